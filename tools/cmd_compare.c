@@ -121,7 +121,7 @@ static int choose_channels(const settings *wanted, pair *both)
 {
     const uint32_t most = both->images[0].channel_count > 3 ? both->images[0].channel_count : 3;
     for (int i = 0; i < 2; i++) both->channels[i] = calloc(most, sizeof(uint32_t));
-    if (both->channels[0] == NULL || both->channels[1] == NULL) return nb_report_failure("compare: memory is out");
+    if (both->channels[0] == NULL || both->channels[1] == NULL) return nb_report_failure("compare: out of memory");
     int missing;
     if (wanted->channel != NULL) {
         if (add_channel(both, wanted->channel, &missing)) return NB_DONE;
@@ -248,7 +248,7 @@ static int write_difference(const pair *both, const settings *wanted, nb_report_
     nebel_image image = {
         .width = both->images[0].width, .height = both->images[0].height, .channel_count = 3, .channel_names = names};
     image.samples = pixels <= SIZE_MAX / (3 * sizeof(float)) ? malloc(pixels * 3 * sizeof(float)) : NULL;
-    if (image.samples == NULL) return nb_report_failure("compare: %s: memory is out", wanted->output);
+    if (image.samples == NULL) return nb_report_failure("compare: %s: out of memory", wanted->output);
     paint(both, wanted, image.samples);
     nb_interrupt_hold();
     const nebel_result result = nebel_write_image(wanted->output, &desc, &image);

@@ -54,7 +54,7 @@ static const char examples[] = "Examples:\n"
 static char *name_picture(const nb_render_call *wanted, uint32_t frame)
 {
     char *const name = wanted->many_frames ? nb_pattern_expand(wanted->output, frame) : strdup(wanted->output);
-    if (name == NULL) (void)nb_report_failure("render: %s: memory is out", wanted->output);
+    if (name == NULL) (void)nb_report_failure("render: %s: out of memory", wanted->output);
     return name;
 }
 
@@ -141,7 +141,7 @@ static int allocate_planes(studio *all)
         good = all->interleaved != NULL;
     }
     if (good) return NB_DONE;
-    return nb_report_failure("render: --size: memory is out for %u x %u pixels; ask for fewer",
+    return nb_report_failure("render: --size: out of memory for %u x %u pixels; ask for fewer",
                              (unsigned)all->wanted->width, (unsigned)all->wanted->height);
 }
 

@@ -87,7 +87,7 @@ static int read_rays(nb_rays *rays)
 {
     enum { PIECE = 1 << 18 };
     char *const piece = malloc(PIECE);
-    if (piece == NULL) return nb_report_failure("standard input: memory is out");
+    if (piece == NULL) return nb_report_failure("standard input: out of memory");
     if (isatty(STDIN_FILENO)) nb_report_message("rays, please: ox oy oz dx dy dz tmax; Ctrl-D ends them");
     int status = NB_DONE;
     for (;;) {
@@ -167,7 +167,7 @@ static nebel_light *trace_all(const nebel_snapshot *fog, const nb_rays *rays, co
     shared.lights =
         rays->count < SIZE_MAX / sizeof(nebel_light) ? malloc((rays->count + 1) * sizeof(nebel_light)) : NULL;
     if (shared.lights == NULL) {
-        (void)nb_report_failure("standard input: memory is out for %zu rays; trace them in parts", rays->count);
+        (void)nb_report_failure("standard input: out of memory for %zu rays; trace them in parts", rays->count);
         return NULL;
     }
     atomic_init(&shared.next_block, 0);
@@ -252,7 +252,7 @@ static int write_lights(const nebel_light *lights, size_t count, const settings 
     static const char header[] = "T_r,T_g,T_b,S_r,S_g,S_b,error\n";
     const size_t step = (size_t)wanted->threads * SHARE;
     page shared = {.precision = wanted->trace.precision, .text = malloc(step * LINE_SIZE)};
-    if (shared.text == NULL) return nb_report_failure("standard output: memory is out");
+    if (shared.text == NULL) return nb_report_failure("standard output: out of memory");
     nb_shortest_prepare();
     int error = nb_output_write(STDOUT_FILENO, header, sizeof header - 1);
     for (size_t first = 0; first < count && error == 0; first += step) {

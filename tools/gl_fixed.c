@@ -408,7 +408,7 @@ static nebel_result say(const work *w, nebel_result result, const char *text)
 
 static nebel_result draw(work *w, const nebel_gl_planes *planes)
 {
-    if (!allocate(w)) return say(w, NEBEL_ERROR_MEMORY, "frame: memory is out; ask for fewer pixels or samples");
+    if (!allocate(w)) return say(w, NEBEL_ERROR_MEMORY, "frame: out of memory; ask for fewer pixels or samples");
     nebel_result result = draw_surfaces(w);
     if (result == NEBEL_OK)
         result = nebel_gl_camera_view(&w->desc->camera, w->width, w->height, &w->fixed->log, &w->view);

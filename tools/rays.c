@@ -37,7 +37,7 @@ static int reserve_entry(nb_rays *rays)
     const size_t most = SIZE_MAX / sizeof *rays->entries;
     const size_t wanted = rays->capacity == 0 ? 1024 : rays->capacity <= most / 2 ? 2 * rays->capacity : 0;
     nb_rays_entry *const grown = wanted > 0 ? realloc(rays->entries, wanted * sizeof *grown) : NULL;
-    if (grown == NULL) return reject(rays, "memory is out after %zu rays; trace them in parts", rays->count);
+    if (grown == NULL) return reject(rays, "out of memory after %zu rays; trace them in parts", rays->count);
     rays->entries = grown;
     rays->capacity = wanted;
     return 1;
@@ -119,7 +119,7 @@ static int keep_partial(nb_rays *rays, const char *data, size_t size)
 {
     if (size > NB_RAYS_LONGEST_LINE - rays->partial_size) return reject_length(rays);
     if (rays->partial == NULL) rays->partial = malloc(NB_RAYS_LONGEST_LINE);
-    if (rays->partial == NULL) return reject(rays, "memory is out");
+    if (rays->partial == NULL) return reject(rays, "out of memory");
     memcpy(rays->partial + rays->partial_size, data, size);
     rays->partial_size += size;
     return 1;

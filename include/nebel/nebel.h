@@ -62,7 +62,7 @@ const char *nebel_version(void);
 #define NEBEL_RESULTS(X)                                                                                               \
     X(OK, 0, "success")                                                                                                \
     X(ERROR_ARGUMENT, -1, "an argument is not what the function takes")                                                \
-    X(ERROR_MEMORY, -2, "memory could not be had")                                                                     \
+    X(ERROR_MEMORY, -2, "out of memory")                                                                               \
     X(ERROR_VALUE, -3, "a value is outside its range")                                                                 \
     X(ERROR_UNBOUNDED, -4, "a ray without end gathers infinite light")                                                 \
     X(ERROR_LIMIT, -5, "a limit is exceeded")                                                                          \

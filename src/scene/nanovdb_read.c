@@ -174,8 +174,9 @@ static nebel_result unzip(reader *in, unsigned char *to, size_t size)
     size_t piece_size;
     uLongf written = (uLongf)size;
     if (!take_piece(in, &piece, &piece_size)) return fail_short(in);
-    if (uncompress(to, &written, piece, (uLong)piece_size) != Z_OK || written != size)
-        return fail(in, NEBEL_ERROR_FORMAT, "its compressed bytes are damaged");
+    const int unzipped = uncompress(to, &written, piece, (uLong)piece_size);
+    if (unzipped == Z_MEM_ERROR) return fail(in, NEBEL_ERROR_MEMORY, "out of memory");
+    if (unzipped != Z_OK || written != size) return fail(in, NEBEL_ERROR_FORMAT, "its compressed bytes are damaged");
     return NEBEL_OK;
 }
 

@@ -352,6 +352,6 @@ nebel_result nebel_change_scene_planets(nebel_scene *scene, const nebel_planet *
         destroy_made(&kept);
     else
         put_made_back(scene, &kept);
-    if (result == NEBEL_ERROR_MEMORY) return nb_fail(&scene->log, result, "memory is out for the scene's planets");
+    if (result == NEBEL_ERROR_MEMORY) return nb_fail(&scene->log, result, "out of memory for the scene's planets");
     return result;
 }

@@ -15,7 +15,7 @@
 
 static nebel_result fail_memory(const nb_draft *draft)
 {
-    draft->log.write(NEBEL_ERROR_MEMORY, "memory is out for the scene", draft->log.user);
+    draft->log.write(NEBEL_ERROR_MEMORY, "out of memory for the scene", draft->log.user);
     return NEBEL_ERROR_MEMORY;
 }
 

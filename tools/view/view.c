@@ -153,7 +153,7 @@ static int open_window(viewer *all, uint32_t width, uint32_t height)
     if (result == NEBEL_OK) result = open_stage(all);
     if (result != NEBEL_OK) return fail(all, result);
     if (nb_panel_open(window->handle, settings->scale > 0 ? settings->scale : window->scale) != 0)
-        return nb_report_failure("view: memory is out");
+        return nb_report_failure("view: out of memory");
     window->has_panel = 1;
     return NB_DONE;
 }
@@ -574,7 +574,7 @@ static int fill_panel(viewer *all)
     nb_panel *const panel = &all->panel;
     const nebel_scene_data *const data = &all->draft.data;
     let_message_fade(all);
-    if (list_origins(all) != 0) return nb_report_failure("view: memory is out");
+    if (list_origins(all) != 0) return nb_report_failure("view: out of memory");
     panel->scene = all->settings->scene;
     panel->driver = all->window.driver;
     panel->data = &all->draft.data;
