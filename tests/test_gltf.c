@@ -508,6 +508,26 @@ static void test_names_are_percent_encoded(void **state)
     assert_broken("\"file\": \"quad.gltf\"", NEBEL_ERROR_FORMAT, "outside the folder");
 }
 
+/* Names in Latin-1 were never allowed, but are read; what Assimp cannot read either is refused with line and column. */
+static void test_json_that_is_none(void **state)
+{
+    (void)state;
+    unsigned char bytes[200];
+    char text[3000];
+    journal kept;
+    nebel_result result;
+    write_picture("t.png");
+    write_bytes("quad.bin", bytes, fill_data(bytes, &integers[0]));
+    describe_data(text, sizeof text, &integers[0], true, ", \"uri\": \"quad.bin\", \"name\": \"\xfc\"");
+    write_gltf("quad.gltf", "", text);
+    nebel_destroy_scene(load("\"file\": \"quad.gltf\"", &result, &kept));
+    assert_int_equal(result, NEBEL_OK);
+    assert_non_null(strstr(kept.last, "is not UTF-8"));
+    describe_data(text, sizeof text, &integers[0], true, ", ");
+    write_gltf("quad.gltf", "", text);
+    assert_broken("\"file\": \"quad.gltf\"", NEBEL_ERROR_FORMAT, "quad.gltf:1:");
+}
+
 /* The second example of KHR_texture_transform: the lower left quarter of the picture, turned. Two more by its formula. */
 static void test_texture_coordinates_are_mapped(void **state)
 {
@@ -554,6 +574,7 @@ int main(void)
         cmocka_unit_test(test_draco),
         cmocka_unit_test(test_unknown_required_extensions_are_named),
         cmocka_unit_test(test_names_are_percent_encoded),
+        cmocka_unit_test(test_json_that_is_none),
         cmocka_unit_test(test_texture_coordinates_are_mapped)
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder_tree);

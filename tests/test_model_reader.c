@@ -314,7 +314,7 @@ static void test_the_reader_is_confined(void **state)
     (void)state;
     static const char *const limits[] = {"Max core file size        0 ", "Max file size             0 ",
                                          "Max processes             0 ", "Max open files            64 ",
-                                         "Max cpu time              4 ", "Max address space         8"};
+                                         "Max cpu time              5 ", "Max address space         8"};
     char line[300] = "";
     if (NB_SANITIZED) skip();
     write_text("endless.smd", "version 1\n\nnodes");

@@ -128,6 +128,8 @@ nebel_result nb_assimp_refuse(const nb_assimp *in, const char *reason)
     if (in->files.refusal != NB_REFUSAL_NONE)
         return nb_model_fail(load, NEBEL_ERROR_FORMAT, "the model \"%s\" cannot be read: it names \"%s\", which %s",
                              file, in->files.refused, nb_model_files_refusal_text(in->files.refusal));
+    if (in->made.fault[0] != '\0')
+        return nb_model_fail(load, NEBEL_ERROR_FORMAT, "the model \"%s\" cannot be read: %s", file, in->made.fault);
     size_t size = strlen(reason);
     while (size > 0 && (reason[size - 1] == '.' || reason[size - 1] == '\n')) size--;
     if (strncmp(reason, unknown, sizeof unknown - 1) != 0)

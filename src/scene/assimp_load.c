@@ -172,9 +172,12 @@ static nebel_result convert_points(nb_assimp *in)
     return nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no vertex", load->source->file);
 }
 
-/* Where reading went on without what a file names. */
+/* Where reading went on without what a file names, or in spite of what is wrong. */
 static void note_refusal(const nb_assimp *in)
 {
+    if (in->made.fault[0] != '\0')
+        nb_model_fail(in->load, NEBEL_OK, "\"%s\" is read as far as it goes: %s", in->load->source->file,
+                      in->made.fault);
     if (in->files.refusal != NB_REFUSAL_NONE)
         nb_model_fail(in->load, NEBEL_OK, "\"%s\" is read without \"%s\", which it names: it %s",
                       in->load->source->file, in->files.refused, nb_model_files_refusal_text(in->files.refusal));

@@ -76,6 +76,7 @@ typedef struct nb_gltf_data {
     nb_bytes text, chunk;
     bool has_chunk;
     bool requires_meshopt;
+    char fault[512]; /* of the text, where it is no good JSON */
     nb_gltf_view *views;
     nb_gltf_accessor *accessors;
     nb_gltf_buffer *buffers;
@@ -86,7 +87,8 @@ typedef struct nb_gltf_data {
     nb_bytes extra; /* what was made of the data */
 } nb_gltf_data;
 
-/* Reads what the text says. `data` has load, files, text and chunk. Errors: FORMAT, MEMORY, UNSUPPORTED. */
+/* Reads what the text says. `data` has load, files, text and chunk. Errors: MEMORY, UNSUPPORTED; FORMAT, which is not
+ * logged but in data->fault where the text is at fault. */
 nebel_result nb_gltf_read_data(nb_gltf_data *data);
 void nb_gltf_release_data(nb_gltf_data *data);
 

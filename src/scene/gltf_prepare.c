@@ -330,6 +330,8 @@ static nebel_result prepare(nb_gltf_data *data, nb_gltf_files *made)
 {
     changes list = {.arena = &data->arena, .allocator = &data->load->allocator};
     nebel_result result = nb_gltf_read_data(data);
+    memcpy(made->fault, data->fault, sizeof made->fault);
+    if (result == NEBEL_ERROR_FORMAT && data->fault[0] != '\0') return NEBEL_OK;
     if (result != NEBEL_OK || !takes_making(data)) return result;
     if (is_glb(data->files->name)) result = read_chunk(data);
     if (result == NEBEL_OK) result = make(data, &list, made);
@@ -366,5 +368,5 @@ nebel_result nb_gltf_prepare(const nb_model_load *load, nb_model_files *files, n
 void nb_gltf_release_files(const nebel_allocator *allocator, nb_gltf_files *made)
 {
     for (int i = 0; i < NB_GLTF_FILE_COUNT; i++) nb_release(allocator, made->files[i].bytes.data);
-    *made = (nb_gltf_files){0};
+    *made = (nb_gltf_files){.fault = ""};
 }

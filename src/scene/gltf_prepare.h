@@ -15,6 +15,7 @@ enum { NB_GLTF_TEXT, NB_GLTF_CHUNK, NB_GLTF_EXTRA, NB_GLTF_FILE_COUNT };
 
 typedef struct nb_gltf_files {
     nb_gltf_file files[NB_GLTF_FILE_COUNT]; /* the text replaces the model; without bytes nothing is replaced */
+    char fault[512]; /* what is wrong with the JSON, which Assimp may take all the same; else "" */
 } nb_gltf_files;
 
 /* Refuses extensions that the file requires and nobody knows. Numbers of vertices that are not floats become floats, and

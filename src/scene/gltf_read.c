@@ -2,6 +2,7 @@
 #include "scene/gltf.h"
 #include "scene/gltf_data.h"
 
+#include <stdio.h>
 #include <string.h>
 
 /* Extensions that are decoded, or that change nothing of what is kept: triangles, base color and its texture. */
@@ -140,13 +141,14 @@ static bool take_buffer(nb_json *json, const nb_json_node *node, nb_gltf_data *d
     return buffer->uri != NULL || fail_memory(json, node);
 }
 
-static bool take_packed(nb_json *json, const nb_json_node *node, nb_gltf_view *view)
+static bool take_packed(nb_json *json, const nb_json_node *node, const nb_gltf_data *data, nb_gltf_view *view)
 {
     static const char *const modes[] = {"ATTRIBUTES", "TRIANGLES", "INDICES"};
     static const char *const filters[] = {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL"};
     const int mode = find_choice(json, node, "mode", modes, 3), filter = find_choice(json, node, "filter", filters, 4);
     if (mode < 0 || filter < 0)
-        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has a mode or a filter that " MESHOPT " does not know");
+        return nb_json_stop(json, nb_gltf_fail(data, "bufferViews", data->view_count - 1,
+                                               "has a mode or a filter that " MESHOPT " does not know"));
     view->is_packed = true;
     view->packed = (nb_meshopt_view){.range = find_range(json, node),
                                      .stride = (uint64_t)find_whole(json, node, "byteStride", 0),
@@ -166,7 +168,7 @@ static bool take_view(nb_json *json, const nb_json_node *node, nb_gltf_data *dat
     view->range = find_range(json, node);
     view->stride = (uint64_t)find_whole(json, node, "byteStride", 0);
     const nb_json_node *packed = find(json, find(json, node, "extensions"), MESHOPT);
-    return packed == NULL || data->load->unpack == NULL || take_packed(json, packed, view);
+    return packed == NULL || data->load->unpack == NULL || take_packed(json, packed, data, view);
 }
 
 static bool take_accessor(nb_json *json, const nb_json_node *node, nb_gltf_data *data)
@@ -252,10 +254,13 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
     return !nb_json_has_key(parent, "meshes") || take_mesh(json, value, data);
 }
 
-static void pass_on(nebel_result result, const char *message, void *user)
+static void keep_fault(nebel_result result, const char *message, void *user)
 {
-    const nb_gltf_data *data = user;
-    nb_model_fail(data->load, result, "the model \"%s\" cannot be read: %s", data->load->source->file, message);
+    nb_gltf_data *data = user;
+    if (result == NEBEL_ERROR_FORMAT)
+        snprintf(data->fault, sizeof data->fault, "%s", message);
+    else
+        nb_model_fail(data->load, result, "the model \"%s\" cannot be read: %s", data->load->source->file, message);
 }
 
 nebel_result nb_gltf_read_data(nb_gltf_data *data)
@@ -265,7 +270,7 @@ nebel_result nb_gltf_read_data(nb_gltf_data *data)
                                .size = data->text.size,
                                .name = data->load->source->file,
                                .allocator = data->load->allocator,
-                               .log = {pass_on, data},
+                               .log = {keep_fault, data},
                                .streamed = streamed,
                                .take = take,
                                .user = data};

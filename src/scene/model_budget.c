@@ -8,7 +8,7 @@ static const uint64_t max_bytes = (uint64_t)1 << 36;
 static const uint64_t base_memory = (uint64_t)768 << 20, memory_per_byte = 64;
 
 /* The slowest reader of Assimp takes 0.1 s for a megabyte. */
-static const unsigned base_seconds = NB_SANITIZED ? 60 : 4, bytes_per_second = NB_SANITIZED ? 1 << 16 : 1 << 21;
+static const unsigned base_seconds = NB_SANITIZED ? 60 : 5, bytes_per_second = NB_SANITIZED ? 1 << 16 : 1 << 21;
 
 /* For other programs that run at the same time, and for slow disks. */
 static const unsigned spare_seconds = NB_SANITIZED ? 60 : 2;
