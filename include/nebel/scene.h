@@ -217,7 +217,8 @@ nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, ne
 nebel_result nebel_parse_scene(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
                                nebel_scene **scene);
 
-/* Loads the models and height fields that the scene names. Idempotent. Not thread safe against readers of the same
+/* Loads the models and height fields that the scene names. Each model is read by nebel-read-model (nebel_scene_desc), which
+ * takes some 5 ms more than reading it here. Idempotent. Not thread safe against readers of the same
  * scene. Errors: FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY; the scene stays usable without models. */
 nebel_result nebel_load_scene_models(nebel_scene *scene);
 
