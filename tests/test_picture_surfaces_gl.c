@@ -227,6 +227,43 @@ static void test_large_triangles(void **state)
     try_ground(1e7, NEBEL_PROJECTION_PANORAMA);
 }
 
+/* ---- a sealed room --------------------------------------------------------------------------- */
+
+/* The sun stands outside; texels of a shadow map are cut off at the edges of the ceiling. */
+static void test_no_light_comes_into_a_sealed_room(void **state)
+{
+    (void)state;
+    static float corners[8][3];
+    static const uint32_t indices[36] = {0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1,
+                                         2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3};
+    for (int i = 0; i < 8; i++) {
+        const float corner[3] = {i & 4 ? 5.f : -5.f, i & 2 ? 4.f : 0.f, i & 1 ? 5.f : -5.f};
+        memcpy(corners[i], corner, sizeof corner);
+    }
+    const nebel_mesh room = {.positions = corners[0],
+                             .indices = indices,
+                             .vertex_count = 8,
+                             .triangle_count = 12,
+                             .base_color = {.5f, .5f, .5f},
+                             .texture = -1};
+    const nebel_scene_data scene = {.mesh_count = 1,
+                                    .meshes = &room,
+                                    .has_sun = 1,
+                                    .sun_direction = {.303046, .808122, .505076},
+                                    .sun_irradiance = {3, 3, 3}};
+    const nebel_camera camera = {.position = {3, 2, 3}, .look_at = {-3, 1, -3}, .up = {0, 1, 0}, .vertical_fov = 80};
+    nb_gl context;
+    picture_pair pair = picture_make(WIDTH, HEIGHT);
+    pass_open(&context, NB_GL_300ES);
+    picture_render(&scene, NULL, &camera, 1, &pair);
+    pass_close(&context);
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+        assert_true(isfinite(pair.gl.depth[i]));
+        assert_true(pair.gl.color[3 * i] < 1e-4f);
+    }
+    picture_free(&pair);
+}
+
 /* ---- random models --------------------------------------------------------------------------- */
 
 typedef struct stage {
@@ -370,6 +407,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_a_crest_is_not_seen_from_behind),
         cmocka_unit_test(test_small_scenes),
         cmocka_unit_test(test_large_triangles),
+        cmocka_unit_test(test_no_light_comes_into_a_sealed_room),
         cmocka_unit_test(test_random_models),
     };
     if (argc > 1 && strcmp(argv[1], "all") == 0) random_scenes = 60;

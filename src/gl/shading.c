@@ -283,8 +283,12 @@ static const char shadow_fragment_text[] =
 /* ---- light ----------------------------------------------------------------------------------- */
 
 /* Each texel of the map is compared with the plane of the surface continued to the texel's centre, so that a surface
- * does not shade itself however it leans; the rest is for neighbours that rise above that plane, and for rounding. A
- * square of two texels smooths the edge. */
+ * does not shade itself however it leans; `rise` is for neighbours that rise above that plane, map_heights.z for rounding. A
+ * square of two texels smooths the edge.
+ *
+ * A texel in which the plane is far above what the sun sees lies beyond the end of the surface, and says nothing of it. Where
+ * there are such texels, or where what rises is most of what is there, the surface may end at another that covers it, as a
+ * wall under a ceiling: then what shades any texel shades the place. */
 static const char shadow_text[] =
     "uniform mat3 scene_light;\n"
     "uniform highp sampler2DArray scene_shadows;\n"
@@ -292,26 +296,27 @@ static const char shadow_text[] =
     "uniform vec4 map_places[NB_CASCADES];\n" /* low corner in light coordinates, texels per metre */
     "uniform vec4 map_ends;\n"                /* distance up to which a map is the finest */
     "uniform vec3 map_heights;\n"             /* of depth 1 and of depth 0; what rounding may amount to */
-    "float shadow_tap(int map, ivec2 texel, float height)\n"
-    "{\n"
-    "    float depth = texelFetch(scene_shadows, ivec3(texel, map), 0).x;\n"
-    "    return depth == 1.0 || mix(map_heights.y, map_heights.x, depth) <= height ? 1.0 : 0.0;\n"
-    "}\n"
     "float shadow_filter(int map, vec2 place, float height, vec2 slope)\n"
     "{\n"
     "    vec2 cell = 1.0 / map_places[map].zw, corner = floor(place), part = place - corner;\n"
-    "    float rise = map_heights.z + max(cell.x, cell.y) * (0.5 + 0.5 * length(slope));\n"
-    "    float sum = 0.0;\n"
+    "    float rise = max(cell.x, cell.y) * (0.5 + 0.5 * length(slope));\n"
+    "    vec2 lit = vec2(0.0);\n"
+    "    float there = 0.0;\n"
     "    for (int y = -1; y <= 1; y++) {\n"
     "        for (int x = -1; x <= 1; x++) {\n"
     "            vec2 way = (vec2(float(x), float(y)) + 0.5 - part) * cell;\n"
-    "            vec2 weight = vec2(x < 0 ? 1.0 - part.x : x > 0 ? part.x : 1.0,\n"
-    "                               y < 0 ? 1.0 - part.y : y > 0 ? part.y : 1.0);\n"
-    "            sum += weight.x * weight.y *\n"
-    "                   shadow_tap(map, ivec2(corner) + ivec2(x, y), height + dot(slope, way) + rise);\n"
+    "            float weight = (x < 0 ? 1.0 - part.x : x > 0 ? part.x : 1.0) * (y < 0 ? 1.0 - part.y : y > 0 ? part.y "
+    ": 1.0);\n"
+    "            float depth = texelFetch(scene_shadows, ivec3(ivec2(corner) + ivec2(x, y), map), 0).x;\n"
+    "            float above = mix(map_heights.y, map_heights.x, depth) - (height + dot(slope, way) + map_heights.z);\n"
+    "            if (depth == 1.0 || above < -8.0 * rise) continue;\n"
+    "            lit += weight * vec2(lessThanEqual(vec2(above), vec2(rise, 0.1 * rise)));\n"
+    "            there += weight;\n"
     "        }\n"
     "    }\n"
-    "    return 0.25 * sum;\n"
+    "    if (!(there > 0.0)) return 1.0;\n"
+    "    if (there < 3.999) return lit.y < 0.999 * there ? 0.0 : 1.0;\n"
+    "    return lit.x > lit.y && lit.y < 0.45 * there ? 0.0 : lit.x / there;\n"
     "}\n"
     "float shadow(vec3 at, vec3 side, float t)\n"
     "{\n"
