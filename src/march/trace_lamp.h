@@ -63,6 +63,12 @@ static nb_real most_fluence(const lamp_pass *pass, nb_wide start, nb_wide end)
     return fluence * REAL(fmax(fmax(intensity[0], intensity[1]), intensity[2]));
 }
 
+/* Radiance of the brightest fog between two places, opaque and with nothing before the lamp. */
+static nb_real most_of_lamp(const lamp_pass *pass, nb_wide start, nb_wide end)
+{
+    return most_fluence(pass, start, end) * pass->scatter;
+}
+
 /* The most irradiance of all lamps anywhere on the rays. */
 static nb_real most_of_lamps(const march *m)
 {
@@ -133,7 +139,7 @@ static nb_real length_past_lamp(const sun_step *s, nb_wide t, int n)
 /* As limit_step, by the most that the lamp brings to the step. */
 static void limit_lamp_step(const lamp_pass *pass, const nb_real before[3], nb_wide end, sun_step *s)
 {
-    const nb_real most = most_fluence(pass, s->start, end) * pass->scatter;
+    const nb_real most = most_of_lamp(pass, s->start, end);
     limit_light(before, (nb_real[3]){most, most, most}, s);
 }
 

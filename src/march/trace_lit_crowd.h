@@ -21,6 +21,10 @@
 /* What a root that begins within a step is off by, more or less. */
 #define EDGE_ERROR NB_F(0.02)
 
+/* By what part of a body's stretch its mean place may be off where its density is taken for linear, and its integral by all
+ * of itself. */
+#define MOMENT_ERROR 0.25
+
 /* Where the ways from a ray to a light may meet a body: nowhere else on the ray; nowhere where first > last. */
 typedef struct lit_shadow {
     nb_wide first, last;
@@ -196,6 +200,8 @@ typedef struct lit_place {
     nb_wide t;
     nb_real depth[3], depth_error[3];
     nb_real behind[3]; /* e^-depth */
+    nb_real way[3];    /* optical depth from there to the light, */
+    nb_real comes[3];  /* through which this comes */
     nb_real seen[3];
     nb_real doubt; /* by what factor that may be off */
 } lit_place;
@@ -228,20 +234,21 @@ static void look_from(const sunlight *sun, const march *m, const crowd_light *li
 {
     nb_wvec3 towards = sun->direction;
     nb_wide reach = NB_WFAR;
-    nb_real arriving = NB_F(1.0), all[3], through[3];
+    nb_real arriving = NB_F(1.0), through[3];
     if (light->pass != NULL) arriving = lamp_arrives(m, light->pass, light->phase, at->t, &towards, &reach);
     const light_depth way = depth_through_shadows(sun, m, at->t, towards, reach);
     at->doubt = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
-        all[c] = at->depth[c] + way.depth[c];
-        const nb_real rounding = (all[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
+        at->way[c] = way.depth[c];
+        const nb_real rounding = (at->depth[c] + way.depth[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
         at->doubt = nb_max(at->doubt, nb_min(at->depth_error[c] + way.error[c], NB_F(1.0)) + rounding);
     }
-    map_channels(sun->snapshot, transmitted, all, through);
+    map_channels(sun->snapshot, transmitted, at->way, through);
     map_channels(sun->snapshot, transmitted, at->depth, at->behind);
     for (int c = 0; c < 3; c++) {
         const double intensity = light->pass != NULL ? light->pass->lamp->intensity[c] : 1;
-        at->seen[c] = through[c] * arriving * REAL(intensity);
+        at->comes[c] = through[c] * arriving * REAL(intensity);
+        at->seen[c] = at->behind[c] * at->comes[c];
     }
 }
 
@@ -250,6 +257,8 @@ static void look_from(const sunlight *sun, const march *m, const crowd_light *li
 /* Half a step: glow times the density's integral, and its moments over places from 0 to 2. */
 typedef struct lit_half {
     nb_real sum[3], first[3], second[3];
+    nb_real doubt
+        [3]; /* by how much the first moment may be off through densities that are not linear, or half the second */
 } lit_half;
 
 /* Of the sun its radiance per metre; of a lamp what scatters. */
@@ -292,7 +301,13 @@ static void add_part(const contact *k, const leaf_span *span, const crowd_light 
     const nb_real value = nb_select(some, along.value, zero), error = nb_select(some, along.error, zero);
     const nb_real scale = nb_rcp_bounded(quarter), most = nb_min(most_depth(&k->medium->body), NB_F(1.0));
     const nb_mask narrow = nb_narrow_mask(span->leave - span->enter < nb_widen(quarter + quarter));
-    nb_real first, second, hidden = zero;
+    const int varies = k->medium->body.density.type != NEBEL_DENSITY_CONSTANT;
+    nb_real first, second, hidden = zero, doubt = zero;
+    if (varies) {
+        const nb_real even = NB_F(0.5) * h * (contact_density(k, enter) + contact_density(k, leave));
+        const nb_real bent = nb_min(nb_abs(value - even) / nb_max(value, NB_TINY), NB_F(1.0));
+        doubt = nb_select(some, bent * h * scale * REAL(MOMENT_ERROR), zero);
+    }
     find_moments_of(k, enter, leave, nb_narrow(enter - from->t) * scale + REAL(place), h * scale, &first, &second);
     for (int c = 0; c < 3; c++) {
         const nb_real glow = glow_in(k, light, c) * value;
@@ -301,6 +316,7 @@ static void add_part(const contact *k, const leaf_span *span, const crowd_light 
         half->sum[c] = half->sum[c] + glow;
         half->first[c] = half->first[c] + glow * nb_select(some, first, zero);
         half->second[c] = half->second[c] + glow * nb_select(some, second, zero);
+        if (varies) half->doubt[c] = half->doubt[c] + glow * doubt;
         hidden = nb_max(hidden, glow * most * from->seen[c]);
     }
     sum->terms = sum->terms + nb_select(some, NB_F(1.0), zero);
@@ -328,7 +344,7 @@ static void add_parts(const march *m, const crowd_light *light, const lit_place 
 static lit_half nothing_scattered(void)
 {
     const nb_real zero = NB_F(0.0);
-    return (lit_half){{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
+    return (lit_half){{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
 }
 
 /* What the parabola through what is seen at three places makes of a half. */
@@ -336,6 +352,13 @@ static nb_real light_of_half(const lit_half *half, int c, nb_real a, nb_real b, 
 {
     const nb_real slope = NB_F(2.0) * b - NB_F(0.5) * (NB_F(3.0) * a + e), bend = NB_F(0.5) * (a + e) - b;
     return a * half->sum[c] + slope * half->first[c] + bend * half->second[c];
+}
+
+/* By how much that may be off through moments. */
+static nb_real doubt_of_half(const lit_half *half, int c, nb_real a, nb_real b, nb_real e)
+{
+    const nb_real slope = NB_F(2.0) * b - NB_F(0.5) * (NB_F(3.0) * a + e), bend = NB_F(0.5) * (a + e) - b;
+    return half->doubt[c] * (nb_abs(slope) + NB_F(2.0) * nb_abs(bend));
 }
 
 /* ---- steps ----------------------------------------------------------------------------------- */
@@ -369,6 +392,25 @@ static nb_real hidden_in_shadows(const sunlight *sun, nb_wide start, nb_wide end
     return nb_min(hidden + nb_sqrt(edges), one);
 }
 
+/* What places do not show between two of them: see unseen_light of trace_lit_rule.h. `most`: what opaque fog makes of 1. */
+static nb_real unseen_between_places(const lit_place at[5], int c, nb_real most)
+{
+    nb_real unseen = NB_F(0.0);
+    for (int i = 0; i < 4; i++) {
+        const int a = i > 0 ? i - 1 : 0, b = i < 3 ? i + 1 : 3;
+        const lit_place *from = &at[i], *to = &at[i + 1];
+        const nb_real falls = at[a].way[c] - at[a + 1].way[c], rises = at[b + 1].way[c] - at[b].way[c];
+        const nb_real least = nb_min(from->way[c], to->way[c]);
+        const nb_real dip = nb_min(nb_max(nb_min(falls, rises), NB_F(0.0)), least);
+        const nb_real change = nb_abs((to->depth[c] - from->depth[c]) + (to->way[c] - from->way[c])) + dip;
+        const nb_real lost = nb_max(from->behind[c] - to->behind[c], NB_F(0.0));
+        nb_real light = most * lost * nb_max(from->comes[c], to->comes[c]) * unseen_share(change);
+        if (nb_any(dip > NB_F(0.0))) light = light * nb_exp(dip);
+        unseen = unseen + light;
+    }
+    return unseen;
+}
+
 static crowd_step try_crowd_step(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *start,
                                  nb_real length, nb_wide end)
 {
@@ -382,7 +424,7 @@ static crowd_step try_crowd_step(const sunlight *sun, const march *m, const crow
         look_from(sun, m, light, &at[i]);
     }
     crowd_step s = {.end = at[4], .error = NB_F(0.0), .rounding = NB_F(0.0), .drop = NB_F(0.0)};
-    nb_real doubt = NB_F(0.0), full = NB_F(0.0);
+    nb_real doubt = NB_F(0.0), full = NB_F(0.0), unseen = NB_F(0.0);
     for (int i = 0; i < 5; i++) doubt = nb_max(doubt, at[i].doubt);
     for (int c = 0; c < 3; c++) {
         const nb_real a = at[0].seen[c], b = at[2].seen[c], e = at[4].seen[c], eighth = NB_F(0.125);
@@ -393,11 +435,14 @@ static crowd_step try_crowd_step(const sunlight *sun, const march *m, const crow
             light_of_half(&half[0], c, a, at[1].seen[c], b) + light_of_half(&half[1], c, b, at[3].seen[c], e);
         s.light[c] = nb_max(light_of_all, NB_F(0.0));
         s.error = nb_max(s.error, first * half[0].sum[c] + last * half[1].sum[c]);
-        s.rounding = nb_max(s.rounding, (half[0].sum[c] + half[1].sum[c]) * most * doubt);
+        const nb_real moments =
+            doubt_of_half(&half[0], c, a, at[1].seen[c], b) + doubt_of_half(&half[1], c, b, at[3].seen[c], e);
+        s.rounding = nb_max(s.rounding, (half[0].sum[c] + half[1].sum[c]) * most * doubt + moments);
         full = nb_max(full, (half[0].sum[c] + half[1].sum[c]) * most);
         s.drop = nb_max(s.drop, at[0].behind[c] - at[4].behind[c]);
+        unseen = nb_max(unseen, unseen_between_places(at, c, light->pass != NULL ? NB_F(1.0) : light->most));
     }
-    s.error = s.error + unresolved + full * hidden_in_shadows(sun, start->t, end, length);
+    s.error = s.error + unseen + unresolved + full * hidden_in_shadows(sun, start->t, end, length);
     return s;
 }
 
@@ -415,6 +460,8 @@ static void select_place(nb_mask mask, lit_place *to, const lit_place *from)
     select_reals(mask, to->depth, from->depth);
     select_reals(mask, to->depth_error, from->depth_error);
     select_reals(mask, to->behind, from->behind);
+    select_reals(mask, to->way, from->way);
+    select_reals(mask, to->comes, from->comes);
     select_reals(mask, to->seen, from->seen);
     to->doubt = nb_select(mask, from->doubt, to->doubt);
 }
@@ -524,8 +571,8 @@ static void walk_through_crowd(const sunlight *sun, const march *m, const crowd_
                                nb_mask lanes, nb_wide first, nb_wide last, gathered *g)
 {
     const nb_real zero = NB_F(0.0);
-    const lit_place origin = {NB_W(0.0),          {zero, zero, zero}, {zero, zero, zero},
-                              {zero, zero, zero}, {zero, zero, zero}, zero};
+    const lit_place origin = {NB_W(0.0),          {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero},
+                              {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
     crowd_walk w = {.last = last, .lanes = nb_wand(nb_widen_mask(lanes), first < last), .left = REAL(MOST_CROWD_STEPS)};
     w.at = place_behind(sun, m, light, &origin, nb_wselect(w.lanes, first, NB_W(0.0)));
     w.whole = nb_max(nb_narrow(last - first), NB_TINY);
@@ -551,7 +598,11 @@ static void gather_light_of_crowd(sunlight *sun, const march *m, const crowd_lig
     const nb_mask lit = find_lit_stretch(m, light->pass != NULL, &first, &last);
     if (!nb_any(lit)) return;
     const nb_wide end = trim_stretch(m, light, first, last, REAL(0.5 * TAIL_SHARE * light->share));
-    const nb_real beyond = most_between(m, light, end, last);
+    const nb_real arriving = light->pass != NULL ? most_fluence(light->pass, end, last) : NB_F(1.0);
+    const nb_real rounding =
+        arriving * light->most * (NB_F(8.0) * NB_EPSILON); /* of the difference of transmittances */
+    const nb_real beyond =
+        most_between(m, light, end, last) + nb_select(nb_narrow_mask(end < last), rounding, NB_F(0.0));
     g->radiance_error = g->radiance_error + nb_select(lit, beyond, NB_F(0.0));
     sun->turn_count = 0;
     if (light->pass != NULL) {

@@ -113,17 +113,14 @@ static nb_real unseen_light(const sun_node at[SUN_NODES], int c, nb_real *steepn
 }
 
 /* Fog that nodes do not show: by how much the rule is off the optical depth of the step, which is exact but for the
- * rounding of `terms` sums, in the brightest place. */
-static nb_real unseen_fog(const sun_node at[SUN_NODES], int c, nb_real terms)
+ * rounding of `terms` sums; with `most` light on it. */
+static nb_real unseen_fog(const sun_node at[SUN_NODES], int c, nb_real terms, nb_real most)
 {
-    nb_real amount = NB_F(0.0), most = NB_F(0.0);
-    for (int n = 0; n < SUN_NODES; n++) {
-        amount = amount + REAL(sun_weights[n]) * at[n].amount[c];
-        most = nb_max(most, at[n].most * (at[n].behind[c] * at[n].through[c]));
-    }
+    nb_real amount = NB_F(0.0);
+    for (int n = 0; n < SUN_NODES; n++) amount = amount + REAL(sun_weights[n]) * at[n].amount[c];
     const nb_real last = at[SUN_NODES - 1].depth[c], rounding = (last + amount) * (NB_F(8.0) + terms) * NB_EPSILON;
     const nb_real off = nb_abs(amount - (last - at[0].depth[c])) - rounding;
-    return most * nb_clamp(off, NB_F(0.0), NB_F(1.0));
+    return most * (at[0].behind[c] * nb_clamp(off, NB_F(0.0), NB_F(1.0)));
 }
 
 /* What the rule makes of a step. */
@@ -134,14 +131,15 @@ typedef struct lit_sum {
     nb_real steepness;       /* see unseen_light */
 } lit_sum;
 
-/* `terms`: how many media there are; `is_gray`: channels have the same depths. */
-static lit_sum sum_nodes_of_step(const sun_node at[SUN_NODES], nb_real terms, int is_gray)
+/* `most`: radiance of the brightest fog anywhere in the step, opaque and with nothing before the light; `terms`: how many
+ * media there are; `is_gray`: channels have the same depths. */
+static lit_sum sum_nodes_of_step(const sun_node at[SUN_NODES], nb_real most, nb_real terms, int is_gray)
 {
     const nb_real zero = NB_F(0.0);
     lit_sum sum = {{zero, zero, zero}, zero, zero, zero, zero};
     nb_real unseen = zero;
     for (int c = 0; c < (is_gray ? 1 : 3); c++)
-        unseen = nb_max(unseen, unseen_light(at, c, &sum.steepness) + unseen_fog(at, c, terms));
+        unseen = nb_max(unseen, unseen_light(at, c, &sum.steepness) + unseen_fog(at, c, terms, most));
     for (int c = 0; c < 3; c++) {
         nb_real light[SUN_NODES], rounding = zero, noise = zero;
         for (int n = 0; n < SUN_NODES; n++) {

@@ -294,6 +294,7 @@ static void fill_node(const sunlight *sun, sun_node *at, const lit_fog *fog, nb_
 
 static light_depth way_to_lamp(sunlight *sun, const march *m, const struct lamp_pass *pass, nb_wide t, nb_wmask lanes);
 static lit_fog lamplit_fog(const march *m, const struct lamp_pass *pass, nb_wide t);
+static nb_real most_of_lamp(const struct lamp_pass *pass, nb_wide start, nb_wide end);
 static nb_real length_past_lamp(const sun_step *s, nb_wide t, int n);
 
 /* What node n of a step stands for; `way` is known at a start that the step knows. */
@@ -353,8 +354,12 @@ static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const
         if (n > 0) s->at_end = way_from(sun, m, s, end, n, lanes);
         at[n] = find_node(sun, m, p, g, s, end, n, &s->at_end);
     }
-    const lit_sum sum = sum_nodes_of_step(at, count_media(m), sun->snapshot->is_gray);
+    const nb_real most = s->lamp != NULL ? most_of_lamp(s->lamp, s->start, end) : at[0].most;
+    const lit_sum sum = sum_nodes_of_step(at, most, count_media(m), sun->snapshot->is_gray);
     take_sum(s, &sum);
+    /* ends are not looked at themselves */
+    s->rounding =
+        s->rounding + largest(s->light) * REAL(STEP_MARGIN) * nb_min(s->steepness, NB_F(1.0) / REAL(STEP_MARGIN));
 }
 
 /* Light is never more than what full light gives: `most` times the loss of transmittance. A better bound than the rule's

@@ -56,9 +56,29 @@ static sun_stretch stretch_between(const march *m, nb_wide start, nb_wide end)
     return s;
 }
 
-static sun_place first_place(sunlight *sun, const march *m, const piece *p, const gathered *g, nb_wmask lanes)
+/* Where the depth to the sun is looked at for an end of a stretch: beside it, as at a body's face itself the way to the
+ * sun may run along it. */
+static nb_wide beside(nb_wide t, nb_wide other)
 {
-    sun_place place = {.t = p->start, .to_sun = depth_to_sun(sun, m, p->start, lanes)};
+    const nb_wide most = WIDE(MOST_MARGIN);
+    return t + nb_wmin(nb_wmax((other - t) * WIDE(STEP_MARGIN), -most), most);
+}
+
+/* At both ends of a stretch, along which it is linear, from the depths beside them. */
+static void extend_to_ends(light_depth *first, light_depth *last, nb_wide start, nb_wide end)
+{
+    const nb_wide margin = beside(start, end) - start, between = (end - start) - NB_W(2.0) * margin;
+    const nb_real share = nb_narrow(margin / nb_wmax(between, NB_WTINY));
+    for (int c = 0; c < 3; c++) {
+        const nb_real more = (last->depth[c] - first->depth[c]) * share;
+        first->depth[c] = nb_max(first->depth[c] - more, NB_F(0.0));
+        last->depth[c] = nb_max(last->depth[c] + more, NB_F(0.0));
+    }
+}
+
+static sun_place first_place(const piece *p, const gathered *g)
+{
+    sun_place place = {.t = p->start};
     for (int c = 0; c < 3; c++) {
         place.depth[c] = g->depth[c];
         place.error[c] = g->depth_error[c];
@@ -66,15 +86,26 @@ static sun_place first_place(sunlight *sun, const march *m, const piece *p, cons
     return place;
 }
 
-static sun_place next_place(sunlight *sun, const march *m, const sun_place *from, const sun_stretch *s, nb_wide t,
-                            nb_wmask lanes)
+static sun_place next_place(const sun_place *from, const sun_stretch *s, nb_wide t)
 {
-    sun_place place = {.t = t, .to_sun = depth_to_sun(sun, m, t, lanes)};
+    sun_place place = {.t = t};
     for (int c = 0; c < 3; c++) {
         place.depth[c] = from->depth[c] + s->depth[c];
         place.error[c] = from->error[c] + s->depth_error[c] + place.depth[c] * NB_EPSILON;
     }
     return place;
+}
+
+/* The depths to the sun from both places. */
+static void look_at_sun(sunlight *sun, const march *m, sun_place *from, sun_place *to, nb_wmask lanes)
+{
+    if (sun->snapshot->way_to_sun == NB_WAY_HEIGHT) {
+        to->to_sun = depth_to_sun(sun, m, to->t, lanes); /* there are no faces: the depth at `from` is known */
+        return;
+    }
+    from->to_sun = depth_to_sun(sun, m, beside(from->t, to->t), lanes);
+    to->to_sun = depth_to_sun(sun, m, beside(to->t, from->t), lanes);
+    extend_to_ends(&from->to_sun, &to->to_sun, from->t, to->t);
 }
 
 /* Adds what is scattered between two places. */
@@ -117,7 +148,8 @@ static void gather_in_closed_form(sunlight *sun, const march *m, const piece *p,
 {
     const nb_wide last = end_of_light(sun, m, p);
     nb_wmask lanes = nb_wand(nb_widen_mask(lit), p->start < last);
-    sun_place from = first_place(sun, m, p, g, lanes);
+    sun_place from = first_place(p, g);
+    if (sun->snapshot->way_to_sun == NB_WAY_HEIGHT) from.to_sun = depth_to_sun(sun, m, from.t, lanes);
     while (nb_wany(lanes)) {
         pass_toggles(&sun->shade, from.t, lanes);
         const nb_wmask dark = nb_wand(lanes, sun->shade.is_dark);
@@ -125,7 +157,8 @@ static void gather_in_closed_form(sunlight *sun, const march *m, const piece *p,
         const nb_wide turn = nb_wmin(next_turn(sun, from.t, bright), nearest_kink(m, from.t, bright));
         const nb_wide end = nb_wselect(lanes, nb_wselect(dark, bright, turn), from.t);
         const sun_stretch between = stretch_between(m, from.t, end);
-        const sun_place to = next_place(sun, m, &from, &between, end, lanes);
+        sun_place to = next_place(&from, &between, end);
+        look_at_sun(sun, m, &from, &to, lanes);
         const nb_mask shines = nb_narrow_mask(nb_wand(lanes, nb_wnot(dark)));
         if (nb_any(shines)) add_closed_step(sun, m, &from, &to, &between, shines, g);
         from = to;

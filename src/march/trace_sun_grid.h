@@ -130,7 +130,7 @@ static sun_step try_grid_step(sunlight *sun, const march *m, const gathered *g, 
     if (nb_any(filled)) {
         sun_node at[SUN_NODES];
         for (int n = 0; n < SUN_NODES; n++) at[n] = grid_node(sun, m, g, w, &nodes, filled, n);
-        sum = sum_nodes_of_step(at, NB_F(1.0), sun->snapshot->is_gray);
+        sum = sum_nodes_of_step(at, at[0].most, NB_F(1.0), sun->snapshot->is_gray);
         for (int c = 0; c < 3; c++) sum.error = nb_max(sum.error, GRID_CAUTION * off_cubic(at, c));
     }
     take_sum(&s, &sum);
