@@ -122,9 +122,16 @@ static bool is_wanted(const char *variable)
 
 static void choose_variables(char *chosen[MAX_VARIABLES + 1])
 {
+    /* In place of the limit of address space, which sanitizers do not bear; what the caller says counts more. */
+    static const char sanitizer[] = "ASAN_OPTIONS=max_allocation_size_mb=1000:hard_rss_limit_mb=2000:detect_leaks=0";
     size_t count = 0;
-    for (char **at = environ; at != NULL && *at != NULL && count < MAX_VARIABLES; at++)
-        if (is_wanted(*at)) chosen[count++] = *at;
+    bool has_options = !NB_SANITIZED;
+    for (char **at = environ; at != NULL && *at != NULL && count + 1 < MAX_VARIABLES; at++)
+        if (is_wanted(*at)) {
+            has_options = has_options || strncmp(*at, sanitizer, strcspn(sanitizer, "=")) == 0;
+            chosen[count++] = *at;
+        }
+    if (!has_options) chosen[count++] = (char *)sanitizer;
     chosen[count] = NULL;
 }
 
