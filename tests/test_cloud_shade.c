@@ -149,6 +149,11 @@ static void test_fog_in_the_shade(void **state)
     }
     print_message("fog has %.3f of the sun or more; %.4f more or less in a ray's neighbour at most\n", least, step);
     assert_true(least < .5 && step < .01);
+    /* There are not pieces enough to be as short as usual: the last one goes to the end. */
+    const nebel_ray level = {{0, 900, 0}, {1, 0, 0}, 2e5};
+    assert_int_equal(nebel_shade_fog(workspace, &level, 0, 1e-3, &shade), NEBEL_OK);
+    assert_int_equal(shade.count, NEBEL_MAX_FOG_SHADES);
+    assert_float_equal(shade.t[shade.count], 2e5, .1);
     assert_int_equal(nebel_shade_fog(NULL, &over, 0, 0, &shade), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_shade_fog(workspace, NULL, 0, 0, &shade), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_shade_fog(workspace, &over, 0, 0, NULL), NEBEL_ERROR_ARGUMENT);

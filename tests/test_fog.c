@@ -1,4 +1,6 @@
 /* Fog that is edited, and memory that fails: after an error everything is as it was. */
+#include "base/base.h"
+
 #include <math.h>
 
 #include "fog_help.h"
@@ -459,6 +461,19 @@ static void test_ambient_light_reaches_later_snapshots_only(void **unused)
     nebel_destroy_fog(fog);
 }
 
+/* A product that wraps around must not become a little memory. */
+static void test_counts_beyond_all_memory_are_refused(void **state)
+{
+    (void)state;
+    fog_memory memory = {0};
+    const nebel_allocator allocator = fog_memory_allocator(&memory);
+    for (size_t size = 2; size <= 1024; size *= 2) {
+        assert_null(nb_allocate(&allocator, SIZE_MAX / size + 2, size));
+        assert_null(nb_allocate_zero(&allocator, SIZE_MAX / size + 2, size));
+    }
+    assert_int_equal(memory.calls, 0);
+}
+
 static void test_empty_descriptions_are_valid(void **unused)
 {
     (void)unused;
@@ -552,6 +567,7 @@ int main(void)
         cmocka_unit_test(test_volumes_give_the_same_bits_in_any_order_and_after_any_history),
         cmocka_unit_test(test_a_snapshot_outlives_changes_and_the_fog),
         cmocka_unit_test(test_ambient_light_reaches_later_snapshots_only),
+        cmocka_unit_test(test_counts_beyond_all_memory_are_refused),
         cmocka_unit_test(test_empty_descriptions_are_valid),
         cmocka_unit_test(test_the_version_is_that_of_the_header),
         cmocka_unit_test(test_every_result_has_a_text_of_its_own),

@@ -101,6 +101,40 @@ static void test_layout(void **state)
     nebel_release_snapshot(snapshot);
 }
 
+/* A block whose x, y and z become y, z and x: faces are packed in the world's axes. */
+static void test_faces_of_a_turned_body(void **state)
+{
+    (void)state;
+    nebel_plane planes[6];
+    for (int i = 0; i < 6; i++) {
+        planes[i] = (nebel_plane){.distance = i + 1};
+        planes[i].normal[i / 2] = i % 2 ? -1 : 1;
+    }
+    const nebel_volume_desc body = {.shape = {.type = NEBEL_SHAPE_CONVEX,
+                                              .planes = planes,
+                                              .plane_count = 6,
+                                              .transform = {.rotation = {.5, .5, .5, .5}, .scale = {1, 1, 1}}},
+                                    .extinction = {1, 1, 1}};
+    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &body, 1);
+    size_t count;
+    nebel_word *words = pack(snapshot, (const double[3]){0, 0, 0}, &count);
+    const float *leaf = words[NB_HEADER_WORDS + NB_MEDIUM_LEAF].v;
+    unsigned found = 0;
+    assert_int_equal((int)leaf[1], 6);
+    for (size_t i = 0; i < 6; i++) {
+        const float *v = words[(size_t)leaf[2] + i].v;
+        for (int k = 0; k < 6; k++) {
+            const int axis = (k / 2 + 1) % 3;
+            const float along = (float)(k % 2 ? -v[axis] : v[axis]),
+                        aside = fabsf(v[0]) + fabsf(v[1]) + fabsf(v[2]) - along;
+            if (along > 0 && aside < 1e-6f * along && fabsf(v[3] - along * (float)(k + 1)) < 1e-6f) found |= 1u << k;
+        }
+    }
+    assert_int_equal(found, 63);
+    free(words);
+    nebel_release_snapshot(snapshot);
+}
+
 static void test_order_and_repetition(void **state)
 {
     (void)state;
@@ -302,6 +336,7 @@ int main(void)
         cmocka_unit_test(test_words_are_numbers),
         cmocka_unit_test(test_extremes),
         cmocka_unit_test(test_layout),
+        cmocka_unit_test(test_faces_of_a_turned_body),
         cmocka_unit_test(test_order_and_repetition),
         cmocka_unit_test(test_bad_input),
         cmocka_unit_test(test_texels),

@@ -28,6 +28,7 @@ typedef struct smoke {
     double tolerance; /* of the CPU; 0: 1e-4 */
     int alone;        /* without the boxes */
     int particles;    /* are drawn as such, not as fog */
+    uint32_t samples; /* of a pixel; 0: 1 */
 } smoke;
 
 static const smoke smokes[] = {
@@ -40,11 +41,14 @@ static const smoke smokes[] = {
          "\"density\":{\"type\":\"radial\",\"power\":2},\"extinction\":[0.5,0.7,0.9],\"source\":[0.9,0.4,0.2]},"
          "{\"shape\":{\"type\":\"cone\",\"from\":[2,0,0],\"to\":[2,3,0],\"radius_from\":1.5,\"radius_to\":0.3},"
          "\"density\":{\"type\":\"soft_edge\",\"distance\":0.4},\"extinction\":1,\"source\":[0.2,0.8,0.3]},"
-         "{\"shape\":{\"type\":\"box\",\"min\":[-2,0,0],\"max\":[0,1,3]},\"operation\":\"exclude\",\"priority\":1}]}"},
+         "{\"shape\":{\"type\":\"box\",\"min\":[-2,0,0],\"max\":[0,1,3]},\"operation\":\"exclude\",\"priority\":1}]}",
+     .samples = 4},
     {.name = "sun, surfaces and their shafts",
      .text = "{\"nebel\":1," CAMERA SUN "\"ambient\":[0.1,0.15,0.2],\"fog\":[{" BOX
              "\"extinction\":0.2,\"albedo\":[0.9,0.8,0.7],\"phase\":{\"type\":\"henyey_greenstein\",\"g\":0.5}},"
-             "{" BALL "\"extinction\":0.6,\"albedo\":0.9}]}"},
+             "{" BALL "\"extinction\":0.6,\"albedo\":0.9},"
+             "{\"shape\":{\"type\":\"box\",\"min\":[-2.5,1,0],\"max\":[1,3,2]},\"operation\":\"exclude\",\"priority\":"
+             "1}]}"},
     {.name = "all around",
      .text = "{\"nebel\":1,"
              "\"camera\":{\"position\":[3,1,2],\"look_at\":[0,1,0]}," SUN "\"fog\":[{" BOX
@@ -151,8 +155,11 @@ static void render_cpu(const nebel_scene_data *data, nebel_snapshot *fog, const 
                        picture_pair *pair)
 {
     nebel_renderer *renderer = NULL;
-    const nebel_frame_desc frame = {
-        .camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = 1, .tolerance = pair->tolerance};
+    const nebel_frame_desc frame = {.camera = *camera,
+                                    .width = WIDTH,
+                                    .height = HEIGHT,
+                                    .samples = s->samples > 0 ? s->samples : 1,
+                                    .tolerance = pair->tolerance};
     assert_int_equal(nebel_create_renderer(data, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, s->method, &(nebel_method_desc){.factor = &factor}), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &pair->cpu), NEBEL_OK);
@@ -168,7 +175,7 @@ static void render_gl(const nebel_scene *scene, const nebel_scene_data *data, ne
     const nebel_gl_frame_desc frame = {.camera = *camera,
                                        .width = WIDTH,
                                        .height = HEIGHT,
-                                       .samples = 1,
+                                       .samples = s->samples > 0 ? s->samples : 1,
                                        .method = s->gl_method,
                                        .factor = &factor,
                                        .clouds_by_processor = 1};

@@ -276,6 +276,29 @@ static void test_tight_rows(void **state)
     nebel_release_snapshot(snapshot);
 }
 
+/* A bar from corner to corner, rising and falling: each row of tiles lists it where it passes, not from one of its ends. */
+static void test_tight_diagonals(void **state)
+{
+    (void)state;
+    const nebel_volume_desc bar = {
+        .shape = {.type = NEBEL_SHAPE_BOX, .min = {-100, -.05, -11}, .max = {100, .05, -10.9}},
+        .extinction = {.1, .1, .1}};
+    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &bar, 1);
+    for (int side = -1; side <= 1; side += 2) {
+        nebel_view view = straight_view(1280, 720);
+        view.eye_from_world[0] = view.eye_from_world[5] = .8;
+        view.eye_from_world[1] = .6 * side;
+        view.eye_from_world[4] = -.6 * side;
+        size_t count;
+        uint32_t *entries = tile(snapshot, &view, 16, &count);
+        const size_t listed = count - 2 * 80 * 45;
+        print_message("a bar from corner to corner: %zu of 3600 tiles\n", listed);
+        assert_in_range(listed, 60, 240);
+        free(entries);
+    }
+    nebel_release_snapshot(snapshot);
+}
+
 static void test_endless_everywhere_behind_nowhere(void **state)
 {
     (void)state;
@@ -359,9 +382,13 @@ static void test_bad_input(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_never_misses), cmocka_unit_test(test_tight),
-        cmocka_unit_test(test_tight_rows),   cmocka_unit_test(test_endless_everywhere_behind_nowhere),
-        cmocka_unit_test(test_ten_thousand), cmocka_unit_test(test_bad_input),
+        cmocka_unit_test(test_never_misses),
+        cmocka_unit_test(test_tight),
+        cmocka_unit_test(test_tight_rows),
+        cmocka_unit_test(test_tight_diagonals),
+        cmocka_unit_test(test_endless_everywhere_behind_nowhere),
+        cmocka_unit_test(test_ten_thousand),
+        cmocka_unit_test(test_bad_input),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
