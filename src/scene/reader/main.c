@@ -31,7 +31,7 @@ typedef struct answer {
 /* ---- writing --------------------------------------------------------------------------------- */
 
 /* Where nobody listens any more there is nothing left to do. */
-static void put(const void *bytes, size_t size)
+static void write_all(const void *bytes, size_t size)
 {
     const char *at = bytes;
     while (size > 0) {
@@ -40,6 +40,27 @@ static void put(const void *bytes, size_t size)
         if (count <= 0) _exit(EXIT_FAILURE);
         at += count;
         size -= (size_t)count;
+    }
+}
+
+/* What waits to be written: each write may wake the program that reads. */
+static char waiting[1 << 16];
+static size_t waiting_size;
+
+static void flush(void)
+{
+    write_all(waiting, waiting_size);
+    waiting_size = 0;
+}
+
+static void put(const void *bytes, size_t size)
+{
+    if (size > sizeof waiting - waiting_size) flush();
+    if (size > sizeof waiting) {
+        write_all(bytes, size);
+    } else if (size > 0) {
+        memcpy(waiting + waiting_size, bytes, size);
+        waiting_size += size;
     }
 }
 
@@ -112,6 +133,7 @@ static void note_file(void *user, const char *path, const struct stat *status)
     if (size >= NB_WIRE_MAX_PATH) return;
     put_frame(NB_WIRE_FILE, 0, size);
     put(path, size);
+    flush(); /* more time is given from now on */
 }
 
 /* ---- what Assimp says ------------------------------------------------------------------------ */
@@ -243,6 +265,7 @@ int main(int count, char **words)
     }
     if (!nb_confine_to_parent(strtol(words[2], NULL, 10))) return EXIT_FAILURE;
     put_frame(NB_WIRE_HELLO, NB_WIRE_VERSION, 0);
+    flush();
     if (!get_request(&in)) return EXIT_FAILURE;
     nb_confine_resources();
     nb_confine_budget(&out.budget);
@@ -251,5 +274,6 @@ int main(int count, char **words)
     const nebel_result result = read_model(&in, &out);
     put_frame(NB_WIRE_END, (int32_t)result, sizeof out.counts);
     put(&out.counts, sizeof out.counts);
+    flush();
     _exit(EXIT_SUCCESS); /* the system gives back faster what is left */
 }
