@@ -21,7 +21,7 @@ FEATURE_COUNT = 25
 
 # One scene for each kind of walk: mixed volumes, lamps, voxels, light scattered more than once, sunlit height fog, soft edges.
 PICTURES = ("forty-volumes", "street-lamps", "smoke", "cloud", "sun-shafts", "soft-edges")
-SIZE = ("32", "18")
+SIZE = ("20", "11")
 
 ONE_CALL = """
 uniform vec4 place;
