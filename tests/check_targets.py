@@ -62,8 +62,8 @@ class InterruptTest(check_cli.PictureCase):
         noise = {"type": "noise", "size": [200, 200, 200], "cells": [60, 60, 60], "octaves": 16, "gain": 0.9}
         self.scene = self.write_scene("slow.json", [{**FOG, "density": noise}] * 8)
         for words in (["render", self.scene, "-o", "a.png"], ["trace", self.scene], ["info", self.scene]):
-            process = subprocess.Popen([NEBEL, *map(str, words)], cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                                       stderr=subprocess.DEVNULL, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+            process = subprocess.Popen([NEBEL, *map(str, words), "--memory", "65536"], cwd=self.folder,
+                                       stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
             time.sleep(0.3)
             self.assertIsNone(process.poll(), "the scene was prepared too soon to be interrupted")
             process.send_signal(signal.SIGINT)

@@ -141,6 +141,53 @@ static void test_groups_have_a_depth(void **state)
     }
 }
 
+/* ---- all of a scene ------------------------------------------------------------------------------ */
+
+#define BOX "\"shape\": {\"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1]}"
+#define NOISE(size, octaves)                                                                                           \
+    "{" BOX ", \"extinction\": 1, \"density\": {\"type\": \"noise\", \"size\": [" size "], \"octaves\": " octaves      \
+    ", \"cells\": [2, 2, 2]}}"
+#define SWARM(count) "{" BOX ", \"count\": " count ", \"absorption\": 1}"
+
+/* Each of these is within the limits of its own, and none of the work is done. */
+static void test_what_is_too_much_in_all(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text;
+        uint64_t memory;
+        const char *wanted;
+    } cases[] = {
+        {FILE_IN("1", "\"fog\": [" NOISE("200, 200, 200", "16") ", " NOISE("200, 200, 200", "16") "]"), 0,
+         "fog[1].density: brings the scene to about 69 s of preparation; 64 s is the most with 4096 MB"},
+        {FILE_IN("1", "\"fog\": [" NOISE("10, 10, 10", "1") ", " NOISE("100, 100, 100", "4") "]"), (uint64_t)64 << 20,
+         "fog[1].density: brings the scene to about 1 s of preparation; 1 s is the most with 64 MB"},
+        {FILE_IN("1", "\"fog\": [], \"nebula\": [" SWARM("20000") ", " SWARM("20000") "]"), (uint64_t)64 << 20,
+         "nebula[1]: brings the scene to 114 MB of memory; 64 MB is the most"},
+        {FILE_IN("1", "\"fog\": [], \"multiple_scattering\": {\"model\": \"diffusion\", \"cells\": 16777216}"),
+         (uint64_t)256 << 20, "multiple_scattering: brings the scene to 1024 MB of memory; 256 MB is the most"},
+        {FILE_IN("1", "\"fog\": [], \"planet\": {\"model\": \"physical\", \"quality\": \"precise\"}"),
+         (uint64_t)64 << 20, "planet: brings the scene to about 2 s of preparation; 1 s is the most with 64 MB"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        journal kept = {0};
+        nebel_scene *scene = NULL;
+        const nebel_scene_desc desc = {.log = {remember, &kept}, .memory = cases[i].memory};
+        assert_int_equal(nebel_parse_scene(cases[i].text, strlen(cases[i].text), "a", &desc, &scene), LIMIT);
+        if (kept.count != 1 || strstr(kept.last, cases[i].wanted) == NULL) fail_msg("%s", kept.last);
+    }
+}
+
+static void test_a_larger_limit(void **state)
+{
+    (void)state;
+    static const char text[] = FILE_IN("1", "\"fog\": [], \"nebula\": [" SWARM("20000") ", " SWARM("20000") "]");
+    nebel_scene *scene = NULL;
+    const nebel_scene_desc desc = {.memory = (uint64_t)256 << 20};
+    assert_int_equal(nebel_parse_scene(text, strlen(text), "a", &desc, &scene), NEBEL_OK);
+    nebel_destroy_scene(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -149,6 +196,8 @@ int main(void)
         cmocka_unit_test(test_what_is_too_much_in_a_key),
         cmocka_unit_test(test_what_settings_of_engines_make),
         cmocka_unit_test(test_groups_have_a_depth),
+        cmocka_unit_test(test_what_is_too_much_in_all),
+        cmocka_unit_test(test_a_larger_limit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,6 +17,10 @@
 
 #include <stdio.h>
 
+enum { MEMORY };
+
+static const nb_option options[] = {[MEMORY] = NB_MEMORY_OPTION};
+
 static const char about[] = "Without SCENE: version, compiler, libraries, processor, instruction sets, OpenGL\n"
                             "and threads, as bug reports need them.\n"
                             "\n"
@@ -116,14 +120,18 @@ static int run(int count, char **words)
     nb_arguments arguments;
     const int status = nb_options_parse(&nb_commands_info, count, words, &arguments);
     if (status >= 0) return status;
+    nb_reader_limit(nb_options_memory(&arguments, MEMORY));
+    if (arguments.misused) return nb_report_misuse("info", "info: nothing was done");
     return arguments.operand_count == 0 ? print_program() : nb_info_print_scene(arguments.operands[0]);
 }
 
 const nb_command nb_commands_info = {
     .name = "info",
     .summary = "what this program is, or what is in a scene",
-    .synopsis = "[SCENE]",
+    .synopsis = "[SCENE] [options]",
     .about = about,
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
     .operands = "one scene file or nothing",
     .most_operands = 1,
     .examples = examples,

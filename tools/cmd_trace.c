@@ -8,6 +8,7 @@
 #include "load.h"
 #include "output.h"
 #include "rays.h"
+#include "reader.h"
 #include "report.h"
 #include "shortest.h"
 #include "workers.h"
@@ -21,7 +22,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { PRECISION, ISA, TOLERANCE, FRAME, THREADS };
+enum { PRECISION, ISA, TOLERANCE, FRAME, THREADS, MEMORY };
 
 static const nb_option options[] = {
     [PRECISION] = {"precision", 'p', "NAME", "double: the reference (default).\nfloat: 32 bit, several rays at once."},
@@ -34,6 +35,7 @@ static const nb_option options[] = {
                    "Default: 0.002."},
     [FRAME] = {"frame", 0, "N", "The frame of moving fog, 0 to 1000000. Default: 0."},
     [THREADS] = {"threads", 't', "N", "Threads, 0 for all (default). Any number gives the\nsame bytes."},
+    [MEMORY] = NB_MEMORY_OPTION,
 };
 
 static const char about[] = "Reads rays from standard input and writes to standard output what the fog of\n"
@@ -272,6 +274,7 @@ static int read_settings(nb_arguments *arguments, settings *wanted)
     static const char *const precisions[] = {"double", "float", NULL};
     const uint32_t threads = nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
     wanted->threads = threads > 0 ? (int)threads : nb_workers_available();
+    nb_reader_limit(nb_options_memory(arguments, MEMORY));
     wanted->frame = nb_options_whole(arguments, FRAME, 0, LAST_FRAME, 0);
     wanted->trace.tolerance = nb_options_number(arguments, TOLERANCE, 0, 1, NEBEL_DEFAULT_TOLERANCE);
     if (wanted->trace.tolerance == 0) nb_options_reject(arguments, TOLERANCE, "is not more than 0");

@@ -1,6 +1,7 @@
 /* nebel view: a window on a scene. */
 #include "commands.h"
 #include "decimal.h"
+#include "reader.h"
 #include "report.h"
 #include "target.h"
 
@@ -12,7 +13,7 @@
 
 #include <string.h>
 
-enum { SIZE, EXPOSURE, FRAME, UI_SCALE, SCREENSHOT, CONTROLS };
+enum { SIZE, EXPOSURE, FRAME, UI_SCALE, SCREENSHOT, CONTROLS, MEMORY };
 
 static const nb_option options[] = {
     [SIZE] = {"size", 's', "WxH", "Of the picture in the window, each side 64 to 8192.\nDefault: 1280x720."},
@@ -25,6 +26,7 @@ static const nb_option options[] = {
         {"controls", 0, "FILE",
          "Keeps a list of the controls in FILE, a line\n\"x y width height name\" for each: for programs that\n"
          "press them."},
+    [MEMORY] = NB_MEMORY_OPTION,
 };
 
 static const char about[] = "Shows SCENE (JSON) in a window, drawn by OpenGL 3.3: turn it, fly through it,\n"
@@ -62,6 +64,7 @@ static int view(nb_arguments *arguments)
     wanted.exposure = nb_options_number(arguments, EXPOSURE, -20, 20, 0);
     wanted.frame = nb_options_number(arguments, FRAME, 0, 1000000, 0);
     wanted.scale = nb_options_number(arguments, UI_SCALE, 0.5, 4, 0);
+    nb_reader_limit(nb_options_memory(arguments, MEMORY));
     wanted.screenshot = arguments->values[SCREENSHOT];
     wanted.controls = arguments->values[CONTROLS];
     if (wanted.screenshot != NULL && nebel_find_image_format(wanted.screenshot) == NEBEL_IMAGE_NONE)

@@ -35,8 +35,10 @@ static int finish(const char *path, nebel_result done, nb_report_listener *liste
 int nb_load_file(const char *path, int with_models, nb_report_listener *listener, nb_load_result *result)
 {
     *result = (nb_load_result){0};
-    const nebel_scene_desc desc = {
-        .log = nb_report_log(listener), .run = nebel_run_parts, .model_reader = nb_reader_path()};
+    const nebel_scene_desc desc = {.log = nb_report_log(listener),
+                                   .run = nebel_run_parts,
+                                   .model_reader = nb_reader_path(),
+                                   .memory = nb_reader_memory()};
     nebel_result done = nebel_load_scene(path, &desc, &result->scene);
     if (done == NEBEL_OK && with_models) done = nebel_load_scene_models(result->scene);
     return finish(path, done, listener, result);

@@ -222,6 +222,11 @@ uint32_t nb_options_whole(nb_arguments *arguments, int option, uint32_t low, uin
     return fallback;
 }
 
+uint64_t nb_options_memory(nb_arguments *arguments, int option)
+{
+    return (uint64_t)nb_options_whole(arguments, option, 64, 1048576, 4096) << 20;
+}
+
 int nb_options_choice(nb_arguments *arguments, int option, const char *const *names, int fallback)
 {
     const char *const text = arguments->values[option];

@@ -49,6 +49,15 @@ void nb_options_print_help(const nb_command *command);
 double nb_options_number(nb_arguments *arguments, int option, double low, double high, double fallback);
 uint32_t nb_options_whole(nb_arguments *arguments, int option, uint32_t low, uint32_t high, uint32_t fallback);
 
+/* --memory of the commands that read scenes. */
+#define NB_MEMORY_OPTION                                                                                               \
+    {                                                                                                                  \
+        "memory", 0, "MB",                                                                                             \
+            "The most that the scene may take, its models aside,\n64 to 1048576; it may take a second of\n"            \
+            "preparation for each 64. Default: 4096."                                                                  \
+    }
+uint64_t nb_options_memory(nb_arguments *arguments, int option); /* bytes */
+
 /* The position of the value in `names`, which ends with NULL. */
 int nb_options_choice(nb_arguments *arguments, int option, const char *const *names, int fallback);
 

@@ -7,6 +7,18 @@
 
 enum { PATH_SIZE = 4096 };
 
+static uint64_t most_memory;
+
+void nb_reader_limit(uint64_t bytes)
+{
+    most_memory = bytes;
+}
+
+uint64_t nb_reader_memory(void)
+{
+    return most_memory;
+}
+
 const char *nb_reader_path(void)
 {
     static const char name[] = "nebel-read-model";

@@ -5,6 +5,7 @@
 #include "decimal.h"
 #include "isa.h"
 #include "pattern.h"
+#include "reader.h"
 #include "report.h"
 #include "workers.h"
 
@@ -30,6 +31,7 @@ enum {
     DEVICE,
     ISA,
     THREADS,
+    MEMORY,
     BOUNCES,
     SEED,
     QUIET,
@@ -82,6 +84,7 @@ const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
     [ISA] = {"isa", 0, "NAME",
              "Instruction set: scalar, sse2, avx2, avx512 or neon.\nDefault: the best of this processor."},
     [THREADS] = {"threads", 't', "N", "Threads, 0 for all (default). Any number gives the\nsame picture."},
+    [MEMORY] = NB_MEMORY_OPTION,
     [BOUNCES] = {"bounces", 0, "N",
                  "With --method reference: how often light is\nscattered or reflected at most, 1 to 10000. 1 is what\n"
                  "exact shows. Default: as often as it happens."},
@@ -272,6 +275,7 @@ int nb_render_call_read(nb_arguments *arguments, nb_render_call *wanted)
     wanted->tolerance = nb_options_number(arguments, TOLERANCE, 0, 1, NEBEL_DEFAULT_TOLERANCE);
     if (wanted->tolerance == 0) nb_options_reject(arguments, TOLERANCE, "is not more than 0");
     wanted->renderer.threads = (int)nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
+    nb_reader_limit(nb_options_memory(arguments, MEMORY));
     wanted->renderer.isa = nb_isa_choose(arguments, ISA);
     read_size(arguments, wanted);
     read_frames(arguments, wanted);

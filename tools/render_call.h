@@ -29,7 +29,7 @@ typedef struct nb_render_call {
     nebel_renderer_desc renderer;
 } nb_render_call;
 
-enum { NB_RENDER_OPTIONS = 21 };
+enum { NB_RENDER_OPTIONS = 22 };
 
 extern const nb_option nb_render_options[NB_RENDER_OPTIONS];
 

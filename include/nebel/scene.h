@@ -206,7 +206,14 @@ typedef struct nebel_scene_desc {
      * file costs an error, not the process. */
     const char *model_reader; /* its path; NULL: bin/nebel-read-model of the prefix that nebel was configured for */
     int models_in_process;    /* nonzero: models are read in this process, without limits; for trusted files alone */
+
+    /* The most bytes that the scene may take for voxels, noise, maps, particles, fog and planets, its models aside; 0:
+     * NEBEL_DEFAULT_SCENE_MEMORY. For each 64 MB it may take about a second of preparation. What exceeds either is LIMIT before
+     * the work is begun. */
+    uint64_t memory;
 } nebel_scene_desc;
+
+#define NEBEL_DEFAULT_SCENE_MEMORY ((uint64_t)4 << 30)
 
 /* Reads and checks a scene file. Models named in it are not loaded yet. "-" is a file name like any other.
  * On an error *scene is NULL. Errors: ARGUMENT, FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY. */

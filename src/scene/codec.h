@@ -14,6 +14,7 @@ typedef struct nb_codec {
     nebel_log log;
     const char *name;
     uint64_t most_pixels; /* 0: NB_MAX_PIXELS */
+    uint64_t room;        /* bytes that samples or voxels may take; 0: any */
 } nb_codec;
 
 /* Larger pictures are refused before memory is asked for: pixels, and samples of all channels. */
@@ -61,6 +62,8 @@ nebel_result nb_image_check(const nb_codec *codec, const nebel_image *image);
 /* The index of a channel, or -1. */
 int nb_image_channel(const nebel_image *image, const char *name);
 
+/* Errors: LIMIT. */
+nebel_result nb_codec_check_room(const nb_codec *codec, uint64_t bytes);
 nebel_result nb_codec_check_size(const nb_codec *codec, uint64_t width, uint64_t height, uint64_t channel_count);
 
 #endif

@@ -17,6 +17,14 @@ nebel_result nb_codec_check_size(const nb_codec *codec, uint64_t width, uint64_t
         (int)log2((double)most), NB_MAX_CHANNELS);
 }
 
+nebel_result nb_codec_check_room(const nb_codec *codec, uint64_t bytes)
+{
+    if (codec->room == 0 || bytes <= codec->room) return NEBEL_OK;
+    return nb_fail(&codec->log, NEBEL_ERROR_LIMIT,
+                   "%s: takes %.0f MB; %.0f MB are left of what the scene may take (nebel: --memory)", codec->name,
+                   (double)bytes / 1048576, floor((double)codec->room / 1048576));
+}
+
 /* Pointers and names share one block. */
 static const char *const *copy_names(const nebel_allocator *allocator, size_t count, const char *const *names)
 {
@@ -37,7 +45,8 @@ nebel_result nb_image_allocate(const nb_codec *codec, uint64_t width, uint64_t h
                                const char *const *names, nebel_image *image)
 {
     *image = (nebel_image){0};
-    const nebel_result result = nb_codec_check_size(codec, width, height, channel_count);
+    nebel_result result = nb_codec_check_size(codec, width, height, channel_count);
+    if (result == NEBEL_OK) result = nb_codec_check_room(codec, width * height * channel_count * sizeof(float));
     if (result != NEBEL_OK) return result;
     image->width = (uint32_t)width;
     image->height = (uint32_t)height;

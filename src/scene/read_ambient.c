@@ -62,11 +62,12 @@ static nebel_result make_map(const nb_codec *codec, const nebel_image *image, ne
 }
 
 /* Larger pictures are refused before memory is asked for. */
-static nebel_result load_map(const nebel_allocator *allocator, const nebel_log *log, const char *file,
-                             nebel_environment_map **map)
+static nebel_result load_map(const nebel_scene *scene, const nebel_log *log, const char *file,
+                             nebel_environment_map **map, double *bytes)
 {
-    const nb_codec codec = {.allocator = *allocator,
+    const nb_codec codec = {.allocator = scene->allocator,
                             .log = *log,
+                            .room = nb_scene_room(scene),
                             .name = file,
                             .most_pixels = (uint64_t)NEBEL_MAX_ENVIRONMENT_WIDTH * NEBEL_MAX_ENVIRONMENT_WIDTH / 2};
     nebel_image image;
@@ -74,7 +75,8 @@ static nebel_result load_map(const nebel_allocator *allocator, const nebel_log *
     if (result != NEBEL_OK) return result;
     result = keep_colors(&codec, &image);
     if (result == NEBEL_OK) result = make_map(&codec, &image, map);
-    nb_image_release(allocator, &image);
+    *bytes = (double)image.width * image.height * (double)sizeof(float[3]);
+    nb_image_release(&scene->allocator, &image);
     return result;
 }
 
@@ -99,9 +101,11 @@ static bool read_file(nb_scene_reader *in, const nb_json_node *node, nebel_envir
     if (file == NULL || !nb_scene_keep_file(scene, file))
         return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
     scene->data.environment_file = file;
-    const nebel_result result = load_map(&scene->allocator, &log, file, &scene->environment_map);
+    double bytes = 0;
+    const nebel_result result = load_map(scene, &log, file, &scene->environment_map, &bytes);
     environment->map = scene->environment_map;
-    return result == NEBEL_OK || nb_json_fail(in->json, result, node, "%s", note.text);
+    if (result != NEBEL_OK) return nb_json_fail(in->json, result, node, "%s", note.text);
+    return nb_scene_charge(in, node, bytes, 0);
 }
 
 static bool read_map(nb_scene_reader *in, const nb_json_node *node, nebel_environment *environment)

@@ -99,7 +99,8 @@ bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *
     nb_json *json = in->json;
     nebel_grid_file file = {.filter = NEBEL_FILTER_LINEAR};
     nb_note note = {""};
-    const nebel_scene_desc desc = {.allocator = in->scene->allocator, .log = nb_note_log(&note)};
+    const nebel_scene_desc desc = {
+        .allocator = in->scene->allocator, .log = nb_note_log(&note), .memory = nb_scene_room(in->scene)};
     if (!names_file(json, node) || !nb_value_members(json, node, &grid_keys[kind_of(json, node)], found) ||
         !read_file(in, found, &file))
         return false;
@@ -107,7 +108,8 @@ bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *
     if (file.name == NULL || !nb_scene_keep_file(in->scene, file.file))
         return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     *density = (nebel_density){.type = NEBEL_DENSITY_GRID};
-    const nebel_result result = nb_voxels_load(&file, &desc, &in->space, &density->grid);
+    uint64_t bytes = 0;
+    const nebel_result result = nb_voxels_load(&file, &desc, &in->space, &density->grid, &bytes);
     if (result != NEBEL_OK) return nb_json_fail(json, result, found[FILE_KEY], "%s", note.text);
-    return nb_scene_keep_grid(in, node, density->grid);
+    return nb_scene_keep_grid(in, node, density->grid) && nb_scene_charge(in, node, (double)bytes, 0);
 }

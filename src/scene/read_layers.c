@@ -79,14 +79,16 @@ bool nb_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, ne
     const char *file = nb_path_join(&scene->arena, scene->folder, path);
     if (file == NULL || !nb_scene_keep_file(scene, file))
         return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
-    const nb_codec codec = {.allocator = scene->allocator, .log = nb_note_log(&note), .name = file};
+    const nb_codec codec = {
+        .allocator = scene->allocator, .log = nb_note_log(&note), .name = file, .room = nb_scene_room(scene)};
     nebel_image *image = &scene->maps[scene->map_count];
     nebel_result result = nb_image_read(&codec, image);
     if (result == NEBEL_OK) {
         scene->map_count++;
         result = set_map(&codec, image, channels, map);
     }
-    return result == NEBEL_OK || nb_json_fail(in->json, result, node, "%s", note.text);
+    if (result != NEBEL_OK) return nb_json_fail(in->json, result, node, "%s", note.text);
+    return nb_scene_charge(in, node, (double)map->width * (double)map->height * channels * (double)sizeof(float), 0);
 }
 
 bool nb_read_seed(nb_scene_reader *in, const nb_json_node *node, uint32_t *seed)

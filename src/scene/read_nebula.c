@@ -173,6 +173,8 @@ static bool finish_nebula(nb_scene_reader *in, const nb_json_node *node, const n
 {
     nb_space_convert_nebula(&in->space, nebula);
     return try_nebula(in, shape != NULL ? shape : node, nebula) && check_total(in, node, nebula) &&
+           nb_scene_charge(in, node, (double)nebula->count * NB_PARTICLE_BYTES,
+                           (double)nebula->count * NB_PARTICLE_SECONDS) &&
            keep_nebula(in, node, nebula, place, name);
 }
 

@@ -72,6 +72,8 @@ bool nb_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_density 
     nb_note note = {""};
     nebel_scene_noise noise = {.desc = {.allocator = in->scene->allocator, .log = nb_note_log(&note)}};
     if (!nb_read_noise_numbers(json, node, &noise)) return false;
+    /* That of the scene's own file has been counted. */
+    if (in->node != NULL && !nb_scene_charge_noise(in, node)) return false;
     noise.desc.name = name_noise(in, node, &noise);
     if (noise.desc.name == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     nb_space_convert_noise(&in->space, &noise);

@@ -188,6 +188,14 @@ static bool try_planet(nb_scene_reader *in, const nb_json_node *node, bool has_a
     return nb_value_fail_within(in->json, node, message, is_of_preset ? advice : "");
 }
 
+static bool charge(nb_scene_reader *in, const nb_json_node *node, const nebel_planet *planet)
+{
+    const bool is_precise = planet->air.quality == NEBEL_AIR_PRECISE, has_clouds = planet->cloud_layer_count > 0;
+    return nb_scene_charge(in, node, NB_PLANET_BYTES + (has_clouds ? NB_CLOUDS_BYTES : 0),
+                           (is_precise ? NB_PRECISE_PLANET_SECONDS : NB_PLANET_SECONDS) +
+                               (has_clouds ? NB_CLOUDS_SECONDS : 0));
+}
+
 static bool read_physical(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
 {
     static const char *const quality_names[] = {"fast", "precise"};
@@ -200,7 +208,8 @@ static bool read_physical(nb_scene_reader *in, const nb_json_node *node, nebel_p
     const int quality = found[QUALITY] != NULL ? nb_value_choice(json, found[QUALITY], quality_names, 2) : 0;
     if (quality < 0) return false;
     planet->air.quality = (nebel_air_quality)quality;
-    return try_planet(in, node, found[AIRS] != NULL, planet) && nb_read_clouds(in, found[CLOUDS], planet);
+    return try_planet(in, node, found[AIRS] != NULL, planet) && nb_read_clouds(in, found[CLOUDS], planet) &&
+           charge(in, node, planet);
 }
 
 /* The model says which keys there may be. */

@@ -179,6 +179,7 @@ nebel_volume_entry nb_volume_entry_default(void)
 static bool keep_volume(nb_scene_reader *in, const nb_json_node *node, const nebel_volume_desc *volume,
                         const nebel_volume_entry *entry, const char *name, nebel_volume_origin origin)
 {
+    if (!nb_scene_charge(in, node, NB_VOLUME_BYTES, NB_VOLUME_SECONDS)) return false;
     nebel_scene *scene = in->scene;
     const size_t count = scene->data.volume_count;
     void *volumes = scene->volumes;

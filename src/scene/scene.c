@@ -154,13 +154,14 @@ void nb_read_keep_message(nebel_result result, const char *message, void *user)
 }
 
 /* What a file's numbers mean, and over which planet fog is, may stand behind them, and those are gone once they are read: a first
- * reading looks for that alone. What is wrong is left for the second one to say. */
+ * reading looks for that alone, and for whether there is too much noise, which is made as it is read. What else is wrong is left for the second one to say. */
 static bool take_space(nb_json *json, const nb_json_node *value, void *user)
 {
     nb_scene_reader *in = user;
     nb_space *space = &in->space, wanted = *space;
     const nb_json_node *parent = nb_json_parent(json, value);
-    if (parent == NULL || nb_json_parent(json, parent) != NULL) return true;
+    if (parent == NULL) return true;
+    if (nb_json_parent(json, parent) != NULL) return nb_scene_count_noise(in, value);
     if (nb_json_has_key(value, "up") && nb_read_up(json, value, &wanted)) space->z_up = wanted.z_up;
     if (nb_json_has_key(value, "unit") && nb_read_unit(json, value, &wanted)) space->unit = wanted.unit;
     if (nb_json_has_key(value, "planet")) in->ball = nb_find_ball(json, value);
@@ -169,12 +170,16 @@ static bool take_space(nb_json *json, const nb_json_node *value, void *user)
 
 static nebel_result find_space(const nb_json_desc *whole, nb_scene_reader *in)
 {
-    nb_json json;
+    nb_json json, *const second = in->json;
     nb_json_desc desc = *whole;
     desc.log = (nebel_log){NULL, NULL};
     desc.take = take_space;
     desc.user = in;
-    return nb_json_read(&json, &desc) == NEBEL_ERROR_MEMORY ? NEBEL_ERROR_MEMORY : NEBEL_OK;
+    in->json = &json;
+    const nebel_result result = nb_json_read(&json, &desc);
+    in->json = second;
+    if (result == NEBEL_ERROR_MEMORY) nb_fail(&whole->log, result, "%s: out of memory", whole->name);
+    return result == NEBEL_ERROR_MEMORY || (result == NEBEL_ERROR_LIMIT && in->over_budget) ? result : NEBEL_OK;
 }
 
 static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size, const char *name, nb_save *save)
@@ -197,10 +202,7 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
     result = find_space(&desc, &in);
     desc.unit = in.space.unit;
     scene->space = in.space;
-    if (result == NEBEL_OK)
-        result = nb_json_read(&json, &desc);
-    else
-        nb_fail(&scene->log, result, "%s: out of memory", name);
+    if (result == NEBEL_OK) result = nb_json_read(&json, &desc);
     nebel_destroy_fog(in.trial);
     scene->data.volumes = scene->volumes;
     scene->data.volume_names = scene->volume_names;
@@ -225,6 +227,7 @@ static nebel_scene *create_scene(const nebel_scene_desc *desc)
     scene->log = desc->log;
     scene->run = desc->run;
     scene->run_user = desc->run_user;
+    scene->budget.most = desc->memory;
     scene->reader.in_process = desc->models_in_process != 0;
     scene->reader.program = nb_model_default_program();
     if (desc->model_reader != NULL)

@@ -15,11 +15,10 @@ static size_t size_of_voxel(nebel_voxel_type type)
     return type == NEBEL_VOXEL_UINT8 ? 1 : type == NEBEL_VOXEL_UINT16 ? 2 : sizeof(float);
 }
 
-nebel_result nb_voxels_allocate(const nb_codec *codec, nb_voxels *voxels)
+static nebel_result count_voxels(const nb_codec *codec, const nb_voxels *voxels, size_t *voxel_count)
 {
     size_t count = 1;
     const size_t *size = voxels->size;
-    voxels->data = NULL;
     for (int i = 0; i < 3; i++) {
         if (size[i] < 1 || size[i] > NEBEL_MAX_GRID_SIZE)
             return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: %zu x %zu x %zu voxels; must be 1 to %d on each axis",
@@ -29,6 +28,16 @@ nebel_result nb_voxels_allocate(const nb_codec *codec, nb_voxels *voxels)
                            size[0], size[1], size[2], NEBEL_MAX_GRID_VOXELS);
         count *= size[i];
     }
+    *voxel_count = count;
+    return nb_codec_check_room(codec, (uint64_t)count * size_of_voxel(voxels->type));
+}
+
+nebel_result nb_voxels_allocate(const nb_codec *codec, nb_voxels *voxels)
+{
+    size_t count = 0;
+    voxels->data = NULL;
+    const nebel_result result = count_voxels(codec, voxels, &count);
+    if (result != NEBEL_OK) return result;
     voxels->data = nb_allocate_zero(&codec->allocator, count, size_of_voxel(voxels->type));
     return voxels->data != NULL ? NEBEL_OK : nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", codec->name);
 }
@@ -61,7 +70,9 @@ static nebel_result read_numbers(const nb_codec *codec, const nebel_grid_file *f
     nb_bytes bytes;
     voxels->type = file->type;
     memcpy(voxels->size, file->size, sizeof voxels->size);
-    nebel_result result = read_file(codec, file->file, &bytes);
+    size_t count = 0;
+    nebel_result result = count_voxels(codec, voxels, &count);
+    if (result == NEBEL_OK) result = read_file(codec, file->file, &bytes);
     if (result != NEBEL_OK) return result;
     result = take_numbers(codec, &bytes, voxels);
     nb_release(&codec->allocator, bytes.data);
@@ -150,7 +161,7 @@ static nebel_result read_slice(const nb_codec *codec, size_t slice, nb_voxels *v
 static nebel_result read_slices(const nb_codec *codec, const nebel_grid_file *file, nb_voxels *voxels)
 {
     char path[PATH_SIZE];
-    const nb_codec of_slice = {.allocator = codec->allocator, .log = codec->log, .name = path};
+    const nb_codec of_slice = {.allocator = codec->allocator, .log = codec->log, .name = path, .room = codec->room};
     nebel_result result = NEBEL_OK;
     if (file->slices < 1 || file->slices > NEBEL_MAX_GRID_SIZE)
         return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: %zu slices; must be 1 to %d", codec->name, file->slices,
@@ -240,22 +251,29 @@ static nebel_result make_grid(const nb_codec *codec, const nebel_grid_file *file
 }
 
 nebel_result nb_voxels_load(const nebel_grid_file *file, const nebel_scene_desc *desc, const nb_space *space,
-                            nebel_grid **grid)
+                            nebel_grid **grid, uint64_t *bytes)
 {
+    *bytes = 0;
     if (grid != NULL) *grid = NULL;
     if (file == NULL || desc == NULL || grid == NULL || file->file == NULL) return NEBEL_ERROR_ARGUMENT;
     if (!nb_allocator_is_valid(&desc->allocator))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
-    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = file->file};
+    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator),
+                            .log = desc->log,
+                            .name = file->file,
+                            .room = desc->memory};
     nb_voxels voxels = {.data = NULL};
     nebel_result result = read_voxels(&codec, file, &voxels);
     if (result == NEBEL_OK) result = turn(&codec, space, &voxels);
     if (result == NEBEL_OK) result = make_grid(&codec, file, &voxels, grid);
+    if (result == NEBEL_OK)
+        *bytes = (uint64_t)voxels.size[0] * voxels.size[1] * voxels.size[2] * size_of_voxel(voxels.type);
     nb_release(&codec.allocator, voxels.data);
     return result;
 }
 
 nebel_result nebel_load_grid(const nebel_grid_file *file, const nebel_scene_desc *desc, nebel_grid **grid)
 {
-    return nb_voxels_load(file, desc, &NB_SPACE_OURS, grid);
+    uint64_t bytes = 0;
+    return nb_voxels_load(file, desc, &NB_SPACE_OURS, grid, &bytes);
 }

@@ -428,7 +428,8 @@ static nebel_result load(const char *path, const nebel_scene_desc *desc, nebel_s
 
 nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log, nb_draft *draft)
 {
-    const nebel_scene_desc desc = {.log = *log, .run = nebel_run_parts, .model_reader = nb_reader_path()};
+    const nebel_scene_desc desc = {
+        .log = *log, .run = nebel_run_parts, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
     *draft = (nb_draft){.log = *log, .frame = frame};
     nebel_result result = load(path, &desc, &draft->scene);
     if (result == NEBEL_OK) result = nebel_load_scene_models(draft->scene);
@@ -662,7 +663,7 @@ static nebel_result use_written(nb_draft *draft, int has_moved)
 /* The file is read again, without its models, so that `written` is what it says. */
 static nebel_result read_back(nb_draft *draft, const char *path)
 {
-    const nebel_scene_desc desc = {.log = draft->log, .model_reader = nb_reader_path()};
+    const nebel_scene_desc desc = {.log = draft->log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
     const int has_moved = !nb_edition_has_same_sources(&draft->now, &draft->written);
     nebel_scene *fresh = NULL;
     nb_edition written;
@@ -684,7 +685,7 @@ static nebel_result read_back(nb_draft *draft, const char *path)
 nebel_result nb_draft_try_file(const char *path, const nebel_log *log)
 {
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.log = *log, .model_reader = nb_reader_path()};
+    const nebel_scene_desc desc = {.log = *log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
     const nebel_result result = load(path, &desc, &scene);
     nebel_destroy_scene(scene);
     return result;
@@ -692,7 +693,7 @@ nebel_result nb_draft_try_file(const char *path, const nebel_log *log)
 
 nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera)
 {
-    const nebel_scene_desc desc = {.log = draft->log, .model_reader = nb_reader_path()};
+    const nebel_scene_desc desc = {.log = draft->log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
     nebel_scene_data before = *nebel_scene_contents(draft->file);
     /* Those of the contents are as the scene is now. */
     before.planets = draft->written.planets;

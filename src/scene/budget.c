@@ -1,0 +1,87 @@
+/* What a scene may take in all, counted before the work. */
+#include "scene/scene_internal.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MEGABYTE 1048576.0
+
+/* How much memory stands for a second of preparation: a scene that may be larger may take longer. */
+#define MEMORY_OF_SECOND (64 * MEGABYTE)
+
+static double most_memory(const nebel_scene *scene)
+{
+    return (double)(scene->budget.most != 0 ? scene->budget.most : NEBEL_DEFAULT_SCENE_MEMORY);
+}
+
+uint64_t nb_scene_room(const nebel_scene *scene)
+{
+    const double left = most_memory(scene) - scene->budget.memory;
+    return left > 1 ? (uint64_t)left : 1;
+}
+
+bool nb_scene_charge(nb_scene_reader *in, const nb_json_node *node, double bytes, double seconds)
+{
+    nebel_scene *scene = in->scene;
+    const double most = most_memory(scene), longest = most / MEMORY_OF_SECOND;
+    const double memory = scene->budget.memory + bytes, time = scene->budget.seconds + seconds;
+    if (memory > most)
+        return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, node,
+                            "brings the scene to %.0f MB of memory; %.0f MB is the most it may take (nebel: --memory)",
+                            memory / MEGABYTE, most / MEGABYTE);
+    if (time > longest)
+        return nb_json_fail(
+            in->json, NEBEL_ERROR_LIMIT, node,
+            "brings the scene to about %.0f s of preparation; %.0f s is the most with %.0f MB of memory "
+            "(nebel: --memory)",
+            time, longest, most / MEGABYTE);
+    scene->budget.memory = memory;
+    scene->budget.seconds = time;
+    return true;
+}
+
+static const nb_json_node *find(const nb_json *json, const nb_json_node *object, const char *key)
+{
+    const nb_json_node *node = object->type == NB_JSON_OBJECT ? nb_json_first(json, object) : NULL;
+    while (node != NULL && !nb_json_has_key(node, key)) node = nb_json_next(json, node);
+    return node;
+}
+
+static bool is_zero(const nb_json *json, const nb_json_node *object, const char *key)
+{
+    const nb_json_node *node = find(json, object, key);
+    if (node == NULL || node->type == NB_JSON_NUMBER) return node == NULL || node->number == 0;
+    for (const nb_json_node *at = nb_json_first(json, node); at != NULL; at = nb_json_next(json, at))
+        if (at->type != NB_JSON_NUMBER || at->number != 0) return false;
+    return true;
+}
+
+bool nb_scene_charge_noise(nb_scene_reader *in, const nb_json_node *density)
+{
+    const nb_json_node *size = find(in->json, density, "size"), *octaves = find(in->json, density, "octaves");
+    const double grids = is_zero(in->json, density, "drift") && is_zero(in->json, density, "change") ? 1 : 2;
+    double voxels = grids;
+    if (size == NULL) return true;
+    for (const nb_json_node *at = nb_json_first(in->json, size); at != NULL; at = nb_json_next(in->json, at))
+        voxels *= at->type == NB_JSON_NUMBER && at->number > 0 && at->number <= NEBEL_MAX_GRID_SIZE ? at->number : 0;
+    /* The reader says what is wrong there. */
+    if (voxels > grids * NEBEL_MAX_NOISE_VOXELS) return true;
+    const bool has_octaves = octaves != NULL && octaves->type == NB_JSON_NUMBER && octaves->number >= 1;
+    return nb_scene_charge(in, density, NB_NOISE_VOXEL_BYTES * voxels,
+                           NB_NOISE_OCTAVE_SECONDS * voxels * (has_octaves ? fmin(octaves->number, 16) : 1));
+}
+
+bool nb_scene_count_noise(nb_scene_reader *in, const nb_json_node *volume)
+{
+    static const char noise[] = "noise";
+    const nb_json_node *density = find(in->json, volume, "density");
+    const nb_json_node *type = density != NULL ? find(in->json, density, "type") : NULL;
+    if (type == NULL || type->type != NB_JSON_STRING || type->string_size != strlen(noise) ||
+        memcmp(type->string, noise, strlen(noise)) != 0)
+        return true;
+    in->json->desc.log = in->scene->log;
+    const bool fits = nb_scene_charge_noise(in, density);
+    in->json->desc.log = (nebel_log){NULL, NULL};
+    in->over_budget = !fits;
+    return fits;
+}
