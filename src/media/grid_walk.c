@@ -446,6 +446,16 @@ void nb_grid_places(const nebel_grid *grid, const nb_grid_line *line, double len
     }
 }
 
+/* From the start of a stretch to a place on it. */
+static double amount_up_to(const cursor *c, const stretch *s, double place)
+{
+    if (!(place > s->start)) return 0;
+    if (!(place < s->end)) return s->amount;
+    if (!isnan(s->level)) return s->amount * ((place - s->start) / (s->end - s->start));
+    const corners corner = corners_of(c->grid, c->grid->type, s->cell);
+    return amount_of(c->grid, between_corners(&corner, c->line, s->cell, s->start, place), place - s->start);
+}
+
 void nb_grid_sums(const nebel_grid *grid, const nb_grid_line *line, double length, int count, const double *place,
                   double *sum)
 {
@@ -454,10 +464,7 @@ void nb_grid_sums(const nebel_grid *grid, const nb_grid_line *line, double lengt
     for (int i = 0; i < count;) {
         const stretch s = next_stretch(&c);
         const int last = c.t >= length && !c.within;
-        for (; i < count && (last || place[i] <= s.end); i++) {
-            const double share = s.end > s.start ? smaller((place[i] - s.start) / (s.end - s.start), 1) : 1;
-            sum[i] = before + share * s.amount;
-        }
+        for (; i < count && (last || place[i] <= s.end); i++) sum[i] = before + amount_up_to(&c, &s, place[i]);
         before += s.amount;
     }
 }

@@ -18,7 +18,7 @@ enum { MOST_LAYERS = 4 };
 
 /* What part of the sunlight interpolation may be off by at one place: it is too large here and too small there, along a ray that
  * is a fifth. */
-#define PLACE_TOLERANCE 0.007
+#define PLACE_TOLERANCE 0.005
 
 static nebel_grid *grid_of(const nebel_snapshot *snapshot, size_t medium)
 {
