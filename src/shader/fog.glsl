@@ -484,24 +484,33 @@ nb_sun_sum nb_light_of_sun(nb_leg leg, nb_piece piece, nb_ray ray, nb_vec3 befor
     sum.light = nb_splat3(0.0);
     sum.strain = 0.0;
     bool closed = nb_sun_is_closed();
+    nb_vec4 to_sun = NEBEL_WORD(NB_HEADER_SUN);
+    bool height = int(to_sun.w) == NB_SUN_HEIGHT;
+    /* Flat fog is asked beside the ends, as at a face itself the way to the sun may run along it, and only as far as light comes:
+     * ways from deeper in endless fog end too early. */
+    float within = min(40.0 / max(nb_smallest(leg.depth[NB_NODES - 1]), 1e-18), 1.0);
+    float beside = 0.001 * within;
     float start = piece.start + leg.from;
     nb_vec3 least = nb_splat3(NB_HUGE);
     nb_vec3 most = nb_splat3(0.0);
     nb_vec3 first = nb_splat3(0.0);
     nb_vec3 last = nb_splat3(0.0);
     for (int j = 0; j < (closed ? 2 : NB_NODES - 1); j++) {
-        float share = closed ? float(j) : nb_leg_node(leg, j);
+        float share = !closed ? nb_leg_node(leg, j) : height ? float(j) : j == 0 ? beside : within - beside;
         nb_vec3 depth = nb_depth_to_sun(ray.origin + ray.direction * (start + leg.h * share));
-        if (closed && j == 0) first = before + depth;
-        if (closed && j == 1) last = before + leg.depth[NB_NODES - 1] + depth;
+        if (closed && j == 0) first = before + share * leg.depth[NB_NODES - 1] + depth;
+        if (closed && j == 1) last = before + share * leg.depth[NB_NODES - 1] + depth;
         if (!closed) sum.light += leg.h * nb_leg_weight(leg, j) * leg.glow[j] * nb_exp3(-(before + leg.depth[j] + depth));
         least = min(least, depth);
         most = max(most, depth);
     }
+    if (closed && !height) {
+        nb_vec3 rise = (last - first) / (within - 2.0 * beside);
+        first -= rise * beside;
+        last = first + rise;
+    }
     if (closed) {
         /* in height fog without a difference of depths, which may be beyond all numbers */
-        nb_vec4 to_sun = NEBEL_WORD(NB_HEADER_SUN);
-        bool height = int(to_sun.w) == NB_SUN_HEIGHT;
         float keeps = height ? 1.0 - ray.direction.y / to_sun.y : 1.0; /* of what the ray gains, what the way to the sun does not lose */
         nb_vec3 change = height ? leg.depth[NB_NODES - 1] * abs(keeps) : abs(last - first);
         nb_vec3 nearest = height ? (keeps < 0.0 ? last : first) : min(first, last);

@@ -288,19 +288,34 @@ float nb_lamp_weight_of_three(int j) { return j == 3 ? 8.0 / 18.0 : j == 1 || j 
 struct nb_lamp_step {
     nb_vec3 light;
     float error;
+    float steepness; /* by how much the logarithm of the light changes from the first node to the next */
 };
 
-/* Light of the first part of a swing, up to w = length, of which `drop` of transmittance is lost. `before` is the depth in front of the
- * piece. Where nodes do not see that loss they have passed over what causes it. */
+/* What part of the light between two nodes they may not show, between which its logarithm changes so. */
+float nb_unseen_share(float change)
+{
+    float share = min(change / 3.0, 1.0);
+    return share * share * share * share * share * share;
+}
+
+/* Light of the first part of a swing, up to w = length, at `end`, of which `drop` of transmittance is lost. `before` is the depth in front of the
+ * piece. Where nodes do not see that loss they have passed over what causes it, and light that changes by large factors from node to
+ * node may be anywhere between them. */
 nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, nb_swing swing,
-                               float length, nb_vec3 before, nb_vec3 seen, nb_vec3 drop, inout int turns)
+                               float length, float end, nb_vec3 before, nb_vec3 seen, nb_vec3 drop, inout int turns)
 {
     nb_vec3 seven = nb_splat3(0.0);
     nb_vec3 three = nb_splat3(0.0);
     nb_vec3 taken = nb_splat3(0.0);
-    for (int j = 0; j < NB_LAMP_NODES; j++) {
-        float w = length * nb_lamp_node(j);
-        float t = nb_swing_place(swing, w);
+    nb_vec3 last_depth = before;
+    nb_vec3 last_way = nb_splat3(0.0);
+    float hidden = 0.0;
+    nb_lamp_step s;
+    s.steepness = 0.0;
+    /* from just behind the start: what is between it and the first node may be all the light there is */
+    for (int j = -1; j < NB_LAMP_NODES; j++) {
+        float w = length * (j < 0 ? 1e-5 : nb_lamp_node(j));
+        float t = min(nb_swing_place(swing, w), end);
         float from = t - by.closest;
         nb_vec3 apart = by.foot + ray.direction * from;
         float square = dot(apart, apart);
@@ -312,26 +327,42 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
         nb_lamp_place place = nb_place_in_piece(ray, first, listed, piece, t, towards, turns);
         nb_vec3 depth = before + place.depth;
         nb_vec3 light = nb_splat3(0.0);
+        nb_vec3 way = last_way;
         if (fluence > 0.0) {
-            nb_vec3 to_lamp = nb_depth_to_light(ray.origin + ray.direction * t, towards, max(distance - by.clear, 0.0), false, turns);
-            light = place.glow * by.intensity * fluence * nb_exp3(-(depth + to_lamp));
+            way = nb_depth_to_light(ray.origin + ray.direction * t, towards, max(distance - by.clear, 0.0), false, turns);
+            light = place.glow * by.intensity * fluence * nb_exp3(-(depth + way));
         }
+        if (j >= 0) {
+            float change = nb_largest(abs((depth - last_depth) + (way - last_way)));
+            nb_vec3 lost = max(nb_exp3(-last_depth) - nb_exp3(-depth), nb_splat3(0.0));
+            hidden += nb_largest(lost * nb_exp3(-min(way, last_way))) * nb_unseen_share(change);
+            if (j == 0) s.steepness = 2.0 * change; /* over a tenth of the step, as src/march/trace_sun.h has it */
+        }
+        last_depth = depth;
+        last_way = way;
+        if (j < 0) continue;
         seven += nb_lamp_weight(j) * light;
         three += nb_lamp_weight_of_three(j) * light;
         taken += nb_lamp_weight(j) * speed * place.extinction * nb_exp3(-depth);
     }
-    float end = nb_swing_place(swing, length);
     float most = nb_most_fluence(by, swing.start, end) * piece.scatter;
-    nb_lamp_step s;
-    s.light = seven;
+    nb_vec3 limit = most * (drop + 8.0 * NB_EPSILON * seen); /* also what rounds to nothing may be light */
+    s.light = min(seven, limit);
     float unseen = nb_largest(abs(taken - drop) - 8.0 * NB_EPSILON * seen); /* beyond rounding */
-    s.error = max(nb_largest(abs(seven - three)), most * unseen);
-    s.error = min(s.error, most * nb_largest(drop));
+    s.error = max(nb_largest(abs(seven - three)), most * max(unseen, hidden));
+    s.error = min(s.error, nb_largest(limit));
     return s;
 }
 
 /* Behind a lamp nothing of its light is left [m]; squares of squares of it are numbers. */
 #define NB_LAMP_REACH 1e8
+
+/* The length of a first step of a few optical depths by the density where the piece begins: light in dense fog comes from there. */
+float nb_first_swing(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, inout int turns)
+{
+    float dense = nb_largest(nb_place_in_piece(ray, first, listed, piece, piece.start, ray.direction, turns).extinction);
+    return nb_swing_between(by.closest, by.aside, piece.start, piece.start + min(4.0 * nb_rcp_bounded(dense), NB_LAMP_REACH)).end;
+}
 
 /* The end of a step on which phase functions change smoothly. `ahead` is the tangent of half the angle by which light is turned: a step
  * goes to 2.5 times as much, and by 1.5 widths where it is in a peak. Towards peaks of light that is turned back it ends at a quarter of
@@ -362,7 +393,7 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
     nb_vec2 lit = nb_vec2(1.0, piece.start);
     float t = piece.start;
     float far = min(piece.end, by.closest + NB_LAMP_REACH);
-    float guess = 1.0;
+    float guess = nb_first_swing(ray, first, listed, piece, by, turns);
     for (int i = 0; i < NB_MOST_LAMP_STEPS; i++) {
         if (!(t < far) || nb_is_tired(turns + nb_grid_turns)) break;
         if (lit.y <= t) {
@@ -378,11 +409,11 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
         turns += NB_LAMP_NODES + 1;
         bool fits = true;
         if (lit.x > 0.0) {
-            nb_lamp_step taken = nb_step_past_lamp(ray, first, listed, piece, by, swing, length, before, seen, seen - behind, turns);
+            nb_lamp_step taken = nb_step_past_lamp(ray, first, listed, piece, by, swing, length, end, before, seen, seen - behind, turns);
             float allowed = tolerance + NB_LAMP_SHARE * nb_largest(max(sum, taken.light));
-            fits = last || taken.error <= allowed || length < 1e-4;
+            fits = last || taken.error <= allowed || length < 1e-7;
             if (fits) sum += lit.x * taken.light;
-            guess = fits ? max(guess, 2.0 * length) : 0.5 * length;
+            guess = fits ? max(guess, 2.0 * length) : length * min(max(0.55 / max(taken.steepness, 0.55), 0.001), 0.5);
         }
         if (fits) {
             t = end;
