@@ -206,6 +206,7 @@ static void test_sunlit_dense_voxels(void **unused)
     tracer t;
     open_tracer(&t, NB_GL_330, TEXTURE,
                 "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_VOXELS\n#define NEBEL_FEATURES 1572866\n", trace_body);
+    try_dense(&t, 0, 5, NEBEL_FILTER_LINEAR, &suns[0]);
     for (int kind = 0; kind < 3; kind++)
         for (int i = 0; i < 4; i++)
             try_dense(&t, kind, (const double[]){.5, 5, 100, 3000}[i],
