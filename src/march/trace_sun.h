@@ -335,6 +335,16 @@ static nb_real count_media(const march *m)
     return count;
 }
 
+static int has_voxels(const march *m)
+{
+    for (size_t i = m->present_first; i < m->present_end; i++)
+        if (present(m, i)->medium->body.density.type == NEBEL_DENSITY_GRID) return 1;
+    return 0;
+}
+
+/* Light among voxels is not as smooth as rules want it. */
+#define ROUGH_CAUTION NB_F(4.0)
+
 static light_depth way_from(sunlight *sun, const march *m, const sun_step *s, nb_wide end, int n, nb_wmask lanes)
 {
     const nb_wide t = place_of_node(s, end, n);
@@ -357,6 +367,7 @@ static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const
     const nb_real most = s->lamp != NULL ? most_of_lamp(s->lamp, s->start, end) : at[0].most;
     const lit_sum sum = sum_nodes_of_step(at, most, count_media(m), sun->snapshot->is_gray);
     take_sum(s, &sum);
+    if (has_voxels(m)) s->error = s->error * ROUGH_CAUTION;
     /* ends are not looked at themselves */
     s->rounding =
         s->rounding + largest(s->light) * REAL(STEP_MARGIN) * nb_min(s->steepness, NB_F(1.0) / REAL(STEP_MARGIN));
@@ -411,13 +422,6 @@ typedef struct sun_piece {
     nb_real whole, pieces; /* its length; how many there may be */
     int is_rough; /* it has voxels, which are integrated from step to step: a walk to every node would be long */
 } sun_piece;
-
-static int has_voxels(const march *m)
-{
-    for (size_t i = m->present_first; i < m->present_end; i++)
-        if (present(m, i)->medium->body.density.type == NEBEL_DENSITY_GRID) return 1;
-    return 0;
-}
 
 static sun_piece sun_piece_of(const march *m, const piece *p, const gathered *g, int is_rough)
 {
