@@ -1,5 +1,7 @@
 #include "scene/keyframes.h"
 
+#include <math.h>
+
 static double frame_at(const double *frames, size_t stride, size_t i)
 {
     return *(const double *)((const char *)frames + i * stride);
@@ -77,7 +79,9 @@ double nb_keyframes_between(const nb_keyframes *around, bool limited, const doub
     const double m0 = around->has_before ? find_slope(around->frames, values, limited) : 0;
     const double m1 = around->has_after ? find_slope(around->frames + 1, values + 1, limited) : 0;
     const double h = around->frames[2] - around->frames[1];
-    const double value = interpolate(around->s, h, values[1], m0, values[2], m1);
+    double value = interpolate(around->s, h, values[1], m0, values[2], m1);
+    /* Keys that all but coincide may have slopes beyond all numbers. */
+    if (!isfinite(value)) value = around->s < .5 ? values[1] : values[2];
     if (!limited) return value;
     const double low = values[1] < values[2] ? values[1] : values[2],
                  high = values[1] < values[2] ? values[2] : values[1];

@@ -1,0 +1,43 @@
+/* What fuzzers share: a log and an allocator that are counted. */
+#ifndef NB_FUZZ_WITNESS_H
+#define NB_FUZZ_WITNESS_H
+
+#include <nebel/nebel.h>
+
+#include <stdlib.h>
+
+typedef struct witness {
+    size_t messages, allocations;
+} witness;
+
+/* What asks for more takes longer than a fuzzer should spend on one input. */
+#define WITNESS_MOST_BYTES ((size_t)1 << 26)
+
+static inline void demand(int holds)
+{
+    if (!holds) abort();
+}
+
+static inline void witness_message(nebel_result result, const char *message, void *user)
+{
+    witness *seen = user;
+    demand(result != NEBEL_OK && message[0] != '\0');
+    seen->messages++;
+}
+
+static inline void *witness_allocate(size_t size, void *user)
+{
+    witness *seen = user;
+    void *memory = size < WITNESS_MOST_BYTES ? malloc(size) : NULL;
+    seen->allocations += memory != NULL;
+    return memory;
+}
+
+static inline void witness_release(void *memory, void *user)
+{
+    witness *seen = user;
+    if (memory != NULL) seen->allocations--;
+    free(memory);
+}
+
+#endif
