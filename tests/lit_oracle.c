@@ -60,13 +60,13 @@ static span meet(span a, span b)
     return (span){fmax(a.enter, b.enter), fmin(a.leave, b.leave)};
 }
 
-static const span nowhere = {INFINITY, -INFINITY}, everywhere = {-INFINITY, INFINITY};
+static const span nowhere = {HUGE_VAL, -HUGE_VAL}, everywhere = {-HUGE_VAL, HUGE_VAL};
 
 /* Where value + rate t <= 0. */
 static span below(double value, double rate)
 {
     if (rate == 0) return value <= 0 ? everywhere : nowhere;
-    return rate > 0 ? (span){-INFINITY, -value / rate} : (span){-value / rate, INFINITY};
+    return rate > 0 ? (span){-HUGE_VAL, -value / rate} : (span){-value / rate, HUGE_VAL};
 }
 
 /* Where a t^2 + 2 b t + c <= 0, a > 0. */
@@ -520,7 +520,7 @@ static void look_at_light(const lit_scene *scene, int light, const line *l, doub
                           double towards[3])
 {
     line way;
-    double depth[3], end = INFINITY, fluence = 1;
+    double depth[3], end = HUGE_VAL, fluence = 1;
     const nebel_lamp *lamp = light >= 0 ? &scene->lamps[light] : NULL;
     at(l, t, way.o);
     for (int k = 0; k < 3; k++) way.d[k] = lamp != NULL ? lamp->position[k] - way.o[k] : scene->sun.direction[k];
