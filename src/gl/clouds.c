@@ -186,7 +186,7 @@ static nebel_result keep_knots(const job *j, nb_cloud_part *part, const nebel_cl
     part->knots = list;
     pixel->first = (uint32_t)part->count;
     pixel->count = knots->count;
-    set_knots(knots, part->knots + part->count);
+    if (knots->count > 0) set_knots(knots, part->knots + part->count); /* the list of none may be NULL */
     part->count += knots->count;
     return NEBEL_OK;
 }
