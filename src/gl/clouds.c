@@ -552,10 +552,16 @@ static nb_cloud_end end_at(const job *j, const double direction[3], float t)
     return (nb_cloud_end){.t = t};
 }
 
+/* NULL for a pixel without knots: the list of none may be NULL, to which nothing is added. */
+static const nb_cloud_knot *knots_of(const nb_cloud_part *part, const nb_cloud_pixel *pixel)
+{
+    return pixel->count > 0 ? part->knots + pixel->first : NULL;
+}
+
 /* Whether knots up to the ground do for a ray that ends there: among fog they must. */
 static int is_found(const job *j, const nb_cloud_part *part, const nb_cloud_pixel *pixel, float end)
 {
-    const nb_cloud_knot *const knots = part->knots + pixel->first;
+    const nb_cloud_knot *const knots = knots_of(part, pixel);
     if (pixel->count == 0 || j->picture->has_fog) return 1;
     return nb_cloud_is_found(pixel->count, knots[0].t, knots[pixel->count - 1].t, HUGE_VALF, end);
 }
@@ -589,7 +595,7 @@ static nebel_result lay_pixel(const job *j, nb_cloud_part *part, uint32_t x, uin
     ray.t_max = lifted.t_max = (double)end->t;
     if ((has_other && (j->picture->has_fog ? end->is_on_ground : end->is_in_sky)) || !is_found(j, part, pixel, end->t))
         return lay_anew(j, part, pixel, end->is_in_sky ? &lifted : &ray, spread, over);
-    lay_over(part->knots + pixel->first, pixel->count, end->t, over);
+    lay_over(knots_of(part, pixel), pixel->count, end->t, over);
     return NEBEL_OK;
 }
 
