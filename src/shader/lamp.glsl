@@ -312,8 +312,10 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
     float hidden = 0.0;
     nb_lamp_step s;
     s.steepness = 0.0;
-    /* from just behind the start: what is between it and the first node may be all the light there is */
-    for (int j = -1; j < NB_LAMP_NODES; j++) {
+    /* From just behind the start, as what is between it and the first node may be all the light there is. Not where a way may cross
+     * voxels: walks through them would use up the turns of the loops that a driver allows. */
+    int begin = NB_HAS(NB_HAS_GRID) ? 0 : -1;
+    for (int j = begin; j < NB_LAMP_NODES; j++) {
         float w = length * (j < 0 ? 1e-5 : nb_lamp_node(j));
         float t = min(nb_swing_place(swing, w), end);
         float from = t - by.closest;
@@ -332,11 +334,11 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
             way = nb_depth_to_light(ray.origin + ray.direction * t, towards, max(distance - by.clear, 0.0), false, turns);
             light = place.glow * by.intensity * fluence * nb_exp3(-(depth + way));
         }
-        if (j >= 0) {
+        if (j > begin) {
             float change = nb_largest(abs((depth - last_depth) + (way - last_way)));
             nb_vec3 lost = max(nb_exp3(-last_depth) - nb_exp3(-depth), nb_splat3(0.0));
             hidden += nb_largest(lost * nb_exp3(-min(way, last_way))) * nb_unseen_share(change);
-            if (j == 0) s.steepness = 2.0 * change; /* over a tenth of the step, as src/march/trace_sun.h has it */
+            if (j == begin + 1) s.steepness = 2.0 * change; /* over a tenth of the step, as src/march/trace_sun.h has it */
         }
         last_depth = depth;
         last_way = way;
