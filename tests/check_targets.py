@@ -57,6 +57,17 @@ class TargetTest(check_cli.PictureCase):
         self.assertEqual(self.files(), self.given)
 
 
+class BudgetTest(check_cli.PictureCase):
+    def test_pictures_count_before_the_work(self):
+        for words in (("a.exr", "--aov", "--size", "8192x8192"), ("a.png", "--size", "4800x4800", "--memory", "256"),
+                      ("a.png", "--size", "640x640", "--memory", "64", "--device", "gl"), ("a.webp", "--frames", "0-1000", "--size", "1000x1000", "--memory", "256"),
+                      ("a.png", "--size", "1000x1000", "--memory", "64", "--multiple-scattering", "diffusion", "--size", "2300x2300")):
+            done = self.render(*words)
+            if "without WebP" not in done.err:
+                self.assert_failed(done, "--size: a ", "brings the scene to", "--memory")
+        self.assertEqual(self.files(), self.given)
+
+
 class InterruptTest(check_cli.PictureCase):
     def test_preparing_ends_at_once(self):
         noise = {"type": "noise", "size": [200, 200, 200], "cells": [60, 60, 60], "octaves": 16, "gain": 0.9}

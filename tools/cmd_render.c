@@ -570,13 +570,43 @@ static int check_count(const studio *all)
                              all->wanted->scene, count, NEBEL_MOST_PACKED_VOLUMES);
 }
 
-static void choose_scattering(const nb_render_call *wanted, nebel_scene *scene)
+static int choose_scattering(studio *all)
 {
+    const nb_render_call *const wanted = all->wanted;
+    nebel_scene *const scene = all->loaded.scene;
     const nebel_diffusion_desc by_default = {0};
     const int is_off = wanted->scattering == NB_SCATTERING_OFF;
-    if (wanted->scattering == NB_SCATTERING_OF_FILE) return;
-    if (is_off || nebel_scene_contents(scene)->diffusion == NULL)
-        (void)nebel_set_scene_diffusion(scene, is_off ? NULL : &by_default);
+    if (wanted->scattering == NB_SCATTERING_OF_FILE) return NB_DONE;
+    if (!is_off && nebel_scene_contents(scene)->diffusion != NULL) return NB_DONE;
+    const nebel_result result = nebel_set_scene_diffusion(scene, is_off ? NULL : &by_default);
+    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
+}
+
+/* What OpenGL's targets take for a pixel (173 measured), and films for one of a picture: an estimate from above, as it depends on
+ * what there is to see. */
+#define GL_PIXEL_BYTES 176.0
+#define FILM_PIXEL_BYTES 0.5
+#define LOSSLESS_PIXEL_BYTES 3.0
+
+static double count_bytes(const nb_render_call *wanted)
+{
+    const double channels = count_channels(wanted);
+    double bytes = (wanted->aov ? 2 : 1) * channels * sizeof(float) + (wanted->gl ? GL_PIXEL_BYTES : 0);
+    if (wanted->is_film)
+        bytes += ((double)wanted->last_frame - wanted->first_frame + 1) *
+                 (wanted->quality == 100 ? LOSSLESS_PIXEL_BYTES : FILM_PIXEL_BYTES);
+    return bytes * wanted->width * wanted->height;
+}
+
+/* Samples and threads take nothing worth counting. */
+static int charge_pictures(studio *all)
+{
+    const nb_render_call *const wanted = all->wanted;
+    char what[96];
+    (void)snprintf(what, sizeof what, "--size: %s of %u x %u pixels", wanted->is_film ? "a film" : "a picture",
+                   (unsigned)wanted->width, (unsigned)wanted->height);
+    const nebel_result result = nebel_charge_scene(all->loaded.scene, what, (uint64_t)count_bytes(wanted));
+    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
 
 static int load(studio *all)
@@ -585,7 +615,8 @@ static int load(studio *all)
     int status = nb_load_file(wanted->scene, 1, &all->listener, &all->loaded);
     if (status == NB_DONE) status = check_sources(wanted, nebel_scene_contents(all->loaded.scene));
     if (status == NB_DONE) status = check_count(all);
-    if (status == NB_DONE) choose_scattering(wanted, all->loaded.scene);
+    if (status == NB_DONE) status = choose_scattering(all);
+    if (status == NB_DONE) status = charge_pictures(all);
     return status == NB_DONE ? nb_load_fog(wanted->scene, wanted->first_frame, &all->listener, &all->loaded) : status;
 }
 

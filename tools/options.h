@@ -53,7 +53,7 @@ uint32_t nb_options_whole(nb_arguments *arguments, int option, uint32_t low, uin
 #define NB_MEMORY_OPTION                                                                                               \
     {                                                                                                                  \
         "memory", 0, "MB",                                                                                             \
-            "The most that the scene may take, its models aside,\n64 to 1048576; it may take a second of\n"            \
+            "The most that the scene and its pictures may take,\n64 to 1048576; it may take a second of\n"             \
             "preparation for each 64. Default: 4096."                                                                  \
     }
 uint64_t nb_options_memory(nb_arguments *arguments, int option); /* bytes */

@@ -207,7 +207,7 @@ typedef struct nebel_scene_desc {
     const char *model_reader; /* its path; NULL: bin/nebel-read-model of the prefix that nebel was configured for */
     int models_in_process;    /* nonzero: models are read in this process, without limits; for trusted files alone */
 
-    /* The most bytes that the scene may take for voxels, noise, maps, particles, fog and planets, its models aside; 0:
+    /* The most bytes that the scene may take for voxels, noise, maps, particles, fog, planets and models; 0:
      * NEBEL_DEFAULT_SCENE_MEMORY. For each 64 MB it may take about a second of preparation. What exceeds either is LIMIT before
      * the work is begun. */
     uint64_t memory;
@@ -332,9 +332,13 @@ typedef enum nebel_volume_origin {
 nebel_volume_origin nebel_scene_volume_origin(const nebel_scene *scene, size_t index);
 
 /* Light that fog scatters more than once, of snapshots from now on: what the section "multiple_scattering" says, in place
- * of it. NULL: none; the description is copied. Not thread safe against readers of the same scene. Errors: ARGUMENT; a
- * commit has those of nebel_set_diffusion. */
+ * of it. NULL: none; the description is copied. Not thread safe against readers of the same scene. Errors: ARGUMENT; LIMIT
+ * where the scene may not take so much, which leaves it as it is; a commit has those of nebel_set_diffusion. */
 nebel_result nebel_set_scene_diffusion(nebel_scene *scene, const nebel_diffusion_desc *desc);
+
+/* Counts what the host itself is about to take for the scene, such as pictures, as nebel_scene_desc.memory does. `what`
+ * begins the message: "--size". Not thread safe against readers of the same scene. Errors: ARGUMENT, LIMIT. */
+nebel_result nebel_charge_scene(nebel_scene *scene, const char *what, uint64_t bytes);
 
 /* A snapshot of the scene's fog at a frame, its nebulae's particles and, as exact fog, its cells among it; release it
  * with nebel_release_snapshot before the scene's allocator goes away. On an error *snapshot is NULL. Errors: ARGUMENT,

@@ -26,7 +26,8 @@ static nebel_result decode(const nb_codec *codec, const nb_bytes *bytes, nebel_t
 /* Texels come as B, G, R, A. */
 static nebel_result copy_texels(const nb_codec *codec, const struct aiTexture *source, nebel_texture *texture)
 {
-    const nebel_result result = nb_codec_check_size(codec, source->mWidth, source->mHeight, 4);
+    nebel_result result = nb_codec_check_size(codec, source->mWidth, source->mHeight, 4);
+    if (result == NEBEL_OK) result = nb_codec_check_room(codec, 4 * (uint64_t)source->mWidth * source->mHeight);
     if (result != NEBEL_OK) return result;
     const size_t count = (size_t)source->mWidth * source->mHeight;
     unsigned char *rgba = nb_allocate(&codec->allocator, count, 4);
@@ -133,12 +134,18 @@ static nebel_result read_picture(nb_assimp *in, const char *path, nebel_texture 
     nb_note note = {""};
     const struct aiTexture *embedded = find_embedded(in->scene, path);
     const char *name = embedded == NULL ? show_path(in, path) : in->load->source->file;
-    const nb_codec codec = {.allocator = in->load->allocator, .log = nb_note_log(&note), .name = name};
+    bool is_full = false;
+    const nb_codec codec = {.allocator = in->load->allocator,
+                            .log = nb_note_log(&note),
+                            .name = name,
+                            .room = nb_model_room(in->load),
+                            .is_full = &is_full};
     if (name == NULL) return nb_model_fail(in->load, NEBEL_ERROR_MEMORY, "out of memory");
     const nebel_result result =
         embedded != NULL ? read_embedded(&codec, embedded, texture) : read_named(in, &codec, path, texture);
     if (result == NEBEL_ERROR_MEMORY)
         return nb_model_fail(in->load, result, "out of memory for the texture \"%s\"", path);
+    if (is_full) return nb_model_fail(in->load, result, "%s", note.text);
     if (result != NEBEL_OK) nb_model_fail(in->load, NEBEL_OK, "%s; the plain colour is used instead", note.text);
     return NEBEL_OK;
 }

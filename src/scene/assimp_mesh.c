@@ -250,7 +250,8 @@ nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *source, cons
     const uint32_t triangle_count = count_triangles(in, source);
     if (triangle_count == 0 || source->mVertices == NULL) return NEBEL_OK;
     if (triangle_count > NB_MAX_TRIANGLES) return nb_model_refuse_triangles(load);
-    const nebel_result result = nb_assimp_find_surface(in, source->mMaterialIndex, &surface);
+    nebel_result result = nb_model_check_room(load, nb_mesh_bytes(0, false, triangle_count));
+    if (result == NEBEL_OK) result = nb_assimp_find_surface(in, source->mMaterialIndex, &surface);
     if (result != NEBEL_OK) return result;
     in->left_out_clear += surface.is_clear;
     if (surface.is_clear) return NEBEL_OK;

@@ -2,6 +2,7 @@
 #include "scene/scene_internal.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #define MEGABYTE 1048576.0
@@ -9,36 +10,95 @@
 /* How much memory stands for a second of preparation: a scene that may be larger may take longer. */
 #define MEMORY_OF_SECOND (64 * MEGABYTE)
 
-static double most_memory(const nebel_scene *scene)
+enum { EXCESS_SIZE = 200 };
+
+double nb_scene_most_memory(const nebel_scene *scene)
 {
     return (double)(scene->budget.most != 0 ? scene->budget.most : NEBEL_DEFAULT_SCENE_MEMORY);
 }
 
+double nb_scene_most_seconds(const nebel_scene *scene)
+{
+    return nb_scene_most_memory(scene) / MEMORY_OF_SECOND;
+}
+
 uint64_t nb_scene_room(const nebel_scene *scene)
 {
-    const double left = most_memory(scene) - scene->budget.memory;
+    const double left = nb_scene_most_memory(scene) - scene->budget.memory;
     return left > 1 ? (uint64_t)left : 1;
+}
+
+/* Of what is asked for, where it is too much: "brings the scene to ...". False where it is not. */
+static bool find_excess(const nebel_scene *scene, double memory, double seconds, char text[EXCESS_SIZE])
+{
+    const double most = nb_scene_most_memory(scene), longest = nb_scene_most_seconds(scene);
+    if (memory > most)
+        snprintf(text, EXCESS_SIZE,
+                 "brings the scene to %.0f MB of memory; %.0f MB is the most it may take (nebel: --memory)",
+                 memory / MEGABYTE, most / MEGABYTE);
+    else if (seconds > longest)
+        snprintf(text, EXCESS_SIZE,
+                 "brings the scene to about %.0f s of preparation; %.0f s is the most with %.0f MB of memory "
+                 "(nebel: --memory)",
+                 seconds, longest, most / MEGABYTE);
+    return memory > most || seconds > longest;
 }
 
 bool nb_scene_charge(nb_scene_reader *in, const nb_json_node *node, double bytes, double seconds)
 {
     nebel_scene *scene = in->scene;
-    const double most = most_memory(scene), longest = most / MEMORY_OF_SECOND;
+    char excess[EXCESS_SIZE];
     const double memory = scene->budget.memory + bytes, time = scene->budget.seconds + seconds;
-    if (memory > most)
-        return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, node,
-                            "brings the scene to %.0f MB of memory; %.0f MB is the most it may take (nebel: --memory)",
-                            memory / MEGABYTE, most / MEGABYTE);
-    if (time > longest)
-        return nb_json_fail(
-            in->json, NEBEL_ERROR_LIMIT, node,
-            "brings the scene to about %.0f s of preparation; %.0f s is the most with %.0f MB of memory "
-            "(nebel: --memory)",
-            time, longest, most / MEGABYTE);
+    if (find_excess(scene, memory, time, excess)) return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, node, "%s", excess);
     scene->budget.memory = memory;
     scene->budget.seconds = time;
     return true;
 }
+
+/* ---- what the host asks for ------------------------------------------------------------------ */
+
+/* Meshes are counted from what was there before them. */
+static double count_memory(const nebel_scene *scene)
+{
+    return scene->models_loaded ? scene->loaded.bytes : scene->budget.memory;
+}
+
+static nebel_result charge_host(nebel_scene *scene, const char *what, double bytes, double seconds)
+{
+    char excess[EXCESS_SIZE];
+    if (find_excess(scene, count_memory(scene) + bytes, scene->budget.seconds + seconds, excess))
+        return nb_fail(&scene->log, NEBEL_ERROR_LIMIT, "%s %s", what, excess);
+    scene->budget.memory += bytes;
+    scene->budget.seconds += seconds;
+    scene->loaded.bytes += bytes;
+    return NEBEL_OK;
+}
+
+nebel_result nebel_charge_scene(nebel_scene *scene, const char *what, uint64_t bytes)
+{
+    if (scene == NULL || what == NULL) return NEBEL_ERROR_ARGUMENT;
+    return charge_host(scene, what, (double)bytes, 0);
+}
+
+nebel_result nebel_set_scene_diffusion(nebel_scene *scene, const nebel_diffusion_desc *desc)
+{
+    if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
+    const double wanted = nb_diffusion_cells(desc), more = wanted - scene->budget.lattice;
+    const nebel_result result = charge_host(scene, "multiple scattering", more * NB_CELL_BYTES, more * NB_CELL_SECONDS);
+    if (result != NEBEL_OK) return result;
+    scene->budget.lattice = wanted;
+    if (desc != NULL) scene->diffusion = *desc;
+    scene->data.diffusion = desc != NULL ? &scene->diffusion : NULL;
+    return NEBEL_OK;
+}
+
+double nb_diffusion_cells(const nebel_diffusion_desc *desc)
+{
+    if (desc == NULL) return 0;
+    return desc->cells != 0 ? fmin(desc->cells, NEBEL_MAX_DIFFUSION_CELLS) : NEBEL_DEFAULT_DIFFUSION_CELLS;
+}
+
+/* ---- noise ----------------------------------------------------------------------------------- */
 
 static const nb_json_node *find(const nb_json *json, const nb_json_node *object, const char *key)
 {

@@ -15,6 +15,7 @@ typedef struct nb_codec {
     const char *name;
     uint64_t most_pixels; /* 0: NB_MAX_PIXELS */
     uint64_t room;        /* bytes that samples or voxels may take; 0: any */
+    bool *is_full;        /* set where they would take more; NULL: nobody asks */
 } nb_codec;
 
 /* Larger pictures are refused before memory is asked for: pixels, and samples of all channels. */

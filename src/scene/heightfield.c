@@ -59,6 +59,9 @@ static nebel_result build(const nb_model_load *load, const nb_heights *map)
     if (triangle_count > NB_MAX_TRIANGLES)
         return nb_model_fail(load, NEBEL_ERROR_LIMIT, "the height map makes %llu triangles; at most %llu",
                              (unsigned long long)triangle_count, (unsigned long long)NB_MAX_TRIANGLES);
+    const nebel_result room =
+        nb_model_check_room(load, nb_mesh_bytes((uint64_t)map->width * map->height, false, triangle_count));
+    if (room != NEBEL_OK) return room;
     nebel_mesh mesh = {.triangle_count = (uint32_t)triangle_count,
                        .texture = -1,
                        .mask = -1,
@@ -84,7 +87,8 @@ static nebel_result read_map(const nb_model_load *load, nb_heights *map)
 {
     const char *file = load->source->file;
     nb_note note = {""};
-    const nb_codec codec = {.allocator = load->allocator, .log = nb_note_log(&note), .name = file};
+    const nb_codec codec = {
+        .allocator = load->allocator, .log = nb_note_log(&note), .name = file, .room = nb_model_room(load)};
     nb_bytes bytes;
     nebel_result result = nb_file_check(&load->log, load->source->where, "height map", file);
     if (result == NEBEL_OK)

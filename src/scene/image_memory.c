@@ -20,6 +20,7 @@ nebel_result nb_codec_check_size(const nb_codec *codec, uint64_t width, uint64_t
 nebel_result nb_codec_check_room(const nb_codec *codec, uint64_t bytes)
 {
     if (codec->room == 0 || bytes <= codec->room) return NEBEL_OK;
+    if (codec->is_full != NULL) *codec->is_full = true;
     return nb_fail(&codec->log, NEBEL_ERROR_LIMIT,
                    "%s: takes %.0f MB; %.0f MB are left of what the scene may take (nebel: --memory)", codec->name,
                    (double)bytes / 1048576, floor((double)codec->room / 1048576));

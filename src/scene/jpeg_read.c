@@ -72,6 +72,8 @@ static void run(decoder *in, const nb_bytes *bytes)
     jpeg_mem_src(&in->jpeg, bytes->data, bytes->size);
     jpeg_read_header(&in->jpeg, TRUE);
     in->result = nb_codec_check_size(in->codec, in->jpeg.image_width, in->jpeg.image_height, 4);
+    if (in->result == NEBEL_OK)
+        in->result = nb_codec_check_room(in->codec, 4 * (uint64_t)in->jpeg.image_width * in->jpeg.image_height);
     if (in->result != NEBEL_OK) return;
     in->jpeg.out_color_space = JCS_EXT_RGBA;
     jpeg_start_decompress(&in->jpeg);

@@ -3,6 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#define MEGABYTE 1048576.0
+
 nebel_result nb_model_fail(const nb_model_load *load, nebel_result result, const char *format, ...)
 {
     char message[768];
@@ -69,11 +71,37 @@ nebel_result nb_model_refuse_triangles(const nb_model_load *load)
                          (unsigned long long)NB_MAX_TRIANGLES);
 }
 
+double nb_mesh_bytes(uint64_t vertices, bool has_uvs, uint64_t triangles)
+{
+    return (double)vertices * (has_uvs ? 32 : 24) + (double)triangles * NB_TRIANGLE_BYTES;
+}
+
+nebel_result nb_model_check_room(const nb_model_load *load, double bytes)
+{
+    if (load->most_bytes == 0 || load->set->bytes + bytes <= load->most_bytes) return NEBEL_OK;
+    return nb_model_fail(load, NEBEL_ERROR_LIMIT,
+                         "the model \"%s\" brings the scene to %.0f MB of memory; %.0f MB is the most it may take "
+                         "(nebel: --memory)",
+                         load->source->file, (load->set->bytes + bytes) / MEGABYTE, load->most_bytes / MEGABYTE);
+}
+
+uint64_t nb_model_room(const nb_model_load *load)
+{
+    if (load->most_bytes == 0 || load->set == NULL) return 0;
+    const double left = load->most_bytes - load->set->bytes;
+    return left > 1 ? (uint64_t)left : 1;
+}
+
 nebel_result nb_model_add_mesh(const nb_model_load *load, nebel_mesh *mesh)
 {
     nb_model_set *set = load->set;
     void *meshes = set->meshes;
-    nebel_result result = NEBEL_OK;
+    const double bytes = nb_mesh_bytes(mesh->vertex_count, mesh->uvs != NULL, mesh->triangle_count);
+    nebel_result result = nb_model_check_room(load, bytes);
+    if (result != NEBEL_OK) {
+        nb_mesh_release(&load->allocator, mesh);
+        return result;
+    }
     if (set->triangle_count + mesh->triangle_count > NB_MAX_TRIANGLES)
         result = nb_model_refuse_triangles(load);
     else if (load->sink != NULL)
@@ -82,6 +110,7 @@ nebel_result nb_model_add_mesh(const nb_model_load *load, nebel_mesh *mesh)
                       set->mesh_count + 1))
         result = nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
     if (result == NEBEL_OK) set->triangle_count += mesh->triangle_count;
+    if (result == NEBEL_OK) set->bytes += bytes;
     if (result != NEBEL_OK || load->sink != NULL) {
         nb_mesh_release(&load->allocator, mesh);
         return result;
@@ -91,11 +120,18 @@ nebel_result nb_model_add_mesh(const nb_model_load *load, nebel_mesh *mesh)
     return NEBEL_OK;
 }
 
+static double texel_bytes(const nebel_texture *texture)
+{
+    return 4.0 * texture->width * texture->height;
+}
+
+/* Its room has been checked before it was read. */
 nebel_result nb_model_add_texture(const nb_model_load *load, const nebel_texture *texture, int32_t *index)
 {
     nb_model_set *set = load->set;
     void *textures = set->textures;
     const size_t count = set->texture_count;
+    set->bytes += texel_bytes(texture);
     if (load->sink != NULL && count < INT32_MAX) {
         load->sink->texture(load->sink->user, texture);
         nb_release(&load->allocator, (void *)texture->rgba);
@@ -147,11 +183,19 @@ static nb_model_source place_source(const nb_model_source *source, const nebel_m
 static nebel_result load_all(const nebel_scene *scene, const nebel_model *models, size_t count, nb_model_set *set)
 {
     nebel_result result = NEBEL_OK;
+    double seconds = scene->budget.seconds;
+    set->bytes = scene->budget.memory;
     for (size_t i = 0; i < count && result == NEBEL_OK; i++) {
         const nb_model_source source = place_source(&scene->models[models[i].source], &models[i]);
-        const nb_model_load load = {
-            .allocator = scene->allocator, .log = scene->log, .source = &source, .set = set, .reader = scene->reader};
-        result = source.is_heightfield ? nb_heightfield_load(&load) : nb_model_read(&load);
+        const nb_model_load load = {.allocator = scene->allocator,
+                                    .log = scene->log,
+                                    .source = &source,
+                                    .set = set,
+                                    .reader = scene->reader,
+                                    .most_bytes = nb_scene_most_memory(scene),
+                                    .most_seconds = nb_scene_most_seconds(scene),
+                                    .seconds = &seconds};
+        result = nb_model_read(&load);
     }
     return result;
 }

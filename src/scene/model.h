@@ -7,6 +7,10 @@
 
 #include <sys/stat.h>
 
+/* What a triangle counts in the scene's memory beside its vertices: what renderers make of it takes most of that (measured
+ * of terrain in sunlit fog, where shadows of surfaces take 300). */
+#define NB_TRIANGLE_BYTES 256.0
+
 /* The most triangles of all models together. */
 #define NB_MAX_TRIANGLES ((uint64_t)1 << 28)
 
@@ -36,8 +40,10 @@ typedef struct nb_model_load {
     nb_model_set *set;
     nb_point_set *points;
     nb_model_reader reader;
-    const nb_model_sink *sink; /* NULL: none */
-    const char *folder, *name; /* which references may not leave, and the file seen from it: set by nb_model_read */
+    double most_bytes;             /* that the set may take, with what it begins with; 0: any */
+    double most_seconds, *seconds; /* that the scene may take for its preparation, and has taken; 0, NULL: any */
+    const nb_model_sink *sink;     /* NULL: none */
+    const char *folder, *name;     /* which references may not leave, and the file seen from it: set by nb_model_read */
     void (*opened)(void *user, const char *path, const struct stat *status); /* told of files; NULL: nobody */
     void *opened_user;
     nb_unpack unpack; /* of EXT_meshopt_compression; NULL: not supported */
@@ -45,7 +51,7 @@ typedef struct nb_model_load {
 
 nebel_result nb_heightfield_load(const nb_model_load *load);
 
-/* Reads a model file, in a process of its own or not, as load->reader says. */
+/* Reads a model file, in a process of its own or not, as load->reader says, or a height field. Counts the time. */
 nebel_result nb_model_read(const nb_model_load *load);
 
 /* Reads it in this process; folder and name are set. */
@@ -64,6 +70,13 @@ void nb_mesh_release(const nebel_allocator *allocator, nebel_mesh *mesh);
 /* Hand over a mesh or a texture, also its memory on failure. Errors: LIMIT, MEMORY. */
 nebel_result nb_model_add_mesh(const nb_model_load *load, nebel_mesh *mesh);
 nebel_result nb_model_add_texture(const nb_model_load *load, const nebel_texture *texture, int32_t *index);
+
+/* Whether the set may grow by so many bytes. LIMIT, said, where it may not. */
+nebel_result nb_model_check_room(const nb_model_load *load, double bytes);
+double nb_mesh_bytes(uint64_t vertices, bool has_uvs, uint64_t triangles);
+
+/* Bytes that are left for a picture; 0: any. */
+uint64_t nb_model_room(const nb_model_load *load);
 
 /* LIMIT, and says that there are more than NB_MAX_TRIANGLES. */
 nebel_result nb_model_refuse_triangles(const nb_model_load *load);

@@ -27,12 +27,23 @@ void nb_budget_add(nb_budget *budget, const struct stat *status)
 
 uint64_t nb_budget_memory(const nb_budget *budget)
 {
-    return base_memory + memory_per_byte * budget->bytes;
+    const uint64_t wanted = memory_per_byte * budget->bytes, most = budget->most_memory;
+    return base_memory + (most != 0 && most < wanted ? most : wanted);
+}
+
+static unsigned wanted_seconds(const nb_budget *budget)
+{
+    return base_seconds + (unsigned)(budget->bytes / bytes_per_second);
+}
+
+bool nb_budget_is_cut(const nb_budget *budget)
+{
+    return budget->most_seconds != 0 && budget->most_seconds < wanted_seconds(budget);
 }
 
 unsigned nb_budget_cpu_seconds(const nb_budget *budget)
 {
-    return base_seconds + (unsigned)(budget->bytes / bytes_per_second);
+    return nb_budget_is_cut(budget) ? budget->most_seconds : wanted_seconds(budget);
 }
 
 unsigned nb_budget_wall_seconds(const nb_budget *budget)

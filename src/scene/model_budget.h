@@ -1,7 +1,9 @@
-/* How much memory and time reading a model may take: a base, and more for each byte of the files it consists of. */
+/* How much memory and time reading a model may take: a base, and more for each byte of the files it consists of, but no more
+ * than the base and what the scene may take. */
 #ifndef NB_SCENE_MODEL_BUDGET_H
 #define NB_SCENE_MODEL_BUDGET_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <sys/stat.h>
@@ -22,7 +24,9 @@
 enum { NB_BUDGET_MAX_FILES = 1024 };
 
 typedef struct nb_budget {
-    uint64_t bytes; /* of all files, each counted once */
+    uint64_t most_memory;  /* of the scene; 0: any */
+    unsigned most_seconds; /* that are left to the scene; 0: any */
+    uint64_t bytes;        /* of all files, each counted once */
     size_t file_count;
     struct nb_budget_file {
         uint64_t device, inode;
@@ -33,6 +37,7 @@ typedef struct nb_budget {
 void nb_budget_add(nb_budget *budget, const struct stat *status);
 
 uint64_t nb_budget_memory(const nb_budget *budget);       /* bytes */
+bool nb_budget_is_cut(const nb_budget *budget);           /* the scene has less time left than the files warrant */
 unsigned nb_budget_cpu_seconds(const nb_budget *budget);  /* of processor time */
 unsigned nb_budget_wall_seconds(const nb_budget *budget); /* more than of processor time */
 

@@ -81,6 +81,8 @@ static nb_wire_request describe(const nb_model_load *load)
     request.max_points = load->points != NULL ? load->points->limit : 0;
     request.triangles = load->set != NULL ? load->set->triangle_count : 0;
     request.textures = load->set != NULL ? load->set->texture_count : 0;
+    request.bytes = load->set != NULL ? load->set->bytes : 0;
+    request.most_bytes = load->most_bytes;
     return request;
 }
 
@@ -264,8 +266,14 @@ static const char *name_signal(int number)
 
 static nebel_result fail_time(const nb_model_load *load, const nb_budget *budget)
 {
+    const unsigned seconds = nb_budget_cpu_seconds(budget);
+    if (nb_budget_is_cut(budget))
+        return nb_model_fail(load, NEBEL_ERROR_LIMIT,
+                             "reading the model \"%s\" takes longer than the %u s that are left of what the scene may "
+                             "take (nebel: --memory)",
+                             load->source->file, seconds);
     return nb_model_fail(load, NEBEL_ERROR_LIMIT, "reading the model \"%s\" takes longer than %u s; " REMEDY,
-                         load->source->file, nb_budget_cpu_seconds(budget));
+                         load->source->file, seconds);
 }
 
 static nebel_result fail_memory(const nb_model_load *load, const nb_budget *budget)
@@ -303,6 +311,8 @@ static nebel_result judge(const nb_receiver *received, nb_receipt receipt, int s
                              "cannot read the model \"%s\": \"%s\" belongs to another version of nebel; install both "
                              "together",
                              load->source->file, load->reader.program);
+    case NB_RECEIPT_REFUSED:
+        return received->result;
     case NB_RECEIPT_MEMORY:
         return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
     default:
@@ -312,12 +322,20 @@ static nebel_result judge(const nb_receiver *received, nb_receipt receipt, int s
     }
 }
 
+static void set_limits(const nb_model_load *load, nb_budget *budget)
+{
+    const double left = load->seconds != NULL ? load->most_seconds - *load->seconds : 0;
+    budget->most_memory = (uint64_t)load->most_bytes;
+    if (left > 0 && left < 1e6 && !NB_SANITIZED) budget->most_seconds = 1 + (unsigned)left;
+}
+
 nebel_result nb_model_process_read(const nb_model_load *load)
 {
     struct stat model;
     child running;
     nb_budget *budget = nb_allocate_zero(&load->allocator, 1, sizeof *budget);
     if (budget == NULL) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
+    set_limits(load, budget);
     if (stat(load->source->file, &model) == 0) nb_budget_add(budget, &model);
     nebel_result result = start(load, &running);
     if (result == NEBEL_OK) {

@@ -1,11 +1,13 @@
 #define _GNU_SOURCE
 /* Where a model is read, and which folder its references may not leave. */
 #include "scene/model.h"
+#include "scene/model_budget.h"
 #include "scene/path.h"
 
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 static nebel_result fail_memory(const nb_model_load *load)
 {
@@ -54,7 +56,7 @@ static nebel_result place(nb_model_load *load, nb_arena *scratch)
     return load->source->folder != NULL ? find_name(load, scratch, own, load) : NEBEL_OK;
 }
 
-nebel_result nb_model_read(const nb_model_load *load)
+static nebel_result read_file(const nb_model_load *load)
 {
     nb_arena scratch = {.allocator = load->allocator};
     nb_model_load placed = *load;
@@ -62,5 +64,27 @@ nebel_result nb_model_read(const nb_model_load *load)
     if (result == NEBEL_OK) result = place(&placed, &scratch);
     if (result == NEBEL_OK) result = load->reader.in_process ? nb_assimp_load(&placed) : nb_model_process_read(&placed);
     nb_arena_release(&scratch);
+    return result;
+}
+
+static double now(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+/* One after the other models could take any time, each within its own limit. */
+nebel_result nb_model_read(const nb_model_load *load)
+{
+    const double begin = now();
+    if (load->seconds != NULL && *load->seconds >= load->most_seconds && !NB_SANITIZED)
+        return nb_model_fail(
+            load, NEBEL_ERROR_LIMIT,
+            "the model \"%s\" is not read any more: the scene has taken %.0f s of preparation, the most "
+            "with its memory (nebel: --memory)",
+            load->source->file, *load->seconds);
+    const nebel_result result = load->source->is_heightfield ? nb_heightfield_load(load) : read_file(load);
+    if (load->seconds != NULL) *load->seconds += now() - begin;
     return result;
 }

@@ -113,6 +113,8 @@ static nb_receipt take_texture(nb_receiver *in, const nb_wire_frame *frame)
     const uint64_t count = (uint64_t)head.width * head.height;
     if (count == 0 || count > NB_MAX_PIXELS || frame->size != sizeof head + 4 * count) return NB_RECEIPT_BAD;
     if (!fits(in, 4 * count)) return NB_RECEIPT_TOO_BIG;
+    in->result = nb_model_check_room(load, 4 * (double)count);
+    if (in->result != NEBEL_OK) return NB_RECEIPT_REFUSED;
     uint8_t *rgba = nb_allocate(&load->allocator, (size_t)count, 4);
     if (rgba == NULL) return NB_RECEIPT_MEMORY;
     texture = (nebel_texture){head.width, head.height, rgba};
@@ -203,6 +205,8 @@ static nb_receipt take_mesh(nb_receiver *in, const nb_wire_frame *frame)
                           3 * sizeof(uint32_t) * (uint64_t)head.triangle_count;
     if (!check_head(in, &head) || frame->size != sizeof head + size) return NB_RECEIPT_BAD;
     if (!fits(in, size)) return NB_RECEIPT_TOO_BIG;
+    in->result = nb_model_check_room(load, nb_mesh_bytes(head.vertex_count, head.has_uvs != 0, head.triangle_count));
+    if (in->result != NEBEL_OK) return NB_RECEIPT_REFUSED;
     nebel_mesh mesh = {.triangle_count = head.triangle_count,
                        .texture = head.texture,
                        .mask = head.mask,

@@ -13,6 +13,7 @@ typedef enum nb_receipt {
     NB_RECEIPT_TOO_BIG, /* more than the budget allows */
     NB_RECEIPT_BAD,     /* it is not what the two agreed on */
     NB_RECEIPT_VERSION, /* it comes from another version */
+    NB_RECEIPT_REFUSED, /* more than is left to the scene, which has been said: the result */
     NB_RECEIPT_MEMORY   /* out of memory here */
 } nb_receipt;
 

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 /* To be raised with every change here, and with every change of what a model becomes. */
-#define NB_WIRE_VERSION 1
+#define NB_WIRE_VERSION 2
 
 /* The whole request is one write to a pipe that nobody reads yet. */
 #define NB_WIRE_MAX_REQUEST 32768
@@ -23,6 +23,7 @@ typedef struct nb_wire_request {
     double unit, color[3];
     uint64_t max_points;
     uint64_t triangles, textures;               /* that the set has already */
+    double bytes, most_bytes;                   /* of the scene: counted already, and that it may take; 0: any */
     uint32_t file_size, folder_size, name_size; /* with the zero byte */
     uint32_t unused;
 } nb_wire_request;

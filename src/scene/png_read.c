@@ -100,6 +100,15 @@ static void read_header(decoder *in)
     choose_transforms(in);
 }
 
+/* Of what is made of the pixels, and of them where both are there at once. */
+static uint64_t kept_row_size(const decoder *in)
+{
+    const uint64_t read = in->row_size, width = in->width;
+    if (in->target == TARGET_TEXTURE) return read;
+    return in->target == TARGET_HEIGHTS ? read + width * sizeof(uint16_t)
+                                        : read + width * (unsigned)in->channel_count * sizeof(float);
+}
+
 static void read_pixels(decoder *in)
 {
     const int passes = png_set_interlace_handling(in->png);
@@ -107,6 +116,8 @@ static void read_pixels(decoder *in)
     in->row_size = png_get_rowbytes(in->png, in->info);
     in->bits = png_get_bit_depth(in->png, in->info);
     in->channel_count = png_get_channels(in->png, in->info);
+    in->result = nb_codec_check_room(in->codec, in->height * kept_row_size(in));
+    if (in->result != NEBEL_OK) png_longjmp(in->png, 1);
     in->pixels = nb_allocate(&in->codec->allocator, in->height, in->row_size);
     if (in->pixels == NULL) stop(in, NEBEL_ERROR_MEMORY, "out of memory");
     for (int pass = 0; pass < passes; pass++)

@@ -38,8 +38,9 @@ bool nb_read_multiple_scattering(nb_scene_reader *in, const nb_json_node *node)
         !read_ground(in, found[GROUND], desc))
         return false;
     desc->cells = (uint32_t)cells;
-    const double lattice = cells != 0 ? cells : NEBEL_DEFAULT_DIFFUSION_CELLS;
+    const double lattice = nb_diffusion_cells(desc);
     if (!nb_scene_charge(in, node, lattice * NB_CELL_BYTES, lattice * NB_CELL_SECONDS)) return false;
+    in->scene->budget.lattice = lattice;
     in->scene->data.diffusion = desc;
     return true;
 }

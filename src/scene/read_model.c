@@ -200,7 +200,10 @@ bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit,
                                 .log = in->scene->log,
                                 .source = &model,
                                 .points = &points,
-                                .reader = in->scene->reader};
+                                .reader = in->scene->reader,
+                                .most_bytes = nb_scene_most_memory(in->scene),
+                                .most_seconds = nb_scene_most_seconds(in->scene),
+                                .seconds = &in->scene->budget.seconds};
     if (node == NULL) return true;
     if (!nb_value_members(in->json, node, &points_keys, found) || !read_file(in, found[FILE_KEY], &model) ||
         !read_folder(in, found[FOLDER], &model) || !read_placement(in->json, found, &model))

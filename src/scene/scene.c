@@ -373,17 +373,6 @@ static nebel_result add_cells(nebel_fog *fog, const nebel_cells_desc *cells)
     return result;
 }
 
-nebel_result nebel_set_scene_diffusion(nebel_scene *scene, const nebel_diffusion_desc *desc)
-{
-    if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (desc != NULL) {
-        scene->diffusion = *desc;
-        desc = &scene->diffusion;
-    }
-    scene->data.diffusion = desc;
-    return NEBEL_OK;
-}
-
 bool nb_scene_is_frame(const nebel_scene *scene, double frame)
 {
     if (fabs(frame) <= NB_MOST_FRAME) return true;

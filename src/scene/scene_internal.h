@@ -30,6 +30,7 @@ typedef struct nb_model_set {
     nebel_texture *textures;
     size_t texture_count, texture_capacity;
     uint64_t triangle_count;
+    double bytes; /* what is counted of the scene's memory, with all that came before the models */
 } nb_model_set;
 
 /* Of a planet: its ground's, and two of each shell of clouds. */
@@ -45,6 +46,7 @@ typedef struct nb_model_reader {
 typedef struct nb_scene_budget {
     uint64_t most;          /* bytes; 0: NEBEL_DEFAULT_SCENE_MEMORY */
     double memory, seconds; /* so far: bytes, of preparation */
+    double lattice;         /* cells of multiple scattering, of what is so far */
 } nb_scene_budget;
 
 struct nebel_scene {
@@ -164,8 +166,13 @@ bool nb_scene_charge(nb_scene_reader *in, const nb_json_node *node, double bytes
 bool nb_scene_charge_noise(nb_scene_reader *in, const nb_json_node *density);
 /* The same for the noise of an element of "fog" or "nebula", if any: before the file is read, as noise is made then. */
 bool nb_scene_count_noise(nb_scene_reader *in, const nb_json_node *volume);
+/* Of the lattice that a description asks for; NULL: 0. */
+double nb_diffusion_cells(const nebel_diffusion_desc *desc);
 /* Bytes that are left, at least 1. */
 uint64_t nb_scene_room(const nebel_scene *scene);
+/* The most bytes and seconds there may be. */
+double nb_scene_most_memory(const nebel_scene *scene);
+double nb_scene_most_seconds(const nebel_scene *scene);
 
 /* nebel_parse_scene; with `save`, notes what is to be changed in the text. */
 nebel_result nb_scene_parse(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,

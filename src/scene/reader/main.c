@@ -234,13 +234,16 @@ static nebel_result read_model(const wanted *in, answer *out)
     const nb_model_sink sink = {put_mesh, put_texture, out};
     const nb_model_source source = describe(in);
     const bool takes_points = (in->request.flags & NB_WIRE_POINTS) != 0;
-    nb_model_set set = {.triangle_count = in->request.triangles, .texture_count = (size_t)in->request.textures};
+    nb_model_set set = {.triangle_count = in->request.triangles,
+                        .texture_count = (size_t)in->request.textures,
+                        .bytes = in->request.bytes};
     nb_point_set points = {.limit = (size_t)in->request.max_points};
     const nb_model_load load = {.allocator = nb_resolve_allocator(&(nebel_allocator){NULL, NULL, NULL}),
                                 .log = {put_message, out},
                                 .source = &source,
                                 .set = takes_points ? NULL : &set,
                                 .points = takes_points ? &points : NULL,
+                                .most_bytes = in->request.most_bytes,
                                 .sink = &sink,
                                 .folder = in->folder,
                                 .name = in->name,
@@ -267,6 +270,7 @@ int main(int count, char **words)
     put_frame(NB_WIRE_HELLO, NB_WIRE_VERSION, 0);
     flush();
     if (!get_request(&in)) return EXIT_FAILURE;
+    out.budget.most_memory = (uint64_t)in.request.most_bytes;
     nb_confine_resources();
     nb_confine_budget(&out.budget);
     nb_confine_files(in.file, in.folder);
