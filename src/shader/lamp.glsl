@@ -285,11 +285,31 @@ float nb_lamp_weight_of_three(int j) { return j == 3 ? 8.0 / 18.0 : j == 1 || j 
 /* What a step's error may be of the light that is found so far. */
 #define NB_LAMP_SHARE 0.01
 
+/* What is known of the place where a step begins, or of the one just behind it. */
+struct nb_lamp_start {
+    nb_vec3 depth; /* from the eye */
+    nb_vec3 way;   /* depth from there to the lamp */
+    bool is_known;
+};
+
+nb_lamp_start nb_open_start()
+{
+    nb_lamp_start start;
+    start.depth = nb_splat3(0.0);
+    start.way = nb_splat3(0.0);
+    start.is_known = false;
+    return start;
+}
+
 struct nb_lamp_step {
     nb_vec3 light;
     float error;
-    float steepness; /* by how much the logarithm of the light changes from the first node to the next */
+    float steepness; /* by how much the logarithm of the light changes from the start to the first node */
+    nb_lamp_start next; /* the end of the step */
 };
+
+/* From the last two nodes on to the end of a step. */
+#define NB_BEHIND_NODES 0.21265858
 
 /* What part of the light between two nodes they may not show, between which its logarithm changes so. */
 float nb_unseen_share(float change)
@@ -300,22 +320,21 @@ float nb_unseen_share(float change)
 
 /* Light of the first part of a swing, up to w = length, at `end`, of which `drop` of transmittance is lost. `before` is the depth in front of the
  * piece. Where nodes do not see that loss they have passed over what causes it, and light that changes by large factors from node to
- * node may be anywhere between them. */
-nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, nb_swing swing,
-                               float length, float end, nb_vec3 before, nb_vec3 seen, nb_vec3 drop, inout int turns)
+ * node may be anywhere between them; what is between the start and the first node may be all the light there is. `start` is asked where
+ * it is not known: a way to the lamp may pass many voxels. */
+nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, nb_swing swing, float length,
+                               float end, nb_vec3 before, nb_vec3 seen, nb_vec3 drop, inout nb_lamp_start start, inout int turns)
 {
     nb_vec3 seven = nb_splat3(0.0);
     nb_vec3 three = nb_splat3(0.0);
     nb_vec3 taken = nb_splat3(0.0);
-    nb_vec3 last_depth = before;
-    nb_vec3 last_way = nb_splat3(0.0);
+    nb_vec3 last_depth = start.depth;
+    nb_vec3 last_way = start.way;
     float hidden = 0.0;
     nb_lamp_step s;
     s.steepness = 0.0;
-    /* From just behind the start, as what is between it and the first node may be all the light there is. Not where a way may cross
-     * voxels: walks through them would use up the turns of the loops that a driver allows. */
-    int begin = NB_HAS(NB_HAS_GRID) ? 0 : -1;
-    for (int j = begin; j < NB_LAMP_NODES; j++) {
+    s.next = nb_open_start();
+    for (int j = start.is_known ? 0 : -1; j < NB_LAMP_NODES; j++) {
         float w = length * (j < 0 ? 1e-5 : nb_lamp_node(j));
         float t = min(nb_swing_place(swing, w), end);
         float from = t - by.closest;
@@ -330,22 +349,27 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
         nb_vec3 depth = before + place.depth;
         nb_vec3 light = nb_splat3(0.0);
         nb_vec3 way = last_way;
-        if (fluence > 0.0) {
+        if (fluence > 0.0 || j < 0) {
             way = nb_depth_to_light(ray.origin + ray.direction * t, towards, max(distance - by.clear, 0.0), false, turns);
             light = place.glow * by.intensity * fluence * nb_exp3(-(depth + way));
         }
-        if (j > begin) {
+        if (j >= 0) {
             float change = nb_largest(abs((depth - last_depth) + (way - last_way)));
             nb_vec3 lost = max(nb_exp3(-last_depth) - nb_exp3(-depth), nb_splat3(0.0));
             hidden += nb_largest(lost * nb_exp3(-min(way, last_way))) * nb_unseen_share(change);
-            if (j == begin + 1) s.steepness = 2.0 * change; /* over a tenth of the step, as src/march/trace_sun.h has it */
+            if (j == 0) s.steepness = 2.0 * change; /* over a tenth of the step, as src/march/trace_sun.h has it */
+            s.next.way = max(way + (way - last_way) * NB_BEHIND_NODES, nb_splat3(0.0));
+            s.next.is_known = fluence > 0.0;
+            seven += nb_lamp_weight(j) * light;
+            three += nb_lamp_weight_of_three(j) * light;
+            taken += nb_lamp_weight(j) * speed * place.extinction * nb_exp3(-depth);
+        } else {
+            start.depth = depth;
+            start.way = way;
+            start.is_known = true;
         }
         last_depth = depth;
         last_way = way;
-        if (j < 0) continue;
-        seven += nb_lamp_weight(j) * light;
-        three += nb_lamp_weight_of_three(j) * light;
-        taken += nb_lamp_weight(j) * speed * place.extinction * nb_exp3(-depth);
     }
     float most = nb_most_fluence(by, swing.start, end) * piece.scatter;
     nb_vec3 limit = most * (drop + 8.0 * NB_EPSILON * seen); /* also what rounds to nothing may be light */
@@ -396,6 +420,7 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
     float t = piece.start;
     float far = min(piece.end, by.closest + NB_LAMP_REACH);
     float guess = nb_first_swing(ray, first, listed, piece, by, turns);
+    nb_lamp_start start = nb_open_start();
     for (int i = 0; i < NB_MOST_LAMP_STEPS; i++) {
         if (!(t < far) || nb_is_tired(turns + nb_grid_turns)) break;
         if (lit.y <= t) {
@@ -407,11 +432,14 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
         nb_swing swing = nb_swing_between(by.closest, by.aside, t, stop);
         float length = lit.x > 0.0 && !last ? min(min(guess, 1.0), swing.end) : swing.end;
         float end = length >= swing.end ? stop : min(nb_swing_place(swing, length), stop);
-        nb_vec3 behind = nb_exp3(-(before + nb_place_in_piece(ray, first, listed, piece, end, ray.direction, turns).depth));
+        nb_vec3 depth = before + nb_place_in_piece(ray, first, listed, piece, end, ray.direction, turns).depth;
+        nb_vec3 behind = nb_exp3(-depth);
         turns += NB_LAMP_NODES + 1;
         bool fits = true;
+        nb_lamp_start next = nb_open_start();
         if (lit.x > 0.0) {
-            nb_lamp_step taken = nb_step_past_lamp(ray, first, listed, piece, by, swing, length, end, before, seen, seen - behind, turns);
+            nb_lamp_step taken = nb_step_past_lamp(ray, first, listed, piece, by, swing, length, end, before, seen, seen - behind, start, turns);
+            next = taken.next;
             float allowed = tolerance + NB_LAMP_SHARE * nb_largest(max(sum, taken.light));
             fits = last || taken.error <= allowed || length < 1e-7;
             if (fits) sum += lit.x * taken.light;
@@ -420,6 +448,8 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
         if (fits) {
             t = end;
             seen = behind;
+            start = next;
+            start.depth = depth;
         }
     }
     return sum;

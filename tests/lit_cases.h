@@ -1,0 +1,111 @@
+/* Sunlit and lamplit fog of which most light comes from a small part of the ray, which steps of any length may pass over. The values
+ * are from quadrature in optical depth, made without nebel. */
+#ifndef LIT_CASES_H
+#define LIT_CASES_H
+
+#include <nebel/nebel.h>
+
+#include <math.h>
+
+typedef struct lit_case {
+    const char *name;
+    nebel_volume_desc volume;
+    nebel_sun sun;   /* of one colour; none: the lamp */
+    nebel_lamp lamp; /* the same */
+    nebel_ray ray;
+    double right; /* radiance, to six digits */
+    double tolerance;
+} lit_case;
+
+#define LIT_GRAY(x)                                                                                                    \
+    {                                                                                                                  \
+        (x), (x), (x)                                                                                                  \
+    }
+#define LIT_HALF_SPACE                                                                                                 \
+    {                                                                                                                  \
+        .type = NEBEL_SHAPE_HALF_SPACE, .normal = { 0, 1, 0 }                                                          \
+    }
+
+static const nebel_shape lit_cut_ball[] = {
+    {.type = NEBEL_SHAPE_SPHERE, .radius = 2},
+    {.type = NEBEL_SHAPE_BOX, .min = {-1, -1, -1}, .max = {1, 1, 1}},
+    {.type = NEBEL_SHAPE_HALF_SPACE, .point = {0, 0.69, 0}, .normal = {0.1827, 0.7308, -0.6577}}};
+
+static const lit_case lit_cases[] = {
+    {"lamplit skin of an opaque ball",
+     {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, -1, 0}, .radius = 1},
+      .extinction = LIT_GRAY(500),
+      .albedo = LIT_GRAY(0.9)},
+     .lamp = {.position = {1, 2, 3}, .intensity = LIT_GRAY(100)},
+     .ray = {{0, 3, 8}, {-0.851919, -3.5, -7.37258}, HUGE_VAL},
+     .right = 0.0138474},
+    {"lamplit skin of a dense half space",
+     {.shape = LIT_HALF_SPACE, .extinction = LIT_GRAY(1000), .albedo = LIT_GRAY(1)},
+     .lamp = {.position = {0, 1, 0}, .intensity = LIT_GRAY(10)},
+     .ray = {{0, 5, 0}, {0, -1, 0}, HUGE_VAL},
+     .right = 0.397490},
+    {"lamplit skin of a denser ball",
+     {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, -100, 0}, .radius = 100},
+      .extinction = LIT_GRAY(1e5),
+      .albedo = LIT_GRAY(1)},
+     .lamp = {.position = {0, 1, 0}, .intensity = LIT_GRAY(10)},
+     .ray = {{0, 5, 0}, {0, -1, 0}, HUGE_VAL},
+     .right = 0.397884},
+    {"half space in low sun",
+     {.shape = LIT_HALF_SPACE, .extinction = LIT_GRAY(1), .albedo = LIT_GRAY(1)},
+     .sun = {{0.9797959, 0.2, 0}, LIT_GRAY(3)},
+     .ray = {{0, 5, 0}, {0, -1, 0}, HUGE_VAL},
+     .right = 0.0397887},
+    {"light that falls off faster than the view",
+     {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-1, -1, -1}, .max = {1, 0, 1}},
+      .extinction = LIT_GRAY(300),
+      .albedo = LIT_GRAY(1)},
+     .lamp = {.position = {20, 0.4, 0}, .intensity = LIT_GRAY(400)},
+     .ray = {{0, 5, 0}, {0, -1, 0}, HUGE_VAL},
+     .right = 0.00155991},
+    {"the same of the sun",
+     {.shape = {.type = NEBEL_SHAPE_CYLINDER, .from = {0, -1000, 0}, .radius = 1000},
+      .extinction = LIT_GRAY(1),
+      .albedo = LIT_GRAY(1)},
+     .sun = {{0.9998, 0.02, 0}, LIT_GRAY(1)},
+     .ray = {{0, 5, 0}, {0, -1, 0}, HUGE_VAL},
+     .right = 0.00156034,
+     .tolerance = 1e-2},
+    {"edges between the parts of an intersection",
+     {.shape = {.type = NEBEL_SHAPE_INTERSECTION, .parts = lit_cut_ball, .part_count = 3},
+      .extinction = LIT_GRAY(0.78),
+      .albedo = LIT_GRAY(1)},
+     .sun = {{0.6, 0.8, 0}, LIT_GRAY(3)},
+     .ray = {{1.28, 4.47, 5}, {-0.30725143, -0.71399379, -0.62913387}, HUGE_VAL},
+     .right = 0.0353103},
+    {"through a lamp's center",
+     {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 100},
+      .extinction = LIT_GRAY(1e-5),
+      .albedo = LIT_GRAY(1),
+      .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.6}},
+     .lamp = {.intensity = LIT_GRAY(1e6)},
+     .ray = {{1.7767116663701477, -1.193014723079912, 4.518850686302743},
+             {-0.35534233327402953, 0.2386029446159824, -0.9037701372605487},
+             HUGE_VAL},
+     .right = 25387.8},
+    {"thin fog that scatters forwards",
+     {.shape = {.type = NEBEL_SHAPE_CYLINDER, .from = {-1, 0, 0}, .to = {1, 0, 0}, .radius = 1},
+      .extinction = LIT_GRAY(1e-8),
+      .albedo = LIT_GRAY(1),
+      .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.99}},
+     .sun = {{1, 0, 0}, LIT_GRAY(1000)},
+     .ray = {{-5, 0, 0}, {1, 0, 0}, HUGE_VAL},
+     .right = 0.0316718},
+    {"the outskirts of a gaussian",
+     {.shape = {.type = NEBEL_SHAPE_WORLD},
+      .density = {.type = NEBEL_DENSITY_GAUSSIAN, .sigma = 0.59},
+      .extinction = LIT_GRAY(0.001),
+      .albedo = LIT_GRAY(1)},
+     .lamp = {.position = {0, 2.19, 0}, .intensity = LIT_GRAY(25)},
+     .ray = {{10.76, -1.47, 12.42}, {-0.5687533786137285, -0.02550983553415296, -0.8221124269870205}, HUGE_VAL},
+     .right = 9.18e-9},
+};
+
+enum { LIT_CASES = sizeof lit_cases / sizeof lit_cases[0] };
+
+#endif
