@@ -259,13 +259,50 @@ static void test_samples_share_the_fog(void **state)
     pass_close(&context);
 }
 
+/* What the sun passes on its way to a surface, and what the eye sees of it, are the same texels. Each frame has other voxels, or
+ * the first again. */
+static void test_sun_and_eye_share_voxels(void **state)
+{
+    (void)state;
+    static const float floor[4][3] = {{-9, -2, 9}, {9, -2, 9}, {9, -2, -9}, {-9, -2, -9}};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    const nebel_mesh mesh = {.positions = floor[0],
+                             .indices = indices,
+                             .vertex_count = 4,
+                             .triangle_count = 2,
+                             .base_color = {.5f, .5f, .5f},
+                             .texture = -1};
+    const nebel_scene_data scene = {
+        .mesh_count = 1, .meshes = &mesh, .has_sun = 1, .sun_direction = {.1, 1, .2}, .sun_irradiance = {3, 3, 3}};
+    const nebel_gl_frame_desc frame = {
+        .camera = {.position = {0, 1, 6}, .look_at = {0, -1, 0}, .up = {0, 1, 0}, .vertical_fov = 60},
+        .width = 32,
+        .height = 24};
+    nb_gl context;
+    nebel_gl_renderer *renderer = NULL;
+    nebel_grid *const grids[] = {grid_ending_in(1), grid_ending_in(2)};
+    pass_open(&context, NB_GL_330);
+    assert_int_equal(nebel_create_gl_renderer(&scene, NULL, &(nebel_gl_renderer_desc){0}, &renderer), NEBEL_OK);
+    start_counting();
+    for (int i = 0; i < 3; i++) {
+        nebel_snapshot *const fog = fog_of_voxels(grids[i % 2], .3);
+        assert_int_equal(nebel_set_gl_renderer_fog(renderer, fog), NEBEL_OK);
+        assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
+        assert_int_equal(voxels, i + 1);
+        nebel_release_snapshot(fog);
+    }
+    stop_counting();
+    nebel_destroy_gl_renderer(renderer);
+    for (int i = 0; i < 2; i++) nebel_release_grid(grids[i]);
+    pass_close(&context);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_passes_hand_over_what_is_new),
-        cmocka_unit_test(test_voxels_stay),
-        cmocka_unit_test(test_errors_are_not_kept),
-        cmocka_unit_test(test_samples_share_the_fog),
+        cmocka_unit_test(test_passes_hand_over_what_is_new), cmocka_unit_test(test_voxels_stay),
+        cmocka_unit_test(test_errors_are_not_kept),          cmocka_unit_test(test_samples_share_the_fog),
+        cmocka_unit_test(test_sun_and_eye_share_voxels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

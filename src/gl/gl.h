@@ -22,6 +22,7 @@ struct nebel_gl {
     nb_programs programs;
     nb_steps steps;
 
+    const nebel_gl *lender;    /* set earlier in a frame: its voxels serve where they are the same; NULL: none */
     int dims_alone;            /* the fog is asked for transmittance alone: nothing of it is mixed */
     int has_warned;            /* of the turns of loops */
     int may_tire;              /* rays may take more of them than this driver has */

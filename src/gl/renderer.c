@@ -49,6 +49,7 @@ static nebel_result make(nebel_gl_renderer *r)
     if (result == NEBEL_OK) result = nebel_create_gl(&desc, &r->sun_cloud);
     if (result != NEBEL_OK) return result;
     r->sun_fog->dims_alone = r->sun_cloud->dims_alone = 1;
+    r->eye_fog->lender = r->sun_fog;
     nb_scene_state_enter(&r->context, &state);
     result = make_objects(r);
     nb_scene_state_leave(&r->context, &state);

@@ -239,12 +239,21 @@ static void keep(nebel_snapshot **kept, nebel_snapshot *snapshot)
     *kept = snapshot;
 }
 
+static int is_lent(const nebel_gl *gl, const nebel_snapshot *snapshot)
+{
+    return gl->lender != NULL && gl->lender->voxels_of != NULL && nebel_same_voxels(gl->lender->voxels_of, snapshot);
+}
+
 /* Voxels stay where they are while other fog and the eye change. */
 static nebel_result upload_voxels(nebel_gl *gl, nebel_snapshot *snapshot)
 {
     size_t count = 0;
     nebel_result result = nebel_pack_voxels(snapshot, NULL, 0, &count);
     if (result != NEBEL_OK || count == 0) return result;
+    if (is_lent(gl, snapshot)) {
+        gl->fog.voxels = gl->lender->voxels;
+        return NEBEL_OK;
+    }
     if (gl->voxels_of == NULL || !nebel_same_voxels(gl->voxels_of, snapshot)) {
         result = write_voxels(gl, snapshot, count);
         keep(&gl->voxels_of, result == NEBEL_OK ? snapshot : NULL);
@@ -329,7 +338,8 @@ static int are_same_views(const nebel_gl *gl, const nebel_view *views, int count
 static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const double eye[3], const nebel_view *views,
                             int view_count)
 {
-    const int has_words = gl->packed == snapshot && memcmp(gl->fog.eye, eye, sizeof gl->fog.eye) == 0;
+    const int has_voxels = gl->fog.voxels == gl->voxels || gl->fog.voxels == 0 || is_lent(gl, snapshot);
+    const int has_words = gl->packed == snapshot && memcmp(gl->fog.eye, eye, sizeof gl->fog.eye) == 0 && has_voxels;
     size_t entry_count = 0;
     nebel_result result = NEBEL_OK;
     gl->has_fog = has_words && are_same_views(gl, views, view_count);
