@@ -392,7 +392,7 @@ class RenderTest(PictureCase):
             self.assert_done(nebel(*words, "-", stdout=log))
         self.assertEqual((self.folder / "log").read_bytes(), b"old" + done.stdout)
         self.assert_done(nebel(*words, "/dev/null"))
-        self.assert_failed(nebel(*words, "/dev/full"), "/dev/full", "No space left")
+        self.assert_failed(nebel(*words, "/dev/full"), "/dev/full", "a device")
         self.assert_misused(nebel(*words, "-", "--aov"), "--aov")
         self.assert_misused(nebel(*words, "-", "--frames", "0-1"), "--output")
 

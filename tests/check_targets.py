@@ -43,6 +43,42 @@ class TargetTest(check_cli.PictureCase):
         self.scene = self.write_scene("grid.json", [{**FOG, "density": density}])
         self.assert_failed(nebel("info", self.scene), "a pipe")
 
+    def test_no_path_may_be_a_pipe_a_device_or_a_folder(self):
+        os.mkfifo(self.folder / "pipe")
+        first = self.scene
+        os.mkfifo(self.folder / "pipe.png")
+        os.mkfifo(self.folder / "pipe.webp")
+        (self.folder / "folder").mkdir()
+        (self.folder / "a.mtl").write_text("newmtl a\nmap_Kd pipe.png\n")
+        (self.folder / "a.obj").write_text("mtllib a.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+
+        def sections(name):
+            """What of a scene names a file."""
+            grid = {"type": "grid", "file": name, "size": [1, 1, 1], "voxels": "float"}
+            yield {"fog": [{**FOG, "density": grid}]}
+            yield {"models": [{"file": name}]}
+            yield {"models": [{"heightfield": {"file": name, "size": [1, 1], "height": 1}}]}
+            yield {"nebula": [{"points": {"file": name}, "absorption": 1, "size": [0.1, 0.1]}]}
+            yield {"ambient": {"type": "environment", "file": name}}
+            yield {"planet": {"model": "layers", "map": name}}
+
+        for name, reason in (("pipe", "a pipe"), ("/dev/zero", "a device"), ("folder", "Is a directory")):
+            self.assert_failed(nebel("info", name, cwd=self.folder), reason)
+            self.assert_failed(nebel("compare", name, name, cwd=self.folder), reason)
+            for number, section in enumerate(sections(name)):
+                with self.subTest(name=name, section=number):
+                    self.scene = self.write_scene("s.json", **{"fog": [FOG], **section})
+                    self.assert_failed(nebel("render", self.scene, "-o", "a.png", cwd=self.folder), name)
+        self.scene = self.write_scene("s.json", [FOG], models=[{"file": "a.obj"}])
+        self.assertIn("pipe.png", nebel("info", self.scene).err)
+        self.scene = first
+        for output, more in (("pipe.png", ()), ("pipe.webp", ("--frames", "0-1"))):
+            done = self.render(output, *more)
+            if "without WebP" not in done.err:
+                self.assert_failed(done, "a pipe")
+        self.assert_failed(nebel("bench", "--quick", "--json", "pipe", cwd=self.folder), "a pipe")
+        self.assert_failed(nebel("bench", "--quick", "--json", "/dev/full", cwd=self.folder), "a device")
+
     def test_a_film_without_room_is_not_begun(self):
         def limit():
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -5,7 +5,9 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include "scene/codec.h"
@@ -555,34 +557,63 @@ static void test_a_link_stays_and_its_target_is_replaced(void **state)
     free(image.samples);
 }
 
-static void test_devices_and_pipes_are_written_and_stay(void **state)
+static void assert_refused(const char *path, const nebel_image *image)
+{
+    journal kept;
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(i == 0 ? check_path(path, &kept) : write_image(path, image, &kept), NEBEL_ERROR_FILE);
+        assert_non_null(strstr(kept.last, "it is a device, a pipe or a socket"));
+    }
+}
+
+static void test_devices_pipes_and_sockets_are_refused(void **state)
 {
     (void)state;
-    journal kept;
     struct stat status;
+    struct sockaddr_un place = {.sun_family = AF_UNIX};
     nebel_image image = make_image(2, 2, 3, rgb_names);
     assert_int_equal(symlink("/dev/full", in_folder("full.png")), 0);
-    assert_int_equal(write_image(in_folder("full.png"), &image, &kept), NEBEL_ERROR_FILE);
-    assert_non_null(strstr(kept.last, "No space left on device"));
-    assert_int_equal(symlink("/dev/null", in_folder("null.exr")), 0);
-    assert_int_equal(check_path(in_folder("null.exr"), &kept), NEBEL_OK);
-    assert_int_equal(check_path(in_folder("null.jpg"), &kept), NEBEL_ERROR_FORMAT);
-    assert_int_equal(write_image(in_folder("null.exr"), &image, &kept), NEBEL_OK);
-    stat("/dev/null", &status);
-    assert_true(S_ISCHR(status.st_mode));
     assert_int_equal(mkfifo(in_folder("pipe.exr"), 0600), 0);
-    assert_int_equal(check_path(in_folder("pipe.exr"), &kept), NEBEL_OK); /* without waiting for a reader */
+    snprintf(place.sun_path, sizeof place.sun_path, "%s", in_folder("socket.png"));
+    const int socket_file = socket(AF_UNIX, SOCK_STREAM, 0);
+    assert_int_equal(bind(socket_file, (const struct sockaddr *)&place, sizeof place), 0);
+    assert_refused(in_folder("full.png"), &image);
+    assert_refused(in_folder("pipe.exr"), &image); /* without waiting for a reader */
+    assert_refused(in_folder("socket.png"), &image);
     const int reader = open(in_folder("pipe.exr"), O_RDONLY | O_NONBLOCK);
-    assert_int_equal(write_image(in_folder("pipe.exr"), &image, &kept), NEBEL_OK);
-    unsigned char start[4];
-    assert_int_equal(read(reader, start, 4), 4);
-    assert_memory_equal(start, "\x76\x2f\x31\x01", 4);
+    assert_refused(in_folder("pipe.exr"), &image);
     close(reader);
+    close(socket_file);
     lstat(in_folder("pipe.exr"), &status);
     assert_true(S_ISFIFO(status.st_mode));
     unlink(in_folder("pipe.exr"));
     unlink(in_folder("full.png"));
-    unlink(in_folder("null.exr"));
+    unlink(in_folder("socket.png"));
+    assert_int_equal(file_count(), 0);
+    free(image.samples);
+}
+
+/* A link says the format. */
+static void test_nothing_and_open_pipes_are_written(void **state)
+{
+    (void)state;
+    journal kept;
+    int ends[2];
+    char name[64];
+    unsigned char start[4];
+    nebel_image image = make_image(2, 2, 3, rgb_names);
+    assert_int_equal(pipe(ends), 0);
+    snprintf(name, sizeof name, "/dev/fd/%d", ends[1]);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(symlink(i == 0 ? "/dev/null" : name, in_folder("open.exr")), 0);
+        assert_int_equal(check_path(in_folder("open.exr"), &kept), NEBEL_OK);
+        assert_int_equal(write_image(in_folder("open.exr"), &image, &kept), NEBEL_OK);
+        unlink(in_folder("open.exr"));
+    }
+    assert_int_equal(read(ends[0], start, 4), 4);
+    assert_memory_equal(start, "\x76\x2f\x31\x01", 4);
+    close(ends[0]);
+    close(ends[1]);
     assert_int_equal(file_count(), 0);
     free(image.samples);
 }
@@ -751,7 +782,8 @@ int main(void)
         cmocka_unit_test(test_only_whole_pictures_are_written),
         cmocka_unit_test(test_a_target_is_replaced_with_its_mode_and_the_umask_holds),
         cmocka_unit_test(test_a_link_stays_and_its_target_is_replaced),
-        cmocka_unit_test(test_devices_and_pipes_are_written_and_stay),
+        cmocka_unit_test(test_devices_pipes_and_sockets_are_refused),
+        cmocka_unit_test(test_nothing_and_open_pipes_are_written),
         cmocka_unit_test(test_streams_take_png_from_where_they_stand),
         cmocka_unit_test(test_a_failure_leaves_everything_as_it_was),
         cmocka_unit_test(test_a_folder_without_permission_is_an_error),

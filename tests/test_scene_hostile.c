@@ -188,7 +188,7 @@ static void test_what_is_no_file_is_named_with_the_reason(void **state)
     assert_int_equal(load(path, &kept), NEBEL_ERROR_FILE);
     assert_non_null(strstr(kept.last, "No such file or directory"));
     assert_int_equal(load("-", &kept), NEBEL_ERROR_FILE);
-    assert_int_equal(load("/dev/null", &kept), NEBEL_ERROR_FORMAT);
+    assert_int_equal(load("/dev/null", &kept), NEBEL_ERROR_FILE);
     assert_int_equal(load("", &kept), NEBEL_ERROR_FILE);
 }
 
@@ -205,24 +205,40 @@ static void test_a_file_without_permission_is_an_error(void **state)
     assert_non_null(strstr(kept.last, "Permission denied"));
 }
 
-static void test_a_scene_may_come_through_a_pipe(void **state)
+static void test_a_scene_may_come_through_an_open_pipe(void **state)
+{
+    (void)state;
+    journal kept;
+    char path[64];
+    int ends[2];
+    assert_int_equal(pipe(ends), 0);
+    const pid_t child = fork();
+    if (child == 0) {
+        const struct timespec nap = {0, 20000000};
+        for (const char *at = rich; *at != '\0'; at += strlen(at) < 300 ? strlen(at) : 300) {
+            if (write(ends[1], at, strlen(at) < 300 ? strlen(at) : 300) < 0) quick_exit(1);
+            nanosleep(&nap, NULL);
+        }
+        quick_exit(0);
+    }
+    close(ends[1]);
+    snprintf(path, sizeof path, "/dev/fd/%d", ends[0]);
+    assert_int_equal(load(path, &kept), NEBEL_OK);
+    close(ends[0]);
+    waitpid(child, NULL, 0);
+}
+
+static void test_a_pipe_by_its_name_is_not_waited_for(void **state)
 {
     journal kept;
     char path[200];
     in_folder(path, *state, "pipe");
     assert_int_equal(mkfifo(path, 0600), 0);
-    const pid_t child = fork();
-    if (child == 0) {
-        const int file = open(path, O_WRONLY);
-        const struct timespec nap = {0, 20000000};
-        for (const char *at = rich; *at != '\0'; at += strlen(at) < 300 ? strlen(at) : 300) {
-            if (write(file, at, strlen(at) < 300 ? strlen(at) : 300) < 0) quick_exit(1);
-            nanosleep(&nap, NULL);
-        }
-        quick_exit(0);
-    }
-    assert_int_equal(load(path, &kept), NEBEL_OK);
-    waitpid(child, NULL, 0);
+    alarm(10);
+    assert_int_equal(load(path, &kept), NEBEL_ERROR_FILE);
+    assert_non_null(strstr(kept.last, "it is a device, a pipe or a socket; name a file"));
+    assert_int_equal(load("/dev/zero", &kept), NEBEL_ERROR_FILE);
+    alarm(0);
 }
 
 static void test_relative_paths_start_at_the_scene(void **state)
@@ -288,7 +304,8 @@ int main(void)
         cmocka_unit_test(test_an_error_far_down_is_found_at_its_line),
         cmocka_unit_test(test_what_is_no_file_is_named_with_the_reason),
         cmocka_unit_test(test_a_file_without_permission_is_an_error),
-        cmocka_unit_test(test_a_scene_may_come_through_a_pipe),
+        cmocka_unit_test(test_a_scene_may_come_through_an_open_pipe),
+        cmocka_unit_test(test_a_pipe_by_its_name_is_not_waited_for),
         cmocka_unit_test(test_relative_paths_start_at_the_scene),
         cmocka_unit_test(test_maps_start_there_too),
     };

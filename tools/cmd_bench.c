@@ -7,11 +7,12 @@
 #endif
 #include "machine.h"
 #include "report.h"
+#include "target.h"
 
 #include "bench/bench.h"
 
-#include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -55,12 +56,22 @@ static void print_head(const char *processor)
     (void)printf("A line: what, how much, how many times its floor, the floor, the target of that ratio.\n");
 }
 
-static int write_json(const nb_figures *figures, FILE *file, const char *path)
+/* The file keeps what it has until there is all of it. */
+static int write_json(const nb_figures *figures, int file, const char *path)
 {
-    nb_figures_write_json(figures, file);
-    const int broken = ferror(file);
-    if (fclose(file) != 0 || broken) return nb_report_failure("bench: %s: could not be written", path);
-    return NB_DONE;
+    char *text = NULL;
+    size_t size = 0;
+    FILE *const stream = open_memstream(&text, &size);
+    if (stream != NULL) nb_figures_write_json(figures, stream);
+    const int good = stream != NULL && !ferror(stream);
+    const int closed = stream != NULL && fclose(stream) == 0;
+    int status = NB_FAILED;
+    if (good && closed)
+        status = nb_target_replace(file, path, text, size);
+    else
+        (void)nb_report_failure("bench: %s: out of memory", path);
+    free(text);
+    return status;
 }
 
 static int bench(const nb_bench_desc *desc, const char *json, const char *renderer)
@@ -74,12 +85,12 @@ static int bench(const nb_bench_desc *desc, const char *json, const char *render
     nb_figures figures = {
         .table = stdout, .processor = processor, .compiler = nb_machine_compiler(), .quick = desc->quick};
     const char *fault = NULL;
-    FILE *const file = json != NULL ? fopen(json, "w") : NULL;
-    if (json != NULL && file == NULL) return nb_report_failure("bench: %s: %s", json, strerror(errno));
+    int file = -1;
+    if (json != NULL && nb_target_open(json, &file) != NB_DONE) return NB_FAILED;
     print_head(processor);
     int status = NB_DONE;
     if (nb_bench_run(desc, &figures, &fault) != 0) status = nb_report_failure("bench: %s", fault);
-    if (file != NULL) {
+    if (json != NULL) {
         const int written = write_json(&figures, file, json);
         if (status == NB_DONE) status = written;
     }

@@ -33,8 +33,9 @@ static const char about[] = "Renders SCENE (JSON): models lit by the sun, lamps 
                             "exact fog.\n"
                             "\n"
                             "A picture appears under its name when it is complete: it is written beside its\n"
-                            "place and renamed. Devices and pipes are written to directly. Ctrl-C ends the\n"
-                            "work and leaves nothing behind; pictures that were complete stay.\n"
+                            "place and renamed. /dev/stdout and /dev/null are written to directly, pipes and\n"
+                            "other devices are refused. Ctrl-C ends the work and leaves nothing behind;\n"
+                            "pictures that were complete stay.\n"
                             "\n"
                             "Where standard error is a terminal, a bar shows how long it will take.\n";
 

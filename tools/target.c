@@ -2,6 +2,7 @@
 #include "target.h"
 
 #include "interrupt.h"
+#include "output.h"
 #include "report.h"
 
 #include <errno.h>
@@ -37,15 +38,79 @@ int nb_target_spare(const char *path, const char *scene, const nebel_scene_data 
     return NB_DONE;
 }
 
+/* ---- files that are no pictures -------------------------------------------------------------- */
+
+static int is_open_already(const char *path)
+{
+    static const char *const places[] = {"/dev/fd/", "/dev/std", "/proc/self/fd/"};
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++)
+        if (strncmp(path, places[i], strlen(places[i])) == 0) return 1;
+    return 0;
+}
+
+static int is_null(const struct stat *status)
+{
+    struct stat null;
+    return S_ISCHR(status->st_mode) && stat("/dev/null", &null) == 0 && status->st_rdev == null.st_rdev;
+}
+
+static int may_be_written(const char *path, const struct stat *status)
+{
+    return S_ISREG(status->st_mode) || is_open_already(path) || is_null(status);
+}
+
+static int refuse(const char *path)
+{
+    return nb_report_failure("cannot write \"%s\": it is a device, a pipe or a socket; name a file", path);
+}
+
+int nb_target_open(const char *path, int *file)
+{
+    struct stat status;
+    *file = -1;
+    if (stat(path, &status) == 0 && !S_ISDIR(status.st_mode) && !may_be_written(path, &status)) return refuse(path);
+    const int opened = open(path, O_WRONLY | O_CREAT | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666);
+    if (opened < 0) return nb_report_failure("cannot write \"%s\": %s", path, strerror(errno));
+    if (fstat(opened, &status) != 0 || !may_be_written(path, &status)) {
+        (void)close(opened);
+        return refuse(path);
+    }
+    (void)fcntl(opened, F_SETFL, is_open_already(path) ? O_APPEND : 0); /* what is slow to read is waited for */
+    *file = opened;
+    return NB_DONE;
+}
+
+int nb_target_replace(int file, const char *path, const char *text, size_t size)
+{
+    struct stat status;
+    const int is_whole = fstat(file, &status) == 0 && S_ISREG(status.st_mode) && !is_open_already(path);
+    int error = is_whole && (lseek(file, 0, SEEK_SET) != 0 || ftruncate(file, 0) != 0) ? errno : 0;
+    if (error == 0) error = nb_output_write(file, text, size);
+    if (close(file) != 0 && error == 0) error = errno;
+    return error == 0 ? NB_DONE : nb_report_failure("cannot write \"%s\": %s", path, strerror(error));
+}
+
+/* One that is replaced again and again. */
 static int check_list(const char *path)
 {
     struct stat status;
+    int file;
+    const int result = nb_target_open(path, &file);
+    if (result != NB_DONE) return result;
+    const int is_regular = fstat(file, &status) == 0 && S_ISREG(status.st_mode);
+    (void)close(file);
+    return is_regular ? NB_DONE : refuse(path);
+}
+
+FILE *nb_target_open_list(const char *path)
+{
+    struct stat status;
     const int file = open(path, O_WRONLY | O_CREAT | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666);
-    if (file < 0 && errno != ENXIO) return nb_report_failure("cannot write \"%s\": %s", path, strerror(errno));
-    const int is_regular = file >= 0 && fstat(file, &status) == 0 && S_ISREG(status.st_mode);
-    if (file >= 0) close(file);
-    if (is_regular) return NB_DONE;
-    return nb_report_failure("cannot write \"%s\": it is a device, a pipe or a socket; name a file", path);
+    if (file < 0) return NULL;
+    const int good = fstat(file, &status) == 0 && S_ISREG(status.st_mode) && ftruncate(file, 0) == 0;
+    FILE *const stream = good ? fdopen(file, "w") : NULL;
+    if (stream == NULL) (void)close(file);
+    return stream;
 }
 
 int nb_target_check_window(const char *picture, const char *list, const char *scene, const nebel_scene_data *contents)

@@ -215,7 +215,8 @@ typedef struct nebel_scene_desc {
 
 #define NEBEL_DEFAULT_SCENE_MEMORY ((uint64_t)4 << 30)
 
-/* Reads and checks a scene file. Models named in it are not loaded yet. "-" is a file name like any other.
+/* Reads and checks a scene file: a regular one, or what is open already (/dev/stdin, /dev/fd/3). Models named in it are not loaded
+ * yet. "-" is a file name like any other.
  * On an error *scene is NULL. Errors: ARGUMENT, FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY. */
 nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, nebel_scene **scene);
 
@@ -399,13 +400,13 @@ typedef enum nebel_image_format {
     NEBEL_IMAGE_EXR  /* every channel as 32-bit float, ZIP compressed */
 } nebel_image_format;
 
-/* What nebel_write_image writes at `path`: by the ending of the name, .png or .exr in any case. A device, a pipe or
- * what is open already (/dev/stdout, /dev/fd/3) takes PNG where its name has neither. Thread safe. */
+/* What nebel_write_image writes at `path`: by the ending of the name, .png or .exr in any case. /dev/null and
+ * what is open already (/dev/stdout, /dev/fd/3) take PNG where their name has neither. Thread safe. */
 nebel_image_format nebel_find_image_format(const char *path);
 
 /* Regular files are written to a temporary name beside the target and renamed, so that on an error nothing of the
- * target has changed and no temporary file is left. Devices and pipes are written directly; /dev/stdout, /dev/stderr
- * and /dev/fd/N are written on from where they stand. Where a limit of the size of files may be met, ignore SIGXFSZ.
+ * target has changed and no temporary file is left. /dev/null is written directly; /dev/stdout, /dev/stderr
+ * and /dev/fd/N are written on from where they stand; other devices, pipes and sockets are refused. Where a limit of the size of files may be met, ignore SIGXFSZ.
  * Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
 nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, const nebel_image *image);
 

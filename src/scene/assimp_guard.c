@@ -28,11 +28,8 @@ typedef struct file_head {
 
 static nebel_result read_head(const nb_model_load *load, file_head *head)
 {
-    FILE *stream = fopen(load->source->file, "rb");
-    const int error = errno;
-    if (stream == NULL)
-        return nb_model_fail(load, NEBEL_ERROR_FILE, "cannot read the model \"%s\": %s", load->source->file,
-                             strerror(error));
+    FILE *stream = nb_file_open_stream(&load->log, load->source->where, "model", load->source->file);
+    if (stream == NULL) return NEBEL_ERROR_FILE;
     head->size = fread(head->bytes, 1, HEAD_SIZE, stream);
     const long end = fseek(stream, 0, SEEK_END) == 0 ? ftell(stream) : -1;
     head->file_size = end >= 0 ? (unsigned long long)end : head->size;

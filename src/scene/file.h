@@ -5,6 +5,7 @@
 #include "base/base.h"
 
 #include <stdbool.h>
+#include <stdio.h>
 
 typedef struct nb_bytes {
     unsigned char *data;
@@ -17,7 +18,7 @@ typedef struct nb_bytes {
 nebel_result nb_file_read(const nebel_allocator *allocator, const nebel_log *log, const char *where, const char *what,
                           const char *path, size_t limit, nb_bytes *bytes);
 
-/* The same of a pipe or device, too, which is read until its end. */
+/* The same, and of what is open already by its name, /dev/stdin or /dev/fd/3, whatever it is, until its end. */
 nebel_result nb_file_read_stream(const nebel_allocator *allocator, const nebel_log *log, const char *what,
                                  const char *path, size_t limit, nb_bytes *bytes);
 
@@ -25,13 +26,23 @@ nebel_result nb_file_read_stream(const nebel_allocator *allocator, const nebel_l
 nebel_result nb_file_read_open(const nebel_allocator *allocator, const nebel_log *log, const char *where,
                                const char *what, const char *path, int file, size_t limit, nb_bytes *bytes);
 
+/* Opens a regular file for reading; whatever else is at the path is not opened. Errors: FILE. */
+nebel_result nb_file_open(const nebel_log *log, const char *where, const char *what, const char *path, int *file);
+
+/* The same as a stream; NULL after an error. */
+FILE *nb_file_open_stream(const nebel_log *log, const char *where, const char *what, const char *path);
+
+/* The open file that a path names, /dev/stdin or /dev/fd/3 or /proc/self/fd/3; -1: none. */
+int nb_file_descriptor(const char *path);
+
 /* Whether `path` is a regular file that may be read: other libraries open it by name, and a pipe would hold them up for
  * ever. Errors: FILE. */
 nebel_result nb_file_check(const nebel_log *log, const char *where, const char *what, const char *path);
 
 /* Writes bytes to a file. A regular file, or one that does not exist, is replaced as a whole or not at all: a temporary
  * file in the same folder takes its name when everything is on the disk. A symbolic link stays, what it points to is
- * replaced. Devices, pipes and sockets are written directly. Errors: FILE, MEMORY. */
+ * replaced. /dev/null and what is open already are written directly, other devices, pipes and sockets are refused: a
+ * pipe may wait for ever, and a device does what nobody expects of a picture. Errors: FILE, MEMORY. */
 nebel_result nb_file_write(const nebel_allocator *allocator, const nebel_log *log, const char *path,
                            const nb_bytes *bytes);
 
@@ -42,8 +53,8 @@ nebel_result nb_file_try(const nebel_allocator *allocator, const nebel_log *log,
 /* The same, and whether there is room for so many bytes. */
 nebel_result nb_file_try_room(const nebel_allocator *allocator, const nebel_log *log, const char *path, size_t size);
 
-/* Whether nb_file_write writes there directly: a device, a pipe, a socket, or what is open already. */
-bool nb_file_is_direct(const char *path);
+/* Whether there is a device, a pipe, a socket or what is open already. */
+bool nb_file_is_special(const char *path);
 
 /* Appends, growing; false when memory is out. */
 int nb_bytes_write(const nebel_allocator *allocator, nb_bytes *bytes, size_t offset, const void *data, size_t size);

@@ -30,12 +30,13 @@ int nb_bytes_write(const nebel_allocator *allocator, nb_bytes *bytes, size_t off
 
 /* ---- where to write -------------------------------------------------------------------------- */
 
-/* Follows symbolic links to the path they end at, which need not exist. NULL, with errno, where that fails. */
+/* Follows symbolic links to the path they end at, which need not exist, but not those of open files. NULL, with errno, where that fails. */
 static const char *follow_links(nb_arena *arena, const char *path)
 {
     char target[PATH_MAX];
     for (int i = 0; i < MAX_LINKS; i++) {
         struct stat status;
+        if (nb_file_descriptor(path) >= 0) return path;
         if (lstat(path, &status) != 0) return errno == ENOENT ? path : NULL;
         if (!S_ISLNK(status.st_mode)) return path;
         const ssize_t size = readlink(path, target, sizeof target - 1);
@@ -82,28 +83,12 @@ static int write_all(int file, const nb_bytes *bytes)
     return 0;
 }
 
-/* The open file that a path stands for, or -1. */
-static int descriptor_of(const char *path)
-{
-    static const char *const folders[] = {"/dev/fd/", "/proc/self/fd/"};
-    if (strcmp(path, "/dev/stdout") == 0) return STDOUT_FILENO;
-    if (strcmp(path, "/dev/stderr") == 0) return STDERR_FILENO;
-    for (size_t i = 0; i < sizeof folders / sizeof *folders; i++) {
-        const size_t size = strlen(folders[i]);
-        const char *name = path + size;
-        if (strncmp(path, folders[i], size) != 0) continue;
-        const size_t digits = strspn(name, "0123456789");
-        if (digits > 0 && digits < 9 && name[digits] == '\0') return atoi(name);
-    }
-    return -1;
-}
-
 /* What is open already goes on from where it stands: opened anew it would lose what was appended to. */
 static int open_directly(const char *path)
 {
-    const int descriptor = descriptor_of(path);
+    const int descriptor = nb_file_descriptor(path);
     if (descriptor >= 0) return fcntl(descriptor, F_DUPFD_CLOEXEC, 0);
-    return open(path, O_WRONLY | O_TRUNC | O_CLOEXEC | O_NOCTTY);
+    return open(path, O_WRONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
 }
 
 static int write_directly(const char *path, const nb_bytes *bytes)
@@ -126,31 +111,30 @@ static int fill_and_rename(int file, const char *temporary, const char *path, co
     return error;
 }
 
-/* Names of files that are open already: what they stand for may be a regular file, but it is the open one that is
- * meant. */
-static bool is_open_file(const char *path)
+static bool is_null(const struct stat *status)
 {
-    static const char *const places[] = {"/dev/fd/", "/dev/std", "/proc/"};
-    for (size_t i = 0; i < sizeof places / sizeof *places; i++)
-        if (strncmp(path, places[i], strlen(places[i])) == 0) return true;
-    return false;
+    struct stat null;
+    return S_ISCHR(status->st_mode) && stat("/dev/null", &null) == 0 && status->st_rdev == null.st_rdev;
 }
 
+/* What is written to as it is: an open file, which may be a regular one, but it is the open one that is meant, or /dev/null. `path` has
+ * no links any more but those of open files. */
 static bool is_direct(const char *path, const struct stat *status)
 {
-    return !S_ISDIR(status->st_mode) && (!S_ISREG(status->st_mode) || is_open_file(path));
+    return !S_ISDIR(status->st_mode) && (nb_file_descriptor(path) >= 0 || is_null(status));
 }
 
-bool nb_file_is_direct(const char *path)
+bool nb_file_is_special(const char *path)
 {
     struct stat status;
-    return stat(path, &status) == 0 && is_direct(path, &status);
+    if (stat(path, &status) != 0 || S_ISDIR(status.st_mode)) return false;
+    return !S_ISREG(status.st_mode) || nb_file_descriptor(path) >= 0;
 }
 
 /* 0 or an error number. */
 static int check_writing(const char *path)
 {
-    const int descriptor = descriptor_of(path);
+    const int descriptor = nb_file_descriptor(path);
     if (descriptor < 0) return access(path, W_OK) == 0 ? 0 : errno;
     const int flags = fcntl(descriptor, F_GETFL);
     if (flags < 0) return errno;
@@ -159,7 +143,7 @@ static int check_writing(const char *path)
 
 /* What is at a path, and where its bytes go. */
 typedef struct target {
-    const char *path; /* symbolic links followed, unless it is written directly */
+    const char *path; /* symbolic links followed */
     bool exists, is_direct;
     struct stat status; /* where it exists */
 } target;
@@ -167,13 +151,13 @@ typedef struct target {
 /* 0 or an error number. */
 static int find_target(nb_arena *arena, const char *path, target *found)
 {
-    *found = (target){.path = path};
-    found->exists = stat(path, &found->status) == 0;
+    *found = (target){.path = follow_links(arena, path)};
+    if (found->path == NULL) return errno;
+    found->exists = stat(found->path, &found->status) == 0;
     if (!found->exists && errno != ENOENT) return errno;
     if (found->exists && S_ISDIR(found->status.st_mode)) return EISDIR;
-    found->is_direct = found->exists && is_direct(path, &found->status);
-    if (!found->is_direct) found->path = follow_links(arena, path);
-    if (found->path == NULL) return errno;
+    found->is_direct = found->exists && is_direct(found->path, &found->status);
+    if (found->exists && !found->is_direct && !S_ISREG(found->status.st_mode)) return ENXIO;
     return found->exists ? check_writing(found->path) : 0;
 }
 
@@ -211,6 +195,12 @@ static nebel_result fail(nb_arena *arena, const nebel_log *log, const char *path
     if (error == ENOMEM) return nb_fail(log, NEBEL_ERROR_MEMORY, "cannot write \"%s\": out of memory", path);
     if (error == EISDIR)
         return nb_fail(log, NEBEL_ERROR_FILE, "cannot write \"%s\": it is a folder; name a file in it", path);
+    if (error == ENXIO)
+        return nb_fail(
+            log, NEBEL_ERROR_FILE,
+            "cannot write \"%s\": it is a device, a pipe or a socket; name a file, or what is open already, as "
+            "/dev/stdout",
+            path);
     if (error == EBADF) return nb_fail(log, NEBEL_ERROR_FILE, "cannot write \"%s\": it is not open to writing", path);
     const char *folder = nb_path_folder(arena, path);
     struct stat status;

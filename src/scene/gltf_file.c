@@ -37,7 +37,8 @@ static nebel_result read_chunk(const nebel_allocator *allocator, FILE *stream, n
 
 static nebel_result read_binary(const nebel_allocator *allocator, const char *file, nb_bytes *text)
 {
-    FILE *stream = fopen(file, "rb");
+    const nebel_log silent = {0};
+    FILE *stream = nb_file_open_stream(&silent, NULL, "model", file);
     if (stream == NULL) return NEBEL_ERROR_FILE;
     const nebel_result result = read_chunk(allocator, stream, text);
     fclose(stream);

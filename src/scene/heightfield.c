@@ -90,10 +90,8 @@ static nebel_result read_map(const nb_model_load *load, nb_heights *map)
     const nb_codec codec = {
         .allocator = load->allocator, .log = nb_note_log(&note), .name = file, .room = nb_model_room(load)};
     nb_bytes bytes;
-    nebel_result result = nb_file_check(&load->log, load->source->where, "height map", file);
-    if (result == NEBEL_OK)
-        result =
-            nb_file_read(&load->allocator, &load->log, load->source->where, "height map", file, FILE_LIMIT, &bytes);
+    nebel_result result =
+        nb_file_read(&load->allocator, &load->log, load->source->where, "height map", file, FILE_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
     if (!nb_png_is(&bytes))
         result = nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" is not a PNG picture", file);

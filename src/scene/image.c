@@ -39,8 +39,7 @@ static nebel_result read_image(const nb_codec *codec, nebel_image *image)
 nebel_result nb_image_read(const nb_codec *codec, nebel_image *image)
 {
     *image = (nebel_image){0};
-    const nebel_result regular = nb_file_check(&codec->log, NULL, "picture", codec->name);
-    return regular == NEBEL_OK ? read_image(codec, image) : regular;
+    return read_image(codec, image);
 }
 
 nebel_result nebel_read_image(const char *path, const nebel_scene_desc *desc, nebel_image *image)
@@ -73,7 +72,7 @@ nebel_image_format nebel_find_image_format(const char *path)
     if (path == NULL) return NEBEL_IMAGE_NONE;
     if (nb_image_ends_in(path, ".png")) return NEBEL_IMAGE_PNG;
     if (nb_image_ends_in(path, ".exr")) return NEBEL_IMAGE_EXR;
-    return nb_file_is_direct(path) ? NEBEL_IMAGE_PNG : NEBEL_IMAGE_NONE;
+    return nb_file_is_special(path) ? NEBEL_IMAGE_PNG : NEBEL_IMAGE_NONE;
 }
 
 static const char *find_fault(const nebel_image *image)

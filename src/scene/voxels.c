@@ -44,9 +44,7 @@ nebel_result nb_voxels_allocate(const nb_codec *codec, nb_voxels *voxels)
 
 static nebel_result read_file(const nb_codec *codec, const char *path, nb_bytes *bytes)
 {
-    const nebel_result regular = nb_file_check(&codec->log, NULL, "grid", path);
-    return regular != NEBEL_OK ? regular
-                               : nb_file_read(&codec->allocator, &codec->log, NULL, "grid", path, FILE_LIMIT, bytes);
+    return nb_file_read(&codec->allocator, &codec->log, NULL, "grid", path, FILE_LIMIT, bytes);
 }
 
 /* ---- numbers --------------------------------------------------------------------------------- */

@@ -1,5 +1,6 @@
 #include "panel.h"
 
+#include "../target.h"
 #include "controls.h"
 #include "fog_panel.h"
 #include "planet_panel.h"
@@ -441,7 +442,7 @@ extern "C" void nb_panel_close(void)
 extern "C" void nb_panel_draw(nb_panel *panel, const char *controls)
 {
     clear_answers(panel);
-    places = controls != nullptr ? fopen(controls, "w") : nullptr;
+    places = controls != nullptr ? nb_target_open_list(controls) : nullptr;
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
     hold_keys();
