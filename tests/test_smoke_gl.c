@@ -221,7 +221,7 @@ static void compare(const smoke *s)
     render_cpu(&data, fog, s, &camera, &pair);
     render_gl(scene, &data, fog, s, &camera, &pair);
     const double shown = picture_shown_apart(&pair), largest = picture_largest_light(&pair);
-    const picture_difference d = picture_compare(&pair, fmax(1, largest));
+    const picture_difference d = picture_compare(&pair, largest > 0 ? largest : 1);
     print_message("%s: of 1000 pixels %.1f are shown 2/255 apart; of %zu with fog %zu are 1/255 apart\n", s->name,
                   1e3 * shown, d.fogged, d.beyond_step);
     assert_true(brightest(&pair) > .1f);

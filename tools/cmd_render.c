@@ -583,9 +583,9 @@ static int choose_scattering(studio *all)
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
 
-/* What OpenGL's targets take for a pixel (173 measured), and films for one of a picture: an estimate from above, as it depends on
+/* What OpenGL's targets take for a pixel (189), and films for one of a picture: an estimate from above, as it depends on
  * what there is to see. */
-#define GL_PIXEL_BYTES 176.0
+#define GL_PIXEL_BYTES 192.0
 #define FILM_PIXEL_BYTES 0.5
 #define LOSSLESS_PIXEL_BYTES 3.0
 

@@ -62,10 +62,10 @@ nebel_result nb_targets_fit(nb_targets *t, const nebel_log *log, uint32_t width,
     t->depth = nb_targets_make_texture(width, height, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT);
     t->place = make_floats(t);
     t->normal = make_floats(t);
-    t->reflectance = nb_targets_make_texture(width, height, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT);
+    t->reflectance = make_floats(t);
     t->in_scattering = make_floats(t);
     t->transmittance = make_floats(t);
-    t->dimming = nb_targets_make_texture(width, height, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT);
+    t->dimming = make_floats(t);
     for (int i = 0; i < 4; i++) t->picture[i] = make_floats(t);
     t->survey_width = (width + NB_SURVEY_BLOCK - 1) / NB_SURVEY_BLOCK;
     t->survey_height = (height + NB_SURVEY_BLOCK - 1) / NB_SURVEY_BLOCK;
