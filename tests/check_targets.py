@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """What the program may not write over or wait for, that a full disk stops a film at once, and that Ctrl-C ends it while a scene is prepared."""
 
+import json
 import os
 import pathlib
 import resource
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -28,6 +30,34 @@ class TargetTest(check_cli.PictureCase):
         self.assert_failed(self.render("frame_%d.exr", "--frames", "0-5"), "frame_3.exr", "the scene reads")
         self.assertEqual((self.folder / "sky.exr").read_bytes(), before)
         self.assertFalse((self.folder / "frame_0.exr").exists())
+
+    def test_what_a_model_reads_stays(self):
+        """However it is spelled: files that a scene's models name in turn."""
+        inner = self.folder / "inner"
+        inner.mkdir()
+        for name in ("skin.png", "bump.png"):
+            self.assert_done(self.render(f"inner/{name}", "--size", "4x4", "-q"))
+        (inner / "a.mtl").write_text("newmtl a\nmap_Kd skin.png\n")
+        (inner / "a.obj").write_text("mtllib a.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n")
+        (inner / "b.png").write_bytes(struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0))  # a buffer, whatever its name
+        (inner / "b.gltf").write_text(json.dumps({
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}], "textures": [{"source": 0}],
+            "images": [{"uri": "bump%2epng"}], "buffers": [{"byteLength": 36, "uri": "b.png"}], "bufferViews": [{"buffer": 0, "byteLength": 36}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}]}))
+        (self.folder / "hard.png").hardlink_to(inner / "skin.png")
+        (self.folder / "soft.png").symlink_to("inner/skin.png")
+        (self.folder / "inner.mtl.png").symlink_to("inner/a.mtl")
+        self.scene = self.write_scene("textured.json", [FOG], models=[{"file": "inner/a.obj"}])
+        for output in ("inner/skin.png", "inner/../inner//skin.png", "hard.png", "soft.png", "inner.mtl.png", inner / "skin.png"):
+            self.assert_failed(self.render(output), "cannot write", "the scene reads")
+        self.assert_done(self.render("inner/bump.png", "--size", "4x4", "-q"))
+        self.scene = self.write_scene("textured.json", [FOG], nebula=[{"points": {"file": "inner/b.gltf"}, "absorption": 1, "size": [0.1, 0.2]}])
+        self.assert_failed(self.render("inner/b.png"), "cannot write", "the scene reads")
+        self.scene = self.write_scene("textured.json", [FOG], models=[{"file": "inner/b.gltf"}])
+        for output in ("inner/b.png", "inner/bump.png"):
+            self.assert_failed(self.render(output, "--device", "cpu"), "cannot write", "the scene reads")
 
     def test_compared_pictures_stay(self):
         self.assert_done(self.render("a.png", "-q"))
@@ -116,6 +146,22 @@ class InterruptTest(check_cli.PictureCase):
             process.send_signal(signal.SIGINT)
             self.assertEqual(process.wait(2), -signal.SIGINT)
         self.assertFalse((self.folder / "a.png").exists())
+
+    def test_preparing_a_frame_ends_at_once(self):
+        fog = {"shape": FOG["shape"], "extinction": 1, "albedo": 0.9, "keys": [{"frame": 0, "extinction": 0}, {"frame": 1, "extinction": 200}, {"frame": 99, "extinction": 201}]}
+        self.scene = self.write_scene("film.json", [fog], sun={"direction": [1, 1, 1], "irradiance": 1},
+                                      multiple_scattering={"model": "diffusion", "cells": 4000000})
+        process = subprocess.Popen([NEBEL, "render", self.scene, "-o", "f%d.png", "--frames", "0-99", "--size", "8x8"], cwd=self.folder, stdin=subprocess.DEVNULL,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+        while process.poll() is None and not (self.folder / "f0.png").exists():
+            time.sleep(0.01)
+        time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        start = time.monotonic()
+        self.assertIn(b"stopped", process.communicate(timeout=60)[1])
+        self.assertLess(time.monotonic() - start, 0.4, "the frame was prepared to its end")
+        self.assertEqual(process.returncode, -signal.SIGINT)
+        self.assertEqual([name for name in self.files() if name.startswith(("f", ".")) and name != "film.json"], ["f0.png"])
 
 
 if __name__ == "__main__":

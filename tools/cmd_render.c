@@ -229,16 +229,20 @@ static int finish_film(studio *all)
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, all->wanted->output, result);
 }
 
-static int show_progress(size_t done, size_t total, void *user)
+static void show_share(studio *all, double share)
 {
-    studio *const all = user;
     const nb_render_call *const wanted = all->wanted;
     const uint32_t frames = wanted->last_frame - wanted->first_frame + 1;
     const uint32_t before = all->frame - wanted->first_frame;
     char label[64] = "";
     if (frames > 1) (void)snprintf(label, sizeof label, "frame %u of %u", (unsigned)before + 1, (unsigned)frames);
-    const double share = total > 0 ? (double)done / (double)total : 0;
     nb_meter_show(&all->meter, (before + share) / frames, label);
+}
+
+static int show_progress(size_t done, size_t total, void *user)
+{
+    nb_interrupt_listen(); /* from the first call on the library asks again and again */
+    show_share(user, total > 0 ? (double)done / (double)total : 0);
     return nb_interrupt_is_requested();
 }
 
@@ -359,7 +363,7 @@ static int open_gl(studio *all)
 static int render_frame(studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
-    (void)show_progress(0, 1, all);
+    show_share(all, 0);
     all->listener.mode = NB_REPORT_KEEP; /* that the frame was stopped is no news */
     const nebel_result result = wanted->gl ? draw_frame(all) : trace_frame(all);
     all->listener.mode = NB_REPORT_PRINT;
@@ -385,7 +389,9 @@ static int move_fog(studio *all)
 
 static int make_picture(studio *all)
 {
-    if (nb_interrupt_is_requested()) return NB_DONE;
+    char what[500];
+    (void)snprintf(what, sizeof what, "render: %s", all->wanted->output);
+    nb_interrupt_unlisten(what); /* no file is open, and what is prepared may take long */
     int status = move_fog(all);
     if (status == NB_DONE) status = render_frame(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
@@ -651,7 +657,6 @@ static int render(const nb_render_call *wanted)
     studio all = {.wanted = wanted, .meter = nb_meter_start(wanted->quiet), .listener = {.quiet = wanted->quiet}};
     int status = open_film(&all);
     if (status == NB_DONE) status = set_up(&all);
-    nb_interrupt_listen(); /* before, nothing is written, and a signal ends the program at once */
     all.frame = wanted->first_frame;
     while (status == NB_DONE && all.frame <= wanted->last_frame) {
         status = make_picture(&all);

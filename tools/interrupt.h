@@ -6,6 +6,10 @@
  * that the caller has told the program to ignore stays ignored. */
 void nb_interrupt_listen(void);
 
+/* No longer: a signal ends the program at once, after a line on standard error, "nebel: WHAT: stopped"; one that has come does so
+ * now. For work that does not ask. */
+void nb_interrupt_unlisten(const char *what);
+
 int nb_interrupt_is_requested(void);
 
 /* Where a signal came, ends the program by it, as the shell expects of an interrupted program; else returns. */

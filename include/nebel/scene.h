@@ -182,8 +182,8 @@ typedef struct nebel_scene_data {
 
     const nebel_diffusion_desc *diffusion; /* the section "multiple_scattering"; NULL: none */
 
-    size_t file_count; /* models, height maps and points that it names; what those name in turn is not among them */
-    const char *const *files; /* as they are opened, once for each time they are named */
+    size_t file_count; /* that it names, as they are opened; and, once models are loaded, what those name in turn */
+    const char *const *files;
 
     size_t model_count;
     const nebel_model *models;

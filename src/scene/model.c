@@ -180,7 +180,33 @@ static nb_model_source place_source(const nb_model_source *source, const nebel_m
     return placed;
 }
 
-static nebel_result load_all(const nebel_scene *scene, const nebel_model *models, size_t count, nb_model_set *set)
+/* ---- the files --------------------------------------------------------------------------------- */
+
+bool nb_scene_keep_file(nebel_scene *scene, const char *file)
+{
+    void *files = (void *)scene->files;
+    const size_t count = scene->data.file_count;
+    const bool room = nb_grow(&scene->allocator, &files, sizeof file, count, &scene->file_capacity, count + 1);
+    scene->files = files;
+    if (!room) return false;
+    scene->files[scene->data.file_count++] = file;
+    return true;
+}
+
+/* Where memory is out the file is not among them, which fails nothing. */
+void nb_scene_note_file(void *user, const char *path, const struct stat *status)
+{
+    nebel_scene *scene = user;
+    (void)status;
+    for (size_t i = 0; i < scene->data.file_count; i++)
+        if (strcmp(scene->files[i], path) == 0) return;
+    const char *kept =
+        scene->data.file_count < NB_MOST_FILES ? nb_arena_copy_text(&scene->arena, path, strlen(path)) : NULL;
+    if (kept != NULL) nb_scene_keep_file(scene, kept);
+    scene->data.files = scene->files;
+}
+
+static nebel_result load_all(nebel_scene *scene, const nebel_model *models, size_t count, nb_model_set *set)
 {
     nebel_result result = NEBEL_OK;
     double seconds = scene->budget.seconds;
@@ -192,6 +218,8 @@ static nebel_result load_all(const nebel_scene *scene, const nebel_model *models
                                     .source = &source,
                                     .set = set,
                                     .reader = scene->reader,
+                                    .opened = nb_scene_note_file,
+                                    .opened_user = scene,
                                     .most_bytes = nb_scene_most_memory(scene),
                                     .most_seconds = nb_scene_most_seconds(scene),
                                     .seconds = &seconds};

@@ -49,6 +49,12 @@ typedef struct nb_model_load {
     nb_unpack unpack; /* of EXT_meshopt_compression; NULL: not supported */
 } nb_model_load;
 
+/* What models name in turn is among the files of the scene `user`, as what they read: nobody writes there. Signature of `opened`. */
+void nb_scene_note_file(void *user, const char *path, const struct stat *status);
+
+/* Files beyond are not noted. */
+#define NB_MOST_FILES ((size_t)1 << 16)
+
 nebel_result nb_heightfield_load(const nb_model_load *load);
 
 /* Reads a model file, in a process of its own or not, as load->reader says, or a height field. Counts the time. */

@@ -95,7 +95,11 @@ static nb_receipt take_path(const nb_receiver *in, const nb_wire_frame *frame)
     char path[TEXT_SIZE];
     struct stat status;
     const nb_receipt receipt = take_text(in, frame, TEXT_SIZE, path);
-    if (receipt == NB_RECEIPT_WHOLE && stat(path, &status) == 0) nb_budget_add(in->budget, &status);
+    if (receipt != NB_RECEIPT_WHOLE || stat(path, &status) != 0) return receipt;
+    const size_t before = in->budget->file_count;
+    nb_budget_add(in->budget, &status);
+    if (in->budget->file_count > before && in->load->opened != NULL)
+        in->load->opened(in->load->opened_user, path, &status);
     return receipt;
 }
 

@@ -25,17 +25,6 @@ static const char *describe_place(nb_scene_reader *in, const nb_json_node *node)
     return tail != NULL ? nb_path_join(&in->scene->arena, in->json->desc.name, tail) : NULL;
 }
 
-bool nb_scene_keep_file(nebel_scene *scene, const char *file)
-{
-    void *files = (void *)scene->files;
-    const size_t count = scene->data.file_count;
-    const bool room = nb_grow(&scene->allocator, &files, sizeof file, count, &scene->file_capacity, count + 1);
-    scene->files = files;
-    if (!room) return false;
-    scene->files[scene->data.file_count++] = file;
-    return true;
-}
-
 static bool read_file(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
 {
     nb_arena *arena = &in->scene->arena;
@@ -201,6 +190,8 @@ bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit,
                                 .source = &model,
                                 .points = &points,
                                 .reader = in->scene->reader,
+                                .opened = nb_scene_note_file,
+                                .opened_user = in->scene,
                                 .most_bytes = nb_scene_most_memory(in->scene),
                                 .most_seconds = nb_scene_most_seconds(in->scene),
                                 .seconds = &in->scene->budget.seconds};
