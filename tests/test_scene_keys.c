@@ -197,6 +197,53 @@ static void test_keys_are_in_the_units_of_the_file(void **state)
     nebel_destroy_scene(scene);
 }
 
+/* Slopes between them are beyond all numbers. */
+static void test_keys_may_all_but_coincide(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good(
+        FOG(BALL ", \"extinction\": 1, \"keys\": [{\"frame\": 0}, {\"frame\": 1e-307, \"extinction\": 1e9, \"shape\": "
+                 "{\"center\": [1e15, 0, 0]}}, {\"frame\": 2e-307, \"extinction\": 0}, {\"frame\": 3e-307, \"shape\": "
+                 "{\"center\": [-1e15, 0, 0]}}, {\"frame\": 1, \"extinction\": 2}]"));
+    for (int i = -1; i <= 40; i++) {
+        const nebel_volume_desc volume = nebel_scene_volume(scene, 0, i * 1e-308);
+        assert_true(volume.extinction[0] >= 0 && volume.extinction[0] <= 1e9);
+        assert_true(isfinite(volume.shape.center[0]));
+    }
+    nebel_destroy_scene(scene);
+}
+
+/* What a host may hand over. */
+static void test_frames_that_are_none(void **state)
+{
+    (void)state;
+    const double odd[] = {(double)NAN, (double)INFINITY, -(double)INFINITY, -1e300, 1e300, 0, 0, -3, 7};
+    enum { COUNT = sizeof odd / sizeof *odd };
+    nebel_scene *scene = parse_good(FOG(BALL ", \"extinction\": 1"));
+    const nebel_volume_desc volume = nebel_scene_volume(scene, 0, 0);
+    for (int shift = 0; shift < COUNT; shift++) {
+        nebel_camera_key cameras[COUNT];
+        nebel_sun_key suns[COUNT];
+        nebel_volume_key volumes[COUNT];
+        for (int i = 0; i < COUNT; i++) {
+            const double frame = odd[(i * 4 + shift) % COUNT];
+            cameras[i] = (nebel_camera_key){.frame = frame, .camera = nebel_scene_contents(scene)->camera};
+            cameras[i].camera.position[0] = i;
+            suns[i] = (nebel_sun_key){.frame = frame, .sun = {.direction = {1, i, 0}, .irradiance = {i, 1, 1}}};
+            volumes[i] = (nebel_volume_key){.frame = frame, .volume = volume};
+            volumes[i].volume.extinction[0] = i;
+        }
+        for (int i = 0; i < COUNT; i++) {
+            const nebel_camera camera = nebel_camera_between_keys(cameras, COUNT, odd[i]);
+            const nebel_sun sun = nebel_sun_between_keys(suns, COUNT, odd[i]);
+            const double extinction = nebel_volume_between_keys(volumes, COUNT, odd[i]).extinction[0];
+            assert_true(isfinite(camera.position[0]) && isfinite(sun.direction[0]) && isfinite(sun.irradiance[0]));
+            assert_true(extinction >= 0 && extinction <= COUNT);
+        }
+    }
+    nebel_destroy_scene(scene);
+}
+
 /* Every shape and density with every number it can move; every frame can be had. */
 static void test_everything_that_moves_can_be_had(void **state)
 {
@@ -265,6 +312,11 @@ static void test_what_no_key_has(void **state)
         {FORMAT, KEY("`{}"), "fog[0].keys[1]: the key \"frame\" is missing; a key of fog needs it"},
         {FORMAT, KEY("`{\"frame\": 0}"),
          "fog[0].keys[1]: its frame 0 is not after the key before it, 0; frames must ascend"},
+        {FORMAT, KEY("`{\"frame\": -1}"),
+         "fog[0].keys[1]: its frame -1 is not after the key before it, 0; frames must ascend"},
+        {FORMAT, KEY("{\"frame\": `1.0000001e9}"), "fog[0].keys[1].frame: is 1000000100; must be"},
+        {FORMAT, KEY("{\"frame\": `1e999}"), "fog[0].keys[1].frame: "},
+        {FORMAT, KEY("{\"frame\": `NaN}"), "fog[0].keys[1].frame: "},
         {FORMAT, KEY("{\"frame\": 1, `\"name\": \"a\"}"),
          "fog[0].keys[1].name: unknown key; a key of fog has: shape, density"},
         {FORMAT, KEY("{\"frame\": 1, `\"phase\": {}}"), "fog[0].keys[1].phase: unknown key"},
@@ -320,6 +372,8 @@ int main(void)
         cmocka_unit_test(test_what_would_vanish_keeps_the_nearer_key),
         cmocka_unit_test(test_a_snapshot_is_that_of_its_frame),
         cmocka_unit_test(test_keys_are_in_the_units_of_the_file),
+        cmocka_unit_test(test_keys_may_all_but_coincide),
+        cmocka_unit_test(test_frames_that_are_none),
         cmocka_unit_test(test_everything_that_moves_can_be_had),
         cmocka_unit_test(test_what_no_key_has),
         cmocka_unit_test(test_every_failing_allocation_is_survived),

@@ -35,7 +35,8 @@ bool nb_keyframes_find(const double *frames, size_t stride, size_t count, double
         around->keys[i] = keys[i];
         around->frames[i] = frame_at(frames, stride, keys[i]);
     }
-    around->s = (frame - around->frames[1]) / (around->frames[2] - around->frames[1]);
+    const double s = (frame - around->frames[1]) / (around->frames[2] - around->frames[1]);
+    around->s = s > 0 ? fmin(s, 1) : 0; /* also of a host's keys that do not ascend, or are no numbers */
     return true;
 }
 
