@@ -50,6 +50,14 @@ typedef struct nb_gltf_view {
     uint64_t unpacked; /* its offset in the extra file */
 } nb_gltf_view;
 
+/* Numbers that stand in place of some. */
+typedef struct nb_gltf_sparse {
+    uint64_t count;
+    int64_t index_view, value_view; /* or -1 */
+    uint64_t index_offset, value_offset;
+    int index_type;
+} nb_gltf_sparse;
+
 typedef struct nb_gltf_accessor {
     nb_gltf_span span;
     int64_t view; /* or -1 */
@@ -58,6 +66,7 @@ typedef struct nb_gltf_accessor {
     unsigned width;
     bool is_normalized, is_sparse, is_attribute;
     char type_name[8];
+    nb_gltf_sparse sparse;
 } nb_gltf_accessor;
 
 typedef struct nb_gltf_buffer {

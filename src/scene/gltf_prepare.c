@@ -119,33 +119,123 @@ static nebel_result find_view(nb_gltf_data *data, const nb_gltf_view *view, cons
     return NEBEL_OK;
 }
 
+/* Numbers of an accessor one after the other. */
+typedef struct numbers {
+    int64_t view; /* or -1 */
+    uint64_t offset, count;
+    unsigned tight;  /* bytes of each */
+    bool is_strided; /* where its view says so */
+} numbers;
+
+/* Where they begin and how far they are apart, within their view. */
+static nebel_result find_numbers(nb_gltf_data *data, size_t index, const numbers *wanted, const unsigned char **bytes,
+                                 uint64_t *stride)
+{
+    if (wanted->view < 0 || (uint64_t)wanted->view >= data->view_count)
+        return nb_gltf_fail(data, "accessors", index, "has a view that does not exist");
+    const nb_gltf_view *view = &data->views[wanted->view];
+    uint64_t size = 0;
+    const nebel_result result = find_view(data, view, bytes, &size);
+    if (result != NEBEL_OK) return result;
+    *stride = wanted->is_strided && view->stride > 0 ? view->stride : wanted->tight;
+    if (*stride < wanted->tight || wanted->offset > size || size - wanted->offset < wanted->tight ||
+        (wanted->count - 1) > (size - wanted->offset - wanted->tight) / *stride)
+        return nb_gltf_fail(data, "accessors", index, "is longer than its view");
+    *bytes += wanted->offset;
+    return NEBEL_OK;
+}
+
+static void convert_one(const nb_gltf_accessor *accessor, const unsigned char *bytes, unsigned char *made)
+{
+    const unsigned size = component_size(accessor->type);
+    for (unsigned k = 0; k < accessor->width; k++) {
+        const float value = read_component(bytes + k * size, accessor->type, accessor->is_normalized);
+        memcpy(made + k * sizeof value, &value, sizeof value);
+    }
+}
+
+static numbers numbers_of(const nb_gltf_accessor *accessor)
+{
+    return (numbers){accessor->view, accessor->offset, accessor->count,
+                     component_size(accessor->type) * accessor->width, true};
+}
+
+/* glTF 2.0, section 3.6.2.3: indices and values are tight. */
+static numbers indices_of(const nb_gltf_accessor *accessor)
+{
+    const nb_gltf_sparse *sparse = &accessor->sparse;
+    return (numbers){sparse->index_view, sparse->index_offset, sparse->count, component_size(sparse->index_type),
+                     false};
+}
+
+static numbers values_of(const nb_gltf_accessor *accessor)
+{
+    const nb_gltf_sparse *sparse = &accessor->sparse;
+    return (numbers){sparse->value_view, sparse->value_offset, sparse->count,
+                     component_size(accessor->type) * accessor->width, false};
+}
+
+static nebel_result check_sparse(nb_gltf_data *data, size_t index)
+{
+    const nb_gltf_accessor *accessor = &data->accessors[index];
+    const int type = accessor->sparse.index_type;
+    const unsigned char *bytes;
+    uint64_t stride;
+    if (type != NB_GLTF_UNSIGNED_BYTE && type != NB_GLTF_UNSIGNED_SHORT && type != NB_GLTF_UNSIGNED_INT)
+        return nb_gltf_fail(data, "accessors", index, "has sparse indices that are no whole numbers");
+    if (accessor->sparse.count == 0 || accessor->sparse.count > accessor->count)
+        return nb_gltf_fail(data, "accessors", index, "has more sparse numbers than numbers, or none");
+    const numbers indices = indices_of(accessor), values = values_of(accessor);
+    const nebel_result result = find_numbers(data, index, &indices, &bytes, &stride);
+    return result == NEBEL_OK ? find_numbers(data, index, &values, &bytes, &stride) : result;
+}
+
+static uint32_t read_index(const unsigned char *bytes, unsigned size)
+{
+    uint32_t index = 0;
+    for (unsigned i = 0; i < size; i++) index |= (uint32_t)bytes[i] << (8 * i);
+    return index;
+}
+
+static nebel_result put_sparse(nb_gltf_data *data, size_t index, unsigned char *made)
+{
+    const nb_gltf_accessor *accessor = &data->accessors[index];
+    const numbers indices = indices_of(accessor), values = values_of(accessor);
+    const unsigned char *places = NULL, *bytes = NULL;
+    uint64_t stride = 0;
+    nebel_result result = find_numbers(data, index, &indices, &places, &stride);
+    if (result == NEBEL_OK) result = find_numbers(data, index, &values, &bytes, &stride);
+    for (uint64_t i = 0; i < accessor->sparse.count && result == NEBEL_OK; i++) {
+        const uint32_t at = read_index(places + i * indices.tight, indices.tight);
+        if (at >= accessor->count) return nb_gltf_fail(data, "accessors", index, "has a sparse index beyond its end");
+        convert_one(accessor, bytes + i * values.tight, made + at * accessor->width * sizeof(float));
+    }
+    return result;
+}
+
+/* A model of zeros takes no bytes: what it announces is believed up to as many. */
+static const uint64_t most_zeros = (uint64_t)1 << 26;
+
 static nebel_result convert(nb_gltf_data *data, size_t index, uint64_t *offset)
 {
     const nb_gltf_accessor *accessor = &data->accessors[index];
-    if (accessor->is_sparse)
-        return nb_gltf_fail(data, "accessors", index, "has sparse numbers that are no floats, which is not supported");
-    if (accessor->view < 0 || (uint64_t)accessor->view >= data->view_count)
-        return nb_gltf_fail(data, "accessors", index, "has a view that does not exist");
-    const nb_gltf_view *view = &data->views[accessor->view];
-    const unsigned width = component_size(accessor->type), tight = width * accessor->width;
-    const uint64_t stride = view->stride > 0 ? view->stride : tight;
+    const bool has_base = accessor->view >= 0 || !accessor->is_sparse;
+    const numbers base = numbers_of(accessor);
+    const uint64_t size = accessor->width * sizeof(float);
     const unsigned char *bytes = NULL;
-    uint64_t size = 0;
-    nebel_result result = find_view(data, view, &bytes, &size);
+    uint64_t stride = 0;
+    nebel_result result = has_base ? find_numbers(data, index, &base, &bytes, &stride) : NEBEL_OK;
+    if (result == NEBEL_OK && !has_base && accessor->count > most_zeros)
+        result = nb_gltf_fail(data, "accessors", index, "has too many numbers");
+    if (result == NEBEL_OK && accessor->is_sparse) result = check_sparse(data, index);
     if (result != NEBEL_OK) return result;
-    if (stride < tight || accessor->offset > size || size - accessor->offset < tight ||
-        (accessor->count - 1) > (size - accessor->offset - tight) / stride)
-        return nb_gltf_fail(data, "accessors", index, "is longer than its view");
-    unsigned char *made = nb_gltf_add_extra(data, accessor->count * accessor->width * sizeof(float), offset);
+    unsigned char *made = nb_gltf_add_extra(data, accessor->count * size, offset);
     if (made == NULL) return fail_memory(data);
-    find_view(data, view, &bytes, &size); /* the extra file may have moved */
-    for (uint64_t i = 0; i < accessor->count; i++)
-        for (unsigned k = 0; k < accessor->width; k++) {
-            const float value = read_component(bytes + accessor->offset + i * stride + k * width, accessor->type,
-                                               accessor->is_normalized);
-            memcpy(made + (i * accessor->width + k) * sizeof value, &value, sizeof value);
-        }
-    return NEBEL_OK;
+    memset(made, 0, (size_t)(accessor->count * size));
+    if (has_base) result = find_numbers(data, index, &base, &bytes, &stride); /* the extra file may have moved */
+    for (uint64_t i = 0; i < accessor->count && has_base && result == NEBEL_OK; i++)
+        convert_one(accessor, bytes + i * stride, made + i * size);
+    return result == NEBEL_OK && accessor->is_sparse ? put_sparse(data, index, made) : result;
 }
 
 /* ---- the new text ---------------------------------------------------------------------------- */

@@ -111,10 +111,13 @@ static bool take_required(nb_json *json, const nb_json_node *list, nb_gltf_data 
         data->requires_meshopt = data->requires_meshopt || is_text(node, MESHOPT);
         if (node->type != NB_JSON_STRING || is_known(data, node)) continue;
         const int size = node->string_size < 80 ? (int)node->string_size : 80;
-        nb_model_fail(
-            data->load, NEBEL_ERROR_UNSUPPORTED,
-            "the model \"%s\" requires the glTF extension \"%.*s\", which is not supported; export it without",
-            data->load->source->file, size, node->string);
+        /* The library itself is linked with no decoder. */
+        const bool is_here = is_text(node, MESHOPT) && data->load->sink == NULL;
+        nb_model_fail(data->load, NEBEL_ERROR_UNSUPPORTED,
+                      "the model \"%s\" requires the glTF extension \"%.*s\", which %s; export it without%s",
+                      data->load->source->file, size, node->string,
+                      is_here ? "is not decoded where models are read in process" : "is not supported",
+                      is_here ? ", or have nebel-read-model read it" : "");
         return nb_json_stop(json, NEBEL_ERROR_UNSUPPORTED);
     }
     return true;
@@ -171,6 +174,17 @@ static bool take_view(nb_json *json, const nb_json_node *node, nb_gltf_data *dat
     return packed == NULL || data->load->unpack == NULL || take_packed(json, packed, data, view);
 }
 
+static void take_sparse(const nb_json *json, const nb_json_node *node, nb_gltf_sparse *sparse)
+{
+    const nb_json_node *indices = find(json, node, "indices"), *values = find(json, node, "values");
+    *sparse = (nb_gltf_sparse){.count = (uint64_t)find_whole(json, node, "count", 0),
+                               .index_view = find_whole(json, indices, "bufferView", -1),
+                               .index_offset = (uint64_t)find_whole(json, indices, "byteOffset", 0),
+                               .index_type = (int)find_whole(json, indices, "componentType", 0),
+                               .value_view = find_whole(json, values, "bufferView", -1),
+                               .value_offset = (uint64_t)find_whole(json, values, "byteOffset", 0)};
+}
+
 static bool take_accessor(nb_json *json, const nb_json_node *node, nb_gltf_data *data)
 {
     static const char *const names[] = {"SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"};
@@ -186,7 +200,9 @@ static bool take_accessor(nb_json *json, const nb_json_node *node, nb_gltf_data 
     accessor->count = (uint64_t)find_whole(json, node, "count", 0);
     accessor->type = (int)find_whole(json, node, "componentType", 0);
     accessor->is_normalized = is_true(json, node, "normalized");
-    accessor->is_sparse = find(json, node, "sparse") != NULL;
+    const nb_json_node *sparse = find(json, node, "sparse");
+    accessor->is_sparse = sparse != NULL;
+    if (sparse != NULL) take_sparse(json, sparse, &accessor->sparse);
     const int name = find_choice(json, node, "type", names, 7);
     if (name < 0) return true;
     accessor->width = widths[name];
