@@ -31,6 +31,11 @@ uint64_t nb_budget_memory(const nb_budget *budget)
     return base_memory + (most != 0 && most < wanted ? most : wanted);
 }
 
+uint64_t nb_budget_most_memory(const nb_budget *budget)
+{
+    return base_memory + (budget->most_memory != 0 ? budget->most_memory : memory_per_byte * max_bytes);
+}
+
 static unsigned wanted_seconds(const nb_budget *budget)
 {
     return base_seconds + (unsigned)(budget->bytes / bytes_per_second);

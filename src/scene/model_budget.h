@@ -37,6 +37,7 @@ typedef struct nb_budget {
 void nb_budget_add(nb_budget *budget, const struct stat *status);
 
 uint64_t nb_budget_memory(const nb_budget *budget);       /* bytes */
+uint64_t nb_budget_most_memory(const nb_budget *budget);  /* the same for files of any size */
 bool nb_budget_is_cut(const nb_budget *budget);           /* the scene has less time left than the files warrant */
 unsigned nb_budget_cpu_seconds(const nb_budget *budget);  /* of processor time */
 unsigned nb_budget_wall_seconds(const nb_budget *budget); /* more than of processor time */

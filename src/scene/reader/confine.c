@@ -47,6 +47,15 @@ static void limit(int resource, rlim_t wanted)
     setrlimit(resource, &now);
 }
 
+/* What the limit may be raised to later. */
+static void cap(int resource, rlim_t most)
+{
+    struct rlimit now;
+    if (getrlimit(resource, &now) != 0 || now.rlim_max <= most) return;
+    now.rlim_max = most;
+    setrlimit(resource, &now);
+}
+
 static void limit_for_ever(int resource, rlim_t wanted)
 {
     const struct rlimit both = {wanted, wanted};
@@ -74,4 +83,5 @@ void nb_confine_budget(const nb_budget *budget)
     if (NB_SANITIZED || getrlimit(RLIMIT_AS, &now) != 0) return;
     if (own_memory == 0) own_memory = now.rlim_cur;
     limit(RLIMIT_AS, own_memory != RLIM_INFINITY && own_memory < memory ? own_memory : memory);
+    cap(RLIMIT_AS, (rlim_t)nb_budget_most_memory(budget));
 }
