@@ -311,11 +311,46 @@ static void lamplight_is_what_brute_force_finds(void **state)
     expect_brute_force(BODIES, 1, 2, 0);
 }
 
+/* Sunlight that falls through narrow slits between opaque boxes onto a slab: in closed form. */
+static void light_falls_through_slits(void **state)
+{
+    (void)state;
+    enum { BOXES = 12 };
+    const double extinction = 0.3, slit = 0.04, width = 22.0 / BOXES;
+    static crowd of;
+    double right = 0;
+    of = (crowd){.count = BOXES + 1, .desc = {.sun = {{0, 1, 0}, {3, 3, 3}}}};
+    of.bodies[BOXES] =
+        (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .min = {-10, -1, -50}, .max = {10, 0, 50}},
+                            .extinction = {extinction, extinction, extinction},
+                            .albedo = {1, 1, 1}};
+    for (int i = 0; i < BOXES; i++) {
+        const double from = -11 + i * width, to = from + width - slit;
+        of.bodies[i] =
+            (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .min = {from, 1, -50}, .max = {to, 2, 50}},
+                                .extinction = {1000, 1000, 1000}};
+        if (i + 1 < BOXES) right += exp(-extinction * (to + 10)) - exp(-extinction * (to + slit + 10));
+    }
+    right *= 3 * exp(-extinction * 0.5) * phase_value(0, 0);
+    const nebel_ray ray = {{-12, -0.5, 0}, {1, 0, 0}, HUGE_VAL};
+    nebel_snapshot *snapshot = commit_crowd(&of);
+    for (int way = 0; way < 3; way++) {
+        const nebel_trace_desc asked = {.precision = way == 2 ? NEBEL_PRECISION_FLOAT : NEBEL_PRECISION_DOUBLE,
+                                        .tolerance = way == 1 ? 1e-5 : 0};
+        nebel_light light;
+        assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &light, 0), NEBEL_OK);
+        assert_true(light.error < (way == 1 ? 1e-5 : 1e-3));
+        assert_true(fabs(light.in_scattering[0] - right) <= light.error);
+    }
+    nebel_release_snapshot(snapshot);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sunlight_is_what_brute_force_finds),
         cmocka_unit_test(lamplight_is_what_brute_force_finds),
+        cmocka_unit_test(light_falls_through_slits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

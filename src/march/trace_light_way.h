@@ -97,8 +97,8 @@ static stretch_ahead ahead_in(const packet *way, const nb_volume *body, int by_t
                            nb_select(nb_narrow_mask(near), slack, NB_F(0.0))};
 }
 
-/* Adds what a body cuts out of the way. Slack is left to the compiler to drop where nobody asks for the error. */
-static void add_body(light_depth *sum, const packet *way, const nb_volume *body)
+/* What a body cuts out of the way. Slack is left to the compiler to drop where nobody asks for the error. */
+static nb_real length_in_body(const packet *way, const nb_volume *body)
 {
     const nb_leaf *leaf = &body->leaves[0];
     nb_interval raw;
@@ -109,16 +109,25 @@ static void add_body(light_depth *sum, const packet *way, const nb_volume *body)
         raw = leaf_interval(way, body, leaf);
     }
     const nb_wide enter = nb_wmax(raw.enter, NB_W(0.0)), leave = nb_wmin(raw.leave, way->t_max);
-    const nb_real length = nb_narrow(nb_wmax(leave - enter, NB_W(0.0)));
+    return nb_narrow(nb_wmax(leave - enter, NB_W(0.0)));
+}
+
+/* By how much that may be off; `noise` is what sums may be off by, relative to each of their terms. */
+static nb_real length_error(const packet *way, const nb_volume *body, int by_tree, nb_real noise)
+{
+    const stretch_ahead s = ahead_in(way, body, by_tree);
+    return s.error + nb_narrow(nb_wmax(s.leave - s.enter, NB_W(0.0))) * noise;
+}
+
+static void add_body(light_depth *sum, const packet *way, const nb_volume *body)
+{
+    const nb_real length = length_in_body(way, body);
     for (int c = 0; c < 3; c++) sum->depth[c] = sum->depth[c] + REAL(body->extinction[c]) * length;
 }
 
-/* `noise` is what the sum may be off by, relative to each of its terms. */
 static void add_body_error(light_depth *sum, const packet *way, const nb_volume *body, int by_tree, nb_real noise)
 {
-    const stretch_ahead s = ahead_in(way, body, by_tree);
-    const nb_real length = nb_narrow(nb_wmax(s.leave - s.enter, NB_W(0.0)));
-    const nb_real error = s.error + length * noise;
+    const nb_real error = length_error(way, body, by_tree, noise);
     for (int c = 0; c < 3; c++) sum->error[c] = sum->error[c] + REAL(body->extinction[c]) * error;
 }
 

@@ -15,6 +15,10 @@
 /* What part of the error all steps together may be off by is left to what lies beyond the last. */
 #define TAIL_SHARE 0.01
 
+/* And to steps in which shadows begin or end: light may jump there, and what a step misses is no less for each metre
+ * however short it is. Each shadow does so twice. */
+#define EDGE_SHARE 0.02
+
 /* More steps of bodies over each other than of one: around each edge of a shadow they are halved. */
 #define MOST_CROWD_STEPS (16 * MOST_SUN_STEPS)
 
@@ -28,8 +32,10 @@
 /* Where the ways from a ray to a light may meet a body: nowhere else on the ray; nowhere where first > last. */
 typedef struct lit_shadow {
     nb_wide first, last;
-    nb_real amount; /* the most optical depth in it */
+    nb_real amount;            /* the most optical depth in it */
+    nb_real at_start, at_last; /* integral of the density on the way from where the step starts; from its last place */
     const nb_medium *medium;
+    size_t next; /* of the shadows that lie on the step at hand */
 } lit_shadow;
 
 /* More than these take memory once. */
@@ -116,7 +122,7 @@ static void set_lamp_shadow(lit_shadow *s, const packet *rays, nb_wvec3 lamp, nb
 static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_lamp *lamp, const nb_medium *medium)
 {
     const nb_volume *body = &medium->body;
-    lit_shadow s = {NB_W(0.0), NB_WFAR, most_depth(body), medium};
+    lit_shadow s = {NB_W(0.0), NB_WFAR, most_depth(body), NB_F(0.0), NB_F(0.0), medium, 0};
     if (is_endless(body)) return s;
     const nb_wvec3 low = nb_wsub3(wide_vector(body->low), rays->origin);
     const nb_wvec3 high = nb_wsub3(wide_vector(body->high), rays->origin);
@@ -149,48 +155,93 @@ static void list_shadows(sunlight *sun, const packet *rays, const nb_lamp *lamp)
     }
 }
 
-/* What a body of any profile takes of the way. */
-static void add_profile(light_depth *sum, const packet *way, const nb_medium *medium)
+/* The integral of a body's density along the way, of any profile, and by how much it may be off. */
+static nb_estimate profile_along(const packet *way, const nb_medium *medium)
 {
-    const nb_volume *body = &medium->body;
-    const stretch_ahead s = ahead_in(way, body, 0);
+    const stretch_ahead s = ahead_in(way, &medium->body, 0);
     const nb_wide leave = nb_wmax(s.leave, s.enter);
     contact k = {.medium = medium, .inside = nb_narrow_mask(s.enter < leave)};
     profile_contact(&k, way);
     const nb_estimate along = contact_integral(&k, s.enter, leave, nb_narrow(leave - s.enter));
-    const nb_real value = nb_select(k.inside, along.value, NB_F(0.0));
-    const nb_real error = nb_select(k.inside, along.error, NB_F(0.0)) + s.error;
+    return (nb_estimate){nb_select(k.inside, along.value, NB_F(0.0)),
+                         nb_select(k.inside, along.error, NB_F(0.0)) + s.error};
+}
+
+static nb_estimate length_along(const march *m, const packet *way, const nb_volume *body)
+{
+    nb_estimate along = {length_in_body(way, body), NB_F(0.0)};
+    if (m->wants_error) along.error = length_error(way, body, 0, NB_F(4.0) * NB_EPSILON);
+    return along;
+}
+
+/* The way to a light from a place, and a lower bound of the optical depth between that place and the one before: from
+ * the bodies that both ways meet, each of which takes a concave amount of the ways between. */
+typedef struct shadowed_way {
+    light_depth depth;
+    nb_real before[3], here[3]; /* of the bodies that both ways meet: on the way from the place before; from here */
+} shadowed_way;
+
+static void note_covering(shadowed_way *sum, const nb_volume *body, nb_mask near, nb_real before, nb_real here)
+{
+    const nb_mask both = nb_and(near, nb_and(before > NB_F(0.0), here > NB_F(0.0)));
+    const nb_real first = nb_select(both, before, NB_F(0.0)), last = nb_select(both, here, NB_F(0.0));
     for (int c = 0; c < 3; c++) {
-        sum->depth[c] = sum->depth[c] + REAL(body->extinction[c]) * value;
-        sum->error[c] = sum->error[c] + REAL(body->extinction[c]) * error;
+        sum->before[c] = sum->before[c] + REAL(body->extinction[c]) * first;
+        sum->here[c] = sum->here[c] + REAL(body->extinction[c]) * last;
     }
 }
 
-/* From t of each ray; of the bodies in whose shadow that is, lane by lane: slack beside them depends on no company. */
-static light_depth depth_through_shadows(const sunlight *sun, const march *m, nb_wide t, nb_wvec3 direction,
-                                         nb_wide reach)
+/* From t of each ray; of the bodies in whose shadow that is, lane by lane: slack beside them depends on no company.
+ * `before`: the last place that was asked. */
+static shadowed_way way_through_shadows(const sunlight *sun, const march *m, nb_wide before, nb_wide t,
+                                        nb_wvec3 direction, nb_wide reach)
 {
     const packet way = {nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t)), direction, reach};
-    light_depth sum = no_depth();
+    const nb_real zero = NB_F(0.0);
+    shadowed_way sum = {no_depth(), {zero, zero, zero}, {zero, zero, zero}};
     nb_real terms = NB_F(4.0);
-    for (size_t i = 0; i < sun->shadow_count; i++) {
-        const lit_shadow *s = &sun->shadows[i];
+    for (size_t i = sun->first_shadow; i < sun->shadow_count; i = sun->shadows[i].next) {
+        lit_shadow *s = &sun->shadows[i];
         const nb_mask near = nb_narrow_mask(nb_wand(s->first <= t, s->last >= t));
         if (!nb_any(near)) continue;
         const nb_volume *body = &s->medium->body;
-        light_depth with = sum;
-        if (body->density.type != NEBEL_DENSITY_CONSTANT) {
-            add_profile(&with, &way, s->medium);
-        } else {
-            add_body(&with, &way, body);
-            if (m->wants_error) add_body_error(&with, &way, body, 0, NB_F(4.0) * NB_EPSILON);
+        const int varies = body->density.type != NEBEL_DENSITY_CONSTANT;
+        const nb_estimate along = varies ? profile_along(&way, s->medium) : length_along(m, &way, body);
+        const nb_mask covers = nb_and(near, nb_narrow_mask(nb_wand(s->first <= before, s->last >= before)));
+        const nb_real value = nb_select(near, along.value, zero), error = nb_select(near, along.error, zero);
+        if (nb_any(covers)) note_covering(&sum, body, covers, s->at_last, value);
+        for (int c = 0; c < 3; c++) {
+            sum.depth.depth[c] = sum.depth.depth[c] + REAL(body->extinction[c]) * value;
+            sum.depth.error[c] = sum.depth.error[c] + REAL(body->extinction[c]) * error;
         }
-        terms = terms + nb_select(near, NB_F(1.0), NB_F(0.0));
-        select_reals(near, sum.depth, with.depth);
-        select_reals(near, sum.error, with.error);
+        terms = terms + nb_select(near, NB_F(1.0), zero);
+        s->at_last = value;
     }
-    for (int c = 0; c < 3; c++) sum.error[c] = sum.error[c] + sum.depth[c] * (terms * NB_EPSILON);
+    for (int c = 0; c < 3; c++) sum.depth.error[c] = sum.depth.error[c] + sum.depth.depth[c] * (terms * NB_EPSILON);
     return sum;
+}
+
+/* Lists the shadows that lie on a step, at the start of which they are. */
+static void list_shadows_of_step(sunlight *sun, nb_wide start, nb_wide end, nb_wmask lanes)
+{
+    size_t *last = &sun->first_shadow;
+    for (size_t i = 0; i < sun->shadow_count; i++) {
+        lit_shadow *s = &sun->shadows[i];
+        if (!nb_wany(nb_wand(lanes, nb_wand(s->first <= end, s->last >= start)))) continue;
+        s->at_last = s->at_start;
+        *last = i;
+        last = &s->next;
+    }
+    *last = sun->shadow_count;
+}
+
+/* The last place is where the next step starts, in these lanes. */
+static void start_from_last(const sunlight *sun, nb_mask lanes)
+{
+    for (size_t i = sun->first_shadow; i < sun->shadow_count; i = sun->shadows[i].next) {
+        lit_shadow *s = &sun->shadows[i];
+        s->at_start = nb_select(lanes, s->at_last, s->at_start);
+    }
 }
 
 /* ---- places ---------------------------------------------------------------------------------- */
@@ -199,12 +250,29 @@ static light_depth depth_through_shadows(const sunlight *sun, const march *m, nb
 typedef struct lit_place {
     nb_wide t;
     nb_real depth[3], depth_error[3];
-    nb_real behind[3]; /* e^-depth */
-    nb_real way[3];    /* optical depth from there to the light, */
-    nb_real comes[3];  /* through which this comes */
+    nb_real behind[3];          /* e^-depth */
+    nb_real way[3];             /* optical depth from there to the light, */
+    nb_real comes[3];           /* through which this comes */
+    nb_real before[3], here[3]; /* see shadowed_way; no way between the place before and this is less deep than both */
+    nb_real arrives;            /* what comes through no fog, of intensity 1 */
+    nb_real cut, cut_depth;     /* see lit_between: of those between the place before and this */
     nb_real seen[3];
-    nb_real doubt; /* by what factor that may be off */
+    nb_real doubt;    /* by what factor that may be off */
+    nb_mask has_edge; /* a shadow begins or ends between the place before and this */
 } lit_place;
+
+/* Where a ray starts, with no light. */
+static lit_place no_place(void)
+{
+    const nb_real zero = NB_F(0.0);
+    lit_place place = {
+        .t = NB_W(0.0), .arrives = zero, .cut = zero, .cut_depth = zero, .doubt = zero, .has_edge = nb_mask_false};
+    for (int c = 0; c < 3; c++) {
+        place.depth[c] = place.depth_error[c] = place.behind[c] = zero;
+        place.way[c] = place.comes[c] = place.seen[c] = place.before[c] = place.here[c] = zero;
+    }
+    return place;
+}
 
 /* What a lamp brings to t, and from where; how far it is. */
 static nb_real lamp_arrives(const march *m, const lamp_pass *pass, const nb_phase *phase, nb_wide t, nb_wvec3 *towards,
@@ -230,16 +298,24 @@ typedef struct crowd_light {
     double share;          /* what its steps may add to the error */
 } crowd_light;
 
-static void look_from(const sunlight *sun, const march *m, const crowd_light *light, lit_place *at)
+static void look_from(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *before,
+                      lit_place *at)
 {
     nb_wvec3 towards = sun->direction;
     nb_wide reach = NB_WFAR;
     nb_real arriving = NB_F(1.0), through[3];
     if (light->pass != NULL) arriving = lamp_arrives(m, light->pass, light->phase, at->t, &towards, &reach);
-    const light_depth way = depth_through_shadows(sun, m, at->t, towards, reach);
+    const shadowed_way all = way_through_shadows(sun, m, before->t, at->t, towards, reach);
+    const light_depth way = all.depth;
     at->doubt = NB_F(0.0);
+    at->arrives = arriving;
+    at->has_edge = nb_mask_false;
     for (int c = 0; c < 3; c++) {
+        const nb_real edges = before->way[c] + way.depth[c] - (all.before[c] + all.here[c]);
+        at->has_edge = nb_or(at->has_edge, edges > (before->way[c] + way.depth[c]) * (NB_F(1024.0) * NB_EPSILON));
         at->way[c] = way.depth[c];
+        at->before[c] = all.before[c];
+        at->here[c] = all.here[c];
         const nb_real rounding = (at->depth[c] + way.depth[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
         at->doubt = nb_max(at->doubt, nb_min(at->depth_error[c] + way.error[c], NB_F(1.0)) + rounding);
     }
@@ -283,9 +359,10 @@ static void find_moments_of(const contact *k, nb_wide enter, nb_wide leave, nb_r
     *second = s * (s + NB_F(2.0) * l * mean) + l * l * square;
 }
 
-/* What bodies add between two places: optical depth and its error, how many depths are summed, light that is not seen from places. */
+/* What bodies add between two places: optical depth and its error, how many depths are summed, light that is not seen from
+ * places, and by how much light is off, per optical depth, of bodies that end there together with shadows. */
 typedef struct lit_between {
-    nb_real depth[3], error[3], terms, unresolved;
+    nb_real depth[3], error[3], terms, unresolved, cut, cut_depth;
 } lit_between;
 
 /* Adds what a body gives from `from` to `to`, which has the places from `place` to place + 1 of its half. */
@@ -302,7 +379,7 @@ static void add_part(const contact *k, const leaf_span *span, const crowd_light 
     const nb_real scale = nb_rcp_bounded(quarter), most = nb_min(most_depth(&k->medium->body), NB_F(1.0));
     const nb_mask narrow = nb_narrow_mask(span->leave - span->enter < nb_widen(quarter + quarter));
     const int varies = k->medium->body.density.type != NEBEL_DENSITY_CONSTANT;
-    nb_real first, second, hidden = zero, doubt = zero;
+    nb_real first, second, hidden = zero, doubt = zero, most_light = zero, deepest = zero;
     if (varies) {
         const nb_real even = NB_F(0.5) * h * (contact_density(k, enter) + contact_density(k, leave));
         const nb_real bent = nb_min(nb_abs(value - even) / nb_max(value, NB_TINY), NB_F(1.0));
@@ -318,9 +395,15 @@ static void add_part(const contact *k, const leaf_span *span, const crowd_light 
         half->second[c] = half->second[c] + glow * nb_select(some, second, zero);
         if (varies) half->doubt[c] = half->doubt[c] + glow * doubt;
         hidden = nb_max(hidden, glow * most * from->seen[c]);
+        most_light = nb_max(most_light, glow);
+        deepest = nb_max(deepest, k->extinction[c] * value);
     }
     sum->terms = sum->terms + nb_select(some, NB_F(1.0), zero);
     sum->unresolved = sum->unresolved + nb_select(narrow, hidden, zero);
+    /* depth and a body's own shadow have a kink where it ends, and its light is all on one side of that */
+    const nb_real open = nb_max(NB_F(1.0) - h * scale, zero);
+    sum->cut = sum->cut + nb_select(some, most_light * open * NB_F(0.5), zero);
+    sum->cut_depth = sum->cut_depth + nb_select(nb_and(some, open > NB_F(1e-3)), deepest, zero);
 }
 
 /* All of them. */
@@ -328,7 +411,7 @@ static void add_parts(const march *m, const crowd_light *light, const lit_place 
                       nb_real quarter, lit_half *half, nb_real *unresolved)
 {
     const nb_real zero = NB_F(0.0);
-    lit_between sum = {{zero, zero, zero}, {zero, zero, zero}, NB_F(2.0), zero};
+    lit_between sum = {{zero, zero, zero}, {zero, zero, zero}, NB_F(2.0), zero, zero, zero};
     for (size_t i = 0; i < m->contact_count; i++) {
         const contact *k = &m->contacts[i];
         add_part(k, &m->spans[k->first_span], light, from, to->t, place, quarter, half, &sum);
@@ -339,6 +422,8 @@ static void add_parts(const march *m, const crowd_light *light, const lit_place 
         to->depth_error[c] = from->depth_error[c] + sum.error[c] + rounding;
     }
     *unresolved = *unresolved + sum.unresolved;
+    to->cut = sum.cut;
+    to->cut_depth = sum.cut_depth;
 }
 
 static lit_half nothing_scattered(void)
@@ -366,6 +451,7 @@ static nb_real doubt_of_half(const lit_half *half, int c, nb_real a, nb_real b, 
 typedef struct crowd_step {
     lit_place end;
     nb_real light[3], error, rounding, drop;
+    nb_mask has_edge; /* a shadow begins or ends in it */
 } crowd_step;
 
 /* What shadows may do that the places of a step do not show, as a part of its light: all of them that are too narrow, and where
@@ -375,7 +461,7 @@ static nb_real hidden_in_shadows(const sunlight *sun, nb_wide start, nb_wide end
 {
     const nb_real zero = NB_F(0.0), one = NB_F(1.0);
     nb_real hidden = zero, edges = zero;
-    for (size_t i = 0; i < sun->shadow_count; i++) {
+    for (size_t i = sun->first_shadow; i < sun->shadow_count; i = sun->shadows[i].next) {
         const lit_shadow *s = &sun->shadows[i];
         const nb_mask begins = nb_narrow_mask(nb_wand(s->first > start, s->first < end));
         const nb_mask stops = nb_narrow_mask(nb_wand(s->last > start, s->last < end));
@@ -392,23 +478,39 @@ static nb_real hidden_in_shadows(const sunlight *sun, nb_wide start, nb_wide end
     return nb_min(hidden + nb_sqrt(edges), one);
 }
 
-/* What places do not show between two of them: see unseen_light of trace_lit_rule.h. `most`: what opaque fog makes of 1. */
-static nb_real unseen_between_places(const lit_place at[5], int c, nb_real most)
+/* What places do not show between two of them: see unseen_light of trace_lit_rule.h. */
+static nb_real unseen_between_places(const lit_place at[5], int c, const crowd_light *light)
 {
+    const nb_real most = light->pass != NULL ? NB_F(1.0) : light->most;
+    const double intensity = light->pass != NULL ? light->pass->lamp->intensity[c] : 1;
     nb_real unseen = NB_F(0.0);
     for (int i = 0; i < 4; i++) {
-        const int a = i > 0 ? i - 1 : 0, b = i < 3 ? i + 1 : 3;
         const lit_place *from = &at[i], *to = &at[i + 1];
-        const nb_real falls = at[a].way[c] - at[a + 1].way[c], rises = at[b + 1].way[c] - at[b].way[c];
-        const nb_real least = nb_min(from->way[c], to->way[c]);
-        const nb_real dip = nb_min(nb_max(nb_min(falls, rises), NB_F(0.0)), least);
+        const nb_real cover = nb_min(to->before[c], to->here[c]);
+        const nb_real dip = nb_max(nb_min(from->way[c], to->way[c]) - cover, NB_F(0.0));
         const nb_real change = nb_abs((to->depth[c] - from->depth[c]) + (to->way[c] - from->way[c])) + dip;
         const nb_real lost = nb_max(from->behind[c] - to->behind[c], NB_F(0.0));
-        nb_real light = most * lost * nb_max(from->comes[c], to->comes[c]) * unseen_share(change);
-        if (nb_any(dip > NB_F(0.0))) light = light * nb_exp(dip);
-        unseen = unseen + light;
+        nb_real comes = nb_max(from->comes[c], to->comes[c]);
+        if (nb_any(dip > NB_F(0.0))) {
+            const nb_real arrives = nb_max(from->arrives, to->arrives) * REAL(intensity);
+            comes = nb_select(dip > NB_F(0.0), arrives * nb_exp(-cover), comes);
+        }
+        unseen = unseen + most * lost * comes * unseen_share(change);
     }
     return unseen;
+}
+
+/* What depths and shadows that begin or end between two places do to the light of bodies that do so, too. */
+static nb_real light_of_cut_bodies(const lit_place at[5], int c)
+{
+    nb_real light = NB_F(0.0);
+    for (int i = 0; i < 4; i++) {
+        const lit_place *from = &at[i], *to = &at[i + 1];
+        const nb_real shadows =
+            to->cut_depth + nb_max(from->way[c] + to->way[c] - (to->before[c] + to->here[c]), NB_F(0.0));
+        light = light + to->cut * nb_max(from->seen[c], to->seen[c]) * nb_min(shadows, NB_F(1.0));
+    }
+    return light;
 }
 
 static crowd_step try_crowd_step(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *start,
@@ -421,9 +523,13 @@ static crowd_step try_crowd_step(const sunlight *sun, const march *m, const crow
     for (int i = 1; i < 5; i++) {
         at[i].t = i == 4 ? end : nb_wmin(start->t + nb_widen(quarter * REAL(i)), end);
         add_parts(m, light, &at[i - 1], &at[i], (i - 1) % 2, quarter, &half[(i - 1) / 2], &unresolved);
-        look_from(sun, m, light, &at[i]);
+        look_from(sun, m, light, &at[i - 1], &at[i]);
     }
-    crowd_step s = {.end = at[4], .error = NB_F(0.0), .rounding = NB_F(0.0), .drop = NB_F(0.0)};
+    crowd_step s = {.end = at[4],
+                    .error = NB_F(0.0),
+                    .rounding = NB_F(0.0),
+                    .drop = NB_F(0.0),
+                    .has_edge = nb_or(nb_or(at[1].has_edge, at[2].has_edge), nb_or(at[3].has_edge, at[4].has_edge))};
     nb_real doubt = NB_F(0.0), full = NB_F(0.0), unseen = NB_F(0.0);
     for (int i = 0; i < 5; i++) doubt = nb_max(doubt, at[i].doubt);
     for (int c = 0; c < 3; c++) {
@@ -440,7 +546,7 @@ static crowd_step try_crowd_step(const sunlight *sun, const march *m, const crow
         s.rounding = nb_max(s.rounding, (half[0].sum[c] + half[1].sum[c]) * most * doubt + moments);
         full = nb_max(full, (half[0].sum[c] + half[1].sum[c]) * most);
         s.drop = nb_max(s.drop, at[0].behind[c] - at[4].behind[c]);
-        unseen = nb_max(unseen, unseen_between_places(at, c, light->pass != NULL ? NB_F(1.0) : light->most));
+        unseen = nb_max(unseen, unseen_between_places(at, c, light) + light_of_cut_bodies(at, c));
     }
     s.error = s.error + unseen + unresolved + full * hidden_in_shadows(sun, start->t, end, length);
     return s;
@@ -467,14 +573,15 @@ static void select_place(nb_mask mask, lit_place *to, const lit_place *from)
 }
 
 /* The place at t behind one that is known. */
-static lit_place place_behind(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *from,
-                              nb_wide t)
+static lit_place place_behind(sunlight *sun, const march *m, const crowd_light *light, const lit_place *from, nb_wide t,
+                              nb_wmask lanes)
 {
     lit_half none = nothing_scattered();
     nb_real unresolved = NB_F(0.0);
     lit_place at = {.t = t};
+    list_shadows_of_step(sun, from->t, t, lanes);
     add_parts(m, light, from, &at, 0, NB_F(1.0), &none, &unresolved);
-    look_from(sun, m, light, &at);
+    look_from(sun, m, light, from, &at);
     return at;
 }
 
@@ -487,17 +594,20 @@ static nb_real next_length(nb_real length, nb_real error, nb_real allowed)
     return length * nb_select(error <= allowed, next, half);
 }
 
-static void step_through_crowd(const sunlight *sun, const march *m, const crowd_light *light, nb_wide bright,
-                               crowd_walk *w, gathered *g)
+static void step_through_crowd(sunlight *sun, const march *m, const crowd_light *light, nb_wide bright, crowd_walk *w,
+                               gathered *g)
 {
     const nb_mask final = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
     const nb_real rest = nb_narrow(bright - w->at.t);
     const nb_real length = nb_select(final, rest, nb_min(w->guess, rest));
     const nb_wide end = nb_wselect(nb_widen_mask(length >= rest), bright, w->at.t + nb_widen(length));
+    list_shadows_of_step(sun, w->at.t, end, w->lanes);
     const crowd_step s = try_crowd_step(sun, m, light, &w->at, length, end);
     const nb_real least = NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
-    const nb_real allowed =
-        least + REAL(light->share * (1 - TAIL_SHARE)) * NB_F(0.5) * (s.drop + length * nb_rcp_bounded(w->whole));
+    const nb_real steady = REAL(0.5 * (1 - EDGE_SHARE)) * (s.drop + length * nb_rcp_bounded(w->whole));
+    const nb_real at_edge =
+        nb_select(s.has_edge, REAL(EDGE_SHARE / (double)(2 * sun->snapshot->medium_count)), NB_F(0.0));
+    const nb_real allowed = least + REAL(light->share * (1 - TAIL_SHARE)) * (steady + at_edge);
     const nb_mask taken = nb_and(nb_or(final, s.error <= allowed), nb_narrow_mask(w->lanes));
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
@@ -507,6 +617,7 @@ static void step_through_crowd(const sunlight *sun, const march *m, const crowd_
     const nb_real error = s.error + s.rounding + most * NB_EPSILON;
     g->radiance_error = g->radiance_error + nb_select(taken, error, NB_F(0.0));
     select_place(taken, &w->at, &s.end);
+    start_from_last(sun, taken);
     w->guess = nb_select(nb_narrow_mask(w->lanes), next_length(length, s.error, allowed), w->guess);
     w->left = w->left - NB_F(1.0);
 }
@@ -567,14 +678,13 @@ static nb_wide trim_stretch(const march *m, const crowd_light *light, nb_wide fi
 }
 
 /* Steps end where a surface's shadow begins or ends, and pass over it. */
-static void walk_through_crowd(const sunlight *sun, const march *m, const crowd_light *light, shade *shadows,
-                               nb_mask lanes, nb_wide first, nb_wide last, gathered *g)
+static void walk_through_crowd(sunlight *sun, const march *m, const crowd_light *light, shade *shadows, nb_mask lanes,
+                               nb_wide first, nb_wide last, gathered *g)
 {
-    const nb_real zero = NB_F(0.0);
-    const lit_place origin = {NB_W(0.0),          {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero},
-                              {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
+    const lit_place origin = no_place();
     crowd_walk w = {.last = last, .lanes = nb_wand(nb_widen_mask(lanes), first < last), .left = REAL(MOST_CROWD_STEPS)};
-    w.at = place_behind(sun, m, light, &origin, nb_wselect(w.lanes, first, NB_W(0.0)));
+    w.at = place_behind(sun, m, light, &origin, nb_wselect(w.lanes, first, NB_W(0.0)), w.lanes);
+    start_from_last(sun, nb_mask_true);
     w.whole = nb_max(nb_narrow(last - first), NB_TINY);
     w.guess = NB_F(0.5) * w.whole;
     while (nb_wany(w.lanes)) {
@@ -582,8 +692,9 @@ static void walk_through_crowd(const sunlight *sun, const march *m, const crowd_
         const nb_wide bright = shadows != NULL ? nb_wmin(shadows->toggle, last) : last;
         const nb_wmask dark = shadows != NULL ? nb_wand(w.lanes, shadows->is_dark) : nb_wmask_false;
         if (nb_wany(dark)) {
-            const lit_place behind = place_behind(sun, m, light, &w.at, nb_wselect(dark, bright, w.at.t));
+            const lit_place behind = place_behind(sun, m, light, &w.at, nb_wselect(dark, bright, w.at.t), w.lanes);
             select_place(nb_narrow_mask(dark), &w.at, &behind);
+            start_from_last(sun, nb_narrow_mask(dark));
             w.left = nb_select(nb_narrow_mask(dark), REAL(MOST_CROWD_STEPS), w.left);
         } else {
             step_through_crowd(sun, m, light, next_turn(sun, w.at.t, bright), &w, g);

@@ -103,10 +103,12 @@ static nb_real unseen_light(const sun_node at[SUN_NODES], int c, nb_real *steepn
         const sun_node *first = &at[j], *last = &at[j + 1];
         const nb_real dip = dip_of_way(at, c, j);
         const nb_real change = nb_abs((last->depth[c] - first->depth[c]) + (last->way[c] - first->way[c])) + dip;
-        const nb_real most = nb_max(first->most * first->through[c], last->most * last->through[c]);
-        nb_real light = most * loss_between(at, c, j) * unseen_share(change);
-        if (nb_any(dip > NB_F(0.0))) light = light * nb_exp(dip);
-        unseen = unseen + light;
+        nb_real most = nb_max(first->most * first->through[c], last->most * last->through[c]);
+        if (nb_any(dip > NB_F(0.0))) {
+            const nb_real least = nb_min(first->way[c], last->way[c]) - dip; /* e^-way may have been 0 */
+            most = nb_select(dip > NB_F(0.0), nb_max(first->most, last->most) * nb_exp(-least), most);
+        }
+        unseen = unseen + most * loss_between(at, c, j) * unseen_share(change);
         if (j == 0) *steepness = nb_max(*steepness, change);
     }
     return unseen;

@@ -37,7 +37,7 @@ typedef struct sunlight {
     const nb_lamp *turning; /* they are this lamp's; NULL: the sun's */
     void *turn_memory;
     struct lit_shadow *shadows; /* see trace_lit_crowd.h */
-    size_t shadow_count, shadow_capacity;
+    size_t shadow_count, shadow_capacity, first_shadow;
     void *shadow_memory;
     shade shade;
     shade *lamp_shades; /* of each lamp; NULL: surfaces keep none away */
