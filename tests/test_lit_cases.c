@@ -98,6 +98,19 @@ static const nebel_volume_desc company[] = {
      .extinction = {0.0005980100383277415, 0.0005980100383277415, 0.0005980100383277415},
      .albedo = {0.5119207657032396, 0.9508476350068125, 0.795565786496648}}};
 
+static void compare_with_alone(const nebel_snapshot *snapshot, const nebel_ray rays[2])
+{
+    for (int isa = NEBEL_ISA_DEFAULT; isa < NEBEL_ISA_COUNT; isa++) {
+        if (!nebel_isa_available((nebel_isa)isa)) continue;
+        const nebel_trace_desc asked = {.precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa};
+        nebel_light both[2], alone[2];
+        assert_int_equal(nebel_trace(snapshot, &asked, 2, rays, sizeof *rays, both, sizeof *both), NEBEL_OK);
+        for (int i = 0; i < 2; i++)
+            assert_int_equal(nebel_trace(snapshot, &asked, 1, &rays[i], 0, &alone[i], 0), NEBEL_OK);
+        assert_memory_equal(both, alone, sizeof both);
+    }
+}
+
 static void an_error_is_the_same_in_any_company(void **state)
 {
     (void)state;
@@ -110,21 +123,40 @@ static void an_error_is_the_same_in_any_company(void **state)
                                {12987.905803801903, 9356.483849675022, 8053.4140760037235},
                                10000000.0}};
     nebel_snapshot *snapshot = fog_commit(&desc, company, sizeof company / sizeof company[0]);
-    for (int isa = NEBEL_ISA_DEFAULT; isa < NEBEL_ISA_COUNT; isa++) {
-        if (!nebel_isa_available((nebel_isa)isa)) continue;
-        const nebel_trace_desc asked = {.precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa};
-        nebel_light both[2], alone[2];
-        assert_int_equal(nebel_trace(snapshot, &asked, 2, rays, sizeof *rays, both, sizeof *both), NEBEL_OK);
-        for (int i = 0; i < 2; i++)
-            assert_int_equal(nebel_trace(snapshot, &asked, 1, &rays[i], 0, &alone[i], 0), NEBEL_OK);
-        assert_memory_equal(both, alone, sizeof both);
-    }
+    compare_with_alone(snapshot, rays);
     nebel_release_snapshot(snapshot);
+}
+
+/* One ray of two is in the voxels. */
+static void an_error_is_the_same_beside_voxels(void **state)
+{
+    (void)state;
+    static const float voxels[] = {0.826f, 0.834f, 0.357f, 0.324f, 0.657f, 0.172f, 0.119f, 0.228f};
+    const nebel_grid_desc of_grid = {.size = {4, 2, 1}, .voxels = voxels, .filter = NEBEL_FILTER_LINEAR};
+    nebel_grid *grid = NULL;
+    assert_int_equal(nebel_create_grid(&of_grid, &grid), NEBEL_OK);
+    const nebel_volume_desc fog[] = {
+        {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-0.64, -0.074, -1.215}, .max = {0.1025, 0.291, -0.8564}},
+         .density = {.type = NEBEL_DENSITY_GRID, .grid = grid},
+         .extinction = {0.001, 0.00114, 0.0015},
+         .albedo = {0.28, 0.91, 0.9}},
+        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0.0231, -0.5634, -1.068}, .radius = 0.7712},
+         .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = 0.378},
+         .extinction = {1.75, 1.32, 1.97},
+         .albedo = {0.88, 0.88, 0.88}}};
+    const nebel_fog_desc desc = {.sun = {{0.5718, 0.799, 0.186}, {1.466, 1.466, 1.466}}};
+    const nebel_ray rays[] = {{{-0.7321759, -0.6259578, -0.9529993}, {0.17222105, 0.9078012, -0.38240934}, 1.0403034},
+                              {{0.0097677520, -0.2111334, -0.4915024}, {0.15538425, 0.4294096, -0.8896421}, 2.0793005}};
+    nebel_snapshot *snapshot = fog_commit(&desc, fog, 2);
+    compare_with_alone(snapshot, rays);
+    nebel_release_snapshot(snapshot);
+    nebel_release_grid(grid);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(light_of_small_places_is_within_the_error),
-                                       cmocka_unit_test(an_error_is_the_same_in_any_company)};
+                                       cmocka_unit_test(an_error_is_the_same_in_any_company),
+                                       cmocka_unit_test(an_error_is_the_same_beside_voxels)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -226,7 +226,7 @@ static void gather_lamplight(sunlight *sun, const march *m, const piece *p, gath
     const nb_mask lit = lamplit_lanes(m, p, &scatter);
     if (!nb_any(lit)) return;
     const nebel_snapshot *snapshot = sun->snapshot;
-    const sun_piece s = sun_piece_of(m, p, g, has_voxels(m));
+    const sun_piece s = sun_piece_of(m, p, g, lanes_in_voxels(m));
     transmittance_until(m, p, &s.before, p->end, behind);
     nb_real drop = NB_F(0.0);
     for (int c = 0; c < 3; c++) drop = nb_max(drop, s.before.transmittance[c] - behind[c]);

@@ -335,11 +335,13 @@ static nb_real count_media(const march *m)
     return count;
 }
 
-static int has_voxels(const march *m)
+/* Lane by lane: what a ray becomes must not depend on its company. */
+static nb_mask lanes_in_voxels(const march *m)
 {
+    nb_mask lanes = nb_mask_false;
     for (size_t i = m->present_first; i < m->present_end; i++)
-        if (present(m, i)->medium->body.density.type == NEBEL_DENSITY_GRID) return 1;
-    return 0;
+        if (present(m, i)->medium->body.density.type == NEBEL_DENSITY_GRID) lanes = nb_or(lanes, present(m, i)->inside);
+    return lanes;
 }
 
 /* Light among voxels is not as smooth as rules want it. */
@@ -367,7 +369,7 @@ static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const
     const nb_real most = s->lamp != NULL ? most_of_lamp(s->lamp, s->start, end) : at[0].most;
     const lit_sum sum = sum_nodes_of_step(at, most, count_media(m), sun->snapshot->is_gray);
     take_sum(s, &sum);
-    if (has_voxels(m)) s->error = s->error * ROUGH_CAUTION;
+    s->error = nb_select(lanes_in_voxels(m), s->error * ROUGH_CAUTION, s->error);
     /* ends are not looked at themselves */
     s->rounding =
         s->rounding + largest(s->light) * REAL(STEP_MARGIN) * nb_min(s->steepness, NB_F(1.0) / REAL(STEP_MARGIN));
@@ -420,12 +422,12 @@ typedef struct sun_piece {
     const piece *p;
     gathered before;       /* what was gathered before it */
     nb_real whole, pieces; /* its length; how many there may be */
-    int is_rough; /* it has voxels, which are integrated from step to step: a walk to every node would be long */
+    nb_mask rough; /* lanes in voxels, which are integrated from step to step: a walk to every node would be long */
 } sun_piece;
 
-static sun_piece sun_piece_of(const march *m, const piece *p, const gathered *g, int is_rough)
+static sun_piece sun_piece_of(const march *m, const piece *p, const gathered *g, nb_mask rough)
 {
-    return (sun_piece){p, *g, nb_max(p->length, NB_TINY), m->event_count + NB_F(1.0), is_rough};
+    return (sun_piece){p, *g, nb_max(p->length, NB_TINY), m->event_count + NB_F(1.0), rough};
 }
 
 /* From where depth is integrated, and what there is before that. */
@@ -437,11 +439,11 @@ typedef struct sun_origin {
 static sun_origin origin_of(const sun_piece *s, const sun_walk *w)
 {
     sun_origin from = {*s->p, s->before};
-    if (!s->is_rough) return from;
-    from.p.start = w->t;
+    if (!nb_any(s->rough)) return from;
+    from.p.start = nb_wselect(nb_widen_mask(s->rough), w->t, from.p.start);
     for (int c = 0; c < 3; c++) {
-        from.before.depth[c] = w->depth[c];
-        from.before.depth_error[c] = w->depth_error[c];
+        from.before.depth[c] = nb_select(s->rough, w->depth[c], from.before.depth[c]);
+        from.before.depth_error[c] = nb_select(s->rough, w->depth_error[c], from.before.depth_error[c]);
     }
     return from;
 }
@@ -627,7 +629,7 @@ static void gather_sunlight(sunlight *sun, const march *m, const piece *p, nb_ma
         gather_in_closed_form(sun, m, p, lit, g);
         return;
     }
-    const sun_piece s = sun_piece_of(m, p, g, has_voxels(m) && !is_grid_alone(sun));
+    const sun_piece s = sun_piece_of(m, p, g, is_grid_alone(sun) ? nb_mask_false : lanes_in_voxels(m));
     sun_walk w = begin_walk(m, p, g, lit);
     while (nb_wany(w.lanes)) {
         pass_toggles(&sun->shade, w.t, w.lanes);
