@@ -431,7 +431,7 @@ typedef struct nebel_fog nebel_fog;
 typedef struct nebel_snapshot nebel_snapshot;
 typedef uint64_t nebel_volume_id; /* 0 is never one */
 
-/* Light from one direction, from endlessly far. What it brings to a place is what all fog on the way there lets
+/* Light from one direction, from 1e18 m away. What it brings to a place is what all fog on the way there lets
  * through; light that was scattered once is not scattered again. */
 typedef struct nebel_sun {
     double direction[3];  /* towards the sun, any length but 0 where it shines */
@@ -563,7 +563,7 @@ void nebel_snapshot_lamp(const nebel_snapshot *snapshot, size_t number, double p
 typedef struct nebel_ray {
     double origin[3];    /* m */
     double direction[3]; /* any length but 0; normalised here */
-    double t_max;        /* m, >= 0; INFINITY is legal */
+    double t_max;        /* m, >= 0; INFINITY is legal, and ends at 1e18 m */
 } nebel_ray;
 
 typedef struct nebel_light {
