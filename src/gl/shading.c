@@ -288,7 +288,9 @@ static const char shadow_fragment_text[] =
  *
  * A texel in which the plane is far above what the sun sees lies beyond the end of the surface, and says nothing of it. Where
  * there are such texels, or where what rises is most of what is there, the surface may end at another that covers it, as a
- * wall under a ceiling: then what shades any texel shades the place. */
+ * wall under a ceiling: then what shades any texel shades the place. What steep surfaces shade near their end is uncertain by a texel
+ * or two, so that a place which is partly lit is looked at again off its surface: a texel and a half, and where two texels lie
+ * beside it. */
 static const char shadow_text[] =
     "uniform mat3 scene_light;\n"
     "uniform highp sampler2DArray scene_shadows;\n"
@@ -325,7 +327,16 @@ static const char shadow_text[] =
     "    for (int map = 0; map < NB_CASCADES; map++) {\n"
     "        vec2 place = (at.xy - map_places[map].xy) * map_places[map].zw;\n"
     "        bool inside = all(greaterThan(place, vec2(1.0))) && all(lessThan(place, vec2(map_size - 1.0)));\n"
-    "        if (t <= map_ends[map] && inside) return shadow_filter(map, place, at.z, slope);\n"
+    "        if (!(t <= map_ends[map] && inside)) continue;\n"
+    "        float lit = shadow_filter(map, place, at.z, slope);\n"
+    "        if (lit == 0.0 || lit == 1.0) return lit;\n"
+    "        float cell = 1.0 / min(map_places[map].z, map_places[map].w);\n"
+    "        vec2 beside = cell * vec2(1.5, 2.0 / max(length(leaning.xy), 0.2));\n"
+    "        for (int i = 0; i < 2; i++) {\n"
+    "            vec3 off = leaning * beside[i];\n"
+    "            lit = min(lit, shadow_filter(map, place + off.xy * map_places[map].zw, at.z + off.z, slope));\n"
+    "        }\n"
+    "        return lit;\n"
     "    }\n"
     "    return 1.0;\n"
     "}\n";
