@@ -402,6 +402,7 @@ static void find_hits(const nb_frame *frame, const nb_place *place, uint32_t sam
     } else {
         nb_hits_trace(geometry->scene, &scratch->rays, scratch->inside, &scratch->packets, &scratch->hits);
     }
+    nb_hits_refine(geometry, &scratch->rays, &scratch->hits);
 }
 
 static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)

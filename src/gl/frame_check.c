@@ -103,6 +103,36 @@ static double pictures_across(const nb_mesh *mesh, const nebel_camera *camera)
     return mesh->longest / (2 * distance * tan(camera->vertical_fov * (3.14159265358979323846 / 360)));
 }
 
+/* How far the planes of large triangles may lie off for floats, over the camera's distance from them. */
+#define MOST_OFF 1e-3
+
+/* Whether the place of a triangle that is askew loses itself among the digits of its corners, for a camera near it. */
+static int is_lost(const nb_mesh *mesh, const nb_large_plane *plane, const double camera[3])
+{
+    double height = -plane->height, off = 0, square = 0;
+    for (int i = 0; i < 3; i++) {
+        const double at = camera[i] - mesh->origin[i];
+        const double extent = fmax(fabs((double)mesh->low[i]), fabs((double)mesh->high[i]));
+        height += plane->normal[i] * at;
+        square += (at - plane->middle[i]) * (at - plane->middle[i]);
+        off += 0x1p-24 * fabs(plane->normal[i]) * (fabs(at) + extent);
+    }
+    return sqrt(square) < plane->radius && off > MOST_OFF * fabs(height);
+}
+
+static nebel_result check_large(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, size_t i)
+{
+    const nb_mesh *const mesh = &r->meshes.list[i];
+    int is_good = 1;
+    for (size_t k = 0; k < mesh->large_count && is_good; k++)
+        is_good = !is_lost(mesh, &mesh->large[k], desc->camera.position);
+    if (is_good) return NEBEL_OK;
+    return nb_fail(&r->log, NEBEL_ERROR_LIMIT,
+                   "mesh %zu: a triangle of %g m or more lies askew, and so near to the camera that OpenGL would draw "
+                   "it more than a thousandth of its distance off: split it, or use the CPU's renderer (--device cpu)",
+                   i, NB_LARGE_EDGE);
+}
+
 static nebel_result check_mesh(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, size_t i)
 {
     const nb_mesh *const mesh = &r->meshes.list[i];
@@ -124,7 +154,10 @@ static nebel_result check_mesh(const nebel_gl_renderer *r, const nebel_gl_frame_
 static nebel_result check_meshes(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
     nebel_result result = NEBEL_OK;
-    for (size_t i = 0; i < r->meshes.count && result == NEBEL_OK; i++) result = check_mesh(r, desc, i);
+    for (size_t i = 0; i < r->meshes.count && result == NEBEL_OK; i++) {
+        result = check_mesh(r, desc, i);
+        if (result == NEBEL_OK) result = check_large(r, desc, i);
+    }
     return result;
 }
 

@@ -3,6 +3,7 @@
 #include "shading.h"
 
 #include "base/holes.h"
+#include "base/vector.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -128,16 +129,27 @@ static double length_between(const float *a, const float *b)
     return sqrt(square);
 }
 
+static nebel_result out_of_memory(const nb_meshes *meshes)
+{
+    return nb_fail(&meshes->log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory; use fewer triangles");
+}
+
+static double longest_edge(const nebel_mesh *mesh, const uint32_t *corners)
+{
+    double longest = 0;
+    for (int k = 0; k < 3; k++) {
+        longest = fmax(longest, length_between(position_of(mesh, corners[k]), position_of(mesh, corners[(k + 1) % 3])));
+    }
+    return longest;
+}
+
 static void add_triangle(draft *d, const uint32_t *corners)
 {
     const nebel_mesh *const mesh = d->mesh;
     nb_vertex last = vertex_of(mesh, corners[2]);
     if (!set_face(position_of(mesh, corners[0]), position_of(mesh, corners[1]), last.position, last.face)) return;
-    for (int k = 0; k < 3; k++) {
-        const float *const corner = position_of(mesh, corners[k]);
-        include(d->made, corner);
-        d->made->longest = fmax(d->made->longest, length_between(corner, position_of(mesh, corners[(k + 1) % 3])));
-    }
+    for (int k = 0; k < 3; k++) include(d->made, position_of(mesh, corners[k]));
+    d->made->longest = fmax(d->made->longest, longest_edge(mesh, corners));
     for (int e = 0; e < 2; e++) {
         for (int k = 0; k < 3; k++) last.edges[e][k] = position_of(mesh, corners[e])[k] - last.position[k];
     }
@@ -145,6 +157,39 @@ static void add_triangle(draft *d, const uint32_t *corners)
     d->indices[d->index_count++] = corners[1];
     d->indices[d->index_count++] = (uint32_t)d->vertex_count;
     d->vertices[d->vertex_count++] = last;
+}
+
+static nb_large_plane plane_of(const nebel_mesh *mesh, const uint32_t *corners)
+{
+    const float *const p[3] = {position_of(mesh, corners[0]), position_of(mesh, corners[1]),
+                               position_of(mesh, corners[2])};
+    double a[3], b[3];
+    nb_large_plane plane = {.height = 0, .radius = longest_edge(mesh, corners)};
+    for (int i = 0; i < 3; i++) {
+        a[i] = (double)p[1][i] - (double)p[0][i];
+        b[i] = (double)p[2][i] - (double)p[0][i];
+        plane.middle[i] = (double)p[0][i] + (a[i] + b[i]) / 3;
+    }
+    nb_vector_cross(a, b, plane.normal);
+    (void)nb_vector_make_unit(plane.normal);
+    for (int i = 0; i < 3; i++) plane.height += plane.normal[i] * (double)p[0][i];
+    return plane;
+}
+
+static nebel_result find_large(const nb_meshes *meshes, const nebel_mesh *mesh, nb_mesh *made)
+{
+    size_t count = 0;
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        count += longest_edge(mesh, mesh->indices + 3 * t) > NB_LARGE_EDGE;
+    }
+    if (count == 0) return NEBEL_OK;
+    made->large = nb_allocate(&meshes->allocator, count, sizeof *made->large);
+    if (made->large == NULL) return out_of_memory(meshes);
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        const uint32_t *const corners = mesh->indices + 3 * t;
+        if (longest_edge(mesh, corners) > NB_LARGE_EDGE) made->large[made->large_count++] = plane_of(mesh, corners);
+    }
+    return NEBEL_OK;
 }
 
 static void fill(draft *d)
@@ -186,11 +231,6 @@ static nebel_result upload(const nb_meshes *meshes, const draft *d)
     return nb_context_check_memory(&meshes->log, "the meshes; use fewer triangles");
 }
 
-static nebel_result out_of_memory(const nb_meshes *meshes)
-{
-    return nb_fail(&meshes->log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory; use fewer triangles");
-}
-
 static nebel_result make_mesh(nb_meshes *meshes, const nebel_mesh *mesh, nb_mesh *made)
 {
     const size_t triangles = mesh->triangle_count;
@@ -206,6 +246,7 @@ static nebel_result make_mesh(nb_meshes *meshes, const nebel_mesh *mesh, nb_mesh
         made->mask = meshes->textures[mesh->mask];
         made->cutoff = mesh->alpha_cutoff - 0.125f / 255; /* as the CPU renderer has it */
     }
+    if (result == NEBEL_OK) result = find_large(meshes, mesh, made);
     if (result == NEBEL_OK) {
         fill(&d);
         result = upload(meshes, &d);
@@ -324,6 +365,7 @@ int nb_meshes_unmap(unsigned buffer, const void *mapped)
 void nb_meshes_delete(nb_meshes *meshes, int in_context)
 {
     if (in_context) delete_objects(meshes);
+    for (size_t i = 0; i < meshes->count; i++) nb_release(&meshes->allocator, meshes->list[i].large);
     nb_release(&meshes->allocator, meshes->list);
     nb_release(&meshes->allocator, meshes->textures);
 }

@@ -22,10 +22,19 @@ typedef struct nb_vertex {
     float edges[2][3]; /* from it to the first corner and to the second */
 } nb_vertex;
 
+#define NB_LARGE_EDGE 1e4 /* m: floats leave less than a millimeter of shorter ones */
+
+/* normal . place = height, and a ball around the triangle, all around the mesh's origin. */
+typedef struct nb_large_plane {
+    double normal[3], height, middle[3], radius;
+} nb_large_plane;
+
 typedef struct nb_mesh {
     double origin[3];
     float low[3], high[3]; /* of the positions that are used */
     double longest;        /* edge of its triangles [m] */
+    nb_large_plane *large; /* of triangles with edges above NB_LARGE_EDGE */
+    size_t large_count;
     float base_color[3];
     unsigned vertex_array, vertices, indices, texture; /* texture 0: none */
     unsigned mask;                                     /* a texture; 0: no holes */
