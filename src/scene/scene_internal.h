@@ -153,8 +153,9 @@ typedef struct nb_scene_reader {
 #define NB_PARTICLE_SECONDS 2.2e-5
 #define NB_VOLUME_BYTES 2e3
 #define NB_VOLUME_SECONDS 5e-6
-#define NB_CELL_BYTES 64.0 /* of the lattice of diffusion */
-#define NB_CELL_SECONDS 2.5e-6
+#define NB_CELL_BYTES                                                                                                  \
+    900.0 /* of the lattice of diffusion, with color, a lamp, emission and ambient light; without 370 */
+#define NB_CELL_SECONDS 1.3e-5
 #define NB_PLANET_BYTES 1e7
 #define NB_PLANET_SECONDS 0.6
 #define NB_PRECISE_PLANET_SECONDS 1.5
