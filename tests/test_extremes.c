@@ -6,6 +6,7 @@
 #include <limits.h>
 #include <math.h>
 
+#include "dice.h"
 #include "fog_help.h"
 
 enum { MOST_VOLUMES = 6, PARTS = 3, PLANES = 10, RAYS = 16 };
@@ -376,6 +377,34 @@ static void test_a_wall_of_fog_is_seen_behind_thin_fog(void **unused)
     nebel_release_snapshot(fog);
 }
 
+/* A density that begins on a face, a rounding beside the place where the ray meets the face: on endless rays that
+ * sliver is nearly no part of the ray and of its optical depth. */
+static void test_endless_rays_pass_slivers_between_a_face_and_a_density(void **unused)
+{
+    (void)unused;
+    const nebel_volume_desc volumes[] = {
+        {.shape = {.type = NEBEL_SHAPE_HALF_SPACE, .point = {0, .9, 0}, .normal = {0, 1, 0}},
+         .density = {.type = NEBEL_DENSITY_LINEAR, .from = {0, .9, 0}, .to = {0, 0, 0}},
+         .extinction = {.03, .03, .03},
+         .source = {.55, .6, .7}},
+        {.shape = {.type = NEBEL_SHAPE_WORLD},
+         .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 30, .below = NEBEL_BELOW_GROW},
+         .extinction = {.004, .004, .004},
+         .source = {.42, .5, .66}}};
+    nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, volumes, 2);
+    uint64_t dices = 34;
+    for (int i = 0; i < 40; i++) {
+        nebel_ray ray = {{.4, 7.6, 19}, {dice(&dices, -1, 1), dice(&dices, -2, -.2), dice(&dices, -1, 1)}, 1e6};
+        nebel_light finite, endless;
+        assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &finite, sizeof finite), NEBEL_OK);
+        ray.t_max = HUGE_VAL;
+        assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &endless, sizeof endless), NEBEL_OK);
+        assert_true(endless.error < 1e-4);
+        assert_true(fabs(endless.in_scattering[0] - finite.in_scattering[0]) <= endless.error + finite.error);
+    }
+    nebel_release_snapshot(fog);
+}
+
 int main(int argc, char **argv)
 {
     if (argc > 1) scene_count = (size_t)strtoull(argv[1], NULL, 10);
@@ -387,6 +416,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_distances_to_a_transmittance_lie_on_the_ray),
         cmocka_unit_test(test_segments_give_transmittances),
         cmocka_unit_test(test_a_wall_of_fog_is_seen_behind_thin_fog),
+        cmocka_unit_test(test_endless_rays_pass_slivers_between_a_face_and_a_density),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -295,7 +295,8 @@ static step consider(const range *r, const gathered *g, nb_wide start, nb_real l
     step s = {.start = start, .length = length, .sum = *sum, .drop = NB_F(0.0), .gauss_bound = NB_HUGE};
     for (int c = 0; c < 3; c++) {
         s.behind[c] = nb_exp(-(g->depth[c] + s.sum.depth[c]));
-        s.drop = nb_max(s.drop, g->transmittance[c] - s.behind[c]);
+        /* their difference rounds to 0 over a sliver between two kinks, which would be halved for ever */
+        s.drop = nb_max(s.drop, g->transmittance[c] * nb_medium_gather(s.sum.depth[c], s.sum.depth[c]));
     }
     bound_crude(r, &s, g);
     return s;
