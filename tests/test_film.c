@@ -2,6 +2,7 @@
 #define _GNU_SOURCE
 #include "scene_help.h"
 
+#include <fcntl.h>
 #include <math.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -217,6 +218,37 @@ static void full_disks_leave_the_old_file(void **test)
     assert_int_equal(remove(path), 0);
 }
 
+/* By a link, which has the name of a film. */
+static void streams_that_take_nothing_stop_it_at_once(void **test)
+{
+    static const char *const names[] = {"R", "G", "B"};
+    static float black[3];
+    journal kept = {0};
+    nebel_film *film;
+    int ends[2];
+    char name[40];
+    const nebel_image image = {1, 1, 3, names, black};
+    const nebel_film_desc desc = {.log = {remember, &kept}};
+    (void)test;
+    assert_int_equal(pipe(ends), 0);
+    snprintf(name, sizeof name, "/dev/fd/%d", ends[1]);
+    assert_int_equal(symlink(name, in_folder("film.webp")), 0);
+    assert_int_equal(nebel_create_film(in_folder("film.webp"), &desc, &film), NEBEL_OK);
+    assert_int_equal(nebel_add_film_picture(film, &image), NEBEL_OK);
+    close(ends[0]);
+    assert_int_equal(nebel_add_film_picture(film, &image), NEBEL_ERROR_FILE);
+    assert_non_null(strstr(kept.last, "Broken pipe"));
+    nebel_destroy_film(film);
+    close(ends[1]);
+    const int full = open("/dev/full", O_WRONLY);
+    assert_int_equal(dup2(full, ends[1]), ends[1]);
+    assert_int_equal(nebel_create_film(in_folder("film.webp"), &desc, &film), NEBEL_ERROR_FILE);
+    assert_non_null(strstr(kept.last, "No space left"));
+    close(ends[1]);
+    close(full);
+    assert_int_equal(remove(in_folder("film.webp")), 0);
+}
+
 static void sides_have_a_limit(void **test)
 {
     static const char *const names[] = {"R", "G", "B"};
@@ -306,6 +338,7 @@ int main(void)
         cmocka_unit_test(one_picture_is_a_film),
         cmocka_unit_test(nothing_is_left_of_what_was_given_up),
         cmocka_unit_test(full_disks_leave_the_old_file),
+        cmocka_unit_test(streams_that_take_nothing_stop_it_at_once),
         cmocka_unit_test(sides_have_a_limit),
         cmocka_unit_test(refusals_say_why),
 #else

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <poll.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -173,12 +174,23 @@ static int write_file(nb_arena *arena, const char *path, const nb_bytes *bytes)
     return fill_and_rename(file, temporary, found.path, found.exists ? &found.status : NULL, bytes);
 }
 
+/* A pipe that nobody reads any more, and a device that is always full: what is written there is lost. */
+static int try_directly(const char *path)
+{
+    struct stat status, full;
+    struct pollfd pipe = {.fd = nb_file_descriptor(path), .events = POLLOUT};
+    if (pipe.fd < 0 || fstat(pipe.fd, &status) != 0) return 0;
+    if (S_ISCHR(status.st_mode) && stat("/dev/full", &full) == 0 && status.st_rdev == full.st_rdev) return ENOSPC;
+    return S_ISFIFO(status.st_mode) && poll(&pipe, 1, 0) == 1 && (pipe.revents & POLLERR) != 0 ? EPIPE : 0;
+}
+
 static int try_file(nb_arena *arena, const char *path, size_t size)
 {
     target found;
     const char *temporary = NULL;
     const int error = find_target(arena, path, &found);
-    if (error != 0 || found.is_direct) return error;
+    if (error != 0) return error;
+    if (found.is_direct) return try_directly(found.path);
     const int file = create_beside(arena, found.path, &temporary);
     if (file < 0) return errno;
     const int full = size > 0 ? posix_fallocate(file, 0, (off_t)size) : 0;
