@@ -175,14 +175,19 @@ int nb_drop_covered(int used, int floor)
     return kept;
 }
 
-/* Pieces end at the faces of bricks: depths from the start of a piece are sums over a few cells then. */
-float nb_even_voxels(nb_ray ray, int medium, float t)
+/* Pieces end where a density is not smooth, so that a first step begins with the fog, and at the faces of bricks: depths from the start
+ * of a piece are sums over a few cells then. */
+float nb_smooth_length(nb_ray ray, int medium, float t)
 {
+    int kind = int(NEBEL_WORD(medium).w);
+    nb_profile profile = nb_profile_of(medium, kind, ray, t);
     float length = NB_FAR;
-    if (NB_HAS(NB_HAS_GRID) && int(NEBEL_WORD(medium).w) == NB_KIND_GRID) {
-        nb_profile profile = nb_profile_of(medium, NB_KIND_GRID, ray, t);
+#if NB_DECLARES(NB_HAS_GRID)
+    if (NB_HAS(NB_HAS_GRID) && kind == NB_KIND_GRID)
         length = nb_grid_faces(profile.offset, profile.slope, NB_BRICK, nb_nearest(t));
-    }
+    else
+#endif
+        length = nb_profile_kink(profile, nb_nearest(t));
     return length;
 }
 
@@ -208,7 +213,7 @@ nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float
         if (!(s.enter < s.leave)) continue;
         piece.end = min(piece.end, s.enter > t ? s.enter : s.leave);
         if (s.enter > t) continue;
-        piece.end = min(piece.end, t + nb_even_voxels(ray, at, t));
+        piece.end = min(piece.end, t + nb_smooth_length(ray, at, t));
         int flags = int(NEBEL_WORD(at + 1).w);
         if (NB_HAS(NB_HAS_COVER) && (flags & NB_LIGHT_COVERS) != 0) piece.floor = max(piece.floor, flags / NB_LIGHT_RANK);
         if (piece.media < NEBEL_SLOTS) nb_set_slot(piece.media, at, s);
@@ -328,6 +333,7 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
     nb_vec3 seven = nb_splat3(0.0);
     nb_vec3 three = nb_splat3(0.0);
     nb_vec3 taken = nb_splat3(0.0);
+    nb_vec3 steepest = nb_splat3(0.0);
     nb_vec3 last_depth = start.depth;
     nb_vec3 last_way = start.way;
     float hidden = 0.0;
@@ -363,6 +369,7 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
             seven += nb_lamp_weight(j) * light;
             three += nb_lamp_weight_of_three(j) * light;
             taken += nb_lamp_weight(j) * speed * place.extinction * nb_exp3(-depth);
+            steepest = max(steepest, t * place.extinction * nb_exp3(-depth));
         } else {
             start.depth = depth;
             start.way = way;
@@ -374,7 +381,8 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
     float most = nb_most_fluence(by, swing.start, end) * piece.scatter;
     nb_vec3 limit = most * (drop + 8.0 * NB_EPSILON * seen); /* also what rounds to nothing may be light */
     s.light = min(seven, limit);
-    float unseen = nb_largest(abs(taken - drop) - 8.0 * NB_EPSILON * seen); /* beyond rounding */
+    nb_vec3 rounding = NB_EPSILON * (8.0 * seen + 4.0 * steepest); /* of transmittance and of places */
+    float unseen = nb_largest(abs(taken - drop) - rounding);
     s.error = max(nb_largest(abs(seven - three)), most * max(unseen, hidden));
     s.error = min(s.error, nb_largest(limit));
     return s;
@@ -383,11 +391,16 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
 /* Behind a lamp nothing of its light is left [m]; squares of squares of it are numbers. */
 #define NB_LAMP_REACH 1e8
 
-/* The length of a first step of a few optical depths by the density where the piece begins: light in dense fog comes from there. */
+/* The length of a first step of a few optical depths: light in dense fog comes from there. Density may begin with nothing and grow. */
 float nb_first_swing(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, inout int turns)
 {
-    float dense = nb_largest(nb_place_in_piece(ray, first, listed, piece, piece.start, ray.direction, turns).extinction);
-    return nb_swing_between(by.closest, by.aside, piece.start, piece.start + min(4.0 * nb_rcp_bounded(dense), NB_LAMP_REACH)).end;
+    float length = min(piece.end - piece.start, NB_LAMP_REACH);
+    float deep = nb_largest(piece.depth);
+    for (int i = 0; i < 24 && deep > 4.01; i++) {
+        length *= max(4.0 / deep, 0.001);
+        deep = nb_largest(nb_place_in_piece(ray, first, listed, piece, piece.start + length, ray.direction, turns).depth);
+    }
+    return nb_swing_between(by.closest, by.aside, piece.start, piece.start + length).end;
 }
 
 /* The end of a step on which phase functions change smoothly. `ahead` is the tangent of half the angle by which light is turned: a step
