@@ -1,35 +1,18 @@
 /* Any bytes as the JSON of a glTF file: what is made of it for Assimp is JSON again, or there is a message; every byte of
  * memory comes back. */
+#include "witness.h"
+
 #include "scene/gltf_data.h"
 #include "scene/reader/unpack.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct witness {
-    size_t errors, allocations;
-} witness;
-
 static void count_message(nebel_result result, const char *message, void *user)
 {
     witness *seen = user;
     if (message[0] == '\0') abort();
-    seen->errors += result != NEBEL_OK;
-}
-
-static void *allocate(size_t size, void *user)
-{
-    witness *seen = user;
-    void *memory = size < (size_t)1 << 24 ? malloc(size) : NULL;
-    seen->allocations += memory != NULL;
-    return memory;
-}
-
-static void release(void *memory, void *user)
-{
-    witness *seen = user;
-    seen->allocations--;
-    free(memory);
+    seen->messages += result != NEBEL_OK;
 }
 
 static bool take_any(nb_json *json, const nb_json_node *value, void *user)
@@ -57,9 +40,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    witness seen = {0};
+    witness seen = {.max_bytes = (size_t)1 << 24};
     const nb_model_source source = {.file = "fuzz.gltf"};
-    const nb_model_load load = {.allocator = {allocate, release, &seen},
+    const nb_model_load load = {.allocator = {witness_allocate, witness_release, &seen},
                                 .log = {count_message, &seen},
                                 .source = &source,
                                 .unpack = nb_unpack_meshopt()};
@@ -69,7 +52,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (text.data == NULL) return 0;
     if (size > 0) memcpy(text.data, data, size);
     const nebel_result result = nb_gltf_prepare_text(&load, &files, &text, &made);
-    if ((result == NEBEL_OK) != (seen.errors == 0)) abort();
+    if ((result == NEBEL_OK) != (seen.messages == 0)) abort();
     if (result == NEBEL_OK && made.files[NB_GLTF_TEXT].bytes.size > 0)
         check_text(&load.allocator, &made.files[NB_GLTF_TEXT].bytes);
     nb_gltf_release_files(&load.allocator, &made);

@@ -1,37 +1,10 @@
 /* Any bytes as a NanoVDB file: voxels or an error with a message, and every byte of memory back. */
+#include "witness.h"
+
 #include "scene/voxels.h"
 
 #include <stdint.h>
 #include <stdlib.h>
-
-typedef struct witness {
-    size_t messages, allocations;
-} witness;
-
-static void count_message(nebel_result result, const char *message, void *user)
-{
-    witness *seen = user;
-    if (result == NEBEL_OK || message[0] == '\0') abort();
-    seen->messages++;
-}
-
-/* More voxels take longer than a fuzzer should spend on one file. */
-#define MOST_BYTES ((size_t)1 << 24)
-
-static void *allocate(size_t size, void *user)
-{
-    witness *seen = user;
-    void *memory = size < MOST_BYTES ? malloc(size) : NULL;
-    seen->allocations += memory != NULL;
-    return memory;
-}
-
-static void release(void *memory, void *user)
-{
-    witness *seen = user;
-    seen->allocations--;
-    free(memory);
-}
 
 static void make_grid(const nebel_allocator *allocator, const nb_voxels *voxels)
 {
@@ -47,11 +20,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    witness seen = {0};
+    witness seen = {.max_bytes = (size_t)1 << 24};
     nb_voxels voxels = {.data = NULL};
     const nb_bytes bytes = {(unsigned char *)data, size, size};
     const nb_codec codec = {
-        .allocator = {allocate, release, &seen}, .log = {count_message, &seen}, .name = "fuzz.nvdb"};
+        .allocator = {witness_allocate, witness_release, &seen}, .log = {witness_message, &seen}, .name = "fuzz.nvdb"};
     const nebel_result result = nb_nanovdb_read(&codec, &bytes, NULL, &voxels);
     if ((result == NEBEL_OK) != (voxels.data != NULL)) abort();
     if ((result == NEBEL_OK) != (seen.messages == 0)) abort();

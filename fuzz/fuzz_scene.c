@@ -1,34 +1,10 @@
 /* Any bytes as a scene file: a scene or an error with a message, and every byte of memory back. */
+#include "witness.h"
+
 #include <nebel/scene.h>
 
 #include <stdint.h>
 #include <stdlib.h>
-
-typedef struct witness {
-    size_t messages, allocations;
-} witness;
-
-static void count_message(nebel_result result, const char *message, void *user)
-{
-    witness *seen = user;
-    if (result == NEBEL_OK || message[0] == '\0') abort();
-    seen->messages++;
-}
-
-static void *allocate(size_t size, void *user)
-{
-    witness *seen = user;
-    void *memory = size < (size_t)1 << 30 ? malloc(size) : NULL;
-    seen->allocations += memory != NULL;
-    return memory;
-}
-
-static void release(void *memory, void *user)
-{
-    witness *seen = user;
-    seen->allocations--;
-    free(memory);
-}
 
 /* More particles take longer than a fuzzer should spend on one scene. */
 enum { MOST_PARTICLES = 2000 };
@@ -68,9 +44,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    witness seen = {0};
+    witness seen = {.max_bytes = (size_t)1 << 30};
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.allocator = {allocate, release, &seen}, .log = {count_message, &seen}};
+    const nebel_scene_desc desc = {.allocator = {witness_allocate, witness_release, &seen},
+                                   .log = {witness_message, &seen}};
     const nebel_result result = nebel_parse_scene((const char *)data, size, "fuzz.json", &desc, &scene);
     if ((result == NEBEL_OK) != (scene != NULL)) abort();
     if ((result == NEBEL_OK) != (seen.messages == 0)) abort();

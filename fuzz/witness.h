@@ -6,12 +6,13 @@
 
 #include <stdlib.h>
 
+/* What asks for more bytes takes longer than a fuzzer should spend on one input. */
+#define WITNESS_MAX_BYTES ((size_t)1 << 26)
+
 typedef struct witness {
     size_t messages, allocations;
+    size_t max_bytes; /* of one allocation; 0: WITNESS_MAX_BYTES */
 } witness;
-
-/* What asks for more takes longer than a fuzzer should spend on one input. */
-#define WITNESS_MOST_BYTES ((size_t)1 << 26)
 
 static inline void demand(int holds)
 {
@@ -28,7 +29,7 @@ static inline void witness_message(nebel_result result, const char *message, voi
 static inline void *witness_allocate(size_t size, void *user)
 {
     witness *seen = user;
-    void *memory = size < WITNESS_MOST_BYTES ? malloc(size) : NULL;
+    void *memory = size < (seen->max_bytes > 0 ? seen->max_bytes : WITNESS_MAX_BYTES) ? malloc(size) : NULL;
     seen->allocations += memory != NULL;
     return memory;
 }

@@ -349,26 +349,28 @@ static void test_the_reader_is_confined(void **state)
 
 /* ---- hostile models -------------------------------------------------------------------------- */
 
+/* Whether a model of such text gives a result, and a last message that names the file and says `words`. */
+static void check_told(const char *file, const char *text, nebel_result result, const char *words)
+{
+    journal kept;
+    write_text(file, text);
+    assert_int_equal(try_model(NULL, file, &kept), result);
+    assert_non_null(strstr(kept.last, file));
+    assert_non_null(strstr(kept.last, words));
+}
+
 /* Where Assimp puts another corner in place of one that does not exist, and tells nobody but its log. */
 static void test_what_assimp_makes_up_is_told(void **state)
 {
     (void)state;
-    journal kept;
-    write_text("corner.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9999999\n");
-    assert_int_equal(try_model(NULL, "corner.off", &kept), NEBEL_OK);
-    assert_non_null(strstr(kept.last, "corner.off"));
-    assert_non_null(strstr(kept.last, "out of range"));
+    check_told("corner.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9999999\n", NEBEL_OK, "out of range");
 }
 
 static void test_more_memory_than_a_file_warrants(void **state)
 {
     (void)state;
-    journal kept;
     if (NB_SANITIZED) skip(); /* no limit then */
-    write_text("counts.off", "OFF\n300000000 300000000 0\n0 0 0\n");
-    assert_int_equal(try_model(NULL, "counts.off", &kept), NEBEL_ERROR_LIMIT);
-    assert_non_null(strstr(kept.last, "counts.off"));
-    assert_non_null(strstr(kept.last, "MB of memory"));
+    check_told("counts.off", "OFF\n300000000 300000000 0\n0 0 0\n", NEBEL_ERROR_LIMIT, "MB of memory");
 }
 
 /* ---- files that a model names ---------------------------------------------------------------- */

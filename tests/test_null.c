@@ -139,8 +139,8 @@ static const char *const channels[] = {"R", "G", "B"};
 static nebel_image good_image = {
     .width = 1, .height = 1, .channel_count = 3, .channel_names = channels, .samples = out.floats};
 
-/* What calls are made of, and what they make. */
-static struct {
+/* What calls take: made before them, or NULL for them to fill. */
+typedef struct objects {
     nebel_cells *cells;
     nebel_fog *fog;
     nebel_volume_id id;
@@ -157,26 +157,10 @@ static struct {
     const nebel_scene_data *contents;
     nebel_renderer *renderer;
     nebel_film *film;
-} made;
-
-static struct {
-    nebel_cells *cells;
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
-    nebel_environment_map *environment_map;
-    nebel_grid *grid;
-    nebel_layers *layers;
-    nebel_atmosphere *atmosphere;
-    nebel_air_view *air_view;
-    nebel_clouds *clouds;
-    nebel_cloud_view *cloud_view;
-    nebel_cloud_workspace *cloud_workspace;
-    nebel_scene *scene;
-    nebel_renderer *renderer;
-    nebel_film *film;
     nebel_particle *particle;
     nebel_tessellation *tessellation;
-} fresh;
+} objects;
+static objects made, fresh;
 
 static nebel_atmosphere_desc good_atmosphere_desc;
 static nebel_air_view_desc good_air_view_desc;

@@ -242,6 +242,17 @@ static nebel_view straight_view(uint32_t width, uint32_t height)
     return view;
 }
 
+/* How many entries the 80 x 45 tiles of 1280 x 720 pixels have for volumes. */
+static size_t count_listed(const nebel_snapshot *snapshot, const nebel_view *view, const char *what)
+{
+    size_t count;
+    uint32_t *entries = tile(snapshot, view, 16, &count);
+    const size_t listed = count - 2 * 80 * 45;
+    free(entries);
+    print_message("%s: %zu of 3600 tiles\n", what, listed);
+    return listed;
+}
+
 static void test_tight(void **state)
 {
     (void)state;
@@ -249,12 +260,7 @@ static void test_tight(void **state)
     const nebel_volume_desc volumes[] = {box_of(0, 0, -11, 1), box_of(0, 0, 30, 5), box_of(500, 0, -11, 1)};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, 3);
     const nebel_view view = straight_view(1280, 720);
-    size_t count;
-    uint32_t *entries = tile(snapshot, &view, 16, &count);
-    const size_t listed = count - 2 * 80 * 45;
-    print_message("one box of 71 pixels: %zu tiles\n", listed);
-    assert_in_range(listed, 25, 36);
-    free(entries);
+    assert_in_range(count_listed(snapshot, &view, "one box of 71 pixels"), 25, 36);
     nebel_release_snapshot(snapshot);
 }
 
@@ -267,12 +273,7 @@ static void test_tight_rows(void **state)
         .extinction = {.1, .1, .1}};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &ground, 1);
     const nebel_view view = straight_view(1280, 720);
-    size_t count;
-    uint32_t *entries = tile(snapshot, &view, 16, &count);
-    const size_t listed = count - 2 * 80 * 45;
-    print_message("the ground left of the camera: %zu of 3600 tiles\n", listed);
-    assert_in_range(listed, 100, 1000);
-    free(entries);
+    assert_in_range(count_listed(snapshot, &view, "the ground left of the camera"), 100, 1000);
     nebel_release_snapshot(snapshot);
 }
 
@@ -289,12 +290,7 @@ static void test_tight_diagonals(void **state)
         view.eye_from_world[0] = view.eye_from_world[5] = .8;
         view.eye_from_world[1] = .6 * side;
         view.eye_from_world[4] = -.6 * side;
-        size_t count;
-        uint32_t *entries = tile(snapshot, &view, 16, &count);
-        const size_t listed = count - 2 * 80 * 45;
-        print_message("a bar from corner to corner: %zu of 3600 tiles\n", listed);
-        assert_in_range(listed, 60, 240);
-        free(entries);
+        assert_in_range(count_listed(snapshot, &view, "a bar from corner to corner"), 60, 240);
     }
     nebel_release_snapshot(snapshot);
 }

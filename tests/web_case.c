@@ -54,34 +54,32 @@ static void print_words(const char *name, const nebel_word *words, size_t count)
     printf("],\n");
 }
 
-static void print_fog(const nebel_snapshot *snapshot, const double eye[3])
+/* Packs words into `words`, or counts them where it is NULL. */
+typedef nebel_result (*pack_fn)(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
+                                size_t *count);
+
+static void print_packed(const char *name, pack_fn pack, const nebel_snapshot *snapshot, const double eye[3])
 {
     size_t count = 0;
-    require(nebel_pack_fog(snapshot, eye, NULL, 0, &count));
+    require(pack(snapshot, eye, NULL, 0, &count));
     nebel_word *words = allocate(count, sizeof *words);
-    require(nebel_pack_fog(snapshot, eye, words, count, &count));
-    print_words("fog", words, count);
+    require(pack(snapshot, eye, words, count, &count));
+    print_words(name, words, count);
     free(words);
 }
 
-static void print_nodes(const nebel_snapshot *snapshot)
+static nebel_result pack_nodes(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
+                               size_t *count)
 {
-    size_t count = 0;
-    require(nebel_pack_diffusion(snapshot, NULL, 0, &count));
-    nebel_word *words = allocate(count, sizeof *words);
-    require(nebel_pack_diffusion(snapshot, words, count, &count));
-    print_words("nodes", words, count);
-    free(words);
+    (void)eye;
+    return nebel_pack_diffusion(snapshot, words, capacity, count);
 }
 
-static void print_environment(const nebel_snapshot *snapshot)
+static nebel_result pack_environment(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words,
+                                     size_t capacity, size_t *count)
 {
-    size_t count = 0;
-    require(nebel_pack_environment(snapshot, 0, NULL, 0, &count));
-    nebel_word *words = allocate(count, sizeof *words);
-    require(nebel_pack_environment(snapshot, 0, words, count, &count));
-    print_words("environment", words, count);
-    free(words);
+    (void)eye;
+    return nebel_pack_environment(snapshot, 0, words, capacity, count);
 }
 
 static void print_voxels(const nebel_snapshot *snapshot)
@@ -189,10 +187,10 @@ static void print_picture(const char *path, unsigned width, unsigned height)
     const frame f = frame_of(&nebel_scene_contents(scene)->camera, width, height);
     printf("{\"features\": %u, \"width\": %u, \"height\": %u,\n", (unsigned)nebel_pack_features(snapshot), width,
            height);
-    print_fog(snapshot, f.position);
+    print_packed("fog", nebel_pack_fog, snapshot, f.position);
     print_voxels(snapshot);
-    print_nodes(snapshot);
-    print_environment(snapshot);
+    print_packed("nodes", pack_nodes, snapshot, f.position);
+    print_packed("environment", pack_environment, snapshot, f.position);
     print_rays(&f);
     print_pixels(&f);
     printf("}\n");
