@@ -15,7 +15,7 @@ import re
 import subprocess
 import sys
 
-EACH = 3600  # rays of a process: ten seeds of 18 kinds of fog, two kinds of light and ten rays
+EACH = 3480  # rays of a process: ten seeds of 18 kinds of fog and two kinds of light, with ten rays each, four of crowds
 ROW = re.compile(r"^(\w[\w ]*?) +(sun|lamps)((?: +[\d.]+){11})$")
 
 

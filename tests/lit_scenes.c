@@ -267,6 +267,11 @@ static nebel_ray draw_ray(uint64_t *dices)
     return ray;
 }
 
+int lit_ray_count(lit_kind kind)
+{
+    return kind == LIT_KIND_CROWD ? 4 : LIT_RAYS_EACH;
+}
+
 void lit_draw_rays(uint64_t seed, nebel_ray rays[LIT_RAYS_EACH])
 {
     uint64_t dices = seed * 31 + 5;

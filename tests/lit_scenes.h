@@ -49,6 +49,9 @@ typedef struct lit_draw {
 } lit_draw;
 
 void lit_draw_fog(lit_draw *draw, lit_kind kind, lit_source source, uint64_t seed);
+
+/* How many rays to try of a scene: fewer through crowds, in which each costs most. */
+int lit_ray_count(lit_kind kind);
 void lit_draw_rays(uint64_t seed, nebel_ray rays[LIT_RAYS_EACH]);
 
 /* NULL where nebel refuses the fog. */

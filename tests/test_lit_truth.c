@@ -52,30 +52,31 @@ static void compare_bits(tally *t, const char *how, const nebel_light *a, const 
                   b->in_scattering[0], b->error, a->transmittance[0], a->in_scattering[0], a->error);
 }
 
-static void compare_orders(const nebel_snapshot *snapshot, const nebel_ray rays[RAYS], const nebel_light lights[RAYS],
+static void compare_orders(const nebel_snapshot *snapshot, int n, const nebel_ray *rays, const nebel_light *lights,
                            tally *t)
 {
+    const size_t count = (size_t)n, some = count / 3;
     nebel_ray shuffled[RAYS];
     nebel_light again[RAYS];
-    for (int i = 0; i < RAYS; i++) shuffled[i * 7 % RAYS] = rays[i];
-    ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, RAYS, shuffled, again);
-    for (int i = 0; i < RAYS; i++) compare_bits(t, "shuffled", &lights[i], &again[i * 7 % RAYS]);
-    for (int i = 0; i < RAYS; i++) ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, 1, &rays[i], &again[i]);
-    for (int i = 0; i < RAYS; i++) compare_bits(t, "alone", &lights[i], &again[i]);
-    ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, RAYS / 3, rays, again);
-    ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, RAYS - RAYS / 3, rays + RAYS / 3, again + RAYS / 3);
-    for (int i = 0; i < RAYS; i++) compare_bits(t, "split", &lights[i], &again[i]);
+    for (int i = 0; i < n; i++) shuffled[i * 7 % n] = rays[i];
+    ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, count, shuffled, again);
+    for (int i = 0; i < n; i++) compare_bits(t, "shuffled", &lights[i], &again[i * 7 % n]);
+    for (int i = 0; i < n; i++) ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, 1, &rays[i], &again[i]);
+    for (int i = 0; i < n; i++) compare_bits(t, "alone", &lights[i], &again[i]);
+    ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, some, rays, again);
+    ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, count - some, rays + some, again + some);
+    for (int i = 0; i < n; i++) compare_bits(t, "split", &lights[i], &again[i]);
 }
 
-static void compare_all_bits(const nebel_snapshot *snapshot, const nebel_ray rays[RAYS], const nebel_light lights[RAYS],
+static void compare_all_bits(const nebel_snapshot *snapshot, int n, const nebel_ray *rays, const nebel_light *lights,
                              tally *t)
 {
     nebel_light again[RAYS];
-    compare_orders(snapshot, rays, lights, t);
+    compare_orders(snapshot, n, rays, lights, t);
     for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
         if (!nebel_isa_available((nebel_isa)isa)) continue;
-        ask(snapshot, ASK_FLOAT, (nebel_isa)isa, RAYS, rays, again);
-        for (int i = 0; i < RAYS; i++) compare_bits(t, nebel_isa_name((nebel_isa)isa), &lights[i], &again[i]);
+        ask(snapshot, ASK_FLOAT, (nebel_isa)isa, (size_t)n, rays, again);
+        for (int i = 0; i < n; i++) compare_bits(t, nebel_isa_name((nebel_isa)isa), &lights[i], &again[i]);
     }
 }
 
@@ -166,15 +167,16 @@ static void try_fog(lit_kind kind, lit_source source, uint64_t seed)
     static lit_fog fog;
     nebel_ray rays[RAYS];
     nebel_light lights[ASK_COUNT][RAYS];
+    const int n = lit_ray_count(kind);
     lit_draw_fog(&draw, kind, source, seed);
     lit_draw_rays(seed, rays);
     nebel_snapshot *snapshot = lit_draw_commit(&draw);
     assert_non_null(snapshot);
     lit_fog_prepare(&draw.scene, &fog);
     for (int way = 0; way < ASK_COUNT; way++)
-        ask(snapshot, (way_to_ask)way, NEBEL_ISA_DEFAULT, RAYS, rays, lights[way]);
-    compare_all_bits(snapshot, rays, lights[ASK_FLOAT], &bits[kind][source]);
-    for (int i = 0; i < RAYS; i++) {
+        ask(snapshot, (way_to_ask)way, NEBEL_ISA_DEFAULT, (size_t)n, rays, lights[way]);
+    compare_all_bits(snapshot, n, rays, lights[ASK_FLOAT], &bits[kind][source]);
+    for (int i = 0; i < n; i++) {
         lit_truth is;
         if (find_truth(&fog, &rays[i], lights, i, &is))
             judge(kind, source, seed, i, lights, &is);
@@ -220,7 +222,9 @@ static size_t print_tallies(void)
 static void errors_of_lit_fog_are_never_too_small(void **state)
 {
     (void)state;
-    const size_t each = LIT_KIND_COUNT * LIT_SOURCE_COUNT * RAYS;
+    size_t each = 0;
+    for (int kind = 0; kind < LIT_KIND_COUNT; kind++)
+        each += (size_t)(LIT_SOURCE_COUNT * lit_ray_count((lit_kind)kind));
     for (uint64_t seed = 0; seed < (ray_count + each - 1) / each; seed++)
         for (int kind = 0; kind < LIT_KIND_COUNT; kind++)
             for (int source = 0; source < LIT_SOURCE_COUNT; source++)
