@@ -308,6 +308,37 @@ static void test_large_triangles(void **state)
     }
 }
 
+/* A wall beside the eye, along which rays graze, and whose edges pass the camera's plane. */
+static void test_a_wall_beside_the_eye(void **state)
+{
+    (void)state;
+    for (int projection = 0; projection < 3; projection++) {
+        float corners[4][3] = {{.01f, -1e5f, 1e5f}, {.01f, 1e5f, 1e5f}, {.01f, 1e5f, -1e5f}, {.01f, -1e5f, -1e5f}};
+        const nebel_mesh wall = card_of(corners, NULL);
+        const nebel_scene_data scene = {.mesh_count = 1, .meshes = &wall};
+        const nebel_camera camera = {.position = {0, .3, 0},
+                                     .look_at = {1, 0, -3},
+                                     .up = {0, 1, 0},
+                                     .vertical_fov = 70,
+                                     .view_height = .1,
+                                     .projection = (nebel_projection)projection};
+        nb_gl context;
+        picture_pair pair = picture_make(96, 64);
+        size_t seen = 0;
+        pass_open(&context, NB_GL_330);
+        picture_render(&scene, NULL, &camera, 1, &pair);
+        pass_close(&context);
+        for (size_t i = 0; i < 96 * 64; i++) {
+            const float wanted = pair.cpu.depth[i];
+            if (!isfinite(wanted)) continue;
+            assert_true(fabsf(pair.gl.depth[i] - wanted) <= 1e-3f * wanted);
+            seen++;
+        }
+        assert_true(seen > 1000);
+        picture_free(&pair);
+    }
+}
+
 /* ---- a sealed room --------------------------------------------------------------------------- */
 
 /* Three axes at right angles; the world's without numbers. */
@@ -539,6 +570,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_a_crest_is_not_seen_from_behind),
         cmocka_unit_test(test_small_scenes),
         cmocka_unit_test(test_large_triangles),
+        cmocka_unit_test(test_a_wall_beside_the_eye),
         cmocka_unit_test(test_no_light_comes_into_sealed_rooms),
         cmocka_unit_test(test_random_models),
     };

@@ -29,8 +29,10 @@ const char nb_surface_inset_text[] =
 const char nb_surface_distance_text[] =
     "float surface_distance(vec3 origin, vec3 direction)\n"
     "{\n"
-    "    float met = dot(surface_face, surface_corner - origin) / dot(surface_face, direction);\n"
+    "    float cosine = dot(surface_face, direction);\n"
+    "    float met = dot(surface_face, surface_corner - origin) / cosine;\n"
     "    float near = dot(surface_place - origin, direction);\n"
-    "    float slack = abs(near) * min(0.5, 0.01 + abs(near) * 1e-5) + 1e-4 * length(surface_corner - origin);\n"
+    "    float slack = abs(near) * min(0.5, 0.01 + abs(near) * 1e-5) ;\n"
+    "    slack += length(surface_corner - origin) * (1e-4 + 1e-6 / max(abs(cosine), 1e-6));\n"
     "    return met > near - slack && met < near + slack ? met : near;\n"
     "}\n";
