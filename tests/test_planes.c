@@ -186,6 +186,23 @@ static nebel_snapshot *one_box(void)
     return fog_commit(&(nebel_fog_desc){0}, &box, 1);
 }
 
+static void test_odd_strides_and_unknown_precisions_are_refused(void **state)
+{
+    (void)state;
+    nebel_snapshot *fog = one_box();
+    const nebel_ray rays[2] = {{.direction = {0, 0, -1}}, {.direction = {0, 0, -1}}};
+    nebel_light lights[2];
+    const nebel_trace_desc unknown = {.precision = (nebel_precision)7};
+    const size_t odd = sizeof *rays + 1;
+    double distances[2];
+    assert_int_equal(nebel_trace(fog, NULL, 2, rays, odd, lights, sizeof *lights), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace(fog, NULL, 2, rays, sizeof *rays, lights, 3), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_find_transmittance(fog, 0.5, 0, 2, rays, odd, distances), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace(fog, &unknown, 2, rays, sizeof *rays, lights, sizeof *lights), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace(fog, NULL, 2, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    nebel_release_snapshot(fog);
+}
+
 static void test_faults_are_named(void **state)
 {
     (void)state;
@@ -203,6 +220,9 @@ static void test_faults_are_named(void **state)
         {.direction_float = {one, one, NULL}},
         {.direction_float = {one, one, one},
          .direction_double = {(const double[RAYS]){1}, (const double[RAYS]){1}, (const double[RAYS]){1}}},
+        {.direction = {0, 0, 1}, .t_max = one, .t_max_stride = 3},
+        {.direction_double = {(const double[RAYS]){1}, (const double[RAYS]){1}, (const double[RAYS]){1}},
+         .direction_stride = 4},
     };
     for (size_t i = 0; i < sizeof faults / sizeof *faults; i++)
         assert_int_equal(nebel_trace_planes(fog, NULL, 1, &faults[i], &to), NEBEL_ERROR_ARGUMENT);
@@ -291,6 +311,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_planes_give_the_bits_of_structures),
         cmocka_unit_test(test_faults_are_named),
+        cmocka_unit_test(test_odd_strides_and_unknown_precisions_are_refused),
         cmocka_unit_test(test_a_ray_that_is_none_is_found),
         cmocka_unit_test(test_a_ray_of_no_length_may_be_anything),
     };

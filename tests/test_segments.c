@@ -281,7 +281,10 @@ static void test_segments_beyond_the_limits_are_refused_by_number(void **unused)
         assert_non_null(strstr(messages.text, "origin"));
         segments.origin[i] = 0;
     }
-    assert_int_equal(messages.count, 4);
+    segments.to_stride = 3;
+    assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &segments, out, 0),
+                     NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(messages.count, 5);
     nebel_release_snapshot(snapshot);
 }
 

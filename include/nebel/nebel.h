@@ -613,9 +613,10 @@ typedef struct nebel_trace_desc {
 
 #define NEBEL_DEFAULT_TOLERANCE 0.002
 
-/* What the fog does along each of n rays. `ray_stride` and `light_stride` are in bytes. desc NULL: the same as all
+/* What the fog does along each of n rays. `ray_stride` and `light_stride` are in bytes, multiples
+ * of the alignment of what they part. desc NULL: the same as all
  * zero. rays and lights must not overlap. A ray with t_max 0 gives transmittance 1, in-scattering 0. Float results are the same bits for every isa and
- * for every way of splitting the rays into calls. Any thread. Errors: ARGUMENT (NULL, a tolerance or a ray that is NaN,
+ * for every way of splitting the rays into calls. Any thread. Errors: ARGUMENT (NULL, an unknown precision, an odd stride, a tolerance or a ray that is NaN,
  * infinite where it must not be, of no direction, of negative t_max; toggles that descend, are negative or NaN),
  * UNSUPPORTED (isa not available), UNBOUNDED (emission in an endless volume that does not absorb), MEMORY (scratch for
  * very many volumes on one ray). On an error the contents of lights are undefined.

@@ -70,6 +70,9 @@ nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa i
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (segments == NULL || (n > 0 && (segments->from == NULL || segments->to == NULL || out == NULL)))
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segments: from, to and out must not be NULL");
+    if ((segments->from_stride | segments->to_stride | out_stride) % sizeof(float) != 0)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segments: strides must be multiples of %zu",
+                       sizeof(float));
     if (channel < 0 || channel > 2) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
     for (int c = 0; c < 3; c++)
         if (!(fabs(segments->origin[c]) <= NEBEL_MAX_LENGTH))

@@ -65,6 +65,9 @@ static nebel_result check_rays(const nebel_snapshot *snapshot, size_t n, const n
                                size_t *failed)
 {
     if (n > 0 && rays == NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "rays: must not be NULL");
+    if (stride % _Alignof(nebel_ray) != 0)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "rays: stride %zu: must be a multiple of %zu", stride,
+                       _Alignof(nebel_ray));
     for (size_t i = 0; i < n; i++) {
         const nebel_ray *ray = nb_stride_from(rays, stride, i);
         if (is_valid(ray)) continue;
@@ -202,8 +205,13 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
     const nebel_trace_desc plain = {0};
     if (desc == NULL) desc = &plain;
     if (n > 0 && lights == NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "trace: lights must not be NULL");
+    if (light_stride % _Alignof(nebel_light) != 0)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "lights: stride %zu: must be a multiple of %zu",
+                       light_stride, _Alignof(nebel_light));
     const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, desc->failed_ray);
     if (valid != NEBEL_OK) return valid;
+    if (desc->precision != NEBEL_PRECISION_DOUBLE && desc->precision != NEBEL_PRECISION_FLOAT)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "precision: %d is unknown", (int)desc->precision);
     const int is_float = desc->precision == NEBEL_PRECISION_FLOAT;
     nb_trace_job job = {.transmittance_only = desc->transmittance_only,
                         .ignore_distances = desc->ignore_distances,
@@ -237,6 +245,16 @@ static const char *fault_of_planes(const nebel_ray_planes *rays)
     return fault_of_ray(&common);
 }
 
+static const char *fault_of_strides(const nebel_ray_planes *rays, const nebel_light_planes *lights)
+{
+    const size_t of_floats[] = {rays->offset_stride, rays->t_max_stride, lights->transmittance_stride,
+                                lights->in_scattering_stride, lights->error_stride};
+    const size_t direction = rays->direction_double[0] != NULL ? sizeof(double) : sizeof(float);
+    int fits = rays->direction_stride % direction == 0;
+    for (size_t i = 0; i < sizeof of_floats / sizeof *of_floats; i++) fits = fits && of_floats[i] % sizeof(float) == 0;
+    return fits ? NULL : "a stride must be a multiple of the size of its numbers";
+}
+
 static void set_stride(size_t *stride, size_t packed)
 {
     if (*stride == 0) *stride = packed;
@@ -258,6 +276,8 @@ nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trac
     set_stride(&to.transmittance_stride, sizeof(float));
     set_stride(&to.in_scattering_stride, sizeof(float));
     set_stride(&to.error_stride, sizeof(float));
+    fault = fault_of_strides(&from, &to);
+    if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "planes: %s", fault);
     const int wants_light = to.in_scattering[0] != NULL || to.in_scattering[1] != NULL || to.in_scattering[2] != NULL;
     const nebel_trace_desc plain = {0};
     const nebel_trace_desc *asked = desc != NULL ? desc : &plain;
@@ -279,7 +299,7 @@ nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double tra
     const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, NULL);
     if (valid != NEBEL_OK) return valid;
     if (!(transmittance > 0 && transmittance < 1))
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "transmittance: must be within 0 and 1");
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "transmittance: must be more than 0 and less than 1");
     if (channel < 0 || channel > 2) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
     if (transmittance < 1 - snapshot->max_opacity) {
         for (size_t i = 0; i < n; i++) distances[i] = HUGE_VAL;
