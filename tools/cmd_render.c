@@ -241,8 +241,10 @@ static void show_share(studio *all, double share)
 
 static int show_progress(size_t done, size_t total, void *user)
 {
-    nb_interrupt_listen(); /* from the first call on the library asks again and again */
-    show_share(user, total > 0 ? (double)done / (double)total : 0);
+    studio *const all = user;
+    if (!all->wanted->gl)
+        nb_interrupt_listen(); /* from the first call on the library asks again and again; OpenGL seldom */
+    show_share(all, total > 0 ? (double)done / (double)total : 0);
     return nb_interrupt_is_requested();
 }
 
