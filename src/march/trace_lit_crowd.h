@@ -491,6 +491,11 @@ static nb_real unseen_between_places(const lit_place at[5], int c, const crowd_l
         const nb_real change = nb_abs((to->depth[c] - from->depth[c]) + (to->way[c] - from->way[c])) + dip;
         const nb_real lost = nb_max(from->behind[c] - to->behind[c], NB_F(0.0));
         nb_real comes = nb_max(from->comes[c], to->comes[c]);
+        if (light->pass != NULL && light->pass->lamp->is_spot) {
+            /* At the edge of its cone there is no light yet, and behind it all at once. */
+            const nb_real arrives = nb_max(from->arrives, to->arrives) * REAL(intensity);
+            comes = nb_max(comes, arrives * nb_exp(-nb_min(from->way[c], to->way[c])));
+        }
         if (nb_any(dip > NB_F(0.0))) {
             const nb_real arrives = nb_max(from->arrives, to->arrives) * REAL(intensity);
             comes = nb_select(dip > NB_F(0.0), arrives * nb_exp(-cover), comes);
