@@ -312,24 +312,22 @@ static void lamplight_is_what_brute_force_finds(void **state)
 }
 
 /* Sunlight that falls through narrow slits between opaque boxes onto a slab: in closed form. */
-static void light_falls_through_slits(void **state)
+static void expect_light_through_slits(int boxes, double slit)
 {
-    (void)state;
-    enum { BOXES = 12 };
-    const double extinction = 0.3, slit = 0.04, width = 22.0 / BOXES;
+    const double extinction = 0.3, width = 22.0 / boxes;
     static crowd of;
     double right = 0;
-    of = (crowd){.count = BOXES + 1, .desc = {.sun = {{0, 1, 0}, {3, 3, 3}}}};
-    of.bodies[BOXES] =
+    of = (crowd){.count = (size_t)boxes + 1, .desc = {.sun = {{0, 1, 0}, {3, 3, 3}}}};
+    of.bodies[boxes] =
         (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .min = {-10, -1, -50}, .max = {10, 0, 50}},
                             .extinction = {extinction, extinction, extinction},
                             .albedo = {1, 1, 1}};
-    for (int i = 0; i < BOXES; i++) {
+    for (int i = 0; i < boxes; i++) {
         const double from = -11 + i * width, to = from + width - slit;
         of.bodies[i] =
             (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .min = {from, 1, -50}, .max = {to, 2, 50}},
                                 .extinction = {1000, 1000, 1000}};
-        if (i + 1 < BOXES) right += exp(-extinction * (to + 10)) - exp(-extinction * (to + slit + 10));
+        if (i + 1 < boxes) right += exp(-extinction * (to + 10)) - exp(-extinction * (to + slit + 10));
     }
     right *= 3 * exp(-extinction * 0.5) * phase_value(0, 0);
     const nebel_ray ray = {{-12, -0.5, 0}, {1, 0, 0}, HUGE_VAL};
@@ -343,6 +341,15 @@ static void light_falls_through_slits(void **state)
         assert_true(fabs(light.in_scattering[0] - right) <= light.error);
     }
     nebel_release_snapshot(snapshot);
+}
+
+static void light_falls_through_slits(void **state)
+{
+    (void)state;
+    expect_light_through_slits(12, 0.04);
+    expect_light_through_slits(12, 1e-3);
+    expect_light_through_slits(3, 0.04); /* so few are no crowd */
+    expect_light_through_slits(7, 0.04);
 }
 
 int main(void)
