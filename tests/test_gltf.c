@@ -485,6 +485,9 @@ static void test_unknown_required_extensions_are_named(void **state)
                   "requires the glTF extension \"VENDOR_unknown\", which is not supported");
     write_gltf("quad.gltf", "\"KHR_mesh_quantization\", \"KHR_materials_unlit\"", text);
     check_quad("quad.gltf", &integers[0], true);
+    write_text("unused.gltf", "{\"asset\": {\"version\": \"2.0\"}, \"extensionsRequired\": "
+                              "[\"KHR_draco_mesh_compression\"]}");
+    assert_broken("\"file\": \"unused.gltf\"", NEBEL_ERROR_FORMAT, "does not name it in \"extensionsUsed\"");
 }
 
 static void test_names_are_percent_encoded(void **state)

@@ -84,7 +84,7 @@ typedef struct nb_gltf_data {
     nb_arena arena;
     nb_bytes text, chunk;
     bool has_chunk;
-    bool requires_meshopt;
+    bool requires_meshopt, requires_draco, uses_draco;
     char fault[512]; /* of the text, where it is no good JSON */
     nb_gltf_view *views;
     nb_gltf_accessor *accessors;

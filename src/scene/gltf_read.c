@@ -5,9 +5,12 @@
 #include <stdio.h>
 #include <string.h>
 
+#define MESHOPT "EXT_meshopt_compression"
+#define DRACO "KHR_draco_mesh_compression"
+
 /* Extensions that are decoded, or that change nothing of what is kept: triangles, base color and its texture. */
 static const char *const known_extensions[] = {"KHR_mesh_quantization",
-                                               "KHR_draco_mesh_compression",
+                                               DRACO,
                                                "KHR_texture_transform",
                                                "KHR_lights_punctual",
                                                "KHR_materials_anisotropy",
@@ -25,8 +28,6 @@ static const char *const known_extensions[] = {"KHR_mesh_quantization",
                                                "KHR_materials_variants",
                                                "KHR_materials_volume",
                                                "KHR_xmp_json_ld"};
-
-#define MESHOPT "EXT_meshopt_compression"
 
 /* ---- members --------------------------------------------------------------------------------- */
 
@@ -109,6 +110,7 @@ static bool take_required(nb_json *json, const nb_json_node *list, nb_gltf_data 
 {
     for (const nb_json_node *node = nb_json_first(json, list); node != NULL; node = nb_json_next(json, node)) {
         data->requires_meshopt = data->requires_meshopt || is_text(node, MESHOPT);
+        data->requires_draco = data->requires_draco || is_text(node, DRACO);
         if (node->type != NB_JSON_STRING || is_known(data, node)) continue;
         const int size = node->string_size < 80 ? (int)node->string_size : 80;
         /* The library itself is linked with no decoder. */
@@ -120,6 +122,14 @@ static bool take_required(nb_json *json, const nb_json_node *list, nb_gltf_data 
                       is_here ? ", or have nebel-read-model read it" : "");
         return nb_json_stop(json, NEBEL_ERROR_UNSUPPORTED);
     }
+    return true;
+}
+
+/* Assimp decodes Draco where the file says that it is used, and takes what is there else. */
+static bool take_used(nb_json *json, const nb_json_node *list, nb_gltf_data *data)
+{
+    for (const nb_json_node *node = nb_json_first(json, list); node != NULL; node = nb_json_next(json, node))
+        data->uses_draco = data->uses_draco || is_text(node, DRACO);
     return true;
 }
 
@@ -260,9 +270,11 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
     nb_gltf_data *data = user;
     const nb_json_node *parent = nb_json_parent(json, value);
     if (parent == NULL) return true;
+    if (nb_json_parent(json, parent) == NULL && value->type != NB_JSON_ARRAY) return true;
+    if (nb_json_parent(json, parent) == NULL && nb_json_has_key(value, "extensionsUsed"))
+        return take_used(json, value, data);
     if (nb_json_parent(json, parent) == NULL)
-        return !nb_json_has_key(value, "extensionsRequired") || value->type != NB_JSON_ARRAY ||
-               take_required(json, value, data);
+        return !nb_json_has_key(value, "extensionsRequired") || take_required(json, value, data);
     if (parent->type != NB_JSON_ARRAY) return true;
     if (nb_json_has_key(parent, "buffers")) return take_buffer(json, value, data);
     if (nb_json_has_key(parent, "bufferViews")) return take_view(json, value, data);
@@ -292,6 +304,12 @@ nebel_result nb_gltf_read_data(nb_gltf_data *data)
                                .user = data};
     const nebel_result result = nb_json_read(&json, &desc);
     if (result != NEBEL_OK) return result;
+    if (data->requires_draco && !data->uses_draco)
+        return nb_model_fail(data->load, NEBEL_ERROR_FORMAT,
+                             "the model \"%s\" requires \"" DRACO
+                             "\", but does not name it in \"extensionsUsed\"; export "
+                             "it again",
+                             data->load->source->file);
     bool is_packed = false;
     for (size_t i = 0; i < data->view_count; i++) is_packed = is_packed || data->views[i].is_packed;
     if (data->requires_meshopt && !is_packed)

@@ -174,7 +174,8 @@ int nb_model_files_open(nb_model_files *files, const char *path)
 
 const char *nb_model_files_refusal_text(nb_refusal refusal)
 {
-    return refusal == NB_REFUSAL_SPECIAL
-               ? "is a device, a pipe or a socket; name a file"
-               : "is outside the folder of the model; move it there, or name a folder that holds both as \"folder\"";
+    return refusal == NB_REFUSAL_SPECIAL ? "is a device, a pipe or a socket; name a file"
+                                         : "is outside the folder of the model, as are links to absolute paths; move "
+                                           "it there, or name a folder that "
+                                           "holds both as \"folder\"";
 }

@@ -4,6 +4,7 @@
 #include "scene/model_budget.h"
 #include "scene/path.h"
 
+#include <errno.h>
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,8 +26,8 @@ static nebel_result find_name(const nb_model_load *load, nb_arena *scratch, cons
     char outer[PATH_MAX], inner[PATH_MAX];
     const char *file = load->source->file, *name = nb_path_name(file);
     if (!find_real_path(load->folder, outer) || !find_real_path(own, inner))
-        return nb_model_fail(load, NEBEL_ERROR_FILE, "cannot open the folder \"%s\" of the model \"%s\"", load->folder,
-                             file);
+        return nb_model_fail(load, NEBEL_ERROR_FILE, "cannot open the folder \"%s\" of the model \"%s\": %s",
+                             load->folder, file, strerror(errno));
     size_t size = strlen(outer);
     while (size > 0 && outer[size - 1] == '/') size--;
     if (strncmp(outer, inner, size) != 0 || (inner[size] != '/' && inner[size] != '\0'))
