@@ -248,6 +248,14 @@ static void cut_piece(const walk *w, double a, double b, lit_cuts *cuts)
     lit_sort(cuts->at, cuts->count);
 }
 
+/* Whether a few roundings of places at the start of a piece change its depth: then no place in the skin can be told from another. */
+static int is_too_dense(const walk *w, double a, double b)
+{
+    double depth[3] = {0, 0, 0};
+    lit_fog_add_depth(w->fog, w->ray, &w->there, a, fmin(b, a * (1 + 1e-13)), depth);
+    return fmax(fmax(depth[0], depth[1]), depth[2]) > 1e-4;
+}
+
 enum { MAX_NODES = 4000000 };
 
 static int pass_piece(walk *w, double a, double b)
@@ -255,6 +263,7 @@ static int pass_piece(walk *w, double a, double b)
     static lit_cuts cuts;
     static part parts[LIT_MAX_CUTS];
     double largest = 1e-12;
+    if (is_too_dense(w, a, b)) return 0;
     cut_piece(w, a, b, &cuts);
     for (size_t i = 0; i + 1 < cuts.count; i++) {
         parts[i] = integrate(w, cuts.at[i], cuts.at[i + 1]);

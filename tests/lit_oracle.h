@@ -14,7 +14,7 @@ typedef struct lit_truth {
     double uncertainty; /* an estimate of how far off in_scattering may be */
 } lit_truth;
 
-/* Along a ray of finite t_max. Returns 0 where that takes too long. */
+/* Along a ray of finite t_max. Returns 0 where that takes too long, or doubles do not hold it. */
 int lit_oracle_trace(const lit_fog *fog, const nebel_ray *ray, lit_effort effort, lit_truth *truth);
 
 #endif

@@ -230,7 +230,7 @@ static void errors_of_lit_fog_are_never_too_small(void **state)
             for (int source = 0; source < LIT_SOURCE_COUNT; source++)
                 try_fog((lit_kind)kind, (lit_source)source, first_seed + seed);
     assert_int_equal(print_tallies(), 0);
-    assert_true(undecided <= ray_count / 1000);
+    assert_true(undecided <= ray_count / 1000 + RAYS); /* of one scene more: all of its rays may be too dense */
 }
 
 int main(int argc, char **argv)
