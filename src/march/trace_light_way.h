@@ -98,7 +98,7 @@ static stretch_ahead ahead_in(const packet *way, const nb_volume *body, int by_t
 }
 
 /* What a body cuts out of the way. Slack is left to the compiler to drop where nobody asks for the error. */
-static nb_real length_in_body(const packet *way, const nb_volume *body)
+static inline __attribute__((always_inline)) nb_real length_in_body(const packet *way, const nb_volume *body)
 {
     const nb_leaf *leaf = &body->leaves[0];
     nb_interval raw;
@@ -113,7 +113,8 @@ static nb_real length_in_body(const packet *way, const nb_volume *body)
 }
 
 /* By how much that may be off; `noise` is what sums may be off by, relative to each of their terms. */
-static nb_real length_error(const packet *way, const nb_volume *body, int by_tree, nb_real noise)
+static inline __attribute__((always_inline)) nb_real length_error(const packet *way, const nb_volume *body, int by_tree,
+                                                                  nb_real noise)
 {
     const stretch_ahead s = ahead_in(way, body, by_tree);
     return s.error + nb_narrow(nb_wmax(s.leave - s.enter, NB_W(0.0))) * noise;
