@@ -195,7 +195,7 @@ static nebel_result draw_narrow(stage *s, nebel_projection projection, double si
     return nebel_gl_render_frame(s->renderer, &desc);
 }
 
-/* Of them triangles would vanish. */
+/* Of them triangles would vanish, and outlines of fog go astray. */
 static void test_views_that_are_too_narrow(void **state)
 {
     (void)state;
@@ -205,6 +205,8 @@ static void test_views_that_are_too_narrow(void **state)
     expect_message(draw_narrow(&s, NEBEL_PROJECTION_ORTHOGRAPHIC, 1e-8), NEBEL_ERROR_LIMIT, "view_height is 1e-08 m");
     expect_message(draw_narrow(&s, NEBEL_PROJECTION_PERSPECTIVE, 1e-8), NEBEL_ERROR_LIMIT, "vertical_fov is 1e-08 deg");
     assert_int_equal(draw_narrow(&s, NEBEL_PROJECTION_ORTHOGRAPHIC, 1e-3), NEBEL_OK);
+    expect_message(draw_narrow(&s, NEBEL_PROJECTION_PERSPECTIVE, 1.2e-3), NEBEL_ERROR_LIMIT, "OpenGL draws fog where");
+    assert_int_equal(draw_narrow(&s, NEBEL_PROJECTION_PERSPECTIVE, 1.5e-3), NEBEL_OK);
     end(&s);
 }
 

@@ -301,8 +301,10 @@ static void test_large_triangles(void **state)
     (void)state;
     for (int projection = 0; projection < 3; projection++) {
         try_ground(1e6, 0, (nebel_projection)projection, (const double[2]){1e-6, 2e-5});
-        if (projection != NEBEL_PROJECTION_ORTHOGRAPHIC)
+        if (projection != NEBEL_PROJECTION_ORTHOGRAPHIC) {
             try_ground(1e8, 0, (nebel_projection)projection, (const double[2]){1e-6, 2e-5});
+            try_ground(2e8, 0, (nebel_projection)projection, (const double[2]){1e-6, 0});
+        }
         try_ground(1e4, .2, (nebel_projection)projection, (const double[2]){2e-5, 1e-3});
         try_ground(1e6, .3, (nebel_projection)projection, (const double[2]){2e-5, 0});
     }

@@ -89,8 +89,8 @@ static nebel_result check_planet(const nebel_gl_renderer *r, const nebel_gl_fram
     return has_air ? check_air(r, desc) : NEBEL_OK;
 }
 
-/* Floats of corners have 24 bits: what is longer leaves none for a picture that shows a part of it. */
-#define LONGEST_EDGE 1e9
+/* Floats of corners have 24 bits: what is longer leaves none for a picture that shows a part of it, and rasterizers lose it. */
+#define LONGEST_EDGE 3e8
 #define MOST_PICTURES 1e7
 
 /* How many pictures high a mesh's longest edge is where the mesh is nearest; of one around the camera, at a sixteenth of that
@@ -161,6 +161,24 @@ static nebel_result check_meshes(const nebel_gl_renderer *r, const nebel_gl_fram
     return result;
 }
 
+/* Where a ray passes a body is found from the eye, a place that floats hold to 2^-24 of the way there. Four such roundings are a
+ * fourth of a pixel of this angle, whatever the distance. */
+#define LEAST_PIXEL 0x1p-20
+
+static nebel_result check_fog(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+{
+    if (desc->camera.projection != NEBEL_PROJECTION_PERSPECTIVE || desc->method != NEBEL_GL_METHOD_EXACT ||
+        nebel_snapshot_volume_count(r->fog) == 0)
+        return NEBEL_OK;
+    const double pixel = 2 * tan(desc->camera.vertical_fov * (3.14159265358979323846 / 360)) / desc->height;
+    if (!(pixel < LEAST_PIXEL)) return NEBEL_OK;
+    return nb_fail(
+        &r->log, NEBEL_ERROR_LIMIT,
+        "camera: vertical_fov is %g degrees, and a pixel %.2g radians; OpenGL draws fog where pixels are at least "
+        "%.2g: go nearer with a wider view, or use the CPU's renderer (--device cpu)",
+        desc->camera.vertical_fov, pixel, LEAST_PIXEL);
+}
+
 nebel_result nb_frame_check(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, uint32_t samples)
 {
     if (!(fabs(desc->time) <= 1e12))
@@ -169,5 +187,6 @@ nebel_result nb_frame_check(const nebel_gl_renderer *r, const nebel_gl_frame_des
     if (result == NEBEL_OK) result = check_samples(r, samples);
     if (result == NEBEL_OK) result = check_planet(r, desc);
     if (result == NEBEL_OK) result = check_meshes(r, desc);
+    if (result == NEBEL_OK) result = check_fog(r, desc);
     return result == NEBEL_OK ? check_method(r, desc) : result;
 }
