@@ -146,12 +146,10 @@ static lit_span in_cone(const lit_line *l, const double from[3], const double to
                  square = b * b - a * c;
     double cuts[6] = {slab.enter, slab.leave};
     int n = 2;
-    if (square > 0 && a != 0) {
-        cuts[n++] = (-b - sqrt(square)) / a;
-        cuts[n++] = (-b + sqrt(square)) / a;
-    } else if (a == 0 && b != 0) {
-        cuts[n++] = -c / (2 * b);
-    }
+    /* Without a difference of like numbers: `a` is all but 0 where the line runs along the side. */
+    const double sum = -b - copysign(sqrt(fmax(square, 0)), b);
+    if (square > 0 && sum != 0) cuts[n++] = c / sum;
+    if (square > 0 && a != 0) cuts[n++] = sum / a;
     for (int i = 1; i < n; i++)
         for (int j = i; j > 0 && cuts[j] < cuts[j - 1]; j--) {
             const double swapped = cuts[j];
@@ -164,9 +162,11 @@ static lit_span in_cone(const lit_line *l, const double from[3], const double to
         if (!isfinite(cuts[i]) || !isfinite(cuts[i + 1])) {
             if (dz != 0) continue;
         }
-        const double t = !isfinite(cuts[i])       ? cuts[i + 1] - 1
-                         : !isfinite(cuts[i + 1]) ? cuts[i] + 1
-                                                  : 0.5 * (cuts[i] + cuts[i + 1]);
+        const int begins = isfinite(cuts[i]), ends = isfinite(cuts[i + 1]);
+        const double t = !begins && !ends ? 0
+                         : !begins        ? cuts[i + 1] - 1
+                         : !ends          ? cuts[i] + 1
+                                          : 0.5 * (cuts[i] + cuts[i + 1]);
         if (a * t * t + 2 * b * t + c > 0 || w + dw * t < 0) continue;
         found.enter = fmin(found.enter, cuts[i]);
         found.leave = fmax(found.leave, cuts[i + 1]);
