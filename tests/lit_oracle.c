@@ -1,5 +1,6 @@
 #include "lit_oracle.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -64,7 +65,7 @@ typedef struct walk {
     lit_effort effort;
     double ray_length;
     lit_marks there;
-    double start, depth[3]; /* of the piece; up to there */
+    double start, end, depth[3]; /* of the piece; up to there */
     double sum[3], off;
     long nodes;
 } walk;
@@ -84,6 +85,14 @@ static void add_own(const walk *w, const nebel_volume_desc *v, double density, d
             density * (v->emission[c] + v->extinction[c] * (v->source[c] + v->albedo[c] * w->fog->scene->ambient[c]));
 }
 
+/* Not so near to an end of the piece that rounding may take the place out of the fog: where light runs along a face, it is
+ * full there and all but gone within. */
+static double place_within(const walk *w, double t)
+{
+    const double margin = 64 * DBL_EPSILON * (1 + w->end);
+    return w->end - w->start > 2 * margin ? fmin(fmax(t, w->start + margin), w->end - margin) : t;
+}
+
 static void light_at(walk *w, double t, double value[3])
 {
     double depth[3] = {w->depth[0], w->depth[1], w->depth[2]}, arriving[3] = {1, 1, 1}, towards[3], glow[3] = {0, 0, 0};
@@ -91,7 +100,7 @@ static void light_at(walk *w, double t, double value[3])
     w->nodes++;
     for (int c = 0; c < 3; c++) value[c] = 0;
     if (is_hidden(depth)) return;
-    if (w->light != OWN) look_at_light(w->fog, w->light, w->ray, t, arriving, towards);
+    if (w->light != OWN) look_at_light(w->fog, w->light, w->ray, place_within(w, t), arriving, towards);
     if (!(arriving[0] + arriving[1] + arriving[2] > 0)) return;
     const double cosine = w->light == OWN ? 0 : fmin(fmax(lit_dot(w->ray->d, towards), -1), 1);
     for (size_t i = 0; i < w->there.count; i++) {
@@ -284,6 +293,7 @@ static int add_light(walk *w, const lit_map *m, lit_truth *truth)
         lit_fog_mark(w->fog, m, 0.5 * (a + b), &w->there);
         if (w->there.count == 0) continue;
         w->start = a;
+        w->end = b;
         if (!pass_piece(w, a, b)) return 0;
         lit_fog_add_depth(w->fog, w->ray, &w->there, a, b, w->depth);
     }
