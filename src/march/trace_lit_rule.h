@@ -48,6 +48,10 @@ typedef struct sun_node {
 /* By what the estimate is larger where null rules do not fall from degree to degree. */
 #define ROUGHNESS NB_F(16.0)
 
+/* The same of the last degree alone, which shows a small kink in light that else is steep: there the lower degrees fall. Of
+ * 200,000 kinks and roots anywhere in light of random slope and curvature half as many pass for smooth as without it. */
+#define KINKED NB_F(4.0)
+
 /* The estimate of the error by null rules. */
 static nb_real error_by_null_rules(const nb_real light[SUN_NODES])
 {
@@ -60,7 +64,8 @@ static nb_real error_by_null_rules(const nb_real light[SUN_NODES])
     }
     const nb_real fine = nb_max(off[2], off[3]), coarse = nb_max(off[0], off[1]);
     const nb_real ratio = nb_min(fine / nb_max(coarse, NB_TINY), NB_F(1.0));
-    return nb_max(off[3], fine * nb_sqrt(ratio) * (NB_F(1.0) + ROUGHNESS * ratio));
+    const nb_real last = nb_min(off[3] / nb_max(off[2], NB_TINY), NB_F(1.0));
+    return nb_max(off[3] * (NB_F(1.0) + KINKED * last), fine * nb_sqrt(ratio) * (NB_F(1.0) + ROUGHNESS * ratio));
 }
 
 /* By how much the way to the light may be less deep somewhere between node j and the next than at both: where it falls
