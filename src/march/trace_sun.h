@@ -36,7 +36,7 @@ typedef struct sunlight {
     int has_turns;          /* of the packet at hand */
     const nb_lamp *turning; /* they are this lamp's; NULL: the sun's */
     void *turn_memory;
-    struct lit_shadow *shadows; /* see trace_lit_crowd.h */
+    struct lit_shadow *shadows; /* see trace_lit_shadow.h */
     size_t shadow_count, shadow_capacity, first_shadow;
     void *shadow_memory;
     shade shade;
