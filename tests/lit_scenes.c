@@ -210,6 +210,8 @@ static void draw_bodies(uint64_t *dices, lit_kind kind, lit_draw *draw)
         return;
     case LIT_KIND_VOXELS:
         draw_voxels(dices, draw);
+        if (one_of(dices, 2))
+            draw_shape(dices, shapes[dice_below(dices, LIT_KIND_WORLD)], draw, &draw->volumes[draw->count++]);
         return;
     default:
         draw_shape(dices, shapes[kind], draw, &draw->volumes[0]);
