@@ -126,6 +126,9 @@ static int all_hold(nebel_light lights[ASK_COUNT][RAYS], int i, const lit_truth 
     return hold;
 }
 
+/* The light of a sliver that the quick look may miss. A fault of nebel that is less would pass with it. */
+#define OVERLOOKED 1e-11
+
 /* Where it seems wrong the oracle looks again, more closely. So it does at some of the rays in any case, and must then see
  * what it saw before. Returns 0 where it does not know. */
 static int find_truth(const lit_fog *fog, const nebel_ray *ray, nebel_light lights[ASK_COUNT][RAYS], int i,
@@ -137,7 +140,8 @@ static int find_truth(const lit_fog *fog, const nebel_ray *ray, nebel_light ligh
     if (holds && asked++ % CLOSE_EVERY != 0) return 1;
     const lit_truth quick = *is;
     if (!lit_oracle_trace(fog, ray, LIT_CLOSE, is)) return 0;
-    const double off = apart(quick.in_scattering, is->in_scattering) / (slack_of(&quick) + slack_of(is));
+    const double slack = slack_of(&quick) + slack_of(is) + OVERLOOKED;
+    const double off = apart(quick.in_scattering, is->in_scattering) / slack;
     oracle.rays++;
     oracle.worst = fmax(oracle.worst, off);
     oracle.wrong += !(off <= 1);

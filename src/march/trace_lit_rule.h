@@ -130,6 +130,34 @@ static nb_real unseen_fog(const sun_node at[SUN_NODES], int c, nb_real terms, nb
     return most * (at[0].behind[c] * nb_clamp(off, NB_F(0.0), NB_F(1.0)));
 }
 
+/* The error that is told, as a multiple of what the nodes are off a cubic: light from voxels is not as smooth as rules
+ * want it. */
+#define VOXEL_CAUTION NB_F(4.0)
+
+/* Through the four nodes of Lobatto's rule goes a cubic, whose integral is their sum. By how much the other nodes are off
+ * it adds up to the difference of both rules. Without signs it cannot vanish by chance. */
+static nb_real off_cubic(const sun_node at[SUN_NODES], int c)
+{
+    static const double cubic[3][4] = {
+        {0.52981150277058676, 0.58869622048869869, -0.17202955382303202, 0.05352183056274658},
+        {-0.125, 0.625, 0.625, -0.125},
+        {0.05352183056274658, -0.17202955382303202, 0.58869622048869869, 0.52981150277058676}};
+    nb_real off = NB_F(0.0);
+    for (int i = 0; i < 3; i++) {
+        const nb_real between = REAL(cubic[i][0]) * at[0].light[c] + REAL(cubic[i][1]) * at[2].light[c] +
+                                REAL(cubic[i][2]) * at[4].light[c] + REAL(cubic[i][3]) * at[6].light[c];
+        off = off + REAL(sun_weights[2 * i + 1]) * nb_abs(at[2 * i + 1].light[c] - between);
+    }
+    return off;
+}
+
+static nb_real error_among_voxels(const sun_node at[SUN_NODES])
+{
+    nb_real off = NB_F(0.0);
+    for (int c = 0; c < 3; c++) off = nb_max(off, off_cubic(at, c));
+    return VOXEL_CAUTION * off;
+}
+
 /* What the rule makes of a step. */
 typedef struct lit_sum {
     nb_real light[3];

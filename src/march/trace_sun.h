@@ -344,9 +344,6 @@ static nb_mask lanes_in_voxels(const march *m)
     return lanes;
 }
 
-/* Light among voxels is not as smooth as rules want it. */
-#define ROUGH_CAUTION NB_F(4.0)
-
 static light_depth way_from(sunlight *sun, const march *m, const sun_step *s, nb_wide end, int n, nb_wmask lanes)
 {
     const nb_wide t = place_of_node(s, end, n);
@@ -369,7 +366,8 @@ static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const
     const nb_real most = s->lamp != NULL ? most_of_lamp(s->lamp, s->start, end) : at[0].most;
     const lit_sum sum = sum_nodes_of_step(at, most, count_media(m), sun->snapshot->is_gray);
     take_sum(s, &sum);
-    s->error = nb_select(lanes_in_voxels(m), s->error * ROUGH_CAUTION, s->error);
+    const nb_mask rough = lanes_in_voxels(m);
+    if (nb_any(rough)) s->error = nb_select(rough, nb_max(s->error * VOXEL_CAUTION, error_among_voxels(at)), s->error);
     /* ends are not looked at themselves */
     s->rounding =
         s->rounding + largest(s->light) * REAL(STEP_MARGIN) * nb_min(s->steepness, NB_F(1.0) / REAL(STEP_MARGIN));

@@ -91,27 +91,6 @@ static sun_node grid_node(sunlight *sun, const march *m, const gathered *g, cons
     return at;
 }
 
-/* The error that is told, as a multiple of what the nodes are off a cubic: light from voxels is not as smooth as rules
- * want it. */
-#define GRID_CAUTION NB_F(4.0)
-
-/* Through the four nodes of Lobatto's rule goes a cubic, whose integral is their sum. By how much the other nodes are off
- * it adds up to the difference of both rules. Without signs it cannot vanish by chance. */
-static nb_real off_cubic(const sun_node at[SUN_NODES], int c)
-{
-    static const double cubic[3][4] = {
-        {0.52981150277058676, 0.58869622048869869, -0.17202955382303202, 0.05352183056274658},
-        {-0.125, 0.625, 0.625, -0.125},
-        {0.05352183056274658, -0.17202955382303202, 0.58869622048869869, 0.52981150277058676}};
-    nb_real off = NB_F(0.0);
-    for (int i = 0; i < 3; i++) {
-        const nb_real between = REAL(cubic[i][0]) * at[0].light[c] + REAL(cubic[i][1]) * at[2].light[c] +
-                                REAL(cubic[i][2]) * at[4].light[c] + REAL(cubic[i][3]) * at[6].light[c];
-        off = off + REAL(sun_weights[2 * i + 1]) * nb_abs(at[2 * i + 1].light[c] - between);
-    }
-    return off;
-}
-
 /* Empty steps have no nodes. */
 static sun_step try_grid_step(sunlight *sun, const march *m, const gathered *g, const sun_walk *w, nb_real length,
                               nb_wide end)
@@ -131,7 +110,7 @@ static sun_step try_grid_step(sunlight *sun, const march *m, const gathered *g, 
         sun_node at[SUN_NODES];
         for (int n = 0; n < SUN_NODES; n++) at[n] = grid_node(sun, m, g, w, &nodes, filled, n);
         sum = sum_nodes_of_step(at, at[0].most, NB_F(1.0), sun->snapshot->is_gray);
-        for (int c = 0; c < 3; c++) sum.error = nb_max(sum.error, GRID_CAUTION * off_cubic(at, c));
+        sum.error = nb_max(sum.error, error_among_voxels(at));
     }
     take_sum(&s, &sum);
     limit_step(m, w->before, &s);
