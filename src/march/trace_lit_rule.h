@@ -52,8 +52,8 @@ typedef struct sun_node {
  * 200,000 kinks and roots anywhere in light of random slope and curvature half as many pass for smooth as without it. */
 #define KINKED NB_F(4.0)
 
-/* The estimate of the error by null rules. */
-static nb_real error_by_null_rules(const nb_real light[SUN_NODES])
+/* The estimate of the error by null rules; `kinked` is KINKED, or 0 where the light can have no kink. */
+static nb_real error_by_null_rules(const nb_real light[SUN_NODES], nb_real kinked)
 {
     nb_real off[NULL_RULES];
     for (int i = 0; i < NULL_RULES; i++) {
@@ -65,7 +65,7 @@ static nb_real error_by_null_rules(const nb_real light[SUN_NODES])
     const nb_real fine = nb_max(off[2], off[3]), coarse = nb_max(off[0], off[1]);
     const nb_real ratio = nb_min(fine / nb_max(coarse, NB_TINY), NB_F(1.0));
     const nb_real last = nb_min(off[3] / nb_max(off[2], NB_TINY), NB_F(1.0));
-    return nb_max(off[3] * (NB_F(1.0) + KINKED * last), fine * nb_sqrt(ratio) * (NB_F(1.0) + ROUGHNESS * ratio));
+    return nb_max(off[3] * (NB_F(1.0) + kinked * last), fine * nb_sqrt(ratio) * (NB_F(1.0) + ROUGHNESS * ratio));
 }
 
 /* By how much the way to the light may be less deep somewhere between node j and the next than at both: where it falls
@@ -184,7 +184,7 @@ static lit_sum sum_nodes_of_step(const sun_node at[SUN_NODES], nb_real most, nb_
             rounding = rounding + weighted * at[n].doubt[c];
             noise = noise + weighted * at[n].noise[c];
         }
-        sum.error = nb_max(sum.error, error_by_null_rules(light));
+        sum.error = nb_max(sum.error, error_by_null_rules(light, KINKED));
         sum.rounding = nb_max(sum.rounding, rounding);
         sum.noise = nb_max(sum.noise, noise);
     }
