@@ -126,7 +126,7 @@ static void try_scene(tracer *t, lit_kind kind, lit_source source, uint64_t seed
 static uint32_t features_of(lit_kind first, lit_kind last, lit_source source)
 {
     uint32_t features = 0;
-    for (int kind = first; kind <= (int)last; kind++)
+    for (int kind = (int)first; kind <= (int)last; kind++)
         for (uint64_t seed = 0; seed < seed_count; seed++) {
             lit_draw_fog(&draw, (lit_kind)kind, source, first_seed + seed);
             nebel_snapshot *snapshot = lit_draw_commit(&draw);
@@ -148,7 +148,7 @@ static void try_kinds(lit_kind first, lit_kind last, lit_source source)
         "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_VOXELS\n#define NEBEL_FEATURES %u\n#define NEBEL_MOST_LIGHT 1e9\n",
         (unsigned)features_of(first, last, source));
     open_tracer(&t, NB_GL_330, TEXTURE, defines, counted_body);
-    for (int kind = first; kind <= (int)last; kind++)
+    for (int kind = (int)first; kind <= (int)last; kind++)
         for (uint64_t seed = 0; seed < seed_count; seed++) try_scene(&t, (lit_kind)kind, source, first_seed + seed);
     nb_gl_close(&t.gl);
 }
