@@ -5,7 +5,7 @@ tables.
 check_lit_truth.py BUILD [--rays N] [--seed N] [--jobs N]
 
 A million rays take 20 minutes on two cores. The same seed gives the same rays. Exits 1 where an error was too small, where a ray had
-other bits, or where the oracle did not agree with itself."""
+other bits, or where the oracle often did not agree with itself."""
 
 import argparse
 import collections

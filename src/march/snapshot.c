@@ -143,6 +143,7 @@ static int copy_media(const nebel_fog *fog, selection of, nebel_snapshot *s)
         s->is_sunlit = s->is_sunlit || medium->is_sunlit;
         s->covering_count += nb_volume_covers(&medium->body) ? 1 : 0;
         s->is_lamplit = s->is_lamplit || medium->is_lamplit;
+        s->has_parts = s->has_parts || nb_volume_covers(&medium->body) || medium->body.leaf_count > 1;
         for (int c = 0; c < 3; c++) s->largest_radiance = fmax(s->largest_radiance, medium->radiance[c]);
     }
     return 1;

@@ -67,6 +67,7 @@ struct nebel_snapshot {
     int is_added;     /* all media are convex bodies of constant density that add: any way's depth is a sum over them */
     int is_lit_crowd; /* many media whose depths add are lit: see trace_lit_crowd.h */
     int is_lamplit;   /* whether any medium is */
+    int has_parts;    /* some body has parts, or takes fog away from others */
     size_t lamp_count;
     nb_lamp *lamps;
     nebel_environment sky;    /* one owner of its map */

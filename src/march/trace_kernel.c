@@ -279,9 +279,11 @@ static void gather_single(march *m, const allowance *may, gathered *g, nb_mask *
     const piece p = {span->enter, span->leave, nb_narrow(span->leave - span->enter), lanes};
     m->contacts[0].inside = lanes;
     m->window_count = 1;
+    m->window[0] = 0;
     m->present[0] = 0;
     m->present_first = 0;
     m->present_end = 1;
+    if (m->wants_signature) sign_piece(m, p.start, lanes);
     gather_piece(m, &p, may, g, unbounded);
 }
 
@@ -312,6 +314,7 @@ static gathered walk_lanes(march *m, const allowance *may, nb_mask which, nb_mas
         const nb_mask here = p.lanes;
         p.lanes = nb_and(here, nb_narrow_mask(lanes));
         const int foggy = mark_inside(m, &p);
+        if (m->wants_signature) sign_piece(m, p.start, p.lanes);
         if (foggy) note_clear(m, &p, &g);
         if (foggy) gather_piece(m, &p, may, &g, unbounded);
         if (nb_any(watched)) pass_ends(m, &g, p.end, nb_and(watched, here));

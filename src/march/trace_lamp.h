@@ -95,6 +95,14 @@ static light_depth way_to_lamp(sunlight *sun, const march *m, const lamp_pass *p
                                    : depth_by_march(sun, m, t, towards, reach);
 }
 
+/* What part of its light a spot sends away from the direction in which it is seen. At the edge of a hard cone the rounding
+ * of a float cosine would decide, so that the difference is taken before. */
+static nb_real part_in_cone(const nb_lamp *lamp, nb_wvec3 towards)
+{
+    const nb_wide within = -nb_wdot3(towards, wide_vector(lamp->axis)) - WIDE(lamp->edge);
+    return nb_lamp_cone(nb_narrow(within), NB_F(0.0), REAL(lamp->rise));
+}
+
 /* What fog at t makes of the lamp's irradiance there. */
 static lit_fog lamplit_fog(const march *m, const lamp_pass *pass, nb_wide t)
 {
@@ -105,10 +113,7 @@ static lit_fog lamplit_fog(const march *m, const lamp_pass *pass, nb_wide t)
     const nb_wvec3 towards = nb_wscale3(apart, -nb_wrcp_bounded(nb_wsqrt(square)));
     const nb_turn turn = nb_turn_between(m->rays.direction, towards);
     nb_real fluence = nb_narrow(nb_lamp_fluence(square, WIDE(lamp->radius2)));
-    if (lamp->is_spot) {
-        const nb_real cosine = nb_narrow(-nb_wdot3(towards, wide_vector(lamp->axis)));
-        fluence = fluence * nb_lamp_cone(cosine, REAL(lamp->edge), REAL(lamp->rise));
-    }
+    if (lamp->is_spot) fluence = fluence * part_in_cone(lamp, towards);
     lit_fog fog = {{zero, zero, zero}, {zero, zero, zero}, zero};
     for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);

@@ -7,12 +7,13 @@ static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
 /* Optical depth from a place on each ray to a light, and by how much it may be off. */
 typedef struct light_depth {
     nb_real depth[3], error[3];
+    nb_real signature; /* of a way that is marched through leaves that may cross; else 0 */
 } light_depth;
 
 static light_depth no_depth(void)
 {
     const nb_real zero = NB_F(0.0);
-    return (light_depth){{zero, zero, zero}, {zero, zero, zero}};
+    return (light_depth){{zero, zero, zero}, {zero, zero, zero}, zero};
 }
 
 /* As far as `reach` into the direction. A march that has run out of memory is not to be used again; the walk of the rays
@@ -27,6 +28,8 @@ static light_depth depth_by_march(sunlight *sun, const march *m, nb_wide t, nb_w
     way->rays.t_max = reach;
     way->wants_error = m->wants_error;
     way->ignores_distances = 1;
+    way->wants_signature = sun->snapshot->has_parts;
+    way->signature = NB_F(0.0);
     light_depth to_light = no_depth();
     sun->out_of_memory = sun->out_of_memory || !meet_fog(sun->way, sun->snapshot);
     if (sun->out_of_memory) return to_light;
@@ -36,6 +39,7 @@ static light_depth depth_by_march(sunlight *sun, const march *m, nb_wide t, nb_w
         to_light.depth[c] = g.depth[c];
         to_light.error[c] = g.depth_error[c] + nb_select(watched, way->grazing_ends.depth[c], way->all_ends.depth[c]);
     }
+    to_light.signature = way->signature;
     return to_light;
 }
 

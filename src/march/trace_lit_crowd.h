@@ -61,20 +61,26 @@ static lit_place no_place(void)
     return place;
 }
 
-/* What a lamp brings to t, and from where; how far it is. */
-static nb_real lamp_arrives(const march *m, const lamp_pass *pass, const nb_phase *phase, nb_wide t, nb_wvec3 *towards,
-                            nb_wide *reach)
+static nb_wvec3 apart_from_lamp(const march *m, const lamp_pass *pass, nb_wide t)
+{
+    return nb_wadd3(pass->foot, nb_wscale3(m->rays.direction, t - pass->closest));
+}
+
+/* What a lamp brings to t, and from where; how far it is. Light jumps at the edge of a hard cone, where steps begin and
+ * end: whether t is in the cone is asked at `beside`, within the step. */
+static nb_real lamp_arrives(const march *m, const lamp_pass *pass, const nb_phase *phase, nb_wide t, nb_wide beside,
+                            nb_wvec3 *towards, nb_wide *reach)
 {
     const nb_lamp *lamp = pass->lamp;
-    const nb_wvec3 apart = nb_wadd3(pass->foot, nb_wscale3(m->rays.direction, t - pass->closest));
+    const nb_wvec3 apart = apart_from_lamp(m, pass, t);
     const nb_wide square = nb_wdot3(apart, apart), distance = nb_wsqrt(square);
     *towards = nb_wscale3(apart, -nb_wrcp_bounded(distance));
     *reach = nb_wmax(distance - WIDE(lamp->clear), NB_W(0.0));
     const nb_real fluence = nb_narrow(nb_lamp_fluence(square, WIDE(lamp->radius2)));
     const nb_real light = fluence * scattered(phase, nb_turn_between(m->rays.direction, *towards));
     if (!lamp->is_spot) return light;
-    const nb_real cosine = nb_narrow(-nb_wdot3(*towards, wide_vector(lamp->axis)));
-    return light * nb_lamp_cone(cosine, REAL(lamp->edge), REAL(lamp->rise));
+    const nb_wvec3 from = apart_from_lamp(m, pass, beside);
+    return light * part_in_cone(lamp, nb_wscale3(from, -nb_wrcp_bounded(nb_wsqrt(nb_wdot3(from, from)))));
 }
 
 /* The light that is scattered: of the sun where `pass` is NULL. */
@@ -85,13 +91,26 @@ typedef struct crowd_light {
     double share;          /* what its steps may add to the error */
 } crowd_light;
 
+/* What is seen of a place that has its depths and what arrives there. */
+static void set_seen(const sunlight *sun, const crowd_light *light, lit_place *at)
+{
+    nb_real through[3];
+    map_channels(sun->snapshot, transmitted, at->way, through);
+    for (int c = 0; c < 3; c++) {
+        const double intensity = light->pass != NULL ? light->pass->lamp->intensity[c] : 1;
+        at->comes[c] = through[c] * at->arrives * REAL(intensity);
+        at->seen[c] = at->behind[c] * at->comes[c];
+    }
+}
+
+/* `beside`: see lamp_arrives. */
 static void look_from(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *before,
-                      lit_place *at)
+                      nb_wide beside, lit_place *at)
 {
     nb_wvec3 towards = sun->direction;
     nb_wide reach = NB_WFAR;
-    nb_real arriving = NB_F(1.0), through[3];
-    if (light->pass != NULL) arriving = lamp_arrives(m, light->pass, light->phase, at->t, &towards, &reach);
+    nb_real arriving = NB_F(1.0);
+    if (light->pass != NULL) arriving = lamp_arrives(m, light->pass, light->phase, at->t, beside, &towards, &reach);
     const shadowed_way all = way_through_shadows(sun, m, before->t, at->t, towards, reach);
     const light_depth way = all.depth;
     at->doubt = NB_F(0.0);
@@ -106,13 +125,8 @@ static void look_from(const sunlight *sun, const march *m, const crowd_light *li
         const nb_real rounding = (at->depth[c] + way.depth[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
         at->doubt = nb_max(at->doubt, nb_min(at->depth_error[c] + way.error[c], NB_F(1.0)) + rounding);
     }
-    map_channels(sun->snapshot, transmitted, at->way, through);
     map_channels(sun->snapshot, transmitted, at->depth, at->behind);
-    for (int c = 0; c < 3; c++) {
-        const double intensity = light->pass != NULL ? light->pass->lamp->intensity[c] : 1;
-        at->comes[c] = through[c] * arriving * REAL(intensity);
-        at->seen[c] = at->behind[c] * at->comes[c];
-    }
+    set_seen(sun, light, at);
 }
 
 /* ---- what bodies scatter between places ------------------------------------------------------ */
@@ -305,17 +319,34 @@ static nb_real light_of_cut_bodies(const lit_place at[5], int c)
     return light;
 }
 
+/* How far beside the ends of a step cones are looked at, as a part of it. */
+#define CONE_MARGIN 1e-6
+
+/* A step that starts at a cone's edge has the other side's light than the step that ended there. */
+static lit_place look_ahead_from(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *start,
+                                 nb_wide margin)
+{
+    lit_place at = *start;
+    nb_wvec3 towards;
+    nb_wide reach;
+    if (light->pass == NULL || !light->pass->lamp->is_spot) return at;
+    at.arrives = lamp_arrives(m, light->pass, light->phase, at.t, at.t + margin, &towards, &reach);
+    set_seen(sun, light, &at);
+    return at;
+}
+
 static crowd_step try_crowd_step(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *start,
                                  nb_real length, nb_wide end)
 {
     const nb_real quarter = NB_F(0.25) * length;
-    lit_place at[5] = {*start};
+    const nb_wide margin = (end - start->t) * WIDE(CONE_MARGIN);
+    lit_place at[5] = {look_ahead_from(sun, m, light, start, margin)};
     lit_half half[2] = {nothing_scattered(), nothing_scattered()};
     nb_real unresolved = NB_F(0.0);
     for (int i = 1; i < 5; i++) {
         at[i].t = i == 4 ? end : nb_wmin(start->t + nb_widen(quarter * REAL(i)), end);
         add_parts(m, light, &at[i - 1], &at[i], (i - 1) % 2, quarter, &half[(i - 1) / 2], &unresolved);
-        look_from(sun, m, light, &at[i - 1], &at[i]);
+        look_from(sun, m, light, &at[i - 1], i == 4 ? end - margin : at[i].t, &at[i]);
     }
     crowd_step s = {.end = at[4],
                     .error = NB_F(0.0),
@@ -361,6 +392,7 @@ static void select_place(nb_mask mask, lit_place *to, const lit_place *from)
     select_reals(mask, to->way, from->way);
     select_reals(mask, to->comes, from->comes);
     select_reals(mask, to->seen, from->seen);
+    to->arrives = nb_select(mask, from->arrives, to->arrives);
     to->doubt = nb_select(mask, from->doubt, to->doubt);
 }
 
@@ -373,7 +405,7 @@ static lit_place place_behind(sunlight *sun, const march *m, const crowd_light *
     lit_place at = {.t = t};
     list_shadows_of_step(sun, from->t, t, lanes);
     add_parts(m, light, from, &at, 0, NB_F(1.0), &none, &unresolved);
-    look_from(sun, m, light, from, &at);
+    look_from(sun, m, light, from, t, &at);
     return at;
 }
 
@@ -399,14 +431,14 @@ static void step_through_crowd(sunlight *sun, const march *m, const crowd_light 
     const nb_real steady = REAL(0.5 * (1 - EDGE_SHARE)) * (s.drop + length * nb_rcp_bounded(w->whole));
     const nb_real at_edge =
         nb_select(s.has_edge, REAL(EDGE_SHARE / (double)(2 * sun->snapshot->medium_count)), NB_F(0.0));
-    const nb_real allowed = least + REAL(light->share * (1 - TAIL_SHARE)) * (steady + at_edge);
+    const nb_real allowed = least + REAL(light->share * (1 - TAIL_SHARE) / ESTIMATE_MARGIN) * (steady + at_edge);
     const nb_mask taken = nb_and(nb_or(final, s.error <= allowed), nb_narrow_mask(w->lanes));
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         g->radiance[c] = g->radiance[c] + nb_select(taken, s.light[c], NB_F(0.0));
         most = nb_max(most, g->radiance[c]);
     }
-    const nb_real error = s.error + s.rounding + most * NB_EPSILON;
+    const nb_real error = s.error * REAL(ESTIMATE_MARGIN) + s.rounding + most * NB_EPSILON;
     g->radiance_error = g->radiance_error + nb_select(taken, error, NB_F(0.0));
     select_place(taken, &w->at, &s.end);
     start_from_last(sun, taken);

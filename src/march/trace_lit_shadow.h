@@ -98,47 +98,107 @@ static void cut_shadow(lit_shadow *s, nb_wide a, nb_wide c, nb_wide worst)
     s->first = nb_wselect(back, nb_wmax(s->first, t), s->first);
 }
 
-/* The ways that meet a box are those for which some u has a t + b u <= c for each face, and for the end of the way. All
- * pairs of lower and upper bounds of u say for which t there is one (Fourier and Motzkin). Of the sun u is the length of
- * the way; of a lamp t and u are such that (lamp u + place at 0 - lamp + direction t) / u is on the way, with u >= 1.
- * A box may be far narrower than the ball around it. */
-static void set_box_shadow(lit_shadow *s, const packet *rays, nb_wvec3 light, int is_lamp, const nb_leaf *leaf)
+/* The flat faces n.x <= level that hold a body, as bounds a t + b u <= c of the ways that meet it, and one of the end of the
+ * way. Of the sun u is the length of the way; of a lamp t and u are such that (lamp u + place at 0 - lamp + direction t) / u is
+ * on the way, with u >= 1. */
+typedef struct flat_bounds {
+    nb_wvec3 place, direction, light;
+    nb_wide margin;
+    int is_lamp;
+    size_t count;
+    nb_wide a[NB_MOST_EDGED_FACES + 1], b[NB_MOST_EDGED_FACES + 1], c[NB_MOST_EDGED_FACES + 1];
+} flat_bounds;
+
+static flat_bounds no_bounds(const packet *rays, nb_wvec3 light, int is_lamp, const nb_leaf *leaf)
 {
-    enum { FACES = 6, BOUNDS = 7 };
-    const nb_wide zero = NB_W(0.0), one = NB_W(1.0);
     const local_ray local = localize(rays, leaf);
     const packet from_light = {is_lamp ? light : rays->origin, light, rays->t_max};
     const local_ray other = localize(&from_light, leaf);
-    const nb_wvec3 l = is_lamp ? other.p : other.d, p = is_lamp ? nb_wsub3(local.p, l) : local.p;
-    const nb_wide ps[3] = {p.x, p.y, p.z}, ds[3] = {local.d.x, local.d.y, local.d.z}, ls[3] = {l.x, l.y, l.z};
-    nb_wide a[BOUNDS], b[BOUNDS], c[BOUNDS];
+    flat_bounds f = {.direction = local.d, .margin = NB_W(4.0) * (local.reach + other.reach), .is_lamp = is_lamp};
+    f.light = is_lamp ? other.p : other.d;
+    f.place = is_lamp ? nb_wsub3(local.p, f.light) : local.p;
+    f.a[0] = NB_W(0.0);
+    f.b[0] = NB_W(-1.0);
+    f.c[0] = NB_W(is_lamp ? -1.0 : 0.0);
+    f.count = 1;
+    return f;
+}
+
+static void add_bound(flat_bounds *f, nb_wvec3 normal, nb_wide level)
+{
+    const nb_wide zero = NB_W(0.0), rest = f->is_lamp ? zero : level;
+    f->a[f->count] = nb_wdot3(normal, f->direction);
+    f->b[f->count] = nb_wdot3(normal, f->light) - (level - rest);
+    f->c[f->count++] = rest - nb_wdot3(normal, f->place);
+}
+
+/* A box of the leaf's frame that holds it. Returns 0 where the ball around it is no larger. */
+static int box_around_leaf(const nb_leaf *leaf, double low[3], double high[3])
+{
+    double side = 1, first = 0, last = 1;
+    if (leaf->type == NB_LEAF_WORLD || (leaf->type == NB_LEAF_BALL && leaf->aligned)) return 0;
+    if (leaf->type == NB_LEAF_BALL) side = last = leaf->radius, first = -leaf->radius;
+    if (leaf->type == NB_LEAF_CONE) side = fmax(leaf->radius, leaf->radius + leaf->slope);
+    if (leaf->type == NB_LEAF_CAPSULE) first = -1, last = leaf->length + 1;
     for (int i = 0; i < 3; i++) {
-        const nb_wide margin =
-            NB_W(4.0) * (local.reach + other.reach) + WIDE((fabs(leaf->low[i]) + fabs(leaf->high[i])) * SCENE_MARGIN);
-        const nb_wide low = WIDE(leaf->low[i]) - margin, high = WIDE(leaf->high[i]) + margin;
-        a[i] = ds[i];
-        b[i] = is_lamp ? ls[i] - high : ls[i];
-        c[i] = (is_lamp ? zero : high) - ps[i];
-        a[i + 3] = -ds[i];
-        b[i + 3] = is_lamp ? low - ls[i] : -ls[i];
-        c[i + 3] = ps[i] - (is_lamp ? zero : low);
+        const int is_box = leaf->type == NB_LEAF_BOX;
+        low[i] = is_box ? leaf->low[i] : i < 2 ? -side : first;
+        high[i] = is_box ? leaf->high[i] : i < 2 ? side : last;
     }
-    a[FACES] = zero;
-    b[FACES] = -one;
-    c[FACES] = is_lamp ? -one : zero;
-    const nb_wide blur = NB_W(64.0) * NB_WEPSILON;
-    for (int i = 0; i < FACES; i++) {
-        const nb_wmask alone = nb_wand(b[i] <= zero, b[i] >= zero);
-        if (nb_wany(alone)) cut_shadow(s, nb_wselect(alone, a[i], zero), c[i], zero);
-        if (!nb_wany(b[i] > zero)) continue;
-        for (int j = 0; j < BOUNDS; j++) {
-            const nb_wmask pair = nb_wand(b[i] > zero, b[j] < zero);
+    return 1;
+}
+
+static void bound_by_box(flat_bounds *f, const double low[3], const double high[3])
+{
+    for (int i = 0; i < 3; i++) {
+        const nb_wide margin = f->margin + WIDE((fabs(low[i]) + fabs(high[i])) * SCENE_MARGIN);
+        const nb_wvec3 n = nb_wvec3(WIDE(i == 0), WIDE(i == 1), WIDE(i == 2));
+        add_bound(f, n, WIDE(high[i]) + margin);
+        add_bound(f, nb_wscale3(n, NB_W(-1.0)), margin - WIDE(low[i]));
+    }
+}
+
+static void bound_by_planes(flat_bounds *f, const nb_volume *body, const nb_leaf *leaf)
+{
+    for (size_t i = 0; i < leaf->face_count; i++) {
+        const nb_face *face = &body->faces[leaf->first_face + i];
+        const nb_wide margin = f->margin + WIDE(fabs(face->distance) * SCENE_MARGIN);
+        add_bound(f, wide_vector(face->normal), WIDE(face->distance) + margin);
+    }
+}
+
+/* All pairs of lower and upper bounds of u say for which t there is one (Fourier and Motzkin). A body may be far narrower than
+ * the ball around it. */
+static void set_flat_shadow(lit_shadow *s, const flat_bounds *f)
+{
+    const nb_wide zero = NB_W(0.0), blur = NB_W(64.0) * NB_WEPSILON;
+    for (size_t i = 1; i < f->count; i++) {
+        const nb_wmask alone = nb_wand(f->b[i] <= zero, f->b[i] >= zero), upper = f->b[i] > zero;
+        if (nb_wany(alone)) cut_shadow(s, nb_wselect(alone, f->a[i], zero), f->c[i], zero);
+        if (!nb_wany(upper)) continue;
+        for (size_t j = 0; j < f->count; j++) {
+            const nb_wmask pair = nb_wand(upper, f->b[j] < zero);
             if (!nb_wany(pair)) continue;
-            const nb_wide x = b[i] * a[j], y = b[j] * a[i];
+            const nb_wide x = f->b[i] * f->a[j], y = f->b[j] * f->a[i];
             const nb_wide rise = nb_wselect(pair, x - y, zero);
-            cut_shadow(s, rise, b[i] * c[j] - b[j] * c[i], (nb_wabs(x) + nb_wabs(y)) * blur);
+            cut_shadow(s, rise, f->b[i] * f->c[j] - f->b[j] * f->c[i], (nb_wabs(x) + nb_wabs(y)) * blur);
         }
     }
+}
+
+static void set_narrow_shadow(lit_shadow *s, const packet *rays, nb_wvec3 light, int is_lamp)
+{
+    const nb_volume *body = &s->medium->body;
+    const nb_leaf *leaf = &body->leaves[0];
+    const int is_polytope = leaf->type == NB_LEAF_PLANES && leaf->face_count <= NB_MOST_EDGED_FACES;
+    double low[3], high[3];
+    if (leaf->type == NB_LEAF_PLANES ? !is_polytope : !box_around_leaf(leaf, low, high)) return;
+    flat_bounds f = no_bounds(rays, light, is_lamp, leaf);
+    if (is_polytope)
+        bound_by_planes(&f, body, leaf);
+    else
+        bound_by_box(&f, low, high);
+    set_flat_shadow(s, &f);
 }
 
 static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_lamp *lamp, const nb_medium *medium)
@@ -155,9 +215,7 @@ static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_la
         set_sun_shadow(&s, rays, sun->direction, center, radius);
     else
         set_lamp_shadow(&s, rays, nb_wsub3(wide_vector(lamp->place), rays->origin), center, radius);
-    if (body->leaves[0].type == NB_LEAF_BOX)
-        set_box_shadow(&s, rays, lamp == NULL ? sun->direction : wide_vector(lamp->place), lamp != NULL,
-                       &body->leaves[0]);
+    set_narrow_shadow(&s, rays, lamp == NULL ? sun->direction : wide_vector(lamp->place), lamp != NULL);
     return s;
 }
 

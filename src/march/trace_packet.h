@@ -89,6 +89,8 @@ typedef struct march {
     const nb_skylight *sky; /* the last that a medium had, NULL: none yet, */
     nb_real sky_light[3];   /* and what comes of it along the rays */
     int ignores_distances;
+    int wants_signature;
+    nb_real signature; /* see sign_piece */
     size_t contact_count, span_count;
     contact *contacts;
     leaf_span *spans;

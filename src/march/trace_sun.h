@@ -316,6 +316,7 @@ static void select_way(nb_mask mask, light_depth *to, const light_depth *from)
 {
     select_reals(mask, to->depth, from->depth);
     select_reals(mask, to->error, from->error);
+    to->signature = nb_select(mask, from->signature, to->signature);
 }
 
 static void take_sum(sun_step *s, const lit_sum *sum)
@@ -354,6 +355,7 @@ static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const
                             nb_wide end, sun_step *s)
 {
     sun_node at[SUN_NODES];
+    nb_mask kinked = nb_mask_false;
     if (!nb_wall(nb_wor(s->knows_start, nb_wnot(lanes)))) {
         const light_depth way = way_from(sun, m, s, end, 0, lanes);
         select_way(nb_narrow_mask(nb_wnot(s->knows_start)), &s->at_start, &way);
@@ -361,13 +363,16 @@ static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const
     s->at_end = s->at_start;
     for (int n = 0; n < SUN_NODES; n++) {
         if (n > 0) s->at_end = way_from(sun, m, s, end, n, lanes);
+        kinked = nb_or(kinked, nb_not(s->at_end.signature == s->at_start.signature));
         at[n] = find_node(sun, m, p, g, s, end, n, &s->at_end);
     }
     const nb_real most = s->lamp != NULL ? most_of_lamp(s->lamp, s->start, end) : at[0].most;
     const lit_sum sum = sum_nodes_of_step(at, most, count_media(m), sun->snapshot->is_gray);
     take_sum(s, &sum);
     const nb_mask rough = lanes_in_voxels(m);
-    if (nb_any(rough)) s->error = nb_select(rough, nb_max(s->error * VOXEL_CAUTION, error_among_voxels(at)), s->error);
+    if (nb_any(rough))
+        s->error = nb_select(rough, nb_max(s->error * VOXEL_CAUTION, VOXEL_CAUTION * off_cubics(at)), s->error);
+    if (nb_any(kinked)) s->error = nb_select(kinked, nb_max(s->error, KINK_CAUTION * off_cubics(at)), s->error);
     /* ends are not looked at themselves */
     s->rounding =
         s->rounding + largest(s->light) * REAL(STEP_MARGIN) * nb_min(s->steepness, NB_F(1.0) / REAL(STEP_MARGIN));
@@ -562,8 +567,8 @@ static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide e
         w->depth[c] = nb_select(taken, s->depth[c], w->depth[c]);
         w->depth_error[c] = nb_select(taken, s->depth_error[c], w->depth_error[c]);
     }
-    const nb_real sum = largest(g->radiance) * NB_EPSILON;
-    g->radiance_error = g->radiance_error + nb_select(taken, s->error + s->rounding + sum, NB_F(0.0));
+    const nb_real error = s->error * REAL(ESTIMATE_MARGIN) + s->rounding + largest(g->radiance) * NB_EPSILON;
+    g->radiance_error = g->radiance_error + nb_select(taken, error, NB_F(0.0));
     const nb_wmask moved = nb_widen_mask(taken);
     const nb_wide along = w->along + s->amount;
     w->along = nb_wselect(moved, along, w->along);

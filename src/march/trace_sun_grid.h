@@ -110,7 +110,7 @@ static sun_step try_grid_step(sunlight *sun, const march *m, const gathered *g, 
         sun_node at[SUN_NODES];
         for (int n = 0; n < SUN_NODES; n++) at[n] = grid_node(sun, m, g, w, &nodes, filled, n);
         sum = sum_nodes_of_step(at, at[0].most, NB_F(1.0), sun->snapshot->is_gray);
-        sum.error = nb_max(sum.error, error_among_voxels(at));
+        sum.error = nb_max(sum.error, VOXEL_CAUTION * off_cubics(at));
     }
     take_sum(&s, &sum);
     limit_step(m, w->before, &s);

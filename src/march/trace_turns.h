@@ -168,6 +168,47 @@ static void note_altitude(sunlight *sun, const packet *rays, const nebel_density
     note_ball(sun, &s, wide_vector(density->center), WIDE(density->radius + density->base));
 }
 
+/* Across this plane a density has a kink. So has the depth of ways that run along it, as all of them pass it at once. */
+static void note_level(sunlight *sun, const ways *s, nb_wvec3 n, nb_wide level)
+{
+    const face_ways f = ways_to_face(s, n, level);
+    const nb_wide most = nb_wsqrt(nb_wdot3(n, n) * nb_wdot3(s->along, s->along)) * NB_W(1e-9);
+    note_turn(sun, -f.off * nb_wrcp_bounded(f.off_rate), nb_wand(nb_wabs(f.rise) <= most, nb_wabs(f.off_rate) > most));
+}
+
+/* Soft edges of flat faces begin and end so, and those of boxes in their middle. */
+static void note_soft_edges(sunlight *sun, const packet *rays, const nb_volume *body)
+{
+    const nb_leaf *leaf = &body->leaves[0];
+    const local_ray local = localize(rays, leaf);
+    const ways s = make_ways(local.p, local.d, in_frame(leaf, sun->direction), 0);
+    const double distance = body->density.distance;
+    for (int i = 0; i < 3 && leaf->type == NB_LEAF_BOX; i++) {
+        const nb_wvec3 n = nb_wvec3(WIDE(i == 0), WIDE(i == 1), WIDE(i == 2));
+        note_level(sun, &s, n, WIDE(leaf->low[i] + distance));
+        note_level(sun, &s, n, WIDE(leaf->high[i] - distance));
+        note_level(sun, &s, n, WIDE(0.5 * (leaf->low[i] + leaf->high[i])));
+    }
+    for (size_t i = 0; i < leaf->face_count && leaf->type == NB_LEAF_PLANES; i++) {
+        const nb_face *face = &body->faces[leaf->first_face + i];
+        note_level(sun, &s, wide_vector(face->normal), WIDE(face->distance - distance));
+    }
+}
+
+/* Of a body in the sun. */
+static void note_levels(sunlight *sun, const packet *rays, const nb_volume *body)
+{
+    const nebel_density *density = &body->density;
+    const ways s = make_ways(rays->origin, rays->direction, sun->direction, 0);
+    if (density->type == NEBEL_DENSITY_SOFT_EDGE) note_soft_edges(sun, rays, body);
+    if (density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_CONSTANT)
+        note_level(sun, &s, nb_wvec3(NB_W(0.0), NB_W(1.0), NB_W(0.0)), WIDE(density->base));
+    if (density->type != NEBEL_DENSITY_LINEAR) return;
+    const nb_wvec3 from = wide_vector(density->from), to = wide_vector(density->to), n = nb_wsub3(to, from);
+    note_level(sun, &s, n, nb_wdot3(n, from));
+    note_level(sun, &s, n, nb_wdot3(n, to));
+}
+
 static void note_leaf(sunlight *sun, const packet *rays, const nb_volume *body, const nb_leaf *leaf, nb_wvec3 towards,
                       int is_lamp)
 {
@@ -192,6 +233,7 @@ static void note_media(sunlight *sun, const packet *rays, const nb_lamp *lamp)
         const nb_volume *body = &snapshot->media[i].body;
         for (size_t k = 0; k < body->leaf_count; k++)
             note_leaf(sun, rays, body, &body->leaves[k], towards, lamp != NULL);
+        if (lamp == NULL) note_levels(sun, rays, body);
         if (body->density.type == NEBEL_DENSITY_GAUSSIAN)
             note_gaussian(sun, rays, &body->density, towards, lamp != NULL);
         if (body->density.type == NEBEL_DENSITY_ALTITUDE && body->density.below == NEBEL_BELOW_CONSTANT)
