@@ -78,6 +78,13 @@ static void put_messages(void)
     for (;;) put_frame(NB_WIRE_MESSAGE, NEBEL_OK, "a", 1);
 }
 
+/* Sanitizers catch some signals. */
+static void die_by(int number)
+{
+    signal(number, SIG_DFL);
+    raise(number);
+}
+
 /* The name of the model says what to do. */
 int main(void)
 {
@@ -88,7 +95,10 @@ int main(void)
     if (strcmp(mode, "garbage") == 0) put(asked, 600);
     put_frame(NB_WIRE_HELLO, NB_WIRE_VERSION + (strcmp(mode, "version") == 0), NULL, 0);
     if (strcmp(mode, "hello") == 0) return 0;
-    if (strcmp(mode, "crash") == 0) signal(SIGSEGV, SIG_DFL), raise(SIGSEGV); /* sanitizers catch it */
+    if (strcmp(mode, "crash") == 0) die_by(SIGSEGV);
+    if (strcmp(mode, "abort") == 0) die_by(SIGABRT);
+    if (strcmp(mode, "division") == 0) die_by(SIGFPE);
+    if (strcmp(mode, "instruction") == 0) die_by(SIGILL);
     if (strcmp(mode, "closes") == 0) close(STDOUT_FILENO), (void)pause();
     if (strcmp(mode, "chatter") == 0) put_messages();
     if (strcmp(mode, "escape") == 0)

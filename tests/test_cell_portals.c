@@ -400,6 +400,10 @@ static void test_descriptions_that_are_none(void **state)
     desc.portal_count = 1;
     refuse(&desc, NEBEL_ERROR_ARGUMENT, SIZE_MAX, SIZE_MAX, "cells: portals is NULL");
     desc = good;
+    desc.allocator = (nebel_allocator){.allocate = fog_memory_allocate};
+    assert_int_equal(nebel_create_cells(&desc, &cells), NEBEL_ERROR_ARGUMENT);
+    assert_null(cells);
+    desc = good;
     desc.span = NEBEL_SPAN_COUNT;
     refuse(&desc, NEBEL_ERROR_ARGUMENT, SIZE_MAX, SIZE_MAX, "cells: model 0 or span 3 is none");
     refuse(&(nebel_cells_desc){.cells = many, .cell_count = NEBEL_MAX_CELLS + 1}, NEBEL_ERROR_LIMIT, SIZE_MAX, SIZE_MAX,

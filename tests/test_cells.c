@@ -396,6 +396,25 @@ static void test_the_order_of_cells_means_nothing(void **state)
     }
 }
 
+/* On a way within the hair that two cells share, no place is before another. */
+static void test_the_order_of_cells_that_share_a_hair_means_nothing(void **state)
+{
+    (void)state;
+    static const double hair = 4 - 5e-7, densities[2] = {.3, .2}, reds[2] = {.5, 1};
+    const nebel_cell_view view = {.eye = {hair, 0, 0}, .forward = {0, 1, 0}};
+    for (int i = 0; i < 4; i++) {
+        const nebel_cell low = BOX(0, 4, .3, .5, 1, 1), high = BOX(4 - 1e-6, 9, densities[i / 2], reds[i % 2], 1, 1);
+        const nebel_cell pair[] = {low, high, low};
+        nebel_cells *a = create(&(nebel_cells_desc){.cells = pair, .cell_count = 2, .span = NEBEL_SPAN_RAY});
+        nebel_cells *b = create(&(nebel_cells_desc){.cells = pair + 1, .cell_count = 2, .span = NEBEL_SPAN_RAY});
+        const nebel_cell_fog one = ask_at(a, &view, hair, 1, 0), other = ask_at(b, &view, hair, 1, 0);
+        assert_memory_equal(&one, &other, sizeof one);
+        assert_near(one.alpha, i == 0 ? .3 : 1 - (1 - .3) * (1 - densities[i / 2]), 1e-15); /* the same fog is one */
+        nebel_destroy_cells(a);
+        nebel_destroy_cells(b);
+    }
+}
+
 /* ---- where the eye and the point may be ------------------------------------------------------ */
 
 static void test_an_eye_on_a_portal(void **state)
@@ -546,6 +565,7 @@ int main(void)
         cmocka_unit_test(test_exponential_fog_is_the_exact_one),
         cmocka_unit_test(test_a_ray_in_a_face),
         cmocka_unit_test(test_the_order_of_cells_means_nothing),
+        cmocka_unit_test(test_the_order_of_cells_that_share_a_hair_means_nothing),
         cmocka_unit_test(test_an_eye_on_a_portal),
         cmocka_unit_test(test_an_eye_a_hair_before_a_portal),
         cmocka_unit_test(test_an_eye_outside_all_cells),

@@ -697,6 +697,9 @@ static void test_bad_calls_are_refused(void **state)
     const nebel_cloud_view_desc unknown = {.clouds = clouds, .isa = (nebel_isa)77, .log = {keep_text, said}};
     assert_int_equal(nebel_create_cloud_view(&unknown, &other), NEBEL_ERROR_UNSUPPORTED);
     assert_string_equal(said, "clouds: instruction set unknown: not available here");
+    const nebel_cloud_view_desc no_sun = {.clouds = clouds, .sun.irradiance = {0, none, 0}, .log = {keep_text, said}};
+    assert_int_equal(nebel_create_cloud_view(&no_sun, &other), NEBEL_ERROR_ARGUMENT);
+    assert_non_null(strstr(said, "clouds: view: sun"));
     assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = clouds, .time = none}, &other),
                      NEBEL_ERROR_VALUE);
     assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = clouds, .tolerance = -1}, &other),

@@ -425,6 +425,10 @@ static void what_is_no_environment_is_refused(void **state)
                      NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_set_environment(fog, &(nebel_environment){.type = NEBEL_ENVIRONMENT_COUNT}),
                      NEBEL_ERROR_ARGUMENT);
+    double radiance[3] = {1, 1, 1}; /* where there is none there is no light */
+    nebel_environment_radiance(&(nebel_environment){.type = NEBEL_ENVIRONMENT_MAP}, (const double[3]){0, 1, 0},
+                               radiance);
+    for (int c = 0; c < 3; c++) assert_true(radiance[c] == 0);
     nebel_release_environment_map(map);
     nebel_destroy_fog(fog);
 }
@@ -452,6 +456,11 @@ static void what_is_no_map_is_refused(void **state)
     desc.pixels = NULL;
     assert_int_equal(nebel_create_environment_map(&desc, &map), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_create_environment_map(NULL, &map), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_environment_map(&desc, NULL), NEBEL_ERROR_ARGUMENT);
+    desc = (nebel_environment_map_desc){
+        .allocator = {.allocate = fog_memory_allocate}, .width = 8, .height = 4, .pixels = pixels};
+    assert_int_equal(nebel_create_environment_map(&desc, &map), NEBEL_ERROR_ARGUMENT);
+    assert_null(map);
 }
 
 /* As many phase functions as there may be, and one more. */

@@ -271,6 +271,23 @@ static void sides_have_a_limit(void **test)
     free(wide.samples);
 }
 
+static void a_finished_film_takes_no_more(void **test)
+{
+    nebel_film *film;
+    journal kept = {0};
+    const nebel_image image = make_picture(0);
+    (void)test;
+    assert_int_equal(nebel_create_film(in_folder("film.webp"), &(nebel_film_desc){.log = {remember, &kept}}, &film),
+                     NEBEL_OK);
+    assert_int_equal(nebel_add_film_picture(film, &image), NEBEL_OK);
+    assert_int_equal(nebel_finish_film(film), NEBEL_OK);
+    assert_int_equal(nebel_add_film_picture(film, &image), NEBEL_ERROR_ARGUMENT);
+    assert_non_null(strstr(kept.last, "the film is finished already"));
+    nebel_destroy_film(film);
+    assert_int_equal(remove(in_folder("film.webp")), 0);
+    free(image.samples);
+}
+
 static void refusals_say_why(void **test)
 {
     journal kept;
@@ -340,6 +357,7 @@ int main(void)
         cmocka_unit_test(full_disks_leave_the_old_file),
         cmocka_unit_test(streams_that_take_nothing_stop_it_at_once),
         cmocka_unit_test(sides_have_a_limit),
+        cmocka_unit_test(a_finished_film_takes_no_more),
         cmocka_unit_test(refusals_say_why),
 #else
         cmocka_unit_test(builds_without_webp_say_so),

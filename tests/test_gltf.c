@@ -488,6 +488,14 @@ static void test_unknown_required_extensions_are_named(void **state)
     write_text("unused.gltf", "{\"asset\": {\"version\": \"2.0\"}, \"extensionsRequired\": "
                               "[\"KHR_draco_mesh_compression\"]}");
     assert_broken("\"file\": \"unused.gltf\"", NEBEL_ERROR_FORMAT, "does not name it in \"extensionsUsed\"");
+#if defined(NEBEL_HAVE_MESHOPT)
+    journal kept;
+    nebel_result result;
+    write_gltf("quad.gltf", "\"EXT_meshopt_compression\"", text);
+    nebel_destroy_scene(load("\"file\": \"quad.gltf\"", &result, &kept));
+    assert_int_equal(result, NEBEL_OK);
+    assert_non_null(strstr(kept.last, "requires \"EXT_meshopt_compression\", but nothing in it is compressed"));
+#endif
 }
 
 static void test_names_are_percent_encoded(void **state)

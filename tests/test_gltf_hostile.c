@@ -131,6 +131,30 @@ static void test_sparse_integers_that_cannot_be(void **state)
     "\"buffers\": [{\"byteLength\": 36, \"uri\": \"" uri "\"}], \"bufferViews\": [{\"buffer\": 0, \"byteLength\": "    \
     "36}], \"accessors\": [{\"bufferView\": 0, \"componentType\": 5121, \"count\": 3, \"type\": \"VEC3\"}]"
 
+/* Bytes of a buffer, or compressed ones, that the file does not have. */
+#define NO_BUFFER(view)                                                                                                \
+    "\"buffers\": [{\"byteLength\": 36, \"uri\": \"a.bin\"}], \"bufferViews\": [{" view "}], \"accessors\": "          \
+    "[{\"bufferView\": 0, \"componentType\": 5121, \"count\": 3, \"type\": \"VEC3\"}]"
+#define COMPRESSED(more)                                                                                               \
+    "\"buffer\": 0, \"byteLength\": 9, \"extensions\": {\"EXT_meshopt_compression\": {\"buffer\": 0, \"byteLength\": " \
+    "9, \"byteStride\": " more "}}"
+
+static void test_views_that_cannot_be(void **state)
+{
+    (void)state;
+    static const char *const cases[][2] = {
+        {NO_BUFFER("\"buffer\": 1, \"byteLength\": 36"), "buffers[1] does not exist, but is named"},
+        {NO_BUFFER(COMPRESSED("4, \"count\": 3, \"mode\": \"LINES\"")), "a mode or a filter that"},
+        {NO_BUFFER(COMPRESSED("3, \"count\": 3, \"mode\": \"ATTRIBUTES\"")), "bufferViews[0] has numbers that"},
+        {NO_BUFFER(COMPRESSED("4, \"count\": 99999, \"mode\": \"ATTRIBUTES\"")), "bufferViews[0] has numbers that"},
+    };
+    write_bytes("a.bin", (const char[36]){0}, 36);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        write_gltf(i > 0 ? "\"EXT_meshopt_compression\"" : "", cases[i][0]);
+        assert_broken("\"file\": \"a.gltf\"", NEBEL_ERROR_FORMAT, cases[i][1]);
+    }
+}
+
 static void assert_all_broken(const char *const *texts, size_t count, const char *message)
 {
     for (size_t i = 0; i < count; i++) {
@@ -227,11 +251,9 @@ static void test_what_is_not_decoded_in_process(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sparse_integers),
-        cmocka_unit_test(test_sparse_integers_that_cannot_be),
-        cmocka_unit_test(test_names_that_lead_out),
-        cmocka_unit_test(test_data_that_are_none),
-        cmocka_unit_test(test_what_is_not_decoded_in_process),
+        cmocka_unit_test(test_sparse_integers),      cmocka_unit_test(test_sparse_integers_that_cannot_be),
+        cmocka_unit_test(test_views_that_cannot_be), cmocka_unit_test(test_names_that_lead_out),
+        cmocka_unit_test(test_data_that_are_none),   cmocka_unit_test(test_what_is_not_decoded_in_process),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder_tree);
 }

@@ -577,6 +577,12 @@ static void types_agree(void **test)
             const nebel_light b = trace(fog[k], NEBEL_PRECISION_DOUBLE, 0, &ray);
             assert_near(a.transmittance[0], b.transmittance[0], 1e-14);
         }
+        for (int isa = 1; isa < NEBEL_ISA_COUNT; isa++)
+            for (int k = 0; k < 3 && nebel_isa_available((nebel_isa)isa); k++) {
+                nebel_light b;
+                trace_at(fog[k], (nebel_isa)isa, 1, &ray, &b);
+                assert_near(a.transmittance[0], b.transmittance[0], 1e-6);
+            }
     }
     for (int i = 0; i < 3; i++) nebel_release_snapshot(fog[i]);
 }

@@ -3,6 +3,7 @@
 #include "model_help.h"
 
 #include <math.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <png.h>
 
@@ -220,6 +221,40 @@ static void test_every_truncated_model_is_survived(void **state)
             assert_true(kept.last[0] != '\0');
         nebel_destroy_scene(scene);
     }
+}
+
+/* ---- textures that are not where they are said to be ------------------------------------------ */
+
+/* A model in the folder sub whose material names this picture; its last message in *kept. */
+static size_t count_textures(const char *before, const char *picture, journal *kept)
+{
+    char text[300];
+    nebel_result result;
+    snprintf(text, sizeof text, "newmtl red\nmap_Kd %s%s\n", before, picture);
+    write_text("sub/t.mtl", text);
+    nebel_scene *scene = load("\"file\": \"sub/t.obj\"", &result, kept);
+    if (result != NEBEL_OK) fail_msg("%s", kept->last);
+    const size_t count = nebel_scene_contents(scene)->texture_count;
+    nebel_destroy_scene(scene);
+    return count;
+}
+
+static void test_textures_are_looked_for_beside_the_model(void **state)
+{
+    (void)state;
+    journal kept;
+    png_image color = {.version = PNG_IMAGE_VERSION, .width = 2, .height = 2, .format = PNG_FORMAT_RGB};
+    const unsigned char pixels[12] = {0};
+    mkdir(in_folder("sub"), 0700);
+    assert_true(png_image_write_to_file(&color, in_folder("sub/color.png"), 0, pixels, 0, NULL));
+    write_text("sub/t.obj", "mtllib t.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 2 0\nvt 0 0\nf 1/1 2/1 3/1\n");
+    assert_int_equal(count_textures(in_folder("sub/"), "color.png", &kept), 1);
+    assert_int_equal(count_textures("/home/author/", "color.png", &kept), 1);
+    assert_int_equal(kept.count, 0);
+    assert_int_equal(count_textures("../", "none.png", &kept), 0);
+    assert_non_null(strstr(kept.last, "the texture \"../none.png\" is outside the folder"));
+    assert_int_equal(count_textures("", "t.obj", &kept), 0);
+    assert_non_null(strstr(kept.last, "sub/t.obj: neither a PNG nor a JPEG picture"));
 }
 
 /* ---- normals of models that have none -------------------------------------------------------- */
@@ -595,17 +630,6 @@ static void test_models_of_many_formats(void **state)
     }
 }
 
-static int remove_folder(void **state)
-{
-    (void)state;
-    static const char *const names[] = {"t.obj",     "t.mtl",     "empty.obj", "points.obj", "bad.obj",  "text.glb",
-                                        "text.gltf", "no.format", "nan.ply",   "cut.ply",    "h.png",    "thin.png",
-                                        "text.png",  "color.png", "cube.ply",  "fold.ply",   "cone.ply", "bowl.ply",
-                                        "empty.glb", "cut.glb",   "glb.obj",   "quad.gltf"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) unlink(in_folder(names[i]));
-    return rmdir(folder);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -618,6 +642,7 @@ int main(void)
         cmocka_unit_test(test_binary_gltf_that_is_cut_short_is_told_how_much_is_missing),
         cmocka_unit_test(test_corners_that_are_no_numbers_are_left_out),
         cmocka_unit_test(test_every_truncated_model_is_survived),
+        cmocka_unit_test(test_textures_are_looked_for_beside_the_model),
         cmocka_unit_test(test_a_cube_with_shared_corners_keeps_its_edges),
         cmocka_unit_test(test_a_fold_is_sharp_from_sixty_degrees_on),
         cmocka_unit_test(test_what_lies_at_one_place_is_smoothed_together),
@@ -632,5 +657,5 @@ int main(void)
         cmocka_unit_test(test_every_failing_allocation_is_survived),
         cmocka_unit_test(test_models_of_many_formats),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, make_folder, remove_folder_tree);
 }

@@ -10,9 +10,17 @@
 #include <math.h>
 #include <signal.h>
 #include <stdbool.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <sys/syscall.h>
 #include <threads.h>
+
+#if defined(__linux__)
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#endif
 
 #define MODELS "/usr/share/assimp/models/"
 
@@ -109,6 +117,32 @@ static void test_a_missing_reader_is_an_error(void **state)
     assert_non_null(strstr(kept.last, "\"/nowhere/reader\", does not start"));
 }
 
+/* The more descriptors are left, the farther it comes: to the model, to the first pipe, to the second. */
+static void test_a_host_without_descriptors_is_told(void **state)
+{
+    (void)state;
+    journal kept;
+    struct rlimit before;
+    int without_pipe = 0;
+    write_text("quad.obj", quad_obj);
+    const int files = count_files();
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &before), 0);
+    for (rlim_t left = 0; left < 4; left++) {
+        const int next = open("/dev/null", O_RDONLY);
+        close(next);
+        const struct rlimit few = {(rlim_t)next + left, before.rlim_max};
+        assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
+        const nebel_result result = try_model(NULL, "quad.obj", &kept);
+        assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
+        assert_int_equal(result, NEBEL_ERROR_FILE);
+        assert_non_null(strstr(kept.last, "quad.obj\": "));
+        assert_non_null(strstr(kept.last, "Too many open files"));
+        without_pipe += strstr(kept.last, "pipe: ") != NULL;
+    }
+    assert_true(without_pipe >= 2);
+    assert_int_equal(count_files(), files);
+}
+
 /* ---- odd readers ----------------------------------------------------------------------------- */
 
 static void test_what_a_reader_sends_is_checked(void **state)
@@ -121,6 +155,9 @@ static void test_what_a_reader_sends_is_checked(void **state)
     } odd[] = {{"nothing", NEBEL_ERROR_FORMAT, "ended early"},
                {"hello", NEBEL_ERROR_FORMAT, "ended early"},
                {"crash", NEBEL_ERROR_FORMAT, "memory that is not its own"},
+               {"abort", NEBEL_ERROR_FORMAT, "ended by an error that it does not handle"},
+               {"division", NEBEL_ERROR_FORMAT, "ended by a division by 0"},
+               {"instruction", NEBEL_ERROR_FORMAT, "ended by an instruction that does not exist"},
                {"closes", NEBEL_ERROR_FORMAT, "cannot be read"},
                {"version", NEBEL_ERROR_FILE, "another version"},
                {"garbage", NEBEL_ERROR_FORMAT, "cannot be"},
@@ -427,20 +464,97 @@ static void test_links_and_pipes_are_no_way_out(void **state)
     nebel_destroy_scene(scene);
 }
 
+#if defined(SYS_openat2) && defined(__linux__)
+
+enum { OLD_CASES = 4 };
+
+typedef struct old_kernel {
+    int is_filtered;
+    nebel_result results[2][OLD_CASES];
+    journal kept[2][OLD_CASES];
+    float green[2][OLD_CASES];
+} old_kernel;
+
+/* Linux before 5.6 has no openat2: here one thread, and the readers that it starts. */
+static int read_on_an_old_kernel(void *user)
+{
+    old_kernel *out = user;
+    struct sock_filter lines[] = {BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(struct seccomp_data, nr)),
+                                  BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_openat2, 0, 1),
+                                  BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | ENOSYS),
+                                  BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW)};
+    const struct sock_fprog whole = {sizeof lines / sizeof *lines, lines};
+    out->is_filtered =
+        prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &whole) == 0;
+    for (int here = 0; here < 2 && out->is_filtered; here++)
+        for (int i = 0; i < OLD_CASES; i++) {
+            char file[40];
+            nebel_scene *scene = NULL;
+            snprintf(file, sizeof file, "old/case%d.obj", i);
+            out->results[here][i] = load_by(NULL, here, file, &out->kept[here][i], &scene);
+            if (out->results[here][i] == NEBEL_OK)
+                out->green[here][i] = nebel_scene_contents(scene)->meshes[0].base_color[1];
+            nebel_destroy_scene(scene);
+        }
+    return 0;
+}
+
+static void test_references_stay_in_the_folder_on_old_kernels(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name, *refused;
+    } cases[OLD_CASES] = {{"in/paint.mtl", NULL},
+                          {"in/none.mtl", ""},
+                          {"../paint.mtl", "outside the folder"},
+                          {"out.mtl", "outside the folder"}};
+    static old_kernel got;
+    thrd_t thread;
+    mkdir(in_folder("old"), 0700);
+    mkdir(in_folder("old/in"), 0700);
+    write_text("paint.mtl", "newmtl red\nKd 1 0 0\n");
+    write_text("old/in/paint.mtl", "newmtl red\nKd 1 0 0\n");
+    assert_int_equal(symlink("../paint.mtl", in_folder("old/out.mtl")), 0);
+    for (int i = 0; i < OLD_CASES; i++) {
+        char file[40], text[200];
+        snprintf(file, sizeof file, "old/case%d.obj", i);
+        snprintf(text, sizeof text, "mtllib %s\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", cases[i].name);
+        write_text(file, text);
+    }
+    assert_int_equal(thrd_create(&thread, read_on_an_old_kernel, &got), thrd_success);
+    thrd_join(thread, NULL);
+    if (!got.is_filtered) skip();
+    for (int here = 0; here < 2; here++)
+        for (int i = 0; i < OLD_CASES; i++) {
+            const journal *kept = &got.kept[here][i];
+            assert_int_equal(got.results[here][i], NEBEL_OK);
+            assert_true((got.green[here][i] == 0) == (cases[i].refused == NULL)); /* the material was read */
+            if (cases[i].refused != NULL && strstr(kept->last, cases[i].refused) == NULL) fail_msg("%s", kept->last);
+        }
+}
+
+#endif
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_a_process_reads_what_this_one_reads),
-                                       cmocka_unit_test(test_a_missing_reader_is_an_error),
-                                       cmocka_unit_test(test_what_a_reader_sends_is_checked),
-                                       cmocka_unit_test(test_hosts_may_ignore_their_children),
-                                       cmocka_unit_test(test_children_of_a_host_stay_its_own),
-                                       cmocka_unit_test(test_a_host_may_have_closed_its_standard_files),
-                                       cmocka_unit_test(test_many_threads_may_read_models),
-                                       cmocka_unit_test(test_the_reader_dies_with_its_parent),
-                                       cmocka_unit_test(test_the_reader_is_confined),
-                                       cmocka_unit_test(test_what_assimp_makes_up_is_told),
-                                       cmocka_unit_test(test_more_memory_than_a_file_warrants),
-                                       cmocka_unit_test(test_references_stay_in_the_folder),
-                                       cmocka_unit_test(test_links_and_pipes_are_no_way_out)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_a_process_reads_what_this_one_reads),
+        cmocka_unit_test(test_a_missing_reader_is_an_error),
+        cmocka_unit_test(test_a_host_without_descriptors_is_told),
+        cmocka_unit_test(test_what_a_reader_sends_is_checked),
+        cmocka_unit_test(test_hosts_may_ignore_their_children),
+        cmocka_unit_test(test_children_of_a_host_stay_its_own),
+        cmocka_unit_test(test_a_host_may_have_closed_its_standard_files),
+        cmocka_unit_test(test_many_threads_may_read_models),
+        cmocka_unit_test(test_the_reader_dies_with_its_parent),
+        cmocka_unit_test(test_the_reader_is_confined),
+        cmocka_unit_test(test_what_assimp_makes_up_is_told),
+        cmocka_unit_test(test_more_memory_than_a_file_warrants),
+        cmocka_unit_test(test_references_stay_in_the_folder),
+#if defined(SYS_openat2) && defined(__linux__)
+        cmocka_unit_test(test_references_stay_in_the_folder_on_old_kernels),
+#endif
+        cmocka_unit_test(test_links_and_pipes_are_no_way_out)
+    };
     return cmocka_run_group_tests(tests, make_folder, remove_folder_tree);
 }

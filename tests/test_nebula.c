@@ -317,6 +317,10 @@ static void test_refuses_what_is_not_a_nebula(void **unused)
     expect(NEBEL_ERROR_VALUE, desc);
     desc = a_nebula(), desc.turbulence = (double)INFINITY;
     expect(NEBEL_ERROR_VALUE, desc);
+    desc = a_nebula(), desc.turbulence_size = NEBEL_MIN_LENGTH / 2;
+    expect(NEBEL_ERROR_VALUE, desc);
+    desc = a_nebula(), desc.allocator.release = fog_memory_release;
+    expect(NEBEL_ERROR_ARGUMENT, desc);
     desc = a_nebula(), desc.absorption[1] = -1;
     expect(NEBEL_ERROR_VALUE, desc);
     desc = a_nebula(), desc.emission[2] = (double)NAN;

@@ -176,6 +176,9 @@ static void bad_numbers_are_refused(void **test)
         assert_null(grid);
         if (strstr(messages.text, cases[i].word) == NULL) fail_msg("case %zu says: %s", i, messages.text);
     }
+    nebel_grid *grid = NULL;
+    const nebel_noise_desc half = {.size = {8, 8, 8}, .cells = {1, 1, 1}, .allocator = {.release = fog_memory_release}};
+    assert_int_equal(nebel_create_noise(&half, &grid), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_create_noise(NULL, NULL), NEBEL_ERROR_ARGUMENT);
 }
 

@@ -316,7 +316,8 @@ static void bad_calls_are_refused(void **state)
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, NULL, 0);
     const nebel_place good = {{0, 0, 0}, 0},
                       bad[] = {{{(double)NAN, 0, 0}, 0}, {{0, 1e16, 0}, 0}, {{0, 0, 0}, (double)NAN}};
-    const nebel_ray ray = {.direction = {0, 0, 1}}, still = {.direction = {0, 0, 0}};
+    const nebel_ray ray = {.direction = {0, 0, 1}}, still = {.direction = {0, 0, 0}},
+                    away = {{0, 0, 1.1 * NEBEL_MAX_LENGTH}, {0, 0, 1}, 0};
     nebel_matter matter;
     nebel_scatterer one;
     nebel_bound bound;
@@ -335,8 +336,9 @@ static void bad_calls_are_refused(void **state)
     refused += nebel_bound_fog(snapshot, &ray, 0, -1, &bound) == NEBEL_ERROR_ARGUMENT;
     refused += nebel_bound_fog(snapshot, &ray, 0, HUGE_VAL, &bound) == NEBEL_ERROR_ARGUMENT;
     refused += nebel_bound_fog(snapshot, &still, 0, 0, &bound) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_bound_fog(snapshot, &away, 0, 0, &bound) == NEBEL_ERROR_ARGUMENT;
     refused += nebel_bound_fog(snapshot, &ray, 0, 0, NULL) == NEBEL_ERROR_ARGUMENT;
-    assert_int_equal(refused, 17);
+    assert_int_equal(refused, 18);
     assert_int_equal(messages.count, refused);
     assert_int_equal(nebel_sample_fog(NULL, 0, NULL, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_sample_fog(snapshot, 0, NULL, 0, NULL, 0), NEBEL_OK);

@@ -595,6 +595,8 @@ static void bad_numbers_are_refused(void **state)
         expect_fault(&(nebel_atmosphere_desc){.airs = {{.scale_height = x}}, .air_count = 1});
     }
     expect_fault(&(nebel_atmosphere_desc){.airs = {{.scale_height = 0}}, .air_count = 1});
+    expect_fault(
+        &(nebel_atmosphere_desc){.airs = {{.profile = (nebel_air_profile)2, .scale_height = 1e4}}, .air_count = 1});
     expect_fault(&(nebel_atmosphere_desc){.thickness = 1, .radius = 1e7});
     expect_fault(&(nebel_atmosphere_desc){.air_count = NEBEL_MAX_AIRS + 1});
     expect_fault(&(nebel_atmosphere_desc){.quality = NEBEL_AIR_QUALITY_COUNT});

@@ -243,6 +243,28 @@ static void test_curves_and_devices(void **state)
                             "\"stage\": \"vertex\", \"curve\": \"exp2\", " DEVICE " }"));
 }
 
+/* Where the section is empty it is written as a whole. */
+static void test_a_table_comes(void **state)
+{
+    (void)state;
+    static float table[256];
+    static const nebel_factor_desc factor = {.end = 1, .density = 1};
+    journal kept;
+    nebel_scene *scene = NULL;
+    for (int i = 0; i < 256; i++) table[i] = (float)(i % 5) / 8;
+    draft d = open_draft(CLASSIC("{}"));
+    d.data.classic = &factor;
+    d.data.classic_curve = NEBEL_CURVE_TABLE;
+    d.data.classic_table = table;
+    assert_int_equal(save(&d, &kept), NEBEL_OK);
+    assert_int_equal(nebel_load_scene(file_path(), &(nebel_scene_desc){.log = {remember, &kept}}, &scene), NEBEL_OK);
+    const nebel_scene_data *data = nebel_scene_contents(scene);
+    assert_int_equal(data->classic_curve, NEBEL_CURVE_TABLE);
+    assert_memory_equal(data->classic_table, table, sizeof table);
+    assert_true(data->classic->end == 1 && data->classic->density == 1);
+    nebel_destroy_scene(scene);
+}
+
 static void test_models(void **state)
 {
     (void)state;
@@ -436,6 +458,9 @@ static void test_volumes_leave(void **state)
     d = open_draft(lines);
     take_out(&d, 0);
     check_saved(&d, SCENE("\"fog\": [\n     // first, with a comma\n    " THICK "\n  ]"));
+    d = open_draft(SCENE("\"fog\": [\n    " THIN " // first, and\n    /* then, */ , " THICK "\n  ]"));
+    take_out(&d, 1);
+    check_saved(&d, SCENE("\"fog\": [\n    " THIN " // first, and\n    /* then, */ \n  ]"));
 }
 
 /* One of each shape and density, so that every word is read again as it was written. */
@@ -589,6 +614,29 @@ static void test_colors_of_a_nebula(void **state)
     d = open_draft(SCENE("\"fog\": [], \"nebula\": [" DUST ", \"colors\": [\"#fff\", [0, 1, 0]]}]"));
     d.nebulae[0].colors = three;
     check_saved(&d, SCENE("\"fog\": [], \"nebula\": [" DUST ", \"colors\": [[1, 0, 0], 0.5]}]"));
+    d = open_draft(SCENE("\"fog\": [], \"nebula\": [" DUST ", \"colors\": [\"#fff\"]}]"));
+    d.nebulae[0].colors = three;
+    d.nebulae[0].color_count = 3;
+    check_saved(&d, SCENE("\"fog\": [], \"nebula\": [" DUST ", \"colors\": [[1, 0, 0], 0.5, [0, 0, 2]]}]"));
+}
+
+static void test_noise(void **state)
+{
+    (void)state;
+#define NOISE(cells, drift)                                                                                            \
+    SCENE("\"unit\": 0.5, \"fog\": [{" BOX                                                                             \
+          ", \"extinction\": 1, \"density\": {\"type\": \"noise\", \"size\": [4, 4, 4], "                              \
+          "\"cells\": " cells drift "}}]")
+    draft d = open_draft(NOISE("[1, 1, 1]", ""));
+    nebel_grid *grid = d.volumes[0].density.grid, *changed;
+    nebel_scene_noise noise;
+    assert_true(nebel_find_scene_noise(d.scene, grid, &noise));
+    noise.desc.cells[1] = 2;
+    noise.drift[0] = .25;
+    assert_int_equal(nebel_change_scene_noise(d.scene, grid, &noise, &changed), NEBEL_OK);
+    d.volumes[0].density.grid = changed;
+    check_saved(&d, NOISE("[1, 2, 1]", ", \"drift\": [0.25, 0, 0]"));
+    nebel_release_grid(changed);
 }
 
 /* What somebody else has changed meanwhile stays. */
@@ -647,6 +695,33 @@ static void test_what_is_refused(void **state)
     check_refused("{", &d, NEBEL_ERROR_FORMAT, "scene.json:");
 }
 
+/* What the file holds otherwise than it did when it was read. */
+static void test_another_file_is_refused(void **state)
+{
+    (void)state;
+#define LAMP(type, more)                                                                                               \
+    "\"lights\": [{\"type\": \"" type "\", \"position\": [0, 9, 0], \"intensity\": 5" more "}], \"fog\": []"
+#define MODEL(name) "\"models\": [{\"file\": \"" name "\"}], \"fog\": []"
+    static const struct {
+        const char *before, *now, *message;
+    } cases[] = {
+        {SCENE(LAMP("point", "")), SCENE(LAMP("spot", ", \"direction\": [0, -1, 0], \"outer_angle\": 30")),
+         "another lamp"},
+        {SCENE(LAMP("point", "")), SCENE("\"fog\": []"), "has 0 lamps where 1 were"},
+        {SCENE(MODEL("a.obj")), SCENE(MODEL("b.obj")), "another model"},
+        {SCENE(MODEL("a.obj")), SCENE("\"fog\": []"), "has 0 models where 1 were"},
+        {SCENE("\"ambient\": 1, \"fog\": []"),
+         SCENE("\"ambient\": {\"type\": \"gradient\", \"zenith\": 1, \"horizon\": 2, \"ground\": 0}, \"fog\": []"),
+         "has not the ambient light that it had"},
+        {SCENE("\"fog\": [], \"nebula\": [" DUST "}]"), SCENE("\"fog\": [], \"nebula\": [" DUST "}, " DUST "}]"),
+         "another nebula"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        draft d = open_draft(cases[i].before);
+        check_refused(cases[i].now, &d, NEBEL_ERROR_ARGUMENT, cases[i].message);
+    }
+}
+
 static void test_memory_runs_out(void **state)
 {
     (void)state;
@@ -698,6 +773,7 @@ int main(void)
         cmocka_unit_test(test_keys_stay_where_their_camera_moves),
         cmocka_unit_test(test_classic_fog),
         cmocka_unit_test(test_curves_and_devices),
+        cmocka_unit_test(test_a_table_comes),
         cmocka_unit_test(test_models),
         cmocka_unit_test(test_contrast_and_phase),
         cmocka_unit_test(test_keys_come_change_and_go),
@@ -712,9 +788,11 @@ int main(void)
         cmocka_unit_test(test_parts_and_planes),
         cmocka_unit_test(test_nebulae),
         cmocka_unit_test(test_colors_of_a_nebula),
+        cmocka_unit_test(test_noise),
         cmocka_unit_test(test_other_changes_of_the_file_stay),
         cmocka_unit_test(test_volumes_that_are_made_of_something_else_stay),
         cmocka_unit_test(test_what_is_refused),
+        cmocka_unit_test(test_another_file_is_refused),
         cmocka_unit_test(test_memory_runs_out),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

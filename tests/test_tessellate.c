@@ -700,6 +700,27 @@ static void test_fog_without_a_proof_is_refused(void **state)
     }
 }
 
+static void test_no_proof_of_voxels_nor_above_a_ball(void **state)
+{
+    (void)state;
+    ground g;
+    make_ground(&g, .4);
+    const nebel_triangles good = triangles_of(&g);
+    const nebel_noise_desc noise = {.size = {4, 4, 4}, .cells = {1, 1, 1}};
+    nebel_volume_desc volumes[2] = {box, box};
+    volumes[0].density = (nebel_density){.type = NEBEL_DENSITY_GRID};
+    assert_int_equal(nebel_create_noise(&noise, &volumes[0].density.grid), NEBEL_OK);
+    volumes[1].density = (nebel_density){.type = NEBEL_DENSITY_ALTITUDE, .radius = 100, .scale_height = 1};
+    for (int i = 0; i < 2; i++) {
+        fog_messages messages = {0};
+        nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, &volumes[i], 1);
+        assert_refused(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}}, &good, NEBEL_ERROR_UNSUPPORTED);
+        assert_non_null(strstr(messages.text, i == 0 ? "proven of a grid" : "proven of fog above a ball"));
+        nebel_release_snapshot(fog);
+    }
+    nebel_release_grid(volumes[0].density.grid);
+}
+
 /* An unused vertex may be anything. Memory may end at any time. */
 static void test_memory_ends(void **state)
 {
@@ -744,6 +765,7 @@ int main(void)
         cmocka_unit_test(test_degenerate_triangles),
         cmocka_unit_test(test_bad_input),
         cmocka_unit_test(test_fog_without_a_proof_is_refused),
+        cmocka_unit_test(test_no_proof_of_voxels_nor_above_a_ball),
         cmocka_unit_test(test_memory_ends),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -49,8 +49,8 @@ NB_INLINE nb_real look_up(const float *table, nb_real amount)
     return (NB_F(1.0) - w) * nb_load_lanes(low) + w * nb_load_lanes(high);
 }
 
-/* The amount of fog by a curve of the optical depth. Light that is gone has a depth at which every curve has passed 1.
- */
+/* The amount of fog by a curve of the optical depth, not the physical one. Light that is gone has a depth at which every
+ * curve has passed 1. */
 NB_INLINE nb_real amount_of(const nb_vertices_job *job, nb_real transmittance)
 {
     const nb_real depth = nb_max(nb_min(-nb_log(transmittance), NB_F(100.0)), NB_F(0.0));
@@ -61,10 +61,8 @@ NB_INLINE nb_real amount_of(const nb_vertices_job *job, nb_real transmittance)
         return nb_expm1(depth);
     case NB_CURVE_EXP2:
         return nb_expm1(depth * depth);
-    case NB_CURVE_TABLE:
-        return look_up(job->table, depth);
     default:
-        return NB_F(1.0) - transmittance;
+        return look_up(job->table, depth);
     }
 }
 
