@@ -991,7 +991,9 @@ class InfoTest(PictureCase):
         world, low, high = {"type": "world"}, [0, -0.1, 1], [0, 0.1, 1]
         ground = {"type": "half_space", "point": [0, 0, 0], "normal": [0, 1, 0]}
         rising = {"type": "height", "base": 0, "scale_height": 3}
+        denser = {way: {"type": "linear", "from": [0, 0, 0], "to": [0, way, 0]} for way in (-5, 5)}
         for shape, density, sun, is_dark in ((world, None, high, True), (world, rising, low, True), (ground, None, low, True),
+                                             (world, denser[5], high, True), (world, denser[-5], high, False),
                                              (world, rising, high, False), (ground, None, high, False), (BOX, None, low, False)):
             volume = {"name": "haze", "shape": shape, "extinction": 0.1, "albedo": 0.9}
             if density is not None:
@@ -1007,10 +1009,12 @@ class InfoTest(PictureCase):
     @with_tables_of_air
     def test_a_planet_without_a_sun(self):
         air, layers, sun = {"model": "physical"}, self.make_layers(), {"direction": [0, 1, 0]}
+        sky = {"type": "gradient", "zenith": 0, "horizon": 0, "ground": 0}
         dark_air, dark = "the planet's air is black", "the planet is black"
         for planet, light, warning in ((air, {}, dark_air), (air, {"ambient": 1}, dark_air), (air, {"sun": sun}, None),
                                        (air, {"sun": {**sun, "irradiance": 0}}, dark_air), (layers, {}, dark),
-                                       (layers, {"ambient": 1}, None), (layers, {"sun": sun}, None)):
+                                       (layers, {"ambient": 1}, None), (layers, {"sun": sun}, None),
+                                       (layers, {"ambient": {**sky, "zenith": 1}}, None), (layers, {"ambient": sky}, dark)):
             scene = self.write_scene("night.json", [], planet=planet, **light)
             told = (nebel("info", scene).out, nebel("render", scene, "-o", self.folder / "night.png", "-s", "8x8", "-q").err)
             for text, head in zip(told, ("warning: ", f"warning: {scene}: ")):

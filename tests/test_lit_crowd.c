@@ -110,16 +110,22 @@ static void make_crowd(crowd *made, size_t count, int mixed, int light, uint64_t
     }
 }
 
-static nebel_snapshot *commit_crowd(const crowd *of)
+static nebel_snapshot *commit(const nebel_fog_desc *desc, size_t count, const nebel_volume_desc *bodies, int has_lamp,
+                              const nebel_lamp *lamp)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&of->desc, &fog), NEBEL_OK);
-    for (size_t i = 0; i < of->count; i++) assert_int_equal(nebel_add_volume(fog, &of->bodies[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, (size_t)of->has_lamp, &of->lamp), NEBEL_OK);
+    assert_int_equal(nebel_create_fog(desc, &fog), NEBEL_OK);
+    for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(fog, &bodies[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(fog, (size_t)has_lamp, lamp), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     nebel_destroy_fog(fog);
     return snapshot;
+}
+
+static nebel_snapshot *commit_crowd(const crowd *of)
+{
+    return commit(&of->desc, of->count, of->bodies, of->has_lamp, &of->lamp);
 }
 
 static void make_rays(nebel_ray rays[RAYS], uint64_t seed)
@@ -352,12 +358,47 @@ static void light_falls_through_slits(void **state)
     expect_light_through_slits(7, 0.04);
 }
 
+/* More than 64 media are no crowd where lamps light two phase functions: those on the way to a lamp are looked for in
+ * the tree. What light never passes changes nothing. */
+static void bodies_far_away_change_nothing(void **state)
+{
+    (void)state;
+    static const nebel_lamp lamp = {.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
+    enum { MANY = 70 };
+    nebel_volume_desc bodies[MANY];
+    nebel_snapshot *fog[2];
+    nebel_light lights[2][FORCED];
+    nebel_ray rays[RAYS];
+    for (int i = 0; i < MANY; i++)
+        bodies[i] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1}, .extinction = {1, 1, 1}};
+    for (int i = 0; i < MANY; i++) bodies[i].shape.center[0] = i < 2 ? i : 100 + 2 * i;
+    for (int i = 0; i < 6; i++) bodies[i / 3].albedo[i % 3] = 0.5, bodies[i / 3].extinction[i % 3] = 0.1;
+    bodies[0].shape.radius = 5;
+    bodies[1].phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.5};
+    for (int k = 0; k < 2; k++) fog[k] = commit(&(nebel_fog_desc){0}, k == 0 ? 2 : MANY, bodies, 1, &lamp);
+    make_rays(rays, 11);
+    for (int precision = 0; precision < 2; precision++) {
+        const nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = 1e-3};
+        for (int k = 0; k < 2; k++)
+            assert_int_equal(nebel_trace(fog[k], &asked, FORCED, rays, sizeof *rays, lights[k], sizeof **lights),
+                             NEBEL_OK);
+        for (int i = 0; i < FORCED; i++) {
+            const double few = lights[0][i].error, many = lights[1][i].error;
+            assert_true(lights[1][i].in_scattering[0] > 1e-3);
+            assert_true(fog_difference(&lights[0][i], &lights[1][i]) == 0);
+            assert_true(many >= few && many <= 1.1 * few);
+        }
+    }
+    for (int k = 0; k < 2; k++) nebel_release_snapshot(fog[k]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sunlight_is_what_brute_force_finds),
         cmocka_unit_test(lamplight_is_what_brute_force_finds),
         cmocka_unit_test(light_falls_through_slits),
+        cmocka_unit_test(bodies_far_away_change_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
