@@ -199,6 +199,13 @@ static void test_corners_that_are_no_numbers_are_left_out(void **state)
     assert_non_null(strstr(kept.last, "1 triangles of"));
     assert_int_equal(check_meshes(scene), 1);
     nebel_destroy_scene(scene);
+    /* Or are beyond the floats in their place. */
+    write_text("far.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1e30 0 0\nf 1 2 3\nf 2 4 3\n");
+    scene = load("\"file\": \"far.obj\", \"scale\": 1e9", &result, &kept);
+    assert_int_equal(result, NEBEL_OK);
+    assert_non_null(strstr(kept.last, "1 triangles of"));
+    assert_int_equal(check_meshes(scene), 1);
+    nebel_destroy_scene(scene);
 }
 
 static void test_every_truncated_model_is_survived(void **state)
@@ -253,6 +260,9 @@ static void test_textures_are_looked_for_beside_the_model(void **state)
     assert_int_equal(kept.count, 0);
     assert_int_equal(count_textures("../", "none.png", &kept), 0);
     assert_non_null(strstr(kept.last, "the texture \"../none.png\" is outside the folder"));
+    mkdir(in_folder("sub/pictures"), 0700);
+    assert_int_equal(count_textures("", "pictures", &kept), 0);
+    assert_non_null(strstr(kept.last, "sub/pictures\": Is a directory"));
     assert_int_equal(count_textures("", "t.obj", &kept), 0);
     assert_non_null(strstr(kept.last, "sub/t.obj: neither a PNG nor a JPEG picture"));
 }
@@ -277,6 +287,22 @@ static void test_a_cube_with_shared_corners_keeps_its_edges(void **state)
         double normal[3];
         face_normal(mesh, i / 3, normal);
         assert_near(mesh->normals + 3 * (size_t)mesh->indices[i], normal[0], normal[1], normal[2]);
+    }
+    nebel_destroy_scene(scene);
+}
+
+/* Normals that are none become those of the triangles; what has no area gets one that points up. */
+static void test_normals_that_are_no_directions_are_mended(void **state)
+{
+    (void)state;
+    write_text("t.obj", "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 5 0 0\nv 6 0 0\nv 5 0 3\nv 7 0 0\nv 8 0 0\nv 9 0 0\n"
+                        "vn 0 0 0\nvn nan 0 0\nf 1//1 2//1 3//1\nf 4//2 5//2 6//2\nf 7//1 8//1 9//1\n");
+    nebel_scene *scene = load_good("\"file\": \"t.obj\"");
+    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    assert_int_equal(check_meshes(scene), 3);
+    for (size_t i = 0; i < 9; i++) {
+        const double x = (double)mesh->positions[3 * (size_t)mesh->indices[i]];
+        assert_near(mesh->normals + 3 * (size_t)mesh->indices[i], 0, x < 2 ? 0 : x < 7 ? -1 : 1, x < 2 ? 1 : 0);
     }
     nebel_destroy_scene(scene);
 }
@@ -644,6 +670,7 @@ int main(void)
         cmocka_unit_test(test_every_truncated_model_is_survived),
         cmocka_unit_test(test_textures_are_looked_for_beside_the_model),
         cmocka_unit_test(test_a_cube_with_shared_corners_keeps_its_edges),
+        cmocka_unit_test(test_normals_that_are_no_directions_are_mended),
         cmocka_unit_test(test_a_fold_is_sharp_from_sixty_degrees_on),
         cmocka_unit_test(test_what_lies_at_one_place_is_smoothed_together),
         cmocka_unit_test(test_a_seam_of_the_texture_stays_smooth),
