@@ -88,6 +88,12 @@ class CallingTest(Case):
             self.assertTrue(done.out.endswith("\n"))
         self.assertRegex(nebel("--version").out, r"^nebel \d+\.\d+\.\d+\n$")
 
+    def test_the_reader_of_models_is_no_command(self):
+        reader = re.search(r"(?m)^model reader: (.+)$", nebel("info").out)[1]
+        done = subprocess.run([reader], capture_output=True, text=True)
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn("they start it themselves", done.stderr)
+
     def test_help_pages_are_complete_and_fit_a_terminal(self):
         overview = nebel("--help").out
         for command in COMMANDS:

@@ -155,6 +155,22 @@ static void test_views_that_cannot_be(void **state)
     }
 }
 
+/* Whole numbers of four bytes are read as well, though no extension allows them. */
+static void test_long_integers(void **state)
+{
+    (void)state;
+    static const uint32_t places[9] = {1, 0, 0, 70000, 0, 0, 0, 70000, 16777216};
+    write_bytes("a.bin", places, sizeof places);
+    write_gltf("", "\"buffers\": [{\"byteLength\": 36, \"uri\": \"a.bin\"}], \"bufferViews\": [{\"buffer\": 0, "
+                   "\"byteLength\": 36}], \"accessors\": [{\"bufferView\": 0, \"componentType\": 5125, \"count\": 3, "
+                   "\"type\": \"VEC3\"}]");
+    nebel_scene *scene = load_good("\"file\": \"a.gltf\"");
+    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    assert_int_equal(mesh->triangle_count, 1);
+    for (size_t i = 0; i < 9; i++) assert_true(mesh->positions[3 * mesh->indices[i / 3] + i % 3] == (float)places[i]);
+    nebel_destroy_scene(scene);
+}
+
 static void assert_all_broken(const char *const *texts, size_t count, const char *message)
 {
     for (size_t i = 0; i < count; i++) {
@@ -251,9 +267,13 @@ static void test_what_is_not_decoded_in_process(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sparse_integers),      cmocka_unit_test(test_sparse_integers_that_cannot_be),
-        cmocka_unit_test(test_views_that_cannot_be), cmocka_unit_test(test_names_that_lead_out),
-        cmocka_unit_test(test_data_that_are_none),   cmocka_unit_test(test_what_is_not_decoded_in_process),
+        cmocka_unit_test(test_sparse_integers),
+        cmocka_unit_test(test_sparse_integers_that_cannot_be),
+        cmocka_unit_test(test_views_that_cannot_be),
+        cmocka_unit_test(test_long_integers),
+        cmocka_unit_test(test_names_that_lead_out),
+        cmocka_unit_test(test_data_that_are_none),
+        cmocka_unit_test(test_what_is_not_decoded_in_process),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder_tree);
 }

@@ -278,6 +278,8 @@ static void scenes_say_what_is_wrong(void **state)
         {"\"type\": \"grid\"", "fog[0].density: the key \"file\" is missing"},
         {"\"type\": \"grid\", \"file\": \"\"", "missing"},
         {"\"type\": \"grid\", \"file\": 5", "fog[0].density.file: is a number; must be the path of a file"},
+        {"\"type\": \"grid\", \"file\": \"\", \"size\": [1, 1, 1], \"voxels\": \"uint8\"",
+         "fog[0].density.file: is empty; must be the path of a file"},
         {"\"type\": \"grid\", \"file\": \"none.nvdb\"", "fog[0].density.file: "},
         {"\"type\": \"grid\", \"file\": \"none.nvdb\", \"slices\": 3", "fog[0].density.slices: unknown key"},
         {"\"type\": \"grid\", \"file\": \"none.raw\"",

@@ -468,6 +468,9 @@ static void test_what_is_no_picture(void **state)
     assert_non_null(strstr(kept.last, "neither a PNG nor an OpenEXR picture"));
     unlink(in_folder("text"));
     assert_int_equal(read_image(in_folder("none"), &image, &kept), NEBEL_ERROR_FILE);
+    const nebel_scene_desc half = {.allocator = {.allocate = metered_allocate}, .log = {remember, &kept}};
+    assert_int_equal(nebel_read_image(in_folder("none"), &half, &image), NEBEL_ERROR_ARGUMENT);
+    assert_string_equal(kept.last, "an allocator needs both its functions; one is NULL");
     assert_int_equal(read_image(folder, &image, &kept), NEBEL_ERROR_FILE);
 }
 

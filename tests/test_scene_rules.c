@@ -448,6 +448,8 @@ static void test_what_no_nebula_has(void **state)
          "nebula[0].absorption: is a string; must be a number or an array"},
         {FORMAT, NEBULA("\"colors\": [`\"#ff\"]"), "nebula[0].colors[0]: is no color"},
         {FORMAT, NEBULA("\"colors\": `[]"), "nebula[0].colors: has 0 colors; 1 to 64 are possible"},
+        {FORMAT, NEBULA("\"emission\": 1e5, \"colors\": [1, `1e5]"),
+         "nebula[0].colors[1]: times the emission is 10000000000; that must be"},
         {FORMAT, NEBULA("\"colors\": [1, `-1]"), "nebula[0].colors[1]: is -1; must be"},
         {FORMAT, NEBULA("\"fade\": `2"), "nebula[0].fade: is 2; must be a number from 0 to 1"},
         {FORMAT, NEBULA("\"turbulence\": `-1"), "nebula[0].turbulence: is -1; must be"},

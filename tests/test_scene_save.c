@@ -480,12 +480,12 @@ static void test_volumes_come(void **state)
          "\"transform\": { \"scale\": [1, 2, 1] } }, { \"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1] }] "
          "}")};
     static const char *const others[] = {
-        ", \"density\": { \"type\": \"height\", \"base\": 2, \"scale_height\": 5, \"below\": \"constant\" }, "
-        "\"extinction\": 0.5, \"albedo\": [0.5, 0.25, 1], \"start\": 1, \"cutoff\": 8 }",
+        (", \"density\": { \"type\": \"height\", \"base\": 2, \"scale_height\": 5, \"below\": \"constant\" }, "
+         "\"extinction\": 0.5, \"albedo\": [0.5, 0.25, 1], \"cutoff\": 8, \"phase\": { \"type\": \"rayleigh\" } }"),
         ", \"density\": { \"type\": \"linear\", \"from\": [0, 0, 0], \"to\": [0, 4, 0] }, \"extinction\": 0 }",
         ", \"density\": { \"type\": \"radial\", \"power\": 2 }, \"extinction\": [1, 2, 3], \"source\": 0.5 }",
-        ", \"density\": { \"type\": \"gaussian\", \"center\": [0, 1, 0], \"sigma\": 2 }, \"extinction\": 1, "
-        "\"emission\": 3 }",
+        (", \"density\": { \"type\": \"gaussian\", \"center\": [0, 1, 0], \"sigma\": 2 }, \"extinction\": 1, "
+         "\"emission\": 3, \"start\": 1 }"),
     };
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
         char wanted[1024];

@@ -41,6 +41,12 @@ static void test_it_is_somewhere_at_every_frame(void **state)
         assert_true(sun.irradiance[0] >= 0 && sun.irradiance[0] <= 4);
     }
     nebel_destroy_scene(scene);
+    /* Halfway between opposite directions there is none: it stands where it stood. */
+    scene = parse_good(SCENE(", \"keys\": [{\"frame\": 0}, {\"frame\": 2, \"direction\": [0, -1, 0]}]", EMPTY));
+    assert_vector(nebel_scene_sun(scene, 0.5).direction, 0, 1, 0);
+    assert_true(fabs(nebel_scene_sun(scene, 1).direction[1]) == 1);
+    assert_vector(nebel_scene_sun(scene, 1.5).direction, 0, -1, 0);
+    nebel_destroy_scene(scene);
     scene = parse_good("{\"nebel\": 1, \"fog\": []}");
     assert_vector(nebel_scene_sun(scene, 3).irradiance, 0, 0, 0);
     assert_int_equal(nebel_light_scene_at(scene, 3), NEBEL_OK);
