@@ -490,14 +490,13 @@ nb_sun_sum nb_light_of_sun(nb_leg leg, nb_piece piece, nb_ray ray, nb_vec3 befor
      * ways from deeper in endless fog end too early. */
     float within = min(40.0 / max(nb_smallest(leg.depth[NB_NODES - 1]), 1e-18), 1.0);
     float beside = 0.001 * within;
-    float start = piece.start + leg.from;
     nb_vec3 least = nb_splat3(NB_HUGE);
     nb_vec3 most = nb_splat3(0.0);
     nb_vec3 first = nb_splat3(0.0);
     nb_vec3 last = nb_splat3(0.0);
     for (int j = 0; j < (closed ? 2 : NB_NODES - 1); j++) {
         float share = !closed ? nb_leg_node(leg, j) : height ? float(j) : j == 0 ? beside : within - beside;
-        nb_vec3 depth = nb_depth_to_sun(ray.origin + ray.direction * (start + leg.h * share));
+        nb_vec3 depth = nb_depth_to_sun(nb_spot_on(ray, piece.start, leg.from + leg.h * share));
         if (closed && j == 0) first = before + share * leg.depth[NB_NODES - 1] + depth;
         if (closed && j == 1) last = before + share * leg.depth[NB_NODES - 1] + depth;
         if (!closed) sum.light += leg.h * nb_leg_weight(leg, j) * leg.glow[j] * nb_exp3(-(before + leg.depth[j] + depth));

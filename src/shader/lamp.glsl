@@ -238,14 +238,15 @@ nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float
     return piece;
 }
 
-/* What media make of light at a place of the piece. */
+/* What media make of light at a place of the piece, `from` metres behind its start: a skin of dense fog may be thinner than what places on
+ * the ray are told apart by. */
 struct nb_lamp_place {
     nb_vec3 depth;      /* from the start of the piece */
     nb_vec3 extinction;
     nb_vec3 glow;       /* radiance per metre and irradiance that comes from `towards` */
 };
 
-nb_lamp_place nb_place_in_piece(nb_ray ray, int first, bool listed, nb_lamp_piece piece, float t, nb_vec3 towards, inout int turns)
+nb_lamp_place nb_place_in_piece(nb_ray ray, int first, bool listed, nb_lamp_piece piece, float from, nb_vec3 towards, inout int turns)
 {
     nb_lamp_place place;
     place.depth = nb_splat3(0.0);
@@ -258,8 +259,8 @@ nb_lamp_place nb_place_in_piece(nb_ray ray, int first, bool listed, nb_lamp_piec
         nb_vec4 extinction = NEBEL_WORD(at);
         nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start);
         int scattering = int(NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w);
-        nb_vec3 here = extinction.xyz * nb_density_beside(profile, t - piece.start);
-        place.depth += extinction.xyz * nb_integral(profile, t - piece.start);
+        nb_vec3 here = extinction.xyz * nb_density_beside(profile, from);
+        place.depth += extinction.xyz * nb_integral(profile, from);
         place.extinction += here;
         if (scattering > 0) place.glow += here * NEBEL_WORD(scattering).xyz * nb_scattered(scattering, ray.direction, towards);
     }
@@ -292,6 +293,7 @@ float nb_lamp_weight_of_three(int j) { return j == 3 ? 8.0 / 18.0 : j == 1 || j 
 
 /* What is known of the place where a step begins, or of the one just behind it. */
 struct nb_lamp_start {
+    float from;    /* metres behind the start of the piece */
     nb_vec3 depth; /* from the eye */
     nb_vec3 way;   /* depth from there to the lamp */
     bool is_known;
@@ -300,6 +302,7 @@ struct nb_lamp_start {
 nb_lamp_start nb_open_start()
 {
     nb_lamp_start start;
+    start.from = 0.0;
     start.depth = nb_splat3(0.0);
     start.way = nb_splat3(0.0);
     start.is_known = false;
@@ -323,8 +326,8 @@ float nb_unseen_share(float change)
     return share * share * share * share * share * share;
 }
 
-/* Light of the first part of a swing, up to w = length, at `end`, of which `drop` of transmittance is lost. `before` is the depth in front of the
- * piece. Where nodes do not see that loss they have passed over what causes it, and light that changes by large factors from node to
+/* Light of the first part of a swing, up to w = length, from `start.from` to `end` metres behind the start of the piece, of which `drop` of
+ * transmittance is lost. `before` is the depth in front of the piece. Where nodes do not see that loss they have passed over what causes it, and light that changes by large factors from node to
  * node may be anywhere between them; what is between the start and the first node may be all the light there is. `start` is asked where
  * it is not known: a way to the lamp may pass many voxels. */
 nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, nb_swing swing, float length,
@@ -342,21 +345,22 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
     s.next = nb_open_start();
     for (int j = start.is_known ? 0 : -1; j < NB_LAMP_NODES; j++) {
         float w = length * (j < 0 ? 1e-5 : nb_lamp_node(j));
-        float t = min(nb_swing_place(swing, w), end);
-        float from = t - by.closest;
-        nb_vec3 apart = by.foot + ray.direction * from;
+        float way_along = min(nb_swing_way(swing, w), end - start.from);
+        float from = start.from + way_along;
+        float along = swing.along + way_along;
+        nb_vec3 apart = by.foot + ray.direction * along;
         float square = dot(apart, apart);
         float distance = sqrt(square);
         nb_vec3 towards = apart * -nb_rcp_bounded(distance);
-        float speed = (by.aside * by.aside + from * from) * nb_swing_rate(swing, w) * length;
+        float speed = (by.aside * by.aside + along * along) * nb_swing_rate(swing, w) * length;
         float cosine = -dot(towards, by.axis);
         float fluence = nb_lamp_fluence(square, by.radius2) * speed * nb_lamp_cone(cosine, by.edge, by.rise);
-        nb_lamp_place place = nb_place_in_piece(ray, first, listed, piece, t, towards, turns);
+        nb_lamp_place place = nb_place_in_piece(ray, first, listed, piece, from, towards, turns);
         nb_vec3 depth = before + place.depth;
         nb_vec3 light = nb_splat3(0.0);
         nb_vec3 way = last_way;
         if (fluence > 0.0 || j < 0) {
-            way = nb_depth_to_light(ray.origin + ray.direction * t, towards, max(distance - by.clear, 0.0), false, turns);
+            way = nb_depth_to_light(nb_spot_on(ray, piece.start, from), towards, max(distance - by.clear, 0.0), false, turns);
             light = place.glow * by.intensity * fluence * nb_exp3(-(depth + way));
         }
         if (j >= 0) {
@@ -369,7 +373,7 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
             seven += nb_lamp_weight(j) * light;
             three += nb_lamp_weight_of_three(j) * light;
             taken += nb_lamp_weight(j) * speed * place.extinction * nb_exp3(-depth);
-            steepest = max(steepest, t * place.extinction * nb_exp3(-depth));
+            steepest = max(steepest, from * place.extinction * nb_exp3(-depth));
         } else {
             start.depth = depth;
             start.way = way;
@@ -378,7 +382,7 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
         last_depth = depth;
         last_way = way;
     }
-    float most = nb_most_fluence(by, swing.start, end) * piece.scatter;
+    float most = nb_most_fluence(by, swing.start, piece.start + end) * piece.scatter;
     nb_vec3 limit = most * (drop + 8.0 * NB_EPSILON * seen); /* also what rounds to nothing may be light */
     s.light = min(seven, limit);
     nb_vec3 rounding = NB_EPSILON * (8.0 * seen + 4.0 * steepest); /* of transmittance and of places */
@@ -398,9 +402,10 @@ float nb_first_swing(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb
     float deep = nb_largest(piece.depth);
     for (int i = 0; i < 24 && deep > 4.01; i++) {
         length *= max(4.0 / deep, 0.001);
-        deep = nb_largest(nb_place_in_piece(ray, first, listed, piece, piece.start + length, ray.direction, turns).depth);
+        deep = nb_largest(nb_place_in_piece(ray, first, listed, piece, length, ray.direction, turns).depth);
     }
-    return nb_swing_between(by.closest, by.aside, piece.start, piece.start + length).end;
+    float along = piece.start - by.closest;
+    return nb_swing_over(by.aside, piece.start, along, along + length, length).end;
 }
 
 /* The end of a step on which phase functions change smoothly. `ahead` is the tangent of half the angle by which light is turned: a step
@@ -430,21 +435,24 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
     nb_vec3 sum = nb_splat3(0.0);
     nb_vec3 seen = nb_exp3(-before);
     nb_vec2 lit = nb_vec2(1.0, piece.start);
-    float t = piece.start;
     float far = min(piece.end, by.closest + NB_LAMP_REACH);
     float guess = nb_first_swing(ray, first, listed, piece, by, turns);
+    float least = 1e-7 * min(guess, 1.0); /* shorter steps are not tried */
     nb_lamp_start start = nb_open_start();
     for (int i = 0; i < NB_MOST_LAMP_STEPS; i++) {
-        if (!(t < far) || nb_is_tired(turns + nb_grid_turns)) break;
+        float t = piece.start + start.from;
+        if (!(start.from < far - piece.start) || nb_is_tired(turns + nb_grid_turns)) break;
         if (lit.y <= t) {
             lit = NEBEL_LAMP_LIT(by.number, ray.origin, ray.direction, t, far);
             lit.y = min(max(lit.y, t + nb_nearest(t)), far);
         }
         bool last = i + 1 == NB_MOST_LAMP_STEPS;
         float stop = last ? far : nb_smooth_end(by, piece, t, nb_lamp_turn(by, ray, t, lit.y));
-        nb_swing swing = nb_swing_between(by.closest, by.aside, t, stop);
+        float along = (piece.start - by.closest) + start.from;
+        float rest = (stop - piece.start) - start.from;
+        nb_swing swing = nb_swing_over(by.aside, t, along, along + rest, rest);
         float length = lit.x > 0.0 && !last ? min(min(guess, 1.0), swing.end) : swing.end;
-        float end = length >= swing.end ? stop : min(nb_swing_place(swing, length), stop);
+        float end = start.from + (length >= swing.end ? rest : min(nb_swing_way(swing, length), rest));
         nb_vec3 depth = before + nb_place_in_piece(ray, first, listed, piece, end, ray.direction, turns).depth;
         nb_vec3 behind = nb_exp3(-depth);
         turns += NB_LAMP_NODES + 1;
@@ -454,14 +462,14 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
             nb_lamp_step taken = nb_step_past_lamp(ray, first, listed, piece, by, swing, length, end, before, seen, seen - behind, start, turns);
             next = taken.next;
             float allowed = tolerance + NB_LAMP_SHARE * nb_largest(max(sum, taken.light));
-            fits = last || taken.error <= allowed || length < 1e-7;
+            fits = last || taken.error <= allowed || length < least;
             if (fits) sum += lit.x * taken.light;
             guess = fits ? max(guess, 2.0 * length) : length * min(max(0.55 / max(taken.steepness, 0.55), 0.001), 0.5);
         }
         if (fits) {
-            t = end;
             seen = behind;
             start = next;
+            start.from = end;
             start.depth = depth;
         }
     }

@@ -40,11 +40,11 @@ nb_vec3 nb_sunlit_radiance(int medium, nb_vec3 direction)
     return radiance;
 }
 
-nb_vec3 nb_depth_to_sun(nb_vec3 place)
+nb_vec3 nb_depth_to_sun(nb_spot spot)
 {
 #if NB_DECLARES(NB_HAS_SUN)
     int turns = 0; /* nb_turns_to_sun counts them */
-    return nb_depth_to_light(place, nb_to_sun(), NB_FAR, true, turns);
+    return nb_depth_to_light(spot, nb_to_sun(), NB_FAR, true, turns);
 #else
     return nb_splat3(0.0);
 #endif

@@ -162,7 +162,7 @@ int nb_walk_voxels(inout nb_gathered g, inout nb_piece piece, nb_ray ray, int us
             if (amount >= 0.0)
                 ways[j] = extinction * amount;
             else
-                ways[j] = nb_depth_to_sun(ray.origin + ray.direction * (piece.start + s));
+                ways[j] = nb_depth_to_sun(nb_spot_on(ray, piece.start, s));
         }
         turns += nb_grid_turns;
         nb_vec3 way_before = ways[0];

@@ -260,16 +260,6 @@ nebel_light nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bo
     return light;
 }
 
-nb_media nb_media_of(int first, int count, bool listed)
-{
-    nb_media media;
-    media.first = first;
-    media.count = count;
-    media.listed = listed;
-    media.to_sun = false;
-    return media;
-}
-
 nb_ray nb_ray_up_to(nb_vec3 origin, nb_vec3 direction, float t_max, bool from_eye)
 {
     nb_ray ray;
@@ -278,6 +268,18 @@ nb_ray nb_ray_up_to(nb_vec3 origin, nb_vec3 direction, float t_max, bool from_ey
     ray.t_max = min(t_max, NB_FAR);
     ray.from_eye = from_eye;
     return ray;
+}
+
+nb_media nb_media_of(int first, int count, bool listed)
+{
+    nb_media media;
+    media.first = first;
+    media.count = count;
+    media.listed = listed;
+    media.to_sun = false;
+    media.is_way = false;
+    media.spot = nb_spot_on(nb_ray_up_to(nb_splat3(0.0), nb_splat3(0.0), 0.0, false), 0.0, 0.0);
+    return media;
 }
 
 bool nb_is_ray(nb_vec3 origin, nb_vec3 direction, float t_max)
