@@ -23,7 +23,7 @@ INPUTS = ["cell", "cells_desc", "cell_view", "cell_point", "factor_desc", "d3d9_
           "gl_renderer_desc", "gl_frame_desc", "gl_planes"]
 OUTPUTS = ["cell_fog", "cell_layer", "factor_desc", "d3d9_fog", "curve", "vertex_desc", "cloud_layer", "cloud_knots", "air_shade",
            "fog_shade", "map", "layer_hits", "droplet_sums", "volume_id", "sunlit_fog", "split_fog", "light", "particle", "matter",
-           "scatterer", "bound", "atmosphere_desc", "air_light", "sun", "environment", "scene_noise", "image", "rays", "word", "texel",
+           "scatterer", "bound", "atmosphere_desc", "air_light", "sun", "environment", "scene_noise", "image", "rays", "view_error", "word", "texel",
            "gl_fog", "gl_textures", "view"]
 FRESH = OBJECTS + ["particle", "tessellation"]
 POINTERS = {"const char": '"test_null"', "const float": "floats", "float": "out.floats", "double": "&out.number", "const double": "numbers", "size_t": "&out.count",

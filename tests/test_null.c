@@ -110,6 +110,7 @@ static struct {
     nebel_scene_noise scene_noise;
     nebel_image image;
     nebel_rays rays;
+    nebel_view_error view_error;
     nebel_word word[64];
     nebel_texel texel[64];
     uint32_t entries[64];

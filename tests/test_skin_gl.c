@@ -57,10 +57,11 @@ static nebel_snapshot *commit_skin(const skin *s, uint64_t seed)
 {
     const double extinction = s->depth / s->radius;
     uint64_t state = seed;
-    nebel_volume_desc volume = {.shape = {.type = s->is_ellipsoid ? NEBEL_SHAPE_ELLIPSOID : NEBEL_SHAPE_SPHERE, .radius = s->radius},
-                                .extinction = {extinction, .8 * extinction, .5 * extinction},
-                                .albedo = {.9, .9, .8},
-                                .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .4}};
+    nebel_volume_desc volume = {
+        .shape = {.type = s->is_ellipsoid ? NEBEL_SHAPE_ELLIPSOID : NEBEL_SHAPE_SPHERE, .radius = s->radius},
+        .extinction = {extinction, .8 * extinction, .5 * extinction},
+        .albedo = {.9, .9, .8},
+        .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .4}};
     nebel_sun sun = {.irradiance = {3, 3, 2}};
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;

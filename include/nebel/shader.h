@@ -330,6 +330,24 @@ typedef struct nebel_rays {
  * rays neither meet in a point nor are parallel with constant w; a size, a range, a kind that is none). */
 nebel_result nebel_view_rays(const nebel_view *view, const nebel_depth_desc *depth, nebel_rays *rays);
 
+/* How well floats hold fog in a view: what they move changes transmittance, and light relative to the brighter of 1 and
+ * the brightest source, by at most `error` a pixel or more beside outlines. The lengths are those of the volume that is
+ * worst. */
+typedef struct nebel_view_error {
+    double error;              /* the sum of the next two */
+    double by_width, by_pixel; /* because the volume is narrow for its distance; because pixels are */
+    double distance;           /* m: of its farthest place from the eye; of endless fog: of what is narrow */
+    double width;              /* m: the least between its faces, or over which its density changes; INFINITY: none */
+    double pixel;              /* m: the width of a pixel at that distance */
+    double clear; /* m: in a view of parallel rays no volume begins nearer to the plane through the eye. 0 in
+                                  others, and where `start` or `cutoff` of a volume counts from there. INFINITY without
+                                  volumes */
+} nebel_view_error;
+
+/* Bounds by how much places in floats change the fog of a view. Errors: as nebel_view_rays. Any thread. O(volumes and
+ * their parts, and the square of the planes of one). */
+nebel_result nebel_find_view_error(const nebel_snapshot *snapshot, const nebel_view *view, nebel_view_error *error);
+
 /* ---- tiles ----------------------------------------------------------------------------------- */
 
 /* Which volumes each tile of the screen may see, so that many small volumes cost what a tile sees. Tiles are tile_size

@@ -574,6 +574,7 @@ static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
     nb_frame_set_vector(program, "scene_sunlight", f->light.sunlight);
     if (f->planet != NULL) nb_gl_air_set_light(&r->air, program, r->scene);
     glUniform1f(glGetUniformLocation(program, "scene_share"), 1 / (float)f->samples);
+    glUniform1f(glGetUniformLocation(program, "scene_ahead"), (float)f->ahead);
     glUniform1i(glGetUniformLocation(program, "scene_is_stored"), f->method.blends_stored);
     if (f->casts) nb_frame_set_shadows(f, program);
     if (has_lamps(f)) set_lamps(f, program);
@@ -738,7 +739,8 @@ static nebel_result draw_samples(frame *f)
 nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc)
 {
     if (renderer == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
-    frame f = {.renderer = renderer, .desc = desc};
+    nebel_gl_frame_desc near = *desc;
+    frame f = {.renderer = renderer, .desc = &near, .ahead = nb_frame_go_near(renderer, &near.camera, desc)};
     renderer->has_frame = 0;
     nebel_result result = nb_context_check(&renderer->log, renderer->vertex_array);
     if (result == NEBEL_OK) result = set_frame(&f);

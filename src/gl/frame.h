@@ -11,6 +11,7 @@
 typedef struct nb_gl_frame {
     nebel_gl_renderer *renderer;
     const nebel_gl_frame_desc *desc;
+    double ahead; /* how far before the camera the eye is [m] */
     uint32_t samples, done;
     nb_lighting light;
     double eye[3];
@@ -33,6 +34,9 @@ typedef struct nb_gl_frame {
     int shafts;              /* models shade fog */
     nebel_sunlit_fog sunlit; /* that fog */
 } nb_gl_frame;
+
+/* Moves a camera of parallel rays up to what it sees. Returns how far [m]. */
+double nb_frame_go_near(const nebel_gl_renderer *renderer, nebel_camera *camera, const nebel_gl_frame_desc *desc);
 
 /* LIMIT where progress, which is told the samples that are done, stops the frame. */
 nebel_result nb_frame_ask(const nb_gl_frame *f);

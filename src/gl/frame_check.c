@@ -1,6 +1,7 @@
 #include "frame_check.h"
 
 #include "method.h"
+#include "panorama.h"
 
 #include <math.h>
 
@@ -161,22 +162,50 @@ static nebel_result check_meshes(const nebel_gl_renderer *r, const nebel_gl_fram
     return result;
 }
 
-/* Where a ray passes a body is found from the eye, a place that floats hold to 2^-24 of the way there. Four such roundings are a
- * fourth of a pixel of this angle, whatever the distance. */
-#define LEAST_PIXEL 0x1p-20
+/* What places in floats may change of the light of fog. */
+#define MOST_FOG_ERROR (1. / 255)
+
+static nebel_view_error find_fog_error(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+{
+    const nebel_log silent = {0};
+    nebel_view views[6];
+    nebel_view_error worst = {.error = 0}, error;
+    const int is_panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
+    if (nb_camera_look(&desc->camera, desc->width, desc->height, &silent, views) != NEBEL_OK) return worst;
+    if (is_panorama) nb_panorama_faces(desc->camera.position, desc->width, desc->height, views);
+    for (int i = 0; i < (is_panorama ? 6 : 1); i++)
+        if (nebel_find_view_error(r->fog, &views[i], &error) == NEBEL_OK && !(error.error <= worst.error))
+            worst = error;
+    return worst;
+}
+
+/* How to see as much with pixels of `wider` times the width. */
+static nebel_result refuse_pixels(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc,
+                                  const nebel_view_error *error, double wider)
+{
+    const int is_parallel = desc->camera.projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
+    const double size = is_parallel ? desc->camera.view_height : desc->camera.vertical_fov;
+    return nb_fail(&r->log, NEBEL_ERROR_LIMIT,
+                   "camera: %s is %g %s, and pixels are %.3g m wide at fog that is %.4g m away; OpenGL draws its "
+                   "outlines with pixels of at least %.3g m: make %s at least %.3g, draw at most %u rows, or use the "
+                   "CPU's renderer (--device cpu)",
+                   is_parallel ? "view_height" : "vertical_fov", size, is_parallel ? "m" : "degrees", error->pixel,
+                   error->distance, error->pixel * wider, is_parallel ? "view_height" : "vertical_fov", size * wider,
+                   (unsigned)(desc->height / wider));
+}
 
 static nebel_result check_fog(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
-    if (desc->camera.projection != NEBEL_PROJECTION_PERSPECTIVE || desc->method != NEBEL_GL_METHOD_EXACT ||
-        nebel_snapshot_volume_count(r->fog) == 0)
-        return NEBEL_OK;
-    const double pixel = 2 * tan(desc->camera.vertical_fov * (3.14159265358979323846 / 360)) / desc->height;
-    if (!(pixel < LEAST_PIXEL)) return NEBEL_OK;
-    return nb_fail(
-        &r->log, NEBEL_ERROR_LIMIT,
-        "camera: vertical_fov is %g degrees, and a pixel %.2g radians; OpenGL draws fog where pixels are at least "
-        "%.2g: go nearer with a wider view, or use the CPU's renderer (--device cpu)",
-        desc->camera.vertical_fov, pixel, LEAST_PIXEL);
+    const int is_exact = desc->method == NEBEL_GL_METHOD_EXACT || desc->method == NEBEL_GL_METHOD_FIVE_TAP;
+    if (!is_exact || nebel_snapshot_volume_count(r->fog) == 0) return NEBEL_OK;
+    const nebel_view_error error = find_fog_error(r, desc);
+    if (error.error <= MOST_FOG_ERROR) return NEBEL_OK;
+    if (error.by_pixel > error.by_width && error.by_width < MOST_FOG_ERROR)
+        return refuse_pixels(r, desc, &error, error.by_pixel / (MOST_FOG_ERROR - error.by_width));
+    return nb_fail(&r->log, NEBEL_ERROR_LIMIT,
+                   "camera: fog, or the height over which it thins out, is only %.4g m wide and %.4g m away; OpenGL "
+                   "would draw it up to %.2g off: go nearer than %.3g m, or use the CPU's renderer (--device cpu)",
+                   error.width, error.distance, error.error, error.distance * MOST_FOG_ERROR / error.error);
 }
 
 nebel_result nb_frame_check(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, uint32_t samples)

@@ -412,6 +412,7 @@ static const char light_text[] =
     "#endif\n"
     "uniform vec3 scene_sunlight;\n" /* reflected by a white surface that faces the sun, before shadows and fog */
     "uniform float scene_share;\n"   /* of this sample */
+    "uniform float scene_ahead;\n"   /* how far before the camera the eye is [m] */
     "layout(location = 0) out highp vec4 out_color;\n"
     "layout(location = 1) out highp vec4 out_transmittance;\n"
     "layout(location = 2) out highp vec4 out_in_scattering;\n"
@@ -494,7 +495,7 @@ static const char light_text[] =
     "    out_color = vec4(scene_share * color, hit);\n"
     "    out_transmittance = vec4(scene_share * transmittance, scene_share);\n"
     "    out_in_scattering = vec4(scene_share * in_scattering, scene_share);\n"
-    "    out_surface = place.x > 0.0 ? hit * vec4(normal.xyz, place.x) : vec4(0.0);\n"
+    "    out_surface = place.x > 0.0 ? hit * vec4(normal.xyz, place.x + scene_ahead) : vec4(0.0);\n"
     "}\n";
 
 /* ---- the survey ------------------------------------------------------------------------------ */
