@@ -83,6 +83,24 @@ static void test_profiles_and_thin_fog(void **state)
     assert_true(find(&volume, &view).error < rounding * 1e6 / (2 * e) * .01);
 }
 
+/* Whatever has no end gives numbers. */
+static void test_endless_fog(void **state)
+{
+    (void)state;
+    const nebel_view views[2] = {view_of(1, 0), view_of(1, 1)};
+    const nebel_shape parts[2] = {{.type = NEBEL_SHAPE_HALF_SPACE, .point = {0, -5, 0}, .normal = {0, 1, 0}},
+                                  {.type = NEBEL_SHAPE_CAPSULE, .from = {0, 0, -40}, .to = {1, 0, -50}, .radius = 3}};
+    nebel_volume_desc volumes[3] = {{.shape = {.type = NEBEL_SHAPE_UNION, .parts = parts, .part_count = 2}},
+                                    {.shape = parts[0]},
+                                    {.density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 10}}};
+    for (int i = 0; i < 6; i++) {
+        nebel_volume_desc *const volume = &volumes[i / 2];
+        for (int c = 0; c < 3; c++) volume->extinction[c] = .1;
+        const nebel_view_error error = find(volume, &views[i % 2]);
+        assert_true(error.error >= 0 && error.error < 1e-3 && isfinite(error.distance));
+    }
+}
+
 static void test_what_does_not_count(void **state)
 {
     (void)state;
@@ -119,8 +137,11 @@ static void test_errors(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_narrow_fog), cmocka_unit_test(test_narrow_pixels),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_narrow_fog),
+                                       cmocka_unit_test(test_narrow_pixels),
                                        cmocka_unit_test(test_profiles_and_thin_fog),
-                                       cmocka_unit_test(test_what_does_not_count), cmocka_unit_test(test_errors)};
+                                       cmocka_unit_test(test_endless_fog),
+                                       cmocka_unit_test(test_what_does_not_count),
+                                       cmocka_unit_test(test_errors)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

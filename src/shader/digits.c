@@ -113,26 +113,27 @@ static int is_seen(const sight *s, const nb_volume *body)
 
 /* ---- how narrow they are --------------------------------------------------------------------- */
 
+/* How far light comes through it, and no farther than it goes. */
 static double way_through(const nb_volume *body)
 {
     double least = HUGE_VAL;
     for (int c = 0; c < 3; c++)
         if (body->extinction[c] > 0) least = fmin(least, body->extinction[c]);
-    const double diagonal = diagonal_of(body), seen = isfinite(least) ? 2 / least : HUGE_VAL;
-    return fmin(diagonal, seen);
+    const double diagonal = diagonal_of(body), seen = fmin(diagonal, 2 / least);
+    return isfinite(least) ? seen : isfinite(diagonal) ? diagonal : 0;
 }
 
-static void eye_in_frame(const sight *s, const nb_leaf *leaf, double place[3])
+static void bring_to_frame(const double from[3], const nb_leaf *leaf, double place[3])
 {
     double way[3];
-    for (int i = 0; i < 3; i++) way[i] = (s->eye[i] - leaf->origin[i]) - leaf->origin_rest[i];
+    for (int i = 0; i < 3; i++) way[i] = (from[i] - leaf->origin[i]) - leaf->origin_rest[i];
     for (int i = 0; i < 3; i++) place[i] = nb_vector_dot(&leaf->matrix[3 * i], way);
 }
 
 static void note_box(const sight *s, const nb_leaf *leaf, double through, narrowness *n)
 {
     double place[3];
-    eye_in_frame(s, leaf, place);
+    bring_to_frame(s->eye, leaf, place);
     for (int i = 0; i < 3; i++) {
         const double scale = nb_vector_length(&leaf->matrix[3 * i]);
         const double width = (leaf->high[i] - leaf->low[i]) / scale;
@@ -141,43 +142,58 @@ static void note_box(const sight *s, const nb_leaf *leaf, double through, narrow
     }
 }
 
-/* Of a face in its leaf's frame: its normal of length 1, and how far within it the eye is. */
+/* Of a face: its normal in the world, of length 1, and how far within it the eye and a place in the body are. */
 typedef struct side {
-    double normal[3], inside;
+    double normal[3], eye, place;
 } side;
 
-static side side_of(const nb_leaf *leaf, const nb_face *face, const double place[3])
+static side side_of(const nb_leaf *leaf, const nb_face *face, const double eye[3], const double place[3])
 {
-    side f = {.inside = face->distance - nb_vector_dot(face->normal, place)};
-    double world[3] = {0, 0, 0};
+    side f = {.eye = face->distance - nb_vector_dot(face->normal, eye),
+              .place = face->distance - nb_vector_dot(face->normal, place)};
     for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) world[k] += leaf->matrix[3 * i + k] * face->normal[i];
-    const double length = nb_vector_length(world);
-    for (int k = 0; k < 3; k++) f.normal[k] = world[k] / length;
-    f.inside /= length;
+        for (int k = 0; k < 3; k++) f.normal[k] += leaf->matrix[3 * i + k] * face->normal[i];
+    const double length = nb_vector_length(f.normal);
+    for (int k = 0; k < 3; k++) f.normal[k] /= length;
+    f.eye /= length;
+    f.place /= length;
     return f;
 }
 
-/* Faces that all but look away from each other. */
+/* Faces that look away from each other. Others meet in an edge, which is an outline. */
 static void note_planes(const sight *s, const nb_volume *body, const nb_leaf *leaf, double through, narrowness *n)
 {
-    double place[3];
-    eye_in_frame(s, leaf, place);
+    double middle[3], eye[3], place[3];
+    for (int i = 0; i < 3; i++) middle[i] = is_endless(body) ? s->eye[i] : 0.5 * (body->low[i] + body->high[i]);
+    bring_to_frame(s->eye, leaf, eye);
+    bring_to_frame(middle, leaf, place);
     for (size_t i = 0; i < leaf->face_count; i++) {
-        const side a = side_of(leaf, &body->faces[leaf->first_face + i], place);
+        const side a = side_of(leaf, &body->faces[leaf->first_face + i], eye, place);
         for (size_t k = 0; k < i; k++) {
-            const side b = side_of(leaf, &body->faces[leaf->first_face + k], place);
-            if (nb_vector_dot(a.normal, b.normal) > -0.9) continue;
-            note(n, fmax(fabs(a.inside), fabs(b.inside)) + through + s->wide, fabs(a.inside + b.inside));
+            const side b = side_of(leaf, &body->faces[leaf->first_face + k], eye, place);
+            const double width = a.place + b.place;
+            if (nb_vector_dot(a.normal, b.normal) > -0.99 || !(width > 0)) continue;
+            note(n, fmax(fabs(a.eye), fabs(b.eye)) + through + s->wide, width);
         }
     }
 }
 
-/* Of a unit radius and, but for balls, a unit length or more in its frame. */
-static double width_of_round(const nb_leaf *leaf)
+static double distance_to(const sight *s, const double place[3])
 {
-    const double across = leaf->type == NB_LEAF_BALL ? 2 * leaf->radius : 1;
-    return across / leaf->scale;
+    double way[3];
+    for (int i = 0; i < 3; i++) way[i] = place[i] - s->eye[i];
+    return nb_vector_length(way);
+}
+
+/* Of a unit radius and, but for balls, a unit length or more in its frame. */
+static void note_round(const sight *s, const nb_volume *body, const nb_leaf *leaf, narrowness *n)
+{
+    const int is_ball = leaf->type == NB_LEAF_BALL;
+    double least = HUGE_VAL;
+    for (int i = 0; i < 3; i++) least = fmin(least, nb_vector_length(&leaf->matrix[3 * i]));
+    const double extent = (is_ball ? leaf->radius : 2 + leaf->length) / least;
+    const double reach = is_endless(body) ? distance_to(s, leaf->origin) + extent : farthest_of(s, body);
+    note(n, reach + s->wide, (is_ball ? 2 * leaf->radius : 1) / leaf->scale);
 }
 
 static void note_leaf(const sight *s, const nb_volume *body, const nb_leaf *leaf, narrowness *n)
@@ -189,14 +205,7 @@ static void note_leaf(const sight *s, const nb_volume *body, const nb_leaf *leaf
     else if (leaf->type == NB_LEAF_PLANES)
         note_planes(s, body, leaf, through, n);
     else
-        note(n, farthest_of(s, body), width_of_round(leaf));
-}
-
-static double distance_to(const sight *s, const double place[3])
-{
-    double way[3];
-    for (int i = 0; i < 3; i++) way[i] = place[i] - s->eye[i];
-    return nb_vector_length(way);
+        note_round(s, body, leaf, n);
 }
 
 static void note_grid(const sight *s, const nb_volume *body, narrowness *n)
