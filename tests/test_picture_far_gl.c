@@ -126,7 +126,7 @@ static void test_far_fog_is_right_or_refused(void **state)
     assert_int_equal(nebel_create_gl_renderer(&empty, NULL, &desc, &opengl), NEBEL_OK);
     for (int shape = 0; shape < SHAPES; shape++)
         for (int d = 3; d <= 8; d++)
-            for (int s = -3; s <= 3; s++) try_view(shape, pow(10, d), pow(10, s), &pair);
+            for (int s = -3; s <= 3; s += 2) try_view(shape, pow(10, d), pow(10, s), &pair);
     for (int i = 0; i < 2 * SHAPES; i++) {
         const tally *const t = &tallies[i / SHAPES][i % SHAPES];
         print_message("%s, %s: %zu right, %zu refused, worst %.1e\n", i < SHAPES ? "perspective" : "parallel rays",
