@@ -137,10 +137,28 @@ static const double gauss_weights[NODES / 2] = {
     0.417959183673469387755102040816327, 0.381830050505118944950369775488975, 0.279705391489276667901467771423780,
     0.129484966168869693270611432679082};
 
+/* What the polynomial through all nodes is at 1, from those on the side of 0 to -1 and from the others: a kink beyond the last
+ * node moves what is there, and no node. */
+static const double at_end[2][NODES] = {
+    {-0.11292917291898148356, 0.091687296848570965774, -0.073778979644262450764, 0.057719118618911434715,
+     -0.043250815978173977256, 0.030438309530367932990, -0.018451577046963430127, 0.006238528645340282776},
+    {0, 0.13978343178290837655, -0.17457035156224131965, 0.22117597022489271509, -0.29141869591999060069,
+     0.42004719972088290489, -0.70667399340457376908, 1.4539837311033124183}};
+
+/* How much light may be between the last nodes and the ends that they do not show, as a part of half a panel. */
+static double unseen_at_ends(walk *w, double a, double b, double first[3], double last[3])
+{
+    double at_a[3], at_b[3], most = 0;
+    light_at(w, a, at_a);
+    light_at(w, b, at_b);
+    for (int c = 0; c < 3; c++) most = fmax(most, fmax(fabs(at_a[c] - first[c]), fabs(at_b[c] - last[c])));
+    return most * (1 - nodes[NODES - 1]);
+}
+
 static part integrate(walk *w, double a, double b)
 {
     const double middle = 0.5 * (a + b), half = 0.5 * (b - a);
-    double kronrod[3] = {0, 0, 0}, gauss[3] = {0, 0, 0};
+    double kronrod[3] = {0, 0, 0}, gauss[3] = {0, 0, 0}, first[3] = {0, 0, 0}, last[3] = {0, 0, 0};
     part p = {.off = 0};
     for (int i = 0; i < NODES; i++)
         for (int side = i == 0 ? 1 : -1; side <= 1; side += 2) {
@@ -148,11 +166,16 @@ static part integrate(walk *w, double a, double b)
             light_at(w, middle + side * half * nodes[i], value);
             for (int c = 0; c < 3; c++) kronrod[c] += kronrod_weights[i] * value[c];
             for (int c = 0; c < 3 && i % 2 == 0; c++) gauss[c] += gauss_weights[i / 2] * value[c];
+            for (int c = 0; c < 3; c++) {
+                first[c] += at_end[i > 0 && side < 0][i] * value[c];
+                last[c] += at_end[i > 0 && side > 0][i] * value[c];
+            }
         }
     for (int c = 0; c < 3; c++) {
         p.sum[c] = half * kronrod[c];
         p.off = fmax(p.off, half * fabs(kronrod[c] - gauss[c]));
     }
+    p.off = fmax(p.off, half * unseen_at_ends(w, a, b, first, last));
     return p;
 }
 

@@ -66,7 +66,7 @@ static ball_sum sum_ball(const nb_real depth[SUN_NODES])
         const nb_real most = nb_max(seen[n - 1], seen[n]) * REAL(sun_nodes[n] - sun_nodes[n - 1]);
         sum.error = sum.error + most * unseen_share(nb_abs(depth[n] - depth[n - 1]));
     }
-    sum.error = sum.error + error_by_null_rules(seen, NB_F(0.0));
+    sum.error = sum.error + error_of_rule(seen, sum.light, NB_F(0.0));
     return sum;
 }
 
