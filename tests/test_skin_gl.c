@@ -1,5 +1,5 @@
-/* Balls so dense that only a skin of them is lit, in shaders against nebel_trace in double: of any size, lit by the sun and by lamps,
- * seen from outside and from within. */
+/* Bodies so dense that only a skin of them is lit, in shaders against nebel_trace in double: of any shape and size, lit by the sun and by
+ * lamps, seen from outside and from within. */
 #include "shader_help.h"
 
 enum { EACH = 64 };
@@ -9,10 +9,15 @@ typedef enum eye_place { OUTSIDE, WITHIN, EYE_PLACES } eye_place;
 static const char *const eye_names[EYE_PLACES] = {"from outside", "from within"};
 static const char *const light_names[2] = {"sun", "lamps"};
 
-/* A skin's depth is extinction times radius. */
+static const nebel_shape_type types[] = {NEBEL_SHAPE_SPHERE,   NEBEL_SHAPE_ELLIPSOID, NEBEL_SHAPE_BOX,  NEBEL_SHAPE_HALF_SPACE, NEBEL_SHAPE_CONVEX,
+                                         NEBEL_SHAPE_CYLINDER, NEBEL_SHAPE_CONE,      NEBEL_SHAPE_CAPSULE};
+enum { TYPES = sizeof types / sizeof *types };
+static const char *const type_names[TYPES] = {"ball", "ellipsoid", "box", "half space", "polytope", "cylinder", "cone", "capsule"};
+
+/* A body's radius is that of a ball around it. A skin's depth is extinction times radius. */
 typedef struct skin {
     double radius, depth, center[3], eye[3];
-    int by_lamps, is_ellipsoid;
+    int by_lamps, kind, is_turned;
     eye_place place;
 } skin;
 
@@ -23,16 +28,70 @@ static void turn_any(uint64_t *state, double size, double v[3])
     for (int k = 0; k < 3; k++) v[k] *= size / sqrt(length);
 }
 
-static skin draw_skin(uint64_t seed, int by_lamps, eye_place place)
+static skin draw_skin(uint64_t seed, int by_lamps, int kind, eye_place place)
 {
     uint64_t state = seed;
-    skin s = {.by_lamps = by_lamps, .place = place, .is_ellipsoid = seed % 3 == 0};
+    skin s = {.by_lamps = by_lamps, .place = place, .kind = kind, .is_turned = seed % 3 == 0};
     s.radius = pow(10, dice(&state, -3, 4));
     s.depth = fmin(pow(10, dice(&state, 3, 8)), .99 * NEBEL_MAX_AMOUNT * s.radius);
     turn_any(&state, s.radius * dice(&state, 0, 50), s.center);
-    turn_any(&state, s.radius * (place == WITHIN ? dice(&state, 0, .9) : 1 + pow(10, dice(&state, -1, 1))), s.eye);
+    const double within = dice(&state, 0, kind < 2 ? .9 : .1), away = 1 + pow(10, dice(&state, -1, 2));
+    turn_any(&state, s.radius * (place == WITHIN ? within : away), s.eye);
     for (int k = 0; k < 3; k++) s.eye[k] += s.center[k];
     return s;
+}
+
+static void set_axis(const skin *s, uint64_t *state, double half, nebel_shape *shape)
+{
+    double axis[3];
+    turn_any(state, half * s->radius, axis);
+    for (int k = 0; k < 3; k++) shape->from[k] = s->center[k] - axis[k], shape->to[k] = s->center[k] + axis[k];
+}
+
+/* Faces of a cube, each leaning; the eye is before the face of a half space, or behind it. */
+static void set_faces(const skin *s, uint64_t *state, nebel_shape *shape)
+{
+    static nebel_plane planes[6];
+    double lean[3];
+    turn_any(state, s->radius, lean);
+    for (int k = 0; k < 3; k++) {
+        const double towards = s->place == WITHIN ? s->radius : s->eye[k] - s->center[k];
+        shape->normal[k] = towards + lean[k];
+        shape->point[k] = s->center[k] + (s->place == WITHIN ? .2 * shape->normal[k] : 0);
+    }
+    for (int i = 0; i < 6; i++) {
+        nebel_plane *face = &planes[i];
+        double length = 0;
+        for (int k = 0; k < 3; k++) face->normal[k] = (k == i / 2 ? i % 2 ? 1 : -1 : 0) + dice(state, -.3, .3);
+        for (int k = 0; k < 3; k++) length += face->normal[k] * face->normal[k];
+        face->distance = sqrt(length) * s->radius * dice(state, .2, .5);
+        for (int k = 0; k < 3; k++) face->distance += face->normal[k] * s->center[k];
+    }
+    shape->planes = planes;
+    shape->plane_count = 6;
+}
+
+static nebel_shape shape_of(const skin *s, uint64_t *state)
+{
+    const double r = s->radius;
+    nebel_shape shape = {.type = types[s->kind], .radius = r};
+    for (int k = 0; k < 3; k++) {
+        const double half = r * dice(state, .2, .57);
+        shape.center[k] = s->center[k];
+        shape.radii[k] = r * (k == 1 ? .5 : 1);
+        shape.min[k] = -half;
+        shape.max[k] = half;
+        if (shape.type != NEBEL_SHAPE_BOX) continue;
+        shape.transform.position[k] = s->center[k];
+        if (s->is_turned) shape.transform.rotation[k] = dice(state, -1, 1);
+    }
+    if (shape.type == NEBEL_SHAPE_HALF_SPACE || shape.type == NEBEL_SHAPE_CONVEX) set_faces(s, state, &shape);
+    if (s->kind < 5) return shape;
+    set_axis(s, state, dice(state, .2, .6), &shape);
+    shape.radius = r * dice(state, .2, .4);
+    shape.radius_from = r * dice(state, .2, .6);
+    shape.radius_to = dice(state, 0, 1) < .5 ? 0 : r * dice(state, 0, .6);
+    return shape;
 }
 
 /* Lamps shine on the surface about as brightly as the sun; for an eye within one is near it. */
@@ -58,17 +117,13 @@ static nebel_snapshot *commit_skin(const skin *s, uint64_t seed)
     const double extinction = s->depth / s->radius;
     uint64_t state = seed;
     nebel_volume_desc volume = {
-        .shape = {.type = s->is_ellipsoid ? NEBEL_SHAPE_ELLIPSOID : NEBEL_SHAPE_SPHERE, .radius = s->radius},
+        .shape = shape_of(s, &state),
         .extinction = {extinction, .8 * extinction, .5 * extinction},
         .albedo = {.9, .9, .8},
         .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .4}};
     nebel_sun sun = {.irradiance = {3, 3, 2}};
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;
-    for (int k = 0; k < 3; k++) {
-        volume.shape.center[k] = s->center[k];
-        volume.shape.radii[k] = s->radius * (k == 1 ? .5 : 1);
-    }
     turn_any(&state, 1, sun.direction);
     assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &made), NEBEL_OK);
     assert_int_equal(nebel_add_volume(made, &volume, NULL), NEBEL_OK);
@@ -96,8 +151,8 @@ static void strew_rays(const skin *s, uint64_t seed)
     }
 }
 
-static double worst[2][EYE_PLACES];
-static size_t tried[2][EYE_PLACES], wrong, ill;
+static double worst[TYPES][2][EYE_PLACES];
+static size_t tried[TYPES][2][EYE_PLACES], wrong, ill;
 
 static void judge(const skin *s, const nebel_snapshot *snapshot, uint64_t seed)
 {
@@ -111,30 +166,39 @@ static void judge(const skin *s, const nebel_snapshot *snapshot, uint64_t seed)
             ill++;
             continue;
         }
-        tried[s->by_lamps][s->place]++;
-        worst[s->by_lamps][s->place] = fmax(worst[s->by_lamps][s->place], off);
+        double *most = &worst[s->kind][s->by_lamps][s->place];
+        tried[s->kind][s->by_lamps][s->place]++;
+        *most = fmax(*most, off);
         if (off <= 1. / 255) continue;
         wrong++;
-        print_message("%s, %s, seed %llu, ray %d, radius %g, depth %g: off by %g: light %g for %g\n",
-                      light_names[s->by_lamps], eye_names[s->place], (unsigned long long)seed, i, s->radius, s->depth,
+        print_message("%s, %s, %s, seed %llu, ray %d, radius %g, depth %g: off by %g: light %g for %g\n",
+                      type_names[s->kind], light_names[s->by_lamps], eye_names[s->place], (unsigned long long)seed, i, s->radius, s->depth,
                       off, (double)answers[i].in_scattering[0], is[0]);
     }
 }
 
+static unsigned features_of_all(int by_lamps)
+{
+    unsigned features = 0;
+    for (int kind = 0; kind < TYPES; kind++) {
+        const skin like = {.by_lamps = by_lamps, .radius = 1, .depth = 1e3, .kind = kind, .is_turned = 1};
+        nebel_snapshot *snapshot = commit_skin(&like, 1);
+        features |= (unsigned)nebel_pack_features(snapshot);
+        nebel_release_snapshot(snapshot);
+    }
+    return features;
+}
+
 static void try_light(int by_lamps, int seeds)
 {
-    const skin like = {.by_lamps = by_lamps, .radius = 1, .depth = 1e3, .is_ellipsoid = 1};
-    nebel_snapshot *snapshot = commit_skin(&like, 1);
     char defines[128];
     tracer t;
-    snprintf(defines, sizeof defines, "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n",
-             (unsigned)nebel_pack_features(snapshot));
-    nebel_release_snapshot(snapshot);
+    snprintf(defines, sizeof defines, "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n", features_of_all(by_lamps));
     open_tracer(&t, NB_GL_330, BLOCK, defines, trace_body);
     for (int i = 0; i < seeds; i++) {
         const uint64_t seed = (uint64_t)i + 1;
-        const skin s = draw_skin(seed, by_lamps, (eye_place)(i % EYE_PLACES));
-        snapshot = commit_skin(&s, seed);
+        const skin s = draw_skin(seed, by_lamps, i / EYE_PLACES % TYPES, (eye_place)(i % EYE_PLACES));
+        nebel_snapshot *snapshot = commit_skin(&s, seed);
         strew_rays(&s, seed);
         pack_and_upload(&t, snapshot, s.eye);
         evaluate(&t);
@@ -147,10 +211,12 @@ static void try_light(int by_lamps, int seeds)
 static void test_lit_skins(void **unused)
 {
     (void)unused;
-    for (int by_lamps = 0; by_lamps < 2; by_lamps++) try_light(by_lamps, (int)nb_test_count(60));
-    for (int i = 0; i < 4; i++)
-        print_message("%s, %s: %zu rays, worst %.1e\n", light_names[i / 2], eye_names[i % 2], tried[i / 2][i % 2],
-                      worst[i / 2][i % 2]);
+    for (int by_lamps = 0; by_lamps < 2; by_lamps++) try_light(by_lamps, (int)nb_test_count(96));
+    for (int i = 0; i < TYPES * 4; i++) {
+        const int kind = i / 4, by_lamps = i / 2 % 2, place = i % 2;
+        print_message("%s, %s, %s: %zu rays, worst %.1e\n", type_names[kind], light_names[by_lamps], eye_names[place],
+                      tried[kind][by_lamps][place], worst[kind][by_lamps][place]);
+    }
     print_message("off by more than 1/255: %zu, and %zu where the ray's own rounding matters as much\n", wrong, ill);
     assert_int_equal(wrong, 0);
 }

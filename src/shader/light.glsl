@@ -53,33 +53,134 @@ nb_spot nb_spot_on(nb_ray ray, float start, float from)
     return spot;
 }
 
-#if NB_DECLARES(NB_HAS_BALL)
-/* The way along v from a place on a ray to the surface of the ball, or ellipsoid, around it; below 0 where the place is outside. With q the
- * place from the center and R the radius, all in the frame of the body, it is
+/* ---- ways out ---------------------------------------------------------------------------------
  *
- *     (sqrt(h^2 + v.v c) - h) / v.v,   h = q.v,   c = R^2 - q.q = d.d (t - enter) (leave - t):
- *
- * by the product a place knows how deep it is in fog so dense that light reaches a skin alone. Of both roots of the quadratic the one that
- * loses no digits, as in src/march/trace_sun_ball.h. Where a piece begins with the body that is to the last bit. */
-float nb_ball_way(int leaf, nb_spot spot, nb_vec3 v)
+ * The way from a place on a ray to where it leaves the body around it, below 0 where the place is outside. In fog so dense that light reaches
+ * a skin alone that is thinner than what places are told apart by, so that a place knows how deep it is from where the ray entered: depths
+ * are polynomials along the ray, from the spot's start, where they are 0 if floats do not tell them from that. */
+
+/* Distances to planes, `there` at the origin of the spot's ray, that grow by `rate` along it; `near` is what floats lose of them. */
+nb_vec3 nb_spot_heights(nb_spot spot, nb_vec3 there, nb_vec3 rate, float near)
 {
-    nb_vec4 head = NEBEL_WORD(leaf);
-    nb_ray local = nb_turned_ray(leaf, int(head.x) >= NB_TYPE_TURNED, spot.ray);
-    nb_vec3 p = local.origin + NEBEL_WORD(leaf + 1).xyz;
-    float square = dot(local.direction, local.direction);
-    float middle = -dot(p, local.direction) * nb_rcp_bounded(square);
-    nb_vec3 closest = p + local.direction * middle;
-    float half_chord = sqrt(max((head.y * head.y - dot(closest, closest)) * nb_rcp_bounded(square), 0.0));
-    float gap = spot.start - (middle - half_chord);
-    if (abs(gap) <= nb_nearest(abs(middle) + half_chord)) gap = 0.0;
-    float entered = gap + spot.from;
-    float left = 2.0 * half_chord - entered;
-    if (!(entered >= 0.0 && left > 0.0)) return -1.0;
-    float h = dot(closest + local.direction * (entered - half_chord), v);
-    float root = sqrt(h * h + dot(v, v) * square * entered * left);
-    return h > 0.0 ? square * entered * left / max(h + root, NB_TINY) : (root - h) * nb_rcp_bounded(dot(v, v));
+    nb_vec3 height = there + rate * spot.start;
+    return height * step(nb_splat3(near), abs(height)) + rate * spot.from;
+}
+
+#if NB_DECLARES(NB_HAS_BOX)
+float nb_box_way(int leaf, nb_spot spot, nb_ray local, nb_vec3 v, float near)
+{
+    nb_vec3 inverse = nb_vec3(nb_rcp_bounded(v.x), nb_rcp_bounded(v.y), nb_rcp_bounded(v.z));
+    nb_vec3 low = nb_spot_heights(spot, NEBEL_WORD(leaf + 1).xyz - local.origin, -local.direction, near);
+    nb_vec3 high = nb_spot_heights(spot, NEBEL_WORD(leaf + 2).xyz - local.origin, -local.direction, near);
+    return nb_largest(max(low, -high)) > 0.0 ? -1.0 : nb_smallest(max(low * inverse, high * inverse));
 }
 #endif
+
+#if NB_DECLARES(NB_HAS_PLANES)
+float nb_planes_way_out(int first, int count, nb_spot spot, nb_vec3 v, float near)
+{
+    float way = NB_FAR;
+    for (int i = 0; i < count; i++) {
+        nb_vec4 face = NEBEL_WORD(first + i);
+        float there = face.w - dot(face.xyz, spot.ray.origin);
+        float noise = near * dot(abs(face.xyz), nb_splat3(1.0));
+        float height = nb_spot_heights(spot, nb_splat3(there), nb_splat3(-dot(face.xyz, spot.ray.direction)), noise).x;
+        float rise = dot(face.xyz, v);
+        if (height < 0.0) return -1.0;
+        if (rise > 0.0) way = min(way, height * nb_rcp_bounded(rise));
+    }
+    return way;
+}
+#endif
+
+#define NB_HAS_ROUND (NB_HAS_BALL | NB_HAS_TUBE | NB_HAS_CONE | NB_HAS_CAPSULE)
+#if NB_DECLARES(NB_HAS_ROUND)
+/* What is round is where x x + y y + ball z z - w w < 0, w its radius at z: of a place p at the spot's start, d along the ray and v along the
+ * way, each with what it adds to w. The first number is that form at the spot. The other is where the way leaves: of both roots of
+ *
+ *     curve s^2 + 2 rise s + level = 0,   level <= 0,
+ *
+ * the one ahead, such that no digits are lost, as in src/march/trace_sun_ball.h; along the nappe of a cone there may be none. */
+nb_vec2 nb_round_way(nb_spot spot, nb_vec4 p, nb_vec4 d, nb_vec4 v, float ball, float near)
+{
+    nb_vec4 signs = nb_vec4(1.0, 1.0, ball, -1.0);
+    float level = dot(p * signs, p);
+    if (abs(level) <= 2.0 * p.w * near) level = 0.0;
+    level += spot.from * (2.0 * dot(p * signs, d) + spot.from * dot(d * signs, d));
+    float rise = dot((p + d * spot.from) * signs, v);
+    float curve = dot(v * signs, v);
+    float root = sqrt(max(rise * rise - curve * level, 0.0));
+    float way = NB_FAR;
+    if (rise > 0.0 && rise * rise >= curve * level)
+        way = -level / max(rise + root, NB_TINY);
+    else if (rise <= 0.0 && curve > 0.0)
+        way = (root - rise) * nb_rcp_bounded(curve);
+    return nb_vec2(level, way);
+}
+
+float nb_round_way_out(int leaf, int type, nb_spot spot, nb_ray local, nb_vec3 v, float near)
+{
+    nb_vec4 head = NEBEL_WORD(leaf);
+    float ball = type == NB_TYPE_BALL ? 1.0 : 0.0;
+    float radius = type == NB_TYPE_BALL || type == NB_TYPE_CONE ? head.y : 1.0;
+    float slope = type == NB_TYPE_CONE ? head.z : 0.0;
+    near += 8.0 * NB_EPSILON * radius;
+    nb_vec3 d = local.direction;
+    nb_vec3 origin = local.origin + NEBEL_WORD(leaf + 1).xyz;
+    nb_vec4 p = nb_vec4(origin + d * spot.start, 0.0);
+    p.w = radius + slope * p.z;
+    nb_vec4 along = nb_vec4(d, slope * d.z);
+    nb_vec4 to = nb_vec4(v, slope * v.z);
+    nb_vec2 side = nb_round_way(spot, p, along, to, ball, near);
+    float way = side.x > 0.0 ? -1.0 : side.y;
+#if NB_DECLARES(NB_HAS_TUBE | NB_HAS_CONE | NB_HAS_CAPSULE)
+    if (type != NB_TYPE_BALL) {
+        float length = type == NB_TYPE_CAPSULE ? head.y : 1.0;
+        nb_vec2 ends = nb_spot_heights(spot, nb_vec3(-origin.z, length - origin.z, 0.0), nb_splat3(-d.z), near).xy;
+        bool between = ends.x <= 0.0 && ends.y >= 0.0;
+        float inverse = nb_rcp_bounded(v.z);
+        if (type != NB_TYPE_CAPSULE) {
+            way = between ? min(way, max(ends.x * inverse, ends.y * inverse)) : -1.0;
+#if NB_DECLARES(NB_HAS_CAPSULE)
+        } else {
+            nb_vec4 shift = nb_vec4(0.0, 0.0, length, 0.0);
+            nb_vec2 start = nb_round_way(spot, p, along, to, 1.0, near);
+            nb_vec2 end = nb_round_way(spot, p - shift, along, to, 1.0, near);
+            bool inside = (between && side.x <= 0.0) || start.x <= 0.0 || end.x <= 0.0;
+            if (side.y * v.z < ends.x) side.y = start.y;
+            else if (side.y * v.z > ends.y) side.y = end.y;
+            way = inside ? side.y : -1.0;
+#endif
+        }
+    }
+#endif
+    return way;
+}
+#endif
+
+float nb_way_out(int leaf, nb_spot spot, nb_vec3 v)
+{
+    int type = int(NEBEL_WORD(leaf).x);
+    bool turned = type >= NB_TYPE_TURNED;
+    if (turned) type -= NB_TYPE_TURNED;
+    nb_ray to = spot.ray;
+    to.direction = v;
+    nb_ray local = nb_turned_ray(leaf, turned, spot.ray);
+    to = nb_turned_ray(leaf, turned, to);
+    float near = 8.0 * NB_EPSILON * spot.start * sqrt(dot(local.direction, local.direction));
+    float way = -1.0;
+#if NB_DECLARES(NB_HAS_ROUND)
+    if (NB_HAS(NB_HAS_ROUND) && type >= NB_TYPE_BALL) way = nb_round_way_out(leaf, type, spot, local, to.direction, near);
+#endif
+#if NB_DECLARES(NB_HAS_BOX)
+    if (NB_HAS(NB_HAS_BOX) && type == NB_TYPE_BOX) way = nb_box_way(leaf, spot, local, to.direction, near);
+#endif
+#if NB_DECLARES(NB_HAS_PLANES)
+    nb_vec4 head = NEBEL_WORD(leaf);
+    if (NB_HAS(NB_HAS_PLANES) && type == NB_TYPE_PLANES) way = nb_planes_way_out(int(head.z), int(head.y), spot, v, near);
+#endif
+    return way;
+}
 
 /* The media from `first` on that a depth asks for. */
 struct nb_media {
@@ -94,13 +195,7 @@ struct nb_media {
 nb_stretch nb_next_way(int at, int leaves, nb_ray ray, nb_media media, float from)
 {
     float way = -1.0;
-#if NB_DECLARES(NB_HAS_BALL)
-    int leaf = at + NB_MEDIUM_LEAF;
-    int type = int(NEBEL_WORD(leaf).x);
-    bool is_ball = leaves == 1 && (type == NB_TYPE_BALL || type == NB_TYPE_BALL + NB_TYPE_TURNED);
-    if (NB_HAS(NB_HAS_BALL) && media.is_way && is_ball)
-        way = nb_ball_way(leaf, media.spot, nb_turned_ray(leaf, type >= NB_TYPE_TURNED, ray).direction);
-#endif
+    if (media.is_way && leaves == 1) way = nb_way_out(at + NB_MEDIUM_LEAF, media.spot, ray.direction);
     nb_stretch s = nb_stretch_of(from, min(way, ray.t_max));
     if (!(way >= 0.0)) s = nb_next_stretch(at, leaves, ray, from);
     return s;
