@@ -2,7 +2,7 @@
  * lamps, seen from outside and from within. */
 #include "shader_help.h"
 
-enum { EACH = 64 };
+enum { EACH = 32 };
 
 typedef enum eye_place { OUTSIDE, WITHIN, EYE_PLACES } eye_place;
 
@@ -156,7 +156,7 @@ static size_t tried[TYPES][2][EYE_PLACES], wrong, ill;
 
 static void judge(const skin *s, const nebel_snapshot *snapshot, uint64_t seed)
 {
-    const nebel_trace_desc truth = {.tolerance = 1e-5};
+    const nebel_trace_desc truth = {.tolerance = 1e-4};
     assert_int_equal(nebel_trace(snapshot, &truth, EACH, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
     for (int i = 0; i < EACH; i++) {
         const double *is = lights[i].in_scattering, scale = fmax(1, fmax(is[0], fmax(is[1], is[2])));
