@@ -9,10 +9,12 @@ typedef enum eye_place { OUTSIDE, WITHIN, EYE_PLACES } eye_place;
 static const char *const eye_names[EYE_PLACES] = {"from outside", "from within"};
 static const char *const light_names[2] = {"sun", "lamps"};
 
-static const nebel_shape_type types[] = {NEBEL_SHAPE_SPHERE,   NEBEL_SHAPE_ELLIPSOID, NEBEL_SHAPE_BOX,  NEBEL_SHAPE_HALF_SPACE, NEBEL_SHAPE_CONVEX,
-                                         NEBEL_SHAPE_CYLINDER, NEBEL_SHAPE_CONE,      NEBEL_SHAPE_CAPSULE};
+static const nebel_shape_type types[] = {NEBEL_SHAPE_SPHERE,     NEBEL_SHAPE_ELLIPSOID, NEBEL_SHAPE_BOX,
+                                         NEBEL_SHAPE_HALF_SPACE, NEBEL_SHAPE_CONVEX,    NEBEL_SHAPE_CYLINDER,
+                                         NEBEL_SHAPE_CONE,       NEBEL_SHAPE_CAPSULE};
 enum { TYPES = sizeof types / sizeof *types };
-static const char *const type_names[TYPES] = {"ball", "ellipsoid", "box", "half space", "polytope", "cylinder", "cone", "capsule"};
+static const char *const type_names[TYPES] = {"ball",     "ellipsoid", "box",  "half space",
+                                              "polytope", "cylinder",  "cone", "capsule"};
 
 /* A body's radius is that of a ball around it. A skin's depth is extinction times radius. */
 typedef struct skin {
@@ -116,11 +118,10 @@ static nebel_snapshot *commit_skin(const skin *s, uint64_t seed)
 {
     const double extinction = s->depth / s->radius;
     uint64_t state = seed;
-    nebel_volume_desc volume = {
-        .shape = shape_of(s, &state),
-        .extinction = {extinction, .8 * extinction, .5 * extinction},
-        .albedo = {.9, .9, .8},
-        .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .4}};
+    nebel_volume_desc volume = {.shape = shape_of(s, &state),
+                                .extinction = {extinction, .8 * extinction, .5 * extinction},
+                                .albedo = {.9, .9, .8},
+                                .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .4}};
     nebel_sun sun = {.irradiance = {3, 3, 2}};
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;
@@ -172,8 +173,8 @@ static void judge(const skin *s, const nebel_snapshot *snapshot, uint64_t seed)
         if (off <= 1. / 255) continue;
         wrong++;
         print_message("%s, %s, %s, seed %llu, ray %d, radius %g, depth %g: off by %g: light %g for %g\n",
-                      type_names[s->kind], light_names[s->by_lamps], eye_names[s->place], (unsigned long long)seed, i, s->radius, s->depth,
-                      off, (double)answers[i].in_scattering[0], is[0]);
+                      type_names[s->kind], light_names[s->by_lamps], eye_names[s->place], (unsigned long long)seed, i,
+                      s->radius, s->depth, off, (double)answers[i].in_scattering[0], is[0]);
     }
 }
 
@@ -193,7 +194,8 @@ static void try_light(int by_lamps, int seeds)
 {
     char defines[128];
     tracer t;
-    snprintf(defines, sizeof defines, "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n", features_of_all(by_lamps));
+    snprintf(defines, sizeof defines, "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n",
+             features_of_all(by_lamps));
     open_tracer(&t, NB_GL_330, BLOCK, defines, trace_body);
     for (int i = 0; i < seeds; i++) {
         const uint64_t seed = (uint64_t)i + 1;
