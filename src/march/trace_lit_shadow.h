@@ -119,7 +119,7 @@ static flat_bounds no_bounds(const packet *rays, nb_wvec3 light, int is_lamp, co
     f.place = is_lamp ? nb_wsub3(local.p, f.light) : local.p;
     f.a[0] = NB_W(0.0);
     f.b[0] = NB_W(-1.0);
-    f.c[0] = NB_W(is_lamp ? -1.0 : 0.0);
+    f.c[0] = is_lamp ? NB_W(-1.0) : NB_W(0.0);
     f.count = 1;
     return f;
 }
