@@ -25,6 +25,11 @@ class PicturesTest(ViewTest):
         self.assertLess(float(re.search(r"RMSE: (\S+)", compared)[1]), 1e-4, "bytes are rounded in the same pattern")
         viewer.end()
 
+    def test_picture_and_list_need_a_file_each(self):
+        done = nebel("view", self.scene, "--screenshot", "one.png", "--controls", "./one.png", cwd=self.folder)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("need a file each", done.err)
+
     def test_screenshot_of_the_window(self):
         done = nebel("view", self.scene, "--size", "560x420", "--screenshot", "window.png", cwd=self.folder,
                      env={"DISPLAY": self.screen.name})

@@ -155,6 +155,29 @@ static void test_views_that_cannot_be(void **state)
     }
 }
 
+/* What Assimp would read without a word, or crash on. */
+static void test_numbers_that_cannot_be(void **state)
+{
+    (void)state;
+    static const char stride[] = "has a byteStride that is no multiple of 4 from 4 to 252";
+    static const char *const cases[][2] = {
+        {NO_BUFFER("\"buffer\": 0, \"byteLength\": 36, \"byteStride\": 4294967292"), stride},
+        {NO_BUFFER("\"buffer\": 0, \"byteLength\": 36, \"byteStride\": 6"), stride},
+        {NO_BUFFER("\"buffer\": 0, \"byteLength\": 36, \"byteStride\": -4"), stride},
+        {NO_BUFFER("\"buffer\": 0, \"byteLength\": 36, \"byteOffset\": -8"),
+         "bufferViews[0] has an offset or a length"},
+        {NO_BUFFER("\"buffer\": 0, \"byteLength\": 36.5"), "bufferViews[0] has an offset or a length"},
+        {"\"accessors\": [{\"byteOffset\": -8, \"componentType\": 5126, \"count\": 3, \"type\": \"VEC3\"}]",
+         "accessors[0] has a byteOffset or a count"},
+        {"\"skins\": [{\"joints\": [0]}]", "skins[0] has no inverseBindMatrices"},
+    };
+    write_bytes("a.bin", (const char[36]){0}, 36);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        write_gltf("", cases[i][0]);
+        assert_broken("\"file\": \"a.gltf\"", NEBEL_ERROR_FORMAT, cases[i][1]);
+    }
+}
+
 /* Whole numbers of four bytes are read as well, though no extension allows them. */
 static void test_long_integers(void **state)
 {
@@ -267,13 +290,10 @@ static void test_what_is_not_decoded_in_process(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sparse_integers),
-        cmocka_unit_test(test_sparse_integers_that_cannot_be),
-        cmocka_unit_test(test_views_that_cannot_be),
-        cmocka_unit_test(test_long_integers),
-        cmocka_unit_test(test_names_that_lead_out),
-        cmocka_unit_test(test_data_that_are_none),
-        cmocka_unit_test(test_what_is_not_decoded_in_process),
+        cmocka_unit_test(test_sparse_integers),        cmocka_unit_test(test_sparse_integers_that_cannot_be),
+        cmocka_unit_test(test_numbers_that_cannot_be), cmocka_unit_test(test_views_that_cannot_be),
+        cmocka_unit_test(test_long_integers),          cmocka_unit_test(test_names_that_lead_out),
+        cmocka_unit_test(test_data_that_are_none),     cmocka_unit_test(test_what_is_not_decoded_in_process),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder_tree);
 }

@@ -113,9 +113,35 @@ FILE *nb_target_open_list(const char *path)
     return stream;
 }
 
+static const char *name_in_folder(const char *path)
+{
+    const char *const slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+static int stat_folder(const char *path, struct stat *status)
+{
+    char folder[4096];
+    const int size = (int)(name_in_folder(path) - path);
+    if (size >= (int)sizeof folder) return -1;
+    snprintf(folder, sizeof folder, "%.*s", size > 0 ? size : 1, size > 0 ? path : ".");
+    return stat(folder, status);
+}
+
+/* Whether both are one file, or will be once they are there. */
+static int will_be_same(const char *path, const char *other)
+{
+    struct stat a, b;
+    if (nb_target_is_same(path, other)) return 1;
+    return strcmp(name_in_folder(path), name_in_folder(other)) == 0 && stat_folder(path, &a) == 0 &&
+           stat_folder(other, &b) == 0 && a.st_dev == b.st_dev && a.st_ino == b.st_ino;
+}
+
 int nb_target_check_window(const char *picture, const char *list, const char *scene, const nebel_scene_data *contents)
 {
     int status = picture != NULL ? nb_target_spare(picture, scene, contents) : NB_DONE;
     if (status == NB_DONE && list != NULL) status = nb_target_spare(list, scene, contents);
+    if (status == NB_DONE && list != NULL && picture != NULL && will_be_same(picture, list))
+        return nb_report_failure("cannot write \"%s\": picture and list of controls need a file each", list);
     return status == NB_DONE && list != NULL ? check_list(list) : status;
 }

@@ -89,7 +89,7 @@ typedef struct nb_gltf_data {
     nb_gltf_view *views;
     nb_gltf_accessor *accessors;
     nb_gltf_buffer *buffers;
-    size_t view_count, accessor_count, buffer_count;
+    size_t view_count, accessor_count, buffer_count, skin_count;
     size_t view_capacity, accessor_capacity, buffer_capacity;
     uint32_t *attributes; /* accessors that primitives name */
     size_t attribute_count, attribute_capacity;

@@ -55,6 +55,12 @@ static int64_t find_whole(const nb_json *json, const nb_json_node *object, const
     return (double)whole == node->number ? whole : fallback;
 }
 
+/* Whether it is a whole number from 0 on, or not there. */
+static bool is_whole(const nb_json *json, const nb_json_node *object, const char *key)
+{
+    return find(json, object, key) == NULL || find_whole(json, object, key, -1) >= 0;
+}
+
 static int find_choice(const nb_json *json, const nb_json_node *object, const char *key, const char *const *names,
                        int count)
 {
@@ -171,6 +177,12 @@ static bool take_packed(nb_json *json, const nb_json_node *node, const nb_gltf_d
     return true;
 }
 
+/* What glTF 2.0 allows; `byteStride` of what is packed may be less. */
+static bool is_stride(uint64_t stride)
+{
+    return stride >= 4 && stride <= 252 && stride % 4 == 0;
+}
+
 static bool take_view(nb_json *json, const nb_json_node *node, nb_gltf_data *data)
 {
     void *views = data->views;
@@ -180,6 +192,12 @@ static bool take_view(nb_json *json, const nb_json_node *node, nb_gltf_data *dat
     view->span = span_of(node);
     view->range = find_range(json, node);
     view->stride = (uint64_t)find_whole(json, node, "byteStride", 0);
+    if (!is_whole(json, node, "byteOffset") || !is_whole(json, node, "byteLength"))
+        return nb_json_stop(json, nb_gltf_fail(data, "bufferViews", data->view_count - 1,
+                                               "has an offset or a length that is no whole number from 0 on"));
+    if (!is_whole(json, node, "byteStride") || (view->stride != 0 && !is_stride(view->stride)))
+        return nb_json_stop(json, nb_gltf_fail(data, "bufferViews", data->view_count - 1,
+                                               "has a byteStride that is no multiple of 4 from 4 to 252"));
     const nb_json_node *packed = find(json, find(json, node, "extensions"), MESHOPT);
     return packed == NULL || data->load->unpack == NULL || take_packed(json, packed, data, view);
 }
@@ -205,6 +223,9 @@ static bool take_accessor(nb_json *json, const nb_json_node *node, nb_gltf_data 
     data->accessors = accessors;
     if (accessor == NULL) return fail_memory(json, node);
     accessor->span = span_of(node);
+    if (!is_whole(json, node, "byteOffset") || !is_whole(json, node, "count"))
+        return nb_json_stop(json, nb_gltf_fail(data, "accessors", data->accessor_count - 1,
+                                               "has a byteOffset or a count that is no whole number from 0 on"));
     accessor->view = find_whole(json, node, "bufferView", -1);
     accessor->offset = (uint64_t)find_whole(json, node, "byteOffset", 0);
     accessor->count = (uint64_t)find_whole(json, node, "count", 0);
@@ -261,9 +282,20 @@ static bool take_mesh(nb_json *json, const nb_json_node *mesh, nb_gltf_data *dat
     return true;
 }
 
+/* Matrices are optional in glTF 2.0, but Assimp takes them for granted. */
+static bool take_skin(nb_json *json, const nb_json_node *skin, nb_gltf_data *data)
+{
+    data->skin_count++;
+    if (find(json, skin, "inverseBindMatrices") != NULL) return true;
+    return nb_json_stop(json,
+                        nb_gltf_fail(data, "skins", data->skin_count - 1,
+                                     "has no inverseBindMatrices, which glTF may leave out but its reader needs"));
+}
+
 /* ---- the text -------------------------------------------------------------------------------- */
 
-static const char *const streamed[] = {"buffers", "bufferViews", "accessors", "meshes", "nodes", "images", NULL};
+static const char *const streamed[] = {"buffers", "bufferViews", "accessors", "meshes",
+                                       "nodes",   "images",      "skins",     NULL};
 
 static bool take(nb_json *json, const nb_json_node *value, void *user)
 {
@@ -279,6 +311,7 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
     if (nb_json_has_key(parent, "buffers")) return take_buffer(json, value, data);
     if (nb_json_has_key(parent, "bufferViews")) return take_view(json, value, data);
     if (nb_json_has_key(parent, "accessors")) return take_accessor(json, value, data);
+    if (nb_json_has_key(parent, "skins")) return take_skin(json, value, data);
     return !nb_json_has_key(parent, "meshes") || take_mesh(json, value, data);
 }
 
