@@ -591,6 +591,45 @@ static void test_a_leaning_edge_is_even(void **state)
     test_picture_free(&picture);
 }
 
+/* A wall of 4 m across the view, on ground of the given half width, in 5 m of fog that takes sunlight away. */
+static void render_wall(double half_width, test_picture *picture)
+{
+    static const float wall[12] = {0, 0, -50, 0, 0, 50, 0, 4, 50, 0, 4, -50};
+    const nebel_volume_desc mist = {.shape = {.type = NEBEL_SHAPE_HALF_SPACE, .point = {0, 5, 0}, .normal = {0, 1, 0}},
+                                    .extinction = {.1, .1, .1}};
+    float ground[12];
+    nebel_mesh meshes[2] = {test_square(), test_square()};
+    for (int i = 0; i < 12; i++) ground[i] = (float)half_width * test_square_positions[i];
+    meshes[0].positions = ground;
+    meshes[1].positions = wall;
+    const nebel_scene_data scene = {
+        .mesh_count = 2, .meshes = meshes, .has_sun = 1, .sun_direction = {-.6, .8, 0}, .sun_irradiance = {3, 3, 3}};
+    nebel_camera camera = test_camera(.3, 20, .2, .3, 0, .2);
+    camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    camera.up[1] = 0;
+    camera.up[2] = -1;
+    nebel_snapshot *fog = test_fog(1, &mist);
+    test_render(&scene, fog, &plain, &camera, 1, picture);
+    nebel_release_snapshot(fog);
+}
+
+/* Triangles of 1e6 m lie in their fog, and in the shadow of what stands on them, as those of 10 m do. */
+static void test_large_ground_is_lit_as_small_ground(void **state)
+{
+    (void)state;
+    test_picture small = test_picture_make(40, 40), large = test_picture_make(40, 40);
+    render_wall(10, &small);
+    assert_true(test_color(&small, 25, 3)[0] == 0 && test_color(&small, 5, 3)[0] > .1f);
+    for (double half_width = 100; half_width < 2e7; half_width *= 10) {
+        render_wall(half_width, &large);
+        for (uint32_t i = 0; i < 40 * 40; i++)
+            for (int c = 0; c < 3; c++)
+                assert_float_equal(test_color(&large, i % 40, i / 40)[c], test_color(&small, i % 40, i / 40)[c], 1e-4);
+    }
+    test_picture_free(&small);
+    test_picture_free(&large);
+}
+
 static void test_means_of_planes_add_up(void **state)
 {
     (void)state;
@@ -639,6 +678,7 @@ int main(void)
         cmocka_unit_test(test_samples_are_stratified),
         cmocka_unit_test(test_an_edge_through_a_pixel_covers_half_of_it),
         cmocka_unit_test(test_a_leaning_edge_is_even),
+        cmocka_unit_test(test_large_ground_is_lit_as_small_ground),
         cmocka_unit_test(test_means_of_planes_add_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

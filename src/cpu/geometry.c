@@ -1,6 +1,7 @@
 #include "geometry.h"
 
 #include "base/holes.h"
+#include "base/vector.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -99,10 +100,37 @@ static void set_bounds(nb_surface *surface)
     }
 }
 
+/* Triangles of an edge of a 16th of their surface are few enough to be looked at one by one. */
+#define COARSE 16.0f
+
+double nb_surface_distance(const nb_surface *surface, uint32_t triangle, const float start[3], const float unit[3],
+                           double *cosine)
+{
+    const nebel_mesh *const mesh = surface->mesh;
+    const uint32_t *const index = mesh->indices + 3 * (size_t)triangle;
+    double a[3], b[3], normal[3], height = 0, rise = 0;
+    for (int k = 0; k < 3; k++) {
+        const double corner = (double)mesh->positions[3 * (size_t)index[0] + (size_t)k];
+        a[k] = (double)mesh->positions[3 * (size_t)index[1] + (size_t)k] - corner;
+        b[k] = (double)mesh->positions[3 * (size_t)index[2] + (size_t)k] - corner;
+    }
+    nb_vector_cross(a, b, normal);
+    for (int k = 0; k < 3; k++) {
+        const double corner = (double)mesh->positions[3 * (size_t)index[0] + (size_t)k];
+        height += normal[k] * (corner + surface->shift[k] - (double)start[k]);
+        rise += normal[k] * (double)unit[k];
+    }
+    if (cosine != NULL) *cosine = fabs(rise) / nb_vector_length(normal);
+    return height / rise;
+}
+
 static void measure(nb_geometry *geometry, nb_surface *surface)
 {
     set_bounds(surface);
     surface->longest_edge = longest_edge(surface->mesh);
+    float widest = 0;
+    for (int i = 0; i < 3; i++) widest = fmaxf(widest, surface->high[i] - surface->low[i]);
+    surface->is_coarse = COARSE * surface->longest_edge > widest;
     for (int i = 0; i < 3; i++) {
         const float radius = fmaxf(-surface->low[i], surface->high[i]);
         geometry->largest_radius = fmax(geometry->largest_radius, (double)radius);
@@ -272,7 +300,7 @@ static void world_bounds(const nb_geometry *geometry, double low[3], double high
 static void move_positions(const double origin[3], nb_surface *surface)
 {
     const nebel_mesh *mesh = surface->mesh;
-    double shift[3];
+    double *const shift = surface->shift;
     for (int i = 0; i < 3; i++) shift[i] = mesh->origin[i] - origin[i];
     for (size_t v = 0; v < mesh->vertex_count; v++) {
         for (size_t i = 0; i < 3; i++) {
@@ -302,6 +330,23 @@ static void drop_holes(const struct RTCFilterFunctionNArguments *met)
     }
 }
 
+/* Shadow rays start beside the triangle that they leave. Embree may meet it, or its neighbours in the same plane, all the same,
+ * within the rounding of its corners. Rows of N numbers of the rays: start, least t, direction, time, t of what is met. */
+static void drop_false_shadows(const struct RTCFilterFunctionNArguments *met)
+{
+    const nb_surface *surface = met->geometryUserPtr;
+    const float *rays = (const float *)met->ray;
+    const unsigned *triangles = (const unsigned *)met->hit + 5 * (size_t)met->N;
+    const size_t n = met->N;
+    for (size_t i = 0; i < n; i++) {
+        if (met->valid[i] == 0 || rays[8 * n + i] > 0x1p-16f * surface->longest_edge) continue;
+        const float start[3] = {rays[i], rays[n + i], rays[2 * n + i]};
+        const float unit[3] = {rays[4 * n + i], rays[5 * n + i], rays[6 * n + i]};
+        if (!(nb_surface_distance(surface, triangles[i], start, unit, NULL) > 0)) met->valid[i] = 0;
+    }
+    if (surface->mask != NULL) drop_holes(met);
+}
+
 static nebel_result attach(nb_geometry *geometry, size_t number)
 {
     const nb_surface *surface = &geometry->surfaces[number];
@@ -311,11 +356,10 @@ static nebel_result attach(nb_geometry *geometry, size_t number)
                                3 * sizeof(float), surface->mesh->vertex_count);
     rtcSetSharedGeometryBuffer(triangles, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, surface->mesh->indices, 0,
                                3 * sizeof(uint32_t), surface->mesh->triangle_count);
-    if (surface->mask != NULL) {
-        rtcSetGeometryUserData(triangles, &geometry->surfaces[number]);
-        rtcSetGeometryIntersectFilterFunction(triangles, drop_holes);
-        rtcSetGeometryOccludedFilterFunction(triangles, drop_holes);
-    }
+    rtcSetGeometryUserData(triangles, &geometry->surfaces[number]);
+    if (surface->mask != NULL) rtcSetGeometryIntersectFilterFunction(triangles, drop_holes);
+    if (surface->mask != NULL || surface->is_coarse)
+        rtcSetGeometryOccludedFilterFunction(triangles, surface->is_coarse ? drop_false_shadows : drop_holes);
     rtcCommitGeometry(triangles);
     rtcAttachGeometryByID(geometry->scene, triangles, (unsigned)number);
     rtcReleaseGeometry(triangles);

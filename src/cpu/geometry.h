@@ -28,7 +28,9 @@ typedef struct nb_surface {
     float *positions;      /* 3 per vertex, and one float more: Embree loads four */
     int16_t *ends;         /* 4 per vertex: like those of a node, in the picture that is being rasterized */
     float low[3], high[3]; /* corners of the mesh around its own origin */
+    double shift[3];       /* what its positions have been moved by */
     float longest_edge;
+    int is_coarse;       /* it has triangles nearly as large as itself: see nb_surface_distance */
     size_t first_vertex; /* among the vertices of all surfaces */
     uint32_t first_id;   /* of its triangles in the geometry, a multiple of NB_FAN */
 } nb_surface;
@@ -52,6 +54,14 @@ typedef struct nb_geometry {
     nb_node *levels[NB_LEVELS]; /* of the tree: parts of `nodes`, leaves first; a node is on two lines of the cache */
     size_t node_counts[NB_LEVELS];
 } nb_geometry;
+
+/* Of an edge, over the way to its triangle: from here on the rounding of corners may be some 1e-5 of that way. */
+#define NB_LONG_EDGE 64.0f
+
+/* How far the plane of a triangle is from a place of the geometry along a direction of length 1, found in double: Embree
+ * tells that from differences of floats as large as the triangle. `cosine` of the angle to the normal, if not NULL. */
+double nb_surface_distance(const nb_surface *surface, uint32_t triangle, const float start[3], const float unit[3],
+                           double *cosine);
 
 /* The surface of the triangle with the given ID. */
 static inline uint32_t nb_owner_of(const nb_geometry *geometry, uint32_t id)

@@ -1,7 +1,5 @@
 #include "hits.h"
 
-#include "base/vector.h"
-
 #include <math.h>
 #include <string.h>
 
@@ -76,9 +74,6 @@ void nb_hits_trace(RTCScene scene, const nb_rays *rays, const int *active, nb_pa
     }
 }
 
-/* Of an edge, over the distance of its plane: from here on rounding of corners may be some 1e-5 of the way along any ray. */
-#define LONG_EDGE 64.0f
-
 static int is_large(const nb_geometry *geometry, const nb_rays *rays, const nb_hits *hits, int i)
 {
     float rise = 0, length2 = 0;
@@ -88,39 +83,20 @@ static int is_large(const nb_geometry *geometry, const nb_rays *rays, const nb_h
         length2 += hits->normal[k][i] * hits->normal[k][i];
     }
     const float distance = hits->t[i] * fabsf(rise), edge = geometry->surfaces[hits->surface[i]].longest_edge;
-    return LONG_EDGE * distance < edge * sqrtf(length2);
-}
-
-/* From the start of ray i to the plane of the triangle; `cosine` of the angle between the ray and the normal. */
-static double way_to_plane(const nb_geometry *geometry, const nb_rays *rays, const nb_hits *hits, int i, double *cosine)
-{
-    const nebel_mesh *const mesh = geometry->surfaces[hits->surface[i]].mesh;
-    const uint32_t *const index = mesh->indices + 3 * (size_t)hits->triangle[i];
-    double a[3], b[3], normal[3], height = 0, rise = 0, length2 = 0;
-    for (int k = 0; k < 3; k++) {
-        const double corner = (double)mesh->positions[3 * (size_t)index[0] + (size_t)k];
-        a[k] = (double)mesh->positions[3 * (size_t)index[1] + (size_t)k] - corner;
-        b[k] = (double)mesh->positions[3 * (size_t)index[2] + (size_t)k] - corner;
-    }
-    nb_vector_cross(a, b, normal);
-    for (int k = 0; k < 3; k++) {
-        const double corner = (double)mesh->positions[3 * (size_t)index[0] + (size_t)k];
-        height += normal[k] * (corner + (mesh->origin[k] - geometry->origin[k]) - (double)rays->start[k][i]);
-        rise += normal[k] * (double)rays->unit[k][i];
-        length2 += normal[k] * normal[k];
-    }
-    *cosine = fabs(rise) / sqrt(length2);
-    return height / rise;
+    return NB_LONG_EDGE * distance < edge * sqrtf(length2);
 }
 
 void nb_hits_refine(const nb_geometry *geometry, const nb_rays *rays, nb_hits *hits)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         if (!is_large(geometry, rays, hits, i)) continue;
-        const float edge = geometry->surfaces[hits->surface[i]].longest_edge;
+        const nb_surface *const surface = &geometry->surfaces[hits->surface[i]];
+        const float start[3] = {rays->start[0][i], rays->start[1][i], rays->start[2][i]};
+        const float unit[3] = {rays->unit[0][i], rays->unit[1][i], rays->unit[2][i]};
         double cosine;
-        const double t = way_to_plane(geometry, rays, hits, i, &cosine);
-        if (t > 0 && fabs(t - (double)hits->t[i]) * cosine <= 0x1p-20 * (double)edge) hits->t[i] = (float)t;
+        const double t = nb_surface_distance(surface, hits->triangle[i], start, unit, &cosine);
+        if (t > 0 && fabs(t - (double)hits->t[i]) * cosine <= 0x1p-20 * (double)surface->longest_edge)
+            hits->t[i] = (float)t;
     }
 }
 

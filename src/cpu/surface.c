@@ -118,6 +118,7 @@ static void fetch(const nb_geometry *geometry, const nebel_scene_data *scene, co
         const nb_surface *surface = &geometry->surfaces[hits->surface[i]];
         const nebel_mesh *mesh = surface->mesh;
         points->edge[i] = surface->longest_edge;
+        if (surface->is_coarse) points->edge[i] = fminf(points->edge[i], NB_LONG_EDGE * hits->t[i]);
         for (int k = 0; k < 3; k++) points->reflectance[k][i] = mesh->base_color[k];
         if (mesh->normals != NULL) set_smooth_normal(mesh, hits, i, points);
         if (mesh->texture >= 0 && mesh->uvs != NULL) {
@@ -189,7 +190,8 @@ static void set_rises(const nb_geometry *geometry, const nb_hits *hits, nb_point
 }
 
 /* Starts of shadow rays. A hit lies off the plane of its triangle by a few rounding errors (2^-24) of the numbers that
- * went into it: the way to it, its coordinates, and the edges of the triangle. 2^-20 of their sum is on the safe side.
+ * went into it: the way to it, its coordinates, and the edges of the triangle. 2^-20 of their sum is on the safe side. Edges
+ * that are longer yet were left out by nb_hits_refine, and are again where the shadow ray meets their triangle.
  */
 NB_CLONES static void lift(const nb_rays *rays, const nb_hits *hits, nb_points *points)
 {
