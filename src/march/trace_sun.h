@@ -157,6 +157,8 @@ typedef struct sun_step {
     nb_real noise;                /* of that, what no shorter step makes less */
     nb_real steepness;            /* see unseen_light */
     nb_real drop;                 /* largest loss of transmittance over it */
+    nb_real most;                 /* no more light is in it */
+    nb_mask is_rough;             /* it is in voxels */
     nb_wmask knows_start;         /* the way to the light from its start is known */
     nb_wmask to_stop;             /* it ends where the light may have a kink or a jump */
     light_depth at_start, at_end; /* the ways to the light from both ends */
@@ -370,6 +372,7 @@ static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const
     const lit_sum sum = sum_nodes_of_step(at, most, count_media(m), sun->snapshot->is_gray);
     take_sum(s, &sum);
     const nb_mask rough = lanes_in_voxels(m);
+    s->is_rough = rough;
     if (nb_any(rough))
         s->error = nb_select(rough, nb_max(s->error * VOXEL_CAUTION, VOXEL_CAUTION * off_cubics(at)), s->error);
     if (nb_any(kinked)) s->error = nb_select(kinked, nb_max(s->error, KINK_CAUTION * off_cubics(at)), s->error);
@@ -393,6 +396,7 @@ static void limit_light(const nb_real before[3], const nb_real most[3], sun_step
         crude = nb_max(crude, limit);
     }
     s->error = nb_min(s->error, crude);
+    s->most = crude;
 }
 
 static void limit_step(const march *m, const nb_real before[3], sun_step *s)
@@ -460,6 +464,7 @@ static sun_step begin_step(const sun_walk *w, nb_real length, nb_wmask stops)
                   .to_stop = stops,
                   .at_start = w->way,
                   .at_end = w->way,
+                  .is_rough = nb_mask_false,
                   .amount = NB_W(0.0),
                   .amount_error = NB_F(0.0)};
     for (int c = 0; c < 3; c++) {
@@ -558,6 +563,10 @@ static nb_real length_of_next(const sun_step *s, nb_real guess, nb_mask taken, n
     return nb_select(taken, longer, shorter);
 }
 
+/* Light may come to voxels through gaps that no node sees, where all nodes are in the dark. What is told is at least this
+ * part of what a step may add. */
+#define GAP_SHARE REAL(1.0 / 3)
+
 static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide end, nb_wmask turns, nb_mask taken,
                           nb_real allowed)
 {
@@ -567,7 +576,9 @@ static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide e
         w->depth[c] = nb_select(taken, s->depth[c], w->depth[c]);
         w->depth_error[c] = nb_select(taken, s->depth_error[c], w->depth_error[c]);
     }
-    const nb_real error = s->error * REAL(ESTIMATE_MARGIN) + s->rounding + largest(g->radiance) * NB_EPSILON;
+    const nb_real gaps = nb_select(s->is_rough, nb_min(s->most, allowed) * GAP_SHARE, NB_F(0.0));
+    const nb_real told = nb_max(s->error * REAL(ESTIMATE_MARGIN), gaps);
+    const nb_real error = told + s->rounding + largest(g->radiance) * NB_EPSILON;
     g->radiance_error = g->radiance_error + nb_select(taken, error, NB_F(0.0));
     const nb_wmask moved = nb_widen_mask(taken);
     const nb_wide along = w->along + s->amount;

@@ -101,6 +101,7 @@ static sun_step try_grid_step(sunlight *sun, const march *m, const gathered *g, 
     const nb_mask filled = nb_and(lanes, nodes.amount > NB_F(0.0));
     const nb_real zero = NB_F(0.0);
     sun_step s = begin_step(w, length, nb_wmask_true);
+    s.is_rough = nb_mask_true;
     s.amount = nb_widen(nodes.amount);
     s.amount_error = nodes.error;
     depth_after(k, g, w->along + s.amount, s.depth);
