@@ -633,6 +633,20 @@ static void pass_shadow(const shade *shadow, const march *m, const sun_piece *s,
     w->t = nb_wselect(dark, end, w->t);
 }
 
+/* Light may run along the face in which a piece begins or ends: within the rounding of places there a way is inside or beside
+ * it. What that does to light of `most` at either end, where fog is so dense that it matters. */
+static nb_real doubt_at_faces(const march *m, const piece *p, const gathered *g, nb_real most)
+{
+    const nb_wide size = sum_of_sizes(m->rays.origin);
+    const nb_wide places[2] = {p->start, nb_wselect(p->end < NB_W(0.5) * NB_WFAR, p->end, p->start)};
+    nb_real doubt = NB_F(0.0);
+    for (int i = 0; i < 2; i++) {
+        const nb_real off = nb_narrow((size + nb_wabs(places[i])) * (NB_W(8.0) * NB_WEPSILON));
+        doubt = doubt + nb_min(largest(sunlit_fog(m, places[i]).extinction) * off, NB_F(1.0));
+    }
+    return largest(g->transmittance) * most * doubt;
+}
+
 /* Adds the sunlight of a piece in the lanes that are lit; `g` is what was gathered before it. A lane's steps are its own.
  */
 static void gather_sunlight(sunlight *sun, const march *m, const piece *p, nb_mask lit, gathered *g)
@@ -644,6 +658,8 @@ static void gather_sunlight(sunlight *sun, const march *m, const piece *p, nb_ma
         return;
     }
     const sun_piece s = sun_piece_of(m, p, g, is_grid_alone(sun) ? nb_mask_false : lanes_in_voxels(m));
+    const nb_real faces = doubt_at_faces(m, p, g, sunlit_fog(m, p->start).most);
+    g->radiance_error = g->radiance_error + nb_select(lit, faces, NB_F(0.0));
     sun_walk w = begin_walk(m, p, g, lit);
     while (nb_wany(w.lanes)) {
         pass_toggles(&sun->shade, w.t, w.lanes);
