@@ -569,7 +569,8 @@ typedef struct nebel_ray {
 typedef struct nebel_light {
     double transmittance[3]; /* RGB, 0..1 */
     double in_scattering[3]; /* RGB radiance, >= 0 */
-    double error; /* bound of the absolute error of the six numbers. In double never more than the tolerance and 1e-8,
+    double
+        error; /* bound of the absolute error of the six numbers. In double hardly ever more than the tolerance and 1e-8,
                      in float than the tolerance and 1e-4 but for one of a thousand rays of the hardest kind, which
                      touch a surface or run level with one to the last bits; at the silhouette of a body whose optical
                      depth is in the thousands one of fourteen has up to 3e-3. Transmittance below the smallest normal
