@@ -16,7 +16,8 @@
 
 enum { RAYS = LIT_RAYS_EACH, CLOSE_EVERY = 24 };
 
-static uint64_t first_seed = 1;
+#define FIRST_SEED 1
+static uint64_t first_seed = FIRST_SEED;
 static size_t ray_count;
 
 typedef enum way_to_ask { ASK_DOUBLE, ASK_FINE, ASK_FLOAT, ASK_COUNT } way_to_ask;
@@ -227,7 +228,7 @@ static size_t print_tallies(void)
  * ray, and where it shows one that is not there the closer look says so. */
 #define MOST_OVERSEEN 0.005
 
-/* Fog in which an error once was too small. */
+/* Fog in which an error once was too small: tried where no other seed is asked for. */
 static const struct {
     lit_kind kind;
     lit_source source;
@@ -244,7 +245,8 @@ static void errors_of_lit_fog_are_never_too_small(void **state)
 {
     (void)state;
     size_t each = 0;
-    for (size_t i = 0; i < sizeof found / sizeof *found; i++) try_fog(found[i].kind, found[i].source, found[i].seed);
+    for (size_t i = 0; i < sizeof found / sizeof *found && first_seed == FIRST_SEED; i++)
+        try_fog(found[i].kind, found[i].source, found[i].seed);
     for (int kind = 0; kind < LIT_KIND_COUNT; kind++)
         each += (size_t)(LIT_SOURCE_COUNT * lit_ray_count((lit_kind)kind));
     for (uint64_t seed = 0; seed < (ray_count + each - 1) / each; seed++)
