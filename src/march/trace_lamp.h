@@ -244,8 +244,8 @@ static void gather_lamplight(sunlight *sun, const march *m, const piece *p, gath
         const nb_mask faint = most <= REAL(FAINT_SHARE * pass.share);
         g->radiance_error = g->radiance_error + nb_select(nb_and(faint, lit), most * drop, NB_F(0.0));
         const nb_mask lanes = nb_and(lit, nb_not(faint));
-        const nb_real faces = doubt_at_faces(m, p, &s.before, most);
-        g->radiance_error = g->radiance_error + nb_select(lanes, faces, NB_F(0.0));
+        const nb_real faces = largest(s.before.transmittance) * most;
+        g->radiance_error = g->radiance_error + doubt_at_faces(sun, m, &pass, p, faces, lanes);
         if (nb_any(lanes)) walk_past_lamp(sun, m, &pass, &s, lanes, g);
     }
 }

@@ -614,6 +614,9 @@ static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_wa
     w->left = w->left - NB_F(1.0);
 }
 
+/* Doubt at faces of less than this share of the tolerance is not looked into. */
+#define FACE_SHARE 0.01
+
 /* To where the sun comes back. */
 static void pass_shadow(const shade *shadow, const march *m, const sun_piece *s, sun_walk *w, nb_wmask dark)
 {
@@ -634,17 +637,33 @@ static void pass_shadow(const shade *shadow, const march *m, const sun_piece *s,
 }
 
 /* Light may run along the face in which a piece begins or ends: within the rounding of places there a way is inside or beside
- * it. What that does to light of `most` at either end, where fog is so dense that it matters. */
-static nb_real doubt_at_faces(const march *m, const piece *p, const gathered *g, nb_real most)
+ * it. What that does to light of `most` at t, in the lanes where fog is so dense that it matters. `pass` NULL: of the sun. */
+static nb_real doubt_at_face(sunlight *sun, const march *m, const struct lamp_pass *pass, nb_wide t, nb_real most,
+                             nb_mask lanes)
 {
-    const nb_wide size = sum_of_sizes(m->rays.origin);
-    const nb_wide places[2] = {p->start, nb_wselect(p->end < NB_W(0.5) * NB_WFAR, p->end, p->start)};
-    nb_real doubt = NB_F(0.0);
+    const nb_wide off = (sum_of_sizes(m->rays.origin) + nb_wabs(t)) * (NB_W(8.0) * NB_WEPSILON);
+    const nb_real skin = largest(sunlit_fog(m, t).extinction) * nb_narrow(off);
+    const nb_real doubt = nb_select(lanes, most * nb_min(skin, NB_F(1.0)), NB_F(0.0));
+    const nb_mask matters = doubt > REAL(FACE_SHARE * sun->share);
+    if (!nb_any(matters)) return doubt;
+    nb_real beside[2][3], change = NB_F(0.0);
     for (int i = 0; i < 2; i++) {
-        const nb_real off = nb_narrow((size + nb_wabs(places[i])) * (NB_W(8.0) * NB_WEPSILON));
-        doubt = doubt + nb_min(largest(sunlit_fog(m, places[i]).extinction) * off, NB_F(1.0));
+        const nb_wide place = i == 0 ? t - off : t + off;
+        const nb_wmask asked = nb_widen_mask(matters);
+        const light_depth way =
+            pass != NULL ? way_to_lamp(sun, m, pass, place, asked) : depth_to_sun(sun, m, place, asked);
+        map_channels(sun->snapshot, transmitted, way.depth, beside[i]);
     }
-    return largest(g->transmittance) * most * doubt;
+    for (int c = 0; c < 3; c++) change = nb_max(change, nb_abs(beside[1][c] - beside[0][c]));
+    return nb_select(matters, doubt * change, doubt);
+}
+
+/* At both ends of a piece. */
+static nb_real doubt_at_faces(sunlight *sun, const march *m, const struct lamp_pass *pass, const piece *p, nb_real most,
+                              nb_mask lanes)
+{
+    const nb_mask bounded = nb_and(lanes, nb_narrow_mask(p->end < NB_W(0.5) * NB_WFAR));
+    return doubt_at_face(sun, m, pass, p->start, most, lanes) + doubt_at_face(sun, m, pass, p->end, most, bounded);
 }
 
 /* Adds the sunlight of a piece in the lanes that are lit; `g` is what was gathered before it. A lane's steps are its own.
@@ -658,8 +677,8 @@ static void gather_sunlight(sunlight *sun, const march *m, const piece *p, nb_ma
         return;
     }
     const sun_piece s = sun_piece_of(m, p, g, is_grid_alone(sun) ? nb_mask_false : lanes_in_voxels(m));
-    const nb_real faces = doubt_at_faces(m, p, g, sunlit_fog(m, p->start).most);
-    g->radiance_error = g->radiance_error + nb_select(lit, faces, NB_F(0.0));
+    const nb_real most = largest(g->transmittance) * sunlit_fog(m, p->start).most;
+    g->radiance_error = g->radiance_error + doubt_at_faces(sun, m, NULL, p, most, lit);
     sun_walk w = begin_walk(m, p, g, lit);
     while (nb_wany(w.lanes)) {
         pass_toggles(&sun->shade, w.t, w.lanes);
