@@ -237,6 +237,7 @@ static const struct {
     {LIT_KIND_ELLIPSOID, LIT_BY_SUN, 777000011},     /* null rules that fall from degree to degree by chance */
     {LIT_KIND_EXCLUDED, LIT_BY_SUN, 777000160},      /* the way to the sun passes where surfaces of two bodies cross */
     {LIT_KIND_EXCLUDED, LIT_BY_SUN, 777000693},      /* it runs along the face of a soft box */
+    {LIT_KIND_EXCLUDED, LIT_BY_SUN, 20001579},       /* the way to the sun leaves a capsule where mantle and cap meet */
     {LIT_KIND_SMALL_CROWD, LIT_BY_LAMPS, 777000485}, /* the edge of a hard cone, where a step begins */
     {LIT_KIND_CROWD, LIT_BY_LAMPS, 365},             /* light in a fifth of a step, most of it hidden */
 };

@@ -127,9 +127,12 @@ static void note_round(sunlight *sun, const nb_leaf *leaf, const ways *s)
     if (leaf->type == NB_LEAF_BALL) {
         note_ball(sun, s, zero, WIDE(FRAME(leaf, radius)));
     } else if (leaf->type == NB_LEAF_CAPSULE) {
+        const nb_wide length = WIDE(FRAME(leaf, length));
         note_mantle(sun, s, one, NB_W(0.0));
         note_ball(sun, s, zero, one);
-        note_ball(sun, s, nb_wvec3(NB_W(0.0), NB_W(0.0), WIDE(FRAME(leaf, length))), one);
+        note_ball(sun, s, nb_wvec3(NB_W(0.0), NB_W(0.0), length), one);
+        note_rim(sun, s, NB_W(0.0), one); /* the curvature jumps where mantle and caps meet */
+        note_rim(sun, s, length, one);
     } else {
         const int cone = leaf->type == NB_LEAF_CONE;
         const nb_wide radius = cone ? WIDE(FRAME(leaf, radius)) : one;
