@@ -177,6 +177,15 @@ class CallingTest(Case):
         self.assertNotIn("\x1b", done.err)
         self.assertEqual(done.err.count("\n"), 1, done.err)
 
+    def test_names_in_scenes_cannot_steer_the_terminal(self):
+        volume = {"name": "a\x9b31m\x1b[2Jb\u00e4", "shape": {"type": "sphere", "center": [0, 0, 0], "radius": 1}, "extinction": 1, "source": 0}
+        done = nebel("info", self.write_scene("named.json", [volume]))
+        self.assert_done(done)
+        self.assertIn("fog[0] 'a", done.out)
+        self.assertIn("b\u00e4'", done.out)
+        self.assertNotIn("\x1b", done.out)
+        self.assertNotIn("\x9b", done.out)
+
     def test_help_to_a_full_disk_fails(self):
         with open("/dev/full", "w") as full:
             done = nebel("--help", stdout=full)

@@ -129,7 +129,7 @@ static void wrong_pictures_are_refused(void **state)
     expect_refused(MAP("missing.exr", ""), NEBEL_ERROR_FILE, "ambient.file: ");
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         write_picture("wrong.exr", WIDTH, HEIGHT, 3, colors, wrong[i]);
-        expect_refused(MAP("wrong.exr", ""), NEBEL_ERROR_VALUE, "ambient.file: environment map: pixel");
+        expect_refused(MAP("wrong.exr", ""), NEBEL_ERROR_VALUE, "wrong.exr: environment map: pixel");
     }
     write_picture("wrong.exr", WIDTH, HEIGHT, 2, colors, 1);
     expect_refused(MAP("wrong.exr", ""), NEBEL_ERROR_FORMAT, "has no channels R, G and B");

@@ -83,6 +83,25 @@ static void test_profiles_and_thin_fog(void **state)
     assert_true(find(&volume, &view).error < rounding * 1e6 / (2 * e) * .01);
 }
 
+/* 2^-22 of the distance at which it begins, times the extinction. */
+static void test_surfaces_in_fog(void **state)
+{
+    (void)state;
+    const nebel_view view = view_of(1, 0);
+    const double wanted = 2 * rounding * 1e3 * 5e4;
+    nebel_volume_desc volume = box(2, -5e4 - 2);
+    expect_near(find(&volume, &view).by_surface, wanted);
+    volume.shape = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE, .point = {9, 8, -5e4}, .normal = {0, 0, 3}};
+    expect_near(find(&volume, &view).by_surface, wanted);
+    volume.shape = (nebel_shape){.type = NEBEL_SHAPE_WORLD};
+    assert_true(find(&volume, &view).by_surface == 0); /* the eye is in it */
+    volume.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .base = -5e4, .scale_height = 10};
+    volume.density.below = NEBEL_BELOW_CONSTANT;
+    expect_near(find(&volume, &view).by_surface, wanted);
+    volume = box(2, 5e4); /* behind the eye */
+    assert_true(find(&volume, &view).by_surface == 0);
+}
+
 /* Whatever has no end gives numbers. */
 static void test_endless_fog(void **state)
 {
@@ -140,6 +159,7 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_narrow_fog),
                                        cmocka_unit_test(test_narrow_pixels),
                                        cmocka_unit_test(test_profiles_and_thin_fog),
+                                       cmocka_unit_test(test_surfaces_in_fog),
                                        cmocka_unit_test(test_endless_fog),
                                        cmocka_unit_test(test_what_does_not_count),
                                        cmocka_unit_test(test_errors)};

@@ -298,14 +298,23 @@ static const char *find_mistake(const nebel_scene_data *scene, const nebel_volum
     return NULL;
 }
 
+/* The start of a warning that is about volume i. */
+static void name_volume(const char *warning, const nebel_scene_data *scene, size_t i)
+{
+    char name[256];
+    (void)snprintf(name, sizeof name, "%s", scene->volume_names[i]);
+    nb_report_mask(name);
+    (void)printf("warning: %sfog[%zu]%s%s%s", warning, i, name[0] != '\0' ? " '" : "", name,
+                 name[0] != '\0' ? "'" : "");
+}
+
 static void warn_of_volumes(const nebel_scene_data *scene)
 {
     for (size_t i = 0; i < scene->volume_count; i++) {
         const char *const mistake = find_mistake(scene, &scene->volumes[i]);
         if (mistake == NULL) continue;
-        const char *const name = scene->volume_names[i];
-        (void)printf("warning: fog[%zu]%s%s%s %s\n", i, name[0] != '\0' ? " '" : "", name, name[0] != '\0' ? "'" : "",
-                     mistake);
+        name_volume("", scene, i);
+        (void)printf(" %s\n", mistake);
     }
 }
 
@@ -313,9 +322,8 @@ static void warn_of_darkness(const nebel_scene_data *scene)
 {
     const size_t endless = nb_find_endless(scene);
     if (endless == scene->volume_count) return;
-    const char *const name = scene->volume_names[endless];
-    (void)printf("warning: no sunlight reaches fog or models: fog[%zu]%s%s%s %s\n", endless,
-                 name[0] != '\0' ? " '" : "", name, name[0] != '\0' ? "'" : "", nb_endless_advice);
+    name_volume("no sunlight reaches fog or models: ", scene, endless);
+    (void)printf(" %s\n", nb_endless_advice);
 }
 
 /* Less than a metre is none: level scenes stand on the ground. */

@@ -5,6 +5,7 @@
 #include "output.h"
 
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -18,9 +19,28 @@ static void put(const char *text, size_t size)
     (void)nb_output_write(STDERR_FILENO, text, size);
 }
 
-static int is_control(unsigned char c)
+/* Bytes of the character of UTF-8 at the start of a text that ends with a 0; 0 where there is none, or a control character. */
+static size_t printable_size(const char *text)
 {
-    return c < 0x20 || c == 0x7f;
+    const unsigned char *const byte = (const unsigned char *)text;
+    if (byte[0] < 0x80) return byte[0] >= 0x20 && byte[0] != 0x7f;
+    const size_t size = byte[0] >= 0xf0 ? 4 : byte[0] >= 0xe0 ? 3 : 2;
+    uint32_t code = byte[0] & (0x7fu >> size);
+    for (size_t i = 1; i < size; i++) {
+        if ((byte[i] & 0xc0) != 0x80) return 0;
+        code = code << 6 | (byte[i] & 0x3fu);
+    }
+    static const uint32_t least[] = {[2] = 0xa0, [3] = 0x800, [4] = 0x10000};
+    return byte[0] < 0xf8 && code >= least[size] && code <= 0x10ffff && (code < 0xd800 || code > 0xdfff) ? size : 0;
+}
+
+void nb_report_mask(char *text)
+{
+    while (*text != '\0') {
+        const size_t size = printable_size(text);
+        if (size == 0) *text = '?';
+        text += size > 0 ? size : 1;
+    }
 }
 
 /* One write for the whole line: messages of several programs in a pipeline do not mix. */
@@ -36,9 +56,8 @@ static void write_line(const char *format, va_list arguments)
         memcpy(text + MESSAGE_SIZE - 1, cut, sizeof cut - 1);
         size = MESSAGE_SIZE - 1 + sizeof cut - 1;
     }
-    for (size_t i = 0; i < size; i++) {
-        if (is_control((unsigned char)text[i])) text[i] = '?';
-    }
+    text[size] = '\0';
+    nb_report_mask(text);
     text[size] = '\n';
     nb_report_status("");
     put(line, sizeof prefix - 1 + size + 1);

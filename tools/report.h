@@ -19,7 +19,10 @@ enum {
     NB_MISUSED = 2 /* the call was wrong */
 };
 
-/* "nebel: MESSAGE" on a line of its own. Control characters become '?', so that no file name can steer a terminal. */
+/* Bytes that are no printable character of UTF-8 become '?', so that no name in a file can steer a terminal. */
+void nb_report_mask(char *text);
+
+/* "nebel: MESSAGE" on a line of its own, masked. */
 void nb_report_message(const char *format, ...) NB_REPORT_PRINTF(1, 2);
 
 /* The same; returns NB_FAILED. */

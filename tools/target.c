@@ -87,6 +87,7 @@ int nb_target_replace(int file, const char *path, const char *text, size_t size)
     int error = is_whole && (lseek(file, 0, SEEK_SET) != 0 || ftruncate(file, 0) != 0) ? errno : 0;
     if (error == 0) error = nb_output_write(file, text, size);
     if (close(file) != 0 && error == 0) error = errno;
+    if (error != 0 && is_whole) (void)unlink(path); /* no half of it */
     return error == 0 ? NB_DONE : nb_report_failure("cannot write \"%s\": %s", path, strerror(error));
 }
 

@@ -6,7 +6,7 @@
  *
  * Along origin + t * direction, 0 <= t <= t_max (metres), every volume of fog has an extinction [1/m, RGB]: a shape
  * times a density profile times an amount. Volumes that overlap add. Where a closed form exists the answer is exact;
- * elsewhere it is integrated until a proven bound is below the tolerance, and `error` says what is left.
+ * elsewhere it is integrated until its error is below the tolerance, and `error` says what is left.
  *
  * A first program:
  *
@@ -570,7 +570,8 @@ typedef struct nebel_light {
     double transmittance[3]; /* RGB, 0..1 */
     double in_scattering[3]; /* RGB radiance, >= 0 */
     double
-        error; /* bound of the absolute error of the six numbers. In double hardly ever more than the tolerance and 1e-8,
+        error; /* of the six numbers, absolute: a bound; of light from the sun and lamps an estimate with a margin, which
+                     scripts/check_lit_truth.py tries on a million random rays. In double hardly ever more than the tolerance and 1e-8,
                      in float than the tolerance and 1e-4 but for one of a thousand rays of the hardest kind, which
                      touch a surface or run level with one to the last bits; at the silhouette of a body whose optical
                      depth is in the thousands one of fourteen has up to 3e-3. Transmittance below the smallest normal

@@ -336,10 +336,12 @@ nebel_result nebel_view_rays(const nebel_view *view, const nebel_depth_desc *dep
 typedef struct nebel_view_error {
     double error;              /* the sum of the next two */
     double by_width, by_pixel; /* because the volume is narrow for its distance; because pixels are */
-    double distance;           /* m: of its farthest place from the eye; of endless fog: of what is narrow */
-    double width;              /* m: the least between its faces, or over which its density changes; INFINITY: none */
-    double pixel;              /* m: the width of a pixel at that distance */
-    double clear; /* m: in a view of parallel rays no volume begins nearer to the plane through the eye. 0 in
+    double
+        by_surface; /* in addition, where surfaces lie in the fog: because their distances are floats. Of all volumes */
+    double distance; /* m: of its farthest place from the eye; of endless fog: of what is narrow */
+    double width;    /* m: the least between its faces, or over which its density changes; INFINITY: none */
+    double pixel;    /* m: the width of a pixel at that distance */
+    double clear;    /* m: in a view of parallel rays no volume begins nearer to the plane through the eye. 0 in
                                   others, and where `start` or `cutoff` of a volume counts from there. INFINITY without
                                   volumes */
 } nebel_view_error;

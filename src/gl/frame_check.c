@@ -174,8 +174,11 @@ static nebel_view_error find_fog_error(const nebel_gl_renderer *r, const nebel_g
     if (nb_camera_look(&desc->camera, desc->width, desc->height, &silent, views) != NEBEL_OK) return worst;
     if (is_panorama) nb_panorama_faces(desc->camera.position, desc->width, desc->height, views);
     for (int i = 0; i < (is_panorama ? 6 : 1); i++)
-        if (nebel_find_view_error(r->fog, &views[i], &error) == NEBEL_OK && !(error.error <= worst.error))
-            worst = error;
+        if (nebel_find_view_error(r->fog, &views[i], &error) == NEBEL_OK) {
+            const double by_surface = fmax(worst.by_surface, error.by_surface);
+            if (!(error.error <= worst.error)) worst = error;
+            worst.by_surface = by_surface;
+        }
     return worst;
 }
 
@@ -199,6 +202,12 @@ static nebel_result check_fog(const nebel_gl_renderer *r, const nebel_gl_frame_d
     const int is_exact = desc->method == NEBEL_GL_METHOD_EXACT || desc->method == NEBEL_GL_METHOD_FIVE_TAP;
     if (!is_exact || nebel_snapshot_volume_count(r->fog) == 0) return NEBEL_OK;
     const nebel_view_error error = find_fog_error(r, desc);
+    if (r->meshes.count > 0 && error.by_surface > MOST_FOG_ERROR)
+        return nb_fail(
+            &r->log, NEBEL_ERROR_LIMIT,
+            "camera: fog is so dense for its distance that OpenGL would draw models in it up to %.2g off: go "
+            "nearer, to a %.2g of the distance, or use the CPU's renderer (--device cpu)",
+            fmin(error.by_surface, 1), MOST_FOG_ERROR / error.by_surface);
     if (error.error <= MOST_FOG_ERROR) return NEBEL_OK;
     if (error.by_pixel > error.by_width && error.by_width < MOST_FOG_ERROR)
         return refuse_pixels(r, desc, &error, error.by_pixel / (MOST_FOG_ERROR - error.by_width));

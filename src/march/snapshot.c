@@ -393,14 +393,14 @@ static nebel_result refuse_looks(const nebel_fog *fog, const nebel_snapshot *s)
 {
     if (s->max_opacity < 1)
         return nb_fail(&fog->log, NEBEL_ERROR_UNSUPPORTED,
-                       "max_opacity: no light is like that, so that diffusion (multiple scattering) cannot follow it; "
+                       "max_opacity is no physical fog, and diffusion (multiple scattering) cannot compute its light; "
                        "leave out max_opacity %g, or diffusion",
                        s->max_opacity);
     for (size_t i = 0; i < s->medium_count; i++)
         if (nb_volume_has_distances(&s->media[i].body))
             return nb_fail(&fog->log, NEBEL_ERROR_UNSUPPORTED,
-                           "fog[%zu].start, cutoff: no light is like that, so that diffusion (multiple scattering) "
-                           "cannot follow it; leave out both, or diffusion",
+                           "fog[%zu].start, cutoff: are no physical fog, and diffusion (multiple scattering) cannot "
+                           "compute its light; leave out both, or diffusion",
                            s->media[i].slot);
     return NEBEL_OK;
 }

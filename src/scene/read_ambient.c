@@ -53,12 +53,14 @@ static nebel_result keep_colors(const nb_codec *codec, nebel_image *image)
 
 static nebel_result make_map(const nb_codec *codec, const nebel_image *image, nebel_environment_map **map)
 {
+    nb_note note = {""};
     const nebel_environment_map_desc desc = {.allocator = codec->allocator,
-                                             .log = codec->log,
+                                             .log = nb_note_log(&note),
                                              .width = image->width,
                                              .height = image->height,
                                              .pixels = image->samples};
-    return nebel_create_environment_map(&desc, map);
+    const nebel_result result = nebel_create_environment_map(&desc, map);
+    return result == NEBEL_OK ? result : nb_fail(&codec->log, result, "%s: %s", codec->name, note.text);
 }
 
 /* Larger pictures are refused before memory is asked for. */
