@@ -1,7 +1,8 @@
 # The kernel files, compiled once per instruction set. Each object has one global symbol, whose name ends in the level.
 
 set(nebel_kernel_files ${PROJECT_SOURCE_DIR}/src/march/trace_kernel.c ${PROJECT_SOURCE_DIR}/src/kernels/transmit_kernel.c
-    ${PROJECT_SOURCE_DIR}/src/kernels/pixels_kernel.c ${PROJECT_SOURCE_DIR}/src/kernels/vertices_kernel.c
+    ${PROJECT_SOURCE_DIR}/src/kernels/pixels_kernel.c ${PROJECT_SOURCE_DIR}/src/kernels/picture_kernel.c
+    ${PROJECT_SOURCE_DIR}/src/kernels/vertices_kernel.c
     ${PROJECT_SOURCE_DIR}/src/planet/cloud_places_kernel.c ${PROJECT_SOURCE_DIR}/src/planet/cloud_drops_kernel.c
     ${PROJECT_SOURCE_DIR}/src/planet/gather_kernel.c ${PROJECT_SOURCE_DIR}/src/planet/look_kernel.c)
 

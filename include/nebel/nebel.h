@@ -707,6 +707,23 @@ typedef enum nebel_depth {
     NEBEL_DEPTH_RAY       /* m along the pixel's ray */
 } nebel_depth;
 
+/* What the samples of a picture are. Floats hold light, 1 is white; whole numbers are 0 to 1 as 0 to the largest. Numbers of
+ * more than a byte have the byte order and the alignment of the machine. */
+typedef enum nebel_pixel_type {
+    NEBEL_PIXEL_RGBA8 = 0, /* red, green, blue, alpha */
+    NEBEL_PIXEL_RGB8,
+    NEBEL_PIXEL_RGBA16,
+    NEBEL_PIXEL_RGB16,
+    NEBEL_PIXEL_RGBA_HALF, /* IEEE 754 binary16 */
+    NEBEL_PIXEL_RGB_HALF,
+    NEBEL_PIXEL_RGBA_FLOAT,
+    NEBEL_PIXEL_RGB_FLOAT,
+    NEBEL_PIXEL_COUNT
+} nebel_pixel_type;
+
+/* Bytes of a pixel; 0: no such type. Any thread. */
+size_t nebel_pixel_size(nebel_pixel_type type);
+
 /* A picture in caller memory, its depth, and the rays it was seen along. Rows `pitch` bytes apart, 0: without gaps. */
 typedef struct nebel_pixels {
     double eye[3];                         /* m, where all rays start */
@@ -716,17 +733,26 @@ typedef struct nebel_pixels {
     uint32_t width, height; /* 1 to 65536 */
     const float *depth;     /* one per pixel; INFINITY where nothing is */
     size_t depth_pitch;
-    const uint8_t *color; /* red, green, blue, alpha */
+    const void *color; /* of the type below */
     size_t color_pitch;
-    uint8_t *out; /* may be color, with the same pitch */
+    void *out; /* may be color, with the same pitch */
     size_t out_pitch;
     uint32_t first_row, row_count; /* the rows to be done, for threads that share a picture; row_count 0: to the last */
+    nebel_pixel_type type;
+    int srgb; /* nonzero: whole numbers are sRGB (IEC 61966-2-1), and fog is added to the light they stand for; 0: to the
+                 numbers as they stand. Floats are light already: they must have 0 */
+    float *transmittance; /* NULL, or where it goes: red, green and blue of each pixel */
+    size_t transmittance_pitch;
 } nebel_pixels;
 
-/* out = transmittance * color + in-scattering, rounded to nearest, alpha as it is, in float throughout. Radiance 1 is
- * 255, in whatever encoding the picture has: physics asks for a linear one, old hardware blended sRGB as it stood.
- * Boxes of constant density that take all colours alike and have one source take the shortest way; everything else goes
- * through nebel_trace in float with the default tolerance. A pixel whose depth is a NaN or negative stays as it is.
+/* out = transmittance * color + in-scattering, alpha as it is, in float throughout. Whole numbers are clamped and rounded
+ * to nearest; white and radiance 1 are their largest. Without `srgb` the numbers are blended in whatever encoding
+ * the picture has: physics asks for light, old hardware and most data sets of foggy pictures blend sRGB as it stands.
+ * With `srgb` bytes are off by at most 0.56 (0.5 is the rounding), numbers of 16 bits by 0.7.
+ *
+ * Fog that is one volume everywhere, of constant density, grey and of one source, and in RGBA8 as it stands boxes that take
+ * all colours alike and have one source, take the shortest way; everything else goes
+ * through nebel_trace_planes with the default tolerance. A pixel whose depth is a NaN or negative stays as it is.
  * Same bits for every isa and for every way of splitting the rows. Any thread. Errors as nebel_trace. */
 nebel_result nebel_fog_pixels(const nebel_snapshot *snapshot, nebel_isa isa, const nebel_pixels *pixels);
 

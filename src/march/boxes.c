@@ -24,8 +24,18 @@ int nb_boxes_list(const nebel_snapshot *snapshot, const double origin[3], int ch
     return 1;
 }
 
+int nb_boxes_are_haze(const nebel_snapshot *snapshot)
+{
+    if (snapshot->medium_count != 1 || snapshot->max_opacity < 1 || !nb_boxes_have_one_color(snapshot)) return 0;
+    const nb_volume *body = &snapshot->media[0].body;
+    return !nb_volume_covers(body) && body->density.type == NEBEL_DENSITY_CONSTANT && body->step_count == 1 &&
+           body->leaves[0].type == NB_LEAF_WORLD && !nb_volume_has_distances(body);
+}
+
 int nb_boxes_have_one_color(const nebel_snapshot *snapshot)
 {
+    if (snapshot->is_sunlit || snapshot->is_lamplit || snapshot->diffusion != NULL || snapshot->own_diffusion != NULL)
+        return 0;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_medium *medium = &snapshot->media[i];
         const double *extinction = medium->body.extinction;

@@ -15,4 +15,7 @@ int nb_boxes_list(const nebel_snapshot *snapshot, const double origin[3], int ch
  * radiance times what it takes away. */
 int nb_boxes_have_one_color(const nebel_snapshot *snapshot);
 
+/* 1 when the fog is one volume everywhere, of constant density and of one colour in that sense. */
+int nb_boxes_are_haze(const nebel_snapshot *snapshot);
+
 #endif

@@ -1,0 +1,315 @@
+/* Fog over pieces of rows of a picture, compiled once per instruction set.
+ *
+ * Bytes stay together, a pixel in each lane of 32 bits; other samples become planes of floats first.
+ */
+#define NB_FAST
+
+#include "picture.h"
+
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+
+#include "packet.h"
+
+#include <string.h>
+
+enum { PIECE = NB_PICTURE_PIECE };
+
+/* ---- sRGB (IEC 61966-2-1) -------------------------------------------------------------------- */
+
+#define DARKEST_POWER NB_F(0.04045)   /* below it sRGB is linear; */
+#define DARKEST_LIGHT NB_F(0.0031308) /* the same as light */
+#define SLOPE 12.92f
+
+/* For bytes: ((c + 0.055) / 1.055)^2.4 as a polynomial, minimax with the slope of encoding as its weight: off by what 0.013 of a
+ * byte is. */
+NB_INLINE nb_real decode_byte(nb_real c)
+{
+    nb_real p = NB_F(0.0872823676);
+    p = p * c + NB_F(-0.30737755);
+    p = p * c + NB_F(0.667160581);
+    p = p * c + NB_F(0.519381982);
+    p = p * c + NB_F(0.0327460770);
+    p = p * c + NB_F(0.000916890797);
+    return nb_select(c > DARKEST_POWER, p, c * nb_splat(1 / SLOPE));
+}
+
+/* 1.055 x^(1 / 2.4) - 0.055 as a minimax polynomial of sqrt(x): off by 0.04 of a byte. */
+NB_INLINE nb_real encode_byte(nb_real x)
+{
+    const nb_real s = nb_sqrt(x);
+    nb_real p = NB_F(-0.948544329);
+    p = p * s + NB_F(3.42155875);
+    p = p * s + NB_F(-5.00683277);
+    p = p * s + NB_F(3.90072043);
+    p = p * s + NB_F(-1.90018679);
+    p = p * s + NB_F(1.57537242);
+    p = p * s + NB_F(-0.0422369182);
+    return nb_select(x > DARKEST_LIGHT, p, x * nb_splat(SLOPE));
+}
+
+NB_INLINE nb_real power(nb_real x, float exponent)
+{
+    return nb_exp(nb_splat(exponent) * nb_log(nb_max(x, NB_TINY)));
+}
+
+NB_INLINE nb_real decode(nb_real c)
+{
+    const nb_real p = power((c + NB_F(0.055)) * nb_splat(1 / 1.055f), 2.4f);
+    return nb_select(c > DARKEST_POWER, p, c * nb_splat(1 / SLOPE));
+}
+
+NB_INLINE nb_real encode(nb_real x)
+{
+    const nb_real p = NB_F(1.055) * power(x, 1 / 2.4f) - NB_F(0.055);
+    return nb_select(x > DARKEST_LIGHT, p, x * nb_splat(SLOPE));
+}
+
+/* ---- light ----------------------------------------------------------------------------------- */
+
+typedef struct light {
+    nb_real transmittance[3], in_scattering[3];
+} light;
+
+/* What one of a haze's pixels has of it, packets of them. */
+typedef struct haze {
+    nb_real octaves, radiance[3];
+    nb_real corner[3], step[3];
+    int along_ray;
+} haze;
+
+static haze make_haze(const nb_picture_haze *h)
+{
+    haze made = {.octaves = nb_splat(h->octaves), .along_ray = h->along_ray};
+    for (int c = 0; c < 3; c++) {
+        made.radiance[c] = nb_splat(h->radiance[c]);
+        made.corner[c] = nb_splat(h->corner[c]);
+        made.step[c] = nb_splat(h->step_x[c]);
+    }
+    return made;
+}
+
+/* Not less than 0 nor NaN is what fog acts on: the exponential of everything else is 1. */
+NB_INLINE nb_real transmittance_of(const haze *h, nb_real x, nb_real depth)
+{
+    nb_real way = depth;
+    if (!h->along_ray) {
+        const nb_vec3 to =
+            nb_vec3(h->corner[0] + x * h->step[0], h->corner[1] + x * h->step[1], h->corner[2] + x * h->step[2]);
+        way = depth * nb_sqrt(nb_dot3(to, to));
+    }
+    return nb_light_after(way * h->octaves);
+}
+
+/* The transmittance of a haze's piece. */
+static void fill_transmittance(const nb_picture_job *job, float *transmittance)
+{
+    const nb_picture_haze *const given = job->haze;
+    const haze h = make_haze(given);
+    float depth[PIECE] = {0}, lanes[NB_WIDTH];
+    memcpy(depth, given->depth, sizeof *depth * job->count);
+    for (uint32_t i = 0; i < NB_WIDTH; i++) lanes[i] = (float)(given->first + i);
+    nb_real x = nb_load_lanes(lanes);
+    for (uint32_t i = 0; i < job->count; i += NB_WIDTH) {
+        nb_store_lanes(transmittance + i, transmittance_of(&h, x, nb_load_lanes(depth + i)));
+        x = x + nb_splat(NB_WIDTH);
+    }
+}
+
+/* A packet's light. `is_haze` is a constant. */
+NB_INLINE light light_at(const nb_picture_job *job, const float *haze_transmittance, uint32_t at, int is_haze)
+{
+    light l;
+    for (int c = 0; c < 3; c++) {
+        if (is_haze) {
+            l.transmittance[c] = nb_load_lanes(haze_transmittance + at);
+            l.in_scattering[c] = (NB_F(1.0) - l.transmittance[c]) * nb_splat(job->haze->radiance[c]);
+        } else {
+            l.transmittance[c] = nb_load_lanes(job->transmittance[c] + at);
+            l.in_scattering[c] = nb_load_lanes(job->in_scattering[c] + at);
+        }
+    }
+    return l;
+}
+
+static void keep_transmittance(const nb_picture_job *job, const float *haze_transmittance)
+{
+    for (uint32_t i = 0; i < job->count; i++) {
+        float kept[3];
+        for (int c = 0; c < 3; c++) kept[c] = job->haze != NULL ? haze_transmittance[i] : job->transmittance[c][i];
+        memcpy(job->kept + i * sizeof kept, kept, sizeof kept);
+    }
+}
+
+/* ---- bytes ----------------------------------------------------------------------------------- */
+
+/* A pixel to each word, the first sample lowest. */
+static void load_bytes(const nb_picture_job *job, uint32_t *words)
+{
+    const unsigned char *at = job->color;
+    if (job->type == NEBEL_PIXEL_RGBA8) {
+        for (uint32_t i = 0; i < job->count; i++, at += 4)
+            words[i] = (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+        return;
+    }
+    for (uint32_t i = 0; i < job->count; i++, at += 3)
+        words[i] = (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16;
+}
+
+static void store_bytes(const nb_picture_job *job, const uint32_t *words)
+{
+    unsigned char *at = job->out;
+    const uint32_t size = job->type == NEBEL_PIXEL_RGBA8 ? 4 : 3;
+    for (uint32_t i = 0; i < job->count; i++, at += size)
+        for (uint32_t c = 0; c < size; c++) at[c] = (unsigned char)(words[i] >> 8 * c);
+}
+
+NB_INLINE nb_bits fog_byte(nb_bits byte, nb_real transmittance, nb_real in_scattering, int srgb)
+{
+    nb_real x = nb_from_bits(byte | NB_INTEGER_BITS) - NB_INTEGER;
+    if (srgb) {
+        const nb_real sum = transmittance * decode_byte(x * nb_splat(1 / 255.0f)) + in_scattering;
+        x = encode_byte(nb_max(sum, NB_F(0.0))) * NB_F(255.0);
+    } else {
+        x = transmittance * x + in_scattering * NB_F(255.0);
+    }
+    const nb_real clamped = nb_min(nb_max(x, NB_F(0.0)), NB_F(255.0));
+    return nb_to_bits(clamped + NB_INTEGER) - NB_INTEGER_BITS;
+}
+
+/* `srgb` and `is_haze` are constants. */
+NB_INLINE void fog_words(const nb_picture_job *job, const float *haze_transmittance, uint32_t *words, int srgb,
+                         int is_haze)
+{
+    for (uint32_t i = 0; i < job->count; i += NB_WIDTH) {
+        const light l = light_at(job, haze_transmittance, i, is_haze);
+        float lanes[NB_WIDTH];
+        memcpy(lanes, words + i, sizeof lanes);
+        const nb_bits pixel = nb_to_bits(nb_load_lanes(lanes));
+        nb_bits done = pixel & 0xff000000u;
+        for (int c = 0; c < 3; c++)
+            done = done | fog_byte((pixel >> (8 * c)) & 0xffu, l.transmittance[c], l.in_scattering[c], srgb) << (8 * c);
+        nb_store_lanes(lanes, nb_from_bits(done));
+        memcpy(words + i, lanes, sizeof lanes);
+    }
+}
+
+static void fog_bytes(const nb_picture_job *job, const float *haze_transmittance)
+{
+    uint32_t words[PIECE] = {0};
+    load_bytes(job, words);
+    if (job->srgb && job->haze != NULL)
+        fog_words(job, haze_transmittance, words, 1, 1);
+    else if (job->srgb)
+        fog_words(job, haze_transmittance, words, 1, 0);
+    else if (job->haze != NULL)
+        fog_words(job, haze_transmittance, words, 0, 1);
+    else
+        fog_words(job, haze_transmittance, words, 0, 0);
+    store_bytes(job, words);
+}
+
+/* ---- other samples --------------------------------------------------------------------------- */
+
+/* IEEE 754 binary16 to float: the exponent's bias is 127 instead of 15, and multiplying sets it right for numbers below
+ * the normal ones, too. */
+NB_INLINE float float_of_half(uint16_t half)
+{
+    const uint32_t shifted = (uint32_t)(half & 0x7fff) << 13, sign = (uint32_t)(half & 0x8000) << 16;
+    float number;
+    memcpy(&number, &shifted, sizeof number);
+    number *= 0x1p112f;
+    uint32_t bits;
+    memcpy(&bits, &number, sizeof bits);
+    if ((half & 0x7c00) == 0x7c00) bits = 0x7f800000u | (uint32_t)(half & 0x3ff) << 13;
+    bits |= sign;
+    memcpy(&number, &bits, sizeof number);
+    return number;
+}
+
+/* To nearest, ties to even; infinite from 65520 on. */
+NB_INLINE uint16_t half_of_float(float number)
+{
+    uint32_t bits;
+    memcpy(&bits, &number, sizeof bits);
+    const uint16_t sign = (uint16_t)(bits >> 16 & 0x8000);
+    bits &= 0x7fffffffu;
+    if (bits > 0x7f800000u) return (uint16_t)(sign | 0x7e00);
+    if (bits >= 0x477ff000u) return (uint16_t)(sign | 0x7c00);
+    if (bits < 0x38800000u) { /* below the normal ones: adding 1/2 rounds at their last bit, 2^-24 */
+        float small;
+        memcpy(&small, &bits, sizeof small);
+        small += 0.5f;
+        memcpy(&bits, &small, sizeof bits);
+        return (uint16_t)(sign | (bits - 0x3f000000u));
+    }
+    bits += 0xfffu + (bits >> 13 & 1);
+    return (uint16_t)(sign | (bits - 0x38000000u) >> 13);
+}
+
+NB_INLINE float read_sample(const unsigned char *at, nebel_pixel_type type)
+{
+    uint16_t half;
+    float number;
+    if (type == NEBEL_PIXEL_RGBA_FLOAT || type == NEBEL_PIXEL_RGB_FLOAT) {
+        memcpy(&number, at, sizeof number);
+        return number;
+    }
+    memcpy(&half, at, sizeof half);
+    if (type == NEBEL_PIXEL_RGBA_HALF || type == NEBEL_PIXEL_RGB_HALF) return float_of_half(half);
+    return (float)half * (1 / 65535.0f);
+}
+
+NB_INLINE void write_sample(unsigned char *at, nebel_pixel_type type, float number)
+{
+    if (type == NEBEL_PIXEL_RGBA_FLOAT || type == NEBEL_PIXEL_RGB_FLOAT) {
+        memcpy(at, &number, sizeof number);
+        return;
+    }
+    uint16_t half = 0;
+    if (type == NEBEL_PIXEL_RGBA_HALF || type == NEBEL_PIXEL_RGB_HALF)
+        half = half_of_float(number);
+    else if (number > 0)
+        half = (uint16_t)((number < 1 ? number : 1) * 65535.0f + 0.5f);
+    memcpy(at, &half, sizeof half);
+}
+
+static void fog_planes(const nb_picture_job *job, const float *haze_transmittance, float planes[3][PIECE])
+{
+    for (uint32_t i = 0; i < job->count; i += NB_WIDTH) {
+        const light l = job->haze != NULL ? light_at(job, haze_transmittance, i, 1) : light_at(job, NULL, i, 0);
+        for (int c = 0; c < 3; c++) {
+            nb_real x = nb_load_lanes(planes[c] + i);
+            x = l.transmittance[c] * (job->srgb ? decode(x) : x) + l.in_scattering[c];
+            nb_store_lanes(planes[c] + i, job->srgb ? encode(x) : x);
+        }
+    }
+}
+
+static void fog_samples(const nb_picture_job *job, const float *haze_transmittance)
+{
+    float planes[3][PIECE] = {{0}};
+    const nebel_pixel_type type = job->type;
+    const int has_alpha = type == NEBEL_PIXEL_RGBA16 || type == NEBEL_PIXEL_RGBA_HALF || type == NEBEL_PIXEL_RGBA_FLOAT;
+    const size_t size = type == NEBEL_PIXEL_RGBA_FLOAT || type == NEBEL_PIXEL_RGB_FLOAT ? 4 : 2;
+    const size_t step = (has_alpha ? 4 : 3) * size;
+    for (uint32_t i = 0; i < job->count; i++)
+        for (size_t c = 0; c < 3; c++) planes[c][i] = read_sample(job->color + i * step + c * size, type);
+    fog_planes(job, haze_transmittance, planes);
+    for (uint32_t i = 0; i < job->count; i++) {
+        for (size_t c = 0; c < 3; c++) write_sample(job->out + i * step + c * size, type, planes[c][i]);
+        if (has_alpha) memmove(job->out + i * step + 3 * size, job->color + i * step + 3 * size, size);
+    }
+}
+
+void NB_SUFFIXED(nb_picture_)(const nb_picture_job *job)
+{
+    float transmittance[PIECE];
+    if (job->haze != NULL) fill_transmittance(job, transmittance);
+    if (job->type == NEBEL_PIXEL_RGBA8 || job->type == NEBEL_PIXEL_RGB8)
+        fog_bytes(job, transmittance);
+    else
+        fog_samples(job, transmittance);
+    if (job->kept != NULL) keep_transmittance(job, transmittance);
+}
