@@ -49,7 +49,7 @@ nebel_install_library(nebel nebel.h cells.h classic.h clouds.h diffusion.h envir
     shader.h)
 nebel_write_pkgconfig(nebel "Exact fog for any renderer" "" "" "-lm")
 if(TARGET nebel_scene)
-    nebel_install_library(nebel_scene scene.h)
+    nebel_install_library(nebel_scene scene.h photograph.h)
     install(TARGETS nebel_read_model)
     set(webp "")
     set(openvdb "")

@@ -21,7 +21,7 @@ import unittest
 
 NEBEL = os.environ["NEBEL"]
 HEADER = "T_r,T_g,T_b,S_r,S_g,S_b,error\n"
-COMMANDS = ("render", "trace", "view", "info", "compare")
+COMMANDS = ("render", "fog", "trace", "view", "info", "compare")
 BOX = {"type": "box", "min": [-5, -5, -5], "max": [5, 5, 5]}
 FOG = {"shape": BOX, "extinction": 0.1, "source": [0.7, 0.7, 0.5]}
 RAY = "-9 0 0 1 0 0 100\n"

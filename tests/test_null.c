@@ -10,6 +10,7 @@
 #include <nebel/environment.h>
 #include <nebel/layers.h>
 #include <nebel/nebula.h>
+#include <nebel/photograph.h>
 #include <nebel/places.h>
 #include <nebel/planet.h>
 #include <nebel/render.h>
@@ -109,6 +110,10 @@ static struct {
     nebel_environment environment;
     nebel_scene_noise scene_noise;
     nebel_image image;
+    nebel_photograph photograph;
+    nebel_intrinsics intrinsics;
+    nebel_pixels pixels;
+    nebel_depth_map depth_map;
     nebel_rays rays;
     nebel_view_error view_error;
     nebel_word word[64];
@@ -139,6 +144,10 @@ static const nebel_frame good_frame = {.color = out.floats};
 static const char *const channels[] = {"R", "G", "B"};
 static nebel_image good_image = {
     .width = 1, .height = 1, .channel_count = 3, .channel_names = channels, .samples = out.floats};
+
+static const nebel_photograph good_photograph = {1, 1, NEBEL_PIXEL_RGB8, out.floats};
+static const nebel_intrinsics good_intrinsics = {1, 1, 0, 0, 0};
+static const nebel_depth_source good_depth_source = {.format = "kitti"};
 
 /* What calls take: made before them, or NULL for them to fill. */
 typedef struct objects {

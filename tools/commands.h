@@ -5,6 +5,7 @@
 #include "options.h"
 
 extern const nb_command nb_commands_render;
+extern const nb_command nb_commands_fog;
 extern const nb_command nb_commands_trace;
 extern const nb_command nb_commands_view;
 extern const nb_command nb_commands_info;

@@ -10,7 +10,8 @@
 #include <string.h>
 
 static const nb_command *const commands[] = {
-    &nb_commands_render, &nb_commands_trace, &nb_commands_view, &nb_commands_info, &nb_commands_compare,
+    &nb_commands_render, &nb_commands_fog,  &nb_commands_trace,
+    &nb_commands_view,   &nb_commands_info, &nb_commands_compare,
 #if defined(NEBEL_HAVE_BENCH)
     &nb_commands_bench,
 #endif
@@ -28,6 +29,8 @@ static int print_help(void)
                  "Examples:\n"
                  "  A picture of a scene:\n"
                  "    nebel render mist.json -o mist.png\n"
+                 "  Fog over a photograph whose depth is known:\n"
+                 "    nebel fog street.png --depth street.exr --hfov 60 --visibility 150 -o foggy.png\n"
                  "  What fog does to the light along one ray, 50 m straight ahead:\n"
                  "    echo '0 1.7 0  0 0 -1  50' | nebel trace mist.json\n"
                  "\n"

@@ -140,7 +140,7 @@ static int take_short_option(nb_arguments *arguments, const char *word, words *r
     return set_option(arguments, option, word[2] != '\0' ? word + 2 : NULL, rest);
 }
 
-static int take_operand(nb_arguments *arguments, const char *word)
+static int take_operand(nb_arguments *arguments, char *word)
 {
     const nb_command *const command = arguments->command;
     if (arguments->operand_count == command->most_operands) {
@@ -153,11 +153,11 @@ static int take_operand(nb_arguments *arguments, const char *word)
 
 int nb_options_parse(const nb_command *command, int count, char **words_given, nb_arguments *arguments)
 {
-    *arguments = (nb_arguments){.command = command};
+    *arguments = (nb_arguments){.command = command, .operands = words_given};
     words rest = {words_given, count};
     int ended = 0;
     while (rest.left > 0) {
-        const char *const word = *rest.next++;
+        char *const word = *rest.next++;
         rest.left--;
         int status = -1;
         if (!ended && strcmp(word, "--") == 0) {

@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { NB_OPTIONS_MOST = 24, NB_OPERANDS_MOST = 2 };
+enum { NB_OPTIONS_MOST = 24 };
 
 typedef struct nb_option {
     const char *name;  /* without the dashes */
@@ -31,7 +31,7 @@ typedef struct nb_command {
 typedef struct nb_arguments {
     const nb_command *command;
     const char *values[NB_OPTIONS_MOST]; /* by position in the table; NULL: not given; "" for an option without value */
-    const char *operands[NB_OPERANDS_MOST];
+    char **operands;                     /* at the beginning of the words */
     int operand_count;
     int misused; /* a value asked for was not what the option takes, and was reported */
 } nb_arguments;

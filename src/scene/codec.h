@@ -7,6 +7,7 @@
 #include "scene/file.h"
 
 #include <stdbool.h>
+#include <string.h>
 
 /* Who asks: whose memory, whose log, and the name of the picture in messages. */
 typedef struct nb_codec {
@@ -29,20 +30,38 @@ typedef struct nb_heights {
     uint16_t *values;
 } nb_heights;
 
+/* A picture as it is stored: 1 to 4 samples a pixel, of 8 bits, or of 16 in the machine's order. */
+typedef struct nb_stored {
+    uint32_t width, height;
+    int bits, channel_count;
+    unsigned char *pixels;
+} nb_stored;
+
+static inline bool nb_codec_is_little_endian(void)
+{
+    const uint16_t one = 1;
+    unsigned char first;
+    memcpy(&first, &one, 1);
+    return first == 1;
+}
+
 /* Files are told apart by their first bytes. */
 bool nb_png_is(const nb_bytes *bytes);
 bool nb_exr_is(const nb_bytes *bytes);
 bool nb_jpeg_is(const nb_bytes *bytes);
 
 /* Errors: FORMAT, LIMIT, MEMORY, UNSUPPORTED; on an error the target is empty. `what` names heights in messages: "a
- * height map". */
+ * height map". What is stored has at least 8 bits; as a color it has 3 or 4 samples. */
 nebel_result nb_png_read_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image);
 nebel_result nb_png_read_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture);
 nebel_result nb_png_read_heights(const nb_codec *codec, const nb_bytes *bytes, const char *what, nb_heights *heights);
+nebel_result nb_png_read_stored(const nb_codec *codec, const nb_bytes *bytes, bool as_color, nb_stored *stored);
+nebel_result nb_jpeg_read_stored(const nb_codec *codec, const nb_bytes *bytes, nb_stored *stored);
 nebel_result nb_jpeg_read_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture);
 nebel_result nb_exr_read_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image);
 
-/* The encoded file in *bytes; free bytes->data also after an error. */
+/* The encoded file in *bytes; free bytes->data also after an error. Color that is stored is sRGB, grey is linear. */
+nebel_result nb_png_write_stored(const nb_codec *codec, const nb_stored *stored, nb_bytes *bytes);
 nebel_result nb_png_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes);
 nebel_result nb_exr_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes);
 
@@ -62,6 +81,12 @@ nebel_result nb_image_check(const nb_codec *codec, const nebel_image *image);
 
 /* The index of a channel, or -1. */
 int nb_image_channel(const nebel_image *image, const char *name);
+
+/* Who asks, of the caller's own; the allocator has both functions or none. Errors: ARGUMENT. */
+nebel_result nb_codec_prepare(const nebel_scene_desc *desc, const char *name, nb_codec *codec);
+
+/* The largest picture file: 8 GiB where sizes have 64 bits. */
+#define NB_FILE_LIMIT (SIZE_MAX >> 31)
 
 /* Errors: LIMIT. */
 nebel_result nb_codec_check_room(const nb_codec *codec, uint64_t bytes);

@@ -4,18 +4,17 @@
 #include <string.h>
 #include <strings.h>
 
-/* The largest picture file: 8 GiB where sizes have 64 bits. */
-#define FILE_LIMIT (SIZE_MAX >> 31)
-
 /* Channel names of EXR end at 255 bytes. */
 enum { MAX_NAME = 255 };
 
 /* ---- reading --------------------------------------------------------------------------------- */
 
-static nebel_result check_desc(const nebel_scene_desc *desc)
+nebel_result nb_codec_prepare(const nebel_scene_desc *desc, const char *name, nb_codec *codec)
 {
-    if (nb_allocator_is_valid(&desc->allocator)) return NEBEL_OK;
-    return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
+    if (!nb_allocator_is_valid(&desc->allocator))
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
+    *codec = (nb_codec){.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = name};
+    return NEBEL_OK;
 }
 
 static nebel_result decode(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image)
@@ -29,7 +28,7 @@ static nebel_result read_image(const nb_codec *codec, nebel_image *image)
 {
     nb_bytes bytes;
     nebel_result result =
-        nb_file_read(&codec->allocator, &codec->log, NULL, "picture", codec->name, FILE_LIMIT, &bytes);
+        nb_file_read(&codec->allocator, &codec->log, NULL, "picture", codec->name, NB_FILE_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
     result = decode(codec, &bytes, image);
     nb_release(&codec->allocator, bytes.data);
@@ -46,9 +45,9 @@ nebel_result nebel_read_image(const char *path, const nebel_scene_desc *desc, ne
 {
     if (image != NULL) *image = (nebel_image){0};
     if (path == NULL || desc == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
-    const nebel_result result = check_desc(desc);
+    nb_codec codec;
+    const nebel_result result = nb_codec_prepare(desc, path, &codec);
     if (result != NEBEL_OK) return result;
-    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
     return read_image(&codec, image);
 }
 
@@ -118,9 +117,9 @@ static nebel_result encode(const nb_codec *codec, const nebel_image *image, nb_b
 nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *desc)
 {
     if (path == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
-    const nebel_result result = check_desc(desc);
+    nb_codec codec;
+    const nebel_result result = nb_codec_prepare(desc, path, &codec);
     if (result != NEBEL_OK) return result;
-    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
     if (nebel_find_image_format(path) == NEBEL_IMAGE_NONE) return fail_ending(&codec);
     return nb_file_try(&codec.allocator, &codec.log, path);
 }
@@ -128,9 +127,9 @@ nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *de
 nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, const nebel_image *image)
 {
     if (path == NULL || desc == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
-    nebel_result result = check_desc(desc);
+    nb_codec codec;
+    nebel_result result = nb_codec_prepare(desc, path, &codec);
     if (result != NEBEL_OK) return result;
-    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
     nb_bytes bytes = {0};
     result = nb_image_check(&codec, image);
     if (result == NEBEL_OK) result = encode(&codec, image, &bytes);

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-typedef enum target { TARGET_IMAGE, TARGET_TEXTURE, TARGET_HEIGHTS } target;
+typedef enum target { TARGET_IMAGE, TARGET_TEXTURE, TARGET_HEIGHTS, TARGET_STORED, TARGET_STORED_COLOR } target;
 
 typedef struct decoder {
     const nb_codec *codec;
@@ -75,6 +75,16 @@ static void stop(decoder *in, nebel_result result, const char *message)
     png_error(in->png, message);
 }
 
+/* Of bits that are no samples of a photograph nor of depth. */
+static void choose_stored(decoder *in, int type)
+{
+    const int bits = png_get_bit_depth(in->png, in->info);
+    if (bits == 1 || (bits < 8 && type != PNG_COLOR_TYPE_PALETTE))
+        stop(in, NEBEL_ERROR_UNSUPPORTED, "it has less than 8 bits a sample; convert it to 8 or 16");
+    if (nb_codec_is_little_endian()) png_set_swap(in->png);
+    if (in->target == TARGET_STORED_COLOR) png_set_gray_to_rgb(in->png);
+}
+
 static void choose_transforms(decoder *in)
 {
     const int type = png_get_color_type(in->png, in->info);
@@ -83,6 +93,7 @@ static void choose_transforms(decoder *in)
         snprintf(message, sizeof message, "%s must be grey, 8 or 16 bit, without alpha; convert it", in->what);
         stop(in, NEBEL_ERROR_FORMAT, message);
     }
+    if (in->target == TARGET_STORED || in->target == TARGET_STORED_COLOR) choose_stored(in, type);
     png_set_expand(in->png);
     if (in->target != TARGET_TEXTURE) return;
     png_set_scale_16(in->png);
@@ -104,7 +115,7 @@ static void read_header(decoder *in)
 static uint64_t kept_row_size(const decoder *in)
 {
     const uint64_t read = in->row_size, width = in->width;
-    if (in->target == TARGET_TEXTURE) return read;
+    if (in->target != TARGET_IMAGE && in->target != TARGET_HEIGHTS) return read;
     return in->target == TARGET_HEIGHTS ? read + width * sizeof(uint16_t)
                                         : read + width * (unsigned)in->channel_count * sizeof(float);
 }
@@ -149,6 +160,8 @@ static nebel_result decode(decoder *in)
     in->pixels = NULL;
     if (in->result == NEBEL_ERROR_LIMIT) return in->result;
     const char *message = in->message[0] != '\0' ? in->message : "out of memory";
+    if (in->result == NEBEL_ERROR_UNSUPPORTED)
+        return nb_fail(&in->codec->log, in->result, "%s: %s", in->codec->name, message);
     return nb_fail(&in->codec->log, in->result, "%s: not a good PNG picture: %s", in->codec->name, message);
 }
 
@@ -188,6 +201,15 @@ nebel_result nb_png_read_texture(const nb_codec *codec, const nb_bytes *bytes, n
     *texture = (nebel_texture){0};
     const nebel_result result = decode(&in);
     if (result == NEBEL_OK) *texture = (nebel_texture){in.width, in.height, in.pixels};
+    return result;
+}
+
+nebel_result nb_png_read_stored(const nb_codec *codec, const nb_bytes *bytes, bool as_color, nb_stored *stored)
+{
+    decoder in = {.codec = codec, .bytes = bytes, .target = as_color ? TARGET_STORED_COLOR : TARGET_STORED};
+    *stored = (nb_stored){0};
+    const nebel_result result = decode(&in);
+    if (result == NEBEL_OK) *stored = (nb_stored){in.width, in.height, in.bits, in.channel_count, in.pixels};
     return result;
 }
 

@@ -1,0 +1,29 @@
+/* Fog over one picture, from its files to its files. */
+#ifndef NB_FOG_WORK_H
+#define NB_FOG_WORK_H
+
+#include "fog_call.h"
+#include "report.h"
+
+/* What all pictures share. */
+typedef struct nb_fog_shared {
+    const nb_fog_call *wanted;
+    const nebel_snapshot *scene_fog;  /* NULL: fog of one density, made for each picture */
+    const nebel_camera *scene_camera; /* the same */
+    double scene_fov;                 /* degrees from top to bottom, where no camera is given */
+    int row_threads;                  /* for the rows of a picture */
+    void (*hold)(int is_held);        /* called around writing files */
+} nb_fog_shared;
+
+/* What there is to tell of a picture. */
+typedef struct nb_fog_tale {
+    uint32_t width, height;
+    double unknown, infinite; /* parts of the pixels, 0 to 1 */
+    double airlight[3];       /* as the picture stores it */
+} nb_fog_tale;
+
+/* NB_DONE; or NB_FAILED with the reason in listener->kept, whose mode is KEEP. Any thread. */
+int nb_fog_work(const nb_fog_shared *shared, const nb_fog_files *files, nb_report_listener *listener,
+                nb_fog_tale *tale);
+
+#endif
