@@ -145,6 +145,7 @@ static const char *const channels[] = {"R", "G", "B"};
 static nebel_image good_image = {
     .width = 1, .height = 1, .channel_count = 3, .channel_names = channels, .samples = out.floats};
 
+static const nebel_camera good_camera = {.look_at = {0, 0, -1}, .up = {0, 1, 0}};
 static const nebel_photograph good_photograph = {1, 1, NEBEL_PIXEL_RGB8, out.floats};
 static const nebel_intrinsics good_intrinsics = {1, 1, 0, 0, 0};
 static const nebel_depth_source good_depth_source = {.format = "kitti"};

@@ -95,8 +95,8 @@ static int read_list(nb_arguments *arguments, int option, int count, double low,
 static void read_depth(nb_arguments *arguments, nb_fog_call *wanted)
 {
     static const char *const kinds[] = {"planar", "radial", "inverse", "disparity", NULL};
-    static const nebel_depth_kind values[] = {NEBEL_DEPTH_PLANAR, NEBEL_DEPTH_RADIAL, NEBEL_DEPTH_INVERSE,
-                                              NEBEL_DEPTH_DISPARITY};
+    static const nebel_depth_measure values[] = {NEBEL_MEASURE_PLANAR, NEBEL_MEASURE_RADIAL, NEBEL_MEASURE_INVERSE,
+                                                 NEBEL_MEASURE_DISPARITY};
     enum { MOST_FORMATS = 16 };
     const char *formats[MOST_FORMATS + 1] = {NULL};
     for (size_t i = 0; i < MOST_FORMATS && nebel_depth_format_at(i) != NULL; i++)
@@ -105,11 +105,12 @@ static void read_depth(nb_arguments *arguments, nb_fog_call *wanted)
     wanted->depth.format = formats[format];
     wanted->depth.channel = arguments->values[DEPTH_CHANNEL];
     if (arguments->values[DEPTH_KIND] != NULL)
-        wanted->depth.kind = values[nb_options_choice(arguments, DEPTH_KIND, kinds, 0)];
+        wanted->depth.measure = values[nb_options_choice(arguments, DEPTH_KIND, kinds, 0)];
     wanted->depth.scale = nb_options_number(arguments, DEPTH_SCALE, 1e-9, 1e9, 0);
     if (format != 0 && arguments->values[DEPTH_SCALE] != NULL)
         nb_options_refuse(arguments, DEPTH_SCALE, "is of --depth-format metric alone; the others have their own");
-    if (nebel_depth_format_at((size_t)format)->kind == NEBEL_DEPTH_DISPARITY && arguments->values[DEPTH_KIND] != NULL)
+    if (nebel_depth_format_at((size_t)format)->measure == NEBEL_MEASURE_DISPARITY &&
+        arguments->values[DEPTH_KIND] != NULL)
         nb_options_refuse(arguments, DEPTH_KIND, "has no place here: the format is disparity");
 }
 

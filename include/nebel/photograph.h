@@ -92,19 +92,19 @@ nebel_result nebel_aim_pixels(nebel_pixels *pixels, const nebel_intrinsics *intr
 
 /* ---- depth ----------------------------------------------------------------------------------- */
 
-typedef enum nebel_depth_kind {
-    NEBEL_DEPTH_KIND_OF_FORMAT = 0,
-    NEBEL_DEPTH_PLANAR,  /* m along the camera's axis */
-    NEBEL_DEPTH_RADIAL,  /* m along the pixel's ray */
-    NEBEL_DEPTH_INVERSE, /* 1 over metres along the axis; 0 is infinitely far */
-    NEBEL_DEPTH_DISPARITY /* pixels between the two pictures of a stereo pair: baseline fx / disparity metres along the axis */
-} nebel_depth_kind;
+typedef enum nebel_depth_measure {
+    NEBEL_MEASURE_OF_FORMAT = 0,
+    NEBEL_MEASURE_PLANAR,  /* m along the camera's axis */
+    NEBEL_MEASURE_RADIAL,  /* m along the pixel's ray */
+    NEBEL_MEASURE_INVERSE, /* 1 over metres along the axis; 0 is infinitely far */
+    NEBEL_MEASURE_DISPARITY /* pixels between the two pictures of a stereo pair: baseline fx / disparity metres along the axis */
+} nebel_depth_measure;
 
-/* How a data set stores depth. Numbers times `scale` plus `offset` are of the kind. */
+/* How a data set stores depth. Numbers times `scale` plus `offset` are of the measure. */
 typedef struct nebel_depth_format {
     const char *name;  /* "kitti" */
     const char *about; /* half a line */
-    nebel_depth_kind kind;
+    nebel_depth_measure measure;
     double scale, offset;
     int32_t invalid;  /* the number that says that nothing is known; -1: none */
     int32_t infinite; /* the number that stands for the sky; -1: none */
@@ -126,7 +126,7 @@ const nebel_depth_format *nebel_find_depth_format(const char *name);
 
 typedef struct nebel_depth_source {
     const char *format;             /* NULL: "metric" */
-    nebel_depth_kind kind;          /* in place of the format's; not where that is DISPARITY */
+    nebel_depth_measure measure;    /* in place of the format's; not where that is DISPARITY */
     double scale;                   /* > 0, of "metric" alone, which needs it where numbers are whole; 0: 1 */
     const char *channel;            /* of EXR; NULL: Z, depth.Z or the only one */
     const nebel_intrinsics *camera; /* of DISPARITY: fx and baseline are read */

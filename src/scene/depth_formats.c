@@ -15,15 +15,15 @@
  *     carla       CARLA, "Depth camera": (R + 256 G + 65536 B) / (2^24 - 1) of 1000 m
  *     hypersim    apple/ml-hypersim: metres along the ray, NaN where nothing is known */
 static const nebel_depth_format formats[] = {
-    {"metric", "metres times --depth-scale", NEBEL_DEPTH_PLANAR, 1, 0, 0, -1, WHOLE | NEBEL_DEPTH_FILES_FLOAT},
-    {"cityscapes", "Cityscapes, disparity", NEBEL_DEPTH_DISPARITY, 1 / 256.0, -1 / 256.0, 0, 1,
+    {"metric", "metres times --depth-scale", NEBEL_MEASURE_PLANAR, 1, 0, 0, -1, WHOLE | NEBEL_DEPTH_FILES_FLOAT},
+    {"cityscapes", "Cityscapes, disparity", NEBEL_MEASURE_DISPARITY, 1 / 256.0, -1 / 256.0, 0, 1,
      NEBEL_DEPTH_FILES_16_BIT},
-    {"kitti", "KITTI depth, VOID", NEBEL_DEPTH_PLANAR, 1 / 256.0, 0, 0, -1, NEBEL_DEPTH_FILES_16_BIT},
-    {"tum", "TUM RGB-D", NEBEL_DEPTH_PLANAR, 1 / 5000.0, 0, 0, -1, NEBEL_DEPTH_FILES_16_BIT},
-    {"scannet", "ScanNet, Kinect, RealSense", NEBEL_DEPTH_PLANAR, 1 / 1000.0, 0, 0, -1, NEBEL_DEPTH_FILES_16_BIT},
-    {"vkitti", "Virtual KITTI 1 and 2", NEBEL_DEPTH_PLANAR, 1 / 100.0, 0, 0, 65535, NEBEL_DEPTH_FILES_16_BIT},
-    {"carla", "CARLA, SkyScenes", NEBEL_DEPTH_PLANAR, 1000 / 16777215.0, 0, -1, 16777215, NEBEL_DEPTH_FILES_24_BIT},
-    {"hypersim", "Hypersim, HDF5 made NPY or EXR", NEBEL_DEPTH_RADIAL, 1, 0, -1, -1, NEBEL_DEPTH_FILES_FLOAT},
+    {"kitti", "KITTI depth, VOID", NEBEL_MEASURE_PLANAR, 1 / 256.0, 0, 0, -1, NEBEL_DEPTH_FILES_16_BIT},
+    {"tum", "TUM RGB-D", NEBEL_MEASURE_PLANAR, 1 / 5000.0, 0, 0, -1, NEBEL_DEPTH_FILES_16_BIT},
+    {"scannet", "ScanNet, Kinect, RealSense", NEBEL_MEASURE_PLANAR, 1 / 1000.0, 0, 0, -1, NEBEL_DEPTH_FILES_16_BIT},
+    {"vkitti", "Virtual KITTI 1 and 2", NEBEL_MEASURE_PLANAR, 1 / 100.0, 0, 0, 65535, NEBEL_DEPTH_FILES_16_BIT},
+    {"carla", "CARLA, SkyScenes", NEBEL_MEASURE_PLANAR, 1000 / 16777215.0, 0, -1, 16777215, NEBEL_DEPTH_FILES_24_BIT},
+    {"hypersim", "Hypersim, HDF5 made NPY or EXR", NEBEL_MEASURE_RADIAL, 1, 0, -1, -1, NEBEL_DEPTH_FILES_FLOAT},
 };
 
 enum { FORMATS = sizeof formats / sizeof *formats };

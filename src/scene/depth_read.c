@@ -116,7 +116,7 @@ static nebel_result read_numbers(const nb_codec *codec, const nb_bytes *bytes, c
 
 /* What becomes of numbers. */
 typedef struct rule {
-    nebel_depth_kind kind;
+    nebel_depth_measure measure;
     double scale, offset;
     double pull; /* of disparity: baseline times focal length */
     int64_t invalid, infinite;
@@ -125,10 +125,10 @@ typedef struct rule {
 static float metres_of(const rule *r, double number)
 {
     const double value = number * r->scale + r->offset;
-    switch (r->kind) {
-    case NEBEL_DEPTH_INVERSE:
+    switch (r->measure) {
+    case NEBEL_MEASURE_INVERSE:
         return value > 0 ? (float)(1 / value) : value == 0 ? INFINITY : NAN;
-    case NEBEL_DEPTH_DISPARITY:
+    case NEBEL_MEASURE_DISPARITY:
         return value > 0 ? (float)(r->pull / value) : NAN;
     default:
         return value > 0 ? (float)value : NAN;
@@ -145,7 +145,7 @@ static float metres_of_whole(const rule *r, int64_t number)
 static float metres_of_float(const rule *r, float number)
 {
     if (isinf(number) && number > 0)
-        return r->kind == NEBEL_DEPTH_INVERSE || r->kind == NEBEL_DEPTH_DISPARITY ? NAN : INFINITY;
+        return r->measure == NEBEL_MEASURE_INVERSE || r->measure == NEBEL_MEASURE_DISPARITY ? NAN : INFINITY;
     const float metres = metres_of(r, (double)number);
     return (double)metres >= ENDLESS ? INFINITY : metres;
 }
@@ -203,8 +203,8 @@ static nebel_result check_source(const nb_codec *codec, const nebel_depth_source
     if (!(source->scale >= 0 && source->scale <= 1e9) || (source->scale > 0 && format != nebel_depth_format_at(0)))
         return nb_fail(&codec->log, NEBEL_ERROR_ARGUMENT,
                        "%s: a scale of depth is more than 0, at most 1e9 and of the format metric alone", codec->name);
-    if (source->kind != NEBEL_DEPTH_KIND_OF_FORMAT && format->kind == NEBEL_DEPTH_DISPARITY &&
-        source->kind != format->kind)
+    if (source->measure != NEBEL_MEASURE_OF_FORMAT && format->measure == NEBEL_MEASURE_DISPARITY &&
+        source->measure != format->measure)
         return nb_fail(&codec->log, NEBEL_ERROR_ARGUMENT, "%s: %s is disparity and nothing else", codec->name,
                        format->name);
     return NEBEL_OK;
@@ -213,13 +213,13 @@ static nebel_result check_source(const nb_codec *codec, const nebel_depth_source
 static nebel_result make_rule(const nb_codec *codec, const nebel_depth_source *source, const nebel_depth_format *format,
                               rule *r)
 {
-    *r = (rule){.kind = source->kind != NEBEL_DEPTH_KIND_OF_FORMAT ? source->kind : format->kind,
+    *r = (rule){.measure = source->measure != NEBEL_MEASURE_OF_FORMAT ? source->measure : format->measure,
                 .scale = source->scale > 0 ? source->scale : format->scale,
                 .offset = format->offset,
                 .invalid = format->invalid,
                 .infinite = format->infinite};
-    if (r->kind == NEBEL_DEPTH_INVERSE) r->invalid = -1;
-    if (r->kind != NEBEL_DEPTH_DISPARITY) return NEBEL_OK;
+    if (r->measure == NEBEL_MEASURE_INVERSE) r->invalid = -1;
+    if (r->measure != NEBEL_MEASURE_DISPARITY) return NEBEL_OK;
     r->pull = source->camera != NULL ? source->camera->baseline * source->camera->fx : 0;
     if (r->pull > 0 && r->pull < HUGE_VAL) return NEBEL_OK;
     return nb_fail(&codec->log, NEBEL_ERROR_VALUE,
@@ -245,7 +245,7 @@ static nebel_result make_map(const nb_codec *codec, const nb_depth_numbers *numb
 {
     *map = (nebel_depth_map){.width = numbers->width,
                              .height = numbers->height,
-                             .type = r->kind == NEBEL_DEPTH_RADIAL ? NEBEL_DEPTH_RAY : NEBEL_DEPTH_AXIS};
+                             .type = r->measure == NEBEL_MEASURE_RADIAL ? NEBEL_DEPTH_RAY : NEBEL_DEPTH_AXIS};
     map->depth = nb_allocate(&codec->allocator, (size_t)map->width * map->height, sizeof *map->depth);
     if (map->depth == NULL) return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", codec->name);
     const nebel_result result = convert(codec, numbers, r, map->depth);
