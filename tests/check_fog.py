@@ -36,7 +36,7 @@ def encode(x):
 
 
 def stretch(camera=None):
-    """Metres along the ray for one along the axis; pixel centres are whole numbers."""
+    """Meters along the ray for one along the axis; pixel centers are whole numbers."""
     c = camera or CAMERA
     u, v = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
     return np.sqrt(1 + ((u - c["cx"]) / c["fx"]) ** 2 + ((v - c["cy"]) / c["fy"]) ** 2)
@@ -231,7 +231,7 @@ class PictureTest(Case):
                     self.assertTrue((got[..., 3] == picture[..., -1]).all())
 
     def test_jpeg(self):
-        image = self.write("p.jpg", files.GREY_JPEG)
+        image = self.write("p.jpg", files.GRAY_JPEG)
         depth = self.write("small.pfm", files.pfm(np.full((8, 16), 30, np.float32)))
         self.assert_done(self.fog(image, "-o", self.out, "--depth", depth, *self.common[2:], "--extinction", 0.02))
         picture = np.full((8, 16, 3), 128, np.uint8)
@@ -254,7 +254,7 @@ class PictureTest(Case):
         done = self.fog(self.image, "-o", self.out, *self.common, "--visibility", 150, "--contrast", 0.02)
         self.assert_done(done)
         beta = -math.log(0.02) / 150
-        self.assertIn(f"extinction {beta:.6g} per metre, airlight 0.800,0.750,0.900, blended in linear light", done.stderr)
+        self.assertIn(f"extinction {beta:.6g} per meter, airlight 0.800,0.750,0.900, blended in linear light", done.stderr)
         self.assert_bytes(self.out, expected(self.picture, np.exp(-beta * self.length)), LINEAR_TOLERANCE)
 
     def test_transmittance(self):
@@ -481,7 +481,7 @@ class BadInputTest(Case):
         self.refuse(npy[:-1], "d.npy", INTRINSICS, "ends too early")
         self.refuse(npy[:60], "d.npy", INTRINSICS, "header")
         self.refuse(b"Pf\n99999999 99999999\n-1\n", "d.pfm", INTRINSICS, "at most 2^28 pixels")
-        self.refuse(files.pfm(good).replace(b"Pf", b"PF"), "d.pfm", INTRINSICS, "in colour")
+        self.refuse(files.pfm(good).replace(b"Pf", b"PF"), "d.pfm", INTRINSICS, "in color")
         self.refuse(self.npy("d.npy", np.asfortranarray(good)), "", INTRINSICS, "Fortran")
         self.refuse(self.npy("d.npy", good[..., None]), "", INTRINSICS, "two dimensions")
         self.refuse(self.npy("d.npy", good.astype(">f4")), "", INTRINSICS, "little endian")
@@ -510,10 +510,10 @@ class BadInputTest(Case):
         for data, words in ((files.png(np.eye(8, 16, dtype=np.uint8), bits=1), ("less than 8 bits",)),
                             (files.CMYK_JPEG, ("RGB",)), (b"GIF89a", ("neither a PNG, a JPEG nor an OpenEXR",)),
                             (exr, ("no channels R, G and B",)), (files.png(np.ones((8, 16), np.uint8))[:60], ("PNG",)),
-                            (files.GREY_JPEG[:100], ("JPEG",)), (b"", ("neither",))):
+                            (files.GRAY_JPEG[:100], ("JPEG",)), (b"", ("neither",))):
             self.assert_error(self.fog(self.write("p", data), *depth, "-o", self.out), 1, "p: ", *words)
         self.write("p.exr", files.exr({n: np.ones((8, 16), np.float32) for n in "RGB"}))
-        self.write("p.jpg", files.GREY_JPEG)
+        self.write("p.jpg", files.GRAY_JPEG)
         self.assert_error(self.fog("p.exr", *depth, "-o", self.out), 1, "becomes an .exr")
         self.assert_error(self.fog("p.jpg", *depth, "-o", "out.exr"), 1, "becomes a .png")
         self.assert_error(self.fog("p.exr", *depth, "-o", "out.exr", "--blend", "srgb"), 1, "floats are light")

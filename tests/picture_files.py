@@ -6,8 +6,8 @@ import zlib
 
 import numpy as np
 
-# 16 x 8 pixels, the left half 128, the right half 200, of all colours, without loss.
-GREY_JPEG = base64.b64decode(
+# 16 x 8 pixels, the left half 128, the right half 200, of all colors, without loss.
+GRAY_JPEG = base64.b64decode(
     "/9j/4AAQSkZJRgABAQAAAQABAAD/2wBDAAEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEB"
     "AQEBAQH/2wBDAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQEBAQH/wAARCAAIABAD"
     "AREAAhEBAxEB/8QAFQABAQAAAAAAAAAAAAAAAAAAAAr/xAAUEAEAAAAAAAAAAAAAAAAAAAAA/8QAFAEBAAAAAAAAAAAAAAAAAAAAAP/EABQRAQAA"
@@ -24,7 +24,7 @@ def chunk(kind, data):
 
 
 def png(array, bits=None):
-    """Of uint8 or uint16, rows x columns or rows x columns x channels; bits 1: grey of 0 and 1."""
+    """Of uint8 or uint16, rows x columns or rows x columns x channels; bits 1: gray of 0 and 1."""
     array = np.asarray(array)
     channels = array.shape[2] if array.ndim == 3 else 1
     bits = bits or 8 * array.dtype.itemsize

@@ -26,9 +26,9 @@ static const char about[] = "Puts fog into pictures whose depth is known: each p
                             "docs/photographs.md has the formulas and the formats of data sets.\n";
 
 static const char examples[] = "Examples:\n"
-                               "  A photograph with depth in metres along the camera's axis:\n"
-                               "    nebel fog street.png --depth street.exr --hfov 60 --visibility 150 -o foggy.png\n"
-                               "  Cityscapes, as Foggy Cityscapes blends it (extinction 0.02 per metre):\n"
+                               "  A photograph with depth in meters along the camera's axis:\n"
+                               "    nebel fog street.png -d street.exr --hfov 60 -v 150 -o foggy.png\n"
+                               "  Cityscapes, as Foggy Cityscapes blends it (extinction 0.02 per meter):\n"
                                "    nebel fog 'left/*_leftImg8bit.png' --depth 'disparity/*_disparity.png' \\\n"
                                "        --camera 'camera/*_camera.json' --depth-format cityscapes \\\n"
                                "        --extinction 0.02 --blend srgb -o 'foggy/*_foggy_beta_0.02.png'\n"
@@ -115,7 +115,7 @@ static void describe_fog(const nb_fog_call *wanted, const crew *all, char *text,
     }
     if (all->done == 1 || wanted->has_airlight)
         (void)snprintf(airlight, sizeof airlight, "airlight %.3f,%.3f,%.3f", light[0], light[1], light[2]);
-    (void)snprintf(text, size, "extinction %.6g per metre, %s, blended in %s", wanted->extinction, airlight,
+    (void)snprintf(text, size, "extinction %.6g per meter, %s, blended in %s", wanted->extinction, airlight,
                    wanted->blends_stored ? "sRGB" : "linear light");
 }
 

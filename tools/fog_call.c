@@ -41,24 +41,24 @@ const nb_option nb_fog_options[NB_FOG_OPTIONS] = {
     [DEPTH_FORMAT] = {"depth-format", 'f', "NAME",
                       "metric (default), cityscapes, kitti, tum, scannet,\nvkitti, carla or hypersim."},
     [DEPTH_SCALE] = {"depth-scale", 0, "M",
-                     "Metres that a number of --depth-format metric stands\nfor. Default: 1 of floats."},
+                     "Meters that a number of --depth-format metric stands\nfor. Default: 1 of floats."},
     [DEPTH_KIND] =
         {"depth-kind", 0, "KIND",
-         "planar: along the camera's axis; radial: along the\npixel's ray; inverse: 1 / metres along the axis;\n"
+         "planar: along the camera's axis; radial: along the\npixel's ray; inverse: 1 / meters along the axis;\n"
          "disparity of a stereo pair. Default: the format's,\nwhich is planar of metric."},
     [DEPTH_CHANNEL] = {"depth-channel", 0, "NAME", "Of EXR. Default: Z, depth.Z or the only one."},
     [CAMERA] = {"camera", 'c', "FILE",
                 "JSON of Cityscapes, calib.txt of KITTI, YAML of\nOpenCV, or a text of fx fy cx cy."},
     [INTRINSICS] = {"intrinsics", 0, "FX,FY,CX,CY",
-                    "The same in pixels; a pixel's centre is a whole\nnumber, counted from 0."},
+                    "The same in pixels; a pixel's center is a whole\nnumber, counted from 0."},
     [HFOV] = {"hfov", 0, "DEG", "The same: degrees from the left to the right edge."},
     [VISIBILITY] = {"visibility", 'v', "M",
                     "How far one sees: where black things have --contrast\nof the fog's light. 0.01 to 1e9."},
     [CONTRAST] = {"contrast", 0, "C", "0 < C < 1. Default: 0.05, the meteorological optical\nrange."},
-    [EXTINCTION] = {"extinction", 0, "B", "In place of --visibility: -ln(C) / M, per metre,\n0 to 1e6."},
+    [EXTINCTION] = {"extinction", 0, "B", "In place of --visibility: -ln(C) / M, per meter,\n0 to 1e6."},
     [AIRLIGHT] =
         {"airlight", 0, "R,G,B",
-         "The fog's own colour, 0 to 1 as the picture stores\nit, or estimate (default): from the picture's dark\n"
+         "The fog's own color, 0 to 1 as the picture stores\nit, or estimate (default): from the picture's dark\n"
          "channel."},
     [BLEND] = {"blend", 0, "SPACE",
                "linear (default): light adds, as in nature; srgb:\nstored numbers do, as in most data sets."},
@@ -66,10 +66,10 @@ const nb_option nb_fog_options[NB_FOG_OPTIONS] = {
                  "Pixels of unknown depth: inpaint (default), from the\nfarther of their neighbours in the row; far; "
                  "keep\nthem without fog."},
     [SKY] = {"sky", 0, "WAY",
-             "Pixels that are infinitely far: far (default), keep\nthem without fog, or at so many metres."},
+             "Pixels that are infinitely far: far (default), keep\nthem without fog, or at so many meters."},
     [SCENE] = {"scene", 0, "FILE", "In place of --visibility: the fog, sun and lamps of\na scene, seen by its camera."},
     [TRANSMITTANCE] = {"transmittance", 0, "FILE",
-                       "Writes what part of the light comes through, 0 to 1:\n.png, 16 bit grey (of colours the "
+                       "Writes what part of the light comes through, 0 to 1:\n.png, 16 bit gray (of colors the "
                        "luminance), or .exr."},
     [THREADS] = {"threads", 't', "N", "Threads, 0 for all (default). Any number gives the\nsame pictures."},
     [QUIET] = {"quiet", 'q', NULL, "No progress bar and no summary."},
@@ -125,7 +125,7 @@ static void read_policies(nb_arguments *arguments, nb_fog_call *wanted)
         wanted->sky = (double)NAN;
     else if (nb_decimal_read(sky, strlen(sky), &wanted->sky) != NB_DECIMAL_GOOD ||
              !(wanted->sky >= 0 && wanted->sky <= 1e9))
-        nb_options_reject(arguments, SKY, "is not far, keep or a number of metres from 0 to 1e9");
+        nb_options_reject(arguments, SKY, "is not far, keep or a number of meters from 0 to 1e9");
 }
 
 /* ---- the camera ------------------------------------------------------------------------------ */

@@ -30,7 +30,7 @@ static int print_help(void)
                  "  A picture of a scene:\n"
                  "    nebel render mist.json -o mist.png\n"
                  "  Fog over a photograph whose depth is known:\n"
-                 "    nebel fog street.png --depth street.exr --hfov 60 --visibility 150 -o foggy.png\n"
+                 "    nebel fog street.png -d street.exr --hfov 60 -v 150 -o foggy.png\n"
                  "  What fog does to the light along one ray, 50 m straight ahead:\n"
                  "    echo '0 1.7 0  0 0 -1  50' | nebel trace mist.json\n"
                  "\n"

@@ -7,9 +7,9 @@
 /* The most pixels of a piece: what is made of them on the way stays near the processor. A multiple of every packet. */
 enum { NB_PICTURE_PIECE = 256 };
 
-/* Fog of one density and colour everywhere. */
+/* Fog of one density and color everywhere. */
 typedef struct nb_picture_haze {
-    float octaves; /* minus how many times a metre halves the light */
+    float octaves; /* minus how many times a meter halves the light */
     float radiance[3];
     int along_ray;              /* depth is a distance, not a multiple of the way at depth 1 */
     float corner[3], step_x[3]; /* of the row */

@@ -7,7 +7,7 @@
 
 #include <math.h>
 
-/* Half the side of the square in which the darkest colour is looked for, and its side. */
+/* Half the side of the square in which the darkest color is looked for, and its side. */
 enum { REACH = 7, SIDE = 2 * REACH + 1, KEYS = 65536 };
 
 typedef struct sampler {
@@ -62,7 +62,7 @@ static uint16_t key_of(const sampler *from, double value)
     return (uint16_t)(bits >> 15);
 }
 
-/* ITU-R BT.601, as usual for brightness of stored colour. */
+/* ITU-R BT.601, as usual for brightness of stored color. */
 static uint16_t brightness_of(const sampler *from, size_t pixel)
 {
     return key_of(from, .299 * sample_of(from, pixel, 0) + .587 * sample_of(from, pixel, 1) +

@@ -1,4 +1,4 @@
-/* Depth in files: numbers first, whatever they mean, then metres. */
+/* Depth in files: numbers first, whatever they mean, then meters. */
 #ifndef NB_SCENE_DEPTH_H
 #define NB_SCENE_DEPTH_H
 

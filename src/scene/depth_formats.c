@@ -10,12 +10,12 @@
  *     cityscapes  README of cityscapesScripts: d = (p - 1) / 256, p = 0 is invalid
  *     kitti       readme of the KITTI depth benchmark: p / 256, 0 has no depth
  *     tum         "File formats" of the TUM RGB-D benchmark: 5000 is 1 m, 0 no data
- *     scannet     ScanNet, as Kinect and RealSense: millimetres, 0 no data
- *     vkitti      Virtual KITTI 1 and 2: centimetres, the sky at the largest number
+ *     scannet     ScanNet, as Kinect and RealSense: millimeters, 0 no data
+ *     vkitti      Virtual KITTI 1 and 2: centimeters, the sky at the largest number
  *     carla       CARLA, "Depth camera": (R + 256 G + 65536 B) / (2^24 - 1) of 1000 m
- *     hypersim    apple/ml-hypersim: metres along the ray, NaN where nothing is known */
+ *     hypersim    apple/ml-hypersim: meters along the ray, NaN where nothing is known */
 static const nebel_depth_format formats[] = {
-    {"metric", "metres times --depth-scale", NEBEL_MEASURE_PLANAR, 1, 0, 0, -1, WHOLE | NEBEL_DEPTH_FILES_FLOAT},
+    {"metric", "meters times --depth-scale", NEBEL_MEASURE_PLANAR, 1, 0, 0, -1, WHOLE | NEBEL_DEPTH_FILES_FLOAT},
     {"cityscapes", "Cityscapes, disparity", NEBEL_MEASURE_DISPARITY, 1 / 256.0, -1 / 256.0, 0, 1,
      NEBEL_DEPTH_FILES_16_BIT},
     {"kitti", "KITTI depth, VOID", NEBEL_MEASURE_PLANAR, 1 / 256.0, 0, 0, -1, NEBEL_DEPTH_FILES_16_BIT},

@@ -57,7 +57,7 @@ static nebel_result read_png(const nb_codec *codec, const nb_bytes *bytes, nb_de
         }
     } else {
         result = nb_fail(&codec->log, NEBEL_ERROR_UNSUPPORTED,
-                         "%s: depth in PNG is grey of 16 or 8 bits, without alpha, or RGB of 8 bits; convert it",
+                         "%s: depth in PNG is gray of 16 or 8 bits, without alpha, or RGB of 8 bits; convert it",
                          codec->name);
     }
     nb_release(&codec->allocator, stored.pixels);
@@ -112,7 +112,7 @@ static nebel_result read_numbers(const nb_codec *codec, const nb_bytes *bytes, c
                    codec->name);
 }
 
-/* ---- metres ---------------------------------------------------------------------------------- */
+/* ---- meters ---------------------------------------------------------------------------------- */
 
 /* What becomes of numbers. */
 typedef struct rule {
@@ -122,7 +122,7 @@ typedef struct rule {
     int64_t invalid, infinite;
 } rule;
 
-static float metres_of(const rule *r, double number)
+static float meters_of(const rule *r, double number)
 {
     const double value = number * r->scale + r->offset;
     switch (r->measure) {
@@ -135,31 +135,31 @@ static float metres_of(const rule *r, double number)
     }
 }
 
-static float metres_of_whole(const rule *r, int64_t number)
+static float meters_of_whole(const rule *r, int64_t number)
 {
     if (number == r->invalid) return NAN;
     if (number == r->infinite) return INFINITY;
-    return metres_of(r, (double)number);
+    return meters_of(r, (double)number);
 }
 
-static float metres_of_float(const rule *r, float number)
+static float meters_of_float(const rule *r, float number)
 {
     if (isinf(number) && number > 0)
         return r->measure == NEBEL_MEASURE_INVERSE || r->measure == NEBEL_MEASURE_DISPARITY ? NAN : INFINITY;
-    const float metres = metres_of(r, (double)number);
-    return (double)metres >= ENDLESS ? INFINITY : metres;
+    const float meters = meters_of(r, (double)number);
+    return (double)meters >= ENDLESS ? INFINITY : meters;
 }
 
 static nebel_result convert(const nb_codec *codec, const nb_depth_numbers *numbers, const rule *r, float *depth)
 {
     enum { SHORTS = 65536 };
     const size_t count = (size_t)numbers->width * numbers->height;
-    for (size_t i = 0; i < count && numbers->words != NULL; i++) depth[i] = metres_of_whole(r, numbers->words[i]);
-    for (size_t i = 0; i < count && numbers->floats != NULL; i++) depth[i] = metres_of_float(r, numbers->floats[i]);
+    for (size_t i = 0; i < count && numbers->words != NULL; i++) depth[i] = meters_of_whole(r, numbers->words[i]);
+    for (size_t i = 0; i < count && numbers->floats != NULL; i++) depth[i] = meters_of_float(r, numbers->floats[i]);
     if (numbers->shorts == NULL) return NEBEL_OK;
     float *table = nb_allocate(&codec->allocator, SHORTS, sizeof *table);
     if (table == NULL) return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", codec->name);
-    for (int i = 0; i < SHORTS; i++) table[i] = metres_of_whole(r, i);
+    for (int i = 0; i < SHORTS; i++) table[i] = meters_of_whole(r, i);
     for (size_t i = 0; i < count; i++) depth[i] = table[numbers->shorts[i]];
     nb_release(&codec->allocator, table);
     return NEBEL_OK;
@@ -173,10 +173,10 @@ static nebel_result check_files(const nb_codec *codec, const nebel_depth_format 
     static const struct {
         int files;
         const char *name;
-    } names[] = {{NEBEL_DEPTH_FILES_16_BIT, "whole numbers of 16 bits, grey"},
+    } names[] = {{NEBEL_DEPTH_FILES_16_BIT, "whole numbers of 16 bits, gray"},
                  {NEBEL_DEPTH_FILES_24_BIT, "RGB of 8 bits"},
                  {NEBEL_DEPTH_FILES_FLOAT, "floats"},
-                 {NEBEL_DEPTH_FILES_8_BIT, "whole numbers of 8 bits, grey"}};
+                 {NEBEL_DEPTH_FILES_8_BIT, "whole numbers of 8 bits, gray"}};
     const char *has = "", *wants = "";
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         if (names[i].files == numbers->files) has = names[i].name;
@@ -188,7 +188,7 @@ static nebel_result check_files(const nb_codec *codec, const nebel_depth_format 
                        codec->name, has, format->name, wants);
     if (format == nebel_depth_format_at(0) && numbers->floats == NULL && !(source->scale > 0))
         return nb_fail(&codec->log, NEBEL_ERROR_VALUE,
-                       "%s: it holds %s, whose size in metres nobody knows; choose a format or give the scale "
+                       "%s: it holds %s, whose size in meters nobody knows; choose a format or give the scale "
                        "(nebel fog: --depth-format, --depth-scale)",
                        codec->name, has);
     return NEBEL_OK;

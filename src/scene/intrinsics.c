@@ -100,7 +100,7 @@ static nebel_result read_plain(const reader *in, nebel_intrinsics *camera)
     return NEBEL_OK;
 }
 
-/* The left colour camera is 2, the right one 3; the fourth column is -fx times the way from camera 0 (A. Geiger and others,
+/* The left color camera is 2, the right one 3; the fourth column is -fx times the way from camera 0 (A. Geiger and others,
  * "Vision meets robotics: the KITTI dataset", 2013). */
 static nebel_result read_kitti(const reader *in, const char *left, const char *right, nebel_intrinsics *camera)
 {

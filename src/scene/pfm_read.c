@@ -49,7 +49,7 @@ nebel_result nb_pfm_read(const nb_codec *codec, const nb_bytes *bytes, nb_depth_
 {
     char width[32], height[32], scale[32];
     size_t at = 3;
-    if (bytes->data[1] == 'F') return fail(codec, "it is a picture in colour; depth is \"Pf\", one number a pixel");
+    if (bytes->data[1] == 'F') return fail(codec, "it is a picture in color; depth is \"Pf\", one number a pixel");
     read_word(bytes, &at, width);
     read_word(bytes, &at, height);
     read_word(bytes, &at, scale);

@@ -36,14 +36,14 @@ static nebel_result take_stored(const nb_stored *stored, nebel_photograph *photo
     return NEBEL_OK;
 }
 
-/* R, G and B, or one grey for all; `places` of up to four channels among the picture's. */
+/* R, G and B, or one gray for all; `places` of up to four channels among the picture's. */
 static size_t find_colors(const nebel_image *image, int places[4])
 {
     static const char *const names[] = {"R", "G", "B", "A"};
     for (int c = 0; c < 4; c++) places[c] = nb_image_channel(image, names[c]);
-    const int grey = nb_image_channel(image, "Y");
-    if (places[0] < 0 && places[1] < 0 && places[2] < 0 && grey >= 0)
-        for (int c = 0; c < 3; c++) places[c] = grey;
+    const int gray = nb_image_channel(image, "Y");
+    if (places[0] < 0 && places[1] < 0 && places[2] < 0 && gray >= 0)
+        for (int c = 0; c < 3; c++) places[c] = gray;
     if (places[0] < 0 || places[1] < 0 || places[2] < 0) return 0;
     return places[3] < 0 ? 3 : 4;
 }
@@ -185,7 +185,7 @@ nebel_result nebel_write_gray(const char *path, const nebel_scene_desc *desc, ui
     nebel_result result = nb_codec_prepare(desc, path, &codec);
     if (result == NEBEL_OK) result = check(&codec, width, height, values);
     if (result == NEBEL_OK && nebel_find_image_format(path) != NEBEL_IMAGE_PNG)
-        result = nb_fail(&codec.log, NEBEL_ERROR_FORMAT, "%s: grey is written as .png; name it so", path);
+        result = nb_fail(&codec.log, NEBEL_ERROR_FORMAT, "%s: gray is written as .png; name it so", path);
     if (result != NEBEL_OK) return result;
     return write_and_release(&codec, encode_gray_png(&codec, width, height, values, &bytes), &bytes);
 }
