@@ -55,8 +55,8 @@ function(nebel_add_kernel file level)
     target_compile_definitions(${target} PRIVATE NB_ISA_${upper}=1 NB_SUFFIX=${level})
     # gcc's note that vectors wider than the base level change the calling convention: the kernels pass none between objects.
     target_compile_options(${target} PRIVATE -Wno-psabi ${nebel_flags_${level}})
-    # The march and air are full of loops over three colours, which -O2 leaves in memory.
-    if(stem MATCHES "^(trace|gather|look)_kernel$" AND CMAKE_C_COMPILER_ID STREQUAL GNU AND NOT NEBEL_SANITIZE)
+    # The march, air and pictures are full of loops over three colors, which -O2 leaves in memory.
+    if(stem MATCHES "^(trace|gather|look|picture)_kernel$" AND CMAKE_C_COMPILER_ID STREQUAL GNU AND NOT NEBEL_SANITIZE)
         target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O3>)
     endif()
 endfunction()

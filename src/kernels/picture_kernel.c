@@ -22,31 +22,30 @@ enum { PIECE = NB_PICTURE_PIECE };
 #define DARKEST_LIGHT NB_F(0.0031308) /* the same as light */
 #define SLOPE 12.92f
 
-/* For bytes: ((c + 0.055) / 1.055)^2.4 as a polynomial, minimax with the slope of encoding as its weight: off by what 0.013 of a
+/* Of a byte: ((c + 0.055) / 1.055)^2.4 as a polynomial, minimax with the slope of encoding as its weight: off by what 0.052 of a
  * byte is. */
-NB_INLINE nb_real decode_byte(nb_real c)
+NB_INLINE nb_real decode_byte(nb_real byte)
 {
-    nb_real p = NB_F(0.0872823676);
-    p = p * c + NB_F(-0.30737755);
-    p = p * c + NB_F(0.667160581);
-    p = p * c + NB_F(0.519381982);
-    p = p * c + NB_F(0.0327460770);
-    p = p * c + NB_F(0.000916890797);
-    return nb_select(c > DARKEST_POWER, p, c * nb_splat(1 / SLOPE));
+    nb_real p = NB_F(-2.76223408e-11);
+    p = p * byte + NB_F(3.17535149e-8);
+    p = p * byte + NB_F(8.61774709e-6);
+    p = p * byte + NB_F(0.000111390588);
+    p = p * byte + NB_F(0.00104625706);
+    return nb_select(byte > NB_F(10.5), p, byte * nb_splat(1 / (255 * SLOPE)));
 }
 
-/* 1.055 x^(1 / 2.4) - 0.055 as a minimax polynomial of sqrt(x): off by 0.04 of a byte. */
+/* 255 (1.055 x^(1 / 2.4) - 0.055), 0 <= x <= 1, as a minimax polynomial of sqrt(x): off by 0.04. */
 NB_INLINE nb_real encode_byte(nb_real x)
 {
     const nb_real s = nb_sqrt(x);
-    nb_real p = NB_F(-0.948544329);
-    p = p * s + NB_F(3.42155875);
-    p = p * s + NB_F(-5.00683277);
-    p = p * s + NB_F(3.90072043);
-    p = p * s + NB_F(-1.90018679);
-    p = p * s + NB_F(1.57537242);
-    p = p * s + NB_F(-0.0422369182);
-    return nb_select(x > DARKEST_LIGHT, p, x * nb_splat(SLOPE));
+    nb_real p = NB_F(-241.878804);
+    p = p * s + NB_F(872.49748);
+    p = p * s + NB_F(-1276.74236);
+    p = p * s + NB_F(994.68371);
+    p = p * s + NB_F(-484.547632);
+    p = p * s + NB_F(401.719967);
+    p = p * s + NB_F(-10.7704141);
+    return nb_select(x > DARKEST_LIGHT, p, x * nb_splat(255 * SLOPE));
 }
 
 NB_INLINE nb_real power(nb_real x, float exponent)
@@ -117,17 +116,18 @@ static void fill_transmittance(const nb_picture_job *job, float *transmittance)
     }
 }
 
-/* A packet's light. `is_haze` is a constant. */
-NB_INLINE light light_at(const nb_picture_job *job, const float *haze_transmittance, uint32_t at, int is_haze)
+/* A packet's light; in-scattering is `scale` where white is. `is_haze` is a constant. */
+NB_INLINE light light_at(const nb_picture_job *job, const float *haze_transmittance, uint32_t at, float scale,
+                         int is_haze)
 {
     light l;
     for (int c = 0; c < 3; c++) {
         if (is_haze) {
             l.transmittance[c] = nb_load_lanes(haze_transmittance + at);
-            l.in_scattering[c] = (NB_F(1.0) - l.transmittance[c]) * nb_splat(job->haze->radiance[c]);
+            l.in_scattering[c] = (NB_F(1.0) - l.transmittance[c]) * nb_splat(job->haze->radiance[c] * scale);
         } else {
             l.transmittance[c] = nb_load_lanes(job->transmittance[c] + at);
-            l.in_scattering[c] = nb_load_lanes(job->in_scattering[c] + at);
+            l.in_scattering[c] = nb_load_lanes(job->in_scattering[c] + at) * nb_splat(scale);
         }
     }
     return l;
@@ -144,38 +144,38 @@ static void keep_transmittance(const nb_picture_job *job, const float *haze_tran
 
 /* ---- bytes ----------------------------------------------------------------------------------- */
 
-/* A pixel to each word, the first sample lowest. */
+/* A pixel to each word, the first sample lowest; of three samples, with the next pixel's first behind them but for the last
+ * pixel, behind which nothing may be read. */
 static void load_bytes(const nb_picture_job *job, uint32_t *words)
 {
-    const unsigned char *at = job->color;
+    const uint32_t last = job->count - 1;
     if (job->type == NEBEL_PIXEL_RGBA8) {
-        for (uint32_t i = 0; i < job->count; i++, at += 4)
-            words[i] = (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+        memcpy(words, job->color, 4 * (size_t)job->count);
         return;
     }
-    for (uint32_t i = 0; i < job->count; i++, at += 3)
-        words[i] = (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16;
+    for (uint32_t i = 0; i < last; i++) memcpy(words + i, job->color + 3 * (size_t)i, 4);
+    memcpy(words + last, job->color + 3 * (size_t)last, 3);
 }
 
+/* From the first to the last, each over the fourth byte of the one before. */
 static void store_bytes(const nb_picture_job *job, const uint32_t *words)
 {
-    unsigned char *at = job->out;
-    const uint32_t size = job->type == NEBEL_PIXEL_RGBA8 ? 4 : 3;
-    for (uint32_t i = 0; i < job->count; i++, at += size)
-        for (uint32_t c = 0; c < size; c++) at[c] = (unsigned char)(words[i] >> 8 * c);
+    const uint32_t last = job->count - 1;
+    if (job->type == NEBEL_PIXEL_RGBA8) {
+        memcpy(job->out, words, 4 * (size_t)job->count);
+        return;
+    }
+    for (uint32_t i = 0; i < last; i++) memcpy(job->out + 3 * (size_t)i, words + i, 4);
+    memcpy(job->out + 3 * (size_t)last, words + last, 3);
 }
 
+/* In-scattering is 1 where white is in light, 255 in stored numbers. Neither sum is negative. */
 NB_INLINE nb_bits fog_byte(nb_bits byte, nb_real transmittance, nb_real in_scattering, int srgb)
 {
-    nb_real x = nb_from_bits(byte | NB_INTEGER_BITS) - NB_INTEGER;
-    if (srgb) {
-        const nb_real sum = transmittance * decode_byte(x * nb_splat(1 / 255.0f)) + in_scattering;
-        x = encode_byte(nb_max(sum, NB_F(0.0))) * NB_F(255.0);
-    } else {
-        x = transmittance * x + in_scattering * NB_F(255.0);
-    }
-    const nb_real clamped = nb_min(nb_max(x, NB_F(0.0)), NB_F(255.0));
-    return nb_to_bits(clamped + NB_INTEGER) - NB_INTEGER_BITS;
+    const nb_real x = nb_from_bits(byte | NB_INTEGER_BITS) - NB_INTEGER;
+    const nb_real sum = transmittance * (srgb ? decode_byte(x) : x) + in_scattering;
+    const nb_real done = srgb ? encode_byte(nb_min(sum, NB_F(1.0))) : nb_min(sum, NB_F(255.0));
+    return nb_to_bits(done + NB_INTEGER) - NB_INTEGER_BITS;
 }
 
 /* `srgb` and `is_haze` are constants. */
@@ -183,7 +183,7 @@ NB_INLINE void fog_words(const nb_picture_job *job, const float *haze_transmitta
                          int is_haze)
 {
     for (uint32_t i = 0; i < job->count; i += NB_WIDTH) {
-        const light l = light_at(job, haze_transmittance, i, is_haze);
+        const light l = light_at(job, haze_transmittance, i, srgb ? 1 : 255, is_haze);
         float lanes[NB_WIDTH];
         memcpy(lanes, words + i, sizeof lanes);
         const nb_bits pixel = nb_to_bits(nb_load_lanes(lanes));
@@ -278,7 +278,7 @@ NB_INLINE void write_sample(unsigned char *at, nebel_pixel_type type, float numb
 static void fog_planes(const nb_picture_job *job, const float *haze_transmittance, float planes[3][PIECE])
 {
     for (uint32_t i = 0; i < job->count; i += NB_WIDTH) {
-        const light l = job->haze != NULL ? light_at(job, haze_transmittance, i, 1) : light_at(job, NULL, i, 0);
+        const light l = job->haze != NULL ? light_at(job, haze_transmittance, i, 1, 1) : light_at(job, NULL, i, 1, 0);
         for (int c = 0; c < 3; c++) {
             nb_real x = nb_load_lanes(planes[c] + i);
             x = l.transmittance[c] * (job->srgb ? decode(x) : x) + l.in_scattering[c];

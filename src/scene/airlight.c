@@ -69,53 +69,63 @@ static uint16_t brightness_of(const sampler *from, size_t pixel)
                             .114 * sample_of(from, pixel, 2));
 }
 
-static uint16_t darkest_of(const sampler *from, size_t pixel)
+static void fill_darkest(const sampler *from, size_t count, uint16_t *keys)
 {
-    const unsigned char *at = from->pixels + pixel * from->pixel_size;
+    const unsigned char *at = from->pixels;
     if (from->sample_size == 1) {
-        const unsigned char low = at[0] < at[1] ? at[0] : at[1];
-        return (uint16_t)(257u * (low < at[2] ? low : at[2]));
+        for (size_t i = 0; i < count; i++, at += from->pixel_size) {
+            const unsigned low = at[0] < at[1] ? at[0] : at[1];
+            keys[i] = (uint16_t)(257 * (low < at[2] ? low : at[2]));
+        }
+        return;
     }
-    return key_of(from, fmin(sample_of(from, pixel, 0), fmin(sample_of(from, pixel, 1), sample_of(from, pixel, 2))));
+    for (size_t i = 0; i < count; i++)
+        keys[i] = key_of(from, fmin(sample_of(from, i, 0), fmin(sample_of(from, i, 1), sample_of(from, i, 2))));
 }
 
 /* ---- the least within a square --------------------------------------------------------------- */
 
-/* to[i] = the lesser of a[i] and b[i]. `to` may be a. */
-static void take_lesser(uint16_t *to, const uint16_t *a, const uint16_t *b, size_t count)
+/* to[i] = the lesser of a[i] and b[i]; `to` is apart from both. */
+static void take_lesser(uint16_t *restrict to, const uint16_t *a, const uint16_t *b, size_t count)
 {
     for (size_t i = 0; i < count; i++) to[i] = a[i] < b[i] ? a[i] : b[i];
 }
 
-/* A row with REACH largest keys before and SIDE behind it, to the least of SIDE neighbours: of 2, 4, 8 and, where two of these
- * overlap, 15. */
-static void find_least_in_row(uint16_t *padded, uint16_t *row, size_t width)
+/* Two rows with REACH largest keys before a row and SIDE behind it. */
+typedef struct padding {
+    uint16_t *a, *b;
+} padding;
+
+/* A row to the least of SIDE neighbors: of 2, 4, 8 and, where two of these overlap, 15. */
+static void find_least_in_row(const padding *p, uint16_t *row, size_t width)
 {
     const size_t whole = width + 2 * REACH;
-    memcpy(padded + REACH, row, width * sizeof *row);
-    take_lesser(padded, padded, padded + 1, whole);
-    take_lesser(padded, padded, padded + 2, whole);
-    take_lesser(padded, padded, padded + 4, whole);
-    take_lesser(row, padded, padded + REACH, width);
+    memcpy(p->a + REACH, row, width * sizeof *row);
+    memset(p->a + REACH + width, 0xff, (REACH + SIDE) * sizeof *p->a);
+    take_lesser(p->b, p->a, p->a + 1, whole + 6);
+    take_lesser(p->a, p->b, p->b + 2, whole + 4);
+    take_lesser(p->b, p->a, p->a + 4, whole);
+    take_lesser(row, p->b, p->b + REACH, width);
+    memset(p->a, 0xff, REACH * sizeof *p->a);
 }
 
-static void find_least_in_rows(uint16_t *keys, size_t width, size_t height, uint16_t *padded)
+static void find_least_in_rows(uint16_t *keys, size_t width, size_t height, uint16_t *rows)
 {
-    for (size_t y = 0; y < height; y++) {
-        memset(padded, 0xff, (width + 2 * SIDE) * sizeof *padded);
-        find_least_in_row(padded, keys + y * width, width);
-    }
+    const padding p = {rows, rows + width + 2 * SIDE};
+    memset(p.a, 0xff, REACH * sizeof *p.a);
+    for (size_t y = 0; y < height; y++) find_least_in_row(&p, keys + y * width, width);
 }
 
-/* The same of columns, row by row: the least of the rows from y on, of 2, 4 and 8, and then of those REACH above and, which
- * reach as far below, at y. Rows behind the last count as it, which changes nothing. */
-static void find_least_in_columns(uint16_t *keys, uint16_t *eights, size_t width, size_t height)
+/* The least of the rows from y on, of 2, 4 and 8, then of 8 that end at y and 8 that begin there. Rows behind the last count as
+ * the last one, which changes nothing. Each step goes down, so that the row it reads is still as it was. */
+static void find_least_in_columns(uint16_t *keys, uint16_t *eights, uint16_t *row, size_t width, size_t height)
 {
     memcpy(eights, keys, width * height * sizeof *keys);
     for (size_t step = 1; step <= 4; step *= 2)
         for (size_t y = 0; y + 1 < height; y++) {
             const size_t other = y + step < height ? y + step : height - 1;
-            take_lesser(eights + y * width, eights + y * width, eights + other * width, width);
+            take_lesser(row, eights + y * width, eights + other * width, width);
+            memcpy(eights + y * width, row, width * sizeof *row);
         }
     for (size_t y = 0; y < height; y++) {
         const uint16_t *above = eights + (y > REACH ? y - REACH : 0) * width;
@@ -178,18 +188,20 @@ nebel_result nebel_estimate_airlight(const nebel_scene_desc *desc, const nebel_p
     if (photograph->pixels == NULL || count == 0 || !make_sampler(photograph, &from))
         return nb_fail(&codec.log, NEBEL_ERROR_ARGUMENT, "airlight: the picture has no pixels, or halves");
     uint16_t *keys = nb_allocate(&codec.allocator, count, sizeof *keys);
-    uint16_t *eights = nb_allocate(&codec.allocator, count + 2 * SIDE, sizeof *eights);
+    uint16_t *eights = nb_allocate(&codec.allocator, count, sizeof *eights);
+    uint16_t *rows = nb_allocate(&codec.allocator, 2 * (width + 2 * SIDE), sizeof *rows);
     uint32_t *counts = nb_allocate(&codec.allocator, KEYS, sizeof *counts);
-    if (keys != NULL && eights != NULL && counts != NULL) {
-        for (size_t i = 0; i < count; i++) keys[i] = darkest_of(&from, i);
-        find_least_in_rows(keys, width, height, eights);
-        find_least_in_columns(keys, eights, width, height);
+    if (keys != NULL && eights != NULL && rows != NULL && counts != NULL) {
+        fill_darkest(&from, count, keys);
+        find_least_in_rows(keys, width, height, rows);
+        find_least_in_columns(keys, eights, rows, width, height);
         choose(&from, keys, count, counts, airlight);
     } else {
         result = nb_fail(&codec.log, NEBEL_ERROR_MEMORY, "airlight: out of memory");
     }
     nb_release(&codec.allocator, keys);
     nb_release(&codec.allocator, eights);
+    nb_release(&codec.allocator, rows);
     nb_release(&codec.allocator, counts);
     return result;
 }
