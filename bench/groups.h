@@ -12,6 +12,7 @@ const char *nb_bench_opengl_planet(const nb_bench_desc *desc, nb_figures *figure
 const char *nb_bench_overlap(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_particles(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_pass(const nb_bench_desc *desc, nb_figures *figures);
+const char *nb_bench_photographs(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_planet(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_process(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_segments(const nb_bench_desc *desc, nb_figures *figures);
