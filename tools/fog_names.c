@@ -176,7 +176,7 @@ static int read_folder(const char *folder, const char *pattern, names *all)
     }
     (void)closedir(open);
     if (!good) return fail_memory();
-    qsort(all->names, all->count, sizeof *all->names, compare_names);
+    if (all->count > 0) qsort(all->names, all->count, sizeof *all->names, compare_names);
     return NB_DONE;
 }
 
