@@ -7,8 +7,10 @@ import os
 import pathlib
 import resource
 import shutil
+import signal
 import subprocess
 import tempfile
+import time
 import unittest
 
 import numpy as np
@@ -414,6 +416,31 @@ class NamesTest(Case):
         self.assert_done(self.fog("left/ulm/0_left.png", "left/ulm/2_left.png", "--depth", "depth/ulm/1_depth.pfm", "-o",
                                   "out/*.png", *self.common))
         self.assertEqual(self.outputs(), ["out/0_left.png", "out/2_left.png"])
+
+    def test_threads_give_the_same_bytes(self):
+        results = []
+        for threads in (1, 4):
+            self.assert_done(self.fog("left/*/*_left.png", "--depth", "depth/*/*_depth.pfm", "-o", "out/*/*.png",
+                                      *self.common[:4], "-t", threads))
+            results.append([(self.folder / name).read_bytes() for name in self.outputs()])
+        self.assertEqual(len(results[0]), 6)
+        self.assertEqual(results[0], results[1])
+
+    def test_a_signal_leaves_whole_pictures(self):
+        picture = np.tile(self.picture, (20, 20, 1))
+        for i in range(40):
+            self.write(f"big/{i}.png", files.png(picture) if i == 0 else (self.folder / "big/0.png").read_bytes())
+        depth = self.npy("d.npy", np.full(picture.shape[:2], 20, np.float32))
+        words = [NEBEL, "fog", "big/*.png", "--depth", str(depth), "-o", "out/*.png", *map(str, self.common), "-t", "2"]
+        running = subprocess.Popen(words, cwd=self.folder, stderr=subprocess.PIPE, text=True)
+        while not self.outputs() and running.poll() is None:
+            time.sleep(0.01)
+        running.send_signal(signal.SIGINT)
+        self.assertIn("stopped", running.communicate(timeout=60)[1])
+        self.assertEqual(running.returncode, -signal.SIGINT)
+        self.assertLess(len(self.outputs()), 40)
+        for name in self.outputs():
+            self.assertEqual(files.read_png((self.folder / name).read_bytes()).shape, picture.shape)
 
     def test_a_fault_of_one_leaves_the_others(self):
         (self.folder / "depth/aachen/1_depth.pfm").unlink()

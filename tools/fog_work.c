@@ -1,5 +1,6 @@
 #include "fog_work.h"
 
+#include "interrupt.h"
 #include "workers.h"
 
 #include <math.h>
@@ -186,6 +187,7 @@ static void fog_rows(int worker, int count, void *user)
     const rows *const all = user;
     nebel_pixels part = all->work->pixels;
     for (uint32_t first = (uint32_t)worker * BAND; first < part.height; first += (uint32_t)count * BAND) {
+        if (nb_interrupt_is_requested()) return;
         part.first_row = first;
         part.row_count = part.height - first < BAND ? part.height - first : BAND;
         const nebel_result result = nebel_fog_pixels(all->fog, NEBEL_ISA_DEFAULT, &part);
@@ -210,7 +212,7 @@ static int add_fog(work *w)
     nb_workers_run(shared->row_threads, fog_rows, (void *)&all);
     for (int i = 0; i < shared->row_threads; i++)
         if (results[i] != NEBEL_OK) return judge(w, w->files->image, results[i]);
-    return NB_DONE;
+    return nb_interrupt_is_requested() ? fail(w, "%s: stopped", w->files->image) : NB_DONE;
 }
 
 /* ---- what is written ------------------------------------------------------------------------- */
