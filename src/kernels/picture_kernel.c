@@ -144,6 +144,55 @@ static void keep_transmittance(const nb_picture_job *job, const float *haze_tran
 
 /* ---- bytes ----------------------------------------------------------------------------------- */
 
+/* Pixels of three bytes to words and back, eight at a time, as long as 32 bytes are there. Returns how many are done. */
+#if defined(NB_ISA_AVX2) || defined(NB_ISA_AVX512)
+enum { TRIPLES = 8, TRIPLES_READ = 11 };
+
+static uint32_t load_triples(const unsigned char *from, uint32_t count, uint32_t *words)
+{
+    const __m256i halves = _mm256_setr_epi32(0, 1, 2, 3, 3, 4, 5, 6);
+    const __m256i spread =
+        _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11, -1));
+    uint32_t i = 0;
+    for (; i + TRIPLES_READ <= count; i += TRIPLES) {
+        const __m256i bytes = _mm256_loadu_si256((const __m256i *)(const void *)(from + 3 * (size_t)i));
+        const __m256i pixels = _mm256_shuffle_epi8(_mm256_permutevar8x32_epi32(bytes, halves), spread);
+        _mm256_storeu_si256((__m256i *)(void *)(words + i), pixels);
+    }
+    return i;
+}
+
+static uint32_t store_triples(const uint32_t *words, uint32_t count, unsigned char *to)
+{
+    const __m256i halves = _mm256_setr_epi32(0, 1, 2, 4, 5, 6, 3, 7);
+    const __m256i gather =
+        _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, -1, -1, -1, -1));
+    uint32_t i = 0;
+    for (; i + TRIPLES_READ <= count; i += TRIPLES) {
+        const __m256i pixels = _mm256_loadu_si256((const __m256i *)(const void *)(words + i));
+        const __m256i bytes = _mm256_permutevar8x32_epi32(_mm256_shuffle_epi8(pixels, gather), halves);
+        _mm256_storeu_si256((__m256i *)(void *)(to + 3 * (size_t)i), bytes);
+    }
+    return i;
+}
+#else
+static uint32_t load_triples(const unsigned char *from, uint32_t count, uint32_t *words)
+{
+    (void)from;
+    (void)count;
+    (void)words;
+    return 0;
+}
+
+static uint32_t store_triples(const uint32_t *words, uint32_t count, unsigned char *to)
+{
+    (void)words;
+    (void)count;
+    (void)to;
+    return 0;
+}
+#endif
+
 /* A pixel to each word, the first sample lowest; of three samples, with the next pixel's first behind them but for the last
  * pixel, behind which nothing may be read. */
 static void load_bytes(const nb_picture_job *job, uint32_t *words)
@@ -153,7 +202,8 @@ static void load_bytes(const nb_picture_job *job, uint32_t *words)
         memcpy(words, job->color, 4 * (size_t)job->count);
         return;
     }
-    for (uint32_t i = 0; i < last; i++) memcpy(words + i, job->color + 3 * (size_t)i, 4);
+    uint32_t i = load_triples(job->color, job->count, words);
+    for (; i < last; i++) memcpy(words + i, job->color + 3 * (size_t)i, 4);
     memcpy(words + last, job->color + 3 * (size_t)last, 3);
 }
 
@@ -165,8 +215,10 @@ static void store_bytes(const nb_picture_job *job, const uint32_t *words)
         memcpy(job->out, words, 4 * (size_t)job->count);
         return;
     }
-    for (uint32_t i = 0; i < last; i++) memcpy(job->out + 3 * (size_t)i, words + i, 4);
-    memcpy(job->out + 3 * (size_t)last, words + last, 3);
+    unsigned char *const out = job->out;
+    uint32_t i = store_triples(words, job->count, out);
+    for (; i < last; i++) memcpy(out + 3 * (size_t)i, words + i, 4);
+    memcpy(out + 3 * (size_t)last, words + last, 3);
 }
 
 /* In-scattering is 1 where white is in light, 255 in stored numbers. Neither sum is negative. */
