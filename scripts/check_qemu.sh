@@ -33,7 +33,7 @@ if ! build_aarch64; then
     exit 1
 fi
 models=(aarch64 Conroe Nehalem Haswell)
-tests=(test_kernels test_pixels test_classic_vertices)
+tests=(test_kernels test_pixels test_pixel_types test_classic_vertices)
 declare -A running
 for model in "${models[@]}"; do
     for name in "${tests[@]}"; do
