@@ -377,11 +377,34 @@ class SceneTest(Case):
         changed = files.read_png(self.out.read_bytes()).astype(int) - self.picture
         self.assertGreater(np.abs(changed).mean(), 5)
 
+    def test_a_seed_gives_each_name_its_own_noise(self):
+        fog = [{"shape": {"type": "box", "min": [-20, 0, -20], "max": [30, 6, 20]}, "extinction": 0.3, "source": 0.9,
+                "density": {"type": "noise", "size": [24, 8, 24], "cells": [3, 1, 3], "seed": 5}}]
+        scene = self.write_scene(fog)
+        depth = self.npy("d.npy", np.full((HEIGHT, WIDTH), 25, np.float32))
+        for name in ("a.png", "b.png", "sub/a.png", "sub/c.png"):
+            self.write(name, files.png(self.picture))
+        (self.folder / "out/sub").mkdir(parents=True)
+
+        def results(*words):
+            for image, out in (("*.png", "out/*.png"), ("sub/*.png", "out/sub/*.png")):
+                self.assert_done(self.fog(image, "--depth", depth, "--scene", scene, "-o", out, *words))
+            return [(self.folder / "out" / name).read_bytes() for name in ("a.png", "b.png", "sub/a.png", "sub/c.png")]
+
+        self.image.unlink()
+        same, first, again, second = results(), results("--seed", 1, "-t", 1), results("--seed", 1, "-t", 3), results("--seed", 2)
+        self.assertEqual(len(set(same)), 1)
+        self.assertEqual(len(set(first)), 3)
+        self.assertEqual(first[0], first[2])
+        self.assertEqual(first, again)
+        self.assertEqual(len(set(same + first + second)), 7)
+
     def test_what_does_not_go_together(self):
         scene = self.write_scene([])
         base = (self.image, "--depth", self.npy("d.npy", np.ones((HEIGHT, WIDTH), np.float32)), "-o", self.out)
         for option, value in (("visibility", 9), ("extinction", 1), ("airlight", "1,1,1"), ("blend", "srgb")):
             self.assert_error(self.fog(*base, "--scene", scene, f"--{option}", value), 2, option, "beside --scene")
+        self.assert_error(self.fog(*base, "--visibility", 9, "--seed", 1), 2, "needs --scene")
         self.camera = {**self.camera, "projection": "orthographic", "view_height": 3}
         del self.camera["vertical_fov"]
         self.assert_error(self.fog(*base, "--scene", self.write_scene([])), 1, "perspective")
@@ -427,9 +450,10 @@ class NamesTest(Case):
         self.assertEqual(results[0], results[1])
 
     def test_a_signal_leaves_whole_pictures(self):
-        picture = np.tile(self.picture, (20, 20, 1))
-        for i in range(40):
-            self.write(f"big/{i}.png", files.png(picture) if i == 0 else (self.folder / "big/0.png").read_bytes())
+        picture = np.tile(self.picture, (10, 10, 1))
+        first = self.write("big/0.png", files.png(picture))
+        for i in range(1, 60):
+            os.link(first, self.folder / f"big/{i}.png")
         depth = self.npy("d.npy", np.full(picture.shape[:2], 20, np.float32))
         words = [NEBEL, "fog", "big/*.png", "--depth", str(depth), "-o", "out/*.png", *map(str, self.common), "-t", "2"]
         running = subprocess.Popen(words, cwd=self.folder, stderr=subprocess.PIPE, text=True)
@@ -438,7 +462,7 @@ class NamesTest(Case):
         running.send_signal(signal.SIGINT)
         self.assertIn("stopped", running.communicate(timeout=60)[1])
         self.assertEqual(running.returncode, -signal.SIGINT)
-        self.assertLess(len(self.outputs()), 40)
+        self.assertLess(len(self.outputs()), 60)
         for name in self.outputs():
             self.assertEqual(files.read_png((self.folder / name).read_bytes()).shape, picture.shape)
 

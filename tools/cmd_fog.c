@@ -154,6 +154,7 @@ static int load_scene(const nb_fog_call *wanted, nb_report_listener *listener, n
     if (camera->projection != NEBEL_PROJECTION_PERSPECTIVE)
         return nb_report_failure("fog: %s: its camera must be a perspective one, as that of the picture",
                                  wanted->scene);
+    shared->scene = loaded->scene;
     shared->scene_fog = loaded->fog;
     shared->scene_camera = camera;
     shared->scene_fov = camera->vertical_fov;

@@ -25,6 +25,7 @@ enum {
     INVALID,
     SKY,
     SCENE,
+    SEED,
     TRANSMITTANCE,
     THREADS,
     QUIET,
@@ -68,6 +69,9 @@ const nb_option nb_fog_options[NB_FOG_OPTIONS] = {
     [SKY] = {"sky", 0, "WAY",
              "Pixels that are infinitely far: far (default), keep\nthem without fog, or at so many meters."},
     [SCENE] = {"scene", 0, "FILE", "In place of --visibility: the fog, sun and lamps of\na scene, seen by its camera."},
+    [SEED] =
+        {"seed", 0, "N",
+         "With --scene: each picture has noise of its own, by N\nand its name. Default: all have that of the scene."},
     [TRANSMITTANCE] = {"transmittance", 0, "FILE",
                        "Writes what part of the light comes through, 0 to 1:\n.png, 16 bit gray (of colors the "
                        "luminance), or .exr."},
@@ -191,8 +195,11 @@ static void read_fog(nb_arguments *arguments, nb_fog_call *wanted)
     wanted->scene = arguments->values[SCENE];
     if (wanted->scene != NULL) {
         refuse_fog(arguments);
+        wanted->has_seed = arguments->values[SEED] != NULL;
+        wanted->seed = nb_options_whole(arguments, SEED, 0, UINT32_MAX, 0);
         return;
     }
+    if (arguments->values[SEED] != NULL) nb_options_refuse(arguments, SEED, "needs --scene, whose noise it changes");
     read_extinction(arguments, wanted);
     read_airlight(arguments, wanted);
     wanted->blends_stored = nb_options_choice(arguments, BLEND, spaces, 0);

@@ -7,7 +7,7 @@
 
 #include <nebel/photograph.h>
 
-enum { NB_FOG_OPTIONS = 20 };
+enum { NB_FOG_OPTIONS = 21 };
 
 /* What becomes of pixels of unknown depth. */
 typedef enum nb_fog_unknown { NB_FOG_FILL = 0, NB_FOG_FAR, NB_FOG_KEEP } nb_fog_unknown;
@@ -17,8 +17,10 @@ typedef struct nb_fog_call {
     nebel_depth_source depth; /* without the camera */
     int has_intrinsics;
     nebel_intrinsics intrinsics;
-    double hfov;        /* degrees; 0: not given */
-    const char *scene;  /* NULL: fog of one density everywhere */
+    double hfov;       /* degrees; 0: not given */
+    const char *scene; /* NULL: fog of one density everywhere */
+    int has_seed;      /* each picture has noise of its own, by this and its name */
+    uint32_t seed;
     double extinction;  /* 1/m */
     int has_airlight;   /* 0: it is estimated */
     double airlight[3]; /* as the picture stores it */

@@ -158,6 +158,25 @@ static int make_fog(work *w)
     return judge(w, w->files->image, result);
 }
 
+/* Of the name without its folder, so that it does not matter where pictures lie. FNV-1a: Fowler, Noll and Vo. */
+static uint32_t hash_name(const char *path)
+{
+    const char *const slash = strrchr(path, '/');
+    uint32_t hash = 2166136261u;
+    for (const char *at = slash != NULL ? slash + 1 : path; *at != '\0'; at++)
+        hash = (hash ^ (unsigned char)*at) * 16777619u;
+    return hash;
+}
+
+static int choose_fog(work *w)
+{
+    const nb_fog_call *const wanted = w->shared->wanted;
+    if (w->shared->scene == NULL) return make_fog(w);
+    if (!wanted->has_seed) return NB_DONE;
+    const uint32_t seed = wanted->seed ^ hash_name(w->files->image);
+    return judge(w, wanted->scene, nebel_commit_scene_fog_anew(w->shared->scene, 0, seed, &w->own_fog));
+}
+
 static int aim(work *w)
 {
     if (w->has_camera) {
@@ -199,7 +218,7 @@ static int add_fog(work *w)
 {
     nebel_result results[NB_WORKERS_MOST] = {NEBEL_OK};
     const nb_fog_shared *const shared = w->shared;
-    const rows all = {w, shared->scene_fog != NULL ? shared->scene_fog : w->own_fog, results};
+    const rows all = {w, w->own_fog != NULL ? w->own_fog : shared->scene_fog, results};
     nebel_pixels *const p = &w->pixels;
     p->depth_type = w->depth.type;
     p->width = w->depth.width;
@@ -276,7 +295,7 @@ static int run(work *w)
     if (status == NB_DONE) status = find_camera(w);
     if (status == NB_DONE) status = read_depth(w);
     if (status == NB_DONE) status = aim(w);
-    if (status == NB_DONE && w->shared->scene_fog == NULL) status = make_fog(w);
+    if (status == NB_DONE) status = choose_fog(w);
     if (status == NB_DONE) status = allocate_transmittance(w);
     if (status == NB_DONE) status = add_fog(w);
     return status == NB_DONE ? write_results(w) : status;

@@ -8,6 +8,7 @@
 /* What all pictures share. */
 typedef struct nb_fog_shared {
     const nb_fog_call *wanted;
+    const nebel_scene *scene;         /* NULL: none; with these three */
     const nebel_snapshot *scene_fog;  /* NULL: fog of one density, made for each picture */
     const nebel_camera *scene_camera; /* the same */
     double scene_fov;                 /* degrees from top to bottom, where no camera is given */

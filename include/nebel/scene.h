@@ -349,6 +349,11 @@ nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, n
 /* The same at frame 0. */
 nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot);
 
+/* The same at a frame with other noise: each noise of the scene gets a seed made of `seed` and its own, so that seeds give
+ * independent fog and the same seed the same. Makes every noise anew, at the cost of nebel_create_noise. Any thread. */
+nebel_result nebel_commit_scene_fog_anew(const nebel_scene *scene, double frame, uint32_t seed,
+                                         nebel_snapshot **snapshot);
+
 /* The same without the particles, for renderers that draw those in another way. */
 nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot);
 

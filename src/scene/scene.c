@@ -1,4 +1,5 @@
 /* Scenes: read, kept, given back. */
+#include "base/hash.h"
 #include "scene/codec.h"
 #include "scene/file.h"
 #include "scene/model.h"
@@ -350,13 +351,29 @@ static nebel_result add_particles(nebel_fog *fog, const nebel_scene *scene)
     return result;
 }
 
-static nebel_result add_volumes(nebel_fog *fog, const nebel_scene *scene, double frame)
+/* What a grid is at a frame, with one more owner; noise with another seed where there is one. */
+static nebel_result find_grid(const nebel_scene *scene, nebel_grid *grid, double frame, const uint32_t *seed,
+                              nebel_grid **at)
+{
+    nebel_scene_noise noise;
+    nebel_grid *changed = NULL;
+    if (seed == NULL || grid == NULL || !nebel_find_scene_noise(scene, grid, &noise))
+        return nebel_scene_grid(scene, grid, frame, at);
+    *at = NULL;
+    noise.desc.seed = nb_mix_bits(noise.desc.seed ^ nb_mix_bits(*seed)) >> 1; /* scene files take 31 bits */
+    nebel_result result = nebel_change_scene_noise(scene, grid, &noise, &changed);
+    if (result == NEBEL_OK) result = nebel_scene_grid(scene, changed, frame, at);
+    nebel_release_grid(changed);
+    return result;
+}
+
+static nebel_result add_volumes(nebel_fog *fog, const nebel_scene *scene, double frame, const uint32_t *seed)
 {
     const nebel_scene_data *data = &scene->data;
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < data->volume_count && result == NEBEL_OK; i++) {
         nebel_volume_desc volume = nebel_scene_volume(scene, i, frame);
-        result = nebel_scene_grid(scene, volume.density.grid, frame, &volume.density.grid);
+        result = find_grid(scene, volume.density.grid, frame, seed, &volume.density.grid);
         if (result == NEBEL_OK) result = nebel_add_volume(fog, &volume, NULL);
         nebel_release_grid(volume.density.grid);
     }
@@ -380,7 +397,8 @@ bool nb_scene_is_frame(const nebel_scene *scene, double frame)
     return false;
 }
 
-static nebel_result commit(const nebel_scene *scene, double frame, int with_particles, nebel_snapshot **snapshot)
+static nebel_result commit(const nebel_scene *scene, double frame, int with_particles, const uint32_t *seed,
+                           nebel_snapshot **snapshot)
 {
     if (scene == NULL || snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_fog *fog = NULL;
@@ -396,7 +414,7 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
     if (result == NEBEL_OK && ambient.type != NEBEL_ENVIRONMENT_CONSTANT) result = nebel_set_environment(fog, &ambient);
     if (result == NEBEL_OK) result = nebel_set_lamps(fog, scene->data.lamp_count, scene->data.lamps);
     if (result == NEBEL_OK) result = nebel_set_diffusion(fog, scene->data.diffusion);
-    if (result == NEBEL_OK) result = add_volumes(fog, scene, frame);
+    if (result == NEBEL_OK) result = add_volumes(fog, scene, frame, seed);
     if (result == NEBEL_OK) result = add_cells(fog, scene->data.cells);
     if (result == NEBEL_OK && with_particles) result = add_particles(fog, scene);
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, snapshot);
@@ -406,12 +424,18 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
 
 nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot)
 {
-    return commit(scene, frame, 1, snapshot);
+    return commit(scene, frame, 1, NULL, snapshot);
+}
+
+nebel_result nebel_commit_scene_fog_anew(const nebel_scene *scene, double frame, uint32_t seed,
+                                         nebel_snapshot **snapshot)
+{
+    return commit(scene, frame, 1, &seed, snapshot);
 }
 
 nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot)
 {
-    return commit(scene, frame, 0, snapshot);
+    return commit(scene, frame, 0, NULL, snapshot);
 }
 
 nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot)
