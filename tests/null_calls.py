@@ -12,15 +12,15 @@ import sys
 
 # Good values by type; those of output are members of `out`, those of objects members of `made`.
 OBJECTS = ["cells", "fog", "snapshot", "environment_map", "grid", "layers", "atmosphere", "air_view", "clouds", "cloud_view",
-           "cloud_workspace", "scene", "renderer", "film", "gl", "gl_classic", "gl_renderer"]
+           "cloud_workspace", "scene", "renderer", "film", "image_writer", "gl", "gl_classic", "gl_renderer"]
 INPUTS = ["cell", "cells_desc", "cell_view", "cell_point", "factor_desc", "d3d9_fog", "d3d9_vertex", "curve", "vertex_desc", "vertices",
           "vertex_output", "tessellation_desc", "triangles", "cloud_layer", "log", "clouds_desc", "cloud_view_desc", "ray",
           "diffusion_desc", "environment_map_desc", "environment", "map_desc", "map", "layers_desc", "layer_view", "grid_desc",
           "noise_desc", "phase", "droplet_sizes", "fog_desc", "volume_desc", "sun", "lamp", "trace_desc", "ray_planes", "light_planes",
           "segments", "pixels", "light", "particle", "nebula_desc", "place", "atmosphere_desc", "air_view_desc", "ground_planes",
           "renderer_desc", "method_desc", "frame_desc", "frame", "scene_desc", "planet", "model", "camera_key", "sun_key", "volume_key",
-          "scene_noise", "image", "film_desc", "grid_file", "view", "depth_desc", "camera", "gl_desc", "gl_pass", "gl_classic_desc",
-          "gl_renderer_desc", "gl_frame_desc", "gl_planes", "photograph", "intrinsics", "depth_source"]
+          "scene_noise", "image", "image_desc", "film_desc", "grid_file", "view", "depth_desc", "camera", "gl_desc", "gl_pass", "gl_classic_desc",
+          "gl_renderer_desc", "gl_frame_desc", "gl_planes"]
 OUTPUTS = ["cell_fog", "cell_layer", "factor_desc", "d3d9_fog", "curve", "vertex_desc", "cloud_layer", "cloud_knots", "air_shade",
            "fog_shade", "map", "layer_hits", "droplet_sums", "volume_id", "sunlit_fog", "split_fog", "light", "particle", "matter",
            "scatterer", "bound", "atmosphere_desc", "air_light", "sun", "environment", "scene_noise", "image", "rays", "view_error", "word", "texel",
@@ -77,6 +77,8 @@ def good_value(parameter):
         return "places", True
     if parameter.startswith("const double *const direction[3]"):
         return "directions", True
+    if re.match(r"char \w+\[NEBEL_MAX_RECORD \+ 1\]", parameter):
+        return "out.record", True
     array = re.match(r"(const )?(double|float) \w+\[(\d+)\]", parameter)
     if array:
         names = {"double": "matrix" if array[3] == "16" else "vector", "float": "floats"}

@@ -72,6 +72,9 @@ static const nebel_frame_desc good_frame_desc = {
     .camera = {.look_at = {0, 0, -1}, .up = {0, 1, 0}, .vertical_fov = 50}, .width = 1, .height = 1, .samples = 1};
 static const nebel_scene_desc good_scene_desc = {.log = {NULL, NULL}};
 static const nebel_model good_model = {.source = 0};
+static const char *const channels[] = {"R", "G", "B"};
+static const nebel_image_desc good_image_desc = {
+    .width = 1, .height = 1, .channel_count = 3, .channel_names = channels};
 static const nebel_film_desc good_film_desc = {.quality = 0};
 static const nebel_grid_file good_grid_file = {.file = "/nonexistent/test_null.raw", .size = {1, 1, 1}};
 static const nebel_view good_view = {.eye_from_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
@@ -121,6 +124,7 @@ static struct {
     uint32_t entries[64];
     double vector[3], number;
     float floats[64];
+    char record[NEBEL_MAX_RECORD + 1];
 } out;
 
 static const nebel_vertex_output good_vertex_output = {NEBEL_VERTEX_FACTOR, out.floats, 0};
@@ -141,7 +145,6 @@ static const nebel_pixels good_pixels = {.corner = {0, 0, -1},
                                          .out = (uint8_t *)out.floats,
                                          .out_pitch = 4};
 static const nebel_frame good_frame = {.color = out.floats};
-static const char *const channels[] = {"R", "G", "B"};
 static nebel_image good_image = {
     .width = 1, .height = 1, .channel_count = 3, .channel_names = channels, .samples = out.floats};
 
@@ -168,6 +171,7 @@ typedef struct objects {
     const nebel_scene_data *contents;
     nebel_renderer *renderer;
     nebel_film *film;
+    nebel_image_writer *image_writer;
     nebel_particle *particle;
     nebel_tessellation *tessellation;
 } objects;
@@ -248,6 +252,7 @@ static void free_fresh(void)
     nebel_destroy_scene(fresh.scene);
     nebel_destroy_renderer(fresh.renderer);
     nebel_destroy_film(fresh.film);
+    nebel_destroy_image_writer(fresh.image_writer);
     nebel_free_scene_particles(made.scene, fresh.particle);
     nebel_destroy_tessellation(fresh.tessellation);
     memset(&fresh, 0, sizeof fresh);

@@ -415,6 +415,36 @@ nebel_image_format nebel_find_image_format(const char *path);
  * Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
 nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, const nebel_image *image);
 
+/* The same from the top down, a few rows at a time, in memory for those alone; with a record of what the picture was made from, where that is
+ * wanted. One thread at a time. */
+typedef struct nebel_image_writer nebel_image_writer;
+
+enum { NEBEL_MAX_RECORD = 127 };
+
+typedef struct nebel_image_desc {
+    nebel_allocator allocator;
+    nebel_log log;
+    uint32_t width, height, channel_count;
+    const char *const *channel_names; /* as in nebel_image; they stay until the writer is destroyed, as does `record` */
+    const char *record; /* 1 to NEBEL_MAX_RECORD printable characters of ASCII, kept in the file; NULL: none */
+} nebel_image_desc;
+
+/* Makes the temporary file. Errors: as nebel_write_image. */
+nebel_result nebel_create_image_writer(const char *path, const nebel_image_desc *desc, nebel_image_writer **writer);
+
+/* The next rows: a multiple of 64 of them, or all that are left. A writer that has failed takes no more. Errors: ARGUMENT, FILE, MEMORY. */
+nebel_result nebel_add_image_rows(nebel_image_writer *writer, uint32_t rows, const float *samples);
+
+/* Gives the file its name, once, when it has all its rows. The bytes are those of nebel_write_image. Errors: ARGUMENT, FILE, MEMORY. */
+nebel_result nebel_finish_image(nebel_image_writer *writer);
+
+/* What was not finished is given up, without a trace. NULL is fine. */
+void nebel_destroy_image_writer(nebel_image_writer *writer);
+
+/* Reads the record of a picture or a film, as far as it needs to: headers, not pixels. "" where there is no such file, no record, or where the
+ * file is not whole: it ends before what its headers say. Thread safe. Errors: ARGUMENT. */
+nebel_result nebel_read_record(const char *path, char record[NEBEL_MAX_RECORD + 1]);
+
 /* Whether nebel_write_image is likely to succeed at `path`, to be asked before the work: the ending is known, and a
  * temporary file can be made beside the target (it is made, and removed) or the device is open to writing. The target
  * does not change. Thread safe. Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
@@ -446,6 +476,9 @@ nebel_result nebel_create_film(const char *path, const nebel_film_desc *desc, ne
 /* Channels R, G, B in 0..1, already in sRGB, become the bytes that nebel_write_image gives a PNG. All pictures of a
  * film have one size, at most 16383 x 16383. On an error the film is as it was. Errors: ARGUMENT, LIMIT, MEMORY. */
 nebel_result nebel_add_film_picture(nebel_film *film, const nebel_image *image);
+
+/* The record that the file will have, as that of nebel_image_desc; it is copied. Errors: ARGUMENT. */
+nebel_result nebel_set_film_record(nebel_film *film, const char *record);
 
 /* Writes the file, once, as nebel_write_image does: as a whole or not at all. Pictures that
  * follow each other and are equal, or nearly so below a quality of 100, become one that lasts longer. Errors: ARGUMENT (no pictures), FILE, MEMORY. */

@@ -60,11 +60,6 @@ nebel_result nb_jpeg_read_stored(const nb_codec *codec, const nb_bytes *bytes, n
 nebel_result nb_jpeg_read_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture);
 nebel_result nb_exr_read_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image);
 
-/* The encoded file in *bytes; free bytes->data also after an error. Color that is stored is sRGB, grey is linear. */
-nebel_result nb_png_write_stored(const nb_codec *codec, const nb_stored *stored, nb_bytes *bytes);
-nebel_result nb_png_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes);
-nebel_result nb_exr_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes);
-
 /* The picture in the regular file codec->name, whichever it is. Errors: FILE, FORMAT, LIMIT, MEMORY, UNSUPPORTED; it is empty then. */
 nebel_result nb_image_read(const nb_codec *codec, nebel_image *image);
 

@@ -1,5 +1,5 @@
 /* OpenEXR out: one part of scan lines, every channel as float, ZIP compressed. */
-#include "scene/codec.h"
+#include "scene/writer.h"
 
 #include <openexr.h>
 #include <stdio.h>
@@ -8,16 +8,17 @@
 /* Names longer than this need a flag in the file. */
 enum { SHORT_NAME = 31 };
 
-typedef struct encoder {
+struct nb_exr_encoder {
     const nb_codec *codec;
-    const nebel_image *image;
-    nb_bytes *bytes;
+    nb_sink *sink;
+    const nebel_image *rows; /* that are written now */
     exr_context_t exr;
     exr_encode_pipeline_t pipeline;
     bool pipeline_ready;
+    uint32_t row_number;                                       /* of the first of `rows` in the picture */
     exr_result_t (*compress)(exr_encode_pipeline_t *pipeline); /* OpenEXR's own */
     char message[200];
-} encoder;
+};
 
 /* ---- OpenEXR's callbacks --------------------------------------------------------------------- */
 
@@ -26,7 +27,7 @@ static void on_error(exr_const_context_t exr, exr_result_t code, const char *mes
     void *user = NULL;
     (void)code;
     if (exr == NULL || exr_get_user_data(exr, &user) != EXR_ERR_SUCCESS || user == NULL) return;
-    encoder *out = user;
+    nb_exr_encoder *out = user;
     if (out->message[0] == '\0') snprintf(out->message, sizeof out->message, "%s", message);
 }
 
@@ -34,35 +35,35 @@ static void on_error(exr_const_context_t exr, exr_result_t code, const char *mes
 static int64_t on_write(exr_const_context_t exr, void *user, const void *data, uint64_t size, uint64_t offset,
                         exr_stream_error_func_ptr_t error)
 {
-    const encoder *out = user;
+    const nb_exr_encoder *out = user;
     (void)exr;
     (void)error;
-    if (!nb_bytes_write(&out->codec->allocator, out->bytes, (size_t)offset, data, (size_t)size)) return -1;
-    return (int64_t)size;
+    return nb_sink_write(out->sink, offset, data, (size_t)size) ? (int64_t)size : -1;
 }
 
 /* ---- encoding -------------------------------------------------------------------------------- */
 
-static bool write_header(encoder *out)
+static bool write_header(nb_exr_encoder *out, const nb_picture_plan *plan)
 {
-    const nebel_image *image = out->image;
     int part;
     bool good = exr_add_part(out->exr, NULL, EXR_STORAGE_SCANLINE, &part) == EXR_ERR_SUCCESS &&
-                exr_initialize_required_attr_simple(out->exr, part, (int32_t)image->width, (int32_t)image->height,
+                exr_initialize_required_attr_simple(out->exr, part, (int32_t)plan->width, (int32_t)plan->height,
                                                     EXR_COMPRESSION_ZIP) == EXR_ERR_SUCCESS;
-    for (uint32_t i = 0; i < image->channel_count && good; i++) {
-        const char *name = image->channel_names[i];
+    for (uint32_t i = 0; i < plan->channel_count && good; i++) {
+        const char *name = plan->channel_names[i];
         if (strlen(name) > SHORT_NAME) exr_set_longname_support(out->exr, 1);
         good = exr_add_channel(out->exr, part, name, EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1) ==
                EXR_ERR_SUCCESS;
     }
+    if (good && plan->record != NULL)
+        good = exr_attr_set_string(out->exr, part, NB_RECORD_KEY, plan->record) == EXR_ERR_SUCCESS;
     return good && exr_write_header(out->exr) == EXR_ERR_SUCCESS;
 }
 
 /* The file's channels are sorted by name; the picture's are not. */
-static void aim_channels(encoder *out, size_t y)
+static void aim_channels(nb_exr_encoder *out, size_t y)
 {
-    const nebel_image *image = out->image;
+    const nebel_image *image = out->rows;
     const float *row = image->samples + y * image->width * image->channel_count;
     for (int i = 0; i < out->pipeline.channel_count; i++) {
         exr_coding_channel_info_t *channel = &out->pipeline.channels[i];
@@ -78,14 +79,14 @@ static void aim_channels(encoder *out, size_t y)
  * reads. Such a block is stored here. */
 static exr_result_t compress_smaller(exr_encode_pipeline_t *pipeline)
 {
-    const encoder *out = pipeline->encoding_user_data;
+    const nb_exr_encoder *out = pipeline->encoding_user_data;
     const exr_result_t result = out->compress(pipeline);
     if (result == EXR_ERR_SUCCESS && pipeline->compressed_bytes == pipeline->packed_bytes)
         memcpy(pipeline->compressed_buffer, pipeline->packed_buffer, pipeline->packed_bytes);
     return result;
 }
 
-static bool start_pipeline(encoder *out)
+static bool start_pipeline(nb_exr_encoder *out)
 {
     if (exr_encoding_choose_default_routines(out->exr, 0, &out->pipeline) != EXR_ERR_SUCCESS) return false;
     out->compress = out->pipeline.compress_fn;
@@ -95,10 +96,10 @@ static bool start_pipeline(encoder *out)
     return true;
 }
 
-static bool write_block(encoder *out, uint32_t y)
+static bool write_block(nb_exr_encoder *out, uint32_t y)
 {
     exr_chunk_info_t chunk;
-    if (exr_write_scanline_chunk_info(out->exr, 0, (int)y, &chunk) != EXR_ERR_SUCCESS) return false;
+    if (exr_write_scanline_chunk_info(out->exr, 0, (int)(out->row_number + y), &chunk) != EXR_ERR_SUCCESS) return false;
     const exr_result_t prepared = out->pipeline_ready ? exr_encoding_update(out->exr, 0, &chunk, &out->pipeline)
                                                       : exr_encoding_initialize(out->exr, 0, &chunk, &out->pipeline);
     if (prepared != EXR_ERR_SUCCESS) return false;
@@ -107,32 +108,71 @@ static bool write_block(encoder *out, uint32_t y)
     return exr_encoding_run(out->exr, 0, &out->pipeline) == EXR_ERR_SUCCESS;
 }
 
-static bool write_blocks(encoder *out)
+static bool write_blocks(nb_exr_encoder *out)
 {
     int32_t step = 0;
     if (exr_get_scanlines_per_chunk(out->exr, 0, &step) != EXR_ERR_SUCCESS || step < 1) return false;
-    for (uint32_t y = 0; y < out->image->height; y += (uint32_t)step)
+    for (uint32_t y = 0; y < out->rows->height; y += (uint32_t)step)
         if (!write_block(out, y)) return false;
     return true;
 }
 
-nebel_result nb_exr_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes)
+/* What the sink has to say it says when it is finished. */
+static nebel_result finding(const nb_exr_encoder *out, bool good)
 {
-    encoder out = {.codec = codec, .image = image, .bytes = bytes};
-    exr_context_initializer_t start = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    start.error_handler_fn = on_error;
-    start.user_data = &out;
-    start.write_fn = on_write;
-    if ((uint64_t)image->width * image->channel_count > INT32_MAX / 4)
-        return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: a row of %llu samples; at most %d", codec->name,
-                       (unsigned long long)image->width * image->channel_count, INT32_MAX / 4);
-    bool good = exr_start_write(&out.exr, codec->name, EXR_WRITE_FILE_DIRECTLY, &start) == EXR_ERR_SUCCESS;
-    good = good && write_header(&out) && write_blocks(&out);
-    if (out.exr != NULL) {
-        exr_encoding_destroy(out.exr, &out.pipeline);
-        good = exr_finish(&out.exr) == EXR_ERR_SUCCESS && good;
-    }
     if (good) return NEBEL_OK;
-    return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: the OpenEXR picture cannot be made: %s", codec->name,
-                   out.message[0] != '\0' ? out.message : "out of memory");
+    if (nb_sink_has_failed(out->sink)) return NEBEL_ERROR_FILE;
+    return nb_fail(&out->codec->log, NEBEL_ERROR_MEMORY, "%s: the OpenEXR picture cannot be made: %s", out->codec->name,
+                   out->message[0] != '\0' ? out->message : "out of memory");
+}
+
+nebel_result nb_exr_write_begin(const nb_codec *codec, const nb_picture_plan *plan, nb_sink *sink,
+                                nb_exr_encoder **encoder)
+{
+    nb_exr_encoder *out = nb_allocate_zero(&codec->allocator, 1, sizeof *out);
+    exr_context_initializer_t start = EXR_DEFAULT_CONTEXT_INITIALIZER;
+    *encoder = out;
+    if (out == NULL)
+        return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: the OpenEXR picture cannot be made: out of memory",
+                       codec->name);
+    *out = (nb_exr_encoder){.codec = codec, .sink = sink};
+    start.error_handler_fn = on_error;
+    start.user_data = out;
+    start.write_fn = on_write;
+    if ((uint64_t)plan->width * plan->channel_count > INT32_MAX / 4)
+        return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: a row of %llu samples; at most %d", codec->name,
+                       (unsigned long long)plan->width * plan->channel_count, INT32_MAX / 4);
+    const bool good = exr_start_write(&out->exr, codec->name, EXR_WRITE_FILE_DIRECTLY, &start) == EXR_ERR_SUCCESS;
+    return finding(out, good && write_header(out, plan));
+}
+
+nebel_result nb_exr_write_rows(nb_exr_encoder *encoder, const nebel_image *rows)
+{
+    encoder->rows = rows;
+    const nebel_result result = finding(encoder, write_blocks(encoder));
+    encoder->row_number += rows->height;
+    return result;
+}
+
+/* OpenEXR closes what it began in any case. */
+static bool finish(nb_exr_encoder *encoder)
+{
+    if (encoder->exr == NULL) return false;
+    exr_encoding_destroy(encoder->exr, &encoder->pipeline);
+    const exr_result_t finished = exr_finish(&encoder->exr);
+    encoder->exr = NULL;
+    return finished == EXR_ERR_SUCCESS;
+}
+
+nebel_result nb_exr_write_end(nb_exr_encoder *encoder)
+{
+    return finding(encoder, finish(encoder));
+}
+
+void nb_exr_write_free(nb_exr_encoder *encoder)
+{
+    if (encoder == NULL) return;
+    const nebel_allocator allocator = encoder->codec->allocator;
+    (void)finish(encoder);
+    nb_release(&allocator, encoder);
 }

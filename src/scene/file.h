@@ -5,6 +5,7 @@
 #include "base/base.h"
 
 #include <stdbool.h>
+#include <stdint.h>
 #include <stdio.h>
 
 typedef struct nb_bytes {
@@ -45,6 +46,22 @@ nebel_result nb_file_check(const nebel_log *log, const char *where, const char *
  * pipe may wait for ever, and a device does what nobody expects of a picture. Errors: FILE, MEMORY. */
 nebel_result nb_file_write(const nebel_allocator *allocator, const nebel_log *log, const char *path,
                            const nb_bytes *bytes);
+
+/* The same of bytes that come one after the other, in little memory. */
+typedef struct nb_sink nb_sink;
+nebel_result nb_sink_open(const nebel_allocator *allocator, const nebel_log *log, const char *path, nb_sink **sink);
+
+/* Writes bytes behind those that are there, or over some of them. False when that failed, as do all later ones; nb_sink_finish says
+ * why. */
+bool nb_sink_write(nb_sink *sink, uint64_t offset, const void *data, size_t size);
+bool nb_sink_has_failed(const nb_sink *sink);
+uint64_t nb_sink_size(const nb_sink *sink); /* bytes so far */
+
+/* Gives the file its name, once. Errors: as nb_file_write. */
+nebel_result nb_sink_finish(nb_sink *sink);
+
+/* Removes what was not finished. NULL is fine. */
+void nb_sink_close(nb_sink *sink);
 
 /* Whether nb_file_write is likely to do it: whether a file can be made in the folder, which is tried, or the device is
  * open to writing. What is at the path does not change. Errors: FILE, MEMORY. */

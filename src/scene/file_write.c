@@ -84,6 +84,17 @@ static int write_all(int file, const nb_bytes *bytes)
     return 0;
 }
 
+/* The same at a place of the file. */
+static int write_at(int file, uint64_t offset, const unsigned char *data, size_t size)
+{
+    for (size_t written = 0; written < size;) {
+        const ssize_t count = pwrite(file, data + written, size - written, (off_t)(offset + written));
+        if (count < 0 && errno != EINTR) return errno;
+        if (count > 0) written += (size_t)count;
+    }
+    return 0;
+}
+
 /* What is open already goes on from where it stands: opened anew it would lose what was appended to. */
 static int open_directly(const char *path)
 {
@@ -98,18 +109,6 @@ static int write_directly(const char *path, const nb_bytes *bytes)
     if (file < 0) return errno;
     const int error = write_all(file, bytes);
     return close(file) != 0 && error == 0 ? errno : error;
-}
-
-static int fill_and_rename(int file, const char *temporary, const char *path, const struct stat *replaced,
-                           const nb_bytes *bytes)
-{
-    int error = write_all(file, bytes);
-    if (error == 0 && replaced != NULL && fchmod(file, replaced->st_mode & 0777) != 0) error = errno;
-    if (error == 0 && fsync(file) != 0) error = errno;
-    if (close(file) != 0 && error == 0) error = errno;
-    if (error == 0 && rename(temporary, path) != 0) error = errno;
-    if (error != 0) unlink(temporary);
-    return error;
 }
 
 static bool is_null(const struct stat *status)
@@ -149,6 +148,18 @@ typedef struct target {
     struct stat status; /* where it exists */
 } target;
 
+struct nb_sink {
+    nebel_allocator allocator;
+    nebel_log log;
+    nb_arena arena;
+    const char *path, *temporary; /* as the caller names it; the file beside it, NULL: there is none */
+    target found;
+    int file;
+    uint64_t written; /* bytes in the file before those in `bytes` */
+    nb_bytes bytes;   /* not written yet; of a direct target all */
+    int error;        /* of the first write that failed */
+};
+
 /* 0 or an error number. */
 static int find_target(nb_arena *arena, const char *path, target *found)
 {
@@ -160,18 +171,6 @@ static int find_target(nb_arena *arena, const char *path, target *found)
     found->is_direct = found->exists && is_direct(found->path, &found->status);
     if (found->exists && !found->is_direct && !S_ISREG(found->status.st_mode)) return ENXIO;
     return found->exists ? check_writing(found->path) : 0;
-}
-
-static int write_file(nb_arena *arena, const char *path, const nb_bytes *bytes)
-{
-    target found;
-    const char *temporary = NULL;
-    const int error = find_target(arena, path, &found);
-    if (error != 0) return error;
-    if (found.is_direct) return write_directly(path, bytes);
-    const int file = create_beside(arena, found.path, &temporary);
-    if (file < 0) return errno;
-    return fill_and_rename(file, temporary, found.path, found.exists ? &found.status : NULL, bytes);
 }
 
 /* A pipe that nobody reads any more, and a device that is always full: what is written there is lost. */
@@ -225,12 +224,113 @@ static nebel_result fail(nb_arena *arena, const nebel_log *log, const char *path
     return nb_fail(log, NEBEL_ERROR_FILE, "cannot write \"%s\": %s", path, strerror(error));
 }
 
+/* ---- a file in the making -------------------------------------------------------------------- */
+
+/* More than that is not kept back. */
+enum { SINK_BYTES = 1 << 20 };
+
+static int open_sink(nb_sink *sink)
+{
+    const int error = find_target(&sink->arena, sink->path, &sink->found);
+    if (error != 0 || sink->found.is_direct) return error;
+    sink->file = create_beside(&sink->arena, sink->found.path, &sink->temporary);
+    if (sink->file >= 0) return 0;
+    sink->temporary = NULL;
+    return errno;
+}
+
+nebel_result nb_sink_open(const nebel_allocator *allocator, const nebel_log *log, const char *path, nb_sink **sink)
+{
+    nb_sink *made = nb_allocate_zero(allocator, 1, sizeof *made + strlen(path) + 1);
+    *sink = NULL;
+    if (made == NULL) return nb_fail(log, NEBEL_ERROR_MEMORY, "cannot write \"%s\": out of memory", path);
+    *made = (nb_sink){.allocator = *allocator, .log = *log, .arena = {.allocator = *allocator}, .file = -1};
+    made->path = strcpy((char *)(made + 1), path);
+    const int error = open_sink(made);
+    const nebel_result result = fail(&made->arena, log, path, error);
+    if (result == NEBEL_OK)
+        *sink = made;
+    else
+        nb_sink_close(made);
+    return result;
+}
+
+static int flush_sink(nb_sink *sink)
+{
+    const int error = write_at(sink->file, sink->written, sink->bytes.data, sink->bytes.size);
+    sink->written += sink->bytes.size;
+    sink->bytes.size = 0;
+    return error;
+}
+
+static int write_sink(nb_sink *sink, uint64_t offset, const unsigned char *data, size_t size)
+{
+    if (offset < sink->written) {
+        const size_t before = size < sink->written - offset ? size : (size_t)(sink->written - offset);
+        const int error = write_at(sink->file, offset, data, before);
+        if (error != 0 || before == size) return error;
+        return write_sink(sink, offset + before, data + before, size - before);
+    }
+    if (!nb_bytes_write(&sink->allocator, &sink->bytes, (size_t)(offset - sink->written), data, size)) return ENOMEM;
+    return sink->file >= 0 && sink->bytes.size >= SINK_BYTES ? flush_sink(sink) : 0;
+}
+
+bool nb_sink_write(nb_sink *sink, uint64_t offset, const void *data, size_t size)
+{
+    if (sink->error == 0) sink->error = write_sink(sink, offset, data, size);
+    return sink->error == 0;
+}
+
+uint64_t nb_sink_size(const nb_sink *sink)
+{
+    return sink->written + sink->bytes.size;
+}
+
+static int rename_sink(nb_sink *sink)
+{
+    const target *found = &sink->found;
+    int error = flush_sink(sink);
+    if (error == 0 && found->exists && fchmod(sink->file, found->status.st_mode & 0777) != 0) error = errno;
+    if (error == 0 && fsync(sink->file) != 0) error = errno;
+    if (close(sink->file) != 0 && error == 0) error = errno;
+    sink->file = -1;
+    if (error == 0 && rename(sink->temporary, found->path) != 0) error = errno;
+    if (error == 0) sink->temporary = NULL;
+    return error;
+}
+
+nebel_result nb_sink_finish(nb_sink *sink)
+{
+    if (sink->error == 0)
+        sink->error = sink->found.is_direct ? write_directly(sink->path, &sink->bytes) : rename_sink(sink);
+    return fail(&sink->arena, &sink->log, sink->path, sink->error);
+}
+
+bool nb_sink_has_failed(const nb_sink *sink)
+{
+    return sink->error != 0;
+}
+
+void nb_sink_close(nb_sink *sink)
+{
+    if (sink == NULL) return;
+    if (sink->file >= 0) close(sink->file);
+    if (sink->temporary != NULL) unlink(sink->temporary);
+    const nebel_allocator allocator = sink->allocator;
+    nb_release(&allocator, sink->bytes.data);
+    nb_arena_release(&sink->arena);
+    nb_release(&allocator, sink);
+}
+
 nebel_result nb_file_write(const nebel_allocator *allocator, const nebel_log *log, const char *path,
                            const nb_bytes *bytes)
 {
-    nb_arena arena = {.allocator = *allocator};
-    const nebel_result result = fail(&arena, log, path, write_file(&arena, path, bytes));
-    nb_arena_release(&arena);
+    nb_sink *sink;
+    nebel_result result = nb_sink_open(allocator, log, path, &sink);
+    if (result != NEBEL_OK) return result;
+    nb_sink_write(sink, 0, bytes->data, bytes->size);
+    result = nb_sink_finish(sink);
+    nb_sink_close(sink);
     return result;
 }
 

@@ -1,5 +1,6 @@
 /* Films: where they go, and when each picture is seen. */
 #include "scene/film.h"
+#include "scene/writer.h"
 
 #include <limits.h>
 #include <math.h>
@@ -18,6 +19,7 @@ struct nebel_film {
     uint64_t count;
     nb_webp *webp; /* NULL before the first picture */
     bool is_finished;
+    char record[NEBEL_MAX_RECORD + 1]; /* "": none */
 };
 
 int nebel_is_film_path(const char *path)
@@ -105,6 +107,46 @@ nebel_result nebel_add_film_picture(nebel_film *film, const nebel_image *image)
     return result;
 }
 
+nebel_result nebel_set_film_record(nebel_film *film, const char *record)
+{
+    if (film == NULL || record == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (!nb_record_is_good(record))
+        return nb_fail(&film->codec.log, NEBEL_ERROR_ARGUMENT, "%s: a record is 1 to %d printable characters of ASCII",
+                       film->codec.name, NEBEL_MAX_RECORD);
+    memcpy(film->record, record, strlen(record) + 1);
+    return NEBEL_OK;
+}
+
+static void put_number(uint32_t number, unsigned char bytes[4])
+{
+    for (int i = 0; i < 4; i++) bytes[i] = (unsigned char)(number >> 8 * i);
+}
+
+/* The size in the first header counts all that follows it. */
+static void write_record(const nebel_film *film, nb_sink *sink)
+{
+    unsigned char chunk[8 + NEBEL_MAX_RECORD + 1] = NB_FILM_RECORD, size[4];
+    const size_t length = strlen(film->record);
+    put_number((uint32_t)length, chunk + 4);
+    memcpy(chunk + 8, film->record, length);
+    nb_sink_write(sink, nb_sink_size(sink), chunk, 8 + length + length % 2);
+    put_number((uint32_t)(nb_sink_size(sink) - 8), size);
+    nb_sink_write(sink, 4, size, sizeof size);
+}
+
+static nebel_result write_film(const nebel_film *film, const nb_bytes *bytes)
+{
+    const nb_codec *codec = &film->codec;
+    nb_sink *sink;
+    nebel_result result = nb_sink_open(&codec->allocator, &codec->log, film->path, &sink);
+    if (result != NEBEL_OK) return result;
+    nb_sink_write(sink, 0, bytes->data, bytes->size);
+    if (film->record[0] != '\0') write_record(film, sink);
+    result = nb_sink_finish(sink);
+    nb_sink_close(sink);
+    return result;
+}
+
 nebel_result nebel_finish_film(nebel_film *film)
 {
     nb_bytes bytes;
@@ -115,7 +157,7 @@ nebel_result nebel_finish_film(nebel_film *film)
                        film->is_finished ? "is finished already" : "has no pictures");
     film->is_finished = true;
     const nebel_result result = nb_webp_end(film->webp, (int)start_of(film, film->count), &bytes);
-    return result == NEBEL_OK ? nb_file_write(&codec->allocator, &codec->log, film->path, &bytes) : result;
+    return result == NEBEL_OK ? write_film(film, &bytes) : result;
 }
 
 void nebel_destroy_film(nebel_film *film)

@@ -6,6 +6,9 @@
 
 typedef struct nb_webp nb_webp;
 
+/* The chunk of a film's record, the last one. Readers of WebP pass over chunks that they do not know. */
+#define NB_FILM_RECORD "NBLR"
+
 /* Whether libwebp is in this build; without it the rest answers UNSUPPORTED. */
 bool nb_webp_is_built(void);
 

@@ -102,18 +102,6 @@ static nebel_result fail_ending(const nb_codec *codec)
                    codec->name);
 }
 
-static nebel_result encode(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes)
-{
-    switch (nebel_find_image_format(codec->name)) {
-    case NEBEL_IMAGE_PNG:
-        return nb_png_write_image(codec, image, bytes);
-    case NEBEL_IMAGE_EXR:
-        return nb_exr_write_image(codec, image, bytes);
-    default:
-        return fail_ending(codec);
-    }
-}
-
 nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *desc)
 {
     if (path == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -122,18 +110,4 @@ nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *de
     if (result != NEBEL_OK) return result;
     if (nebel_find_image_format(path) == NEBEL_IMAGE_NONE) return fail_ending(&codec);
     return nb_file_try(&codec.allocator, &codec.log, path);
-}
-
-nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, const nebel_image *image)
-{
-    if (path == NULL || desc == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
-    nb_codec codec;
-    nebel_result result = nb_codec_prepare(desc, path, &codec);
-    if (result != NEBEL_OK) return result;
-    nb_bytes bytes = {0};
-    result = nb_image_check(&codec, image);
-    if (result == NEBEL_OK) result = encode(&codec, image, &bytes);
-    if (result == NEBEL_OK) result = nb_file_write(&codec.allocator, &codec.log, path, &bytes);
-    nb_release(&codec.allocator, bytes.data);
-    return result;
 }

@@ -30,11 +30,12 @@ static unsigned char quantize(float value, float rounding)
     return (unsigned char)(scaled < 255.0f ? scaled : 255.0f);
 }
 
-void nb_rounding_fill_row(const nebel_image *image, const int channels[3], uint32_t y, unsigned char *row)
+void nb_rounding_fill_row(const nebel_image *image, const int channels[3], uint32_t y, uint32_t below,
+                          unsigned char *row)
 {
     const float *samples = image->samples + (size_t)y * image->width * image->channel_count;
     for (uint32_t x = 0; x < image->width; x++) {
-        const float rounding = threshold(x, y);
+        const float rounding = threshold(x, below);
         for (int c = 0; c < 3; c++) row[3 * (size_t)x + (size_t)c] = quantize(samples[channels[c]], rounding);
         samples += image->channel_count;
     }

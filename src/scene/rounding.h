@@ -8,7 +8,8 @@
 nebel_result nb_rounding_find_channels(const nb_codec *codec, const nebel_image *image, const char *what,
                                        int channels[3]);
 
-/* Row y of the picture as 3 bytes a pixel. What lies outside 0..1 is clamped, NaN is 0. */
-void nb_rounding_fill_row(const nebel_image *image, const int channels[3], uint32_t y, unsigned char *row);
+/* Row y of the image, which is row `below` of the whole picture, as 3 bytes a pixel. What lies outside 0..1 is clamped, NaN is 0. */
+void nb_rounding_fill_row(const nebel_image *image, const int channels[3], uint32_t y, uint32_t below,
+                          unsigned char *row);
 
 #endif

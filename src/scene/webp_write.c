@@ -91,7 +91,7 @@ nebel_result nb_webp_add(nb_webp *film, const nebel_image *image, int start)
     film->picture.use_argb = 1;
     for (uint32_t y = 0; y < image->height; y++) {
         uint32_t *to = film->picture.argb + (size_t)y * (size_t)film->picture.argb_stride;
-        nb_rounding_fill_row(image, channels, y, film->row);
+        nb_rounding_fill_row(image, channels, y, y, film->row);
         for (uint32_t x = 0; x < image->width; x++) {
             const unsigned char *from = film->row + 3 * (size_t)x;
             to[x] = UINT32_C(0xff000000) | (uint32_t)from[0] << 16 | (uint32_t)from[1] << 8 | from[2];
