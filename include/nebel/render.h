@@ -107,6 +107,13 @@ nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method me
 /* Called from one thread at a time with 0 <= done <= total; return nonzero to stop the frame. */
 typedef int (*nebel_progress_fn)(size_t done, size_t total, void *user);
 
+/* A rectangle of a picture, in pixels; its first row is the upper one. */
+typedef struct nebel_window {
+    uint32_t left, top, width, height;
+} nebel_window;
+
+enum { NEBEL_WINDOW_STEP = 64 };
+
 typedef struct nebel_frame_desc {
     nebel_camera camera;
     uint32_t width, height; /* pixels, 1 to 32768 */
@@ -121,10 +128,13 @@ typedef struct nebel_frame_desc {
     /* Within 1e12: what a planet's layers have turned by, in the unit of its days, and its clouds have moved by, in that of its
      * winds; frames in scenes. */
     double time;
+    /* The part of the picture that is rendered, for pictures in bands or tiles; all 0: the whole. `left` and `top` are multiples of
+     * NEBEL_WINDOW_STEP, and so are `width` and `height` unless the window ends with the picture. Pixels are those of the whole picture, bit for bit. */
+    nebel_window window;
 } nebel_frame_desc;
 
-/* One frame in linear light. Every plane is caller memory, width * height pixels, top row first, or NULL when not
- * wanted. */
+/* One frame in linear light. Every plane is caller memory, width * height pixels (of the window, where there is one), top row
+ * first, or NULL when not wanted. */
 typedef struct nebel_frame {
     float *color;         /* 3: transmittance * surface + in_scattering */
     float *transmittance; /* 3: mean over the samples */

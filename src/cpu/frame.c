@@ -37,6 +37,32 @@ static nebel_result check_desc(const nebel_frame_desc *desc, const nebel_log *lo
     return NEBEL_OK;
 }
 
+/* A window ends where regions end: what is found once for a batch is then found as in the whole picture. */
+static int is_good_side(uint32_t first, uint32_t size, uint32_t whole)
+{
+    const uint32_t left = first <= whole ? whole - first : 0;
+    return first % NB_REGION == 0 && size > 0 && size <= left && (size % NB_REGION == 0 || size == left);
+}
+
+_Static_assert((int)NEBEL_WINDOW_STEP == (int)NB_REGION, "windows end where regions end");
+
+static nebel_result set_window(nb_frame *frame, const nebel_frame_desc *desc)
+{
+    const nebel_window *wanted = &desc->window;
+    frame->window = *wanted;
+    if (wanted->left == 0 && wanted->top == 0 && wanted->width == 0 && wanted->height == 0)
+        frame->window = (nebel_window){0, 0, desc->width, desc->height};
+    if (is_good_side(frame->window.left, frame->window.width, desc->width) &&
+        is_good_side(frame->window.top, frame->window.height, desc->height))
+        return NEBEL_OK;
+    return nb_fail(
+        &frame->renderer->log, NEBEL_ERROR_VALUE,
+        "frame: a window of %u x %u pixels at %u, %u; it must be within the picture, begin at multiples of %d and "
+        "have multiples of %d, or end with the picture",
+        (unsigned)wanted->width, (unsigned)wanted->height, (unsigned)wanted->left, (unsigned)wanted->top,
+        NEBEL_WINDOW_STEP, NEBEL_WINDOW_STEP);
+}
+
 static nb_lit_box box_of(const nb_geometry *geometry, const double min[3], const double max[3])
 {
     nb_lit_box box;
@@ -98,6 +124,7 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     nebel_renderer *renderer = frame->renderer;
     nb_geometry *geometry = &renderer->geometry;
     nebel_result result = check_desc(desc, &renderer->log);
+    if (result == NEBEL_OK) result = set_window(frame, desc);
     if (result == NEBEL_OK) result = nb_lighting_set(&frame->lighting, renderer->scene, &renderer->log);
     if (result == NEBEL_OK)
         result = nb_view_set(&frame->view, &desc->camera, desc->width, desc->height, &renderer->log);
@@ -194,10 +221,16 @@ static uint32_t count_groups(const nb_frame *frame)
     return (frame->samples + NB_TOGETHER - 1) / NB_TOGETHER;
 }
 
+static uint32_t count_regions(uint32_t pixels)
+{
+    return (pixels + NB_REGION - 1) / NB_REGION;
+}
+
 static void render_region(const nb_frame *frame, size_t number, nb_state *state, nb_scratch *scratch)
 {
-    const uint32_t columns = (frame->width + NB_REGION - 1) / NB_REGION;
-    const uint32_t left = (uint32_t)(number % columns) * NB_REGION, top = (uint32_t)(number / columns) * NB_REGION;
+    const uint32_t columns = count_regions(frame->window.width);
+    const uint32_t left = frame->window.left + (uint32_t)(number % columns) * NB_REGION;
+    const uint32_t top = frame->window.top + (uint32_t)(number / columns) * NB_REGION;
     for (uint32_t first = 0; first < frame->samples; first += NB_TOGETHER) {
         const uint32_t count = frame->samples - first < NB_TOGETHER ? frame->samples - first : NB_TOGETHER;
         const nebel_result result = render_samples(frame, left, top, first, count, scratch);
@@ -232,10 +265,10 @@ nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc
         nb_air_free(&made.air);
         return result;
     }
-    const size_t columns = (made.width + NB_REGION - 1) / NB_REGION, rows = (made.height + NB_REGION - 1) / NB_REGION;
-    const size_t parts = columns * rows * count_groups(&made);
+    const size_t regions = (size_t)count_regions(made.window.width) * count_regions(made.window.height);
+    const size_t parts = regions * count_groups(&made);
     nb_state state = {.desc = desc, .total = parts, .step = (parts + 99) / 100};
-    render_regions(&made, columns * rows, &state);
+    render_regions(&made, regions, &state);
     nb_cloudscape_free(&made);
     nb_air_free(&made.air);
     if (state.result == NEBEL_ERROR_LIMIT) return nb_fail(&renderer->log, state.result, "frame: stopped");

@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+/* A part of the window. */
 typedef struct nb_area {
     uint32_t left, top, columns, rows;
 } nb_area;
@@ -14,8 +15,9 @@ static uint32_t least(uint32_t a, uint32_t b)
 
 static nb_area area_of(const nb_frame *frame, const nb_place *place)
 {
-    const uint32_t left = place->left, top = place->top + nb_lane_y(place->first);
-    return (nb_area){left, top, least(NB_REGION, frame->width - left), least(NB_BLOCK, frame->height - top)};
+    const nebel_window *window = &frame->window;
+    const uint32_t left = place->left - window->left, top = place->top + nb_lane_y(place->first) - window->top;
+    return (nb_area){left, top, least(NB_REGION, window->width - left), least(NB_BLOCK, window->height - top)};
 }
 
 /* Lane of a pixel in its batch: the inverse of nb_lane_x and nb_lane_y. */
@@ -85,7 +87,7 @@ static void add_depths(const nb_frame *frame, const nb_area *area, int is_first,
                        uint32_t *counts)
 {
     for (uint32_t y = 0; y < area->rows; y++) {
-        float *row = frame->planes->depth + (size_t)(area->top + y) * frame->width + area->left;
+        float *row = frame->planes->depth + (size_t)(area->top + y) * frame->window.width + area->left;
         for (uint32_t x = 0; x < area->columns; x++) {
             const uint32_t i = lane_of(x, y);
             const int hit = scratch->hits.surface[i] != NB_NONE;
@@ -101,7 +103,7 @@ void nb_planes_add(const nb_frame *frame, const nb_place *place, int is_first, n
     const nebel_frame *planes = frame->planes;
     const nb_light_samples *samples = &scratch->samples;
     const nb_area area = area_of(frame, place);
-    const uint32_t width = frame->width;
+    const uint32_t width = frame->window.width;
     if (planes->color != NULL) add_vectors(planes->color, width, &area, is_first, samples->color);
     if (planes->transmittance != NULL)
         add_vectors(planes->transmittance, width, &area, is_first, samples->transmittance);
@@ -124,7 +126,7 @@ static void scale(float *plane, uint32_t width, const nb_area *area, size_t chan
 static void divide_depths(const nb_frame *frame, const nb_area *area, const uint32_t *counts)
 {
     for (uint32_t y = 0; y < area->rows; y++) {
-        float *row = frame->planes->depth + (size_t)(area->top + y) * frame->width + area->left;
+        float *row = frame->planes->depth + (size_t)(area->top + y) * frame->window.width + area->left;
         for (uint32_t x = 0; x < area->columns; x++) {
             const uint32_t count = counts[lane_of(x, y)];
             row[x] = count > 0 ? row[x] / (float)count : INFINITY;
@@ -139,8 +141,8 @@ void nb_planes_finish(const nb_frame *frame, const nb_place *place, const nb_scr
     if (planes->depth != NULL) divide_depths(frame, &area, scratch->hit_counts + place->first);
     if (frame->samples == 1) return;
     const float factor = 1 / (float)frame->samples;
-    scale(planes->color, frame->width, &area, 3, factor);
-    scale(planes->transmittance, frame->width, &area, 3, factor);
-    scale(planes->in_scattering, frame->width, &area, 3, factor);
-    scale(planes->normal, frame->width, &area, 3, factor);
+    scale(planes->color, frame->window.width, &area, 3, factor);
+    scale(planes->transmittance, frame->window.width, &area, 3, factor);
+    scale(planes->in_scattering, frame->window.width, &area, 3, factor);
+    scale(planes->normal, frame->window.width, &area, 3, factor);
 }

@@ -111,8 +111,8 @@ void nb_reference_finish(const nb_frame *frame, const nb_place *place, const nb_
     const nb_sums *sums = &scratch->sums;
     for (uint32_t i = 0; i < NB_BATCH; i++) {
         const uint32_t lane = place->first + i, x = place->left + nb_lane_x(lane), y = place->top + nb_lane_y(lane);
-        const size_t pixel = 3 * ((size_t)y * frame->width + x);
         if (x >= frame->width || y >= frame->height) continue;
+        const size_t pixel = 3 * nb_planes_pixel(frame, x, y);
         for (int c = 0; c < 3; c++) {
             const double sum = sums->light[c][lane];
             if (frame->planes->color != NULL) frame->planes->color[pixel + (size_t)c] = (float)(sum / frame->samples);

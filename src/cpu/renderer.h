@@ -137,6 +137,7 @@ typedef struct nb_frame {
     int has_lamp_shafts; /* the same of lamps */
     nb_lit_box lamplit_box;
     uint32_t width, height, samples;
+    nebel_window window; /* of the picture that is rendered; the planes are as large */
     nb_air air;
     const nebel_layers *layers;   /* NULL: none */
     nebel_cloud_view *cloud_view; /* the same */
@@ -171,6 +172,12 @@ void nb_reference_finish(const nb_frame *frame, const nb_place *place, const nb_
 
 /* Adds the sample of a batch to the planes: the first sample replaces what is there. */
 void nb_planes_add(const nb_frame *frame, const nb_place *place, int is_first, nb_scratch *scratch);
+
+/* The place of a pixel of the picture, within the window, in a plane of one channel. */
+static inline size_t nb_planes_pixel(const nb_frame *frame, uint32_t x, uint32_t y)
+{
+    return (size_t)(y - frame->window.top) * frame->window.width + (x - frame->window.left);
+}
 
 /* Makes means of sums. */
 void nb_planes_finish(const nb_frame *frame, const nb_place *place, const nb_scratch *scratch);
