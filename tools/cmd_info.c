@@ -3,6 +3,7 @@
 #include "info_scene.h"
 #include "isa.h"
 #include "machine.h"
+#include "ranks.h"
 #include "reader.h"
 #include "report.h"
 #include "workers.h"
@@ -111,6 +112,8 @@ static int print_program(void)
     print_instruction_sets();
     print_opengl();
     (void)printf("viewer: " VIEWER "\n");
+    const char *const ranks = nb_ranks_library();
+    (void)printf("MPI: %s\n", ranks != NULL ? ranks : "not in this build");
     (void)printf("threads: %d\n", nb_workers_available());
     return NB_DONE;
 }

@@ -9,11 +9,10 @@
 #include "layers.h"
 #include "load.h"
 #include "meter.h"
-#include "pattern.h"
 #include "render_call.h"
+#include "render_out.h"
 #include "report.h"
 #include "spread.h"
-#include "target.h"
 
 #include <nebel/render.h>
 #include <nebel/shader.h>
@@ -51,41 +50,6 @@ static const char examples[] = "Examples:\n"
                                "\n"
                                "Exit status: 0 done, 1 the work failed, 2 the call was wrong.\n";
 
-/* The file name of a frame; free it. NULL after a message. */
-static char *name_picture(const nb_render_call *wanted, uint32_t frame)
-{
-    char *const name = wanted->many_frames ? nb_pattern_expand(wanted->output, frame) : strdup(wanted->output);
-    if (name == NULL) (void)nb_report_failure("render: %s: out of memory", wanted->output);
-    return name;
-}
-
-/* Before minutes of work: every picture has a place to go to. */
-static int check_targets(const nb_render_call *wanted)
-{
-    if (wanted->is_film) return NB_DONE; /* nebel_create_film does */
-    for (uint32_t frame = wanted->first_frame; frame <= wanted->last_frame; frame++) {
-        if (nb_interrupt_is_requested()) break;
-        char *const name = name_picture(wanted, frame);
-        const int status = name != NULL ? nb_target_check(name) : NB_FAILED;
-        free(name);
-        if (status != NB_DONE) return status;
-    }
-    return NB_DONE;
-}
-
-/* The same where the scene is known: none takes the place of what it reads. */
-static int check_sources(const nb_render_call *wanted, const nebel_scene_data *contents)
-{
-    if (wanted->is_film) return nb_target_spare(wanted->output, wanted->scene, contents);
-    for (uint32_t frame = wanted->first_frame; frame <= wanted->last_frame; frame++) {
-        char *const name = name_picture(wanted, frame);
-        const int status = name != NULL ? nb_target_spare(name, wanted->scene, contents) : NB_FAILED;
-        free(name);
-        if (status != NB_DONE) return status;
-    }
-    return NB_DONE;
-}
-
 /* ---- the pictures ---------------------------------------------------------------------------- */
 
 /* What lives as long as all frames. */
@@ -96,21 +60,30 @@ typedef struct studio {
     nebel_renderer *renderer; /* of the CPU */
     nb_finer finer;
     nebel_cells *cells; /* of the methods of that name */
-    nebel_film *film;   /* NULL: pictures in files of their own */
 #if defined(NEBEL_HAVE_GL)
     nb_gl_painter painter; /* of OpenGL */
 #endif
     float *samples[NB_LAYER_COUNT]; /* NULL: not wanted */
     float *interleaved;             /* all planes pixel by pixel; NULL where there is only one */
     nb_meter meter;
-    uint32_t frame;
+    nb_jobs jobs;
+    nb_render_out out;
+    nb_render_item item; /* in work */
+    int has_moved;       /* the fog is that of the frame `moved_to` */
+    uint32_t moved_to;
 } studio;
 
-static float *allocate_pixels(const nb_render_call *wanted, uint32_t channels)
+/* Pixels that are rendered at once. */
+static size_t count_pixels(const studio *all)
 {
-    const size_t most = SIZE_MAX / sizeof(float) / channels;
-    if (wanted->width > most / wanted->height) return NULL;
-    return malloc((size_t)wanted->width * wanted->height * channels * sizeof(float));
+    const nb_render_call *const wanted = all->wanted;
+    return (size_t)wanted->width * (all->out.band_rows > 0 ? all->out.band_rows : wanted->height);
+}
+
+static float *allocate_pixels(const studio *all, uint32_t channels)
+{
+    const size_t most = SIZE_MAX / sizeof(float) / channels, pixels = count_pixels(all);
+    return pixels <= most ? malloc(pixels * channels * sizeof(float)) : NULL;
 }
 
 static int writes_plane(const nb_render_call *wanted, int which)
@@ -134,11 +107,11 @@ static int allocate_planes(studio *all)
         if (!writes_plane(wanted, i) &&
             (i != NB_LAYER_STANDARD_ERROR || !nb_layer_is_known((nb_layer)i, wanted->gl, wanted->method)))
             continue;
-        all->samples[i] = allocate_pixels(wanted, nb_layer_kinds[i].channels);
+        all->samples[i] = allocate_pixels(all, nb_layer_kinds[i].channels);
         good = all->samples[i] != NULL;
     }
     if (good && wanted->aov) {
-        all->interleaved = allocate_pixels(wanted, count_channels(wanted));
+        all->interleaved = allocate_pixels(all, count_channels(wanted));
         good = all->interleaved != NULL;
     }
     if (good) return NB_DONE;
@@ -152,7 +125,7 @@ static void free_studio(studio *all)
     free(all->interleaved);
     nebel_destroy_renderer(all->renderer);
     nebel_destroy_cells(all->cells);
-    nebel_destroy_film(all->film);
+    nb_render_out_free(&all->out);
 #if defined(NEBEL_HAVE_GL)
     nb_gl_painter_close(&all->painter);
 #endif
@@ -173,8 +146,9 @@ static void show_light(const nb_render_call *wanted, size_t pixels, float *sampl
 static nebel_image join_planes(studio *all, const char *names[NB_LAYERS_MOST_CHANNELS])
 {
     const nb_render_call *const wanted = all->wanted;
-    const size_t pixels = (size_t)wanted->width * wanted->height;
-    nebel_image image = {.width = wanted->width, .height = wanted->height, .channel_names = names};
+    const nebel_window *const window = &all->item.window;
+    const size_t pixels = (size_t)window->width * window->height;
+    nebel_image image = {.width = window->width, .height = window->height, .channel_names = names};
     const uint32_t of = count_channels(wanted);
     for (int i = 0; i < NB_LAYER_COUNT; i++) {
         if (!writes_plane(wanted, i)) continue;
@@ -188,55 +162,22 @@ static nebel_image join_planes(studio *all, const char *names[NB_LAYERS_MOST_CHA
     return image;
 }
 
-static int write_picture(studio *all)
+static int write_item(studio *all)
 {
     const char *names[NB_LAYERS_MOST_CHANNELS];
     const nebel_image image = join_planes(all, names);
-    if (all->film != NULL) {
-        const nebel_result result = nebel_add_film_picture(all->film, &image);
-        return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, all->wanted->output, result);
-    }
-    char *const name = name_picture(all->wanted, all->frame);
-    if (name == NULL) return NB_FAILED;
-    const nebel_scene_desc desc = {.log = nb_report_log(&all->listener)};
-    nb_interrupt_hold();
-    const nebel_result result = nebel_write_image(name, &desc, &image);
-    nb_interrupt_release();
-    const int status = result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, name, result);
-    free(name);
-    return status;
+    return nb_render_out_write(&all->out, &all->item, &image);
 }
 
-/* Before the long work, because it sees whether the film can be written. */
-static int open_film(studio *all)
+static void show_share(studio *all, double of_item)
 {
-    const nb_render_call *const wanted = all->wanted;
-    if (!wanted->is_film) return NB_DONE;
-    const nebel_film_desc desc = {
-        .log = nb_report_log(&all->listener), .frames_per_second = wanted->fps, .quality = wanted->quality};
-    nb_interrupt_hold();
-    const nebel_result result = nebel_create_film(wanted->output, &desc, &all->film);
-    nb_interrupt_release();
-    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->output, result);
-}
-
-static int finish_film(studio *all)
-{
-    if (all->film == NULL) return NB_DONE;
-    nb_interrupt_hold();
-    const nebel_result result = nebel_finish_film(all->film);
-    nb_interrupt_release();
-    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, all->wanted->output, result);
-}
-
-static void show_share(studio *all, double share)
-{
-    const nb_render_call *const wanted = all->wanted;
-    const uint32_t frames = wanted->last_frame - wanted->first_frame + 1;
-    const uint32_t before = all->frame - wanted->first_frame;
+    uint64_t done, count;
+    const double share = nb_jobs_share(&all->jobs, of_item, &done, &count);
     char label[64] = "";
-    if (frames > 1) (void)snprintf(label, sizeof label, "frame %u of %u", (unsigned)before + 1, (unsigned)frames);
-    nb_meter_show(&all->meter, (before + share) / frames, label);
+    if (count > 1)
+        (void)snprintf(label, sizeof label, "%s %llu of %llu", all->out.band_rows > 0 ? "band" : "frame",
+                       (unsigned long long)(done < count ? done + 1 : count), (unsigned long long)count);
+    nb_meter_show(&all->meter, share, label);
 }
 
 static int show_progress(size_t done, size_t total, void *user)
@@ -244,7 +185,8 @@ static int show_progress(size_t done, size_t total, void *user)
     studio *const all = user;
     if (!all->wanted->gl)
         nb_interrupt_listen(); /* from the first call on the library asks again and again; OpenGL seldom */
-    show_share(all, total > 0 ? (double)done / (double)total : 0);
+    nb_jobs_answer(&all->jobs);
+    if (all->jobs.is_chief) show_share(all, total > 0 ? (double)done / (double)total : 0);
     return nb_interrupt_is_requested();
 }
 
@@ -252,7 +194,7 @@ static nebel_result trace_frame(studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
     const nebel_frame_desc desc = {
-        .camera = nebel_scene_camera(all->loaded.scene, all->frame),
+        .camera = nebel_scene_camera(all->loaded.scene, all->item.frame),
         .width = wanted->width,
         .height = wanted->height,
         .samples = wanted->samples,
@@ -261,7 +203,8 @@ static nebel_result trace_frame(studio *all)
         .progress_user = all,
         .bounces = wanted->bounces,
         .seed = wanted->seed,
-        .time = all->frame,
+        .time = all->item.frame,
+        .window = all->item.window,
     };
     const nebel_frame frame = {
         .color = all->samples[NB_LAYER_COLOR],
@@ -310,7 +253,7 @@ static nebel_result draw_frame(studio *all)
     const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
     const nebel_vertex_desc look = look_of(all->wanted->method, scene);
     const nebel_gl_frame_desc desc = {
-        .camera = nebel_scene_camera(all->loaded.scene, all->frame),
+        .camera = nebel_scene_camera(all->loaded.scene, all->item.frame),
         .width = all->wanted->width,
         .height = all->wanted->height,
         .samples = all->wanted->samples,
@@ -323,7 +266,7 @@ static nebel_result draw_frame(studio *all)
         .d3d9 = scene->classic_d3d9,
         .z_near = scene->classic_z_near,
         .z_far = scene->classic_z_far,
-        .time = all->frame,
+        .time = all->item.frame,
         .clouds_by_processor = 1,
     };
     const nebel_gl_planes wanted = {
@@ -333,8 +276,8 @@ static nebel_result draw_frame(studio *all)
         .depth = all->samples[NB_LAYER_DEPTH],
         .normal = all->samples[NB_LAYER_NORMAL],
     };
-    if (all->frame == all->wanted->first_frame) nb_meter_say(&all->meter, "OpenGL: compiling shaders...");
-    return nb_gl_painter_draw(&all->painter, all->frame, &desc, &wanted);
+    if (all->jobs.made == 0) nb_meter_say(&all->meter, "OpenGL: compiling shaders...");
+    return nb_gl_painter_draw(&all->painter, all->item.frame, &desc, &wanted);
 }
 
 static int open_gl(studio *all)
@@ -365,7 +308,7 @@ static int open_gl(studio *all)
 static int render_frame(studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
-    show_share(all, 0);
+    if (all->jobs.is_chief) show_share(all, 0);
     all->listener.mode = NB_REPORT_KEEP; /* that the frame was stopped is no news */
     const nebel_result result = wanted->gl ? draw_frame(all) : trace_frame(all);
     all->listener.mode = NB_REPORT_PRINT;
@@ -374,22 +317,26 @@ static int render_frame(studio *all)
                              all->listener.kept[0] != '\0' ? all->listener.kept : nebel_result_text(result));
 }
 
+/* Of a picture; bands know their own alone. */
 static void note_spread(const studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
     const size_t pixels = (size_t)wanted->width * wanted->height;
-    if (all->samples[NB_LAYER_STANDARD_ERROR] != NULL && !wanted->quiet)
+    if (all->out.band_rows == 0 && all->samples[NB_LAYER_STANDARD_ERROR] != NULL && !wanted->quiet)
         nb_spread_report(all->samples[NB_LAYER_STANDARD_ERROR], 3 * pixels, wanted->samples);
 }
 
 static int move_fog(studio *all)
 {
-    const nebel_result result = nb_load_move_fog(&all->loaded, all->frame);
+    if (all->has_moved && all->moved_to == all->item.frame) return NB_DONE;
+    const nebel_result result = nb_load_move_fog(&all->loaded, all->item.frame);
+    all->has_moved = result == NEBEL_OK;
+    all->moved_to = all->item.frame;
     nb_finer_light(&all->finer, nebel_scene_contents(all->loaded.scene));
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 
-static int make_picture(studio *all)
+static int make_item(studio *all)
 {
     char what[500];
     (void)snprintf(what, sizeof what, "render: %s", all->wanted->output);
@@ -397,9 +344,19 @@ static int make_picture(studio *all)
     int status = move_fog(all);
     if (status == NB_DONE) status = render_frame(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
-    status = write_picture(all);
+    status = write_item(all);
     if (status == NB_DONE) note_spread(all);
     return status;
+}
+
+/* Makes an item, or finds it there, and joins the parts of its file when it was the last one. */
+static int do_item(studio *all, uint64_t number)
+{
+    all->item = nb_render_out_item(&all->out, number);
+    const int is_there = nb_render_out_has(&all->out, &all->item);
+    const int status = is_there ? NB_DONE : make_item(all);
+    if (status != NB_DONE || nb_interrupt_is_requested()) return status;
+    return nb_jobs_finish(&all->jobs, number, is_there) ? nb_render_out_join(&all->out, &all->item) : NB_DONE;
 }
 
 /* What of a planet moves. */
@@ -597,14 +554,15 @@ static int choose_scattering(studio *all)
 #define FILM_PIXEL_BYTES 0.5
 #define LOSSLESS_PIXEL_BYTES 3.0
 
-static double count_bytes(const nb_render_call *wanted)
+static double count_bytes(const studio *all)
 {
+    const nb_render_call *const wanted = all->wanted;
     const double channels = count_channels(wanted);
     double bytes = (wanted->aov ? 2 : 1) * channels * sizeof(float) + (wanted->gl ? GL_PIXEL_BYTES : 0);
     if (wanted->is_film)
         bytes += ((double)wanted->last_frame - wanted->first_frame + 1) *
                  (wanted->quality == 100 ? LOSSLESS_PIXEL_BYTES : FILM_PIXEL_BYTES);
-    return bytes * wanted->width * wanted->height;
+    return bytes * (double)count_pixels(all);
 }
 
 /* Samples and threads take nothing worth counting. */
@@ -614,7 +572,7 @@ static int charge_pictures(studio *all)
     char what[96];
     (void)snprintf(what, sizeof what, "--size: %s of %u x %u pixels", wanted->is_film ? "a film" : "a picture",
                    (unsigned)wanted->width, (unsigned)wanted->height);
-    const nebel_result result = nebel_charge_scene(all->loaded.scene, what, (uint64_t)count_bytes(wanted));
+    const nebel_result result = nebel_charge_scene(all->loaded.scene, what, (uint64_t)count_bytes(all));
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
 
@@ -622,7 +580,7 @@ static int load(studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
     int status = nb_load_file(wanted->scene, 1, &all->listener, &all->loaded);
-    if (status == NB_DONE) status = check_sources(wanted, nebel_scene_contents(all->loaded.scene));
+    if (status == NB_DONE) status = nb_render_out_spare(&all->out, nebel_scene_contents(all->loaded.scene));
     if (status == NB_DONE) status = check_count(all);
     if (status == NB_DONE) status = choose_scattering(all);
     if (status == NB_DONE) status = charge_pictures(all);
@@ -635,7 +593,7 @@ static int set_up(studio *all)
     int status = load(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
-    warn_of_light(nebel_scene_contents(all->loaded.scene), wanted);
+    if (all->jobs.is_chief) warn_of_light(nebel_scene_contents(all->loaded.scene), wanted);
     status = check_classic(all);
     if (status == NB_DONE) status = make_cells(all);
     if (status == NB_DONE) status = tessellate(all);
@@ -644,34 +602,64 @@ static int set_up(studio *all)
     return wanted->gl ? open_gl(all) : open_renderer(all);
 }
 
-static void summarize(const nb_render_call *wanted, double seconds)
+/* "96 pictures, 12 of them were there, ". */
+static void count_pictures(const studio *all, char *text, size_t size)
 {
-    char span[32], count[32] = "";
+    const unsigned long long kept = all->jobs.all_kept, count = all->jobs.all_made + kept;
+    const char *const what = all->out.band_rows > 0 ? "band" : "picture";
+    text[0] = '\0';
+    if (!all->wanted->many_frames && all->out.band_rows == 0 && kept == 0) return;
+    const int used = snprintf(text, size, "%llu %s%s, ", count, what, count == 1 ? "" : "s");
+    if (kept > 0 && used > 0 && (size_t)used < size)
+        (void)snprintf(text + used, size - (size_t)used, "%llu of them there already, ", kept);
+}
+
+static void summarize(const studio *all, double seconds)
+{
+    const nb_render_call *const wanted = all->wanted;
+    char span[32], count[96];
     nb_meter_write_span(seconds, span, sizeof span);
-    const unsigned frames = (unsigned)(wanted->last_frame - wanted->first_frame + 1);
-    if (wanted->many_frames) (void)snprintf(count, sizeof count, "%u picture%s, ", frames, frames > 1 ? "s" : "");
+    count_pictures(all, count, sizeof count);
     nb_report_message("%s: %s%u x %u, %u sample%s, %s", wanted->output, count, (unsigned)wanted->width,
                       (unsigned)wanted->height, (unsigned)wanted->samples, wanted->samples > 1 ? "s" : "", span);
+}
+
+/* Before the items: what all processes need, and whether they agree on what that is. */
+static int prepare(studio *all)
+{
+    char name[NEBEL_MAX_RECORD + 1];
+    int status = nb_render_out_check(&all->out, &all->jobs);
+    if (status == NB_DONE) status = nb_render_out_open(&all->out);
+    if (status == NB_DONE) status = set_up(all);
+    if (status == NB_DONE && !nb_interrupt_is_requested())
+        status = nb_render_out_sign(&all->out, nebel_scene_contents(all->loaded.scene));
+    if (nb_interrupt_is_requested()) return status;
+    nb_render_out_name_job(&all->out, name);
+    return nb_jobs_begin(&all->jobs, nb_render_out_count_items(&all->out), nb_render_out_group(&all->out), status,
+                         name);
 }
 
 static int render(const nb_render_call *wanted)
 {
     studio all = {.wanted = wanted, .meter = nb_meter_start(wanted->quiet), .listener = {.quiet = wanted->quiet}};
-    int status = open_film(&all);
-    if (status == NB_DONE) status = set_up(&all);
-    all.frame = wanted->first_frame;
-    while (status == NB_DONE && all.frame <= wanted->last_frame) {
-        status = make_picture(&all);
-        if (nb_interrupt_is_requested()) break;
-        all.frame++;
-    }
-    if (status == NB_DONE && all.frame > wanted->last_frame) status = finish_film(&all);
+    all.jobs = nb_jobs_of(&wanted->shard);
+    int status = nb_jobs_join(&all.jobs);
+    if (status != NB_DONE) return status;
+    nb_render_call own = *wanted;
+    own.quiet |= !all.jobs.is_chief; /* what one has said need not be repeated */
+    all.wanted = &own;
+    all.listener.quiet = own.quiet;
+    all.out = nb_render_out_of(all.wanted, &all.jobs, &all.listener);
+    status = prepare(&all);
+    uint64_t item;
+    while (status == NB_DONE && !nb_interrupt_is_requested() && nb_jobs_take(&all.jobs, &item))
+        status = do_item(&all, item);
+    if (status == NB_DONE && !nb_interrupt_is_requested()) status = nb_render_out_finish(&all.out);
     const double seconds = nb_meter_end(&all.meter);
     free_studio(&all);
-    if (status == NB_DONE && all.frame <= wanted->last_frame) {
-        return nb_report_failure("render: %s: stopped", wanted->output);
-    }
-    if (status == NB_DONE && !wanted->quiet) summarize(wanted, seconds);
+    if (nb_interrupt_is_requested()) return nb_report_failure("render: %s: stopped", wanted->output);
+    status = nb_jobs_end(&all.jobs, status);
+    if (status == NB_DONE && !own.quiet) summarize(&all, seconds);
     return status;
 }
 
@@ -682,8 +670,7 @@ static int run(int count, char **words)
     int status = nb_options_parse(&nb_commands_render, count, words, &arguments);
     if (status < 0) status = nb_render_call_read(&arguments, &wanted);
     if (status >= 0) return status;
-    status = check_targets(&wanted);
-    if (status == NB_DONE) status = render(&wanted);
+    status = render(&wanted);
     nb_interrupt_obey();
     return status;
 }

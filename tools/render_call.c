@@ -7,6 +7,7 @@
 #include "pattern.h"
 #include "reader.h"
 #include "report.h"
+#include "target.h"
 #include "workers.h"
 
 #include <string.h>
@@ -34,6 +35,9 @@ enum {
     MEMORY,
     BOUNCES,
     SEED,
+    SHARD,
+    RESUME,
+    BANDS,
     QUIET,
     COUNT
 };
@@ -90,6 +94,13 @@ const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
                  "exact shows. Default: as often as it happens."},
     [SEED] = {"seed", 0, "N",
               "With --method reference: 0 to 4294967295; other\nseeds give independent pictures. Default: 0."},
+    [SHARD] = NB_SHARD_OPTION,
+    [RESUME] = {"resume", 0, NULL,
+                "Leaves pictures as they are that are there already,\nwhole and made from the same files and options."},
+    [BANDS] =
+        {"bands", 0, "ROWS",
+         "Renders a picture in bands of so many rows, a\nmultiple of 64, in memory for one of them. Default:\nfor one "
+         "picture with --shard, --resume or MPI, of a\nquarter of a million pixels; else none."},
     [QUIET] = {"quiet", 'q', NULL,
                "No progress bar, no notes and no summary; warnings\nand errors are still reported."},
 };
@@ -265,6 +276,24 @@ static void read_scattering(nb_arguments *arguments, nb_render_call *wanted)
     wanted->scattering = chosen[nb_options_choice(arguments, MULTIPLE_SCATTERING, models, 0)];
 }
 
+static void read_jobs(nb_arguments *arguments, nb_render_call *wanted)
+{
+    static const int of_files[] = {SHARD, RESUME, BANDS};
+    wanted->shard = nb_jobs_read_shard(arguments, SHARD);
+    wanted->resume = arguments->values[RESUME] != NULL;
+    wanted->band_rows = nb_options_whole(arguments, BANDS, NEBEL_WINDOW_STEP, LARGEST_SIDE, 0);
+    if (wanted->band_rows % NEBEL_WINDOW_STEP != 0)
+        nb_options_reject(arguments, BANDS, "is no multiple of 64, such as 128");
+    if (wanted->band_rows > 0 && wanted->is_film)
+        nb_options_refuse(arguments, BANDS, "is for pictures; the frames of a film are parts already");
+    if (wanted->band_rows > 0 && wanted->gl)
+        nb_options_refuse(arguments, BANDS,
+                          "is for --device cpu: OpenGL draws a picture as a whole; leave it out with gl");
+    for (size_t i = 0; i < sizeof of_files / sizeof *of_files; i++)
+        if (arguments->values[of_files[i]] != NULL && wanted->output != NULL && nb_target_is_special(wanted->output))
+            nb_options_refuse(arguments, of_files[i], "is for pictures in files; leave it out, or name a file");
+}
+
 int nb_render_call_read(nb_arguments *arguments, nb_render_call *wanted)
 {
     wanted->scene = arguments->operands[0];
@@ -285,6 +314,7 @@ int nb_render_call_read(nb_arguments *arguments, nb_render_call *wanted)
     read_reference(arguments, wanted);
     read_scattering(arguments, wanted);
     read_tessellate(arguments, wanted);
+    read_jobs(arguments, wanted);
     if (arguments->misused) return nb_report_misuse("render", "render: nothing was done");
     return -1;
 }

@@ -2,6 +2,7 @@
 #ifndef NB_RENDER_CALL_H
 #define NB_RENDER_CALL_H
 
+#include "jobs.h"
 #include "options.h"
 
 #include <nebel/render.h>
@@ -22,14 +23,17 @@ typedef struct nb_render_call {
     nebel_tessellation_desc tessellation; /* bound 0: the triangles of the models */
     uint32_t first_frame, last_frame;
     int many_frames, is_film, aov, quiet, gl;
-    double fps;  /* of a film, and */
-    int quality; /* NEBEL_DEFAULT_FILM_QUALITY */
+    nb_shard shard;
+    int resume;         /* what is there already, made from the same, stays */
+    uint32_t band_rows; /* in which pictures are rendered; 0: as the job asks for */
+    double fps;         /* of a film, and */
+    int quality;        /* NEBEL_DEFAULT_FILM_QUALITY */
     nebel_method method;
     nb_scattering scattering;
     nebel_renderer_desc renderer;
 } nb_render_call;
 
-enum { NB_RENDER_OPTIONS = 22 };
+enum { NB_RENDER_OPTIONS = 25 };
 
 extern const nb_option nb_render_options[NB_RENDER_OPTIONS];
 

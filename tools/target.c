@@ -59,6 +59,12 @@ static int may_be_written(const char *path, const struct stat *status)
     return S_ISREG(status->st_mode) || is_open_already(path) || is_null(status);
 }
 
+int nb_target_is_special(const char *path)
+{
+    struct stat status;
+    return is_open_already(path) || (stat(path, &status) == 0 && is_null(&status));
+}
+
 static int refuse(const char *path)
 {
     return nb_report_failure("cannot write \"%s\": it is a device, a pipe or a socket; name a file", path);

@@ -15,6 +15,9 @@ extern "C" {
  * no folder. Otherwise NB_FAILED after a message. */
 int nb_target_check(const char *path);
 
+/* Whether there is something that is written to as it is, not replaced: /dev/null, or what is open already. */
+int nb_target_is_special(const char *path);
+
 /* Whether two paths lead to one file that exists. */
 int nb_target_is_same(const char *path, const char *other);
 

@@ -1,0 +1,212 @@
+#define _POSIX_C_SOURCE 200809L
+#include "parts.h"
+
+#include "interrupt.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* FILE.parts/TEXT; free it. */
+static char *name_in_folder(const nb_parts *parts, const char *text)
+{
+    static const char folder[] = ".parts/";
+    const size_t size = strlen(parts->file) + strlen(text) + sizeof folder;
+    char *const name = malloc(size);
+    if (name == NULL)
+        nb_report_message("%s: out of memory", parts->file);
+    else
+        (void)snprintf(name, size, "%s%s%s", parts->file, folder, text);
+    return name;
+}
+
+char *nb_parts_name(const nb_parts *parts, uint32_t part)
+{
+    char text[32];
+    const char *const ending = nebel_find_image_format(parts->file) == NEBEL_IMAGE_EXR ? "exr" : "png";
+    (void)snprintf(text, sizeof text, "%06lu.%s", (unsigned long)part, ending);
+    return name_in_folder(parts, text);
+}
+
+int nb_parts_make_folder(const nb_parts *parts)
+{
+    char *const folder = name_in_folder(parts, "");
+    if (folder == NULL) return NB_FAILED;
+    folder[strlen(folder) - 1] = '\0';
+    const int is_there = mkdir(folder, 0777) == 0 || errno == EEXIST;
+    const int status =
+        is_there ? NB_DONE : nb_report_failure("cannot make the folder \"%s\": %s", folder, strerror(errno));
+    free(folder);
+    return status;
+}
+
+int nb_parts_have(const nb_parts *parts, uint32_t part)
+{
+    char wanted[NEBEL_MAX_RECORD + 1], found[NEBEL_MAX_RECORD + 1];
+    char *const name = nb_parts_name(parts, part);
+    if (name == NULL) return 0;
+    parts->record(parts->user, part, wanted);
+    (void)nebel_read_record(name, found);
+    free(name);
+    return strcmp(wanted, found) == 0;
+}
+
+int nb_parts_have_all(const nb_parts *parts)
+{
+    for (uint32_t i = 0; i < parts->count; i++)
+        if (!nb_parts_have(parts, i)) return 0;
+    return 1;
+}
+
+/* ---- joining --------------------------------------------------------------------------------- */
+
+static int read_part(const nb_parts *parts, uint32_t part, nebel_image *image)
+{
+    const nebel_scene_desc desc = {.log = nb_report_log(parts->listener)};
+    char *const name = nb_parts_name(parts, part);
+    if (name == NULL) return NB_FAILED;
+    const nebel_result result = nebel_read_image(name, &desc, image);
+    const int status = result == NEBEL_OK ? NB_DONE : nb_report_result(parts->listener, name, result);
+    free(name);
+    return status;
+}
+
+static void free_part(nebel_image *image)
+{
+    nebel_free_image(&(nebel_scene_desc){0}, image);
+}
+
+/* A picture in the making. */
+typedef struct joining {
+    nebel_image_writer *writer; /* NULL until the first part says which channels there are */
+    nebel_image_desc desc;
+    nebel_image first; /* keeps their names */
+    uint32_t row;
+} joining;
+
+static int add_band(const nb_parts *parts, joining *joint, const nebel_image *band)
+{
+    if (band->width != joint->desc.width || band->height > joint->desc.height - joint->row ||
+        band->channel_count != joint->desc.channel_count)
+        return nb_report_failure("%s: its parts do not fit together; remove the folder \"%s.parts\" and render again",
+                                 parts->file, parts->file);
+    const nebel_result result = nebel_add_image_rows(joint->writer, band->height, band->samples);
+    joint->row += band->height;
+    return result == NEBEL_OK ? NB_DONE : nb_report_result(parts->listener, parts->file, result);
+}
+
+static int begin_picture(const nb_parts *parts, joining *joint)
+{
+    const int status = read_part(parts, 0, &joint->first);
+    if (status != NB_DONE) return status;
+    joint->desc.channel_count = joint->first.channel_count;
+    joint->desc.channel_names = joint->first.channel_names;
+    const nebel_result result = nebel_create_image_writer(parts->file, &joint->desc, &joint->writer);
+    return result == NEBEL_OK ? add_band(parts, joint, &joint->first)
+                              : nb_report_result(parts->listener, parts->file, result);
+}
+
+static int add_part(const nb_parts *parts, uint32_t part, joining *joint)
+{
+    nebel_image band;
+    int status = read_part(parts, part, &band);
+    if (status == NB_DONE) status = add_band(parts, joint, &band);
+    free_part(&band);
+    return status;
+}
+
+int nb_parts_join_picture(const nb_parts *parts, uint32_t width, uint32_t height, const char *record)
+{
+    joining joint = {.desc = {.log = nb_report_log(parts->listener), .width = width, .height = height, .record = record}};
+    nb_interrupt_hold(); /* as long as the temporary file is there */
+    int status = begin_picture(parts, &joint);
+    for (uint32_t i = 1; i < parts->count && status == NB_DONE && !nb_interrupt_is_requested(); i++)
+        status = add_part(parts, i, &joint);
+    if (status == NB_DONE && !nb_interrupt_is_requested()) {
+        const nebel_result result = nebel_finish_image(joint.writer);
+        if (result != NEBEL_OK) status = nb_report_result(parts->listener, parts->file, result);
+    }
+    nebel_destroy_image_writer(joint.writer);
+    free_part(&joint.first);
+    nb_interrupt_release();
+    return status;
+}
+
+static int add_frames(const nb_parts *parts, nebel_film *film)
+{
+    for (uint32_t i = 0; i < parts->count; i++) {
+        nebel_image picture;
+        const int status = read_part(parts, i, &picture);
+        if (status != NB_DONE) return status;
+        nb_interrupt_hold(); /* whether there is room is tried with a file */
+        const nebel_result result = nebel_add_film_picture(film, &picture);
+        nb_interrupt_release();
+        free_part(&picture);
+        if (result != NEBEL_OK) return nb_report_result(parts->listener, parts->file, result);
+        if (nb_interrupt_is_requested()) return NB_DONE;
+    }
+    return NB_DONE;
+}
+
+int nb_parts_join_film(const nb_parts *parts, const nebel_film_desc *desc, const char *record)
+{
+    nebel_film *film = NULL;
+    nb_interrupt_hold();
+    nebel_result result = nebel_create_film(parts->file, desc, &film);
+    nb_interrupt_release();
+    if (result == NEBEL_OK) result = nebel_set_film_record(film, record);
+    int status = result == NEBEL_OK ? add_frames(parts, film) : nb_report_result(parts->listener, parts->file, result);
+    if (status == NB_DONE && !nb_interrupt_is_requested()) {
+        nb_interrupt_hold();
+        result = nebel_finish_film(film);
+        nb_interrupt_release();
+        if (result != NEBEL_OK) status = nb_report_result(parts->listener, parts->file, result);
+    }
+    nebel_destroy_film(film);
+    return status;
+}
+
+/* ---- removing -------------------------------------------------------------------------------- */
+
+/* As src/scene names what is not finished. */
+static int is_unfinished(const char *name)
+{
+    static const char begin[] = ".nebel-", end[] = ".tmp";
+    const size_t size = strlen(name);
+    return size > sizeof begin + sizeof end && strncmp(name, begin, sizeof begin - 1) == 0 &&
+           strcmp(name + size - (sizeof end - 1), end) == 0;
+}
+
+static void remove_file(const nb_parts *parts, const char *text)
+{
+    char *const name = name_in_folder(parts, text);
+    if (name != NULL) (void)unlink(name);
+    free(name);
+}
+
+static void remove_unfinished(const nb_parts *parts, const char *folder)
+{
+    DIR *const open = opendir(folder);
+    if (open == NULL) return;
+    for (const struct dirent *entry = readdir(open); entry != NULL; entry = readdir(open))
+        if (is_unfinished(entry->d_name)) remove_file(parts, entry->d_name);
+    (void)closedir(open);
+}
+
+void nb_parts_remove(const nb_parts *parts)
+{
+    for (uint32_t i = 0; i < parts->count; i++) {
+        char *const name = nb_parts_name(parts, i);
+        if (name != NULL) (void)unlink(name);
+        free(name);
+    }
+    char *const folder = name_in_folder(parts, "");
+    if (folder == NULL) return;
+    remove_unfinished(parts, folder);
+    (void)rmdir(folder);
+    free(folder);
+}

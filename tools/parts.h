@@ -1,0 +1,39 @@
+/* Parts of a picture or a film, each a picture in a file of its own in the folder FILE.parts. */
+#ifndef NB_PARTS_H
+#define NB_PARTS_H
+
+#include "report.h"
+
+#include <nebel/scene.h>
+
+#include <stdint.h>
+
+typedef struct nb_parts {
+    const char *file; /* what they make */
+    uint32_t count;
+    nb_report_listener *listener;
+    /* The record of a part. */
+    void (*record)(void *user, uint32_t part, char record[NEBEL_MAX_RECORD + 1]);
+    void *user;
+} nb_parts;
+
+/* The name of a part, an EXR of an EXR and else a PNG; free it. NULL after a message. */
+char *nb_parts_name(const nb_parts *parts, uint32_t part);
+
+/* Makes the folder, where there is none. */
+int nb_parts_make_folder(const nb_parts *parts);
+
+/* Whether a part is there, whole and with its record. */
+int nb_parts_have(const nb_parts *parts, uint32_t part);
+int nb_parts_have_all(const nb_parts *parts);
+
+/* Joins bands of rows, all `rows` high but the last, to a picture of this size, in memory for one of them. */
+int nb_parts_join_picture(const nb_parts *parts, uint32_t width, uint32_t height, const char *record);
+
+/* Joins frames to a film, and finishes it. */
+int nb_parts_join_film(const nb_parts *parts, const nebel_film_desc *desc, const char *record);
+
+/* Removes the parts, what ended processes left half written beside them, and the folder. What cannot be removed stays. */
+void nb_parts_remove(const nb_parts *parts);
+
+#endif
