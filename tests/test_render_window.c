@@ -95,7 +95,7 @@ static void test_windows_have_the_pixels_of_the_whole(void **state)
         for (size_t i = 0; i < sizeof projections / sizeof *projections; i++) {
             nebel_camera camera = test_camera(.5, 1, 6, 0, 0, 0);
             camera.projection = projections[i];
-            compare_windows(renderer, &camera, methods[m] == NEBEL_METHOD_EXACT ? 5 : 2);
+            if (methods[m] != NEBEL_METHOD_REFERENCE || i == 0) compare_windows(renderer, &camera, 2);
         }
     }
     nebel_destroy_renderer(renderer);

@@ -649,6 +649,7 @@ static int render(const nb_render_call *wanted)
     own.quiet |= !all.jobs.is_chief; /* what one has said need not be repeated */
     all.wanted = &own;
     all.listener.quiet = own.quiet;
+    if (all.jobs.is_joined && !own.quiet) nb_meter_write_lines(&all.meter);
     all.out = nb_render_out_of(all.wanted, &all.jobs, &all.listener);
     status = prepare(&all);
     uint64_t item;

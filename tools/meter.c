@@ -17,6 +17,9 @@
 static const double drawing_pause = 0.1;
 static const double guessing_pause = 0.5;
 
+/* Between two lines of a log: twice as long each time. */
+static const double first_line_pause = 2, longest_line_pause = 60;
+
 enum { DEFAULT_COLUMNS = 80, WIDEST_BAR = 40, NARROWEST_BAR = 8 };
 
 /* Seconds since some moment; never goes back. */
@@ -78,11 +81,32 @@ static void draw(double done, const char *label, const char *left)
     nb_report_status(line);
 }
 
+void nb_meter_write_lines(nb_meter *meter)
+{
+    if (meter->visible) return;
+    meter->line_pause = first_line_pause;
+    meter->drawn = meter->started;
+}
+
+/* Whether it is time to say something. */
+static int is_due(const nb_meter *meter, double now)
+{
+    if (meter->visible) return meter->drawn < 0 || now - meter->drawn >= drawing_pause;
+    return meter->line_pause > 0 && now - meter->drawn >= meter->line_pause;
+}
+
+static void write_line(nb_meter *meter, double done, const char *label, const char *left)
+{
+    nb_report_message("%s%s%d %%%s%s", label, label[0] != '\0' ? ", " : "", (int)(100 * done),
+                      left[0] != '\0' ? ", " : "", left);
+    meter->line_pause = fmin(2 * meter->line_pause, longest_line_pause);
+}
+
 void nb_meter_show(nb_meter *meter, double done, const char *label)
 {
-    if (!meter->visible) return;
+    if (!meter->visible && meter->line_pause == 0) return;
     const double now = clock_seconds();
-    if (meter->drawn >= 0 && now - meter->drawn < drawing_pause) return;
+    if (!is_due(meter, now)) return;
     meter->drawn = now;
     char span[32], left[48] = "";
     const double share = done > 1 ? 1 : done < 0 ? 0 : done;
@@ -92,7 +116,10 @@ void nb_meter_show(nb_meter *meter, double done, const char *label)
         nb_meter_write_span(ceil(remaining), span, sizeof span);
         (void)snprintf(left, sizeof left, "%s left", span);
     }
-    draw(share, label, left);
+    if (meter->visible)
+        draw(share, label, left);
+    else
+        write_line(meter, share, label, left);
 }
 
 void nb_meter_say(const nb_meter *meter, const char *words)

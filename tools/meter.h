@@ -7,11 +7,15 @@
 typedef struct nb_meter {
     int visible;
     double started, drawn; /* s */
+    double line_pause;     /* s, until the next line; 0: none are written */
 } nb_meter;
 
 /* Starts the clock. The bar is drawn only where standard error is a terminal that can go back to the beginning of a
  * line. */
 nb_meter nb_meter_start(int quiet);
+
+/* Where there is no bar: lines from time to time, for the logs of long jobs. */
+void nb_meter_write_lines(nb_meter *meter);
 
 /* `done` of all the work, 0 to 1; `label` may be "". Cheap to call often. */
 void nb_meter_show(nb_meter *meter, double done, const char *label);
