@@ -47,6 +47,8 @@ static const char examples[] = "Examples:\n"
                                "  Four seconds of film, in one file or as pictures:\n"
                                "    nebel render orbit.json -o orbit.webp --frames 0-95\n"
                                "    nebel render orbit.json -o 'frames/orbit_%04d.png' --frames 0-95\n"
+                               "  The same by four processes, which go on where they were:\n"
+                               "    mpirun -n 4 nebel render orbit.json -o orbit.webp --frames 0-95 --resume\n"
                                "\n"
                                "Exit status: 0 done, 1 the work failed, 2 the call was wrong.\n";
 

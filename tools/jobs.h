@@ -26,8 +26,7 @@ typedef struct nb_shard {
 
 #define NB_SHARD_OPTION                                                                                                \
     {                                                                                                                  \
-        "shard", 0, "K/N",                                                                                             \
-            "Does part K, from 0, of N equal parts of the work, for\nmany machines: see docs/clusters.md."             \
+        "shard", 0, "K/N", "Does part K, from 0, of N parts of the work; for\nmany machines."                          \
     }
 nb_shard nb_jobs_read_shard(nb_arguments *arguments, int option);
 

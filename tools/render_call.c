@@ -95,12 +95,10 @@ const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
     [SEED] = {"seed", 0, "N",
               "With --method reference: 0 to 4294967295; other\nseeds give independent pictures. Default: 0."},
     [SHARD] = NB_SHARD_OPTION,
-    [RESUME] = {"resume", 0, NULL,
-                "Leaves pictures as they are that are there already,\nwhole and made from the same files and options."},
-    [BANDS] =
-        {"bands", 0, "ROWS",
-         "Renders a picture in bands of so many rows, a\nmultiple of 64, in memory for one of them. Default:\nfor one "
-         "picture with --shard, --resume or MPI, of a\nquarter of a million pixels; else none."},
+    [RESUME] = {"resume", 0, NULL, "Leaves what is there already, whole and made from\nthe same files and options."},
+    [BANDS] = {"bands", 0, "ROWS",
+               "Renders a picture in bands of so many rows, a\nmultiple of 64, in memory for one of them. Default:\n"
+               "none; of one picture with --shard, --resume or MPI\nas many as have 2^18 pixels."},
     [QUIET] = {"quiet", 'q', NULL,
                "No progress bar, no notes and no summary; warnings\nand errors are still reported."},
 };
