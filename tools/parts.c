@@ -5,6 +5,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -60,6 +61,27 @@ int nb_parts_have_all(const nb_parts *parts)
     for (uint32_t i = 0; i < parts->count; i++)
         if (!nb_parts_have(parts, i)) return 0;
     return 1;
+}
+
+/* ---- the lock -------------------------------------------------------------------------------- */
+
+static const char lock_name[] = "lock";
+
+int nb_parts_lock(const nb_parts *parts, int *lock)
+{
+    struct flock whole = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
+    char *const name = name_in_folder(parts, lock_name);
+    *lock = name != NULL ? open(name, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666) : -1;
+    free(name);
+    if (*lock < 0 || fcntl(*lock, F_SETLK, &whole) == 0) return 1;
+    const int is_taken = errno == EACCES || errno == EAGAIN;
+    if (is_taken) (void)close(*lock);
+    return !is_taken;
+}
+
+void nb_parts_unlock(int lock)
+{
+    if (lock >= 0) (void)close(lock);
 }
 
 /* ---- joining --------------------------------------------------------------------------------- */
@@ -121,7 +143,8 @@ static int add_part(const nb_parts *parts, uint32_t part, joining *joint)
 
 int nb_parts_join_picture(const nb_parts *parts, uint32_t width, uint32_t height, const char *record)
 {
-    joining joint = {.desc = {.log = nb_report_log(parts->listener), .width = width, .height = height, .record = record}};
+    joining joint = {
+        .desc = {.log = nb_report_log(parts->listener), .width = width, .height = height, .record = record}};
     nb_interrupt_hold(); /* as long as the temporary file is there */
     int status = begin_picture(parts, &joint);
     for (uint32_t i = 1; i < parts->count && status == NB_DONE && !nb_interrupt_is_requested(); i++)
@@ -204,6 +227,7 @@ void nb_parts_remove(const nb_parts *parts)
         if (name != NULL) (void)unlink(name);
         free(name);
     }
+    remove_file(parts, lock_name);
     char *const folder = name_in_folder(parts, "");
     if (folder == NULL) return;
     remove_unfinished(parts, folder);

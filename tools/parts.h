@@ -27,6 +27,11 @@ int nb_parts_make_folder(const nb_parts *parts);
 int nb_parts_have(const nb_parts *parts, uint32_t part);
 int nb_parts_have_all(const nb_parts *parts);
 
+/* Whether nobody else joins these parts just now, so that this process may, until nb_parts_unlock: 1 with the lock. Ends with the process. Where
+ * the file system has no locks two may join at the same time, which write the same bytes. */
+int nb_parts_lock(const nb_parts *parts, int *lock);
+void nb_parts_unlock(int lock);
+
 /* Joins bands of rows, all `rows` high but the last, to a picture of this size, in memory for one of them. */
 int nb_parts_join_picture(const nb_parts *parts, uint32_t width, uint32_t height, const char *record);
 

@@ -362,15 +362,26 @@ static int join_parts(const nb_render_out *out, const nb_parts *parts, uint32_t 
                                 : nb_parts_join_picture(parts, out->wanted->width, out->wanted->height, record);
 }
 
-/* Two shards that end at the same time may both join: they write the same bytes, and who loses parts to the other finds the file. */
+/* With the lock: another process may have joined them meanwhile. */
+static int join_and_remove(const nb_render_out *out, const nb_parts *parts, uint32_t frame)
+{
+    if (!nb_parts_have_all(parts)) return NB_DONE;
+    const int status = join_parts(out, parts, frame);
+    if (status == NB_DONE && !nb_interrupt_is_requested()) nb_parts_remove(parts);
+    return status;
+}
+
+/* Of shards that end at the same time one joins. */
 static int join(const nb_render_out *out, const nb_parts *parts, uint32_t frame)
 {
-    const int is_there = out->wanted->resume && has_file(out, parts->file, frame);
-    if (!is_there && !nb_parts_have_all(parts)) return NB_DONE;
-    int status = is_there ? NB_DONE : join_parts(out, parts, frame);
-    if (nb_interrupt_is_requested()) return status;
-    if (status != NB_DONE && has_file(out, parts->file, frame)) status = NB_DONE;
-    if (status == NB_DONE) nb_parts_remove(parts);
+    int lock;
+    if (out->wanted->resume && has_file(out, parts->file, frame)) {
+        nb_parts_remove(parts); /* what was left when the process that joined them was ended */
+        return NB_DONE;
+    }
+    if (!nb_parts_have_all(parts) || !nb_parts_lock(parts, &lock)) return NB_DONE;
+    const int status = join_and_remove(out, parts, frame);
+    nb_parts_unlock(lock);
     return status;
 }
 
