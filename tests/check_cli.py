@@ -783,6 +783,42 @@ class FramesTest(PictureCase):
         self.assert_done(self.render("u.png", "--frame", "1"))
         self.assertEqual((self.folder / "u.png").read_bytes(), pictures[1])
 
+    def test_a_shutter_blurs_what_moves(self):
+        """Fog that thickens over a frame has the mean of its transmittance, (exp(-a d) - exp(-b d)) / ((b - a) d), within the midpoint rule's error."""
+        thin, thick, depth, samples = 0.11, 0.21, 10, 64
+        mean = (math.exp(-thin * depth) - math.exp(-thick * depth)) / ((thick - thin) * depth)
+        camera = {"position": [0, 0, 6], "look_at": [0, 0, 0], "projection": "orthographic", "view_height": 2}
+        fog = {"shape": BOX, "extinction": thin, "source": 0}
+        # Level slopes at the first and the last key, even ones between: the second frame grows evenly.
+        keys = [{"frame": frame, "extinction": thin + (thick - thin) * (frame - 1)} for frame in range(4)]
+        moving = dict(fog, keys=keys)
+        self.write_scene("even.json", [dict(fog, extinction=-math.log(mean) / depth)], background=1, camera=camera)
+        self.scene = self.write_scene("moving.json", [moving], background=1, camera=camera)
+        self.assert_done(self.render("moving.exr", "--frame", "1", "--shutter", "1", "--samples", samples, "--tolerance", "1e-6"))
+        self.scene = self.folder / "even.json"
+        self.assert_done(self.render("even.exr", "--samples", "1"))
+        seen = nebel("compare", "moving.exr", "even.exr", cwd=self.folder).out
+        self.assertLess(float(re.search(r"largest difference: ([\d.e-]+)", seen)[1]), 1e-4, seen)
+        seen = nebel("compare", "moving.exr", self.made("other.exr", "moving.json", "--frame", "1", "--shutter", "0.5"), cwd=self.folder).out
+        self.assertGreater(float(re.search(r"largest difference: ([\d.e-]+)", seen)[1]), 0.02, "half a frame is another time")
+
+    def made(self, name, scene, *words):
+        self.scene = self.folder / scene
+        self.assert_done(self.render(name, *words))
+        return name
+
+    def test_a_shutter_leaves_what_stands(self):
+        self.assert_done(self.render("a.png", "--samples", "7"))
+        self.assert_done(self.render("b.png", "--samples", "7", "--shutter", "0.5"))
+        pictures = [(self.folder / name).read_bytes() for name in ("a.png", "b.png")]
+        self.assertEqual(*[picture[picture.index(b"IDAT"):] for picture in pictures])
+        notes = [self.render("a.png", "--samples", "3", "--method", "reference", *words).err for words in ([], ["--shutter", "1"])]
+        self.assertEqual(*[re.search(r"standard error [\d.e-]+ of a pixel, [\d.e-]+ of", note)[0] for note in notes])
+        for value in ("-0.1", "1.1", "x", ""):
+            self.assert_misused(self.render("c.png", "--shutter", value), "--shutter")
+        for words in (["--samples", "1"], ["--device", "gl"], ["--method", "vertex", "--tessellate", "0.1"]):
+            self.assert_misused(self.render("c.png", "--shutter", "0.5", *words), "--shutter")
+
     def test_no_bar_without_a_terminal(self):
         done = self.render("a.png", "--samples", "64")
         self.assertNotIn("\r", done.err)

@@ -20,7 +20,7 @@ FRAMES = 8
 PICTURES = ("f%d.png", ["--frames", f"0-{FRAMES - 1}"], FRAMES)
 FILM = ("f.webp", ["--frames", f"0-{FRAMES - 1}", "--quality", "100"], FRAMES)
 LARGE = ("large.png", ["--size", "300x400", "--bands", "64"], 7)
-LAYERS = ("large.exr", ["--size", "300x400", "--bands", "128", "--aov"], 4)
+LAYERS = ("large.exr", ["--size", "300x400", "--bands", "128", "--aov", "--shutter", "0.5", "--samples", "3"], 4)
 
 
 def ranks_are_missing():

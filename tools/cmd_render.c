@@ -12,6 +12,7 @@
 #include "render_call.h"
 #include "render_out.h"
 #include "report.h"
+#include "shutter.h"
 #include "spread.h"
 
 #include <nebel/render.h>
@@ -66,13 +67,15 @@ typedef struct studio {
     nb_gl_painter painter; /* of OpenGL */
 #endif
     float *samples[NB_LAYER_COUNT]; /* NULL: not wanted */
+    nb_shutter shutter;
+    uint32_t sub_frame, sub_frames; /* times of a picture: which is in work, of how many */
     float *interleaved;             /* all planes pixel by pixel; NULL where there is only one */
     nb_meter meter;
     nb_jobs jobs;
     nb_render_out out;
     nb_render_item item; /* in work */
-    int has_moved;       /* the fog is that of the frame `moved_to` */
-    uint32_t moved_to;
+    int has_moved;       /* the fog is that of the time `moved_to`, in frames */
+    double moved_to;
 } studio;
 
 /* Pixels that are rendered at once. */
@@ -116,6 +119,7 @@ static int allocate_planes(studio *all)
         all->interleaved = allocate_pixels(all, count_channels(wanted));
         good = all->interleaved != NULL;
     }
+    if (good && wanted->shutter > 0) good = nb_shutter_open(&all->shutter, all->samples, count_pixels(all));
     if (good) return NB_DONE;
     return nb_report_failure("render: --size: out of memory for %u x %u pixels; ask for fewer",
                              (unsigned)all->wanted->width, (unsigned)all->wanted->height);
@@ -125,6 +129,7 @@ static void free_studio(studio *all)
 {
     for (int i = 0; i < NB_LAYER_COUNT; i++) free(all->samples[i]);
     free(all->interleaved);
+    nb_shutter_free(&all->shutter);
     nebel_destroy_renderer(all->renderer);
     nebel_destroy_cells(all->cells);
     nb_render_out_free(&all->out);
@@ -188,15 +193,17 @@ static int show_progress(size_t done, size_t total, void *user)
     if (!all->wanted->gl)
         nb_interrupt_listen(); /* from the first call on the library asks again and again; OpenGL seldom */
     nb_jobs_answer(&all->jobs);
-    if (all->jobs.is_chief) show_share(all, total > 0 ? (double)done / (double)total : 0);
+    const double share = total > 0 ? (double)done / (double)total : 0;
+    if (all->jobs.is_chief) show_share(all, (all->sub_frame + share) / all->sub_frames);
     return nb_interrupt_is_requested();
 }
 
-static nebel_result trace_frame(studio *all)
+/* The samples from `first_sample` on, at a time. */
+static nebel_result trace_samples(studio *all, double time, uint32_t first_sample, uint32_t count)
 {
     const nb_render_call *const wanted = all->wanted;
     const nebel_frame_desc desc = {
-        .camera = nebel_scene_camera(all->loaded.scene, all->item.frame),
+        .camera = nebel_scene_camera(all->loaded.scene, time),
         .width = wanted->width,
         .height = wanted->height,
         .samples = wanted->samples,
@@ -205,8 +212,10 @@ static nebel_result trace_frame(studio *all)
         .progress_user = all,
         .bounces = wanted->bounces,
         .seed = wanted->seed,
-        .time = all->item.frame,
+        .time = time,
         .window = all->item.window,
+        .first_sample = first_sample,
+        .sample_count = count,
     };
     const nebel_frame frame = {
         .color = all->samples[NB_LAYER_COLOR],
@@ -219,6 +228,40 @@ static nebel_result trace_frame(studio *all)
     };
     const nebel_result result = nebel_set_renderer_fog(all->renderer, all->loaded.fog);
     return result == NEBEL_OK ? nebel_render_frame(all->renderer, &desc, &frame) : result;
+}
+
+/* Puts the fog and the light of the scene to a time. */
+static nebel_result move_to(studio *all, double time)
+{
+    if (all->has_moved && all->moved_to == time) return NEBEL_OK;
+    const nebel_result result = nb_load_move_fog(&all->loaded, time);
+    all->has_moved = result == NEBEL_OK;
+    all->moved_to = time;
+    nb_finer_light(&all->finer, nebel_scene_contents(all->loaded.scene));
+    return result;
+}
+
+/* Each sample at its time, while the shutter is open. */
+static nebel_result trace_motion(studio *all)
+{
+    const nb_render_call *const wanted = all->wanted;
+    const size_t pixels = (size_t)all->item.window.width * all->item.window.height;
+    nb_shutter_begin(&all->shutter);
+    for (uint32_t i = 0; i < wanted->samples; i++) {
+        const double time = all->item.frame + wanted->shutter * nb_shutter_time(i, wanted->samples);
+        all->sub_frame = i;
+        nebel_result result = move_to(all, time);
+        if (result == NEBEL_OK) result = trace_samples(all, time, i, 1);
+        if (result != NEBEL_OK) return result;
+        nb_shutter_add(&all->shutter, all->samples, pixels);
+    }
+    nb_shutter_finish(&all->shutter, all->samples, pixels);
+    return NEBEL_OK;
+}
+
+static nebel_result trace_frame(studio *all)
+{
+    return all->wanted->shutter > 0 ? trace_motion(all) : trace_samples(all, all->item.frame, 0, 0);
 }
 
 /* Two passes take the fog's own light, unless a response curve has none. */
@@ -330,11 +373,7 @@ static void note_spread(const studio *all)
 
 static int move_fog(studio *all)
 {
-    if (all->has_moved && all->moved_to == all->item.frame) return NB_DONE;
-    const nebel_result result = nb_load_move_fog(&all->loaded, all->item.frame);
-    all->has_moved = result == NEBEL_OK;
-    all->moved_to = all->item.frame;
-    nb_finer_light(&all->finer, nebel_scene_contents(all->loaded.scene));
+    const nebel_result result = all->wanted->shutter > 0 ? NEBEL_OK : move_to(all, all->item.frame);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 
@@ -560,7 +599,8 @@ static double count_bytes(const studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
     const double channels = count_channels(wanted);
-    double bytes = (wanted->aov ? 2 : 1) * channels * sizeof(float) + (wanted->gl ? GL_PIXEL_BYTES : 0);
+    double bytes = ((wanted->aov ? 2 : 1) + (wanted->shutter > 0 ? 1 : 0)) * channels * sizeof(float) +
+                   (wanted->gl ? GL_PIXEL_BYTES : 0);
     if (wanted->is_film)
         bytes += ((double)wanted->last_frame - wanted->first_frame + 1) *
                  (wanted->quality == 100 ? LOSSLESS_PIXEL_BYTES : FILM_PIXEL_BYTES);
@@ -645,6 +685,7 @@ static int render(const nb_render_call *wanted)
 {
     studio all = {.wanted = wanted, .meter = nb_meter_start(wanted->quiet), .listener = {.quiet = wanted->quiet}};
     all.jobs = nb_jobs_of(&wanted->shard);
+    all.sub_frames = wanted->shutter > 0 ? wanted->samples : 1;
     int status = nb_jobs_join(&all.jobs);
     if (status != NB_DONE) return status;
     nb_render_call own = *wanted;

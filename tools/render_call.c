@@ -20,6 +20,7 @@ enum {
     EXPOSURE,
     FRAME,
     FRAMES,
+    SHUTTER,
     FPS,
     QUALITY,
     AOV,
@@ -56,6 +57,10 @@ const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
     [FRAMES] = {"frames", 0, "A-B",
                 "All frames from A to B; FILE then has %d or %04d\nwhere the number belongs (and %% for a %), or it "
                 "ends\nin .webp: one film of all."},
+    [SHUTTER] = {"shutter", 0, "S",
+                 "Motion blur: how long a picture looks from its frame\non, in frames, 0 to 1; each of its --samples "
+                 "at a\ntime "
+                 "of its own. Default: 0, a moment."},
     [FPS] = {"fps", 0, "N", "Of a film: frames a second, 1 to 100. Default: 24."},
     [QUALITY] = {"quality", 0, "N", "Of a film, 1 to 100: more is larger and better, 100\nwithout loss. Default: 85."},
     [AOV] = {"aov", 0, NULL,
@@ -261,6 +266,18 @@ static void read_device(nb_arguments *arguments, nb_render_call *wanted)
         nb_options_refuse(arguments, TOLERANCE, "is for --method exact; leave it out with another");
 }
 
+static void read_shutter(nb_arguments *arguments, nb_render_call *wanted)
+{
+    wanted->shutter = nb_options_number(arguments, SHUTTER, 0, 1, 0);
+    if (wanted->shutter == 0) return;
+    if (wanted->samples < 2)
+        nb_options_refuse(arguments, SHUTTER, "needs a --samples for each time; ask for 2 or more, better 16");
+    if (wanted->gl) nb_options_refuse(arguments, SHUTTER, "is for --device cpu; leave it out with gl");
+    if (wanted->tessellation.bound > 0)
+        nb_options_refuse(arguments, SHUTTER,
+                          "has many cameras, and each needs other triangles; leave out --tessellate");
+}
+
 static void read_scattering(nb_arguments *arguments, nb_render_call *wanted)
 {
     static const char *const models[] = {"off", "diffusion", NULL};
@@ -312,6 +329,7 @@ int nb_render_call_read(nb_arguments *arguments, nb_render_call *wanted)
     read_reference(arguments, wanted);
     read_scattering(arguments, wanted);
     read_tessellate(arguments, wanted);
+    read_shutter(arguments, wanted);
     read_jobs(arguments, wanted);
     if (arguments->misused) return nb_report_misuse("render", "render: nothing was done");
     return -1;

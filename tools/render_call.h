@@ -20,6 +20,7 @@ typedef struct nb_render_call {
     uint32_t width, height, samples;
     uint32_t bounces, seed; /* of the reference; 0 bounces: no limit */
     double exposure, tolerance;
+    double shutter;                       /* how long a picture looks, in frames; 0: a moment */
     nebel_tessellation_desc tessellation; /* bound 0: the triangles of the models */
     uint32_t first_frame, last_frame;
     int many_frames, is_film, aov, quiet, gl;
@@ -33,7 +34,7 @@ typedef struct nb_render_call {
     nebel_renderer_desc renderer;
 } nb_render_call;
 
-enum { NB_RENDER_OPTIONS = 25 };
+enum { NB_RENDER_OPTIONS = 26 };
 
 extern const nb_option nb_render_options[NB_RENDER_OPTIONS];
 

@@ -160,7 +160,7 @@ static void add_options(const nb_render_call *wanted, const nebel_scene_data *co
                               wanted->tessellation.most_triangles,
                               wanted->tessellation.deepest};
     for (size_t i = 0; i < sizeof whole / sizeof *whole; i++) nb_fingerprint_add_whole(print, whole[i]);
-    const double numbers[] = {wanted->exposure, wanted->tolerance, wanted->tessellation.bound};
+    const double numbers[] = {wanted->exposure, wanted->tolerance, wanted->shutter, wanted->tessellation.bound};
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) nb_fingerprint_add_number(print, numbers[i]);
 }
 

@@ -131,6 +131,9 @@ typedef struct nebel_frame_desc {
     /* The part of the picture that is rendered, for pictures in bands or tiles; all 0: the whole. `left` and `top` are multiples of
      * NEBEL_WINDOW_STEP, and so are `width` and `height` unless the window ends with the picture. Pixels are those of the whole picture, bit for bit. */
     nebel_window window;
+    /* Of the samples of a pixel, those that are rendered: sample_count of them from first_sample on; a count of 0: all. Each is what it is among all, and the
+     * planes have the mean of those that are rendered: for motion, one frame for each sample. */
+    uint32_t first_sample, sample_count;
 } nebel_frame_desc;
 
 /* One frame in linear light. Every plane is caller memory, width * height pixels (of the window, where there is one), top row

@@ -28,6 +28,11 @@ static nebel_result check_desc(const nebel_frame_desc *desc, const nebel_log *lo
     if (desc->samples > 4096) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "frame: %u samples; 1 to 4096 are possible", (unsigned)desc->samples);
     }
+    const uint32_t samples = desc->samples != 0 ? desc->samples : 4;
+    if (desc->sample_count > samples ||
+        desc->first_sample > samples - (desc->sample_count > 0 ? desc->sample_count : samples))
+        return nb_fail(log, NEBEL_ERROR_VALUE, "frame: %u samples from number %u on, of %u; they must be among them",
+                       (unsigned)desc->sample_count, (unsigned)desc->first_sample, (unsigned)samples);
     if (!(fabs(desc->time) <= 1e12))
         return nb_fail(log, NEBEL_ERROR_VALUE, "frame: time is %g; must be within -1e12 and 1e12", desc->time);
     if (!(desc->tolerance >= 0) || isinf(desc->tolerance)) {
@@ -135,6 +140,8 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     frame->width = desc->width;
     frame->height = desc->height;
     frame->samples = desc->samples != 0 ? desc->samples : 4;
+    frame->first_sample = desc->first_sample;
+    frame->sample_count = desc->sample_count != 0 ? desc->sample_count : frame->samples;
     frame->rasters = nb_raster_is_apt(geometry, frame->view.projection, desc->width, desc->height);
     if (frame->rasters) {
         const nb_picture picture = {desc->width, desc->height, nb_sample_range_of(frame->samples)};
@@ -166,7 +173,7 @@ static nebel_result render_batch(const nb_frame *frame, const nb_place *place, u
         now.sample = first + s;
         if (!is_even) result = nb_batch_render(frame, &now, s, scratch);
         if (result != NEBEL_OK) return result;
-        nb_planes_add(frame, &now, now.sample == 0, scratch);
+        nb_planes_add(frame, &now, now.sample == frame->first_sample, scratch);
     }
     return result;
 }
@@ -218,7 +225,7 @@ static int count_part(nb_state *state, nebel_result result)
 
 static uint32_t count_groups(const nb_frame *frame)
 {
-    return (frame->samples + NB_TOGETHER - 1) / NB_TOGETHER;
+    return (frame->sample_count + NB_TOGETHER - 1) / NB_TOGETHER;
 }
 
 static uint32_t count_regions(uint32_t pixels)
@@ -231,9 +238,9 @@ static void render_region(const nb_frame *frame, size_t number, nb_state *state,
     const uint32_t columns = count_regions(frame->window.width);
     const uint32_t left = frame->window.left + (uint32_t)(number % columns) * NB_REGION;
     const uint32_t top = frame->window.top + (uint32_t)(number / columns) * NB_REGION;
-    for (uint32_t first = 0; first < frame->samples; first += NB_TOGETHER) {
-        const uint32_t count = frame->samples - first < NB_TOGETHER ? frame->samples - first : NB_TOGETHER;
-        const nebel_result result = render_samples(frame, left, top, first, count, scratch);
+    for (uint32_t first = 0; first < frame->sample_count; first += NB_TOGETHER) {
+        const uint32_t rest = frame->sample_count - first, count = rest < NB_TOGETHER ? rest : NB_TOGETHER;
+        const nebel_result result = render_samples(frame, left, top, frame->first_sample + first, count, scratch);
         if (count_part(state, result)) return;
     }
     nb_place place = {left, top, 0, 0};

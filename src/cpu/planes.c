@@ -139,8 +139,8 @@ void nb_planes_finish(const nb_frame *frame, const nb_place *place, const nb_scr
     const nebel_frame *planes = frame->planes;
     const nb_area area = area_of(frame, place);
     if (planes->depth != NULL) divide_depths(frame, &area, scratch->hit_counts + place->first);
-    if (frame->samples == 1) return;
-    const float factor = 1 / (float)frame->samples;
+    if (frame->sample_count == 1) return;
+    const float factor = 1 / (float)frame->sample_count;
     scale(planes->color, frame->window.width, &area, 3, factor);
     scale(planes->transmittance, frame->window.width, &area, 3, factor);
     scale(planes->in_scattering, frame->window.width, &area, 3, factor);

@@ -82,7 +82,7 @@ nebel_result nb_reference_trace(const nb_frame *frame, const nb_place *place, nb
         nb_surface_points(&renderer->geometry, renderer->scene, &renderer->table, &scratch->rays, &scratch->hits,
                           frame->lighting.sun, &scratch->points);
     nb_lone_ray_clear(&scratch->lone);
-    if (place->sample == 0) clear_sums(place->first, &scratch->sums);
+    if (place->sample == frame->first_sample) clear_sums(place->first, &scratch->sums);
     for (int i = 0; i < NB_BATCH; i++) {
         if (!scratch->inside[i]) continue;
         const uint32_t lane = place->first + (uint32_t)i;
@@ -115,10 +115,11 @@ void nb_reference_finish(const nb_frame *frame, const nb_place *place, const nb_
         const size_t pixel = 3 * nb_planes_pixel(frame, x, y);
         for (int c = 0; c < 3; c++) {
             const double sum = sums->light[c][lane];
-            if (frame->planes->color != NULL) frame->planes->color[pixel + (size_t)c] = (float)(sum / frame->samples);
+            if (frame->planes->color != NULL)
+                frame->planes->color[pixel + (size_t)c] = (float)(sum / frame->sample_count);
             if (frame->planes->standard_error != NULL)
                 frame->planes->standard_error[pixel + (size_t)c] =
-                    (float)standard_error(sum, sums->square[c][lane], frame->samples);
+                    (float)standard_error(sum, sums->square[c][lane], frame->sample_count);
         }
     }
 }

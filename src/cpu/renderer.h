@@ -137,7 +137,8 @@ typedef struct nb_frame {
     int has_lamp_shafts; /* the same of lamps */
     nb_lit_box lamplit_box;
     uint32_t width, height, samples;
-    nebel_window window; /* of the picture that is rendered; the planes are as large */
+    uint32_t first_sample, sample_count; /* those of the samples that are rendered */
+    nebel_window window;                 /* of the picture that is rendered; the planes are as large */
     nb_air air;
     const nebel_layers *layers;   /* NULL: none */
     nebel_cloud_view *cloud_view; /* the same */

@@ -1,4 +1,4 @@
-/* Windows of a picture: the same pixels as in the whole, and no others. */
+/* Parts of a picture, windows and samples: the same pixels as in the whole, and no others. */
 #include "test_render_scene.h"
 
 enum { WIDTH = 200, HEIGHT = 150, PLANES = 7 };
@@ -33,14 +33,24 @@ static void free_planes(test_planes *planes)
     }
 }
 
+static nebel_frame_desc frame_of(const nebel_camera *camera, uint32_t samples)
+{
+    return (nebel_frame_desc){.camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = samples, .seed = 3};
+}
+
+static nebel_result render_desc(nebel_renderer *renderer, const nebel_frame_desc *desc, const test_planes *to)
+{
+    const nebel_frame frame = {to->planes[0], to->planes[1], to->planes[2], to->planes[3],
+                               to->planes[4], to->planes[5], to->planes[6]};
+    return nebel_render_frame(renderer, desc, &frame);
+}
+
 static nebel_result render(nebel_renderer *renderer, const nebel_camera *camera, uint32_t samples,
                            const nebel_window *window, const test_planes *to)
 {
-    const nebel_frame_desc desc = {
-        .camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = samples, .seed = 3, .window = *window};
-    const nebel_frame frame = {to->planes[0], to->planes[1], to->planes[2], to->planes[3],
-                               to->planes[4], to->planes[5], to->planes[6]};
-    return nebel_render_frame(renderer, &desc, &frame);
+    nebel_frame_desc desc = frame_of(camera, samples);
+    desc.window = *window;
+    return render_desc(renderer, &desc, to);
 }
 
 static void compare(const test_planes *whole, const test_planes *part, const nebel_window *window)
@@ -130,11 +140,66 @@ static void test_windows_that_cut_regions_are_refused(void **state)
     nebel_release_snapshot(fog);
 }
 
+/* ---- samples --------------------------------------------------------------------------------- */
+
+enum { SAMPLES = 5 };
+
+static void add_sample(const test_planes *one, int is_first, test_planes *sum)
+{
+    for (size_t p = 0; p < 3; p++)
+        for (size_t i = 0; i < (size_t)WIDTH * HEIGHT * 3; i++)
+            sum->planes[p][i] = (is_first ? 0 : sum->planes[p][i]) + one->planes[p][i];
+}
+
+/* Each sample is what it is among all: their mean is the picture, bit for bit where the renderer adds floats as well. */
+static void compare_samples(nebel_renderer *renderer, const nebel_camera *camera)
+{
+    test_planes whole = make_planes(WIDTH, HEIGHT), one = make_planes(WIDTH, HEIGHT), sum = make_planes(WIDTH, HEIGHT);
+    nebel_frame_desc desc = frame_of(camera, SAMPLES);
+    assert_int_equal(render_desc(renderer, &desc, &whole), NEBEL_OK);
+    desc.sample_count = 1;
+    for (desc.first_sample = 0; desc.first_sample < SAMPLES; desc.first_sample++) {
+        assert_int_equal(render_desc(renderer, &desc, &one), NEBEL_OK);
+        add_sample(&one, desc.first_sample == 0, &sum);
+    }
+    for (size_t p = 0; p < 3; p++) {
+        for (size_t i = 0; i < (size_t)WIDTH * HEIGHT * 3; i++) sum.planes[p][i] *= 1 / (float)SAMPLES;
+        assert_memory_equal(sum.planes[p], whole.planes[p], sizeof(float) * WIDTH * HEIGHT * 3);
+    }
+    free_planes(&whole);
+    free_planes(&one);
+    free_planes(&sum);
+}
+
+static void test_samples_are_the_same_alone(void **state)
+{
+    (void)state;
+    test_barrel barrel;
+    test_barrel_make(&barrel);
+    nebel_snapshot *fog = make_fog();
+    nebel_renderer *renderer = NULL;
+    assert_int_equal(nebel_create_renderer(&barrel.scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    const nebel_camera camera = test_camera(.5, 1, 6, 0, 0, 0);
+    compare_samples(renderer, &camera);
+    test_planes whole = make_planes(WIDTH, HEIGHT);
+    static const uint32_t bad[][2] = {{0, 6}, {5, 1}, {4, 2}, {UINT32_MAX, 1}, {1, UINT32_MAX}, {1, 0}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        nebel_frame_desc desc = frame_of(&camera, SAMPLES);
+        desc.first_sample = bad[i][0];
+        desc.sample_count = bad[i][1];
+        assert_int_equal(render_desc(renderer, &desc, &whole), NEBEL_ERROR_VALUE);
+    }
+    free_planes(&whole);
+    nebel_destroy_renderer(renderer);
+    nebel_release_snapshot(fog);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_windows_have_the_pixels_of_the_whole),
         cmocka_unit_test(test_windows_that_cut_regions_are_refused),
+        cmocka_unit_test(test_samples_are_the_same_alone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
