@@ -11,7 +11,8 @@
 
 enum { READ_SIZE = 1 << 18 };
 
-/* Offset basis and prime, 2^88 + 0x13b, of the 128-bit hash. Source: Fowler, Noll, Vo, Eastlake, Hansen, RFC 9923. */
+/* Offset basis and prime, 2^88 + 0x13b, of the 128-bit hash. Source: Fowler, Noll, Vo,
+ * Eastlake, draft-eastlake-fnv. */
 nb_fingerprint nb_fingerprint_start(void)
 {
     return (nb_fingerprint){UINT64_C(0x6c62272e07bb0142), UINT64_C(0x62b821756295c58d)};

@@ -34,7 +34,13 @@ nb_meter nb_meter_start(int quiet)
 {
     const char *const terminal = getenv("TERM");
     const int able = terminal != NULL && terminal[0] != '\0' && strcmp(terminal, "dumb") != 0;
-    return (nb_meter){.visible = !quiet && able && isatty(STDERR_FILENO), .started = clock_seconds(), .drawn = -1};
+    const double now = clock_seconds();
+    return (nb_meter){.visible = !quiet && able && isatty(STDERR_FILENO), .started = now, .began = now, .drawn = -1};
+}
+
+void nb_meter_begin(nb_meter *meter)
+{
+    meter->began = clock_seconds();
 }
 
 void nb_meter_write_span(double seconds, char *text, size_t size)
@@ -110,7 +116,7 @@ void nb_meter_show(nb_meter *meter, double done, const char *label)
     meter->drawn = now;
     char span[32], left[48] = "";
     const double share = done > 1 ? 1 : done < 0 ? 0 : done;
-    const double spent = now - meter->started;
+    const double spent = now - meter->began;
     if (spent > guessing_pause && share > 0) {
         const double remaining = spent * (1 - share) / share;
         nb_meter_write_span(ceil(remaining), span, sizeof span);

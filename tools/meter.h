@@ -6,13 +6,16 @@
 
 typedef struct nb_meter {
     int visible;
-    double started, drawn; /* s */
-    double line_pause;     /* s, until the next line; 0: none are written */
+    double started, began, drawn; /* s */
+    double line_pause;            /* s, until the next line; 0: none are written */
 } nb_meter;
 
 /* Starts the clock. The bar is drawn only where standard error is a terminal that can go back to the beginning of a
  * line. */
 nb_meter nb_meter_start(int quiet);
+
+/* The work begins whose share is shown: what was prepared before says nothing of the time left. */
+void nb_meter_begin(nb_meter *meter);
 
 /* Where there is no bar: lines from time to time, for the logs of long jobs. */
 void nb_meter_write_lines(nb_meter *meter);

@@ -12,13 +12,15 @@ static double turn_digits(uint32_t i)
     return turned;
 }
 
-/* Places are Hammersley's points of the bases 1 and 2; base 3 is the next one that is independent of both. By rank, so that the times of any count
- * are as far apart. */
+/* Places are Hammersley's points of base 2; base 3 is the next one. From number 5 on, the least of times follows places: correlations with both
+ * coordinates are below 0.31 for 9 samples and more, below 0.06 for 16, 32 and 64. By rank, so that the times of any count are as far apart. */
+enum { FIRST_NUMBER = 5 };
+
 double nb_shutter_time(uint32_t sample, uint32_t count)
 {
     uint32_t rank = 0;
-    const double turned = turn_digits(sample);
-    for (uint32_t i = 0; i < count; i++) rank += turn_digits(i) < turned;
+    const double turned = turn_digits(sample + FIRST_NUMBER);
+    for (uint32_t i = 0; i < count; i++) rank += turn_digits(i + FIRST_NUMBER) < turned;
     return (rank + 0.5) / count;
 }
 

@@ -1,0 +1,133 @@
+/* Fingerprints, shards and the times of samples: against other ways to say the same. */
+#define _GNU_SOURCE
+#include "fingerprint.h"
+#include "jobs.h"
+#include "shutter.h"
+#include "unit.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static const char *text_of(const nb_fingerprint *print)
+{
+    static char text[NB_FINGERPRINT_TEXT];
+    nb_fingerprint_write(print, text);
+    return text;
+}
+
+/* By integers of any size in Python: h = (h ^ byte) * (2^88 + 0x13b) mod 2^128; the first three are in draft-eastlake-fnv as well. */
+static void test_fingerprints_are_those_of_fnv(void **state)
+{
+    (void)state;
+    nb_fingerprint print = nb_fingerprint_start();
+    assert_string_equal(text_of(&print), "6c62272e07bb014262b821756295c58d");
+    nb_fingerprint_add(&print, "a", 1);
+    assert_string_equal(text_of(&print), "d228cb696f1a8caf78912b704e4a8964");
+    print = nb_fingerprint_start();
+    nb_fingerprint_add(&print, "foo", 3);
+    nb_fingerprint_add(&print, "bar", 3);
+    assert_string_equal(text_of(&print), "343e1662793c64bf6f0d3597ba446f18");
+    unsigned char bytes[768];
+    for (size_t i = 0; i < sizeof bytes; i++) bytes[i] = (unsigned char)i;
+    print = nb_fingerprint_start();
+    nb_fingerprint_add(&print, bytes, sizeof bytes);
+    assert_string_equal(text_of(&print), "ceced98447397784e46346c4dbaac68d");
+}
+
+static void test_files_are_their_bytes_and_their_size(void **state)
+{
+    char path[] = "/tmp/nebel_fingerprint_XXXXXX";
+    static unsigned char bytes[700000]; /* more than is read at once */
+    (void)state;
+    for (size_t i = 0; i < sizeof bytes; i++) bytes[i] = (unsigned char)(i * 7 + i / 256);
+    FILE *file = fdopen(mkstemp(path), "wb");
+    assert_int_equal(fwrite(bytes, 1, sizeof bytes, file), sizeof bytes);
+    assert_int_equal(fclose(file), 0);
+    nb_fingerprint of_file = nb_fingerprint_start(), of_bytes = nb_fingerprint_start();
+    assert_int_equal(nb_fingerprint_add_file(&of_file, path), 0);
+    nb_fingerprint_add(&of_bytes, bytes, sizeof bytes);
+    nb_fingerprint_add(&of_bytes, (const unsigned char[8]){0x60, 0xae, 0x0a}, 8); /* 700000, the low byte first */
+    assert_memory_equal(&of_file, &of_bytes, sizeof of_file);
+    assert_int_equal(remove(path), 0);
+    assert_int_not_equal(nb_fingerprint_add_file(&of_file, path), 0);
+    assert_int_not_equal(nb_fingerprint_add_file(&of_file, "/tmp"), 0);
+}
+
+/* Every item belongs to one shard, and the last of a group's that a shard has tells it. */
+static void test_shards_share_all_items(void **state)
+{
+    (void)state;
+    for (uint64_t count = 0; count < 30; count++)
+        for (uint64_t group = 1; group < 6; group++)
+            for (uint32_t shards = 1; shards < 8; shards++) {
+                unsigned char taken[30] = {0};
+                for (uint32_t k = 0; k < shards; k++) {
+                    nb_jobs jobs = nb_jobs_of(&(nb_shard){k, shards});
+                    uint64_t item;
+                    assert_int_equal(nb_jobs_begin(&jobs, count, group, 0, ""), 0);
+                    while (nb_jobs_take(&jobs, &item)) {
+                        assert_int_equal(item % shards, k);
+                        taken[item]++;
+                        const uint64_t next = item + shards;
+                        const int is_last = next >= count || next / group != item / group;
+                        assert_int_equal(nb_jobs_finish(&jobs, item, 0), is_last);
+                    }
+                    assert_int_equal(nb_jobs_end(&jobs, 0), 0);
+                }
+                for (uint64_t i = 0; i < count; i++) assert_int_equal(taken[i], 1);
+            }
+}
+
+/* What was there already is no work: neither done nor left. */
+static void test_progress_counts_what_there_was_to_do(void **state)
+{
+    (void)state;
+    nb_jobs jobs = nb_jobs_of(&(nb_shard){1, 2});
+    uint64_t item, done, all;
+    assert_int_equal(nb_jobs_begin(&jobs, 20, 1, 0, ""), 0);
+    for (int i = 0; i < 6; i++) {
+        assert_true(nb_jobs_take(&jobs, &item));
+        (void)nb_jobs_finish(&jobs, item, i < 4);
+    }
+    assert_true(fabs(nb_jobs_share(&jobs, 0.5, &done, &all) - 2.5 / 6) < 1e-12);
+    assert_int_equal(done, 2);
+    assert_int_equal(all, 6);
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* One sample in each of `count` equal parts of the span; and hardly any tie to the sample's number, which is its place in the pixel. */
+static void test_times_divide_the_span(void **state)
+{
+    (void)state;
+    for (uint32_t count = 1; count <= 130; count++) {
+        double times[130], tie = 0;
+        for (uint32_t i = 0; i < count; i++) {
+            times[i] = nb_shutter_time(i, count);
+            tie += (times[i] - 0.5) * ((i + 0.5) / count - 0.5) * 12 / count;
+        }
+        if (count >= 9) assert_true(fabs(tie) < 0.31);
+        if (count == 16 || count == 32 || count == 64) assert_true(fabs(tie) < 0.06);
+        qsort(times, count, sizeof *times, compare_doubles);
+        for (uint32_t i = 0; i < count; i++) assert_true(fabs(times[i] - (i + 0.5) / count) < 1e-12);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_fingerprints_are_those_of_fnv),
+        cmocka_unit_test(test_files_are_their_bytes_and_their_size),
+        cmocka_unit_test(test_shards_share_all_items),
+        cmocka_unit_test(test_progress_counts_what_there_was_to_do),
+        cmocka_unit_test(test_times_divide_the_span),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
