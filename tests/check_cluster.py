@@ -309,6 +309,17 @@ class RanksTest(RanksCase):
         after = self.stamps(folder)
         self.assertEqual({name for name in after if after[name] != before[name]}, {"f3.png"})
 
+    def test_the_first_rank_reports_for_all(self):
+        """In a log: lines, the first after two seconds."""
+        kind = ("f%d.png", ["--frames", "0-1999", "--size", "320x180", "--samples", "64"], 2000)
+        process = self.start("a", (2, [NEBEL, *self.words(kind, "--threads", "1")]))
+        line = process.stdout.readline()
+        process.terminate()
+        seen = line + process.communicate(timeout=60)[0]
+        self.assertRegex(line, r"^nebel: frame \d+ of 2000, \d+ %, .* left$")
+        self.assertNotEqual(process.returncode, 0, seen)
+        self.assertEqual([name for name in self.contents("a") if name.endswith(".tmp")], [], "no temporary file is left")
+
     def test_one_rank_cannot_write(self):
         """What it has not done is missing, the rest is there, and the job has failed."""
         kind = ("f%d.png", ["--frames", "0-7", "--size", "320x180"], 8)
