@@ -249,6 +249,20 @@ class ResumeTest(ClusterCase):
                 self.assertEqual(self.contents("a"), expected)
                 shutil.rmtree(self.folder / "a")
 
+    def test_parts_of_other_bands_go(self):
+        expected = self.expected(LARGE)
+        self.assert_done(self.run_in("a", LARGE, "--shard", "1/2"))
+        other = (LARGE[0], ["--size", "300x400", "--bands", "192"])
+        self.assertIn("3 bands, 300", self.run_in("a", other, "--resume").err)
+        self.assertEqual(self.contents("a"), expected)
+        (self.folder / "a" / "large.png").unlink()
+        self.assert_done(self.run_in("a", LARGE, "--shard", "1/2"))
+        mine = self.folder / "a" / "large.png.parts" / "mine.png"
+        mine.write_bytes(b"somebody else's")
+        self.assert_done(self.run_in("a", LARGE, "--resume"))
+        self.assertEqual((self.folder / "a" / "large.png").read_bytes(), expected["large.png"])
+        self.assertEqual([path.name for path in mine.parent.iterdir()], ["mine.png"])
+
     def test_ctrl_c_loses_what_is_in_work(self):
         if not self.has_films:
             return

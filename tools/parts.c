@@ -195,42 +195,39 @@ int nb_parts_join_film(const nb_parts *parts, const nebel_film_desc *desc, const
 
 /* ---- removing -------------------------------------------------------------------------------- */
 
-/* As src/scene names what is not finished. */
-static int is_unfinished(const char *name)
+static int ends_in(const char *name, const char *end)
 {
-    static const char begin[] = ".nebel-", end[] = ".tmp";
-    const size_t size = strlen(name);
-    return size > sizeof begin + sizeof end && strncmp(name, begin, sizeof begin - 1) == 0 &&
-           strcmp(name + size - (sizeof end - 1), end) == 0;
+    const size_t size = strlen(name), length = strlen(end);
+    return size > length && strcmp(name + size - length, end) == 0;
 }
 
-static void remove_file(const nb_parts *parts, const char *text)
+/* Digits and an ending, as parts are named, also those of other bands; and as src/scene names what is not finished. */
+static int is_ours(const char *name)
 {
-    char *const name = name_in_folder(parts, text);
-    if (name != NULL) (void)unlink(name);
-    free(name);
+    static const char unfinished[] = ".nebel-";
+    const size_t digits = strspn(name, "0123456789");
+    if (strcmp(name, lock_name) == 0) return 1;
+    if (strncmp(name, unfinished, sizeof unfinished - 1) == 0) return ends_in(name, ".tmp");
+    return digits >= 6 && (strcmp(name + digits, ".png") == 0 || strcmp(name + digits, ".exr") == 0);
 }
 
-static void remove_unfinished(const nb_parts *parts, const char *folder)
+static void remove_files(const nb_parts *parts, const char *folder)
 {
     DIR *const open = opendir(folder);
     if (open == NULL) return;
-    for (const struct dirent *entry = readdir(open); entry != NULL; entry = readdir(open))
-        if (is_unfinished(entry->d_name)) remove_file(parts, entry->d_name);
+    for (const struct dirent *entry = readdir(open); entry != NULL; entry = readdir(open)) {
+        char *const name = is_ours(entry->d_name) ? name_in_folder(parts, entry->d_name) : NULL;
+        if (name != NULL) (void)unlink(name);
+        free(name);
+    }
     (void)closedir(open);
 }
 
 void nb_parts_remove(const nb_parts *parts)
 {
-    for (uint32_t i = 0; i < parts->count; i++) {
-        char *const name = nb_parts_name(parts, i);
-        if (name != NULL) (void)unlink(name);
-        free(name);
-    }
-    remove_file(parts, lock_name);
     char *const folder = name_in_folder(parts, "");
     if (folder == NULL) return;
-    remove_unfinished(parts, folder);
+    remove_files(parts, folder);
     (void)rmdir(folder);
     free(folder);
 }

@@ -38,7 +38,8 @@ int nb_parts_join_picture(const nb_parts *parts, uint32_t width, uint32_t height
 /* Joins frames to a film, and finishes it. */
 int nb_parts_join_film(const nb_parts *parts, const nebel_film_desc *desc, const char *record);
 
-/* Removes the parts, what ended processes left half written beside them, and the folder. What cannot be removed stays. */
+/* Removes the parts, those that calls with other bands left, what ended processes left half written, and the folder. Other files stay, and the folder
+ * with them. */
 void nb_parts_remove(const nb_parts *parts);
 
 #endif
