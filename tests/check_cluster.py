@@ -153,6 +153,11 @@ class ShardTest(ClusterCase):
         self.assert_done(nebel(*words, text=text, cwd=self.folder))
         self.assert_failed(nebel(*words, "--resume", text=text, cwd=self.folder), "scene in a file")
 
+    def test_copies_of_a_job_are_told(self):
+        def notes(*words, tasks="3"):
+            return self.run_in("a", PICTURES, *words, env={"SLURM_STEP_NUM_TASKS": tasks}).err.count("each does all of the work")
+        self.assertEqual([notes(), notes("--shard", "0/3"), notes("--quiet"), notes(tasks="1"), notes(tasks="x")], [1, 0, 0, 0, 0])
+
     def test_a_full_disk(self):
         """A limit of the size of files stands for it. Larger pictures: LLVM's OpenMP writes a file of 1024 bytes itself."""
         kind = ("f%d.png", ["--frames", "0-3", "--size", "320x180"], 4)

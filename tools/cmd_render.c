@@ -696,6 +696,7 @@ static int render(const nb_render_call *wanted)
     all.out = nb_render_out_of(all.wanted, &all.jobs, &all.listener);
     status = prepare(&all);
     uint64_t item;
+    if (status == NB_DONE && !own.quiet) nb_jobs_note_copies(&all.jobs);
     nb_meter_begin(&all.meter);
     while (status == NB_DONE && !nb_interrupt_is_requested() && nb_jobs_take(&all.jobs, &item))
         status = do_item(&all, item);

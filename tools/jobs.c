@@ -4,6 +4,7 @@
 #include "ranks.h"
 #include "report.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 /* Of shards: as many as frames. */
@@ -54,6 +55,19 @@ int nb_jobs_begin(nb_jobs *jobs, uint64_t count, uint64_t group, int status, con
     const int worst = nb_ranks_agree(status, same);
     if (worst == NB_DONE) nb_ranks_open_counters(NB_RANKS_FIRST_GROUP + (count + group - 1) / group);
     return worst;
+}
+
+void nb_jobs_note_copies(const nb_jobs *jobs)
+{
+    const char *const tasks = getenv("SLURM_STEP_NUM_TASKS");
+    uint32_t count;
+    if (nb_jobs_are_shared(jobs) || jobs->count < 2 || tasks == NULL ||
+        nb_decimal_read_whole(tasks, strlen(tasks), &count) != NB_DECIMAL_GOOD || count < 2)
+        return;
+    nb_report_message(
+        "note: srun started %u processes, and each does all of the work; share it with srun --mpi=pmix, or with "
+        "--shard $SLURM_PROCID/$SLURM_NTASKS",
+        (unsigned)count);
 }
 
 static uint64_t step_of(const nb_jobs *jobs)

@@ -52,6 +52,9 @@ int nb_jobs_are_shared(const nb_jobs *jobs);
  * joined. Returns the worst status of them all, NB_FAILED after a message where they do not have the same. */
 int nb_jobs_begin(nb_jobs *jobs, uint64_t count, uint64_t group, int status, const char *same);
 
+/* A note where srun started several of these processes and none knows of the others: each does the whole work. */
+void nb_jobs_note_copies(const nb_jobs *jobs);
+
 /* 1 with the next item; 0: there is none. Not after nb_jobs_begin has failed. */
 int nb_jobs_take(nb_jobs *jobs, uint64_t *item);
 
