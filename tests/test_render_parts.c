@@ -151,7 +151,8 @@ static void add_sample(const test_planes *one, int is_first, test_planes *sum)
             sum->planes[p][i] = (is_first ? 0 : sum->planes[p][i]) + one->planes[p][i];
 }
 
-/* Each sample is what it is among all: their mean is the picture, bit for bit where the renderer adds floats as well. */
+/* Each sample is what it is among all: their mean is the picture, bit for bit where the renderer adds floats as well.
+ * */
 static void compare_samples(nebel_renderer *renderer, const nebel_camera *camera)
 {
     test_planes whole = make_planes(WIDTH, HEIGHT), one = make_planes(WIDTH, HEIGHT), sum = make_planes(WIDTH, HEIGHT);

@@ -18,7 +18,8 @@ static const char *text_of(const nb_fingerprint *print)
     return text;
 }
 
-/* By integers of any size in Python: h = (h ^ byte) * (2^88 + 0x13b) mod 2^128; the first three are in draft-eastlake-fnv as well. */
+/* By integers of any size in Python: h = (h ^ byte) * (2^88 + 0x13b) mod 2^128; the first three are in
+ * draft-eastlake-fnv as well. */
 static void test_fingerprints_are_those_of_fnv(void **state)
 {
     (void)state;
@@ -103,7 +104,8 @@ static int compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* One sample in each of `count` equal parts of the span; and hardly any tie to the sample's number, which is its place in the pixel. */
+/* One sample in each of `count` equal parts of the span; and hardly any tie to the sample's number, which is its
+ * place in the pixel. */
 static void test_times_divide_the_span(void **state)
 {
     (void)state;

@@ -1,4 +1,5 @@
-/* What a file was made from, as a number of 128 bits: FNV-1a. It finds what has changed, and keeps nobody out who wants to deceive. */
+/* What a file was made from, as a number of 128 bits: FNV-1a. It finds what has changed, and keeps nobody out who
+ * wants to deceive. */
 #ifndef NB_FINGERPRINT_H
 #define NB_FINGERPRINT_H
 

@@ -27,8 +27,9 @@ int nb_parts_make_folder(const nb_parts *parts);
 int nb_parts_have(const nb_parts *parts, uint32_t part);
 int nb_parts_have_all(const nb_parts *parts);
 
-/* Whether nobody else joins these parts just now, so that this process may, until nb_parts_unlock: 1 with the lock. Ends with the process. Where
- * the file system has no locks two may join at the same time, which write the same bytes. */
+/* Whether nobody else joins these parts just now, so that this process may, until nb_parts_unlock: 1 with the lock.
+ * Ends with the process. Where the file system has no locks two may join at the same time, which write the same
+ * bytes. */
 int nb_parts_lock(const nb_parts *parts, int *lock);
 void nb_parts_unlock(int lock);
 
@@ -38,8 +39,8 @@ int nb_parts_join_picture(const nb_parts *parts, uint32_t width, uint32_t height
 /* Joins frames to a film, and finishes it. */
 int nb_parts_join_film(const nb_parts *parts, const nebel_film_desc *desc, const char *record);
 
-/* Removes the parts, those that calls with other bands left, what ended processes left half written, and the folder. Other files stay, and the folder
- * with them. */
+/* Removes the parts, those that calls with other bands left, what ended processes left half written, and the folder.
+ * Other files stay, and the folder with them. */
 void nb_parts_remove(const nb_parts *parts);
 
 #endif

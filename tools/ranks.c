@@ -45,7 +45,8 @@ const char *nb_ranks_library(void)
 int nb_ranks_begin(void)
 {
     int provided;
-    /* Threads of OpenMP ask for the share that is done, one at a time. Errors of MPI end the job, which is its default. */
+    /* Threads of OpenMP ask for the share that is done, one at a time. Errors of MPI end the job, which is its
+     * default. */
     (void)MPI_Init_thread(NULL, NULL, MPI_THREAD_SERIALIZED, &provided);
     (void)MPI_Comm_rank(MPI_COMM_WORLD, &own);
     (void)MPI_Comm_size(MPI_COMM_WORLD, &count);

@@ -20,8 +20,8 @@ int nb_ranks_begin(void);
 int nb_ranks_own(void);
 int nb_ranks_count(void);
 
-/* The worst of the statuses of all, for all. `same` must be the same text for all where none has failed: NB_FAILED otherwise, which the first
- * rank reports. All of them ask; who comes early sleeps. */
+/* The worst of the statuses of all, for all. `same` must be the same text for all where none has failed: NB_FAILED
+ * otherwise, which the first rank reports. All of them ask; who comes early sleeps. */
 int nb_ranks_agree(int status, const char *same);
 
 /* Makes counters, 0 at first. All of them do. Returns whether there is memory. */
@@ -30,8 +30,8 @@ int nb_ranks_open_counters(uint64_t count);
 /* Adds to a counter; what it was before. From one thread at a time. */
 uint64_t nb_ranks_add(uint64_t counter, uint64_t number);
 
-/* To be called now and then in long work, from one thread at a time: where the network does not reach the counters by itself, others wait for this
- * process to answer. */
+/* To be called now and then in long work, from one thread at a time: where the network does not reach the counters by
+ * itself, others wait for this process to answer. */
 void nb_ranks_answer(void);
 
 /* Leaves the others; they all do. */

@@ -1,7 +1,9 @@
-/* Where the pictures of `nebel render` go: a file, numbered files, a film; and the parts of those that many processes make together.
+/* Where the pictures of `nebel render` go: a file, numbered files, a film; and the parts of those that many processes
+ * make together.
  *
- * An item of the job is a frame or, of pictures in bands, a band of rows. Every picture and film carries a record of what it was made from. Parts lie in a
- * folder of their own beside the file, FILE.parts, each with its record; who finds all of them there joins them to the file and removes them. */
+ * An item of the job is a frame or, of pictures in bands, a band of rows. Every picture and film carries a record of what
+ * it was made from. Parts lie in a folder of their own beside the file, FILE.parts, each with its record. The process that
+ * finds all of them there joins them to the file and removes them. */
 #ifndef NB_RENDER_OUT_H
 #define NB_RENDER_OUT_H
 

@@ -12,8 +12,9 @@ static double turn_digits(uint32_t i)
     return turned;
 }
 
-/* Places are Hammersley's points of base 2; base 3 is the next one. From number 5 on, the least of times follows places: correlations with both
- * coordinates are below 0.31 for 9 samples and more, below 0.06 for 16, 32 and 64. By rank, so that the times of any count are as far apart. */
+/* Places are Hammersley's points of base 2; base 3 is the next one. From number 5 on, the least of times follows
+ * places: correlations with both coordinates are below 0.31 for 9 samples and more, below 0.06 for 16, 32 and 64. By
+ * rank, so that the times of any count are as far apart. */
 enum { FIRST_NUMBER = 5 };
 
 double nb_shutter_time(uint32_t sample, uint32_t count)
@@ -62,7 +63,8 @@ static void add_largest(const float *plane, int is_first, size_t count, float *l
     for (size_t i = 0; i < count; i++) largest[i] = is_first || plane[i] > largest[i] ? plane[i] : largest[i];
 }
 
-/* Squares of what samples of a color are off their mean: `sum` is of `before` samples. B. P. Welford, Technometrics 4 (1962). */
+/* Squares of what samples of a color are off their mean: `sum` is of `before` samples. B. P. Welford, Technometrics 4
+ * (1962). */
 static void add_squares(const float *color, const float *sum, uint32_t before, size_t count, float *squares)
 {
     for (size_t i = 0; i < count; i++) {

@@ -7,8 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* The time of a sample of a pixel, 0 to 1 of the span: in the middle of one of `count` equal parts, each of which has one sample. Times do not follow
- * the samples' places in the pixel. */
+/* The time of a sample of a pixel, 0 to 1 of the span: in the middle of one of `count` equal parts, each of which has
+ * one sample. Times do not follow the samples' places in the pixel. */
 double nb_shutter_time(uint32_t sample, uint32_t count);
 
 /* Sums of planes of so many pixels. */

@@ -1,4 +1,5 @@
-/* The records of pictures and films: what they were made from. Files are walked by their headers; pixels are not looked at. */
+/* The records of pictures and films: what they were made from. Files are walked by their headers; pixels are not
+ * looked at. */
 #define _POSIX_C_SOURCE 200809L
 #include "scene/film.h"
 #include "scene/writer.h"

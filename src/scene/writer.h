@@ -20,8 +20,8 @@ bool nb_record_is_good(const char *record);
 /* Rows that come at once: all but the last time a multiple of this, so that no compressed block of OpenEXR is cut. */
 enum { NB_WRITER_ROWS = 64 };
 
-/* The same for each format. What `begin` gives, also after an error, free with nb_NAME_write_free; `codec` and `sink` stay until then. FILE
- * without a message: the sink has failed. Errors: ARGUMENT, FILE, LIMIT, MEMORY. */
+/* The same for each format. What `begin` gives, also after an error, free with nb_NAME_write_free; `codec` and `sink`
+ * stay until then. FILE without a message: the sink has failed. Errors: ARGUMENT, FILE, LIMIT, MEMORY. */
 typedef struct nb_png_encoder nb_png_encoder;
 nebel_result nb_png_write_begin(const nb_codec *codec, const nb_picture_plan *plan, nb_sink *sink,
                                 nb_png_encoder **encoder);
