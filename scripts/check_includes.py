@@ -46,7 +46,7 @@ FOREIGN = {
     "cpu": {"embree3/", "omp.h"},
     "gl": {"epoxy/"},
     "tools": POSIX | {"omp.h", "mpi.h", "epoxy/", "GLFW/", "imgui.h", "backends/"},
-    "bench": POSIX | {"omp.h", "embree3/", "epoxy/"},
+    "bench": POSIX | {"omp.h", "embree3/", "epoxy/", "png.h"},
     "examples": {"epoxy/", "GLFW/", "SDL.h", "windows.h", "d3d9.h"},
 }
 

@@ -20,7 +20,7 @@ INPUTS = ["cell", "cells_desc", "cell_view", "cell_point", "factor_desc", "d3d9_
           "segments", "pixels", "light", "particle", "nebula_desc", "place", "atmosphere_desc", "air_view_desc", "ground_planes",
           "renderer_desc", "method_desc", "frame_desc", "frame", "scene_desc", "planet", "model", "camera_key", "sun_key", "volume_key",
           "scene_noise", "image", "image_desc", "film_desc", "grid_file", "view", "depth_desc", "camera", "gl_desc", "gl_pass", "gl_classic_desc",
-          "gl_renderer_desc", "gl_frame_desc", "gl_planes"]
+          "gl_renderer_desc", "gl_frame_desc", "gl_planes", "photograph", "intrinsics", "depth_source"]
 OUTPUTS = ["cell_fog", "cell_layer", "factor_desc", "d3d9_fog", "curve", "vertex_desc", "cloud_layer", "cloud_knots", "air_shade",
            "fog_shade", "map", "layer_hits", "droplet_sums", "volume_id", "sunlit_fog", "split_fog", "light", "particle", "matter",
            "scatterer", "bound", "atmosphere_desc", "air_light", "sun", "environment", "scene_noise", "image", "rays", "view_error", "word", "texel",

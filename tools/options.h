@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { NB_OPTIONS_MOST = 32, NB_OPERANDS_MOST = 2 };
+enum { NB_OPTIONS_MOST = 32 };
 
 typedef struct nb_option {
     const char *name;  /* without the dashes */

@@ -1,7 +1,7 @@
 /* Pictures as they are stored, in and out. */
 #include <nebel/photograph.h>
 
-#include "scene/codec.h"
+#include "scene/writer.h"
 
 #include <math.h>
 
@@ -114,17 +114,28 @@ void nebel_free_photograph(const nebel_scene_desc *desc, nebel_photograph *photo
 
 /* ---- writing --------------------------------------------------------------------------------- */
 
-static nebel_result encode(const nb_codec *codec, const nebel_photograph *photograph, nb_bytes *bytes)
+/* Opens the file, and gives it its name when `stored` is in it. */
+static nebel_result write_stored(const nb_codec *codec, const nb_stored *stored)
+{
+    nb_sink *sink;
+    nebel_result result = nb_sink_open(&codec->allocator, &codec->log, codec->name, &sink);
+    if (result != NEBEL_OK) return result;
+    result = nb_png_write_stored(codec, stored, NULL, sink);
+    if (result == NEBEL_OK || result == NEBEL_ERROR_FILE) result = nb_sink_finish(sink);
+    nb_sink_close(sink);
+    return result;
+}
+
+static nebel_result write_as(const nb_codec *codec, const nebel_scene_desc *desc, const nebel_photograph *photograph)
 {
     static const char *const names[] = {"R", "G", "B", "A"};
     const nebel_image_format format = nebel_find_image_format(codec->name);
     nb_stored stored = {.width = photograph->width, .height = photograph->height, .pixels = photograph->pixels};
-    if (format == NEBEL_IMAGE_PNG && is_stored(photograph->type, &stored))
-        return nb_png_write_stored(codec, &stored, bytes);
+    if (format == NEBEL_IMAGE_PNG && is_stored(photograph->type, &stored)) return write_stored(codec, &stored);
     if (format == NEBEL_IMAGE_EXR && is_float(photograph->type)) {
         const nebel_image image = {photograph->width, photograph->height,
                                    photograph->type == NEBEL_PIXEL_RGB_FLOAT ? 3 : 4, names, photograph->pixels};
-        return nb_exr_write_image(codec, &image, bytes);
+        return nebel_write_image(codec->name, desc, &image);
     }
     if (format == NEBEL_IMAGE_NONE)
         return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: unknown picture format; the name must end in .png or .exr",
@@ -140,28 +151,18 @@ static nebel_result check(const nb_codec *codec, uint32_t width, uint32_t height
     return nb_codec_check_size(codec, width, height, 4);
 }
 
-static nebel_result write_and_release(const nb_codec *codec, nebel_result result, nb_bytes *bytes)
-{
-    if (result == NEBEL_OK) result = nb_file_write(&codec->allocator, &codec->log, codec->name, bytes);
-    nb_release(&codec->allocator, bytes->data);
-    return result;
-}
-
 nebel_result nebel_write_photograph(const char *path, const nebel_scene_desc *desc, const nebel_photograph *photograph)
 {
     nb_codec codec;
-    nb_bytes bytes = {0};
     if (path == NULL || desc == NULL || photograph == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = nb_codec_prepare(desc, path, &codec);
     if (result == NEBEL_OK) result = check(&codec, photograph->width, photograph->height, photograph->pixels);
-    if (result != NEBEL_OK) return result;
-    return write_and_release(&codec, encode(&codec, photograph, &bytes), &bytes);
+    return result == NEBEL_OK ? write_as(&codec, desc, photograph) : result;
 }
 
 /* ---- one number a pixel ---------------------------------------------------------------------- */
 
-static nebel_result encode_gray_png(const nb_codec *codec, uint32_t width, uint32_t height, const float *values,
-                                    nb_bytes *bytes)
+static nebel_result write_gray_png(const nb_codec *codec, uint32_t width, uint32_t height, const float *values)
 {
     const size_t count = (size_t)width * height;
     uint16_t *numbers = nb_allocate(&codec->allocator, count, sizeof *numbers);
@@ -171,7 +172,7 @@ static nebel_result encode_gray_png(const nb_codec *codec, uint32_t width, uint3
         numbers[i] = (uint16_t)(inside * 65535.0f + 0.5f);
     }
     const nb_stored stored = {width, height, 16, 1, (unsigned char *)numbers};
-    const nebel_result result = nb_png_write_stored(codec, &stored, bytes);
+    const nebel_result result = write_stored(codec, &stored);
     nb_release(&codec->allocator, numbers);
     return result;
 }
@@ -180,12 +181,10 @@ nebel_result nebel_write_gray(const char *path, const nebel_scene_desc *desc, ui
                               const float *values)
 {
     nb_codec codec;
-    nb_bytes bytes = {0};
     if (path == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = nb_codec_prepare(desc, path, &codec);
     if (result == NEBEL_OK) result = check(&codec, width, height, values);
     if (result == NEBEL_OK && nebel_find_image_format(path) != NEBEL_IMAGE_PNG)
         result = nb_fail(&codec.log, NEBEL_ERROR_FORMAT, "%s: gray is written as .png; name it so", path);
-    if (result != NEBEL_OK) return result;
-    return write_and_release(&codec, encode_gray_png(&codec, width, height, values, &bytes), &bytes);
+    return result == NEBEL_OK ? write_gray_png(&codec, width, height, values) : result;
 }

@@ -10,7 +10,7 @@ struct nb_png_encoder {
     nb_sink *sink;
     png_structp png;
     png_infop info;
-    int channels[3];
+    int channels[3]; /* of floats; and */
     uint32_t row_number;
     unsigned char *row;
     char message[200];
@@ -56,24 +56,41 @@ static void on_flush(png_structp png)
 
 /* ---- encoding -------------------------------------------------------------------------------- */
 
-/* One filter and a low level: against libpng's defaults 8 % more bytes in less than half the time. */
-static void write_header(nb_png_encoder *out, const nb_picture_plan *plan)
+static void set_record(nb_png_encoder *out, const char *record)
 {
+    char key[] = NB_RECORD_KEY, text[NEBEL_MAX_RECORD + 1];
+    if (record == NULL) return;
+    snprintf(text, sizeof text, "%s", record);
+    const png_text chunk = {.compression = PNG_TEXT_COMPRESSION_NONE, .key = key, .text = text};
+    png_set_text(out->png, out->info, &chunk, 1);
+}
+
+/* One filter and a low level: against libpng's defaults 8 % more bytes in less than half the time. */
+static void write_header(nb_png_encoder *out, const nb_stored *kind, const char *record)
+{
+    static const int types[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB,
+                                PNG_COLOR_TYPE_RGBA};
     if (setjmp(png_jmpbuf(out->png)) != 0) return;
     png_set_user_limits(out->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
     png_set_write_fn(out->png, out, on_write, on_flush);
-    png_set_IHDR(out->png, out->info, plan->width, plan->height, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
-                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    png_set_sRGB_gAMA_and_cHRM(out->png, out->info, PNG_sRGB_INTENT_PERCEPTUAL);
+    png_set_IHDR(out->png, out->info, kind->width, kind->height, kind->bits, types[kind->channel_count - 1],
+                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    if (kind->channel_count >= 3)
+        png_set_sRGB_gAMA_and_cHRM(out->png, out->info, PNG_sRGB_INTENT_PERCEPTUAL);
+    else
+        png_set_gAMA(out->png, out->info, 1);
     png_set_filter(out->png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
     png_set_compression_level(out->png, 3);
-    if (plan->record != NULL) {
-        char key[] = NB_RECORD_KEY, text[NEBEL_MAX_RECORD + 1];
-        snprintf(text, sizeof text, "%s", plan->record);
-        png_text record = {.compression = PNG_TEXT_COMPRESSION_NONE, .key = key, .text = text};
-        png_set_text(out->png, out->info, &record, 1);
-    }
+    set_record(out, record);
     png_write_info(out->png, out->info);
+    if (kind->bits == 16 && nb_codec_is_little_endian()) png_set_swap(out->png);
+}
+
+static void write_stored_rows(nb_png_encoder *out, const nb_stored *stored)
+{
+    const size_t size = (size_t)stored->width * (size_t)stored->channel_count * (size_t)stored->bits / 8;
+    if (setjmp(png_jmpbuf(out->png)) != 0) return;
+    for (uint32_t y = 0; y < stored->height; y++) png_write_row(out->png, stored->pixels + y * size);
 }
 
 static void write_rows(nb_png_encoder *out, const nebel_image *rows)
@@ -101,8 +118,8 @@ static nebel_result finding(const nb_png_encoder *out)
                    out->message);
 }
 
-nebel_result nb_png_write_begin(const nb_codec *codec, const nb_picture_plan *plan, nb_sink *sink,
-                                nb_png_encoder **encoder)
+/* In *encoder also after an error. */
+static nebel_result open_encoder(const nb_codec *codec, nb_sink *sink, nb_png_encoder **encoder)
 {
     nb_png_encoder *out = nb_allocate_zero(&codec->allocator, 1, sizeof *out);
     *encoder = out;
@@ -110,18 +127,27 @@ nebel_result nb_png_write_begin(const nb_codec *codec, const nb_picture_plan *pl
         return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: the PNG picture cannot be made: out of memory",
                        codec->name);
     *out = (nb_png_encoder){.codec = codec, .sink = sink, .message = "out of memory"};
+    out->png =
+        png_create_write_struct_2(PNG_LIBPNG_VER_STRING, out, on_error, on_warning, out, on_allocate, on_release);
+    out->info = out->png != NULL ? png_create_info_struct(out->png) : NULL;
+    if (out->info != NULL) out->message[0] = '\0';
+    return finding(out);
+}
+
+nebel_result nb_png_write_begin(const nb_codec *codec, const nb_picture_plan *plan, nb_sink *sink,
+                                nb_png_encoder **encoder)
+{
     const nebel_image names = {.channel_count = plan->channel_count, .channel_names = plan->channel_names};
-    const nebel_result result = nb_rounding_find_channels(codec, &names, "a PNG", out->channels);
+    const nb_stored kind = {plan->width, plan->height, 8, 3, NULL};
+    nebel_result result = open_encoder(codec, sink, encoder);
+    nb_png_encoder *out = *encoder;
+    if (result == NEBEL_OK) result = nb_rounding_find_channels(codec, &names, "a PNG", out->channels);
     if (result != NEBEL_OK) return result;
     out->row = nb_allocate(&codec->allocator, plan->width, 3);
-    if (out->row != NULL)
-        out->png =
-            png_create_write_struct_2(PNG_LIBPNG_VER_STRING, out, on_error, on_warning, out, on_allocate, on_release);
-    out->info = out->png != NULL ? png_create_info_struct(out->png) : NULL;
-    if (out->info != NULL) {
-        out->message[0] = '\0';
-        write_header(out, plan);
-    }
+    if (out->row == NULL)
+        return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: the PNG picture cannot be made: out of memory",
+                       codec->name);
+    write_header(out, &kind, plan->record);
     return finding(out);
 }
 
@@ -135,6 +161,20 @@ nebel_result nb_png_write_end(nb_png_encoder *encoder)
 {
     write_end(encoder);
     return finding(encoder);
+}
+
+nebel_result nb_png_write_stored(const nb_codec *codec, const nb_stored *stored, const char *record, nb_sink *sink)
+{
+    nb_png_encoder *out;
+    nebel_result result = open_encoder(codec, sink, &out);
+    if (result == NEBEL_OK) {
+        write_header(out, stored, record);
+        if (out->message[0] == '\0') write_stored_rows(out, stored);
+        if (out->message[0] == '\0') write_end(out);
+        result = finding(out);
+    }
+    nb_png_write_free(out);
+    return result;
 }
 
 void nb_png_write_free(nb_png_encoder *encoder)

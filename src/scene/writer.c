@@ -59,11 +59,12 @@ nebel_result nebel_create_image_writer(const char *path, const nebel_image_desc 
 {
     if (writer != NULL) *writer = NULL;
     if (path == NULL || desc == NULL || writer == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (!nb_allocator_is_valid(&desc->allocator))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
-    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
+    const nebel_scene_desc asking = {.allocator = desc->allocator, .log = desc->log};
+    nb_codec codec;
+    nebel_result result = nb_codec_prepare(&asking, path, &codec);
+    if (result != NEBEL_OK) return result;
     const nb_picture_plan plan = {desc->width, desc->height, desc->channel_count, desc->channel_names, desc->record};
-    nebel_result result = check_plan(&codec, &plan);
+    result = check_plan(&codec, &plan);
     if (result != NEBEL_OK) return result;
     const nebel_image_format format = nebel_find_image_format(path);
     if (format == NEBEL_IMAGE_NONE) return fail_ending(&codec);

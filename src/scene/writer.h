@@ -29,6 +29,9 @@ nebel_result nb_png_write_rows(nb_png_encoder *encoder, const nebel_image *rows)
 nebel_result nb_png_write_end(nb_png_encoder *encoder);
 void nb_png_write_free(nb_png_encoder *encoder); /* NULL is fine */
 
+/* All of a picture as it is stored: color is sRGB, grey is linear. `record` may be NULL. */
+nebel_result nb_png_write_stored(const nb_codec *codec, const nb_stored *stored, const char *record, nb_sink *sink);
+
 typedef struct nb_exr_encoder nb_exr_encoder;
 nebel_result nb_exr_write_begin(const nb_codec *codec, const nb_picture_plan *plan, nb_sink *sink,
                                 nb_exr_encoder **encoder);
