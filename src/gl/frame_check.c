@@ -165,6 +165,9 @@ static nebel_result check_meshes(const nebel_gl_renderer *r, const nebel_gl_fram
 /* What places in floats may change of the light of fog. */
 #define MOST_FOG_ERROR (1. / 255)
 
+/* The same for models in it: more, because only surfaces within a mean free path of where fog begins are that far off. */
+#define MOST_SURFACE_ERROR (4. / 255)
+
 static nebel_view_error find_fog_error(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
     const nebel_log silent = {0};
@@ -202,12 +205,12 @@ static nebel_result check_fog(const nebel_gl_renderer *r, const nebel_gl_frame_d
     const int is_exact = desc->method == NEBEL_GL_METHOD_EXACT || desc->method == NEBEL_GL_METHOD_FIVE_TAP;
     if (!is_exact || nebel_snapshot_volume_count(r->fog) == 0) return NEBEL_OK;
     const nebel_view_error error = find_fog_error(r, desc);
-    if (r->meshes.count > 0 && error.by_surface > MOST_FOG_ERROR)
+    if (r->meshes.count > 0 && error.by_surface > MOST_SURFACE_ERROR)
         return nb_fail(
             &r->log, NEBEL_ERROR_LIMIT,
             "camera: fog is so dense for its distance that OpenGL would draw models in it up to %.2g off: go "
             "nearer, to a %.2g of the distance, or use the CPU's renderer (--device cpu)",
-            fmin(error.by_surface, 1), MOST_FOG_ERROR / error.by_surface);
+            fmin(error.by_surface, 1), MOST_SURFACE_ERROR / error.by_surface);
     if (error.error <= MOST_FOG_ERROR) return NEBEL_OK;
     if (error.by_pixel > error.by_width && error.by_width < MOST_FOG_ERROR)
         return refuse_pixels(r, desc, &error, error.by_pixel / (MOST_FOG_ERROR - error.by_width));
