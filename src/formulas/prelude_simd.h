@@ -98,7 +98,10 @@
 #define NB_WIDE_SIGNS(m) NB_TWO_SIGNS(m)
 #define NB_TO_WIDE(x) vcvt_f64_f32(x)
 #define NB_TO_REAL(x) vcvt_f32_f64(x)
-#define NB_TO_WMASK(m) ((nb_wmask)vmovl_s32((int32x2_t)(m)))
+/* Each lane twice, not vmovl_s32: gcc 12 takes such an extension out where only its first lane was extended before
+ * (its pass -free). */
+#define NB_TO_WMASK(m)                                                                                                 \
+    ((nb_wmask)vcombine_s32(vzip1_s32((int32x2_t)(m), (int32x2_t)(m)), vzip2_s32((int32x2_t)(m), (int32x2_t)(m))))
 #define NB_TO_MASK(m) ((nb_mask)vmovn_s64((int64x2_t)(m)))
 #define NB_TWO_SIGNS(m) ((unsigned)((m)[0] & 1) | (unsigned)((m)[1] & 2))
 #if defined(NB_FAST)

@@ -112,13 +112,11 @@ static void look_ahead(shade *s)
 /* Of `count` rays, of which `first` are the toggles' first; NULL: light reaches all. */
 static void begin_shade(shade *s, const uint32_t *first, const float *toggles, size_t count)
 {
-    for (size_t i = 0; i < NB_WIDTH; i++) {
-        const int counts = first != NULL && i < count;
-        s->next[i] = counts ? first[i] : 0;
-        s->end[i] = counts ? first[i + 1] : 0;
-        s->dark[i] = 0;
+    *s = (shade){.toggles = toggles};
+    for (size_t i = 0; first != NULL && i < count; i++) {
+        s->next[i] = first[i];
+        s->end[i] = first[i + 1];
     }
-    s->toggles = toggles;
     look_ahead(s);
 }
 

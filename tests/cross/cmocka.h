@@ -85,6 +85,7 @@ static inline int cross_is_near(float a, float b, float epsilon)
 #define assert_string_not_equal(a, b) CROSS_REQUIRE(strcmp(a, b) != 0, #a " is not " #b)
 #define assert_memory_equal(a, b, size) CROSS_REQUIRE(memcmp(a, b, size) == 0, #a " equals " #b)
 #define assert_memory_not_equal(a, b, size) CROSS_REQUIRE(memcmp(a, b, size) != 0, #a " differs from " #b)
-#define assert_float_equal(a, b, epsilon) CROSS_REQUIRE(cross_is_near(a, b, epsilon), #a " is near " #b)
+#define assert_float_equal(a, b, epsilon)                                                                              \
+    CROSS_REQUIRE(cross_is_near((float)(a), (float)(b), (float)(epsilon)), #a " is near " #b)
 
 #endif
