@@ -296,7 +296,7 @@ static void test_without_memory(void **state)
         nebel_destroy_scene(scene);
         assert_int_equal(m.live, 0);
         if (result == NEBEL_OK) break;
-        assert_true(calls < 90);
+        assert_true(calls < 80);
     }
 }
 

@@ -23,23 +23,6 @@ int nb_airs_are_empty(const nb_airs *airs)
     return 1;
 }
 
-void nb_airs_smooth(const nb_airs *airs, int orders, nb_airs *smooth)
-{
-    *smooth = *airs;
-    smooth->is_smooth = 1;
-    for (int k = 0; k < airs->count; k++) {
-        nb_air *air = &smooth->airs[k];
-        const double peak = nb_air_peak(&airs->airs[k], orders);
-        for (int c = 0; c < 3; c++) {
-            air->scattering[c] = (1 - peak) * airs->airs[k].scattering[c];
-            air->extinction[c] -= peak * airs->airs[k].scattering[c];
-            if (peak * airs->airs[k].scattering[c] > 0) smooth->is_smooth = 0;
-        }
-        for (int l = 0; l <= NB_MOMENTS; l++)
-            air->moments[l] = l < orders ? (airs->airs[k].moments[l] - peak) / (1 - peak) : 0;
-    }
-}
-
 /* ---- shells ---------------------------------------------------------------------------------- */
 
 static int has_shell(const nb_airs *airs, double low, double high)
@@ -107,9 +90,7 @@ double nb_track_enter(nb_track track, double sphere)
 
 static void add_rising(const nb_airs *airs, nb_track track, double length, double depth[3])
 {
-    double met[NEBEL_MAX_AIRS] = {0};
-    nb_add_rising(airs, (nb_tracks){track.radius, track.rise}, length, met);
-    for (int c = 0; c < 3; c++) depth[c] += nb_depth_of(airs, met, c);
+    nb_add_rising(airs, (nb_tracks){track.radius, track.rise}, length, depth);
 }
 
 /* From the lowest place on, up on both sides. */

@@ -28,7 +28,6 @@ typedef struct nb_airs {
     int shell_count;
     nb_air airs[NEBEL_MAX_AIRS];
     int count;
-    int is_smooth; /* of nb_airs_smooth: nothing had to be changed */
 } nb_airs;
 
 /* A ray through air: `radius` m from the centre at its start, and how far that is behind the place where the ray is
@@ -41,17 +40,6 @@ double nb_air_density(const nb_air *air, double height);
 
 /* Whether there is no air at all. */
 int nb_airs_are_empty(const nb_airs *airs);
-
-/* The part of scattered light that goes nearly straight ahead, where `orders` moments are kept of a phase function. */
-static inline double nb_air_peak(const nb_air *air, int orders)
-{
-    return air->moments[orders] > 0 ? air->moments[orders] : 0;
-}
-
-/* Air whose phase functions have no more than `orders` moments, and which scatters light that comes often as the other does: the
- * part of it that goes nearly straight ahead counts as not scattered at all (delta-M: Wiscombe, Journal of the Atmospheric Sciences
- * 34, 1977). is_smooth says that both are the same. */
-void nb_airs_smooth(const nb_airs *airs, int orders, nb_airs *smooth);
 
 /* Sets the shells of airs that have everything else. */
 void nb_airs_cut(nb_airs *airs);

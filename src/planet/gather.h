@@ -5,30 +5,22 @@
 #include "path.h"
 #include "scatter.h"
 
-enum {
-    NB_GATHER_NODES = 64, /* at a time */
-    NB_GATHER_TURNS = 6,  /* by peaks, one after the other: more of them count as so many */
-};
+enum { NB_GATHER_NODES = 64 }; /* at a time */
 
 /* For a sun of irradiance 1, what reaches the start of the ray from each node, whose weight is counted: sunlight, for a
  * scattering of 1/m and a phase function of 1; light scattered by all air after that of the table; and about what of this
  * is missing for want of moments, and in twilight for want of entries. */
 typedef struct nb_node_light {
     double sun[3][NB_GATHER_NODES], often[3][NB_GATHER_NODES], missing[3][NB_GATHER_NODES];
-    double radiance[3][NB_GATHER_NODES]; /* of the table, at the node itself, of the ray's direction */
 } nb_node_light;
 
 typedef struct nb_gather_job {
     const nb_airs *airs;
-    const nb_airs *smooth;     /* what light scattered often is scattered by, if it is not `airs`; else NULL */
     const nb_scatter *scatter; /* NULL: sunlight alone */
     int wants_sun;
     nb_track track;
     nb_aspect aspect;            /* of the ray's direction, where it starts */
     double rest[NEBEL_MAX_AIRS]; /* by nb_gather_aim, else 0: nothing is missing */
-    /* By nb_gather_aim, of light that peaks of phase functions turn on its way: the smooth part of each phase function, and the peak's
-     * after two scatterings and more, all by peaks. */
-    double smooth_phase[NEBEL_MAX_AIRS], peak_phase[NEBEL_MAX_AIRS][NB_GATHER_TURNS];
     const nb_path *path;
     int first, count; /* nodes; first: a multiple of NB_PATH_LANES */
 } nb_gather_job;

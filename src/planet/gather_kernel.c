@@ -24,94 +24,26 @@
 typedef struct nb_nodes {
     int at;
     nb_real radius, sun, zenith; /* cosines of the sun and of the ray's direction to the zenith there */
-    nb_real weight;
+    nb_real left[3];             /* weight and transmittance */
 } nb_nodes;
-
-NB_MOMENTS_INLINE nb_real left_of(const nb_nodes *nodes, const double transmittance[])
-{
-    return nodes->weight * nb_load_lanes(transmittance + nodes->at);
-}
 
 static inline nb_nodes nodes_at(const nb_gather_job *job, int at)
 {
     const nb_path *path = job->path;
-    const nb_real s = nb_load_lanes(path->s + at), radius = nb_load_lanes(path->radius + at);
+    const nb_real s = nb_load_lanes(path->s + at), weight = nb_load_lanes(path->weight + at);
+    const nb_real radius = nb_load_lanes(path->radius + at);
     const nb_real up = nb_splat(job->track.radius * job->aspect.height_of_sun) + s * nb_splat(job->aspect.sun);
-    return (nb_nodes){.at = at,
-                      .radius = radius,
-                      .sun = up / radius,
-                      .zenith = (nb_splat(job->track.rise) + s) / radius,
-                      .weight = nb_load_lanes(path->weight + at)};
-}
-
-/* Where fewer light is turned series are exact with the terms that are kept, and differences are not. */
-#define FEW_TURNS 1e-3
-
-/* What is off of light that peaks turn, and for peaks of what smooth air scatters, or would scatter evenly. Measured on flat haze of
- * depths 0.1 to 4 and g up to 0.9 the most is 0.65 and 0.15 (test_dense_air), and high over Mars, lit from below, 0.25. */
-#define TURNED_OFF 0.7
-#define PEAK_OFF 0.3
-
-/* Light that is scattered, and what of it may be wrong. */
-typedef struct nb_scattered {
-    nb_real light, missing;
-} nb_scattered;
-
-/* Light that goes nearly straight from the sun to a node and on to the eye: `straight` is what nothing turns, `ahead` that with what
- * peaks turn, in any number. They turn it by chance, T times in the mean, so that n scatterings by peaks, one of which is at the node,
- * have a share of T^(n - 1) / n!, and one by a smooth phase function all that they bring. Small angles add up: of phase functions
- * moments are multiplied (Wang and Guth, Physical Review 84, 1951). Per unit of scattering at the node. */
-NB_MOMENTS_INLINE void weigh_turns(nb_real straight, nb_real ahead, nb_real turns[NB_GATHER_TURNS])
-{
-    const nb_real tiny = NB_F(1e-300), depth = nb_log(nb_max(ahead, tiny) / nb_max(straight, tiny));
-    nb_real share = straight, rest = (ahead - straight) / nb_max(depth, NB_F(FEW_TURNS)) - straight;
-    for (int n = 0; n < NB_GATHER_TURNS - 1; n++) {
-        share = share * depth * nb_splat(1.0 / (n + 2));
-        turns[n] = share;
-        rest = rest - share;
-    }
-    turns[NB_GATHER_TURNS - 1] = nb_select(depth > NB_F(FEW_TURNS), nb_max(NB_F(0.0), rest), NB_F(0.0));
-}
-
-/* What air scatters of light that peaks turn, and about what of this is wrong as its way is not quite straight. */
-NB_MOMENTS_INLINE nb_scattered turn_light(const nb_gather_job *job, int at, int c, nb_real straight, nb_real ahead)
-{
-    nb_scattered sum = {NB_F(0.0), NB_F(0.0)};
-    nb_real turns[NB_GATHER_TURNS];
-    weigh_turns(straight, ahead, turns);
-    for (int k = 0; k < job->airs->count; k++) {
-        const double scattering = job->airs->airs[k].scattering[c];
-        if (!(scattering > 0)) continue;
-        nb_real light = (ahead - straight) * nb_splat(job->smooth_phase[k]), size = nb_abs(light);
-        for (int n = 0; n < NB_GATHER_TURNS; n++) {
-            const nb_real part = turns[n] * nb_splat(job->peak_phase[k][n]);
-            light = light + part;
-            size = size + nb_abs(part);
-        }
-        const nb_real scattered = nb_splat(scattering) * nb_load_lanes(job->path->density[k] + at);
-        sum.light = sum.light + scattered * light;
-        sum.missing = sum.missing + scattered * size * NB_F(TURNED_OFF);
-    }
-    return sum;
+    nb_nodes nodes = {
+        .at = at, .radius = radius, .sun = up / radius, .zenith = (nb_splat(job->track.rise) + s) / radius};
+    for (int c = 0; c < 3; c++) nodes.left[c] = weight * nb_load_lanes(path->transmittance[c] + at);
+    return nodes;
 }
 
 static void add_sun(const nb_gather_job *job, const nb_nodes *nodes, nb_node_light *light)
 {
-    const int to = nodes->at - job->first;
-    nb_real met[NEBEL_MAX_AIRS];
-    const nb_mask dark = nb_tracks_meet(job->airs, (nb_tracks){nodes->radius, nodes->radius * nodes->sun}, met);
-    for (int c = 0; c < 3; c++) {
-        const nb_real straight = left_of(nodes, job->path->transmittance[c]) *
-                                 nb_select(dark, NB_F(0.0), nb_exp(-nb_depth_of(job->airs, met, c)));
-        nb_store_lanes(light->sun[c] + to, straight);
-        if (job->smooth == NULL || job->scatter == NULL) continue;
-        const nb_real ahead = left_of(nodes, job->path->smooth[c]) *
-                              nb_select(dark, NB_F(0.0), nb_exp(-nb_depth_of(job->smooth, met, c)));
-        const nb_scattered turned = turn_light(job, nodes->at, c, straight, ahead);
-        const nb_real often = nb_load_lanes(light->often[c] + to) + turned.light;
-        nb_store_lanes(light->often[c] + to, nb_max(NB_F(0.0), often));
-        nb_store_lanes(light->missing[c] + to, nb_load_lanes(light->missing[c] + to) + turned.missing);
-    }
+    nb_real sunlight[3];
+    nb_tracks_sunlight(job->airs, (nb_tracks){nodes->radius, nodes->radius * nodes->sun}, sunlight);
+    for (int c = 0; c < 3; c++) nb_store_lanes(light->sun[c] + (nodes->at - job->first), nodes->left[c] * sunlight[c]);
 }
 
 /* ---- scattered often ------------------------------------------------------------------------- */
@@ -131,35 +63,25 @@ NB_MOMENTS_INLINE nb_real weigh_rest(const nb_gather_job *job, int at, int c)
 /* What air gives of the moments of one order, 1/m. */
 NB_MOMENTS_INLINE nb_real weigh(const nb_gather_job *job, int at, int order, int c)
 {
-    const nb_airs *airs = job->smooth != NULL ? job->smooth : job->airs;
     nb_real sum = NB_F(0.0);
-    for (int k = 0; k < airs->count; k++) {
-        const nb_air *air = &airs->airs[k];
+    for (int k = 0; k < job->airs->count; k++) {
+        const nb_air *air = &job->airs->airs[k];
         const double times = (2 * order + 1) / NB_FOUR_PI * air->scattering[c] * air->moments[order];
         if (air->scattering[c] > 0) sum = sum + nb_splat(times) * nb_load_lanes(job->path->density[k] + at);
     }
     return sum;
 }
 
-/* The part of what air scatters that peaks have. */
-NB_MOMENTS_INLINE nb_real peak_part(const nb_gather_job *job, int at, int c)
-{
-    nb_real peaks = NB_F(0.0), all = NB_F(1e-300);
-    for (int k = 0; k < job->airs->count; k++) {
-        const nb_air *air = &job->airs->airs[k];
-        const nb_real scattered = nb_splat(air->scattering[c]) * nb_load_lanes(job->path->density[k] + at);
-        all = all + scattered;
-        peaks = peaks + scattered * nb_splat(nb_air_peak(air, job->scatter->orders));
-    }
-    return peaks / all;
-}
-
 /* For a first moment of 1: what the field of the spots gives towards a direction, and about what it would give more or
- * less if all orders were kept, as if the next one's moments were as large as those of the last one. radiance: of the field itself. */
+ * less if all orders were kept, as if the next one's moments were as large as those of the last one. */
+typedef struct nb_scattered {
+    nb_real light, missing;
+} nb_scattered;
+
 NB_MOMENTS_INLINE nb_scattered scatter(const nb_gather_job *job, int orders, const nb_spots *spots, int at,
-                                       const nb_real basis[NB_FIELD], int c, nb_real *radiance)
+                                       const nb_real basis[NB_FIELD], int c)
 {
-    nb_real sum = weigh(job, at, 0, c) * basis[0], square = NB_F(1.0), seen = basis[0];
+    nb_real sum = weigh(job, at, 0, c) * basis[0], square = NB_F(1.0);
     for (int order = 1, i = 1; order < orders; order++) {
         nb_real part = NB_F(0.0);
         square = NB_F(0.0);
@@ -169,13 +91,8 @@ NB_MOMENTS_INLINE nb_scattered scatter(const nb_gather_job *job, int orders, con
             square = square + moment * moment;
         }
         sum = sum + weigh(job, at, order, c) * part;
-        seen = seen + nb_splat(2 * order + 1) * part;
     }
-    *radiance = nb_max(NB_F(0.0), seen) * nb_splat(1 / NB_FOUR_PI);
-    nb_real missing = weigh_rest(job, at, c) * nb_sqrt(square);
-    if (job->smooth != NULL)
-        missing = missing + NB_F(PEAK_OFF) * peak_part(job, at, c) * nb_max(nb_abs(sum), weigh(job, at, 0, c));
-    return (nb_scattered){sum, missing};
+    return (nb_scattered){nb_max(NB_F(0.0), sum), weigh_rest(job, at, c) * nb_sqrt(square)};
 }
 
 NB_MOMENTS_INLINE void add_often(const nb_gather_job *job, int orders, const nb_nodes *nodes, nb_node_light *light)
@@ -186,11 +103,8 @@ NB_MOMENTS_INLINE void add_often(const nb_gather_job *job, int orders, const nb_
     nb_real basis[NB_FIELD];
     nb_basis_of(orders, (nb_aspects){nodes->zenith, nb_splat(job->aspect.sun), nodes->sun}, basis);
     for (int c = 0; c < 3; c++) {
-        const double(*left)[NB_PATH_MOST] = job->smooth != NULL ? job->path->smooth : job->path->transmittance;
-        const nb_real mean = nb_exp(nb_moment_at(&spots, 0, c)), all = left_of(nodes, left[c]) * mean;
-        nb_real radiance;
-        const nb_scattered scattered = scatter(job, orders, &spots, nodes->at, basis, c, &radiance);
-        nb_store_lanes(light->radiance[c] + to, mean * radiance);
+        const nb_real all = nodes->left[c] * nb_exp(nb_moment_at(&spots, 0, c));
+        const nb_scattered scattered = scatter(job, orders, &spots, nodes->at, basis, c);
         nb_store_lanes(light->often[c] + to, all * scattered.light);
         nb_store_lanes(light->missing[c] + to, all * (scattered.missing + dark * scattered.light));
     }
@@ -210,8 +124,11 @@ void NB_SUFFIXED(nb_gather_)(const nb_gather_job *job, nb_node_light *light)
 {
     for (int at = job->first; at < job->first + job->count; at += NB_WIDTH) {
         const nb_nodes nodes = nodes_at(job, at);
-        if (job->scatter != NULL && job->scatter->orders == NB_FEW_MOMENTS) add_often_by_few(job, &nodes, light);
-        if (job->scatter != NULL && job->scatter->orders == NB_MOMENTS) add_often_by_all(job, &nodes, light);
         if (job->wants_sun) add_sun(job, &nodes, light);
+        if (job->scatter == NULL) continue;
+        if (job->scatter->orders == NB_FEW_MOMENTS)
+            add_often_by_few(job, &nodes, light);
+        else
+            add_often_by_all(job, &nodes, light);
     }
 }

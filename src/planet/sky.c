@@ -12,8 +12,6 @@
 
 #include "formulas/elementary.inc"
 
-#define PI 3.14159265358979323846
-
 /* ---- along a ray ----------------------------------------------------------------------------- */
 
 /* The shadow is a cylinder behind the planet: |p + s d|^2 - ((p + s d) sun)^2 is the square of the radius. */
@@ -75,76 +73,12 @@ static void gather_nodes(nb_gathering *gathering, int from, int to, nb_gathered 
     }
 }
 
-/* Of a node that is at hand. */
-static void radiance_at(const nb_gathering *gathering, int node, double radiance[3])
-{
-    for (int c = 0; c < 3; c++) radiance[c] = gathering->light.radiance[c][node - gathering->job.first];
-}
-
 /* The first node from `from` on that is not before `end`. */
 static int node_at(const nb_path *path, int from, double end)
 {
     while (from < path->count && path->s[from] < end) from++;
     return from;
 }
-
-/* ---- light that peaks turn ------------------------------------------------------------------- */
-
-/* Of the ground where a ray ends; 0 where it does not meet it. */
-static void find_ground(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, double radiance[3])
-{
-    const nb_airs *airs = &atmosphere->airs;
-    const double way = nb_track_enter(track, airs->radius);
-    for (int c = 0; c < 3; c++) radiance[c] = 0;
-    if (!(way < HUGE_VAL)) return;
-    const double sun = fmax(-1, fmin(1, (track.radius * aspect.height_of_sun + way * aspect.sun) / airs->radius));
-    double sky[3], straight[3];
-    nb_scatter_look_up_ground(&atmosphere->scatter, sun, sky);
-    nb_track_sunlight(airs, (nb_track){airs->radius, airs->radius * sun}, straight);
-    for (int c = 0; c < 3; c++) radiance[c] = atmosphere->ground_albedo[c] / PI * (sky[c] + fmax(0, sun) * straight[c]);
-}
-
-/* The radiance that comes from behind an end, for the transmittance of smooth air from there on: of the ground, and of air that is
- * alike. The light of the table is smooth: nothing shines through what a ray may end at. */
-static double radiance_behind(double left, double ground, double air)
-{
-    return left * ground + (1 - left) * air;
-}
-
-/* About so much of it is off. */
-#define BEHIND_OFF 0.2
-
-/* Adds what peaks turn of the light that comes from behind an end: smooth air lets it through as if it came straight. */
-static void add_behind(const nb_path *path, const double ground[3], const double air[3], double end,
-                       nb_gathered *gathered)
-{
-    const int last = path->ends - 1;
-    int i = 0;
-    while (i < last && path->end[i] < end) i++;
-    for (int c = 0; c < 3; c++) {
-        const double ahead = path->end_smooth[c][i], left = ahead > 0 ? path->end_smooth[c][last] / ahead : 0;
-        const double turned = (ahead - path->end_left[c][i]) * radiance_behind(left, ground[c], air[c]);
-        gathered->often[c] += turned;
-        gathered->missing[c] += BEHIND_OFF * turned;
-    }
-}
-
-/* The same per metre where the ray begins. */
-static void add_behind_start(const nebel_atmosphere *atmosphere, const nb_path *path, const double ground[3],
-                             const double air[3], nb_gathered *start)
-{
-    const nb_airs *airs = &atmosphere->airs;
-    for (int k = 0; k < airs->count; k++)
-        for (int c = 0; c < 3; c++) {
-            const double peak = nb_air_peak(&airs->airs[k], atmosphere->scatter.orders);
-            const double turned = peak * airs->airs[k].scattering[c] * path->density[k][path->count] *
-                                  radiance_behind(path->end_smooth[c][path->ends - 1], ground[c], air[c]);
-            start->often[c] += turned;
-            start->missing[c] += BEHIND_OFF * turned;
-        }
-}
-
-/* ---- along a path ---------------------------------------------------------------------------- */
 
 nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path *path,
                            int count, const double ends[], nb_gathered gathered[])
@@ -155,27 +89,19 @@ nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, n
     memset(&start, 0, sizeof start);
     gathering.atmosphere = atmosphere;
     gathering.job = (nb_gather_job){.airs = &atmosphere->airs,
-                                    .smooth = nb_atmosphere_smooth(atmosphere),
                                     .scatter = &atmosphere->scatter,
                                     .wants_sun = 1,
                                     .track = track,
                                     .aspect = aspect,
                                     .path = path};
-    const int turns = gathering.job.smooth != NULL && path->ends > 0;
-    double ground[3], air[3] = {0, 0, 0};
-    if (turns) find_ground(atmosphere, track, aspect, ground);
     nb_gather_aim(&gathering.job);
     for (int k = 0, i = 0; k < count; k++) {
         const int to = k + 1 == count ? path->count : node_at(path, i, ends[k]);
         gather_nodes(&gathering, i, to, &sum);
-        if (to > i) radiance_at(&gathering, to - 1, air);
         gathered[k] = sum;
-        if (turns) add_behind(path, ground, air, ends[k], &gathered[k]);
         i = to;
     }
     gather_nodes(&gathering, path->count, path->count + 1, &start);
-    radiance_at(&gathering, path->count, air);
-    if (turns) add_behind_start(atmosphere, path, ground, air, &start);
     return start;
 }
 
@@ -186,8 +112,7 @@ nb_gathered nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, n
     nb_path path;
     nb_find_shadow(&atmosphere->airs, track, aspect, cuts);
     memcpy(cuts + 2, ends, (size_t)count * sizeof *ends);
-    nb_path_lay(&atmosphere->airs, nb_atmosphere_smooth(atmosphere), rule, track, ends[count - 1], 2 + count, cuts,
-                &path);
+    nb_path_lay(&atmosphere->airs, rule, track, ends[count - 1], 2 + count, cuts, &path);
     return nb_gather_path(atmosphere, track, aspect, &path, count, ends, gathered);
 }
 
@@ -248,7 +173,6 @@ static double place_over(const nebel_atmosphere *atmosphere, const double place[
 typedef struct nb_inside {
     nb_track track;
     double height_of_sun, length;
-    double end; /* of the ray in the air, however long it is */
 } nb_inside;
 
 /* Rays from outside are counted from where they pass the centre, so that their distance loses no digits. */
@@ -271,8 +195,8 @@ static nb_inside find_inside(const nebel_atmosphere *atmosphere, const double st
         inside.track = (nb_track){airs->top, -half};
     }
     inside.height_of_sun = bound_cosine(nb_vector_dot(from, sun) / inside.track.radius);
-    inside.end = fmin(nb_track_enter(inside.track, airs->radius), nb_track_leave(inside.track, airs->top));
-    inside.length = fmax(0, fmin(left, inside.end));
+    const double end = fmin(nb_track_enter(inside.track, airs->radius), nb_track_leave(inside.track, airs->top));
+    inside.length = fmax(0, fmin(left, end));
     return inside;
 }
 
@@ -289,16 +213,15 @@ static void trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, cons
     for (int c = 0; c < 3; c++) light->transmittance[c] = nb_exp(-depth[c]);
     light->error = NB_LIGHT_ROUNDING;
     if (!(fmax(sun->irradiance[0], fmax(sun->irradiance[1], sun->irradiance[2])) > 0)) return;
-    nb_gathered gathered[2];
-    const double ends[2] = {inside.length, inside.end};
+    nb_gathered gathered;
     const nb_aspect aspect = {bound_cosine(inside.track.rise / inside.track.radius),
                               bound_cosine(nb_vector_dot(unit, sun->direction)), inside.height_of_sun};
     double once[3];
-    nb_gather(atmosphere, &atmosphere->rule, inside.track, aspect, inside.length < inside.end ? 2 : 1, ends, gathered);
-    nb_gathered_once(atmosphere, &gathered[0], aspect.sun, once);
+    nb_gather(atmosphere, &atmosphere->rule, inside.track, aspect, 1, &inside.length, &gathered);
+    nb_gathered_once(atmosphere, &gathered, aspect.sun, once);
     for (int c = 0; c < 3; c++) {
-        light->in_scattering[c] = sun->irradiance[c] * (once[c] + gathered[0].often[c]);
-        const double off = nb_gathered_off(atmosphere, &gathered[0], once, c);
+        light->in_scattering[c] = sun->irradiance[c] * (once[c] + gathered.often[c]);
+        const double off = nb_gathered_off(atmosphere, &gathered, once, c);
         light->error = fmax(light->error, sun->irradiance[c] * off + NB_LIGHT_ROUNDING);
     }
 }
