@@ -68,8 +68,8 @@ static nebel_result write_files(const nb_darkroom *room)
         const double disparity = room->camera.baseline * room->camera.fx / (double)room->depth[i];
         share[i] = (float)((round(disparity * 16) * 16 + 1) / 65535);
     }
-    nebel_result result = nebel_write_photograph(room->paths[0], &room->host, &room->photograph);
-    if (result == NEBEL_OK) result = nebel_write_gray(room->paths[1], &room->host, room->width, room->height, share);
+    nebel_result result = nebel_write_photograph(room->paths[0], &room->host, &room->photograph, NULL);
+    if (result == NEBEL_OK) result = nebel_write_gray(room->paths[1], &room->host, room->width, room->height, share, NULL);
     free(share);
     return result;
 }
@@ -156,7 +156,7 @@ static nebel_result fog_files(const nb_darkroom *room)
     if (result == NEBEL_OK) result = nebel_read_depth(room->paths[1], &source, &room->host, &map);
     if (result == NEBEL_OK) result = nebel_estimate_airlight(&room->host, &photograph, airlight);
     if (result == NEBEL_OK) result = add_fog(room, map.depth, 1, photograph.pixels, photograph.pixels);
-    if (result == NEBEL_OK) result = nebel_write_photograph(room->paths[2], &room->host, &photograph);
+    if (result == NEBEL_OK) result = nebel_write_photograph(room->paths[2], &room->host, &photograph, NULL);
     nebel_free_photograph(&room->host, &photograph);
     nebel_free_depth(&room->host, &map);
     return result;

@@ -640,10 +640,16 @@ class RenderTest(PictureCase):
         self.assert_misused(self.render("a.png", "--method", "five-tap"), "--method", "--device gl")
         self.assertEqual(self.files(), self.given)
 
+    def test_folders_are_made(self):
+        for out, frames in (("a/b/c.png", ()), ("n/%d/x.exr", ("--frames", "0-1")), ("./a//d/../e/f.png", ())):
+            self.assert_done(self.render(out, *frames))
+        made = {str(path.relative_to(self.folder)) for path in self.folder.rglob("*") if path.name not in self.given}
+        self.assertEqual(made, {"a", "a/b", "a/b/c.png", "n", "n/0", "n/0/x.exr", "n/1", "n/1/x.exr", "a/d", "a/e", "a/e/f.png"})
+
     def test_places_that_cannot_be_written_are_found_before_the_work(self):
         began = time.monotonic()
         more = ("--size", "4000x4000", "--samples", "4096")
-        self.assert_failed(self.render("none/a.png", *more), "none/a.png", "make it first")
+        self.assert_failed(self.render("/proc/none/a.png", *more), 'cannot make the folder "/proc/none"')
         (self.folder / "folder.png").mkdir()
         self.assert_failed(self.render("folder.png", *more), "folder.png", "name a file in it")
         self.assert_failed(self.render("triangle.obj/a.png", *more), "triangle.obj")
@@ -651,7 +657,7 @@ class RenderTest(PictureCase):
         self.assert_failed(self.render("dangling.png", *more), "dangling.png")
         self.assert_failed(self.render("/proc/a.png", *more), "/proc/a.png", "no file can be made")
         self.assert_failed(self.render("a" * 300 + ".png", *more), "too long")
-        self.assert_failed(self.render("none%d/a.png", "--frames", "0-1", *more), "none0/a.png")
+        self.assert_failed(self.render("/proc/none%d/a.png", "--frames", "0-1", *more), "/proc/none0")
         self.assertEqual(self.files(), sorted(self.given + ["dangling.png", "folder.png"]))
         if os.geteuid() != 0:
             (self.folder / "locked").mkdir(mode=0o555)
@@ -748,7 +754,7 @@ class FramesTest(PictureCase):
         limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1024, 1024))
         done = self.render("a.webp", "--frames", "0-15", "--quality", "100", preexec_fn=limit)
         self.assert_failed(done, "a.webp", "too large")
-        self.assert_failed(self.render("none/a.webp", "--frames", "0-3"), "none/a.webp")
+        self.assert_failed(self.render("triangle.obj/a.webp", "--frames", "0-3"), "triangle.obj", "Not a directory")
         self.assertEqual((self.folder / "a.webp").read_bytes(), film)
         self.assertEqual(self.files(), sorted(self.given + ["a.webp", "fog.json"]))
 

@@ -435,6 +435,13 @@ class NamesTest(Case):
             wanted = expected(self.picture, np.full((HEIGHT, WIDTH), math.exp(-0.02 * (10 + i))))
             self.assert_bytes(self.folder / f"out/ulm/{i}_foggy.png", wanted, LINEAR_TOLERANCE)
 
+    def test_folders_of_results_are_made(self):
+        done = self.fog("left/*/*_left.png", "--depth", "depth/*/*_depth.pfm", "-o", "out/*/a/b/*.png", "--transmittance", "t/*/*.png",
+                        *self.common)
+        self.assert_done(done)
+        self.assertEqual(self.outputs(), [f"out/{t}/a/b/{i}.png" for t in ("aachen", "ulm") for i in range(3)])
+        self.assertEqual(len(list((self.folder / "t").glob("*/*.png"))), 6)
+
     def test_names_without_stars_give_their_stem(self):
         self.assert_done(self.fog("left/ulm/0_left.png", "left/ulm/2_left.png", "--depth", "depth/ulm/1_depth.pfm", "-o",
                                   "out/*.png", *self.common))
@@ -494,6 +501,20 @@ class NamesTest(Case):
             self.assert_error(self.fog("left/ulm/*_left.png", *depth, "-o", out, *self.common), 2, "written twice")
             self.assert_error(self.fog("left/ulm/1_left.png", *depth, "-o", out, *self.common), 1, "is one of the files")
         self.assertEqual((self.folder / "left/ulm/1_left.png").read_bytes(), before)
+        done = self.fog("left/ulm/*_left.png", *depth, "-o", "left/ulm/*_left.png", *self.common)
+        self.assert_error(done, 1, "is one of the files")
+        self.assertEqual(done.stderr.count("\n"), 1)
+
+    def test_one_result_in_the_place_of_something_read_leaves_the_others(self):
+        (self.folder / "out/1.png").symlink_to("../left/ulm/1_left.png")
+        (self.folder / "t2.png").symlink_to("depth/ulm/0_depth.pfm")
+        before = (self.folder / "left/ulm/1_left.png").read_bytes()
+        done = self.fog("left/ulm/*_left.png", "--depth", "depth/ulm/*_depth.pfm", "-o", "out/*.png", "--transmittance", "t*.png",
+                        *self.common)
+        self.assert_error(done, 1, 'cannot write "out/1.png": it is one of the files that are read', 'cannot write "t2.png"')
+        self.assertIn("1 picture, 2 failed", done.stderr)
+        self.assertEqual((self.folder / "left/ulm/1_left.png").read_bytes(), before)
+        self.assertEqual(self.outputs(), ["out/0.png", "out/1.png"])
 
     def test_a_full_disk_leaves_nothing_half(self):
         limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000))
@@ -569,7 +590,7 @@ class BadInputTest(Case):
         self.assert_error(self.fog("p.jpg", *depth, "-o", "out.exr"), 1, "becomes a .png")
         self.assert_error(self.fog("p.exr", *depth, "-o", "out.exr", "--blend", "srgb"), 1, "floats are light")
         self.assert_error(self.fog("p.jpg", *depth, "-o", self.out, "--airlight", "2,1,1"), 1, "at most 1")
-        self.assert_error(self.fog("p.jpg", *depth, "-o", "none/out.png"), 1, "there is no folder")
+        self.assert_error(self.fog("p.jpg", *depth, "-o", "p.jpg/out.png"), 1, "cannot make the folder", "Not a directory")
         self.assertFalse(self.out.exists())
 
     def test_calls(self):

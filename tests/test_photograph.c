@@ -94,7 +94,7 @@ static void write_depth_files(const nebel_scene_desc *host)
     write_bytes(in_folder("d.pfm"), pfm, (size_t)head + sizeof floats);
     write_npy(in_folder("f4.npy"), "<f4", 4, floats);
     write_npy(in_folder("u2.npy"), "<u2", 2, shorts);
-    assert_int_equal(nebel_write_gray(in_folder("d.png"), host, WIDTH, HEIGHT, floats), NEBEL_OK);
+    assert_int_equal(nebel_write_gray(in_folder("d.png"), host, WIDTH, HEIGHT, floats, NULL), NEBEL_OK);
     const nebel_image image = {WIDTH, HEIGHT, 1, z, floats};
     assert_int_equal(nebel_write_image(in_folder("d.exr"), host, &image), NEBEL_OK);
 }
@@ -122,7 +122,7 @@ static int make_files(void **state)
     for (size_t i = 0; i < 3; i++) {
         nebel_photograph photograph;
         fill(&photograph, pictures[i].type, pixels);
-        assert_int_equal(nebel_write_photograph(in_folder(pictures[i].name), &host, &photograph), NEBEL_OK);
+        assert_int_equal(nebel_write_photograph(in_folder(pictures[i].name), &host, &photograph, NULL), NEBEL_OK);
     }
     write_depth_files(&host);
     write_bytes(in_folder("city.json"), city, sizeof city - 1);
@@ -187,10 +187,11 @@ static void test_pictures_come_back_as_they_were(void **state)
     const nebel_scene_desc host = {.log = {.write = NULL}};
     for (nebel_pixel_type type = NEBEL_PIXEL_RGBA8; type < NEBEL_PIXEL_COUNT; type++) {
         nebel_photograph photograph, back;
+        char record[NEBEL_MAX_RECORD + 1];
         const int is_float = type == NEBEL_PIXEL_RGB_FLOAT || type == NEBEL_PIXEL_RGBA_FLOAT;
         const char *const path = in_folder(is_float ? "out.exr" : "out.png");
         fill(&photograph, type, pixels);
-        const nebel_result result = nebel_write_photograph(path, &host, &photograph);
+        const nebel_result result = nebel_write_photograph(path, &host, &photograph, "nebel test");
         if (type == NEBEL_PIXEL_RGB_HALF || type == NEBEL_PIXEL_RGBA_HALF) {
             assert_int_equal(result, NEBEL_ERROR_FORMAT);
             continue;
@@ -198,9 +199,28 @@ static void test_pictures_come_back_as_they_were(void **state)
         assert_int_equal(result, NEBEL_OK);
         assert_int_equal(nebel_read_photograph(path, &host, &back), NEBEL_OK);
         assert_int_equal(back.type, type);
+        assert_int_equal(nebel_read_record(path, record), NEBEL_OK);
+        assert_string_equal(record, "nebel test");
         assert_memory_equal(back.pixels, pixels, COUNT * nebel_pixel_size(type));
         nebel_free_photograph(&host, &back);
     }
+}
+
+static void test_records_of_gray(void **state)
+{
+    (void)state;
+    char record[NEBEL_MAX_RECORD + 1];
+    const char *const path = in_folder("out.png");
+    const nebel_scene_desc host = {.log = {.write = NULL}};
+    const float half = 0.5f;
+    float light[3] = {0};
+    const nebel_photograph photograph = {1, 1, NEBEL_PIXEL_RGB_FLOAT, light};
+    assert_int_equal(nebel_write_gray(path, &host, 1, 1, &half, "gray"), NEBEL_OK);
+    assert_int_equal(nebel_write_gray(path, &host, 1, 1, &half, "of\ntwo lines"), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_write_gray(path, &host, 1, 1, &half, ""), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_write_photograph(in_folder("out.exr"), &host, &photograph, "\x7f"), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_read_record(path, record), NEBEL_OK);
+    assert_string_equal(record, "gray");
 }
 
 static void test_every_kind_of_camera_file(void **state)
@@ -350,6 +370,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_pictures_come_back_as_they_were),
+        cmocka_unit_test(test_records_of_gray),
         cmocka_unit_test(test_every_kind_of_camera_file),
         cmocka_unit_test(test_every_failing_allocation_is_survived),
         cmocka_unit_test(test_damaged_files_are_errors_or_pictures),

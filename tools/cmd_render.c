@@ -178,13 +178,7 @@ static int write_item(studio *all)
 
 static void show_share(studio *all, double of_item)
 {
-    uint64_t done, count;
-    const double share = nb_jobs_share(&all->jobs, of_item, &done, &count);
-    char label[64] = "";
-    if (count > 1)
-        (void)snprintf(label, sizeof label, "%s %llu of %llu", all->out.band_rows > 0 ? "band" : "frame",
-                       (unsigned long long)(done < count ? done + 1 : count), (unsigned long long)count);
-    nb_meter_show(&all->meter, share, label);
+    nb_jobs_show(&all->jobs, &all->meter, all->out.band_rows > 0 ? "band" : "frame", of_item);
 }
 
 static int show_progress(size_t done, size_t total, void *user)
@@ -644,26 +638,16 @@ static int set_up(studio *all)
     return wanted->gl ? open_gl(all) : open_renderer(all);
 }
 
-/* "96 pictures, 12 of them were there, ". */
-static void count_pictures(const studio *all, char *text, size_t size)
-{
-    const unsigned long long kept = all->jobs.all_kept, count = all->jobs.all_made + kept;
-    const char *const what = all->out.band_rows > 0 ? "band" : "picture";
-    text[0] = '\0';
-    if (!all->wanted->many_frames && all->out.band_rows == 0 && kept == 0) return;
-    const int used = snprintf(text, size, "%llu %s%s, ", count, what, count == 1 ? "" : "s");
-    if (kept > 0 && used > 0 && (size_t)used < size)
-        (void)snprintf(text + used, size - (size_t)used, "%llu of them there already, ", kept);
-}
-
 static void summarize(const studio *all, double seconds)
 {
     const nb_render_call *const wanted = all->wanted;
-    char span[32], count[96];
+    char span[32], count[128] = "";
+    const int is_one = !wanted->many_frames && all->out.band_rows == 0 && all->jobs.all_kept == 0;
     nb_meter_write_span(seconds, span, sizeof span);
-    count_pictures(all, count, sizeof count);
-    nb_report_message("%s: %s%u x %u, %u sample%s, %s", wanted->output, count, (unsigned)wanted->width,
-                      (unsigned)wanted->height, (unsigned)wanted->samples, wanted->samples > 1 ? "s" : "", span);
+    if (!is_one) nb_jobs_describe(&all->jobs, all->out.band_rows > 0 ? "band" : "picture", count, sizeof count);
+    nb_report_message("%s: %s%s%u x %u, %u sample%s, %s", wanted->output, count, is_one ? "" : ", ",
+                      (unsigned)wanted->width, (unsigned)wanted->height, (unsigned)wanted->samples,
+                      wanted->samples > 1 ? "s" : "", span);
 }
 
 /* Before the items: what all processes need, and whether they agree on what that is. */

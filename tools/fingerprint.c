@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 enum { READ_SIZE = 1 << 18 };
@@ -54,6 +55,9 @@ void nb_fingerprint_add_number(nb_fingerprint *print, double number)
 static int add_open(nb_fingerprint *print, int file, unsigned char *buffer)
 {
     uint64_t size = 0;
+    struct stat status;
+    if (fstat(file, &status) != 0) return errno;
+    if (!S_ISREG(status.st_mode)) return ENXIO; /* a device may have no end */
     for (;;) {
         const ssize_t count = read(file, buffer, READ_SIZE);
         if (count < 0 && errno == EINTR) continue;
@@ -70,7 +74,7 @@ int nb_fingerprint_add_file(nb_fingerprint *print, const char *path)
 {
     unsigned char *const buffer = malloc(READ_SIZE);
     if (buffer == NULL) return ENOMEM;
-    /* The scene was read from there; what is no regular file by now does not hold us up. */
+    /* What is no regular file does not hold us up. */
     const int file = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
     int error = file < 0 ? errno : add_open(print, file, buffer);
     if (file >= 0 && close(file) != 0 && error == 0) error = errno;

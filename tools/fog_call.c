@@ -27,6 +27,8 @@ enum {
     SCENE,
     SEED,
     TRANSMITTANCE,
+    SHARD,
+    RESUME,
     THREADS,
     QUIET,
     COUNT
@@ -75,6 +77,8 @@ const nb_option nb_fog_options[NB_FOG_OPTIONS] = {
     [TRANSMITTANCE] = {"transmittance", 0, "FILE",
                        "Writes what part of the light comes through, 0 to 1:\n.png, 16 bit gray (of colors the "
                        "luminance), or .exr."},
+    [SHARD] = NB_SHARD_OPTION,
+    [RESUME] = NB_RESUME_OPTION,
     [THREADS] = {"threads", 't', "N", "Threads, 0 for all (default). Any number gives the\nsame pictures."},
     [QUIET] = {"quiet", 'q', NULL, "No progress bar and no summary."},
 };
@@ -205,6 +209,16 @@ static void read_fog(nb_arguments *arguments, nb_fog_call *wanted)
     wanted->blends_stored = nb_options_choice(arguments, BLEND, spaces, 0);
 }
 
+/* ---- many processes -------------------------------------------------------------------------- */
+
+static void read_jobs(nb_arguments *arguments, nb_fog_call *wanted)
+{
+    static const int of_files[] = {SHARD, RESUME};
+    wanted->shard = nb_jobs_read_shard(arguments, SHARD);
+    wanted->resume = arguments->values[RESUME] != NULL;
+    nb_jobs_refuse_special(arguments, of_files, sizeof of_files / sizeof *of_files, wanted->patterns.output);
+}
+
 /* ---- all of it ------------------------------------------------------------------------------- */
 
 static void need(nb_arguments *arguments, int option)
@@ -235,6 +249,7 @@ int nb_fog_call_read(nb_arguments *arguments, nb_fog_call *wanted)
     read_policies(arguments, wanted);
     read_camera(arguments, wanted);
     read_fog(arguments, wanted);
+    read_jobs(arguments, wanted);
     wanted->threads = (int)nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
     if (wanted->threads == 0) wanted->threads = nb_workers_available();
     wanted->quiet = arguments->values[QUIET] != NULL;

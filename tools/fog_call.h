@@ -3,11 +3,12 @@
 #define NB_FOG_CALL_H
 
 #include "fog_names.h"
+#include "jobs.h"
 #include "options.h"
 
 #include <nebel/photograph.h>
 
-enum { NB_FOG_OPTIONS = 21 };
+enum { NB_FOG_OPTIONS = 23 };
 
 /* What becomes of pixels of unknown depth. */
 typedef enum nb_fog_unknown { NB_FOG_FILL = 0, NB_FOG_FAR, NB_FOG_KEEP } nb_fog_unknown;
@@ -27,6 +28,8 @@ typedef struct nb_fog_call {
     int blends_stored;  /* sRGB as it stands; 0: light */
     nb_fog_unknown unknown;
     double sky; /* m, of pixels where nothing is: INFINITY, or NaN to keep them */
+    nb_shard shard;
+    int resume; /* results that are there already, made from the same, stay */
     int threads;
     int quiet;
 } nb_fog_call;

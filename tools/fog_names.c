@@ -53,18 +53,21 @@ static char *fill_stars(const char *pattern, const parts *of)
     return name;
 }
 
-static void free_files(nb_fog_files *files)
+char **nb_fog_names_of(nb_fog_files *files, int i)
 {
-    free(files->image);
-    free(files->depth);
-    free(files->output);
-    free(files->camera);
-    free(files->transmittance);
+    char **const names[NB_FOG_NAMES] = {&files->image, &files->depth, &files->output, &files->camera,
+                                        &files->transmittance};
+    return names[i];
+}
+
+void nb_fog_names_free_one(nb_fog_files *files)
+{
+    for (int i = 0; i < NB_FOG_NAMES; i++) free(*nb_fog_names_of(files, i));
 }
 
 void nb_fog_names_free(nb_fog_list *list)
 {
-    for (size_t i = 0; i < list->count; i++) free_files(&list->files[i]);
+    for (size_t i = 0; i < list->count; i++) nb_fog_names_free_one(&list->files[i]);
     free(list->files);
     *list = (nb_fog_list){0};
 }
@@ -91,7 +94,7 @@ static int add_files(const nb_fog_patterns *patterns, const char *image, const p
                      (files.camera != NULL) == (patterns->camera != NULL) &&
                      (files.transmittance != NULL) == (patterns->transmittance != NULL);
     if (!good) {
-        free_files(&files);
+        nb_fog_names_free_one(&files);
         return fail_memory();
     }
     list->files[list->count++] = files;
@@ -302,42 +305,56 @@ static void note_place(const char *path, place *places, size_t *count)
     places[(*count)++] = (place){status.st_dev, status.st_ino};
 }
 
-static int check_spared(const char *path, const place *places, size_t count)
+static int is_read(const char *path, const place *places, size_t count)
 {
     place at;
     size_t found = 0;
     note_place(path, &at, &found);
-    if (found == 0 || bsearch(&at, places, count, sizeof *places, compare_places) == NULL) return NB_DONE;
-    return nb_report_failure("fog: cannot write \"%s\": it is one of the files that are read; name another file", path);
+    return found > 0 && bsearch(&at, places, count, sizeof *places, compare_places) != NULL;
 }
 
-static int check_sources(const nb_fog_list *list, const char *scene)
+/* Marks what is refused. One message where that is all, as by a pattern that is wrong. */
+static int refuse_read(nb_fog_list *list, const place *places, size_t count)
 {
-    place *const places = malloc((3 * list->count + 1) * sizeof *places);
+    size_t refused = 0;
+    for (size_t i = 0; i < list->count; i++) {
+        nb_fog_files *const files = &list->files[i];
+        if (is_read(files->output, places, count))
+            files->refused = files->output;
+        else if (is_read(files->transmittance, places, count))
+            files->refused = files->transmittance;
+        refused += files->refused != NULL;
+    }
+    if (refused < list->count) return NB_DONE;
+    return nb_report_failure("fog: " NB_FOG_REFUSAL, list->files[0].refused);
+}
+
+static int check_sources(nb_fog_list *list, const char *scene, const nebel_scene_data *contents)
+{
+    const size_t scene_files = contents != NULL ? contents->file_count : 0;
+    place *const places = malloc((3 * list->count + scene_files + 1) * sizeof *places);
     if (places == NULL) return fail_memory();
     size_t count = 0;
-    int status = NB_DONE;
     note_place(scene, places, &count);
+    for (size_t i = 0; i < scene_files; i++) note_place(contents->files[i], places, &count);
     for (size_t i = 0; i < list->count; i++) {
         note_place(list->files[i].image, places, &count);
         note_place(list->files[i].depth, places, &count);
         note_place(list->files[i].camera, places, &count);
     }
     qsort(places, count, sizeof *places, compare_places);
-    for (size_t i = 0; i < list->count && status == NB_DONE; i++) {
-        status = check_spared(list->files[i].output, places, count);
-        if (status == NB_DONE) status = check_spared(list->files[i].transmittance, places, count);
-    }
+    const int status = refuse_read(list, places, count);
     free(places);
     return status;
 }
 
-int nb_fog_names_list(const nb_fog_patterns *patterns, const char *scene, nb_fog_list *list)
+int nb_fog_names_list(const nb_fog_patterns *patterns, const char *scene, const nebel_scene_data *contents,
+                      nb_fog_list *list)
 {
     int status = NB_DONE;
     *list = (nb_fog_list){0};
     for (int i = 0; i < patterns->image_count && status == NB_DONE; i++)
         status = add_operand(patterns, patterns->images[i], list);
     if (status == NB_DONE) status = check_twice(list);
-    return status == NB_DONE ? check_sources(list, scene) : status;
+    return status == NB_DONE ? check_sources(list, scene, contents) : status;
 }

@@ -2,12 +2,20 @@
 #ifndef NB_FOG_NAMES_H
 #define NB_FOG_NAMES_H
 
+#include <nebel/scene.h>
+
 #include <stddef.h>
 
 typedef struct nb_fog_files {
     char *image, *depth, *output;
     char *camera, *transmittance; /* NULL: none */
+    const char *refused;          /* of the results one that would take the place of something that is read; NULL: none */
 } nb_fog_files;
+
+/* The names one by one, the first from 0. */
+enum { NB_FOG_NAMES = 5 };
+char **nb_fog_names_of(nb_fog_files *files, int i);
+void nb_fog_names_free_one(nb_fog_files *files);
 
 typedef struct nb_fog_list {
     nb_fog_files *files; /* by the operand that they come from, then by name */
@@ -24,8 +32,12 @@ typedef struct nb_fog_patterns {
 } nb_fog_patterns;
 
 /* NB_DONE; NB_FAILED or NB_MISUSED after a message: an operand that no file matches, stars that do not fit, one name for two
- * results, or a result in the place of something that is read; `scene` (NULL: none) is read, too. */
-int nb_fog_names_list(const nb_fog_patterns *patterns, const char *scene, nb_fog_list *list);
+ * results, or all results in the place of something that is read; `scene` (NULL: none) is read, too, with its files. */
+int nb_fog_names_list(const nb_fog_patterns *patterns, const char *scene, const nebel_scene_data *contents,
+                      nb_fog_list *list);
+
+/* What there is to say of a refused result, by its name. */
+#define NB_FOG_REFUSAL "cannot write \"%s\": it is one of the files that are read; name another file"
 
 /* Fine with what a failed call left. */
 void nb_fog_names_free(nb_fog_list *list);

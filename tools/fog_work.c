@@ -1,6 +1,7 @@
 #include "fog_work.h"
 
 #include "interrupt.h"
+#include "record.h"
 #include "workers.h"
 
 #include <math.h>
@@ -19,7 +20,9 @@ typedef struct work {
     nebel_depth_map depth;
     nebel_intrinsics camera;
     int has_camera;
-    float *transmittance; /* three a pixel; NULL: not wanted */
+    int needs_picture, needs_transmittance; /* which is not there */
+    nb_fog_records records;
+    float *transmittance; /* three a pixel; NULL: not needed */
     nebel_snapshot *own_fog;
     nebel_pixels pixels;
     nb_fog_tale *tale;
@@ -62,8 +65,6 @@ static int read_picture(work *w)
                     files->output);
     if (is_float(w) && w->shared->wanted->blends_stored)
         return fail(w, "%s: floats are light, which --blend srgb does not mean; leave it out", files->image);
-    w->tale->width = w->photograph.width;
-    w->tale->height = w->photograph.height;
     return NB_DONE;
 }
 
@@ -112,9 +113,9 @@ static int read_depth(work *w)
         return fail(w, "%s: the picture is %u x %u pixels, its depth \"%s\" %u x %u; both must have one size",
                     w->files->image, (unsigned)w->photograph.width, (unsigned)w->photograph.height, w->files->depth,
                     (unsigned)map->width, (unsigned)map->height);
-    const double count = (double)map->width * map->height;
-    w->tale->unknown = (double)map->unknown_count / count;
-    w->tale->infinite = (double)map->infinite_count / count;
+    w->tale->pixels = (size_t)map->width * map->height;
+    w->tale->unknown = map->unknown_count;
+    w->tale->infinite = map->infinite_count;
     follow_policies(w);
     return NB_DONE;
 }
@@ -158,22 +159,12 @@ static int make_fog(work *w)
     return judge(w, w->files->image, result);
 }
 
-/* Of the name without its folder, so that it does not matter where pictures lie. FNV-1a: Fowler, Noll and Vo. */
-static uint32_t hash_name(const char *path)
-{
-    const char *const slash = strrchr(path, '/');
-    uint32_t hash = 2166136261u;
-    for (const char *at = slash != NULL ? slash + 1 : path; *at != '\0'; at++)
-        hash = (hash ^ (unsigned char)*at) * 16777619u;
-    return hash;
-}
-
 static int choose_fog(work *w)
 {
     const nb_fog_call *const wanted = w->shared->wanted;
     if (w->shared->scene == NULL) return make_fog(w);
     if (!wanted->has_seed) return NB_DONE;
-    const uint32_t seed = wanted->seed ^ hash_name(w->files->image);
+    const uint32_t seed = nb_fog_record_seed(wanted, w->files->image);
     return judge(w, wanted->scene, nebel_commit_scene_fog_anew(w->shared->scene, 0, seed, &w->own_fog));
 }
 
@@ -204,9 +195,11 @@ static void fog_rows(int worker, int count, void *user)
 {
     enum { BAND = 16 };
     const rows *const all = user;
+    const nb_fog_shared *const shared = all->work->shared;
     nebel_pixels part = all->work->pixels;
     for (uint32_t first = (uint32_t)worker * BAND; first < part.height; first += (uint32_t)count * BAND) {
         if (nb_interrupt_is_requested()) return;
+        shared->answer(shared->user);
         part.first_row = first;
         part.row_count = part.height - first < BAND ? part.height - first : BAND;
         const nebel_result result = nebel_fog_pixels(all->fog, NEBEL_ISA_DEFAULT, &part);
@@ -239,7 +232,7 @@ static int add_fog(work *w)
 static int allocate_transmittance(work *w)
 {
     const size_t count = (size_t)w->photograph.width * w->photograph.height;
-    if (w->files->transmittance == NULL) return NB_DONE;
+    if (!w->needs_transmittance) return NB_DONE;
     if (count <= SIZE_MAX / (3 * sizeof(float))) w->transmittance = malloc(count * 3 * sizeof(float));
     return w->transmittance != NULL ? NB_DONE : fail(w, "%s: out of memory", w->files->transmittance);
 }
@@ -247,50 +240,79 @@ static int allocate_transmittance(work *w)
 static nebel_result write_transmittance(const work *w)
 {
     const char *const path = w->files->transmittance;
+    const char *const record = w->shared->start != NULL ? w->records.transmittance : NULL;
     const uint32_t width = w->photograph.width, height = w->photograph.height;
     float *const t = w->transmittance;
     if (nebel_find_image_format(path) == NEBEL_IMAGE_EXR) {
         const nebel_photograph picture = {width, height, NEBEL_PIXEL_RGB_FLOAT, t};
-        return nebel_write_photograph(path, &w->host, &picture);
+        return nebel_write_photograph(path, &w->host, &picture, record);
     }
     for (size_t i = 0; i < (size_t)width * height; i++) /* luminance, ITU-R BT.709 */
         t[i] = 0.2126f * t[3 * i] + 0.7152f * t[3 * i + 1] + 0.0722f * t[3 * i + 2];
-    return nebel_write_gray(path, &w->host, width, height, t);
+    return nebel_write_gray(path, &w->host, width, height, t, record);
 }
 
-static int write_results(work *w)
+static nebel_result write_picture(const work *w)
 {
-    const nb_fog_files *const files = w->files;
-    w->shared->hold(1);
-    nebel_result result = nebel_write_photograph(files->output, &w->host, &w->photograph);
-    const char *path = files->output;
-    if (result == NEBEL_OK && files->transmittance != NULL) {
-        path = files->transmittance;
-        result = write_transmittance(w);
-    }
-    w->shared->hold(0);
-    return judge(w, path, result);
+    const char *const record = w->shared->start != NULL ? w->records.picture : NULL;
+    return nebel_write_photograph(w->files->output, &w->host, &w->photograph, record);
 }
 
-/* Before the work. */
-static int check_results(work *w)
+static nebel_result check_picture(const work *w)
+{
+    return nebel_check_image_path(w->files->output, &w->host);
+}
+
+static nebel_result check_transmittance(const work *w)
+{
+    return nebel_check_image_path(w->files->transmittance, &w->host);
+}
+
+typedef nebel_result result_fn(const work *w);
+
+/* With those results that are needed. */
+static int do_results(work *w, result_fn *with_picture, result_fn *with_transmittance)
 {
     const char *path = w->files->output;
+    nebel_result result = NEBEL_OK;
     w->shared->hold(1);
-    nebel_result result = nebel_check_image_path(path, &w->host);
-    if (result == NEBEL_OK && w->files->transmittance != NULL) {
+    if (w->needs_picture) result = with_picture(w);
+    if (result == NEBEL_OK && w->needs_transmittance) {
         path = w->files->transmittance;
-        result = nebel_check_image_path(path, &w->host);
+        result = with_transmittance(w);
     }
     w->shared->hold(0);
+    w->tale->cannot_write = result == NEBEL_ERROR_FILE;
     return judge(w, path, result);
+}
+
+/* Which results are missing, or made from something else. What is read later than this leaves a record that is older, so that a file
+ * that changes in between makes the result a stale one. */
+static void find_needs(work *w)
+{
+    const nb_fog_shared *const shared = w->shared;
+    const nb_fog_files *const files = w->files;
+    w->needs_picture = 1;
+    w->needs_transmittance = files->transmittance != NULL;
+    if (shared->start == NULL) return;
+    nb_fingerprint print = *shared->start;
+    nb_fog_record_add(&print, shared->wanted, files);
+    w->records = nb_fog_record_write(&print);
+    if (!shared->wanted->resume) return;
+    w->needs_picture = !nb_record_is_in(files->output, w->records.picture);
+    if (w->needs_transmittance)
+        w->needs_transmittance = !nb_record_is_in(files->transmittance, w->records.transmittance);
+    w->tale->is_kept = !w->needs_picture && !w->needs_transmittance;
 }
 
 /* ---- all of it ------------------------------------------------------------------------------- */
 
 static int run(work *w)
 {
-    int status = check_results(w);
+    if (w->files->refused != NULL) return fail(w, NB_FOG_REFUSAL, w->files->refused);
+    find_needs(w);
+    if (w->tale->is_kept) return NB_DONE;
+    int status = do_results(w, check_picture, check_transmittance); /* before the work */
     if (status == NB_DONE) status = read_picture(w);
     if (status == NB_DONE) status = find_camera(w);
     if (status == NB_DONE) status = read_depth(w);
@@ -298,7 +320,7 @@ static int run(work *w)
     if (status == NB_DONE) status = choose_fog(w);
     if (status == NB_DONE) status = allocate_transmittance(w);
     if (status == NB_DONE) status = add_fog(w);
-    return status == NB_DONE ? write_results(w) : status;
+    return status == NB_DONE ? do_results(w, write_picture, write_transmittance) : status;
 }
 
 int nb_fog_work(const nb_fog_shared *shared, const nb_fog_files *files, nb_report_listener *listener, nb_fog_tale *tale)

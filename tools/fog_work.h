@@ -3,6 +3,7 @@
 #define NB_FOG_WORK_H
 
 #include "fog_call.h"
+#include "fog_record.h"
 #include "report.h"
 
 /* What all pictures share. */
@@ -12,15 +13,19 @@ typedef struct nb_fog_shared {
     const nebel_snapshot *scene_fog;  /* NULL: fog of one density, made for each picture */
     const nebel_camera *scene_camera; /* the same */
     double scene_fov;                 /* degrees from top to bottom, where no camera is given */
+    const nb_fingerprint *start;      /* of the records; NULL: there are none */
     int row_threads;                  /* for the rows of a picture */
     void (*hold)(int is_held);        /* called around writing files */
+    void (*answer)(void *user);       /* called now and then */
+    void *user;
 } nb_fog_shared;
 
 /* What there is to tell of a picture. */
 typedef struct nb_fog_tale {
-    uint32_t width, height;
-    double unknown, infinite; /* parts of the pixels, 0 to 1 */
-    double airlight[3];       /* as the picture stores it */
+    size_t pixels, unknown, infinite; /* the latter two of the pixels */
+    double airlight[3];               /* as the picture stores it */
+    int is_kept;                      /* all was there already, and nothing was done */
+    int cannot_write;                 /* why it has failed */
 } nb_fog_tale;
 
 /* NB_DONE; or NB_FAILED with the reason in listener->kept, whose mode is KEEP. Any thread. */

@@ -3,7 +3,9 @@
 #include "decimal.h"
 #include "ranks.h"
 #include "report.h"
+#include "target.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,6 +29,13 @@ nb_shard nb_jobs_read_shard(nb_arguments *arguments, int option)
     return shard;
 }
 
+void nb_jobs_refuse_special(nb_arguments *arguments, const int *options, size_t option_count, const char *output)
+{
+    for (size_t i = 0; i < option_count; i++)
+        if (arguments->values[options[i]] != NULL && output != NULL && nb_target_is_special(output))
+            nb_options_refuse(arguments, options[i], "is for pictures in files; leave it out, or name a file");
+}
+
 nb_jobs nb_jobs_of(const nb_shard *shard)
 {
     return (nb_jobs){.shard = *shard, .is_chief = 1};
@@ -41,6 +50,20 @@ int nb_jobs_join(nb_jobs *jobs)
     return status;
 }
 
+int nb_jobs_copy_first(const nb_jobs *jobs, int status, char **bytes, size_t *size)
+{
+    if (!jobs->is_joined) return status;
+    const int worst = nb_ranks_agree(status, "");
+    if (worst != NB_DONE) return worst;
+    uint64_t length = *size;
+    nb_ranks_copy_first(&length, sizeof length);
+    if (!jobs->is_chief) *bytes = malloc((size_t)length + 1);
+    *size = (size_t)length;
+    const int has_room = nb_ranks_agree(*bytes != NULL ? NB_DONE : nb_report_failure("out of memory"), "");
+    if (has_room == NB_DONE) nb_ranks_copy_first(*bytes, *size);
+    return has_room;
+}
+
 int nb_jobs_are_shared(const nb_jobs *jobs)
 {
     return jobs->is_joined || jobs->shard.count > 0;
@@ -51,9 +74,9 @@ int nb_jobs_begin(nb_jobs *jobs, uint64_t count, uint64_t group, int status, con
     jobs->count = count;
     jobs->group = group;
     jobs->next = jobs->shard.number;
-    if (!jobs->is_joined) return status;
-    const int worst = nb_ranks_agree(status, same);
-    if (worst == NB_DONE) nb_ranks_open_counters(NB_RANKS_FIRST_GROUP + (count + group - 1) / group);
+    const int worst = jobs->is_joined ? nb_ranks_agree(status, same) : status;
+    jobs->has_begun = worst == NB_DONE;
+    if (jobs->has_begun && jobs->is_joined) nb_ranks_open_counters(NB_RANKS_FIRST_GROUP + (count + group - 1) / group);
     return worst;
 }
 
@@ -93,6 +116,12 @@ int nb_jobs_finish(nb_jobs *jobs, uint64_t item, int is_kept)
     return nb_ranks_add(NB_RANKS_FIRST_GROUP + group, 1) + 1 == size;
 }
 
+void nb_jobs_fail(nb_jobs *jobs)
+{
+    jobs->failed++;
+    if (jobs->is_joined) (void)nb_ranks_add(NB_RANKS_FAILED, 1);
+}
+
 void nb_jobs_answer(const nb_jobs *jobs)
 {
     if (jobs->is_joined) nb_ranks_answer();
@@ -102,6 +131,7 @@ static void sum_up(nb_jobs *jobs)
 {
     jobs->all_made = jobs->is_joined ? nb_ranks_add(NB_RANKS_MADE, 0) : jobs->made;
     jobs->all_kept = jobs->is_joined ? nb_ranks_add(NB_RANKS_KEPT, 0) : jobs->kept;
+    jobs->all_failed = jobs->is_joined ? nb_ranks_add(NB_RANKS_FAILED, 0) : jobs->failed;
 }
 
 static uint64_t count_own(const nb_jobs *jobs)
@@ -110,13 +140,30 @@ static uint64_t count_own(const nb_jobs *jobs)
     return jobs->count > jobs->shard.number ? (jobs->count - jobs->shard.number + step - 1) / step : 0;
 }
 
+uint64_t nb_jobs_even_share(const nb_jobs *jobs)
+{
+    const uint64_t processes = jobs->is_joined ? (uint64_t)nb_ranks_count() : 1;
+    return (count_own(jobs) + processes - 1) / processes;
+}
+
 double nb_jobs_share(nb_jobs *jobs, double of_item, uint64_t *done, uint64_t *all)
 {
     sum_up(jobs);
     const uint64_t count = jobs->is_joined ? jobs->count : count_own(jobs);
-    *done = jobs->all_made;
+    *done = jobs->all_made + jobs->all_failed;
     *all = count - jobs->all_kept;
     return *all > 0 ? ((double)*done + of_item) / (double)*all : 1;
+}
+
+void nb_jobs_show(nb_jobs *jobs, nb_meter *meter, const char *what, double of_item)
+{
+    uint64_t done, count;
+    const double share = nb_jobs_share(jobs, of_item, &done, &count);
+    char label[64] = "";
+    if (count > 1)
+        (void)snprintf(label, sizeof label, "%s %llu of %llu", what, (unsigned long long)(done < count ? done + 1 : count),
+                       (unsigned long long)count);
+    nb_meter_show(meter, share, label);
 }
 
 int nb_jobs_end(nb_jobs *jobs, int status)
@@ -126,8 +173,18 @@ int nb_jobs_end(nb_jobs *jobs, int status)
         return status;
     }
     const int worst = nb_ranks_agree(status, "");
-    if (worst == NB_DONE) sum_up(jobs);
+    if (jobs->has_begun) sum_up(jobs);
+    nb_ranks_sum(jobs->sums, NB_JOBS_SUMS);
     nb_ranks_end();
     jobs->is_joined = 0;
     return worst;
+}
+
+void nb_jobs_describe(const nb_jobs *jobs, const char *what, char *text, size_t size)
+{
+    const unsigned long long kept = jobs->all_kept, count = jobs->all_made + kept, failed = jobs->all_failed;
+    char there[48] = "", lost[48] = "";
+    if (kept > 0) (void)snprintf(there, sizeof there, ", %llu of them there already", kept);
+    if (failed > 0) (void)snprintf(lost, sizeof lost, ", %llu failed", failed);
+    (void)snprintf(text, size, "%llu %s%s%s%s", count, what, count == 1 ? "" : "s", there, lost);
 }

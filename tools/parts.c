@@ -1,7 +1,9 @@
 #define _POSIX_C_SOURCE 200809L
 #include "parts.h"
 
+#include "folder.h"
 #include "interrupt.h"
+#include "record.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -9,7 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 /* FILE.parts/TEXT; free it. */
@@ -38,22 +39,20 @@ int nb_parts_make_folder(const nb_parts *parts)
     char *const folder = name_in_folder(parts, "");
     if (folder == NULL) return NB_FAILED;
     folder[strlen(folder) - 1] = '\0';
-    const int is_there = mkdir(folder, 0777) == 0 || errno == EEXIST;
-    const int status =
-        is_there ? NB_DONE : nb_report_failure("cannot make the folder \"%s\": %s", folder, strerror(errno));
+    const int status = nb_folder_make(folder);
     free(folder);
     return status;
 }
 
 int nb_parts_have(const nb_parts *parts, uint32_t part)
 {
-    char wanted[NEBEL_MAX_RECORD + 1], found[NEBEL_MAX_RECORD + 1];
+    char wanted[NEBEL_MAX_RECORD + 1];
     char *const name = nb_parts_name(parts, part);
     if (name == NULL) return 0;
     parts->record(parts->user, part, wanted);
-    (void)nebel_read_record(name, found);
+    const int has = nb_record_is_in(name, wanted);
     free(name);
-    return strcmp(wanted, found) == 0;
+    return has;
 }
 
 int nb_parts_have_all(const nb_parts *parts)

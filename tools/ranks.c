@@ -87,15 +87,34 @@ static int find_worst(int status)
     return worst;
 }
 
+void nb_ranks_copy_first(void *bytes, size_t size)
+{
+    enum { MOST_AT_ONCE = 1 << 28 }; /* MPI counts with int */
+    char *at = bytes;
+    while (size > 0) {
+        const size_t part = size < MOST_AT_ONCE ? size : MOST_AT_ONCE;
+        MPI_Request request;
+        (void)MPI_Ibcast(at, (int)part, MPI_BYTE, 0, MPI_COMM_WORLD, &request);
+        wait_for(&request);
+        at += part;
+        size -= part;
+    }
+}
+
+void nb_ranks_sum(uint64_t *numbers, int number_count)
+{
+    MPI_Request request;
+    (void)MPI_Iallreduce(MPI_IN_PLACE, numbers, number_count, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD, &request);
+    wait_for(&request);
+}
+
 int nb_ranks_agree(int status, const char *same)
 {
     const int worst = find_worst(status);
     if (worst != NB_DONE) return worst;
     char of_first[SAME_SIZE] = "";
-    MPI_Request request;
     if (own == 0) (void)snprintf(of_first, sizeof of_first, "%s", same);
-    (void)MPI_Ibcast(of_first, SAME_SIZE, MPI_CHAR, 0, MPI_COMM_WORLD, &request);
-    wait_for(&request);
+    nb_ranks_copy_first(of_first, sizeof of_first);
     const int differ = find_worst(strcmp(of_first, same) != 0);
     if (!differ) return NB_DONE;
     if (own == 0)
@@ -170,6 +189,16 @@ int nb_ranks_agree(int status, const char *same)
 {
     (void)same;
     return status;
+}
+
+void nb_ranks_copy_first(void *bytes, size_t size)
+{
+    (void)bytes, (void)size;
+}
+
+void nb_ranks_sum(uint64_t *numbers, int number_count)
+{
+    (void)numbers, (void)number_count;
 }
 
 int nb_ranks_open_counters(uint64_t number)

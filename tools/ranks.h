@@ -2,10 +2,11 @@
 #ifndef NB_RANKS_H
 #define NB_RANKS_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 /* What shares the work of a job. Behind them stands one counter for each group of items. */
-enum { NB_RANKS_NEXT, NB_RANKS_MADE, NB_RANKS_KEPT, NB_RANKS_FIRST_GROUP };
+enum { NB_RANKS_NEXT, NB_RANKS_MADE, NB_RANKS_KEPT, NB_RANKS_FAILED, NB_RANKS_FIRST_GROUP };
 
 /* The library of MPI, "Open MPI 4.1.4"; NULL: this build has none. */
 const char *nb_ranks_library(void);
@@ -23,6 +24,12 @@ int nb_ranks_count(void);
 /* The worst of the statuses of all, for all. `same` must be the same text for all where none has failed: NB_FAILED
  * otherwise, which the first rank reports. All of them ask; who comes early sleeps. */
 int nb_ranks_agree(int status, const char *same);
+
+/* The bytes of the first rank for all, which know how many there are. All of them ask. */
+void nb_ranks_copy_first(void *bytes, size_t size);
+
+/* Adds up the numbers of all, for all. All of them ask. */
+void nb_ranks_sum(uint64_t *numbers, int number_count);
 
 /* Makes counters, 0 at first. All of them do. Returns whether there is memory. */
 int nb_ranks_open_counters(uint64_t count);

@@ -7,7 +7,6 @@
 #include "pattern.h"
 #include "reader.h"
 #include "report.h"
-#include "target.h"
 #include "workers.h"
 
 #include <string.h>
@@ -100,7 +99,7 @@ const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
     [SEED] = {"seed", 0, "N",
               "With --method reference: 0 to 4294967295; other\nseeds give independent pictures. Default: 0."},
     [SHARD] = NB_SHARD_OPTION,
-    [RESUME] = {"resume", 0, NULL, "Leaves what is there already, whole and made from\nthe same files and options."},
+    [RESUME] = NB_RESUME_OPTION,
     [BANDS] = {"bands", 0, "ROWS",
                "Renders a picture in bands of so many rows, a\nmultiple of 64, in memory for one of them. Default:\n"
                "none; of one picture with --shard, --resume or MPI\nas many as have 2^18 pixels."},
@@ -304,9 +303,7 @@ static void read_jobs(nb_arguments *arguments, nb_render_call *wanted)
     if (wanted->band_rows > 0 && wanted->gl)
         nb_options_refuse(arguments, BANDS,
                           "is for --device cpu: OpenGL draws a picture as a whole; leave it out with gl");
-    for (size_t i = 0; i < sizeof of_files / sizeof *of_files; i++)
-        if (arguments->values[of_files[i]] != NULL && wanted->output != NULL && nb_target_is_special(wanted->output))
-            nb_options_refuse(arguments, of_files[i], "is for pictures in files; leave it out, or name a file");
+    nb_jobs_refuse_special(arguments, of_files, sizeof of_files / sizeof *of_files, wanted->output);
 }
 
 int nb_render_call_read(nb_arguments *arguments, nb_render_call *wanted)

@@ -1,17 +1,17 @@
 #define _POSIX_C_SOURCE 200809L
 #include "render_out.h"
 
+#include "folder.h"
 #include "interrupt.h"
 #include "parts.h"
 #include "pattern.h"
+#include "record.h"
 #include "target.h"
 
 #include <nebel/nebel.h>
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 /* Pixels of a band where nobody says how many rows it has: a few megabytes, and seconds of work. */
 enum { BAND_PIXELS = 1 << 18 };
@@ -88,7 +88,8 @@ static char *name_picture(const nb_render_call *wanted, uint32_t frame)
 static int check_picture(const nb_render_call *wanted, uint32_t frame)
 {
     char *const name = name_picture(wanted, frame);
-    const int status = name != NULL ? nb_target_check(name) : NB_FAILED;
+    int status = name != NULL ? nb_folder_make_for(name) : NB_FAILED;
+    if (status == NB_DONE) status = nb_target_check(name);
     free(name);
     return status;
 }
@@ -99,7 +100,8 @@ int nb_render_out_check(const nb_render_out *out, const nb_jobs *jobs)
     const nb_render_call *const wanted = out->wanted;
     const uint32_t step = jobs->shard.count > 0 && count_bands(out) == 1 ? jobs->shard.count : 1;
     const uint32_t first = step > 1 ? jobs->shard.number : 0;
-    if (wanted->is_film || !jobs->is_chief) return NB_DONE; /* nebel_create_film does */
+    if (wanted->is_film) return nb_folder_make_for(wanted->output); /* nebel_create_film does the rest, in each process */
+    if (!jobs->is_chief) return NB_DONE;
     for (uint64_t i = first; i < count_frames(wanted); i += step) {
         if (nb_interrupt_is_requested()) break;
         const int status = check_picture(wanted, wanted->first_frame + (uint32_t)i);
@@ -164,36 +166,19 @@ static void add_options(const nb_render_call *wanted, const nebel_scene_data *co
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) nb_fingerprint_add_number(print, numbers[i]);
 }
 
-/* A file that cannot be read is a fact as well: the scene was loaded without it. */
-static void add_file(const char *path, nb_fingerprint *print)
-{
-    nb_fingerprint_add_whole(print, (uint64_t)nb_fingerprint_add_file(print, path));
-}
-
 int nb_render_out_sign(nb_render_out *out, const nebel_scene_data *contents)
 {
-    struct stat status;
     const nb_render_call *const wanted = out->wanted;
     const int needs_it = out->part_count > 0 || wanted->resume;
-    /* A pipe cannot be read twice. */
-    if (stat(wanted->scene, &status) != 0 || !S_ISREG(status.st_mode))
+    if (!nb_record_can_add_scene(wanted->scene))
         return needs_it ? nb_report_failure("render: %s: --shard, --resume, --bands and MPI need a scene in a file",
                                             wanted->scene)
                         : NB_DONE;
-    out->base = nb_fingerprint_start();
+    out->base = nb_record_start();
     out->has_base = 1;
-    nb_fingerprint_add_text(&out->base, nebel_version());
     add_options(wanted, contents, &out->base);
-    add_file(wanted->scene, &out->base);
-    for (size_t i = 0; i < contents->file_count; i++) add_file(contents->files[i], &out->base);
+    nb_record_add_scene(&out->base, wanted->scene, contents);
     return NB_DONE;
-}
-
-static void write_record(const nb_fingerprint *print, char record[NEBEL_MAX_RECORD + 1])
-{
-    char digits[NB_FINGERPRINT_TEXT];
-    nb_fingerprint_write(print, digits);
-    (void)snprintf(record, NEBEL_MAX_RECORD + 1, "nebel %.32s %s", nebel_version(), digits);
 }
 
 static nb_fingerprint print_picture(const nb_render_out *out, uint32_t frame)
@@ -217,7 +202,7 @@ static void record_file(const nb_render_out *out, uint32_t frame, char record[NE
         nb_fingerprint_add_number(&print, wanted->fps);
         nb_fingerprint_add_whole(&print, (uint64_t)wanted->quality);
     }
-    write_record(&print, record);
+    nb_record_write(&print, record);
 }
 
 /* Of a picture as a whole, or of its band. */
@@ -229,7 +214,7 @@ static void record_item(const nb_render_out *out, const nb_render_item *item, ch
         nb_fingerprint_add_whole(&print, item->window.top);
         nb_fingerprint_add_whole(&print, item->window.height);
     }
-    write_record(&print, record);
+    nb_record_write(&print, record);
 }
 
 void nb_render_out_name_job(const nb_render_out *out, char name[NEBEL_MAX_RECORD + 1])
@@ -242,7 +227,7 @@ void nb_render_out_name_job(const nb_render_out *out, char name[NEBEL_MAX_RECORD
     nb_fingerprint_add_whole(&print, out->wanted->last_frame);
     nb_fingerprint_add_whole(&print, out->band_rows);
     nb_fingerprint_add_whole(&print, (uint64_t)out->wanted->resume);
-    write_record(&print, name);
+    nb_record_write(&print, name);
 }
 
 /* ---- parts ----------------------------------------------------------------------------------- */
@@ -273,10 +258,9 @@ static nb_parts parts_of(group *of, const char *file)
 
 static int has_file(const nb_render_out *out, const char *name, uint32_t frame)
 {
-    char wanted[NEBEL_MAX_RECORD + 1], found[NEBEL_MAX_RECORD + 1];
+    char wanted[NEBEL_MAX_RECORD + 1];
     record_file(out, frame, wanted);
-    (void)nebel_read_record(name, found);
-    return strcmp(wanted, found) == 0;
+    return nb_record_is_in(name, wanted);
 }
 
 int nb_render_out_has(nb_render_out *out, const nb_render_item *item)

@@ -37,7 +37,7 @@ uint64_t nb_render_out_count_items(const nb_render_out *out);
 uint64_t nb_render_out_group(const nb_render_out *out); /* items of a file */
 nb_render_item nb_render_out_item(const nb_render_out *out, uint64_t number);
 
-/* Before minutes of work: whether everything has a place to go to. Messages, and NB_FAILED where not. */
+/* Before minutes of work: whether everything has a place to go to; folders are made. Messages, and NB_FAILED where not. */
 int nb_render_out_check(const nb_render_out *out, const nb_jobs *jobs);
 
 /* The same where the scene is known: nothing takes the place of what it reads. */

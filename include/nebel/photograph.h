@@ -13,7 +13,7 @@
  *                            .type = photograph.type, .srgb = 1, .color = photograph.pixels, .out = photograph.pixels};
  *     nebel_aim_pixels(&pixels, &camera, NULL);
  *     nebel_fog_pixels(fog, NEBEL_ISA_DEFAULT, &pixels);
- *     nebel_write_photograph("street_foggy.png", &host, &photograph);
+ *     nebel_write_photograph("street_foggy.png", &host, &photograph, NULL);
  *
  * Of nebel_scene_desc `allocator` and `log` are read. Messages begin with the file. All functions are thread safe. Link with
  * libnebel_scene and libnebel.
@@ -44,12 +44,14 @@ nebel_result nebel_read_photograph(const char *path, const nebel_scene_desc *des
 void nebel_free_photograph(const nebel_scene_desc *desc, nebel_photograph *photograph);
 
 /* Writes whole numbers to a .png in sRGB with the bits of the photograph, floats to an .exr. The file is replaced as by
- * nebel_write_image. Errors: ARGUMENT, FILE, FORMAT (another ending, or one that does not fit the numbers), LIMIT, MEMORY. */
-nebel_result nebel_write_photograph(const char *path, const nebel_scene_desc *desc, const nebel_photograph *photograph);
+ * nebel_write_image. `record` is that of nebel_image_desc: what the picture was made from, for nebel_read_record; NULL: none.
+ * Errors: ARGUMENT, FILE, FORMAT (another ending, or one that does not fit the numbers), LIMIT, MEMORY. */
+nebel_result nebel_write_photograph(const char *path, const nebel_scene_desc *desc, const nebel_photograph *photograph,
+                                    const char *record);
 
 /* Writes one number per pixel, 0 to 1, to a gray, linear PNG of 16 bits. Values outside are clamped. Errors: as above. */
 nebel_result nebel_write_gray(const char *path, const nebel_scene_desc *desc, uint32_t width, uint32_t height,
-                              const float *values);
+                              const float *values, const char *record);
 
 /* Estimates the color of endless fog from the dark channel of a photograph: 0 to 1 as the photograph stores it, or light if it
  * stores floats. The dark channel of a pixel is the smallest number within 15 x 15 pixels around it. The candidates are the

@@ -110,11 +110,9 @@ nebel_result nebel_add_film_picture(nebel_film *film, const nebel_image *image)
 nebel_result nebel_set_film_record(nebel_film *film, const char *record)
 {
     if (film == NULL || record == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (!nb_record_is_good(record))
-        return nb_fail(&film->codec.log, NEBEL_ERROR_ARGUMENT, "%s: a record is 1 to %d printable characters of ASCII",
-                       film->codec.name, NEBEL_MAX_RECORD);
-    memcpy(film->record, record, strlen(record) + 1);
-    return NEBEL_OK;
+    const nebel_result result = nb_record_check(&film->codec, record);
+    if (result == NEBEL_OK) memcpy(film->record, record, strlen(record) + 1);
+    return result;
 }
 
 static void put_number(uint32_t number, unsigned char bytes[4])

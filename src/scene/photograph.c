@@ -115,28 +115,41 @@ void nebel_free_photograph(const nebel_scene_desc *desc, nebel_photograph *photo
 /* ---- writing --------------------------------------------------------------------------------- */
 
 /* Opens the file, and gives it its name when `stored` is in it. */
-static nebel_result write_stored(const nb_codec *codec, const nb_stored *stored)
+static nebel_result write_stored(const nb_codec *codec, const nb_stored *stored, const char *record)
 {
     nb_sink *sink;
     nebel_result result = nb_sink_open(&codec->allocator, &codec->log, codec->name, &sink);
     if (result != NEBEL_OK) return result;
-    result = nb_png_write_stored(codec, stored, NULL, sink);
+    result = nb_png_write_stored(codec, stored, record, sink);
     if (result == NEBEL_OK || result == NEBEL_ERROR_FILE) result = nb_sink_finish(sink);
     nb_sink_close(sink);
     return result;
 }
 
-static nebel_result write_as(const nb_codec *codec, const nebel_scene_desc *desc, const nebel_photograph *photograph)
+static nebel_result write_light(const nb_codec *codec, const nebel_photograph *photograph, const char *record)
 {
     static const char *const names[] = {"R", "G", "B", "A"};
+    const nebel_image_desc desc = {.allocator = codec->allocator,
+                                   .log = codec->log,
+                                   .width = photograph->width,
+                                   .height = photograph->height,
+                                   .channel_count = photograph->type == NEBEL_PIXEL_RGB_FLOAT ? 3 : 4,
+                                   .channel_names = names,
+                                   .record = record};
+    nebel_image_writer *writer;
+    nebel_result result = nebel_create_image_writer(codec->name, &desc, &writer);
+    if (result == NEBEL_OK) result = nebel_add_image_rows(writer, photograph->height, photograph->pixels);
+    if (result == NEBEL_OK) result = nebel_finish_image(writer);
+    nebel_destroy_image_writer(writer);
+    return result;
+}
+
+static nebel_result write_as(const nb_codec *codec, const nebel_photograph *photograph, const char *record)
+{
     const nebel_image_format format = nebel_find_image_format(codec->name);
     nb_stored stored = {.width = photograph->width, .height = photograph->height, .pixels = photograph->pixels};
-    if (format == NEBEL_IMAGE_PNG && is_stored(photograph->type, &stored)) return write_stored(codec, &stored);
-    if (format == NEBEL_IMAGE_EXR && is_float(photograph->type)) {
-        const nebel_image image = {photograph->width, photograph->height,
-                                   photograph->type == NEBEL_PIXEL_RGB_FLOAT ? 3 : 4, names, photograph->pixels};
-        return nebel_write_image(codec->name, desc, &image);
-    }
+    if (format == NEBEL_IMAGE_PNG && is_stored(photograph->type, &stored)) return write_stored(codec, &stored, record);
+    if (format == NEBEL_IMAGE_EXR && is_float(photograph->type)) return write_light(codec, photograph, record);
     if (format == NEBEL_IMAGE_NONE)
         return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: unknown picture format; the name must end in .png or .exr",
                        codec->name);
@@ -144,25 +157,29 @@ static nebel_result write_as(const nb_codec *codec, const nebel_scene_desc *desc
                    "%s: a picture of whole numbers is written as .png, one of floats as .exr; name it so", codec->name);
 }
 
-static nebel_result check(const nb_codec *codec, uint32_t width, uint32_t height, const void *numbers)
+static nebel_result check(const nb_codec *codec, uint32_t width, uint32_t height, const void *numbers,
+                          const char *record)
 {
     if (numbers == NULL || width == 0 || height == 0)
         return nb_fail(&codec->log, NEBEL_ERROR_ARGUMENT, "%s: the picture has no pixels", codec->name);
-    return nb_codec_check_size(codec, width, height, 4);
+    const nebel_result result = nb_codec_check_size(codec, width, height, 4);
+    return result == NEBEL_OK ? nb_record_check(codec, record) : result;
 }
 
-nebel_result nebel_write_photograph(const char *path, const nebel_scene_desc *desc, const nebel_photograph *photograph)
+nebel_result nebel_write_photograph(const char *path, const nebel_scene_desc *desc, const nebel_photograph *photograph,
+                                    const char *record)
 {
     nb_codec codec;
     if (path == NULL || desc == NULL || photograph == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = nb_codec_prepare(desc, path, &codec);
-    if (result == NEBEL_OK) result = check(&codec, photograph->width, photograph->height, photograph->pixels);
-    return result == NEBEL_OK ? write_as(&codec, desc, photograph) : result;
+    if (result == NEBEL_OK) result = check(&codec, photograph->width, photograph->height, photograph->pixels, record);
+    return result == NEBEL_OK ? write_as(&codec, photograph, record) : result;
 }
 
 /* ---- one number a pixel ---------------------------------------------------------------------- */
 
-static nebel_result write_gray_png(const nb_codec *codec, uint32_t width, uint32_t height, const float *values)
+static nebel_result write_gray_png(const nb_codec *codec, uint32_t width, uint32_t height, const float *values,
+                                   const char *record)
 {
     const size_t count = (size_t)width * height;
     uint16_t *numbers = nb_allocate(&codec->allocator, count, sizeof *numbers);
@@ -172,19 +189,19 @@ static nebel_result write_gray_png(const nb_codec *codec, uint32_t width, uint32
         numbers[i] = (uint16_t)(inside * 65535.0f + 0.5f);
     }
     const nb_stored stored = {width, height, 16, 1, (unsigned char *)numbers};
-    const nebel_result result = write_stored(codec, &stored);
+    const nebel_result result = write_stored(codec, &stored, record);
     nb_release(&codec->allocator, numbers);
     return result;
 }
 
 nebel_result nebel_write_gray(const char *path, const nebel_scene_desc *desc, uint32_t width, uint32_t height,
-                              const float *values)
+                              const float *values, const char *record)
 {
     nb_codec codec;
     if (path == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = nb_codec_prepare(desc, path, &codec);
-    if (result == NEBEL_OK) result = check(&codec, width, height, values);
+    if (result == NEBEL_OK) result = check(&codec, width, height, values, record);
     if (result == NEBEL_OK && nebel_find_image_format(path) != NEBEL_IMAGE_PNG)
         result = nb_fail(&codec.log, NEBEL_ERROR_FORMAT, "%s: gray is written as .png; name it so", path);
-    return result == NEBEL_OK ? write_gray_png(&codec, width, height, values) : result;
+    return result == NEBEL_OK ? write_gray_png(&codec, width, height, values, record) : result;
 }

@@ -19,12 +19,19 @@ static nebel_result fail_ending(const nb_codec *codec)
                    codec->name);
 }
 
-bool nb_record_is_good(const char *record)
+static bool is_good(const char *record)
 {
     size_t size = 0;
     for (; record[size] != '\0'; size++)
         if (size == NEBEL_MAX_RECORD || record[size] < 0x20 || record[size] > 0x7e) return false;
     return size > 0;
+}
+
+nebel_result nb_record_check(const nb_codec *codec, const char *record)
+{
+    if (record == NULL || is_good(record)) return NEBEL_OK;
+    return nb_fail(&codec->log, NEBEL_ERROR_ARGUMENT, "%s: a record is 1 to %d printable characters of ASCII",
+                   codec->name, NEBEL_MAX_RECORD);
 }
 
 static nebel_result begin(nebel_image_writer *writer)
@@ -50,9 +57,7 @@ static nebel_result check_plan(const nb_codec *codec, const nb_picture_plan *pla
     float none;
     const nebel_image image = {plan->width, plan->height, plan->channel_count, plan->channel_names, &none};
     const nebel_result result = nb_image_check(codec, &image);
-    if (result != NEBEL_OK || plan->record == NULL || nb_record_is_good(plan->record)) return result;
-    return nb_fail(&codec->log, NEBEL_ERROR_ARGUMENT, "%s: a record is 1 to %d printable characters of ASCII",
-                   codec->name, NEBEL_MAX_RECORD);
+    return result == NEBEL_OK ? nb_record_check(codec, plan->record) : result;
 }
 
 nebel_result nebel_create_image_writer(const char *path, const nebel_image_desc *desc, nebel_image_writer **writer)

@@ -14,8 +14,8 @@ typedef struct nb_picture_plan {
 /* The name of the record in files: key of PNG's text, attribute of OpenEXR. */
 #define NB_RECORD_KEY "nebel_record"
 
-/* Printable and not too long, so that every format can keep it. */
-bool nb_record_is_good(const char *record);
+/* Whether a record is printable and not too long, so that every format can keep it. NULL is fine. Errors: ARGUMENT. */
+nebel_result nb_record_check(const nb_codec *codec, const char *record);
 
 /* Rows that come at once: all but the last time a multiple of this, so that no compressed block of OpenEXR is cut. */
 enum { NB_WRITER_ROWS = 64 };

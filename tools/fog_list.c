@@ -1,0 +1,149 @@
+#define _POSIX_C_SOURCE 200809L
+#include "fog_list.h"
+
+#include "fingerprint.h"
+#include "folder.h"
+#include "report.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- shards ---------------------------------------------------------------------------------- */
+
+/* The low bits of FNV-1a follow those of the last letter; the high ones are mixed. */
+static uint32_t shard_of(const char *name, uint32_t count)
+{
+    nb_fingerprint print = nb_fingerprint_start();
+    nb_fingerprint_add_text(&print, name);
+    return (uint32_t)((print.high ^ print.low) % count);
+}
+
+void nb_fog_list_keep(nb_fog_list *list, const nb_shard *shard)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < list->count && shard->count > 0; i++) {
+        nb_fog_files *const files = &list->files[i];
+        if (shard_of(files->image, shard->count) == shard->number)
+            list->files[kept++] = *files;
+        else
+            nb_fog_names_free_one(files);
+    }
+    if (shard->count > 0) list->count = kept;
+}
+
+/* ---- folders --------------------------------------------------------------------------------- */
+
+static size_t folder_size(const char *path)
+{
+    const char *const slash = strrchr(path, '/');
+    return slash != NULL ? (size_t)(slash - path) : 0;
+}
+
+/* Neighbours in the list have mostly one folder, which is not looked at again. */
+static int make_folder(const char *path, const char **before)
+{
+    if (path == NULL) return NB_DONE;
+    const size_t size = folder_size(path);
+    const int is_same = *before != NULL && folder_size(*before) == size && strncmp(*before, path, size) == 0;
+    *before = path;
+    return is_same ? NB_DONE : nb_folder_make_for(path);
+}
+
+int nb_fog_list_make_folders(const nb_fog_list *list)
+{
+    const char *output = NULL, *transmittance = NULL;
+    int status = NB_DONE;
+    for (size_t i = 0; i < list->count && status == NB_DONE; i++) {
+        status = make_folder(list->files[i].output, &output);
+        if (status == NB_DONE) status = make_folder(list->files[i].transmittance, &transmittance);
+    }
+    return status;
+}
+
+/* ---- as bytes -------------------------------------------------------------------------------- */
+
+/* Each name is a text, of which the first letter says whether there is one; the text behind them, which result is refused. */
+enum { TEXTS = NB_FOG_NAMES + 1 };
+static const char is_name = '+', is_none = '-';
+
+static const char *mark_of(const nb_fog_files *files)
+{
+    return files->refused == NULL ? "" : files->refused == files->output ? "o" : "t";
+}
+
+static size_t count_bytes(const nb_fog_list *list)
+{
+    size_t size = 0;
+    for (size_t i = 0; i < list->count; i++) {
+        for (int k = 0; k < NB_FOG_NAMES; k++) {
+            const char *const name = *nb_fog_names_of(&list->files[i], k);
+            size += 2 + (name != NULL ? strlen(name) : 0);
+        }
+        size += strlen(mark_of(&list->files[i])) + 1;
+    }
+    return size;
+}
+
+static char *add_text(char *at, const char *text)
+{
+    const size_t size = strlen(text) + 1;
+    memcpy(at, text, size);
+    return at + size;
+}
+
+/* NULL: memory is out. */
+static char *pack(const nb_fog_list *list, size_t *size)
+{
+    *size = count_bytes(list);
+    char *const bytes = malloc(*size + 1), *at = bytes;
+    for (size_t i = 0; i < list->count && bytes != NULL; i++) {
+        for (int k = 0; k < NB_FOG_NAMES; k++) {
+            const char *const name = *nb_fog_names_of(&list->files[i], k);
+            *at = name != NULL ? is_name : is_none;
+            at = add_text(at + 1, name != NULL ? name : "");
+        }
+        at = add_text(at, mark_of(&list->files[i]));
+    }
+    return bytes;
+}
+
+static int take_files(const char **at, nb_fog_files *files)
+{
+    int good = 1;
+    for (int k = 0; k < NB_FOG_NAMES; k++) {
+        char **const name = nb_fog_names_of(files, k);
+        if (**at == is_name) *name = strdup(*at + 1);
+        good = good && (*name != NULL) == (**at == is_name);
+        *at += strlen(*at) + 1;
+    }
+    if (**at != '\0') files->refused = **at == 'o' ? files->output : files->transmittance;
+    *at += strlen(*at) + 1;
+    return good;
+}
+
+static int unpack(const char *bytes, size_t size, nb_fog_list *list)
+{
+    size_t texts = 0;
+    for (size_t i = 0; i < size; i++) texts += bytes[i] == '\0';
+    list->count = 0;
+    list->capacity = texts / TEXTS;
+    list->files = calloc(list->capacity + 1, sizeof *list->files);
+    int good = list->files != NULL;
+    while (good && list->count < list->capacity) good = take_files(&bytes, &list->files[list->count++]);
+    return good ? NB_DONE : nb_report_failure("fog: out of memory");
+}
+
+int nb_fog_list_copy_first(const nb_jobs *jobs, int status, nb_fog_list *list)
+{
+    char *bytes = NULL;
+    size_t size = 0;
+    if (!jobs->is_joined) return status;
+    if (jobs->is_chief && status == NB_DONE) {
+        bytes = pack(list, &size);
+        if (bytes == NULL) status = nb_report_failure("fog: out of memory");
+    }
+    status = nb_jobs_copy_first(jobs, status, &bytes, &size);
+    if (!jobs->is_chief && status == NB_DONE) status = unpack(bytes, size, list);
+    free(bytes);
+    return status;
+}
