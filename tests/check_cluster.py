@@ -302,10 +302,61 @@ class RanksCase(ClusterCase):
     def ranks(self, name, number, kind, *more):
         return self.mpirun(name, (number, [NEBEL, *self.words(kind, "--threads", "1", *more)]))
 
+    def find_ranks(self, process):
+        """Processes of nebel that mpirun started."""
+        found = []
+        for entry in pathlib.Path("/proc").glob("[0-9]*"):
+            try:
+                words = (entry / "cmdline").read_bytes().split(b"\0")
+                parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            except (OSError, IndexError, ValueError):
+                continue
+            if parent == process.pid and words[0] == NEBEL.encode():
+                found.append(int(entry.name))
+        return found
+
+    def kill_and_resume(self, name, kind, expected, pause, chosen):
+        """Whether somebody died of it."""
+        process = self.start(name, (3, [NEBEL, *self.words(kind, "--threads", "1", "--resume")]))
+        time.sleep(pause)
+        ranks = self.find_ranks(process)
+        if ranks:
+            os.kill(ranks[chosen % len(ranks)], signal.SIGKILL)
+        process.communicate(timeout=120)
+        finished = {file: stamp for file, stamp in self.stamps(name).items() if not file.endswith(".tmp") and file != "lock"}
+        for file in set(finished) & set(expected):
+            self.assertEqual((self.folder / name / file).read_bytes(), expected[file], f"{file} is not whole")
+        is_complete = set(expected) <= set(finished)
+        kept = kind[2] if is_complete else self.count_items(finished)
+        status, seen = self.ranks(name, 3, kind, "--resume")
+        self.assertEqual(status, 0, seen)
+        self.assertIn(f"{kept} of them there already" if kept else "s, ", seen)
+        after = self.stamps(name)
+        for file in set(finished) & set(after):
+            self.assertEqual(after[file], finished[file], f"{file} was written again")
+        self.assertEqual({file: data for file, data in self.contents(name).items() if not file.endswith(".tmp")}, expected)
+        self.assertTrue(is_complete or process.returncode != 0, "a job that is not complete has failed")
+        return bool(ranks) and process.returncode != 0
+
+    def count_items(self, finished):
+        """How many are complete of what has files of these names."""
+        return len(finished)
+
+
+class FewRanksTest(RanksCase):
+    """The first opinion: one picture, in bands."""
+
+    def test_bands_of_one_picture(self):
+        expected = self.expected(LARGE)
+        for number in (4, 7):
+            status, seen = self.ranks(f"large-{number}", number, LARGE)
+            self.assertEqual(status, 0, seen)
+            self.assertEqual(self.contents(f"large-{number}"), expected)
+
 
 class RanksTest(RanksCase):
     def test_ranks_make_the_bytes_of_one_process(self):
-        numbers = {"f%d.png": (1, 2, 7), "f.webp": (4,), "large.png": (2,), "large.exr": (4,)}
+        numbers = {"f%d.png": (1, 2, 4, 7), "f.webp": (4, 7), "large.png": (2, 4, 7), "large.exr": (4, 7)}
         for kind in self.kinds():
             expected = self.expected(kind)
             for number in numbers[kind[0]]:
@@ -382,42 +433,6 @@ class RanksTest(RanksCase):
 
 class KillTest(RanksCase):
     """Slow: a rank is killed at random moments."""
-
-    def find_ranks(self, process):
-        """Processes of nebel that mpirun started."""
-        found = []
-        for entry in pathlib.Path("/proc").glob("[0-9]*"):
-            try:
-                words = (entry / "cmdline").read_bytes().split(b"\0")
-                parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
-            except (OSError, IndexError, ValueError):
-                continue
-            if parent == process.pid and words[0] == NEBEL.encode():
-                found.append(int(entry.name))
-        return found
-
-    def kill_and_resume(self, name, kind, expected, pause, chosen):
-        """Whether somebody died of it."""
-        process = self.start(name, (3, [NEBEL, *self.words(kind, "--threads", "1", "--resume")]))
-        time.sleep(pause)
-        ranks = self.find_ranks(process)
-        if ranks:
-            os.kill(ranks[chosen % len(ranks)], signal.SIGKILL)
-        process.communicate(timeout=120)
-        finished = {file: stamp for file, stamp in self.stamps(name).items() if not file.endswith(".tmp") and file != "lock"}
-        for file in set(finished) & set(expected):
-            self.assertEqual((self.folder / name / file).read_bytes(), expected[file], f"{file} is not whole")
-        is_complete = set(expected) <= set(finished)
-        kept = kind[2] if is_complete else len(finished)
-        status, seen = self.ranks(name, 3, kind, "--resume")
-        self.assertEqual(status, 0, seen)
-        self.assertIn(f"{kept} of them there already" if kept else "s, ", seen)
-        after = self.stamps(name)
-        for file in set(finished) & set(after):
-            self.assertEqual(after[file], finished[file], f"{file} was written again")
-        self.assertEqual({file: data for file, data in self.contents(name).items() if not file.endswith(".tmp")}, expected)
-        self.assertTrue(is_complete or process.returncode != 0, "a job that is not complete has failed")
-        return bool(ranks) and process.returncode != 0
 
     def test_a_rank_that_is_killed(self):
         seed = int(os.environ.get("NEBEL_TEST_SEED", time.time_ns() % 1000000))

@@ -10,7 +10,7 @@
 
 /* ---- shards ---------------------------------------------------------------------------------- */
 
-/* The low bits of FNV-1a follow those of the last letter; the high ones are mixed. */
+/* Names that count give high halves that lie in few shards, and low halves in others: together they are spread evenly. */
 static uint32_t shard_of(const char *name, uint32_t count)
 {
     nb_fingerprint print = nb_fingerprint_start();

@@ -8,13 +8,13 @@
 static void add_options(const nb_fog_call *wanted, nb_fingerprint *print)
 {
     const nebel_intrinsics *const camera = &wanted->intrinsics;
-    const uint64_t whole[] = {(uint64_t)wanted->depth.measure, (uint64_t)wanted->has_intrinsics,
+    const uint64_t whole[] = {(uint64_t)wanted->depth.measure,   (uint64_t)wanted->has_intrinsics,
                               (uint64_t)(wanted->scene != NULL), (uint64_t)wanted->has_seed,
-                              (uint64_t)wanted->has_airlight, (uint64_t)wanted->blends_stored,
-                              (uint64_t)wanted->unknown};
-    const double numbers[] = {wanted->depth.scale, camera->fx, camera->fy, camera->cx, camera->cy, wanted->hfov,
-                              wanted->extinction, wanted->airlight[0], wanted->airlight[1], wanted->airlight[2],
-                              wanted->sky};
+                              (uint64_t)wanted->has_airlight,    (uint64_t)wanted->blends_stored,
+                              (uint64_t)wanted->unknown,         wanted->seed};
+    const double numbers[] = {wanted->depth.scale, camera->fx,          camera->fy,         camera->cx,
+                              camera->cy,          wanted->hfov,        wanted->extinction, wanted->airlight[0],
+                              wanted->airlight[1], wanted->airlight[2], wanted->sky};
     for (size_t i = 0; i < sizeof whole / sizeof *whole; i++) nb_fingerprint_add_whole(print, whole[i]);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) nb_fingerprint_add_number(print, numbers[i]);
     nb_fingerprint_add_text(print, wanted->depth.format);

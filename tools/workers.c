@@ -1,7 +1,8 @@
-#define _POSIX_C_SOURCE 200809L
+#define _GNU_SOURCE
 
 #include "workers.h"
 
+#include <sched.h>
 #include <threads.h>
 #include <unistd.h>
 
@@ -22,7 +23,9 @@ static int run_share(void *user)
 
 int nb_workers_available(void)
 {
-    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    cpu_set_t ours; /* fewer where a launcher bound the process to some */
+    if (sched_getaffinity(0, sizeof ours, &ours) == 0) processors = CPU_COUNT(&ours);
     if (processors < 1) return 1;
     return processors > NB_WORKERS_MOST ? NB_WORKERS_MOST : (int)processors;
 }
