@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { READ_SIZE = 1 << 18 };
+enum { READ_SIZE = 1 << 18 }; /* a multiple of 8 */
 
 /* Offset basis and prime, 2^88 + 0x13b, of the 128-bit hash. Source: Fowler, Noll, Vo,
  * Eastlake, draft-eastlake-fnv. */
@@ -19,17 +19,36 @@ nb_fingerprint nb_fingerprint_start(void)
     return (nb_fingerprint){UINT64_C(0x6c62272e07bb0142), UINT64_C(0x62b821756295c58d)};
 }
 
+static nb_fingerprint multiply(nb_fingerprint print)
+{
+    const uint64_t by_half = (print.low & UINT32_MAX) * 0x13b, by_other = (print.low >> 32) * 0x13b + (by_half >> 32);
+    return (nb_fingerprint){print.high * 0x13b + (print.low << 24) + (by_other >> 32), print.low * 0x13b};
+}
+
 void nb_fingerprint_add(nb_fingerprint *print, const void *bytes, size_t size)
 {
     const unsigned char *const at = bytes;
-    uint64_t high = print->high, low = print->low;
+    nb_fingerprint now = *print;
     for (size_t i = 0; i < size; i++) {
-        low ^= at[i];
-        const uint64_t by_half = (low & UINT32_MAX) * 0x13b, by_other = (low >> 32) * 0x13b + (by_half >> 32);
-        high = high * 0x13b + (low << 24) + (by_other >> 32);
-        low *= 0x13b;
+        now.low ^= at[i];
+        now = multiply(now);
     }
-    *print = (nb_fingerprint){high, low};
+    *print = now;
+}
+
+/* Eight bytes at a time, the first one lowest, which takes an eighth of the time; what is left at the end one by one. */
+static void add_words(nb_fingerprint *print, const unsigned char *bytes, size_t size)
+{
+    nb_fingerprint now = *print;
+    size_t i = 0;
+    for (; i + 8 <= size; i += 8) {
+        uint64_t word = 0;
+        for (int k = 0; k < 8; k++) word |= (uint64_t)bytes[i + (size_t)k] << 8 * k;
+        now.low ^= word;
+        now = multiply(now);
+    }
+    *print = now;
+    nb_fingerprint_add(print, bytes + i, size - i);
 }
 
 void nb_fingerprint_add_text(nb_fingerprint *print, const char *text)
@@ -51,6 +70,18 @@ void nb_fingerprint_add_number(nb_fingerprint *print, double number)
     nb_fingerprint_add_whole(print, bits);
 }
 
+/* Reads as much as there is, up to READ_SIZE. 0 or an error number. */
+static int fill(int file, unsigned char *buffer, size_t *count)
+{
+    for (*count = 0; *count < READ_SIZE;) {
+        const ssize_t more = read(file, buffer + *count, READ_SIZE - *count);
+        if (more < 0 && errno != EINTR) return errno;
+        if (more == 0) return 0;
+        if (more > 0) *count += (size_t)more;
+    }
+    return 0;
+}
+
 /* 0 or an error number. */
 static int add_open(nb_fingerprint *print, int file, unsigned char *buffer)
 {
@@ -58,13 +89,12 @@ static int add_open(nb_fingerprint *print, int file, unsigned char *buffer)
     struct stat status;
     if (fstat(file, &status) != 0) return errno;
     if (!S_ISREG(status.st_mode)) return ENXIO; /* a device may have no end */
-    for (;;) {
-        const ssize_t count = read(file, buffer, READ_SIZE);
-        if (count < 0 && errno == EINTR) continue;
-        if (count < 0) return errno;
-        if (count == 0) break;
-        nb_fingerprint_add(print, buffer, (size_t)count);
-        size += (size_t)count;
+    size_t count = READ_SIZE;
+    while (count == READ_SIZE) {
+        const int error = fill(file, buffer, &count);
+        if (error != 0) return error;
+        add_words(print, buffer, count);
+        size += count;
     }
     nb_fingerprint_add_whole(print, size);
     return 0;

@@ -21,7 +21,7 @@ void nb_fingerprint_add_text(nb_fingerprint *print, const char *text);
 void nb_fingerprint_add_whole(nb_fingerprint *print, uint64_t number);
 void nb_fingerprint_add_number(nb_fingerprint *print, double number);
 
-/* What is in a regular file, and how much; not its name or time. Returns 0, or the errno of what went wrong. */
+/* What is in a regular file, in words of eight bytes, and how much; not its name or time. Returns 0, or the errno of what went wrong. */
 int nb_fingerprint_add_file(nb_fingerprint *print, const char *path);
 
 void nb_fingerprint_write(const nb_fingerprint *print, char text[NB_FINGERPRINT_TEXT]);
