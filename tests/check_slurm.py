@@ -3,6 +3,7 @@
 
 import os
 import pathlib
+import re
 import shutil
 import socket
 import subprocess
@@ -10,6 +11,7 @@ import time
 import unittest
 
 from check_cluster import FILM, FRAMES, LARGE, MISSING, PICTURES, ClusterCase
+from check_cluster_fog import PAIRS, FogCase
 
 SCRIPTS = pathlib.Path(os.environ["NEBEL_SOURCE"]) / "examples" / "cluster"
 
@@ -60,7 +62,7 @@ def find_ports(count):
 
 
 @unittest.skipIf(find_missing(), find_missing())
-class SlurmTest(ClusterCase):
+class SlurmCase(ClusterCase):
     def setUp(self):
         super().setUp()
         slurm = self.folder / "slurm"
@@ -92,11 +94,16 @@ class SlurmTest(ClusterCase):
         logs = self.folder / f"logs-{time.time_ns()}"
         logs.mkdir()
         words = ["sbatch", "--wait", "-o", f"{logs}/%A_%a.log", "--cpus-per-task=1", *options, str(SCRIPTS / script),
-                 *self.words(kind)[1:]]
+                 *self.words(kind)]
         done = subprocess.run(words, cwd=folder, env={**self.environment, **environment}, capture_output=True, text=True, timeout=120)
         seen = "".join(path.read_text() for path in sorted(logs.iterdir()))
         return done.returncode == 0, done.stderr + seen
 
+    def contents_of_files(self, name):
+        return {path.name: path.read_bytes() for path in (self.folder / name).iterdir() if path.is_file()}
+
+
+class SlurmTest(SlurmCase):
     def test_array(self):
         for kind in [PICTURES] + ([FILM] if self.has_films else []):
             expected = self.expected(kind)
@@ -110,9 +117,6 @@ class SlurmTest(ClusterCase):
         self.assertTrue(good, seen)
         self.assertEqual(seen.count(f"{FRAMES // 2} pictures, {FRAMES // 2} of them there already"), 2, seen)
 
-    def contents_of_files(self, name):
-        return {path.name: path.read_bytes() for path in (self.folder / name).iterdir() if path.is_file()}
-
     @unittest.skipIf(MISSING, MISSING)
     def test_mpi(self):
         expected = self.expected(LARGE)
@@ -125,6 +129,32 @@ class SlurmTest(ClusterCase):
         good, seen = self.submit("m", "mpi.sbatch", ["--ntasks-per-node=2"], LARGE)
         self.assertFalse(good, "what fails is told")
         self.assertIn("triangle.obj", seen)
+
+
+class FogSlurmTest(FogCase, SlurmCase):
+    def test_array(self):
+        expected = self.expected(PAIRS)
+        good, seen = self.submit("a", "array.sbatch", ["--array=0-2"], PAIRS)
+        self.assertTrue(good, seen)
+        self.assertEqual(self.contents("a"), expected)
+        (self.folder / "a/q_2.png").unlink()
+        good, seen = self.submit("a", "array.sbatch", ["--array=0-2"], PAIRS)
+        self.assertTrue(good, seen)
+        self.assertEqual(sum(map(int, re.findall(r"(\d+) of them there already", seen))), PAIRS[2] - 1, seen)
+        self.assertEqual(self.contents("a"), expected)
+
+    @unittest.skipIf(MISSING, MISSING)
+    def test_mpi(self):
+        expected = self.expected(PAIRS)
+        (self.folder / "depth/3.pfm").rename(self.folder / "gone.pfm")
+        good, seen = self.submit("m", "mpi.sbatch", ["--ntasks-per-node=2"], PAIRS)
+        self.assertFalse(good, "what fails is told")
+        self.assertEqual(seen.count(f"{PAIRS[2] - 1} pictures, 1 failed"), 1, seen)
+        (self.folder / "gone.pfm").rename(self.folder / "depth/3.pfm")
+        good, seen = self.submit("m", "mpi.sbatch", ["--ntasks-per-node=2"], PAIRS)
+        self.assertTrue(good, seen)
+        self.assertIn(f"{PAIRS[2] - 1} of them there already", seen)
+        self.assertEqual(self.contents("m"), expected)
 
 
 if __name__ == "__main__":
