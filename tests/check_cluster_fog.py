@@ -229,6 +229,36 @@ class FogResumeTest(FogCase):
         self.assertEqual(len(made), stale * (1 if kind == PLAIN else 2), made)
         self.assertEqual(self.contents("a"), self.expected(kind))
 
+    def test_results_beside_the_pictures(self):
+        """The pattern of pictures fits those of results, too: they are passed over. Others' files are not written over."""
+        call = ["fog", "*.png", "--depth", "../depth/0.pfm", "-o", "*_foggy.png", "--transmittance", "*_t.png", *CAMERA, "--visibility"]
+        folder = self.folder / "photos"
+        names = {f"{i}{end}.png" for i in range(COUNT) for end in ("", "_foggy", "_t")}
+        self.assert_done(nebel(*call, "80", "--shard", "0/2", cwd=folder))
+        done = nebel(*call, "80", "--shard", "1/2", cwd=folder)
+        self.assert_done(done)
+        self.assertRegex(done.err, r"note: \d+ of the pictures are results of an earlier call")
+        self.assertEqual(set(self.contents("photos")), names)
+        before = self.stamps("photos")
+        self.assert_made_again(nebel(*call, "80", "--resume", cwd=folder), COUNT, COUNT)
+        self.assertEqual(self.stamps("photos"), before)
+        self.assert_made_again(nebel(*call, "81", "--resume", cwd=folder), COUNT, 0)
+        (folder / "1_foggy.png").write_bytes(files.png(photograph()))
+        own = (folder / "1_foggy.png").read_bytes()
+        done = nebel(*call, "81", "--resume", cwd=folder)
+        self.assert_failed(done, 'cannot write "1_foggy.png": it is one of the files that are read')
+        self.assertEqual((folder / "1_foggy.png").read_bytes(), own)
+
+    def test_results_that_go_in_a_circle(self):
+        folder = self.folder_of("c")
+        for name in ("qrqrs.png", "rqrs.png"):
+            done = nebel("fog", "../photos/0.png", "--depth", "../depth/0.pfm", *CAMERA, "--visibility", "9", "-o", name, cwd=folder)
+            self.assert_done(done)
+        before = self.contents("c")
+        done = nebel("fog", "q*qrs.png", "r*s.png", "--depth", "../depth/0.pfm", *CAMERA, "--visibility", "9", "-o", "*qrs.png", cwd=folder)
+        self.assert_failed(done, "each picture is the result of another one")
+        self.assertEqual(self.contents("c"), before)
+
     def test_what_is_stale_is_made_again(self):
         def write_depth():
             (self.folder / "depth/2.pfm").write_bytes(files.pfm(np.full((HEIGHT, WIDTH), 7, np.float32)))

@@ -223,6 +223,9 @@ static int list_files(crew *all)
     if (!all->jobs.is_chief) return NB_DONE;
     const int status = nb_fog_names_list(&wanted->patterns, wanted->scene, contents_of(all), &all->list);
     if (status != NB_DONE) return status;
+    if (all->list.result_count > 0 && !wanted->quiet)
+        nb_report_message("note: %zu of the pictures are results of an earlier call, and are passed over",
+                          all->list.result_count);
     nb_fog_list_keep(&all->list, &wanted->shard);
     return nb_fog_list_make_folders(&all->list);
 }
@@ -274,8 +277,7 @@ static int fog_pictures(crew *all)
     int status = prepare(all);
     if (status == NB_DONE) status = fog_list(all);
     const double seconds = nb_meter_end(&all->meter);
-    if (nb_interrupt_is_requested())
-        return nb_report_failure("fog: %s: stopped", all->shared.wanted->patterns.output);
+    if (nb_interrupt_is_requested()) return nb_report_failure("fog: %s: stopped", all->shared.wanted->patterns.output);
     status = nb_jobs_end(&all->jobs, status);
     const int has_some = status == NB_DONE || all->jobs.all_made + all->jobs.all_kept > 0;
     if (has_some && !all->shared.wanted->quiet) summarize(all, seconds);

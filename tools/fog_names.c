@@ -2,6 +2,7 @@
 
 #include "fog_names.h"
 
+#include "fog_spare.h"
 #include "report.h"
 
 #include <dirent.h>
@@ -256,97 +257,7 @@ static int add_operand(const nb_fog_patterns *patterns, const char *image, nb_fo
     return result;
 }
 
-/* ---- what must not be the same --------------------------------------------------------------- */
-
-static int compare_texts(const void *a, const void *b)
-{
-    return strcmp(*(const char *const *)a, *(const char *const *)b);
-}
-
-/* Two results of one name would write over each other. */
-static int check_twice(const nb_fog_list *list)
-{
-    const char **const results = malloc((2 * list->count + 1) * sizeof *results);
-    if (results == NULL) return fail_memory();
-    size_t count = 0;
-    int status = NB_DONE;
-    for (size_t i = 0; i < list->count; i++) {
-        results[count++] = list->files[i].output;
-        if (list->files[i].transmittance != NULL) results[count++] = list->files[i].transmittance;
-    }
-    qsort(results, count, sizeof *results, compare_texts);
-    for (size_t i = 1; i < count && status == NB_DONE; i++)
-        if (strcmp(results[i - 1], results[i]) == 0 && strcmp(results[i], "/dev/null") != 0)
-            status = nb_report_misuse("fog",
-                                      "fog: --output: '%s' would be written twice; put a * where the pictures' "
-                                      "names differ",
-                                      results[i]);
-    free(results);
-    return status;
-}
-
-typedef struct place {
-    dev_t device;
-    ino_t number;
-} place;
-
-static int compare_places(const void *a, const void *b)
-{
-    const place *const x = a, *const y = b;
-    if (x->device != y->device) return x->device < y->device ? -1 : 1;
-    return x->number == y->number ? 0 : x->number < y->number ? -1 : 1;
-}
-
-/* Only files count: several may read /dev/null. */
-static void note_place(const char *path, place *places, size_t *count)
-{
-    struct stat status;
-    if (path == NULL || stat(path, &status) != 0 || !S_ISREG(status.st_mode)) return;
-    places[(*count)++] = (place){status.st_dev, status.st_ino};
-}
-
-static int is_read(const char *path, const place *places, size_t count)
-{
-    place at;
-    size_t found = 0;
-    note_place(path, &at, &found);
-    return found > 0 && bsearch(&at, places, count, sizeof *places, compare_places) != NULL;
-}
-
-/* Marks what is refused. One message where that is all, as by a pattern that is wrong. */
-static int refuse_read(nb_fog_list *list, const place *places, size_t count)
-{
-    size_t refused = 0;
-    for (size_t i = 0; i < list->count; i++) {
-        nb_fog_files *const files = &list->files[i];
-        if (is_read(files->output, places, count))
-            files->refused = files->output;
-        else if (is_read(files->transmittance, places, count))
-            files->refused = files->transmittance;
-        refused += files->refused != NULL;
-    }
-    if (refused < list->count) return NB_DONE;
-    return nb_report_failure("fog: " NB_FOG_REFUSAL, list->files[0].refused);
-}
-
-static int check_sources(nb_fog_list *list, const char *scene, const nebel_scene_data *contents)
-{
-    const size_t scene_files = contents != NULL ? contents->file_count : 0;
-    place *const places = malloc((3 * list->count + scene_files + 1) * sizeof *places);
-    if (places == NULL) return fail_memory();
-    size_t count = 0;
-    note_place(scene, places, &count);
-    for (size_t i = 0; i < scene_files; i++) note_place(contents->files[i], places, &count);
-    for (size_t i = 0; i < list->count; i++) {
-        note_place(list->files[i].image, places, &count);
-        note_place(list->files[i].depth, places, &count);
-        note_place(list->files[i].camera, places, &count);
-    }
-    qsort(places, count, sizeof *places, compare_places);
-    const int status = refuse_read(list, places, count);
-    free(places);
-    return status;
-}
+/* ---- all of it ------------------------------------------------------------------------------- */
 
 int nb_fog_names_list(const nb_fog_patterns *patterns, const char *scene, const nebel_scene_data *contents,
                       nb_fog_list *list)
@@ -355,6 +266,5 @@ int nb_fog_names_list(const nb_fog_patterns *patterns, const char *scene, const 
     *list = (nb_fog_list){0};
     for (int i = 0; i < patterns->image_count && status == NB_DONE; i++)
         status = add_operand(patterns, patterns->images[i], list);
-    if (status == NB_DONE) status = check_twice(list);
-    return status == NB_DONE ? check_sources(list, scene, contents) : status;
+    return status == NB_DONE ? nb_fog_spare(list, scene, contents) : status;
 }

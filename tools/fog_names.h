@@ -9,7 +9,8 @@
 typedef struct nb_fog_files {
     char *image, *depth, *output;
     char *camera, *transmittance; /* NULL: none */
-    const char *refused;          /* of the results one that would take the place of something that is read; NULL: none */
+    const char *refused; /* of the results one that would take the place of something that is read; NULL: none */
+    int is_result;       /* of an earlier call */
 } nb_fog_files;
 
 /* The names one by one, the first from 0. */
@@ -20,6 +21,7 @@ void nb_fog_names_free_one(nb_fog_files *files);
 typedef struct nb_fog_list {
     nb_fog_files *files; /* by the operand that they come from, then by name */
     size_t count, capacity;
+    size_t result_count; /* that matched the operands, too, and were taken out */
 } nb_fog_list;
 
 /* What the list is made of. A star in an operand stands for any letters but a slash; where names have as many stars they get
@@ -31,8 +33,8 @@ typedef struct nb_fog_patterns {
     const char *depth, *output, *camera, *transmittance; /* the last two may be NULL */
 } nb_fog_patterns;
 
-/* NB_DONE; NB_FAILED or NB_MISUSED after a message: an operand that no file matches, stars that do not fit, one name for two
- * results, or all results in the place of something that is read; `scene` (NULL: none) is read, too, with its files. */
+/* NB_DONE; NB_FAILED or NB_MISUSED after a message: an operand that no file matches, stars that do not fit, or what nb_fog_spare
+ * says; `scene` (NULL: none) is read, too, with its files. */
 int nb_fog_names_list(const nb_fog_patterns *patterns, const char *scene, const nebel_scene_data *contents,
                       nb_fog_list *list);
 

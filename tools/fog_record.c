@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+static const char maker[] = "fog";
+
 /* Whatever changes a pixel; threads do not. */
 static void add_options(const nb_fog_call *wanted, nb_fingerprint *print)
 {
@@ -52,7 +54,7 @@ void nb_fog_record_add(nb_fingerprint *print, const nb_fog_call *wanted, const n
 static void write_record(nb_fingerprint print, const char *what, char record[NEBEL_MAX_RECORD + 1])
 {
     nb_fingerprint_add_text(&print, what);
-    nb_record_write(&print, record);
+    nb_record_write(&print, maker, record);
 }
 
 nb_fog_records nb_fog_record_write(const nb_fingerprint *print)
@@ -61,6 +63,13 @@ nb_fog_records nb_fog_record_write(const nb_fingerprint *print)
     write_record(*print, "picture", records.picture);
     write_record(*print, "transmittance", records.transmittance);
     return records;
+}
+
+int nb_fog_record_is_in(const char *path)
+{
+    char record[NEBEL_MAX_RECORD + 1];
+    (void)nebel_read_record(path, record);
+    return strncmp(record, "nebel ", 6) == 0 && strstr(record, " fog ") != NULL;
 }
 
 void nb_fog_record_name_job(const nb_fingerprint *start, const nb_fog_call *wanted, char name[NEBEL_MAX_RECORD + 1])
@@ -72,5 +81,5 @@ void nb_fog_record_name_job(const nb_fingerprint *start, const nb_fog_call *want
     for (int i = 0; i < patterns->image_count; i++) nb_fingerprint_add_text(&print, patterns->images[i]);
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         nb_fingerprint_add_text(&print, names[i] != NULL ? names[i] : "");
-    nb_record_write(&print, name);
+    nb_record_write(&print, maker, name);
 }

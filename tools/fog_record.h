@@ -21,6 +21,9 @@ typedef struct nb_fog_records {
 } nb_fog_records;
 nb_fog_records nb_fog_record_write(const nb_fingerprint *print);
 
+/* Whether a file is a result of nebel fog, of any call. */
+int nb_fog_record_is_in(const char *path);
+
 /* What the job is, for all its processes. */
 void nb_fog_record_name_job(const nb_fingerprint *start, const nb_fog_call *wanted, char name[NEBEL_MAX_RECORD + 1]);
 

@@ -31,11 +31,11 @@ int nb_record_can_add_scene(const char *path)
     return stat(path, &status) == 0 && S_ISREG(status.st_mode);
 }
 
-void nb_record_write(const nb_fingerprint *print, char record[NEBEL_MAX_RECORD + 1])
+void nb_record_write(const nb_fingerprint *print, const char *maker, char record[NEBEL_MAX_RECORD + 1])
 {
     char digits[NB_FINGERPRINT_TEXT];
     nb_fingerprint_write(print, digits);
-    (void)snprintf(record, NEBEL_MAX_RECORD + 1, "nebel %.32s %s", nebel_version(), digits);
+    (void)snprintf(record, NEBEL_MAX_RECORD + 1, "nebel %.32s %.32s %s", nebel_version(), maker, digits);
 }
 
 int nb_record_is_in(const char *path, const char *record)

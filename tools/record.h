@@ -18,7 +18,8 @@ void nb_record_add_scene(nb_fingerprint *print, const char *path, const nebel_sc
 /* Whether a scene that was read from there can be read a second time: a pipe cannot. */
 int nb_record_can_add_scene(const char *path);
 
-void nb_record_write(const nb_fingerprint *print, char record[NEBEL_MAX_RECORD + 1]);
+/* `maker` is a word. */
+void nb_record_write(const nb_fingerprint *print, const char *maker, char record[NEBEL_MAX_RECORD + 1]);
 
 /* Whether a file is there, whole, and made from the same. */
 int nb_record_is_in(const char *path, const char *record);

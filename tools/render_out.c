@@ -202,7 +202,7 @@ static void record_file(const nb_render_out *out, uint32_t frame, char record[NE
         nb_fingerprint_add_number(&print, wanted->fps);
         nb_fingerprint_add_whole(&print, (uint64_t)wanted->quality);
     }
-    nb_record_write(&print, record);
+    nb_record_write(&print, "render", record);
 }
 
 /* Of a picture as a whole, or of its band. */
@@ -214,7 +214,7 @@ static void record_item(const nb_render_out *out, const nb_render_item *item, ch
         nb_fingerprint_add_whole(&print, item->window.top);
         nb_fingerprint_add_whole(&print, item->window.height);
     }
-    nb_record_write(&print, record);
+    nb_record_write(&print, "render", record);
 }
 
 void nb_render_out_name_job(const nb_render_out *out, char name[NEBEL_MAX_RECORD + 1])
@@ -227,7 +227,7 @@ void nb_render_out_name_job(const nb_render_out *out, char name[NEBEL_MAX_RECORD
     nb_fingerprint_add_whole(&print, out->wanted->last_frame);
     nb_fingerprint_add_whole(&print, out->band_rows);
     nb_fingerprint_add_whole(&print, (uint64_t)out->wanted->resume);
-    nb_record_write(&print, name);
+    nb_record_write(&print, "render", name);
 }
 
 /* ---- parts ----------------------------------------------------------------------------------- */
