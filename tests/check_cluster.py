@@ -338,6 +338,18 @@ class RanksCase(ClusterCase):
         self.assertTrue(is_complete or process.returncode != 0, "a job that is not complete has failed")
         return bool(ranks) and process.returncode != 0
 
+    def kill_often(self, kinds, longest):
+        """At ten random moments, up to so many seconds after the start."""
+        seed = int(os.environ.get("NEBEL_TEST_SEED", time.time_ns() % 1000000))
+        dice = random.Random(seed)
+        expected = [self.expected(kind) for kind in kinds]
+        killed = 0
+        for i in range(10):
+            k = i % len(kinds)
+            with self.subTest(f"NEBEL_TEST_SEED={seed}, number {i}, {kinds[k][0]}"):
+                killed += self.kill_and_resume(f"kill-{i}", kinds[k], expected[k], dice.uniform(0.2, longest), dice.randrange(3))
+        self.assertGreater(killed, 2, "the work was over before anybody was killed")
+
     def count_items(self, finished):
         """How many are complete of what has files of these names."""
         return len(finished)
@@ -435,19 +447,11 @@ class KillTest(RanksCase):
     """Slow: a rank is killed at random moments."""
 
     def test_a_rank_that_is_killed(self):
-        seed = int(os.environ.get("NEBEL_TEST_SEED", time.time_ns() % 1000000))
-        dice = random.Random(seed)
         kinds = [("f%02d.png", ["--frames", "0-23", "--size", "160x90", "--samples", "64"], 24),
                  ("large.exr", ["--size", "320x1000", "--bands", "64", "--samples", "64"], 16)]
         if self.has_films:
             kinds.append(("f.webp", ["--frames", "0-23", "--size", "160x90", "--samples", "64", "--quality", "100"], 24))
-        expected = [self.expected(kind) for kind in kinds]
-        killed = 0
-        for i in range(10):
-            k = i % len(kinds)
-            with self.subTest(f"NEBEL_TEST_SEED={seed}, number {i}, {kinds[k][0]}"):
-                killed += self.kill_and_resume(f"kill-{i}", kinds[k], expected[k], dice.uniform(0.2, 1.5), dice.randrange(3))
-        self.assertGreater(killed, 2, "the work was over before anybody was killed")
+        self.kill_often(kinds, 1.5)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 picture, one file or one process leaves the others."""
 
 import os
-import random
 import re
 import resource
 import shutil
@@ -284,26 +283,6 @@ class FogResumeTest(FogCase):
         self.assert_done(done)
         self.check_stale(NOISE, lambda: grid.write_bytes(bytes(range(1, 9))), COUNT)
 
-    def test_every_option_that_changes_pixels(self):
-        words = self.words
-        base = ("p_*.png", [], COUNT)
-        changes = [["--visibility", "80"], ["--visibility", "81"], ["--visibility", "80", "--contrast", "0.02"], ["--extinction", "0.03"],
-                   *(["--extinction", "0.03", *more] for more in (
-                       ["--airlight", "1,1,1"], ["--airlight", "1,1,0"], ["--blend", "srgb"], ["--invalid", "far"], ["--invalid", "keep"],
-                       ["--sky", "keep"], ["--sky", "50"], ["--depth-kind", "radial"], ["--depth-scale", "2"], ["--depth-format", "hypersim"],
-                       ["--depth-channel", "Z"])),
-                   ["--scene", "../fog.json"], ["--scene", "../fog.json", "--seed", "0"], ["--scene", "../fog.json", "--seed", "1"]]
-        cameras = [CAMERA, ["--intrinsics", "80,80,44.5,30"], ["--hfov", "50"], ["--hfov", "51"]]
-        calls = [[*change, *CAMERA] for change in changes] + [["--visibility", "80", *camera] for camera in cameras[1:]]
-        for call in calls:
-            with self.subTest(call):
-                self.assert_made_again(self.run_in("a", base, "--resume", *call), COUNT, 0)
-        self.assert_made_again(self.run_in("a", base, "--resume", *calls[-1]), COUNT, COUNT)
-        known = set(re.findall(r"(?m)^  ....--([a-z-]+)", nebel("fog", "--help").out))
-        told = {word[2:] for call in calls for word in call if word.startswith("--")}
-        self.assertEqual(known - told, {"depth", "output", "transmittance", "shard", "resume", "threads", "quiet", "help"})
-        self.assertEqual(words(PLAIN)[0], "fog")
-
     def test_a_seed_goes_by_the_name(self):
         """A picture under another name has other noise."""
         folder = self.folder_of("a")
@@ -342,6 +321,26 @@ class FogResumeTest(FogCase):
     def test_devices_without_an_end_are_no_depth(self):
         done = nebel("fog", "../photos/0.png", "--depth", "/dev/zero", "--visibility", "9", "-o", "a.png", cwd=self.folder_of("a"))
         self.assert_failed(done, "/dev/zero", "a device")
+
+
+class FogOptionsTest(FogCase):
+    def test_every_option_that_changes_pixels(self):
+        base = ("p_*.png", [], COUNT)
+        changes = [["--visibility", "80"], ["--visibility", "81"], ["--visibility", "80", "--contrast", "0.02"], ["--extinction", "0.03"],
+                   *(["--extinction", "0.03", *more] for more in (
+                       ["--airlight", "1,1,1"], ["--airlight", "1,1,0"], ["--blend", "srgb"], ["--invalid", "far"], ["--invalid", "keep"],
+                       ["--sky", "keep"], ["--sky", "50"], ["--depth-kind", "radial"], ["--depth-scale", "2"], ["--depth-format", "hypersim"],
+                       ["--depth-channel", "Z"])),
+                   ["--scene", "../fog.json"], ["--scene", "../fog.json", "--seed", "0"], ["--scene", "../fog.json", "--seed", "1"]]
+        cameras = [CAMERA, ["--intrinsics", "80,80,44.5,30"], ["--hfov", "50"], ["--hfov", "51"]]
+        calls = [[*change, *CAMERA] for change in changes] + [["--visibility", "80", *camera] for camera in cameras[1:]]
+        for call in calls:
+            with self.subTest(call):
+                self.assert_made_again(self.run_in("a", base, "--resume", *call), COUNT, 0)
+        self.assert_made_again(self.run_in("a", base, "--resume", *calls[-1]), COUNT, COUNT)
+        known = set(re.findall(r"(?m)^  ....--([a-z-]+)", nebel("fog", "--help").out))
+        told = {word[2:] for call in calls for word in call if word.startswith("--")}
+        self.assertEqual(known - told, {"depth", "output", "transmittance", "shard", "resume", "threads", "quiet", "help"})
 
 
 # ---- ranks --------------------------------------------------------------------------------------
@@ -464,18 +463,10 @@ class FogKillTest(FogCase, RanksCase):
     """Slow: a rank is killed at random moments."""
 
     def test_a_rank_that_is_killed(self):
-        seed = int(os.environ.get("NEBEL_TEST_SEED", time.time_ns() % 1000000))
-        dice = random.Random(seed)
         for i in range(20, 60):
             self.add_photograph(f"{i}", photograph(300, 400))
         kinds = [(name, [*options, "--hfov", "50"] if "--scene" in options else options, COUNT + 40) for name, options, _ in (PAIRS, NOISE)]
-        expected = [self.expected(kind) for kind in kinds]
-        killed = 0
-        for i in range(10):
-            k = i % len(kinds)
-            with self.subTest(f"NEBEL_TEST_SEED={seed}, number {i}, {kinds[k][0]}"):
-                killed += self.kill_and_resume(f"kill-{i}", kinds[k], expected[k], dice.uniform(0.3, 2), dice.randrange(3))
-        self.assertGreater(killed, 2, "the work was over before anybody was killed")
+        self.kill_often(kinds, 2)
 
 
 if __name__ == "__main__":
