@@ -69,7 +69,8 @@ static nebel_result write_files(const nb_darkroom *room)
         share[i] = (float)((round(disparity * 16) * 16 + 1) / 65535);
     }
     nebel_result result = nebel_write_photograph(room->paths[0], &room->host, &room->photograph, NULL);
-    if (result == NEBEL_OK) result = nebel_write_gray(room->paths[1], &room->host, room->width, room->height, share, NULL);
+    if (result == NEBEL_OK)
+        result = nebel_write_gray(room->paths[1], &room->host, room->width, room->height, share, NULL);
     free(share);
     return result;
 }

@@ -45,7 +45,7 @@ FOREIGN = {
                       "nanovdb/", "zlib.h", "blosc.h", "webp/", "openvdb/", "exception", "new"},
     "cpu": {"embree3/", "omp.h"},
     "gl": {"epoxy/"},
-    "tools": POSIX | {"omp.h", "mpi.h", "epoxy/", "GLFW/", "imgui.h", "backends/"},
+    "tools": POSIX | {"sched.h", "omp.h", "mpi.h", "epoxy/", "GLFW/", "imgui.h", "backends/"},
     "bench": POSIX | {"omp.h", "embree3/", "epoxy/", "png.h"},
     "examples": {"epoxy/", "GLFW/", "SDL.h", "windows.h", "d3d9.h"},
 }

@@ -376,6 +376,13 @@ class FogRanksTest(FogCase, RanksCase):
                     self.assertEqual(seen.count(f": {COUNT} pictures, "), 1, f"one summary: {seen}")
                     self.assertEqual(seen.count("depth: 0.1 % unknown, filled in; 0.0 % without end; ") + seen.count("\n"), 3, seen)
 
+    def test_ranks_with_many_threads(self):
+        """More than pictures, so that some share one."""
+        expected = self.expected(NOISE)
+        status, seen = self.ranks("a", 2, NOISE, "--threads", "16")
+        self.assertEqual(status, 0, seen)
+        self.assertEqual(self.contents("a"), expected)
+
     def test_bad_input_leaves_the_others(self):
         reasons = self.break_some()
         (self.folder_of("a") / "p_6.png").symlink_to("../photos/7.png")
@@ -427,6 +434,15 @@ class FogRanksTest(FogCase, RanksCase):
         """Shared memory of MPI that is no file has no such limit."""
         memory = ["env", "OMPI_MCA_shmem=sysv"]
         self.check_full_disk([*memory, "sh", "-c", 'ulimit -f 2; exec "$@"', "sh"], memory)
+
+    def test_no_rank_can_write(self):
+        """Two pictures each, and the rest is not tried."""
+        memory = ["env", "OMPI_MCA_shmem=sysv", "sh", "-c", 'ulimit -f 2; exec "$@"', "sh"]
+        status, seen = self.mpirun("a", (2, [*memory, NEBEL, *self.words(PLAIN, "--threads", "1")]))
+        self.assertEqual(status, 1, seen)
+        self.assertEqual(seen.count('cannot write "p_'), 4, seen)
+        self.assertIn(f"{COUNT - 4} pictures are left to do", seen)
+        self.assertEqual(self.contents("a"), {})
 
     def test_a_full_disk_of_one_rank(self):
         """A file system of one page in place of the folder."""

@@ -161,8 +161,8 @@ void nb_jobs_show(nb_jobs *jobs, nb_meter *meter, const char *what, double of_it
     const double share = nb_jobs_share(jobs, of_item, &done, &count);
     char label[64] = "";
     if (count > 1)
-        (void)snprintf(label, sizeof label, "%s %llu of %llu", what, (unsigned long long)(done < count ? done + 1 : count),
-                       (unsigned long long)count);
+        (void)snprintf(label, sizeof label, "%s %llu of %llu", what,
+                       (unsigned long long)(done < count ? done + 1 : count), (unsigned long long)count);
     nb_meter_show(meter, share, label);
 }
 

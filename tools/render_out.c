@@ -100,7 +100,8 @@ int nb_render_out_check(const nb_render_out *out, const nb_jobs *jobs)
     const nb_render_call *const wanted = out->wanted;
     const uint32_t step = jobs->shard.count > 0 && count_bands(out) == 1 ? jobs->shard.count : 1;
     const uint32_t first = step > 1 ? jobs->shard.number : 0;
-    if (wanted->is_film) return nb_folder_make_for(wanted->output); /* nebel_create_film does the rest, in each process */
+    if (wanted->is_film)
+        return nb_folder_make_for(wanted->output); /* nebel_create_film does the rest, in each process */
     if (!jobs->is_chief) return NB_DONE;
     for (uint64_t i = first; i < count_frames(wanted); i += step) {
         if (nb_interrupt_is_requested()) break;
