@@ -22,7 +22,7 @@ CAMERA = ["--camera", "../camera.txt"]
 # Outputs, their options, and how many items they have.
 PLAIN = ("p_*.png", [*CAMERA, "--visibility", "80"], COUNT)
 PAIRS = ("q_*.png", [*CAMERA, "--visibility", "80", "--transmittance", "t_*.exr"], COUNT)
-NOISE = ("n_*.png", ["--scene", "../fog.json", "--seed", "3", "--transmittance", "t_*.png"], COUNT)
+NOISE = ("n_*.png", ["--scene", "../fog.json", "--frame", "name", "--seed", "3", "--transmittance", "t_*.png"], COUNT)
 KINDS = (PLAIN, PAIRS, NOISE)
 
 
@@ -52,6 +52,7 @@ class FogCase(ClusterCase):
 
     def write_noise(self, seed):
         fog = {"shape": {"type": "box", "min": [-20, -6, -90], "max": [20, 6, 1]}, "extinction": 0.1, "source": 0.8,
+               "keys": [{"frame": 0}, {"frame": 10, "extinction": 0.2}],
                "density": {"type": "noise", "size": [12, 12, 12], "cells": [2, 2, 2], "seed": seed}}
         self.write_scene("fog.json", [fog], camera={"position": [0, 0, 0], "look_at": [0, 0, -1], "vertical_fov": 40})
 
@@ -331,7 +332,8 @@ class FogOptionsTest(FogCase):
                        ["--airlight", "1,1,1"], ["--airlight", "1,1,0"], ["--blend", "srgb"], ["--invalid", "far"], ["--invalid", "keep"],
                        ["--sky", "keep"], ["--sky", "50"], ["--depth-kind", "radial"], ["--depth-scale", "2"], ["--depth-format", "hypersim"],
                        ["--depth-channel", "Z"])),
-                   ["--scene", "../fog.json"], ["--scene", "../fog.json", "--seed", "0"], ["--scene", "../fog.json", "--seed", "1"]]
+                   ["--scene", "../fog.json"], ["--scene", "../fog.json", "--frame", "1"], ["--scene", "../fog.json", "--frame", "name"],
+                   ["--scene", "../fog.json", "--seed", "0"], ["--scene", "../fog.json", "--seed", "1"]]
         cameras = [CAMERA, ["--intrinsics", "80,80,44.5,30"], ["--hfov", "50"], ["--hfov", "51"]]
         calls = [[*change, *CAMERA] for change in changes] + [["--visibility", "80", *camera] for camera in cameras[1:]]
         for call in calls:

@@ -399,6 +399,41 @@ class SceneTest(Case):
         self.assertEqual(first, again)
         self.assertEqual(len(set(same + first + second)), 7)
 
+    def test_frames_of_a_scene(self):
+        """At their keys camera and fog are what a scene that stands still has, and names give each picture its own frame."""
+        shape = {"type": "half_space", "point": [0, 1.5, 0], "normal": [0, 1, 0]}
+        keys = [{"frame": f, "position": [3, 2, 1 - f / 10], "look_at": [4, 2 + f / 20, 0.2]} for f in (0, 10, 20)]
+        fog = {"shape": shape, "extinction": 0.02, "source": 0.6,
+               "keys": [{"frame": 0}, {"frame": 10, "extinction": 0.05}, {"frame": 20, "extinction": 0.1}]}
+        moving = self.write("moving.json", json.dumps({"nebel": 1, "fog": [fog], "camera": {"vertical_fov": 50, "keys": keys}}))
+        depth = self.npy("d.npy", DICE.uniform(0.5, 60, (HEIGHT, WIDTH)).astype(np.float32))
+        (self.folder / "film").mkdir()
+        wanted = {}
+        for key, extinction in zip(keys, (0.02, 0.05, 0.1)):
+            still = self.write_scene([{"shape": shape, "extinction": extinction, "source": 0.6}],
+                                     camera={"position": key["position"], "look_at": key["look_at"], "vertical_fov": 50})
+            self.assert_done(self.fog(self.image, "--depth", depth, "--scene", still, "-o", "still.png"))
+            wanted[key["frame"]] = files.read_png((self.folder / "still.png").read_bytes())
+            self.assert_done(self.fog(self.image, "--depth", depth, "--scene", moving, "--frame", key["frame"], "-o", "one.png"))
+            self.assertTrue((files.read_png((self.folder / "one.png").read_bytes()) == wanted[key["frame"]]).all())
+            shutil.copy(self.image, self.folder / f"film/town_3_{key['frame']:06d}_left8bit.png")
+        self.assertFalse((wanted[0] == wanted[10]).all())
+        shutil.copy(self.image, self.folder / "film/town_none_left8bit.png")
+        shutil.copy(self.image, self.folder / "film/town_1000001_left8bit.png")
+        done = self.fog("film/*_left8bit.png", "--depth", depth, "--scene", moving, "--frame", "name", "-o", "out/*.png")
+        self.assert_error(done, 1, "film/town_none_left8bit.png: --frame name: there is no number", "town_1000001", "3 pictures, 2 failed")
+        for frame, picture in wanted.items():
+            got = files.read_png((self.folder / f"out/town_3_{frame:06d}.png").read_bytes())
+            self.assertTrue((got == picture).all(), frame)
+        base = (self.image, "--depth", depth, "-o", self.out)
+        for frame in ("names", "-1", "1.5", "1000001"):
+            self.assert_error(self.fog(*base, "--scene", moving, "--frame", frame), 2, "--frame")
+        self.assert_error(self.fog(*base, "--visibility", 9, "--frame", 1), 2, "needs --scene")
+        sun = {"irradiance": 5, "direction": [0, 1, 0], "keys": [{"frame": 0, "direction": [0, 1, 0]}, {"frame": 9, "direction": [1, 1, 0]}]}
+        sunny = self.write_scene([fog], sun=sun)
+        self.assert_error(self.fog(*base, "--scene", sunny, "--frame", "name"), 1, "the sun has keys")
+        self.assert_done(self.fog(*base, "--scene", sunny, "--frame", 5))
+
     def test_what_does_not_go_together(self):
         scene = self.write_scene([])
         base = (self.image, "--depth", self.npy("d.npy", np.ones((HEIGHT, WIDTH), np.float32)), "-o", self.out)

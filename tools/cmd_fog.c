@@ -55,7 +55,6 @@ enum { MOST_UNWRITTEN = 2 };
 typedef struct crew {
     nb_fog_shared shared;
     nb_load_result loaded;
-    nebel_camera camera;
     nb_report_listener listener; /* of the scene */
     nb_fog_list list;
     nb_fingerprint start; /* of the records */
@@ -198,16 +197,17 @@ static int load_scene(crew *all)
 {
     const nb_fog_call *const wanted = all->shared.wanted;
     if (wanted->scene == NULL) return NB_DONE;
-    const int status = nb_load_scene(wanted->scene, 0, 0, &all->listener, &all->loaded);
+    const int status = nb_load_scene(wanted->scene, 0, wanted->frame, &all->listener, &all->loaded);
     if (status != NB_DONE) return status;
-    all->camera = nebel_scene_camera(all->loaded.scene, 0);
-    if (all->camera.projection != NEBEL_PROJECTION_PERSPECTIVE)
+    if (nebel_scene_camera(all->loaded.scene, wanted->frame).projection != NEBEL_PROJECTION_PERSPECTIVE)
         return nb_report_failure("fog: %s: its camera must be a perspective one, as that of the picture",
                                  wanted->scene);
+    if (wanted->frame_of_name && nebel_scene_contents(all->loaded.scene)->sun_key_count > 1)
+        return nb_report_failure(
+            "fog: %s: --frame name: the sun has keys, and light is prepared for one frame; name the frame",
+            wanted->scene);
     all->shared.scene = all->loaded.scene;
     all->shared.scene_fog = all->loaded.fog;
-    all->shared.scene_camera = &all->camera;
-    all->shared.scene_fov = all->camera.vertical_fov;
     return NB_DONE;
 }
 

@@ -25,6 +25,7 @@ enum {
     INVALID,
     SKY,
     SCENE,
+    FRAME,
     SEED,
     TRANSMITTANCE,
     SHARD,
@@ -71,6 +72,10 @@ const nb_option nb_fog_options[NB_FOG_OPTIONS] = {
     [SKY] = {"sky", 0, "WAY",
              "Pixels that are infinitely far: far (default), keep\nthem without fog, or at so many meters."},
     [SCENE] = {"scene", 0, "FILE", "In place of --visibility: the fog, sun and lamps of\na scene, seen by its camera."},
+    [FRAME] = {"frame", 0, "N",
+               "With --scene: the frame of its camera, fog and sun, 0\nto 1000000, or name: the last number in what "
+               "the last\n"
+               "* of a picture's name stands for. Default: 0."},
     [SEED] =
         {"seed", 0, "N",
          "With --scene: each picture has noise of its own, by N\nand its name. Default: all have that of the scene."},
@@ -193,17 +198,26 @@ static void refuse_fog(nb_arguments *arguments)
             nb_options_refuse(arguments, options[i], "has no place beside --scene, whose fog and light are its own");
 }
 
+static void read_frame(nb_arguments *arguments, nb_fog_call *wanted)
+{
+    const char *const frame = arguments->values[FRAME];
+    wanted->frame_of_name = frame != NULL && strcmp(frame, "name") == 0;
+    if (!wanted->frame_of_name) wanted->frame = nb_options_whole(arguments, FRAME, 0, NB_FOG_LAST_FRAME, 0);
+}
+
 static void read_fog(nb_arguments *arguments, nb_fog_call *wanted)
 {
     static const char *const spaces[] = {"linear", "srgb", NULL};
     wanted->scene = arguments->values[SCENE];
     if (wanted->scene != NULL) {
         refuse_fog(arguments);
+        read_frame(arguments, wanted);
         wanted->has_seed = arguments->values[SEED] != NULL;
         wanted->seed = nb_options_whole(arguments, SEED, 0, UINT32_MAX, 0);
         return;
     }
     if (arguments->values[SEED] != NULL) nb_options_refuse(arguments, SEED, "needs --scene, whose noise it changes");
+    if (arguments->values[FRAME] != NULL) nb_options_refuse(arguments, FRAME, "needs --scene, which has frames");
     read_extinction(arguments, wanted);
     read_airlight(arguments, wanted);
     wanted->blends_stored = nb_options_choice(arguments, BLEND, spaces, 0);

@@ -8,7 +8,7 @@
 
 #include <nebel/photograph.h>
 
-enum { NB_FOG_OPTIONS = 23 };
+enum { NB_FOG_OPTIONS = 24 };
 
 /* What becomes of pixels of unknown depth. */
 typedef enum nb_fog_unknown { NB_FOG_FILL = 0, NB_FOG_FAR, NB_FOG_KEEP } nb_fog_unknown;
@@ -20,6 +20,8 @@ typedef struct nb_fog_call {
     nebel_intrinsics intrinsics;
     double hfov;       /* degrees; 0: not given */
     const char *scene; /* NULL: fog of one density everywhere */
+    int frame_of_name; /* each picture has the frame that is in its name, in place of `frame` */
+    uint32_t frame;    /* of the scene */
     int has_seed;      /* each picture has noise of its own, by this and its name */
     uint32_t seed;
     double extinction;  /* 1/m */

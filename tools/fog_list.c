@@ -5,6 +5,7 @@
 #include "folder.h"
 #include "report.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -62,15 +63,24 @@ int nb_fog_list_make_folders(const nb_fog_list *list)
 
 /* ---- as bytes -------------------------------------------------------------------------------- */
 
-/* Each name is a text, of which the first letter says whether there is one; the text behind them, which result is refused. */
-enum { TEXTS = NB_FOG_NAMES + 1 };
-static const char is_name = '+', is_none = '-';
+/* Each name is a text, of which the first letter says whether there is one. The text behind them says which result is refused, and the
+ * number. */
+enum { TEXTS = NB_FOG_NAMES + 1, REST_SIZE = 16 };
+static const char is_name = '+', is_none = '-', is_output = 'o', is_transmittance = 't';
 
-static const char *mark_of(const nb_fog_files *files)
+static void write_rest(const nb_fog_files *files, char text[REST_SIZE])
 {
-    return files->refused == NULL ? "" : files->refused == files->output ? "o" : "t";
+    const char refused = files->refused == files->output ? is_output : is_transmittance;
+    (void)snprintf(text, REST_SIZE, "%c%lu", files->refused != NULL ? refused : is_none, (unsigned long)files->number);
 }
 
+static void read_rest(const char *text, nb_fog_files *files)
+{
+    if (*text != is_none) files->refused = *text == is_output ? files->output : files->transmittance;
+    files->number = (uint32_t)strtoul(text + 1, NULL, 10);
+}
+
+/* At most. */
 static size_t count_bytes(const nb_fog_list *list)
 {
     size_t size = 0;
@@ -79,7 +89,7 @@ static size_t count_bytes(const nb_fog_list *list)
             const char *const name = *nb_fog_names_of(&list->files[i], k);
             size += 2 + (name != NULL ? strlen(name) : 0);
         }
-        size += strlen(mark_of(&list->files[i])) + 1;
+        size += REST_SIZE;
     }
     return size;
 }
@@ -94,16 +104,18 @@ static char *add_text(char *at, const char *text)
 /* NULL: memory is out. */
 static char *pack(const nb_fog_list *list, size_t *size)
 {
-    *size = count_bytes(list);
-    char *const bytes = malloc(*size + 1), *at = bytes;
+    char *const bytes = malloc(count_bytes(list) + 1), *at = bytes;
+    char rest[REST_SIZE];
     for (size_t i = 0; i < list->count && bytes != NULL; i++) {
         for (int k = 0; k < NB_FOG_NAMES; k++) {
             const char *const name = *nb_fog_names_of(&list->files[i], k);
             *at = name != NULL ? is_name : is_none;
             at = add_text(at + 1, name != NULL ? name : "");
         }
-        at = add_text(at, mark_of(&list->files[i]));
+        write_rest(&list->files[i], rest);
+        at = add_text(at, rest);
     }
+    *size = (size_t)(at - bytes);
     return bytes;
 }
 
@@ -116,7 +128,7 @@ static int take_files(const char **at, nb_fog_files *files)
         good = good && (*name != NULL) == (**at == is_name);
         *at += strlen(*at) + 1;
     }
-    if (**at != '\0') files->refused = **at == 'o' ? files->output : files->transmittance;
+    read_rest(*at, files);
     *at += strlen(*at) + 1;
     return good;
 }

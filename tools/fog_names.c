@@ -26,6 +26,11 @@ static int fail_memory(void)
     return nb_report_failure("fog: out of memory");
 }
 
+static int is_digit(char c)
+{
+    return c >= '0' && c <= '9';
+}
+
 static int count_stars(const char *text)
 {
     int count = 0;
@@ -84,11 +89,24 @@ static int grow(nb_fog_list *list)
     return 1;
 }
 
+/* The last digits of a text. */
+static uint32_t find_number(const char *text, size_t size)
+{
+    uint32_t number = 0;
+    while (size > 0 && !is_digit(text[size - 1])) size--;
+    size_t first = size;
+    while (first > 0 && is_digit(text[first - 1])) first--;
+    if (first == size) return UINT32_MAX;
+    for (; first < size && number <= NB_FOG_LAST_FRAME; first++) number = 10 * number + (uint32_t)(text[first] - '0');
+    return number;
+}
+
 static int add_files(const nb_fog_patterns *patterns, const char *image, const parts *of, nb_fog_list *list)
 {
     if (!grow(list)) return fail_memory();
     nb_fog_files files = {
         .image = strdup(image), .depth = fill_stars(patterns->depth, of), .output = fill_stars(patterns->output, of)};
+    files.number = find_number(of->text[of->count - 1], of->size[of->count - 1]);
     if (patterns->camera != NULL) files.camera = fill_stars(patterns->camera, of);
     if (patterns->transmittance != NULL) files.transmittance = fill_stars(patterns->transmittance, of);
     const int good = files.image != NULL && files.depth != NULL && files.output != NULL &&

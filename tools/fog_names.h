@@ -11,7 +11,10 @@ typedef struct nb_fog_files {
     char *camera, *transmittance; /* NULL: none */
     const char *refused; /* of the results one that would take the place of something that is read; NULL: none */
     int is_result;       /* of an earlier call */
+    uint32_t number;     /* the last one in what the last star stands for; above NB_FOG_LAST_FRAME: there is none */
 } nb_fog_files;
+
+enum { NB_FOG_LAST_FRAME = 1000000 };
 
 /* The names one by one, the first from 0. */
 enum { NB_FOG_NAMES = 5 };

@@ -10,10 +10,16 @@ static const char maker[] = "fog";
 static void add_options(const nb_fog_call *wanted, nb_fingerprint *print)
 {
     const nebel_intrinsics *const camera = &wanted->intrinsics;
-    const uint64_t whole[] = {(uint64_t)wanted->depth.measure,   (uint64_t)wanted->has_intrinsics,
-                              (uint64_t)(wanted->scene != NULL), (uint64_t)wanted->has_seed,
-                              (uint64_t)wanted->has_airlight,    (uint64_t)wanted->blends_stored,
-                              (uint64_t)wanted->unknown,         wanted->seed};
+    const uint64_t whole[] = {(uint64_t)wanted->depth.measure,
+                              (uint64_t)wanted->has_intrinsics,
+                              (uint64_t)(wanted->scene != NULL),
+                              (uint64_t)wanted->frame_of_name,
+                              wanted->frame,
+                              (uint64_t)wanted->has_seed,
+                              wanted->seed,
+                              (uint64_t)wanted->has_airlight,
+                              (uint64_t)wanted->blends_stored,
+                              (uint64_t)wanted->unknown};
     const double numbers[] = {wanted->depth.scale, camera->fx,          camera->fy,         camera->cx,
                               camera->cy,          wanted->hfov,        wanted->extinction, wanted->airlight[0],
                               wanted->airlight[1], wanted->airlight[2], wanted->sky};
@@ -48,6 +54,7 @@ void nb_fog_record_add(nb_fingerprint *print, const nb_fog_call *wanted, const n
     nb_record_add_file(print, files->depth);
     nb_fingerprint_add_whole(print, files->camera != NULL);
     if (files->camera != NULL) nb_record_add_file(print, files->camera);
+    if (wanted->frame_of_name) nb_fingerprint_add_whole(print, files->number);
     if (wanted->has_seed) nb_fingerprint_add_whole(print, nb_fog_record_seed(wanted, files->image));
 }
 

@@ -20,6 +20,8 @@ typedef struct work {
     nebel_depth_map depth;
     nebel_intrinsics camera;
     int has_camera;
+    uint32_t frame;                         /* of the scene, and */
+    nebel_camera scene_camera;              /* its camera then */
     int needs_picture, needs_transmittance; /* which is not there */
     nb_fog_records records;
     float *transmittance; /* three a pixel; NULL: not needed */
@@ -68,6 +70,18 @@ static int read_picture(work *w)
     return NB_DONE;
 }
 
+static int find_frame(work *w)
+{
+    const nb_fog_call *const wanted = w->shared->wanted;
+    if (w->shared->scene == NULL) return NB_DONE;
+    w->frame = wanted->frame_of_name ? w->files->number : wanted->frame;
+    if (w->frame > NB_FOG_LAST_FRAME)
+        return fail(w, "%s: --frame name: there is no number up to %d where the last * is", w->files->image,
+                    NB_FOG_LAST_FRAME);
+    w->scene_camera = nebel_scene_camera(w->shared->scene, w->frame);
+    return NB_DONE;
+}
+
 /* From what was given; has_camera stays 0 where nothing was. */
 static int find_camera(work *w)
 {
@@ -80,8 +94,8 @@ static int find_camera(work *w)
         w->camera = wanted->intrinsics;
     else if (wanted->hfov > 0)
         w->camera = nebel_intrinsics_of_view(wanted->hfov, width, height);
-    else if (w->shared->scene_camera != NULL) {
-        w->camera = nebel_intrinsics_of_view(w->shared->scene_fov, height, width);
+    else if (w->shared->scene != NULL) {
+        w->camera = nebel_intrinsics_of_view(w->scene_camera.vertical_fov, height, width); /* from top to bottom */
         w->camera.cx = (width - 1.0) / 2;
         w->camera.cy = (height - 1.0) / 2;
     } else
@@ -163,15 +177,20 @@ static int choose_fog(work *w)
 {
     const nb_fog_call *const wanted = w->shared->wanted;
     if (w->shared->scene == NULL) return make_fog(w);
-    if (!wanted->has_seed) return NB_DONE;
-    const uint32_t seed = nb_fog_record_seed(wanted, w->files->image);
-    return judge(w, wanted->scene, nebel_commit_scene_fog_anew(w->shared->scene, 0, seed, &w->own_fog));
+    nebel_result result = NEBEL_OK;
+    if (wanted->has_seed) {
+        const uint32_t seed = nb_fog_record_seed(wanted, w->files->image);
+        result = nebel_commit_scene_fog_anew(w->shared->scene, w->frame, seed, &w->own_fog);
+    } else if (wanted->frame_of_name && nebel_scene_contents(w->shared->scene)->moving_volume_count > 0)
+        result = nebel_commit_scene_fog_at(w->shared->scene, w->frame, &w->own_fog);
+    return judge(w, wanted->scene, result);
 }
 
 static int aim(work *w)
 {
     if (w->has_camera) {
-        if (nebel_aim_pixels(&w->pixels, &w->camera, w->shared->scene_camera) == NEBEL_OK) return NB_DONE;
+        const nebel_camera *const place = w->shared->scene != NULL ? &w->scene_camera : NULL;
+        if (nebel_aim_pixels(&w->pixels, &w->camera, place) == NEBEL_OK) return NB_DONE;
         return fail(w, "%s: the camera of the scene looks nowhere", w->shared->wanted->scene);
     }
     if (w->depth.type == NEBEL_DEPTH_RAY) { /* the direction does not matter */
@@ -314,6 +333,7 @@ static int run(work *w)
     if (w->tale->is_kept) return NB_DONE;
     int status = do_results(w, check_picture, check_transmittance); /* before the work */
     if (status == NB_DONE) status = read_picture(w);
+    if (status == NB_DONE) status = find_frame(w);
     if (status == NB_DONE) status = find_camera(w);
     if (status == NB_DONE) status = read_depth(w);
     if (status == NB_DONE) status = aim(w);
