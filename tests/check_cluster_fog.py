@@ -378,6 +378,22 @@ class FogRanksTest(FogCase, RanksCase):
                     self.assertEqual(seen.count(f": {COUNT} pictures, "), 1, f"one summary: {seen}")
                     self.assertEqual(seen.count("depth: 0.1 % unknown, filled in; 0.0 % without end; ") + seen.count("\n"), 3, seen)
 
+    def test_the_first_rank_reports_for_all(self):
+        """In a log: lines, the first after two seconds. What is stopped then has whole pictures."""
+        self.add_photograph("0", photograph(300, 400))
+        (self.folder / "many").mkdir()
+        for i in range(2000):
+            os.link(self.folder / "photos/0.png", self.folder / f"many/{i}.png")
+        call = [NEBEL, "fog", "../many/*.png", "--depth", "../depth/0.pfm", "--hfov", "50", "--visibility", "9", "-o", "*.png", "--threads", "2"]
+        process = self.start("a", (2, call))
+        line = process.stdout.readline()
+        process.terminate()
+        seen = line + process.communicate(timeout=60)[0]
+        self.assertRegex(line, r"^nebel: picture \d+ of 2000, \d+ %, .* left$")
+        self.assertNotEqual(process.returncode, 0, seen)
+        pictures = {name: data for name, data in self.contents("a").items() if not name.endswith(".tmp")}
+        self.assertTrue(pictures and all(data.endswith(b"IEND\xaeB`\x82") for data in pictures.values()), seen)
+
     def test_ranks_with_many_threads(self):
         """More than pictures, so that some share one."""
         expected = self.expected(NOISE)
