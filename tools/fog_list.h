@@ -5,8 +5,8 @@
 #include "fog_names.h"
 #include "jobs.h"
 
-/* Leaves the pictures of a shard. Their names say which they are, so that a folder to which files come between the calls of two
- * shards leaves no file to none of them, or to both. A shard of 0 parts has all. */
+/* Leaves the pictures of a shard. Their names say which they are, not their places in the list: each has exactly one shard, also if files
+ * come or go between the calls of two shards. A shard of 0 parts has all. */
 void nb_fog_list_keep(nb_fog_list *list, const nb_shard *shard);
 
 /* Makes the folders of the results, where they are missing. NB_FAILED after a message. */
