@@ -152,6 +152,7 @@ class FogShardTest(FogCase):
             self.assert_misused(self.run_in("a", PLAIN, "--shard", shard), "--shard")
         for words in (["--shard", "0/2"], ["--resume"]):
             self.assert_misused(self.run_in("a", ("/dev/null", PLAIN[1]), *words), words[0], "files")
+            self.assert_misused(self.run_in("a", PLAIN, "--transmittance", "/dev/null", *words), words[0], "files")
         self.assertEqual(self.contents("a"), {})
 
     def test_a_scene_from_a_pipe_has_no_record(self):

@@ -231,6 +231,7 @@ static void read_jobs(nb_arguments *arguments, nb_fog_call *wanted)
     wanted->shard = nb_jobs_read_shard(arguments, SHARD);
     wanted->resume = arguments->values[RESUME] != NULL;
     nb_jobs_refuse_special(arguments, of_files, sizeof of_files / sizeof *of_files, wanted->patterns.output);
+    nb_jobs_refuse_special(arguments, of_files, sizeof of_files / sizeof *of_files, wanted->patterns.transmittance);
 }
 
 /* ---- all of it ------------------------------------------------------------------------------- */
