@@ -109,12 +109,14 @@ static nebel_result set_air(nb_frame *frame, const nebel_frame_desc *desc)
     nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
     if (scene->planet_count == 0 || scene->planets[0].atmosphere == NULL) return NEBEL_OK;
-    if (renderer->method != NEBEL_METHOD_EXACT)
+    if (renderer->method != NEBEL_METHOD_EXACT && renderer->method != NEBEL_METHOD_REFERENCE)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
-                       "planets are drawn by the method exact alone: ask for no other method, or leave the planet out");
+                       "planets are drawn by the methods exact and reference alone: ask for no other method, or leave the "
+                       "planet out");
     if (frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
                        "frame: orthographic cameras see no planets; take a perspective one or a panorama");
+    if (renderer->method == NEBEL_METHOD_REFERENCE) return NEBEL_OK;
     const double tolerance = desc->tolerance > 0 ? desc->tolerance : NEBEL_DEFAULT_TOLERANCE;
     frame->air.tolerance = (float)tolerance;
     frame->air.pixel = nb_view_pixel(&frame->view, frame->height);
@@ -262,22 +264,27 @@ static void render_regions(const nb_frame *frame, size_t regions, nb_state *stat
     }
 }
 
+static void free_frame(nb_frame *frame)
+{
+    nb_cloudscape_free(frame);
+    nb_reference_free(frame);
+    nb_air_free(&frame->air);
+}
+
 nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc *desc, const nebel_frame *frame)
 {
     if (renderer == NULL || desc == NULL || frame == NULL) return NEBEL_ERROR_ARGUMENT;
     nb_frame made = {.renderer = renderer, .planes = frame};
     const nebel_result result = set_frame(&made, desc);
     if (result != NEBEL_OK) {
-        nb_cloudscape_free(&made);
-        nb_air_free(&made.air);
+        free_frame(&made);
         return result;
     }
     const size_t regions = (size_t)count_regions(made.window.width) * count_regions(made.window.height);
     const size_t parts = regions * count_groups(&made);
     nb_state state = {.desc = desc, .total = parts, .step = (parts + 99) / 100};
     render_regions(&made, regions, &state);
-    nb_cloudscape_free(&made);
-    nb_air_free(&made.air);
+    free_frame(&made);
     if (state.result == NEBEL_ERROR_LIMIT) return nb_fail(&renderer->log, state.result, "frame: stopped");
     if (state.result != NEBEL_OK) {
         return nb_fail(&renderer->log, state.result, "frame: fog along a ray: %s", nebel_result_text(state.result));

@@ -11,9 +11,15 @@
 /* Paths that carry less are left to roulette. */
 #define SMALL_THROUGHPUT 0.125
 
+/* What of the camera's ray a path stands for. Before air, which is thin, light that it scatters and light from behind it have
+ * a path each; fog has one for both. */
+typedef enum path_share { ALL, SCATTERED, PASSED } path_share;
+
 /* A path at work. */
 typedef struct path {
     const nb_path_world *world;
+    const nb_path_eye *eye;
+    path_share share;
     nb_lone_ray *lone;
     nb_chance chance;
     int channel;
@@ -22,6 +28,7 @@ typedef struct path {
     double throughput[3]; /* what light from here on counts */
     double radiance[3];
     double shone[3]; /* what it had when its first ray ended */
+    double came_through; /* what its first ray left of light from behind the media */
 } path;
 
 /* ---- rays against surfaces ------------------------------------------------------------------- */
@@ -90,7 +97,7 @@ static void take_hit(const struct RTCRayHit *found, nb_rays *rays, nb_hits *hits
     hits->v[0] = found->hit.v;
 }
 
-static nb_meeting find_meeting(path *p)
+static nb_meeting find_surface(path *p)
 {
     const nb_path_world *world = p->world;
     nb_lone_ray *lone = p->lone;
@@ -106,6 +113,38 @@ static nb_meeting find_meeting(path *p)
     take_hit(&found, &lone->rays, &lone->hits);
     nb_surface_points(world->geometry, world->scene, world->table, &lone->rays, &lone->hits, sun, &lone->points);
     return nb_meeting_of(&lone->hits, &lone->points, 0);
+}
+
+/* Surfaces on the ground touch it: they are seen where they lie this little behind it, which is more than rounding. */
+static double behind(double t)
+{
+    return 1e-5 * t + 1e-3;
+}
+
+void nb_path_meet_ground(const nb_path_world *world, nebel_ray *ray, nb_meeting *meeting)
+{
+    const nb_ground_hit hit = nb_media_find_ground(&world->media, ray);
+    const int meets_surface = meeting->t < HUGE_VAL;
+    /* From on the ground or below it all surfaces are seen before it. */
+    if (hit.world == NULL || (meets_surface && (hit.t == 0 || hit.t + behind(meeting->t) >= meeting->t))) return;
+    *meeting = (nb_meeting){.t = hit.t, .is_ground = 1};
+    ray->t_max = hit.t;
+    for (int c = 0; c < 3; c++) {
+        meeting->reflectance[c] = (float)hit.world->planet->air.ground_albedo[c];
+        meeting->normal[c] = meeting->side[c] = (float)hit.normal[c];
+        meeting->place[c] = hit.place[c];
+    }
+    meeting->cosine = (float)nb_vector_dot(hit.normal, world->to_sun);
+    meeting->lit = world->has_sun && meeting->cosine > 0;
+}
+
+/* Where the path's next ray ends. */
+static nb_meeting find_meeting(path *p)
+{
+    nb_meeting meeting = find_surface(p);
+    p->ray.t_max = meeting.t;
+    nb_path_meet_ground(p->world, &p->ray, &meeting);
+    return meeting;
 }
 
 /* ---- directions ------------------------------------------------------------------------------ */
@@ -153,12 +192,12 @@ static nebel_result add_arriving(path *p, const double origin[3], const double d
 {
     const nb_path_world *world = p->world;
     if (!(share > 0) || is_shadowed(world->geometry, origin, direction, shadowed)) return NEBEL_OK;
-    nb_track way = {.fog = world->fog, .ray.t_max = reach, .ignore_distances = 1, .channel = p->channel};
+    nb_track way = {.media = &world->media, .ray.t_max = reach, .ignore_distances = 1, .channel = p->channel};
     memcpy(way.ray.origin, origin, sizeof way.ray.origin);
     memcpy(way.ray.direction, direction, sizeof way.ray.direction);
     double transmittance = 1;
     nebel_result result = NEBEL_OK;
-    if (world->fog != NULL) result = nb_track_transmittance(&way, &p->chance, &transmittance);
+    if (!nb_media_are_empty(&world->media)) result = nb_track_transmittance(&way, &p->chance, &transmittance);
     if (result == NEBEL_OK) add(p, light, share * transmittance);
     return result;
 }
@@ -167,7 +206,9 @@ static nebel_result add_arriving(path *p, const double origin[3], const double d
 static nebel_result add_sunlight(path *p, const double origin[3], double share)
 {
     const nb_path_world *world = p->world;
-    return world->has_sun ? add_arriving(p, origin, world->to_sun, HUGE_VAL, HUGE_VAL, world->sun, share) : NEBEL_OK;
+    if (!world->has_sun) return NEBEL_OK;
+    const double left = nb_media_sun_left(&world->media, origin, world->to_sun, world->disc);
+    return add_arriving(p, origin, world->to_sun, HUGE_VAL, HUGE_VAL, world->sun, left * share);
 }
 
 /* ---- lamps ----------------------------------------------------------------------------------- */
@@ -188,7 +229,7 @@ typedef struct chosen_lamp {
 static lit_ray light_ray(const nb_path_world *world, const nb_track *track)
 {
     lit_ray lit = {.track = *track, .sum = 0};
-    if (world->fog == NULL || world->scene->lamp_count == 0) return lit;
+    if (nb_media_are_empty(&world->media) || world->scene->lamp_count == 0) return lit;
     lit.track.ray.t_max = nb_track_reach(&track->ray);
     lit.sum = nb_lamps_sum(world->scene, nb_lamp_weight_along, &lit.track.ray);
     return lit;
@@ -217,12 +258,13 @@ static nebel_result add_scattered(path *p, const double place[3], const nebel_ph
     return add_arriving(p, place, sight->direction, sight->reach, sight->shadowed, light, value);
 }
 
-/* A volume that scatters at a place, by chance. */
-static nebel_result choose_scatterer(path *p, const nebel_place *place, nebel_scatterer *scatterer)
+/* One of the media that scatter at a place, by chance. */
+static nebel_result choose_scatterer(path *p, const nebel_place *place, const nb_matter *matter,
+                                     nb_scatterer *scatterer)
 {
     const nb_path_world *world = p->world;
     const int channel = world->is_grey ? -1 : p->channel;
-    return nebel_choose_scatterer(world->fog, place, channel, nb_chance_next(&p->chance), scatterer);
+    return nb_media_choose(&world->media, place, matter, channel, nb_chance_next(&p->chance), scatterer);
 }
 
 /* Places in light are found in two ways: where a flight collides, and as lamps see the ray pass. This is how many there
@@ -238,7 +280,7 @@ static double density_of(const path *p, const lit_ray *lit, double extinction, d
 static nebel_result add_colliding_light(path *p, const lit_ray *lit, const nb_flight *flight, const nebel_phase *phase)
 {
     if (!(lit->sum > 0)) return NEBEL_OK;
-    const double extinction = flight->matter.extinction[p->channel];
+    const double extinction = flight->matter.all.extinction[p->channel];
     const double share = extinction / density_of(p, lit, extinction, flight->t);
     return add_scattered(p, flight->place.position, phase, (const double[3]){share, share, share});
 }
@@ -255,15 +297,15 @@ static nebel_result add_passing_light(path *p, const lit_ray *lit)
     nb_track way = lit->track;
     way.ray.t_max = nb_passing_draw(&passing, nb_chance_next(&p->chance));
     nebel_place place;
-    nebel_matter matter;
-    nebel_scatterer scatterer;
+    nb_matter matter;
+    nb_scatterer scatterer;
     double transmittance, share[3];
-    nebel_result result = nb_track_look(&way, way.ray.t_max, &place, &matter);
-    if (result == NEBEL_OK) result = choose_scatterer(p, &place, &scatterer);
+    nebel_result result = nb_track_look(&way, way.ray.t_max, NB_MEDIA_ALL, &place, &matter);
+    if (result == NEBEL_OK) result = choose_scatterer(p, &place, &matter, &scatterer);
     if (result != NEBEL_OK || scatterer.probability == 0) return result;
     result = nb_track_transmittance(&way, &p->chance, &transmittance);
     if (result != NEBEL_OK || transmittance == 0) return result;
-    const double density = density_of(p, lit, matter.extinction[p->channel], way.ray.t_max);
+    const double density = density_of(p, lit, matter.all.extinction[p->channel], way.ray.t_max);
     for (int c = 0; c < 3; c++) share[c] = transmittance * scatterer.scattering[c] / scatterer.probability / density;
     return add_scattered(p, place.position, &scatterer.phase, share);
 }
@@ -293,8 +335,8 @@ static void add_ambient(path *p)
 /* What is behind everything. */
 static void add_background(path *p)
 {
-    if (p->is_first && !p->world->shows_ambient)
-        add(p, p->world->background, 1);
+    if (p->is_first)
+        add(p, p->eye->background, 1);
     else
         add_ambient(p);
 }
@@ -305,20 +347,21 @@ static void add_background(path *p)
 static nebel_result scatter(path *p, const lit_ray *lit, const nb_flight *flight)
 {
     const nb_path_world *world = p->world;
-    nebel_scatterer scatterer;
-    nebel_result result = choose_scatterer(p, &flight->place, &scatterer);
+    nb_scatterer scatterer;
+    nebel_result result = choose_scatterer(p, &flight->place, &flight->matter, &scatterer);
     if (result != NEBEL_OK) return result;
     for (int c = 0; c < 3; c++) {
         const double scattered = scatterer.probability > 0 ? scatterer.scattering[c] / scatterer.probability : 0;
-        p->throughput[c] *= scattered / flight->matter.extinction[p->channel];
+        p->throughput[c] *= scattered / flight->matter.all.extinction[p->channel];
     }
     if (scatterer.probability == 0) return NEBEL_OK;
     const double cosine = fmin(fmax(nb_vector_dot(p->ray.direction, world->to_sun), -1), 1);
     result = add_sunlight(p, flight->place.position, nebel_phase_value(&scatterer.phase, cosine));
     if (result == NEBEL_OK) result = add_colliding_light(p, lit, flight, &scatterer.phase);
-    double direction[3];
-    turn_about(p->ray.direction, nebel_phase_sample(&scatterer.phase, nb_chance_next(&p->chance)), &p->chance,
-               direction);
+    double direction[3], weight;
+    const double turned = nb_scatterer_turn(&scatterer, nb_chance_next(&p->chance), &weight);
+    turn_about(p->ray.direction, turned, &p->chance, direction);
+    for (int c = 0; c < 3; c++) p->throughput[c] *= weight;
     memcpy(p->ray.origin, flight->place.position, sizeof p->ray.origin);
     memcpy(p->ray.direction, direction, sizeof direction);
     return result;
@@ -329,7 +372,7 @@ static nebel_result reflect(path *p, const nb_meeting *at)
     const double *origin = p->world->geometry->origin;
     for (int c = 0; c < 3; c++) {
         p->throughput[c] *= (double)at->reflectance[c];
-        p->ray.origin[c] = origin[c] + (double)at->start[c];
+        p->ray.origin[c] = at->is_ground ? at->place[c] : origin[c] + (double)at->start[c];
     }
     reflect_diffusely(at, &p->chance, p->ray.direction);
     nebel_result result = add_reflected(p, at);
@@ -349,62 +392,93 @@ static int survives(path *p)
     return 1;
 }
 
+/* The first ray of a path of light from behind the media, which has no flight. */
+static nebel_result pass(path *p, const nb_track *track, nb_flight *flight)
+{
+    memset(flight, 0, sizeof *flight);
+    return nb_track_transmittance(track, &p->chance, &flight->weight);
+}
+
+static nebel_result fly(path *p, const nb_track *track, const lit_ray *lit, nb_flight *flight)
+{
+    nebel_result result = add_passing_light(p, lit);
+    if (result == NEBEL_OK) result = nb_track_fly(track, &p->chance, flight);
+    if (result == NEBEL_OK) add(p, flight->shone, 1);
+    return result;
+}
+
 /* One ray of the path, to its next bounce. *ended: nothing more comes. */
 static nebel_result go_on(path *p, const nb_meeting *at, nb_flight *flight, int *ended)
 {
     const nb_path_world *world = p->world;
-    const nb_track track = {world->fog, p->ray, !p->is_first, p->channel};
+    const nb_track track = {&world->media, p->ray, !p->is_first, p->channel};
     const lit_ray lit = light_ray(world, &track);
-    nebel_result result = add_passing_light(p, &lit);
-    if (result == NEBEL_OK) result = nb_track_fly(&track, &p->chance, flight);
+    const path_share share = p->is_first ? p->share : ALL;
+    nebel_result result = share == PASSED ? pass(p, &track, flight) : fly(p, &track, &lit, flight);
     if (result != NEBEL_OK) return result;
-    add(p, flight->shone, 1);
-    if (p->is_first) memcpy(p->shone, p->radiance, sizeof p->shone);
-    *ended = !flight->collided && at->t == HUGE_VAL;
-    if (*ended)
+    if (p->is_first) {
+        memcpy(p->shone, p->radiance, sizeof p->shone);
+        p->came_through = flight->collided ? 0 : flight->weight;
+    }
+    for (int c = 0; c < 3; c++) p->throughput[c] *= flight->weight;
+    const int is_lost = share == SCATTERED && !flight->collided;
+    *ended = is_lost || (!flight->collided && at->t == HUGE_VAL);
+    if (*ended && !is_lost)
         add_background(p);
-    else
+    else if (!*ended)
         result = flight->collided ? scatter(p, &lit, flight) : reflect(p, at);
     p->ray.t_max = HUGE_VAL;
     return result;
 }
 
-/* Follows the path of one channel, or of all where they are alike. *came_through: no fog stopped its first ray. */
-static nebel_result follow(path *p, const nb_meeting *first, int *came_through)
+/* Follows the path of one channel, or of all where they are alike. */
+static nebel_result follow(path *p)
 {
     const nb_path_world *world = p->world;
-    nb_meeting at = *first;
+    nb_meeting at = p->eye->first;
     for (uint32_t bounce = 1;; bounce++) {
         nb_flight flight;
         int ended;
         const nebel_result result = go_on(p, &at, &flight, &ended);
         if (result != NEBEL_OK) return result;
-        if (bounce == 1) *came_through = !flight.collided;
         p->is_first = 0;
         if (!ended && bounce == world->bounces) add_ambient(p);
         if (ended || bounce == world->bounces || !survives(p)) return NEBEL_OK;
         at = find_meeting(p);
-        p->ray.t_max = at.t;
     }
 }
 
-nebel_result nb_path_trace(const nb_path_world *world, const nebel_ray *eye, const nb_meeting *first,
-                           const uint32_t number[4], nb_lone_ray *lone, nb_path_light *light)
+/* Adds a path to the channels that it stands for. */
+static void gather(const path *p, int is_grey, nb_path_light *light)
+{
+    for (int k = p->channel; k < (is_grey ? 3 : p->channel + 1); k++) {
+        light->color[k] += p->radiance[k];
+        if (p->share != SCATTERED) light->transmittance[k] = p->came_through;
+        if (p->share == ALL)
+            light->in_scattering[k] = p->came_through > 0 ? p->shone[k] : p->radiance[k];
+        else if (p->share == SCATTERED)
+            light->in_scattering[k] = p->radiance[k];
+    }
+}
+
+nebel_result nb_path_trace(const nb_path_world *world, const nb_path_eye *eye, const uint32_t number[4],
+                           nb_lone_ray *lone, nb_path_light *light)
 {
     const nb_chance stream = nb_chance_of(number[0], number[1], number[2], number[3]);
-    for (int c = 0; c < 3; c++) {
-        path p = {.world = world, .lone = lone, .chance = stream, .channel = c, .ray = *eye, .is_first = 1};
-        for (int k = 0; k < 3; k++) p.throughput[k] = world->is_grey || k == c ? 1 : 0;
-        p.chance.state += (uint64_t)c << 62;
-        int came_through = 0;
-        const nebel_result result = follow(&p, first, &came_through);
-        if (result != NEBEL_OK) return result;
-        for (int k = c; k < (world->is_grey ? 3 : c + 1); k++) {
-            light->color[k] = p.radiance[k];
-            light->transmittance[k] = came_through;
-            light->in_scattering[k] = came_through ? p.shone[k] : p.radiance[k];
+    const int has_air = world->media.planet_count > 0;
+    memset(light, 0, sizeof *light);
+    for (int c = 0; c < (world->is_grey ? 1 : 3); c++) {
+        nb_chance chance = stream;
+        chance.state += (uint64_t)c << 62;
+        for (int share = has_air ? SCATTERED : ALL; share <= (has_air ? PASSED : ALL); share++) {
+            path p = {.world = world, .eye = eye, .share = share, .lone = lone, .chance = chance, .channel = c,
+                      .ray = eye->ray, .is_first = 1};
+            for (int k = 0; k < 3; k++) p.throughput[k] = world->is_grey || k == c ? 1 : 0;
+            const nebel_result result = follow(&p);
+            if (result != NEBEL_OK) return result;
+            chance = p.chance;
+            gather(&p, world->is_grey, light);
         }
-        if (world->is_grey) break;
     }
     return NEBEL_OK;
 }

@@ -15,6 +15,8 @@ typedef struct nb_meeting {
     float start[3];           /* of the rays that go on */
     float cosine;             /* of the angle between shading normal and sun */
     int lit;                  /* whether the surface faces the sun */
+    int is_ground;            /* of a planet, and rays go on from `place`, in the scene's coordinates */
+    double place[3];
 } nb_meeting;
 
 /* Room for what one ray meets, shaded as all rays of the renderer are: a batch of one. */
@@ -26,31 +28,40 @@ typedef struct nb_lone_ray {
 
 /* All that is the same for all paths of a frame. */
 typedef struct nb_path_world {
-    const nebel_snapshot *fog;     /* NULL: none */
+    nb_media media;
     const nebel_scene_data *scene; /* for its surfaces and lamps */
     const nb_geometry *geometry;
     const nb_srgb_table *table;
     double to_sun[3], sun[3];      /* unit direction; irradiance, 0 without sun */
-    nebel_environment environment; /* ambient light */
-    double background[3];
-    int has_sun, is_grey, shows_ambient;
+    double disc;                   /* radians: the radius of the sun, as other planets than that of a place hide it */
+    nebel_environment environment; /* ambient light, from beyond all air */
+    int has_sun, is_grey;
     uint32_t
         bounces; /* after so many no light is looked for but the sun's, lamps' and the ambient light of the place */
 } nb_path_world;
 
 typedef struct nb_path_light {
     double color[3], in_scattering[3];
-    double transmittance[3]; /* 1 where the path came through to what is behind the fog */
+    double transmittance[3]; /* 1 where the path came through to what is behind the fog; through air a mean of 1 */
 } nb_path_light;
+
+/* The camera's part of a path. */
+typedef struct nb_path_eye {
+    nebel_ray ray;        /* with t_max where it meets `first` or HUGE_VAL */
+    nb_meeting first;     /* a surface or the ground */
+    double background[3]; /* behind everything, seen along it */
+} nb_path_eye;
 
 void nb_lone_ray_clear(nb_lone_ray *lone);
 
 /* What lane i of a batch met. */
 nb_meeting nb_meeting_of(const nb_hits *hits, const nb_points *points, int i);
 
-/* The light of one path that begins along `eye`, with t_max where it meets `first` or HUGE_VAL. `number` are those of
- * column, row, sample and seed. Errors: UNBOUNDED. */
-nebel_result nb_path_trace(const nb_path_world *world, const nebel_ray *eye, const nb_meeting *first,
-                           const uint32_t number[4], nb_lone_ray *lone, nb_path_light *light);
+/* Puts the ground of a planet in the place of a meeting behind it. `ray` ends at the meeting. */
+void nb_path_meet_ground(const nb_path_world *world, nebel_ray *ray, nb_meeting *meeting);
+
+/* The light of one path. `number` are those of column, row, sample and seed. Errors: UNBOUNDED. */
+nebel_result nb_path_trace(const nb_path_world *world, const nb_path_eye *eye, const uint32_t number[4],
+                           nb_lone_ray *lone, nb_path_light *light);
 
 #endif

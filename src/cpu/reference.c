@@ -14,6 +14,27 @@ static void copy(const double from[3], double to[3])
     memcpy(to, from, 3 * sizeof *to);
 }
 
+/* Planets with air, and the sun behind it. Their sky is no ambient light here: paths find it. */
+static nebel_result set_planets(nb_frame *frame, double time)
+{
+    const nebel_renderer *renderer = frame->renderer;
+    const nebel_scene_data *scene = renderer->scene;
+    nb_world worlds[NEBEL_MAX_PLANETS];
+    const int count = nb_worlds_set(worlds, scene, frame->view.position);
+    if (count == 0) return NEBEL_OK;
+    frame->planets = nb_allocate(&renderer->allocator, (size_t)count, sizeof *frame->planets);
+    if (frame->planets == NULL)
+        return nb_fail(&renderer->log, NEBEL_ERROR_MEMORY, "frame: out of memory for the air of planets");
+    for (int i = 0; i < count; i++) nb_planet_medium_set(&frame->planets[i], worlds[i].planet, time);
+    frame->world.media.planets = frame->planets;
+    frame->world.media.planet_count = count;
+    frame->world.disc = frame->air.sun_radius = nb_worlds_disc(scene);
+    nb_worlds_disc_light(scene, frame->air.sun_radius, frame->air.sun_light);
+    frame->air.pixel = nb_view_pixel(&frame->view, frame->height);
+    if (nb_scene_owns_ambient(scene)) frame->world.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_CONSTANT};
+    return NEBEL_OK;
+}
+
 nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc)
 {
     const nebel_renderer *renderer = frame->renderer;
@@ -23,20 +44,26 @@ nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc)
     if (scene->max_opacity > 0 && scene->max_opacity < 1)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
                        "frame: max_opacity is a look that no light has; the reference cannot show it");
-    *world = (nb_path_world){.fog = renderer->fog,
+    const int has_fog = renderer->fog != NULL && nebel_snapshot_volume_count(renderer->fog) > 0;
+    *world = (nb_path_world){.media.fog = has_fog ? renderer->fog : NULL,
                              .scene = scene,
                              .geometry = &renderer->geometry,
                              .table = &renderer->table,
                              .has_sun = frame->lighting.has_sun,
-                             .is_grey = renderer->fog == NULL || nebel_is_fog_grey(renderer->fog),
                              .bounces = desc->bounces != 0 ? desc->bounces : MOST_BOUNCES};
     copy(frame->lighting.sun_direction, world->to_sun);
     world->environment = frame->lighting.environment;
-    world->shows_ambient = frame->lighting.shows_ambient;
-    copy(scene->background, world->background);
     if (world->has_sun) copy(scene->sun_irradiance, world->sun);
     frame->seed = desc->seed;
-    return NEBEL_OK;
+    const nebel_result result = set_planets(frame, desc->time);
+    world->is_grey = nb_media_are_grey(&world->media);
+    return result;
+}
+
+void nb_reference_free(nb_frame *frame)
+{
+    nb_release(&frame->renderer->allocator, frame->planets);
+    frame->planets = NULL;
 }
 
 /* From where lengths along the ray count: before it was advanced to the geometry. */
@@ -52,6 +79,21 @@ static nebel_ray eye_ray(const nb_frame *frame, const nb_rays *rays, int i)
     }
     for (int c = 0; c < 3; c++) ray.direction[c] /= sqrt(square);
     return ray;
+}
+
+/* Where the camera's ray ends, and what is behind everything. */
+static void look(const nb_frame *frame, nb_scratch *scratch, int i, nb_path_eye *eye)
+{
+    eye->ray = eye_ray(frame, &scratch->rays, i);
+    eye->first = nb_meeting_of(&scratch->hits, &scratch->points, i);
+    const double advance = frame->view.advance * (double)scratch->rays.length[i];
+    eye->first.t = eye->ray.t_max = advance + eye->first.t;
+    nb_path_meet_ground(&frame->world, &eye->ray, &eye->first);
+    nb_air_background(&frame->air, &frame->lighting, &scratch->rays, i, eye->background);
+    if (!eye->first.is_ground) return;
+    scratch->hits.surface[i] = NB_GROUND;
+    scratch->hits.t[i] = (float)(eye->first.t - advance);
+    for (int c = 0; c < 3; c++) scratch->points.normal[c][i] = eye->first.normal[c];
 }
 
 static void put(const nb_path_light *light, uint32_t lane, int i, nb_scratch *scratch)
@@ -88,11 +130,10 @@ nebel_result nb_reference_trace(const nb_frame *frame, const nb_place *place, nb
         const uint32_t lane = place->first + (uint32_t)i;
         const uint32_t number[4] = {place->left + nb_lane_x(lane), place->top + nb_lane_y(lane), place->sample,
                                     frame->seed};
-        const nb_meeting meeting = nb_meeting_of(&scratch->hits, &scratch->points, i);
-        nebel_ray eye = eye_ray(frame, &scratch->rays, i);
-        eye.t_max = frame->view.advance * (double)scratch->rays.length[i] + meeting.t;
+        nb_path_eye eye;
         nb_path_light light;
-        const nebel_result result = nb_path_trace(&frame->world, &eye, &meeting, number, &scratch->lone, &light);
+        look(frame, scratch, i, &eye);
+        const nebel_result result = nb_path_trace(&frame->world, &eye, number, &scratch->lone, &light);
         if (result != NEBEL_OK) return result;
         put(&light, lane, i, scratch);
     }

@@ -144,6 +144,7 @@ typedef struct nb_frame {
     nebel_cloud_view *cloud_view; /* the same */
     nebel_layer_view layer_view;
     nb_path_world world; /* of the method REFERENCE */
+    nb_planet_medium *planets; /* of the same: those with air; NULL: none */
     uint32_t seed;
 } nb_frame;
 
@@ -164,8 +165,9 @@ void nb_batch_find(const nb_frame *frame, const nb_place *place, uint32_t sample
 void nb_batch_find_centers(const nb_frame *frame, const nb_place *place, nb_scratch *scratch);
 nebel_result nb_batch_light(const nb_frame *frame, nb_scratch *scratch);
 
-/* The reference in nb_batch_render's place: after first hits are found. Errors: VALUE, UNSUPPORTED; UNBOUNDED. */
+/* The reference in nb_batch_render's place: after first hits are found. Errors: VALUE, UNSUPPORTED, MEMORY; UNBOUNDED. */
 nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc);
+void nb_reference_free(nb_frame *frame);
 nebel_result nb_reference_trace(const nb_frame *frame, const nb_place *place, nb_scratch *scratch);
 
 /* Colours in the precision that they were summed in, and the standard errors. */

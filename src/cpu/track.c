@@ -9,10 +9,23 @@
 /* Weights below this are left to roulette. */
 #define SMALL_WEIGHT 1e-3
 
+/* Depth that flights through air alone collide by beyond its own: half of it spread as that is, half evenly over pieces. */
+#define MORE_DEPTH 1.
+
+/* There stops are so often more than collisions at least, by which weights of those that pass stay small. */
+#define STOPS_OF_AIR 4
+
 /* A piece of a track, with the rate at which chance stops in it. */
 typedef struct piece {
     double end, rate; /* m, 1/m */
+    double boost;     /* collisions are so many times more often than the extinction says */
 } piece;
+
+/* How flights through air alone are to collide. */
+typedef struct boosts {
+    double depth; /* of such pieces, by their bounds */
+    int pieces;
+} boosts;
 
 double nb_track_reach(const nebel_ray *ray)
 {
@@ -29,26 +42,62 @@ static double largest(const double rgb[3])
     return fmax(rgb[0], fmax(rgb[1], rgb[2]));
 }
 
-static nebel_result next_piece(const nb_track *track, double t, double reach, int wants_emission, piece *p)
+static void start_walk(const nb_track *track, nb_media_part part, nb_media_walk *walk)
 {
-    nebel_bound bound;
-    const nebel_result result = nebel_bound_fog(track->fog, &track->ray, track->ignore_distances, t, &bound);
-    if (result != NEBEL_OK) return result;
-    p->rate = bound.extinction[track->channel];
-    if (wants_emission && largest(bound.emission) > 0) {
-        if (p->rate == 0 && isinf(bound.end) && isinf(track->ray.t_max)) return NEBEL_ERROR_UNBOUNDED;
-        p->rate = fmax(p->rate, STOPS_OF_EMISSION / (fmin(bound.end, reach) - t));
+    nb_media_walk_start(track->media, &track->ray, track->ignore_distances, part, walk);
+}
+
+/* How much air alone is on the way. */
+static nebel_result find_boosts(const nb_track *track, double reach, boosts *air)
+{
+    nb_media_walk walk;
+    *air = (boosts){0, 0};
+    if (track->media->planet_count == 0) return NEBEL_OK;
+    start_walk(track, NB_MEDIA_ALL, &walk);
+    for (double t = 0; t < reach;) {
+        const nebel_result result = nb_media_walk_to(&walk, t);
+        if (result != NEBEL_OK) return result;
+        const double end = fmin(walk.end, reach), rate = walk.extinction[track->channel];
+        if (walk.is_air && rate > 0) {
+            air->depth += rate * (end - t);
+            air->pieces++;
+        }
+        t = end;
     }
-    p->end = fmin(bound.end, reach);
     return NEBEL_OK;
 }
 
-nebel_result nb_track_look(const nb_track *track, double t, nebel_place *place, nebel_matter *matter)
+/* Of a piece of air alone. */
+static void set_boost(const boosts *air, double from, piece *p)
+{
+    const double depth = p->rate * (p->end - from);
+    if (!(depth > 0)) return;
+    p->boost = 1 + 0.5 * MORE_DEPTH * (1 / air->depth + 1 / (air->pieces * depth));
+    p->rate *= STOPS_OF_AIR * p->boost;
+}
+
+static nebel_result next_piece(const nb_track *track, nb_media_walk *walk, double t, double reach, const boosts *air,
+                               piece *p)
+{
+    const nebel_result result = nb_media_walk_to(walk, t);
+    if (result != NEBEL_OK) return result;
+    p->rate = walk->extinction[track->channel];
+    p->boost = 1;
+    p->end = fmin(walk->end, reach);
+    if (largest(walk->emission) > 0) {
+        if (p->rate == 0 && isinf(walk->end) && isinf(track->ray.t_max)) return NEBEL_ERROR_UNBOUNDED;
+        p->rate = fmax(p->rate, STOPS_OF_EMISSION / (p->end - t));
+    }
+    if (walk->is_air) set_boost(air, t, p);
+    return NEBEL_OK;
+}
+
+nebel_result nb_track_look(const nb_track *track, double t, nb_media_part part, nebel_place *place, nb_matter *matter)
 {
     const nebel_ray *ray = &track->ray;
     for (int i = 0; i < 3; i++) place->position[i] = ray->origin[i] + t * ray->direction[i];
     place->distance = track->ignore_distances ? -1 : t;
-    return nebel_sample_fog(track->fog, 1, place, sizeof *place, matter, sizeof *matter);
+    return nb_media_look(track->media, place, part, matter);
 }
 
 /* The way to the next stop at this rate. */
@@ -57,25 +106,42 @@ static double draw_way(double rate, nb_chance *chance)
     return rate > 0 ? -log1p(-nb_chance_next(chance)) / rate : HUGE_VAL;
 }
 
+/* Whether the flight ends at its stop, by chance, with what it weighs from there on. */
+static int collides(const piece *p, double extinction, nb_chance *chance, double *weight)
+{
+    const double part = p->boost * extinction / p->rate;
+    if (nb_chance_next(chance) * p->rate < p->boost * extinction) {
+        *weight /= p->boost;
+        return 1;
+    }
+    if (p->boost > 1) *weight *= (1 - extinction / p->rate) / (1 - part);
+    return 0;
+}
+
 nebel_result nb_track_fly(const nb_track *track, nb_chance *chance, nb_flight *flight)
 {
-    const double reach = track->fog != NULL ? nb_track_reach(&track->ray) : 0;
+    const double reach = !nb_media_are_empty(track->media) ? nb_track_reach(&track->ray) : 0;
+    nb_media_walk walk;
+    boosts air;
     memset(flight, 0, sizeof *flight);
-    for (double t = 0; t < reach;) {
+    flight->weight = 1;
+    nebel_result result = find_boosts(track, reach, &air);
+    start_walk(track, NB_MEDIA_ALL, &walk);
+    for (double t = 0; t < reach && result == NEBEL_OK;) {
         piece p;
-        nebel_result result = next_piece(track, t, reach, 1, &p);
-        if (result != NEBEL_OK) return result;
-        while ((t += draw_way(p.rate, chance)) < p.end) {
-            result = nb_track_look(track, t, &flight->place, &flight->matter);
+        result = next_piece(track, &walk, t, reach, &air, &p);
+        while (result == NEBEL_OK && (t += draw_way(p.rate, chance)) < p.end) {
+            result = nb_track_look(track, t, NB_MEDIA_ALL, &flight->place, &flight->matter);
             if (result != NEBEL_OK) return result;
-            for (int c = 0; c < 3; c++) flight->shone[c] += flight->matter.emission[c] / p.rate;
-            flight->collided = nb_chance_next(chance) * p.rate < flight->matter.extinction[track->channel];
+            for (int c = 0; c < 3; c++)
+                flight->shone[c] += flight->weight * flight->matter.all.emission[c] / p.rate;
             flight->t = t;
+            flight->collided = collides(&p, flight->matter.all.extinction[track->channel], chance, &flight->weight);
             if (flight->collided) return NEBEL_OK;
         }
         t = p.end;
     }
-    return NEBEL_OK;
+    return result;
 }
 
 /* 0: the weight is gone. */
@@ -88,23 +154,28 @@ static int survives(double *weight, nb_chance *chance)
 
 nebel_result nb_track_transmittance(const nb_track *track, nb_chance *chance, double *transmittance)
 {
-    const double reach = track->fog != NULL ? nb_track_reach(&track->ray) : 0;
+    const double reach = !nb_media_are_empty(track->media) ? nb_track_reach(&track->ray) : 0;
+    const int channel = track->channel;
+    const double air = nb_media_air_transmittance(track->media, &track->ray, channel);
     double weight = 1;
     *transmittance = 0;
+    if (!(air > 0)) return NEBEL_OK;
+    nb_media_walk walk;
+    start_walk(track, NB_MEDIA_WITHOUT_AIR, &walk);
     for (double t = 0; t < reach;) {
-        piece p;
-        nebel_result result = next_piece(track, t, reach, 0, &p);
+        nebel_result result = nb_media_walk_to(&walk, t);
         if (result != NEBEL_OK) return result;
-        while ((t += draw_way(p.rate, chance)) < p.end) {
+        const double rate = walk.extinction[channel], end = fmin(walk.end, reach);
+        while ((t += draw_way(rate, chance)) < end) {
             nebel_place place;
-            nebel_matter matter;
-            result = nb_track_look(track, t, &place, &matter);
+            nb_matter matter;
+            result = nb_track_look(track, t, NB_MEDIA_WITHOUT_AIR, &place, &matter);
             if (result != NEBEL_OK) return result;
-            weight *= fmax(1 - matter.extinction[track->channel] / p.rate, 0);
+            weight *= fmax(1 - matter.all.extinction[channel] / rate, 0);
             if (!survives(&weight, chance)) return NEBEL_OK;
         }
-        t = p.end;
+        t = end;
     }
-    *transmittance = weight;
+    *transmittance = air * weight;
     return NEBEL_OK;
 }

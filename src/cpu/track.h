@@ -1,16 +1,17 @@
-/* Free flights through fog, by chance: what the reference renderer knows of fog. It asks for the fog at places and for
- * bounds of it alone, never for the closed forms that it is to judge. */
+/* Free flights through fog, air and clouds, by chance: what the reference renderer knows of media. It asks for the media at
+ * places and for bounds of them alone, never for what it is to judge; but for the transmittance of air, whose closed form
+ * is right to 1e-9. */
 #ifndef NB_CPU_TRACK_H
 #define NB_CPU_TRACK_H
 
 #include "base/base.h"
 #include "chance.h"
 
-#include <nebel/places.h>
+#include "media.h"
 
-/* A way through the fog. One channel's extinction rules. */
+/* A way through the media. One channel's extinction rules. */
 typedef struct nb_track {
-    const nebel_snapshot *fog;
+    const nb_media *media;
     nebel_ray ray; /* with a direction of length 1 */
     int ignore_distances;
     int channel;
@@ -19,24 +20,28 @@ typedef struct nb_track {
 typedef struct nb_flight {
     int collided; /* else t_max was reached */
     double t;     /* m; there */
+    double weight; /* of what comes from there, mean 1 for the chances of analog flights */
     nebel_place place;
-    nebel_matter matter; /* there */
-    double shone[3];     /* what the fog on the way emits towards the start, dimmed */
+    nb_matter matter; /* there */
+    double shone[3];  /* what the fog on the way emits towards the start, dimmed */
 } nb_flight;
 
-/* How far along the ray there may be fog, m: what is farther than places may be counts as none. */
+/* How far along the ray there may be media, m: what is farther than places may be counts as none. */
 double nb_track_reach(const nebel_ray *ray);
 
-/* The fog at t. */
-nebel_result nb_track_look(const nb_track *track, double t, nebel_place *place, nebel_matter *matter);
+/* The media at t. */
+nebel_result nb_track_look(const nb_track *track, double t, nb_media_part part, nebel_place *place, nb_matter *matter);
 
-/* Delta tracking: Woodcock et al., "Techniques used in the GEM code", 1965. The mean of `collided` is the opacity; that
- * of `shone` the integral of emission times transmittance, which is gathered wherever the bound's rate stops the flight.
+/* Delta tracking: Woodcock et al., "Techniques used in the GEM code", 1965. The mean of `collided` times weight is the
+ * opacity; that of `shone` the integral of emission times transmittance, which is gathered wherever the bound's rate stops
+ * the flight. In pieces of nothing but air flights collide more often than light does, and weigh less (weighted delta
+ * tracking, Galtier et al., "Integral formulation of null-collision Monte Carlo algorithms", 2013): air is thin where it is
+ * bright at dusk. Elsewhere the weight stays as it is.
  * Errors: UNBOUNDED (emission without end and without extinction). */
 nebel_result nb_track_fly(const nb_track *track, nb_chance *chance, nb_flight *flight);
 
-/* Ratio tracking: Novak, Selle and Jarosz, "Residual Ratio Tracking", 2014. The mean is the transmittance. Below 1e-3
- * roulette decides, by which the variance grows by less than 1e-3 of the transmittance. */
+/* Ratio tracking: Novak, Selle and Jarosz, "Residual Ratio Tracking", 2014, times what air leaves. The mean is the
+ * transmittance. Below 1e-3 roulette decides, by which the variance grows by less than 1e-3 of the transmittance. */
 nebel_result nb_track_transmittance(const nb_track *track, nb_chance *chance, double *transmittance);
 
 #endif

@@ -1,0 +1,226 @@
+#include "planet_medium.h"
+
+#include <math.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+/* ---- directions ------------------------------------------------------------------------------ */
+
+static void set_turns(nb_turns *turns, const nebel_phase *phase)
+{
+    turns->phase = *phase;
+    for (int i = 0; i <= NB_TURNS; i++) turns->cosines[i] = nebel_phase_sample(phase, (double)i / NB_TURNS);
+    turns->cosines[0] = -1;
+    turns->cosines[NB_TURNS] = 1;
+}
+
+double nb_turns_draw(const nb_turns *turns, double chance, double *weight)
+{
+    const double place = chance * NB_TURNS;
+    const int i = place < NB_TURNS - 1 ? (int)place : NB_TURNS - 1;
+    const double wide = turns->cosines[i + 1] - turns->cosines[i];
+    const double cosine = fmin(1, turns->cosines[i] + (place - i) * wide);
+    *weight = 2 * PI * nebel_phase_value(&turns->phase, cosine) * NB_TURNS * wide;
+    return cosine;
+}
+
+/* ---- air ------------------------------------------------------------------------------------- */
+
+/* docs/planet.md: e^(-height / scale height), or straight lines from a layer's middle. */
+static double density_at(const nebel_air *air, double height)
+{
+    if (air->profile == NEBEL_AIR_EXPONENTIAL) return exp(-height / air->scale_height);
+    return fmax(0, 1 - fabs(height - air->middle) / air->width);
+}
+
+/* Between two heights. */
+static double most_density(const nebel_air *air, double low, double high)
+{
+    if (air->profile == NEBEL_AIR_LAYER) return density_at(air, fmin(fmax(air->middle, low), high));
+    return density_at(air, low);
+}
+
+/* ---- shells ---------------------------------------------------------------------------------- */
+
+static void add_shell(nb_shells *shells, double radius, double top)
+{
+    int i = shells->count;
+    if (!(radius < top) || shells->count == NB_MOST_SHELLS) return;
+    for (int k = 0; k < i; k++)
+        if (shells->radii[k] == radius) return;
+    for (; i > 0 && shells->radii[i - 1] > radius; i--) shells->radii[i] = shells->radii[i - 1];
+    shells->radii[i] = radius;
+    shells->count++;
+}
+
+/* Exponentials fall to a third from one shell to the next; light layers are cut at their edges and within. */
+static void cut_air(nb_shells *shells, const nebel_air *air, double ground, double top)
+{
+    for (int i = 0; i < NB_SHELLS_PER_AIR; i++) {
+        const double height = air->profile == NEBEL_AIR_EXPONENTIAL
+                                  ? (i + 1) * air->scale_height
+                                  : air->middle + air->width * (2. * i / (NB_SHELLS_PER_AIR - 1) - 1);
+        if (height > 0) add_shell(shells, ground + height, top);
+    }
+}
+
+static void cut_clouds(nb_shells *shells, const nebel_planet *planet, double top)
+{
+    for (uint32_t k = 0; k < planet->cloud_layer_count; k++) {
+        add_shell(shells, planet->air.radius + planet->cloud_layers[k].base, top);
+        add_shell(shells, planet->air.radius + planet->cloud_layers[k].top, top);
+    }
+}
+
+/* What is below radii[i] and above the shell before. Below the ground all is as on it. */
+static void bound_shell(const nebel_planet *planet, int with_air, nb_shells *shells, int i)
+{
+    const nebel_atmosphere_desc *desc = &planet->air;
+    const double low = fmax(0, i > 0 ? shells->radii[i - 1] - desc->radius : 0);
+    const double high = fmax(0, shells->radii[i] - desc->radius);
+    for (uint32_t k = 0; k < desc->air_count && with_air; k++) {
+        const double most = most_density(&desc->airs[k], low, high);
+        for (int c = 0; c < 3; c++)
+            shells->air[i][c] += most * (desc->airs[k].scattering[c] + desc->airs[k].absorption[c]);
+    }
+    for (uint32_t k = 0; k < planet->cloud_layer_count && planet->clouds != NULL; k++) {
+        const double middle = 0.5 * (low + high);
+        if (middle > planet->cloud_layers[k].base && middle < planet->cloud_layers[k].top)
+            shells->clouds[i] = planet->cloud_layers[k].extinction;
+    }
+}
+
+/* Bounds hold for what is computed, too. */
+#define ROUNDING (1 + 1e-6)
+
+static void end_shells(const nebel_planet *planet, double top, int with_air, nb_shells *shells)
+{
+    shells->radii[shells->count++] = top;
+    for (int i = 0; i < shells->count; i++) {
+        bound_shell(planet, with_air, shells, i);
+        shells->clouds[i] *= ROUNDING;
+        for (int c = 0; c < 3; c++) shells->air[i][c] *= ROUNDING;
+    }
+}
+
+void nb_planet_medium_set(nb_planet_medium *medium, const nebel_planet *planet, double time)
+{
+    const nebel_atmosphere_desc *desc = &planet->air;
+    const double top = desc->radius + desc->thickness;
+    memset(medium, 0, sizeof *medium);
+    medium->world = nb_world_of(planet);
+    medium->time = time;
+    add_shell(&medium->shells, desc->radius, top);
+    for (uint32_t k = 0; k < desc->air_count; k++) {
+        cut_air(&medium->shells, &desc->airs[k], desc->radius, top);
+        set_turns(&medium->airs[k], &desc->airs[k].phase);
+    }
+    if (planet->clouds != NULL) {
+        cut_clouds(&medium->shells, planet, top);
+        cut_clouds(&medium->sheets, planet, top);
+    }
+    for (uint32_t k = 0; k < planet->cloud_layer_count; k++) {
+        const nebel_phase drops = {.type = NEBEL_PHASE_DROPLETS, .diameter = planet->cloud_layers[k].diameter};
+        set_turns(&medium->drops[k], &drops);
+    }
+    end_shells(planet, top, 1, &medium->shells);
+    end_shells(planet, top, 0, &medium->sheets);
+}
+
+/* ---- places ---------------------------------------------------------------------------------- */
+
+static void look_at_clouds(const nb_planet_medium *medium, const double place[3], double height,
+                           nb_planet_matter *matter)
+{
+    const nebel_planet *planet = medium->world.planet;
+    if (planet->clouds == NULL) return;
+    for (uint32_t k = 0; k < planet->cloud_layer_count; k++) {
+        const nebel_cloud_layer *layer = &planet->cloud_layers[k];
+        float extinction = 0;
+        if (!(height > layer->base && height < layer->top)) continue;
+        /* Places and the frame's time are in order, so that it cannot fail. */
+        (void)nebel_cloud_extinction(planet->clouds, medium->time, 0, 1, (const double(*)[3])place, 0, &extinction);
+        matter->clouds = (double)extinction;
+        matter->layer = (int)k;
+    }
+}
+
+nb_planet_matter nb_planet_matter_at(const nb_planet_medium *medium, const double place[3], int with_air)
+{
+    const nebel_atmosphere_desc *desc = &medium->world.planet->air;
+    nb_planet_matter matter = {.medium = NULL};
+    double from[3];
+    for (int c = 0; c < 3; c++) from[c] = place[c] - medium->world.center[c];
+    const double height = fmax(0, nb_vector_length(from) - desc->radius);
+    if (!(height < desc->thickness)) return matter;
+    matter.medium = medium;
+    for (uint32_t k = 0; k < desc->air_count && with_air; k++) matter.density[k] = density_at(&desc->airs[k], height);
+    look_at_clouds(medium, place, height, &matter);
+    return matter;
+}
+
+/* ---- rays ------------------------------------------------------------------------------------ */
+
+/* Where the ray crosses a sphere on its way down or up; at its lowest place where it passes over the sphere. In the order of
+ * the spheres also when rounded. */
+static double crossing(const nb_planet_walk *walk, int sphere, int is_down)
+{
+    const double radius = walk->shells->radii[sphere], lowest = walk->lowest_radius;
+    const double half = radius > lowest ? sqrt((radius - lowest) * (radius + lowest)) : 0;
+    return is_down ? walk->lowest_t - half : walk->lowest_t + half;
+}
+
+/* How many of the spheres, counted from the smallest, lie below the ray's start: on its way down those that it enters later,
+ * on its way up those that it has left. */
+static int count_below(const nb_planet_walk *walk)
+{
+    int low = 0, high = walk->shells->count;
+    while (low < high) {
+        const int middle = (low + high) / 2;
+        const double t = crossing(walk, middle, walk->is_down);
+        if (walk->is_down ? t > 0 : t <= 0)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* Of the sphere that the piece lies over, and of the one that is around it. */
+static void set_piece(nb_planet_walk *walk)
+{
+    const nb_shells *shells = walk->shells;
+    const int below = walk->below;
+    walk->is_down = walk->is_down && below > 0 && shells->radii[below - 1] > walk->lowest_radius;
+    walk->end = HUGE_VAL;
+    walk->clouds = walk->air[0] = walk->air[1] = walk->air[2] = 0;
+    if (walk->is_down)
+        walk->end = crossing(walk, below - 1, 1);
+    else if (below < shells->count)
+        walk->end = crossing(walk, below, 0);
+    if (below == shells->count) return;
+    walk->clouds = shells->clouds[below];
+    memcpy(walk->air, shells->air[below], sizeof walk->air);
+}
+
+void nb_planet_walk_start(const nb_planet_medium *medium, const nebel_ray *ray, int with_air, nb_planet_walk *walk)
+{
+    double to[3], aside[3];
+    walk->shells = with_air ? &medium->shells : &medium->sheets;
+    for (int c = 0; c < 3; c++) to[c] = medium->world.center[c] - ray->origin[c];
+    walk->lowest_t = nb_vector_dot(to, ray->direction);
+    for (int c = 0; c < 3; c++) aside[c] = to[c] - walk->lowest_t * ray->direction[c];
+    walk->lowest_radius = nb_vector_length(aside);
+    walk->is_down = walk->lowest_t > 0;
+    walk->below = count_below(walk);
+    set_piece(walk);
+}
+
+void nb_planet_walk_to(nb_planet_walk *walk, double t)
+{
+    while (walk->end <= t) {
+        walk->below += walk->is_down ? -1 : 1;
+        set_piece(walk);
+    }
+}
