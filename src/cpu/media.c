@@ -175,13 +175,6 @@ nebel_result nb_media_choose(const nb_media *media, const nebel_place *place, co
     return NEBEL_OK;
 }
 
-double nb_scatterer_turn(const nb_scatterer *scatterer, double chance, double *weight)
-{
-    if (scatterer->turns != NULL) return nb_turns_draw(scatterer->turns, chance, weight);
-    *weight = 1;
-    return nebel_phase_sample(&scatterer->phase, chance);
-}
-
 /* ---- grounds --------------------------------------------------------------------------------- */
 
 static double up_at(const nb_world *world, const double place[3], double up[3])

@@ -63,9 +63,6 @@ nebel_result nb_media_walk_to(nb_media_walk *walk, double t);
 nebel_result nb_media_choose(const nb_media *media, const nebel_place *place, const nb_matter *matter, int channel,
                              double chance, nb_scatterer *scatterer);
 
-/* Draws the cosine of the angle by which light turns. *weight: phase function by density of the draw. */
-double nb_scatterer_turn(const nb_scatterer *scatterer, double chance, double *weight);
-
 /* What the air of all planets leaves of light along a ray up to its t_max: the closed form of nebel_trace_air. */
 double nb_media_air_transmittance(const nb_media *media, const nebel_ray *ray, int channel);
 

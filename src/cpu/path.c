@@ -4,6 +4,7 @@
 #include "lampchance.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #define PI 3.14159265358979323846
@@ -11,9 +12,20 @@
 /* Paths that carry less are left to roulette. */
 #define SMALL_THROUGHPUT 0.125
 
+/* So often a path sends another one off about the sun where phase functions are peaked; so many may wait. */
+#define SUNWARD 0.3
+enum { MOST_WAITING = 64 };
+
 /* What of the camera's ray a path stands for. Before air, which is thin, light that it scatters and light from behind it have
  * a path each; fog has one for both. */
 typedef enum path_share { ALL, SCATTERED, PASSED } path_share;
+
+/* A path that waits until the one that it left is done. */
+typedef struct waiting_path {
+    nebel_ray ray;
+    double throughput[3], promise;
+    uint32_t bounces; /* behind it */
+} waiting_path;
 
 /* A path at work. */
 typedef struct path {
@@ -26,6 +38,10 @@ typedef struct path {
     nebel_ray ray;
     int is_first;         /* the ray is the camera's */
     double throughput[3]; /* what light from here on counts */
+    double promise;       /* how much of the sun the next bounce may send along the path, at least 1 */
+    uint32_t bounces;     /* so far */
+    waiting_path waiting[MOST_WAITING];
+    int waiting_count;
     double radiance[3];
     double shone[3]; /* what it had when its first ray ended */
     double came_through; /* what its first ray left of light from behind the media */
@@ -343,6 +359,65 @@ static void add_background(path *p)
 
 /* ---- bounces --------------------------------------------------------------------------------- */
 
+static double cosine_between(const double a[3], const double b[3])
+{
+    return fmin(fmax(nb_vector_dot(a, b), -1), 1);
+}
+
+/* Goes on from a place in a direction with what that counts. */
+static void head(path *p, const double place[3], const double direction[3], double weight)
+{
+    memcpy(p->ray.origin, place, sizeof p->ray.origin);
+    memcpy(p->ray.direction, direction, sizeof p->ray.direction);
+    p->ray.t_max = HUGE_VAL;
+    for (int c = 0; c < 3; c++) p->throughput[c] *= weight;
+}
+
+/* Of a direction that is drawn by the phase function, and as often as `part` says by the same about the sun: what each counts,
+ * by the balance heuristic. At most 1, so that the weights of many bounces do not drift apart. */
+static double weigh(path *p, const nb_turns *turns, double part, const double direction[3])
+{
+    const double cosine = cosine_between(p->ray.direction, direction);
+    const double value = nebel_phase_value(&turns->phase, cosine);
+    p->promise = 1;
+    if (part == 0) return value / nb_turns_density(turns, cosine);
+    const double sunward = cosine_between(p->world->to_sun, direction);
+    p->promise = fmax(1, nebel_phase_value(&turns->phase, sunward));
+    return value / (nb_turns_density(turns, cosine) + part * nb_turns_density(turns, sunward));
+}
+
+/* Drops and dust send most light on nearly straight, so that paths that chance turns towards the sun would be rare and bright:
+ * more of them are sent there, and all count less. */
+static void leave_sunward(path *p, const nb_turns *turns, const double place[3])
+{
+    path other;
+    double direction[3];
+    memcpy(&other, p, offsetof(path, waiting));
+    turn_about(p->world->to_sun, nb_turns_draw(turns, nb_chance_next(&p->chance)), &p->chance, direction);
+    head(&other, place, direction, weigh(&other, turns, SUNWARD, direction));
+    waiting_path *next = &p->waiting[p->waiting_count++];
+    *next = (waiting_path){.ray = other.ray, .promise = other.promise, .bounces = p->bounces};
+    memcpy(next->throughput, other.throughput, sizeof next->throughput);
+}
+
+/* Sends the path on. */
+static void turn(path *p, const nb_scatterer *scatterer, const double place[3])
+{
+    const nb_turns *turns = scatterer->turns;
+    const double chance = nb_chance_next(&p->chance);
+    double direction[3];
+    if (turns == NULL) {
+        turn_about(p->ray.direction, nebel_phase_sample(&scatterer->phase, chance), &p->chance, direction);
+        p->promise = 1;
+        head(p, place, direction, 1);
+        return;
+    }
+    const double part = turns->is_peaked && p->world->has_sun && p->waiting_count < MOST_WAITING ? SUNWARD : 0;
+    if (part > 0 && nb_chance_next(&p->chance) < part) leave_sunward(p, turns, place);
+    turn_about(p->ray.direction, nb_turns_draw(turns, chance), &p->chance, direction);
+    head(p, place, direction, weigh(p, turns, part, direction));
+}
+
 /* Scatters at a collision. The throughput is 0 where the light is absorbed. */
 static nebel_result scatter(path *p, const lit_ray *lit, const nb_flight *flight)
 {
@@ -355,15 +430,10 @@ static nebel_result scatter(path *p, const lit_ray *lit, const nb_flight *flight
         p->throughput[c] *= scattered / flight->matter.all.extinction[p->channel];
     }
     if (scatterer.probability == 0) return NEBEL_OK;
-    const double cosine = fmin(fmax(nb_vector_dot(p->ray.direction, world->to_sun), -1), 1);
+    const double cosine = cosine_between(p->ray.direction, world->to_sun);
     result = add_sunlight(p, flight->place.position, nebel_phase_value(&scatterer.phase, cosine));
     if (result == NEBEL_OK) result = add_colliding_light(p, lit, flight, &scatterer.phase);
-    double direction[3], weight;
-    const double turned = nb_scatterer_turn(&scatterer, nb_chance_next(&p->chance), &weight);
-    turn_about(p->ray.direction, turned, &p->chance, direction);
-    for (int c = 0; c < 3; c++) p->throughput[c] *= weight;
-    memcpy(p->ray.origin, flight->place.position, sizeof p->ray.origin);
-    memcpy(p->ray.direction, direction, sizeof direction);
+    turn(p, &scatterer, flight->place.position);
     return result;
 }
 
@@ -375,6 +445,7 @@ static nebel_result reflect(path *p, const nb_meeting *at)
         p->ray.origin[c] = at->is_ground ? at->place[c] : origin[c] + (double)at->start[c];
     }
     reflect_diffusely(at, &p->chance, p->ray.direction);
+    p->promise = 1;
     nebel_result result = add_reflected(p, at);
     if (result == NEBEL_OK && at->lit) result = add_sunlight(p, p->ray.origin, (double)at->cosine / PI);
     return result;
@@ -382,10 +453,10 @@ static nebel_result reflect(path *p, const nb_meeting *at)
 
 /* ---- paths ----------------------------------------------------------------------------------- */
 
-/* 0: the path ends, and others carry its light. */
+/* 0: the path ends, and others carry its light. What goes on just beside the sun is worth more than it carries. */
 static int survives(path *p)
 {
-    const double most = fmax(p->throughput[0], fmax(p->throughput[1], p->throughput[2]));
+    const double most = p->promise * fmax(p->throughput[0], fmax(p->throughput[1], p->throughput[2]));
     if (most >= SMALL_THROUGHPUT) return 1;
     if (nb_chance_next(&p->chance) * SMALL_THROUGHPUT >= most) return 0;
     for (int c = 0; c < 3; c++) p->throughput[c] *= SMALL_THROUGHPUT / most;
@@ -411,9 +482,9 @@ static nebel_result fly(path *p, const nb_track *track, const lit_ray *lit, nb_f
 static nebel_result go_on(path *p, const nb_meeting *at, nb_flight *flight, int *ended)
 {
     const nb_path_world *world = p->world;
-    const nb_track track = {&world->media, p->ray, !p->is_first, p->channel};
-    const lit_ray lit = light_ray(world, &track);
     const path_share share = p->is_first ? p->share : ALL;
+    const nb_track track = {&world->media, p->ray, !p->is_first, p->channel, share == SCATTERED};
+    const lit_ray lit = light_ray(world, &track);
     nebel_result result = share == PASSED ? pass(p, &track, flight) : fly(p, &track, &lit, flight);
     if (result != NEBEL_OK) return result;
     if (p->is_first) {
@@ -431,21 +502,39 @@ static nebel_result go_on(path *p, const nb_meeting *at, nb_flight *flight, int 
     return result;
 }
 
-/* Follows the path of one channel, or of all where they are alike. */
-static nebel_result follow(path *p)
+/* Follows a path until it ends; others may wait then. */
+static nebel_result follow(path *p, const nb_meeting *first)
 {
     const nb_path_world *world = p->world;
-    nb_meeting at = p->eye->first;
-    for (uint32_t bounce = 1;; bounce++) {
+    nb_meeting at = *first;
+    for (;;) {
         nb_flight flight;
         int ended;
+        p->bounces++;
         const nebel_result result = go_on(p, &at, &flight, &ended);
         if (result != NEBEL_OK) return result;
         p->is_first = 0;
-        if (!ended && bounce == world->bounces) add_ambient(p);
-        if (ended || bounce == world->bounces || !survives(p)) return NEBEL_OK;
+        if (!ended && p->bounces == world->bounces) add_ambient(p);
+        if (ended || p->bounces == world->bounces || !survives(p)) return NEBEL_OK;
         at = find_meeting(p);
     }
+}
+
+/* Follows the path of one channel, or of all where they are alike, and those that it leaves. */
+static nebel_result follow_all(path *p)
+{
+    nebel_result result = follow(p, &p->eye->first);
+    while (result == NEBEL_OK && p->waiting_count > 0) {
+        const waiting_path *next = &p->waiting[--p->waiting_count];
+        p->ray = next->ray;
+        p->promise = next->promise;
+        p->bounces = next->bounces;
+        memcpy(p->throughput, next->throughput, sizeof p->throughput);
+        if (p->bounces == p->world->bounces || !survives(p)) continue;
+        const nb_meeting at = find_meeting(p);
+        result = follow(p, &at);
+    }
+    return result;
 }
 
 /* Adds a path to the channels that it stands for. */
@@ -474,7 +563,7 @@ nebel_result nb_path_trace(const nb_path_world *world, const nb_path_eye *eye, c
             path p = {.world = world, .eye = eye, .share = share, .lone = lone, .chance = chance, .channel = c,
                       .ray = eye->ray, .is_first = 1};
             for (int k = 0; k < 3; k++) p.throughput[k] = world->is_grey || k == c ? 1 : 0;
-            const nebel_result result = follow(&p);
+            const nebel_result result = follow_all(&p);
             if (result != NEBEL_OK) return result;
             chance = p.chance;
             gather(&p, world->is_grey, light);

@@ -7,22 +7,33 @@
 
 /* ---- directions ------------------------------------------------------------------------------ */
 
+/* Phase functions that are larger straight ahead, 1/sr, count as peaked. */
+#define PEAK 2
+
 static void set_turns(nb_turns *turns, const nebel_phase *phase)
 {
     turns->phase = *phase;
+    turns->is_peaked = nebel_phase_value(phase, 1) > PEAK;
     for (int i = 0; i <= NB_TURNS; i++) turns->cosines[i] = nebel_phase_sample(phase, (double)i / NB_TURNS);
     turns->cosines[0] = -1;
     turns->cosines[NB_TURNS] = 1;
 }
 
-double nb_turns_draw(const nb_turns *turns, double chance, double *weight)
+double nb_turns_draw(const nb_turns *turns, double chance)
 {
     const double place = chance * NB_TURNS;
     const int i = place < NB_TURNS - 1 ? (int)place : NB_TURNS - 1;
-    const double wide = turns->cosines[i + 1] - turns->cosines[i];
-    const double cosine = fmin(1, turns->cosines[i] + (place - i) * wide);
-    *weight = 2 * PI * nebel_phase_value(&turns->phase, cosine) * NB_TURNS * wide;
-    return cosine;
+    return fmin(1, turns->cosines[i] + (place - i) * (turns->cosines[i + 1] - turns->cosines[i]));
+}
+
+double nb_turns_density(const nb_turns *turns, double cosine)
+{
+    int low = 0, high = NB_TURNS;
+    while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        *(turns->cosines[middle] <= cosine ? &low : &high) = middle;
+    }
+    return 1 / (2 * PI * NB_TURNS * (turns->cosines[low + 1] - turns->cosines[low]));
 }
 
 /* ---- air ------------------------------------------------------------------------------------- */

@@ -12,6 +12,7 @@ enum { NB_TURNS = 1024 };
 /* A phase function for sampling: between two neighboring cosines all are drawn alike, each pair as often as another. */
 typedef struct nb_turns {
     nebel_phase phase;
+    int is_peaked;                /* light goes on nearly straight far more often than elsewhere */
     double cosines[NB_TURNS + 1]; /* from -1 to 1 */
 } nb_turns;
 
@@ -62,7 +63,10 @@ void nb_planet_walk_start(const nb_planet_medium *medium, const nebel_ray *ray, 
 /* Goes on to the piece that holds t, which is not before the one that the walk is in. */
 void nb_planet_walk_to(nb_planet_walk *walk, double t);
 
-/* Draws a cosine. *weight: phase function by density of the draw, of mean 1. */
-double nb_turns_draw(const nb_turns *turns, double chance, double *weight);
+/* Draws a cosine. */
+double nb_turns_draw(const nb_turns *turns, double chance);
+
+/* How densely directions are drawn there, 1/sr. */
+double nb_turns_density(const nb_turns *turns, double cosine);
 
 #endif

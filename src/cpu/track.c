@@ -10,10 +10,10 @@
 #define SMALL_WEIGHT 1e-3
 
 /* Depth that flights through air alone collide by beyond its own: half of it spread as that is, half evenly over pieces. */
-#define MORE_DEPTH 1.
+#define MORE_DEPTH 1.5
 
 /* There stops are so often more than collisions at least, by which weights of those that pass stay small. */
-#define STOPS_OF_AIR 4
+#define STOPS_OF_AIR 8
 
 /* A piece of a track, with the rate at which chance stops in it. */
 typedef struct piece {
@@ -52,7 +52,7 @@ static nebel_result find_boosts(const nb_track *track, double reach, boosts *air
 {
     nb_media_walk walk;
     *air = (boosts){0, 0};
-    if (track->media->planet_count == 0) return NEBEL_OK;
+    if (!track->is_boosted) return NEBEL_OK;
     start_walk(track, NB_MEDIA_ALL, &walk);
     for (double t = 0; t < reach;) {
         const nebel_result result = nb_media_walk_to(&walk, t);
@@ -88,7 +88,7 @@ static nebel_result next_piece(const nb_track *track, nb_media_walk *walk, doubl
         if (p->rate == 0 && isinf(walk->end) && isinf(track->ray.t_max)) return NEBEL_ERROR_UNBOUNDED;
         p->rate = fmax(p->rate, STOPS_OF_EMISSION / (p->end - t));
     }
-    if (walk->is_air) set_boost(air, t, p);
+    if (track->is_boosted && walk->is_air) set_boost(air, t, p);
     return NEBEL_OK;
 }
 

@@ -15,6 +15,7 @@ typedef struct nb_track {
     nebel_ray ray; /* with a direction of length 1 */
     int ignore_distances;
     int channel;
+    int is_boosted; /* flights collide with air more often than light does, and weigh less */
 } nb_track;
 
 typedef struct nb_flight {
