@@ -328,7 +328,7 @@ static estimate measure_flux(const layer *l, int above, uint32_t paths)
     static nb_lone_ray lone;
     static const nb_geometry nothing;
     static const nebel_scene_data no_lamps;
-    const nb_path_world world = {.fog = snapshot,
+    const nb_path_world world = {.media.fog = snapshot,
                                  .scene = &no_lamps,
                                  .geometry = &nothing,
                                  .to_sun = {sqrt(1 - l->sun * l->sun), l->sun, 0},
@@ -340,11 +340,11 @@ static estimate measure_flux(const layer *l, int above, uint32_t paths)
     double sum = 0, square = 0;
     for (uint32_t i = 0; i < paths; i++) {
         const double angle = dice(&numbers, 0, 2 * test_pi), up = sqrt(dice(&numbers, 0, 1)), level = sqrt(1 - up * up);
-        const nebel_ray eye = {
-            {0, above ? 1 : -11, 0}, {level * cos(angle), above ? -up : up, level * sin(angle)}, HUGE_VAL};
+        const nb_path_eye eye = {
+            .ray = {{0, above ? 1 : -11, 0}, {level * cos(angle), above ? -up : up, level * sin(angle)}, HUGE_VAL},
+            .first.t = HUGE_VAL};
         nb_path_light light;
-        assert_int_equal(
-            nb_path_trace(&world, &eye, &(nb_meeting){.t = HUGE_VAL}, (const uint32_t[4]){i}, &lone, &light), NEBEL_OK);
+        assert_int_equal(nb_path_trace(&world, &eye, (const uint32_t[4]){i}, &lone, &light), NEBEL_OK);
         sum += test_pi * light.color[0] / paths;
         square += pow(test_pi * light.color[0], 2) / paths;
     }
@@ -434,7 +434,8 @@ static void variances_are_those_of_T38(void **state)
     for (int i = 0; i < 3; i++) {
         if (i > 0 && !nb_test_tries((size_t)i, 3)) continue;
         nebel_snapshot *fog = loosely_bounded_fog(cases[i].part);
-        const nb_track track = {.fog = fog, .ray = {{0, 0, 0}, {0, 0, 1}, cases[i].depth / cases[i].part}};
+        const nb_media media = {.fog = fog};
+        const nb_track track = {.media = &media, .ray = {{0, 0, 0}, {0, 0, 1}, cases[i].depth / cases[i].part}};
         const double expected = exp(-cases[i].depth), variance[2] = {cases[i].delta, cases[i].ratio};
         double sum[2] = {0}, square[2] = {0};
         nb_chance chance = nb_chance_of(1, 2, 3, (uint32_t)i);

@@ -27,7 +27,7 @@ typedef struct trial {
 static void start(trial *t, const nebel_lamp *lamps, size_t count, const nebel_volume_desc *volume)
 {
     *t = (trial){.scene = {.lamp_count = count, .lamps = lamps}};
-    t->world = (nb_path_world){.fog = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, volume, 1),
+    t->world = (nb_path_world){.media.fog = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, volume, 1),
                                .scene = &t->scene,
                                .geometry = &t->geometry,
                                .is_grey = 1,
@@ -36,7 +36,7 @@ static void start(trial *t, const nebel_lamp *lamps, size_t count, const nebel_v
 
 static void end(trial *t)
 {
-    nebel_release_snapshot((nebel_snapshot *)t->world.fog);
+    nebel_release_snapshot((nebel_snapshot *)t->world.media.fog);
 }
 
 static nebel_volume_desc white_fog(double extinction)
@@ -49,7 +49,7 @@ static void follow(const trial *t, const nebel_ray *eye, const nb_meeting *at, d
     static nb_lone_ray lone;
     nb_path_light light;
     const uint32_t number[4] = {all->count++};
-    assert_int_equal(nb_path_trace(&t->world, eye, at, number, &lone, &light), NEBEL_OK);
+    assert_int_equal(nb_path_trace(&t->world, &(nb_path_eye){.ray = *eye, .first = *at}, number, &lone, &light), NEBEL_OK);
     all->sum += weight * light.color[0];
     all->square += pow(weight * light.color[0], 2);
 }

@@ -712,7 +712,7 @@ static void odd_cameras(void **state)
     assert_int_equal(nebel_render_frame(renderer, &desc, &(nebel_frame){.color = NULL}), NEBEL_ERROR_UNSUPPORTED);
     desc.camera.projection = NEBEL_PROJECTION_PANORAMA;
     assert_int_equal(nebel_render_frame(renderer, &desc, &(nebel_frame){.color = NULL}), NEBEL_OK);
-    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_REFERENCE, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_ADDITIVE, NULL), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &desc, &(nebel_frame){.color = NULL}), NEBEL_ERROR_UNSUPPORTED);
     nebel_destroy_renderer(renderer);
 }

@@ -47,122 +47,6 @@ typedef struct path {
     double came_through; /* what its first ray left of light from behind the media */
 } path;
 
-/* ---- rays against surfaces ------------------------------------------------------------------- */
-
-void nb_lone_ray_clear(nb_lone_ray *lone)
-{
-    memset(lone, 0, sizeof *lone);
-    for (int i = 0; i < NB_BATCH; i++) lone->hits.surface[i] = NB_NONE;
-}
-
-nb_meeting nb_meeting_of(const nb_hits *hits, const nb_points *points, int i)
-{
-    nb_meeting meeting = {.t = HUGE_VAL};
-    if (hits->surface[i] == NB_NONE) return meeting;
-    meeting.t = (double)hits->t[i];
-    meeting.cosine = points->cosine[i];
-    meeting.lit = points->lit[i] != 0;
-    for (int c = 0; c < 3; c++) {
-        meeting.reflectance[c] = points->reflectance[c][i];
-        meeting.normal[c] = points->normal[c][i];
-        meeting.side[c] = points->side[c][i];
-        meeting.start[c] = points->start[c][i];
-    }
-    return meeting;
-}
-
-static void set_ray(const nb_geometry *geometry, const double origin[3], const double direction[3], struct RTCRay *ray)
-{
-    memset(ray, 0, sizeof *ray);
-    ray->org_x = nb_clamp_coordinate((float)(origin[0] - geometry->origin[0]));
-    ray->org_y = nb_clamp_coordinate((float)(origin[1] - geometry->origin[1]));
-    ray->org_z = nb_clamp_coordinate((float)(origin[2] - geometry->origin[2]));
-    ray->dir_x = (float)direction[0];
-    ray->dir_y = (float)direction[1];
-    ray->dir_z = (float)direction[2];
-    ray->tfar = HUGE_VALF;
-    ray->mask = UINT32_MAX;
-}
-
-static int is_shadowed(const nb_geometry *geometry, const double origin[3], const double direction[3], double reach)
-{
-    struct RTCRay ray;
-    struct RTCIntersectContext context;
-    if (geometry->scene == NULL || reach == 0) return 0;
-    rtcInitIntersectContext(&context);
-    set_ray(geometry, origin, direction, &ray);
-    ray.tfar = (float)reach;
-    rtcOccluded1(geometry->scene, &context, &ray);
-    return ray.tfar < 0;
-}
-
-static void take_hit(const struct RTCRayHit *found, nb_rays *rays, nb_hits *hits)
-{
-    const struct RTCRay *ray = &found->ray;
-    const float start[3] = {ray->org_x, ray->org_y, ray->org_z}, unit[3] = {ray->dir_x, ray->dir_y, ray->dir_z};
-    const float normal[3] = {found->hit.Ng_x, found->hit.Ng_y, found->hit.Ng_z};
-    for (int k = 0; k < 3; k++) {
-        rays->start[k][0] = start[k];
-        rays->unit[k][0] = unit[k];
-        hits->normal[k][0] = normal[k];
-    }
-    hits->surface[0] = found->hit.geomID;
-    hits->triangle[0] = found->hit.primID;
-    hits->t[0] = ray->tfar;
-    hits->u[0] = found->hit.u;
-    hits->v[0] = found->hit.v;
-}
-
-static nb_meeting find_surface(path *p)
-{
-    const nb_path_world *world = p->world;
-    nb_lone_ray *lone = p->lone;
-    struct RTCRayHit found;
-    struct RTCIntersectContext context;
-    const float sun[3] = {(float)world->to_sun[0], (float)world->to_sun[1], (float)world->to_sun[2]};
-    if (world->geometry->scene == NULL) return (nb_meeting){.t = HUGE_VAL};
-    rtcInitIntersectContext(&context);
-    set_ray(world->geometry, p->ray.origin, p->ray.direction, &found.ray);
-    found.hit.geomID = found.hit.primID = found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(world->geometry->scene, &context, &found);
-    if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return (nb_meeting){.t = HUGE_VAL};
-    take_hit(&found, &lone->rays, &lone->hits);
-    nb_surface_points(world->geometry, world->scene, world->table, &lone->rays, &lone->hits, sun, &lone->points);
-    return nb_meeting_of(&lone->hits, &lone->points, 0);
-}
-
-/* Surfaces on the ground touch it: they are seen where they lie this little behind it, which is more than rounding. */
-static double behind(double t)
-{
-    return 1e-5 * t + 1e-3;
-}
-
-void nb_path_meet_ground(const nb_path_world *world, nebel_ray *ray, nb_meeting *meeting)
-{
-    const nb_ground_hit hit = nb_media_find_ground(&world->media, ray);
-    const int meets_surface = meeting->t < HUGE_VAL;
-    /* From on the ground or below it all surfaces are seen before it. */
-    if (hit.world == NULL || (meets_surface && (hit.t == 0 || hit.t + behind(meeting->t) >= meeting->t))) return;
-    *meeting = (nb_meeting){.t = hit.t, .is_ground = 1};
-    ray->t_max = hit.t;
-    for (int c = 0; c < 3; c++) {
-        meeting->reflectance[c] = (float)hit.world->planet->air.ground_albedo[c];
-        meeting->normal[c] = meeting->side[c] = (float)hit.normal[c];
-        meeting->place[c] = hit.place[c];
-    }
-    meeting->cosine = (float)nb_vector_dot(hit.normal, world->to_sun);
-    meeting->lit = world->has_sun && meeting->cosine > 0;
-}
-
-/* Where the path's next ray ends. */
-static nb_meeting find_meeting(path *p)
-{
-    nb_meeting meeting = find_surface(p);
-    p->ray.t_max = meeting.t;
-    nb_path_meet_ground(p->world, &p->ray, &meeting);
-    return meeting;
-}
-
 /* ---- directions ------------------------------------------------------------------------------ */
 
 /* The direction at an angle to the axis, by chance around it. */
@@ -207,7 +91,7 @@ static nebel_result add_arriving(path *p, const double origin[3], const double d
                                  double shadowed, const double light[3], double share)
 {
     const nb_path_world *world = p->world;
-    if (!(share > 0) || is_shadowed(world->geometry, origin, direction, shadowed)) return NEBEL_OK;
+    if (!(share > 0) || nb_meeting_is_shadowed(world->geometry, origin, direction, shadowed)) return NEBEL_OK;
     nb_track way = {.media = &world->media, .ray.t_max = reach, .ignore_distances = 1, .channel = p->channel};
     memcpy(way.ray.origin, origin, sizeof way.ray.origin);
     memcpy(way.ray.direction, direction, sizeof way.ray.direction);
@@ -516,7 +400,7 @@ static nebel_result follow(path *p, const nb_meeting *first)
         p->is_first = 0;
         if (!ended && p->bounces == world->bounces) add_ambient(p);
         if (ended || p->bounces == world->bounces || !survives(p)) return NEBEL_OK;
-        at = find_meeting(p);
+        at = nb_meeting_find(world, &p->ray, p->lone);
     }
 }
 
@@ -531,7 +415,7 @@ static nebel_result follow_all(path *p)
         p->bounces = next->bounces;
         memcpy(p->throughput, next->throughput, sizeof p->throughput);
         if (p->bounces == p->world->bounces || !survives(p)) continue;
-        const nb_meeting at = find_meeting(p);
+        const nb_meeting at = nb_meeting_find(p->world, &p->ray, p->lone);
         result = follow(p, &at);
     }
     return result;

@@ -57,8 +57,15 @@ void nb_lone_ray_clear(nb_lone_ray *lone);
 /* What lane i of a batch met. */
 nb_meeting nb_meeting_of(const nb_hits *hits, const nb_points *points, int i);
 
+/* Whether a surface is in the way, within `reach` m. */
+int nb_meeting_is_shadowed(const nb_geometry *geometry, const double origin[3], const double direction[3],
+                           double reach);
+
 /* Puts the ground of a planet in the place of a meeting behind it. `ray` ends at the meeting. */
-void nb_path_meet_ground(const nb_path_world *world, nebel_ray *ray, nb_meeting *meeting);
+void nb_meeting_end_at_ground(const nb_path_world *world, nebel_ray *ray, nb_meeting *meeting);
+
+/* What a ray meets first; the ray ends there. */
+nb_meeting nb_meeting_find(const nb_path_world *world, nebel_ray *ray, nb_lone_ray *lone);
 
 /* The light of one path. `number` are those of column, row, sample and seed. Errors: UNBOUNDED. */
 nebel_result nb_path_trace(const nb_path_world *world, const nb_path_eye *eye, const uint32_t number[4],

@@ -76,18 +76,18 @@ static void cut_air(nb_shells *shells, const nebel_air *air, double ground, doub
     }
 }
 
-static void cut_clouds(nb_shells *shells, const nebel_planet *planet, double top)
+static void cut_clouds(const nb_planet_medium *medium, nb_shells *shells, double top)
 {
-    for (uint32_t k = 0; k < planet->cloud_layer_count; k++) {
-        add_shell(shells, planet->air.radius + planet->cloud_layers[k].base, top);
-        add_shell(shells, planet->air.radius + planet->cloud_layers[k].top, top);
+    for (uint32_t k = 0; k < medium->layer_count; k++) {
+        add_shell(shells, medium->world.radius + medium->layers[k].base, top);
+        add_shell(shells, medium->world.radius + medium->layers[k].top, top);
     }
 }
 
 /* What is below radii[i] and above the shell before. Below the ground all is as on it. */
-static void bound_shell(const nebel_planet *planet, int with_air, nb_shells *shells, int i)
+static void bound_shell(const nb_planet_medium *medium, int with_air, nb_shells *shells, int i)
 {
-    const nebel_atmosphere_desc *desc = &planet->air;
+    const nebel_atmosphere_desc *desc = &medium->world.planet->air;
     const double low = fmax(0, i > 0 ? shells->radii[i - 1] - desc->radius : 0);
     const double high = fmax(0, shells->radii[i] - desc->radius);
     for (uint32_t k = 0; k < desc->air_count && with_air; k++) {
@@ -95,23 +95,34 @@ static void bound_shell(const nebel_planet *planet, int with_air, nb_shells *she
         for (int c = 0; c < 3; c++)
             shells->air[i][c] += most * (desc->airs[k].scattering[c] + desc->airs[k].absorption[c]);
     }
-    for (uint32_t k = 0; k < planet->cloud_layer_count && planet->clouds != NULL; k++) {
+    for (uint32_t k = 0; k < medium->layer_count; k++) {
         const double middle = 0.5 * (low + high);
-        if (middle > planet->cloud_layers[k].base && middle < planet->cloud_layers[k].top)
-            shells->clouds[i] = planet->cloud_layers[k].extinction;
+        if (middle > medium->layers[k].base && middle < medium->layers[k].top)
+            shells->clouds[i] = medium->layers[k].extinction;
     }
 }
 
 /* Bounds hold for what is computed, too. */
 #define ROUNDING (1 + 1e-6)
 
-static void end_shells(const nebel_planet *planet, double top, int with_air, nb_shells *shells)
+static void end_shells(const nb_planet_medium *medium, double top, int with_air, nb_shells *shells)
 {
     shells->radii[shells->count++] = top;
     for (int i = 0; i < shells->count; i++) {
-        bound_shell(planet, with_air, shells, i);
+        bound_shell(medium, with_air, shells, i);
         shells->clouds[i] *= ROUNDING;
         for (int c = 0; c < 3; c++) shells->air[i][c] *= ROUNDING;
+    }
+}
+
+/* Descriptions may leave out what their kind has. They are in order, or the planet would have no clouds. */
+static void set_clouds(nb_planet_medium *medium, const nebel_planet *planet)
+{
+    medium->layer_count = planet->clouds != NULL ? planet->cloud_layer_count : 0;
+    for (uint32_t k = 0; k < medium->layer_count; k++) {
+        (void)nebel_resolve_cloud_layer(planet->air.thickness, &planet->cloud_layers[k], NULL, &medium->layers[k]);
+        const nebel_phase drops = {.type = NEBEL_PHASE_DROPLETS, .diameter = medium->layers[k].diameter};
+        set_turns(&medium->drops[k], &drops);
     }
 }
 
@@ -122,21 +133,16 @@ void nb_planet_medium_set(nb_planet_medium *medium, const nebel_planet *planet, 
     memset(medium, 0, sizeof *medium);
     medium->world = nb_world_of(planet);
     medium->time = time;
+    set_clouds(medium, planet);
     add_shell(&medium->shells, desc->radius, top);
     for (uint32_t k = 0; k < desc->air_count; k++) {
         cut_air(&medium->shells, &desc->airs[k], desc->radius, top);
         set_turns(&medium->airs[k], &desc->airs[k].phase);
     }
-    if (planet->clouds != NULL) {
-        cut_clouds(&medium->shells, planet, top);
-        cut_clouds(&medium->sheets, planet, top);
-    }
-    for (uint32_t k = 0; k < planet->cloud_layer_count; k++) {
-        const nebel_phase drops = {.type = NEBEL_PHASE_DROPLETS, .diameter = planet->cloud_layers[k].diameter};
-        set_turns(&medium->drops[k], &drops);
-    }
-    end_shells(planet, top, 1, &medium->shells);
-    end_shells(planet, top, 0, &medium->sheets);
+    cut_clouds(medium, &medium->shells, top);
+    cut_clouds(medium, &medium->sheets, top);
+    end_shells(medium, top, 1, &medium->shells);
+    end_shells(medium, top, 0, &medium->sheets);
 }
 
 /* ---- places ---------------------------------------------------------------------------------- */
@@ -145,9 +151,8 @@ static void look_at_clouds(const nb_planet_medium *medium, const double place[3]
                            nb_planet_matter *matter)
 {
     const nebel_planet *planet = medium->world.planet;
-    if (planet->clouds == NULL) return;
-    for (uint32_t k = 0; k < planet->cloud_layer_count; k++) {
-        const nebel_cloud_layer *layer = &planet->cloud_layers[k];
+    for (uint32_t k = 0; k < medium->layer_count; k++) {
+        const nebel_cloud_layer *layer = &medium->layers[k];
         float extinction = 0;
         if (!(height > layer->base && height < layer->top)) continue;
         /* Places and the frame's time are in order, so that it cannot fail. */

@@ -28,7 +28,9 @@ typedef struct nb_shells {
 
 typedef struct nb_planet_medium {
     nb_world world;
-    double time;              /* of clouds */
+    double time; /* of clouds */
+    nebel_cloud_layer layers[NEBEL_MAX_CLOUD_LAYERS];
+    uint32_t layer_count;
     nb_shells shells, sheets; /* sheets: of clouds alone */
     nb_turns airs[NEBEL_MAX_AIRS], drops[NEBEL_MAX_CLOUD_LAYERS];
 } nb_planet_medium;

@@ -88,7 +88,7 @@ static void look(const nb_frame *frame, nb_scratch *scratch, int i, nb_path_eye 
     eye->first = nb_meeting_of(&scratch->hits, &scratch->points, i);
     const double advance = frame->view.advance * (double)scratch->rays.length[i];
     eye->first.t = eye->ray.t_max = advance + eye->first.t;
-    nb_path_meet_ground(&frame->world, &eye->ray, &eye->first);
+    nb_meeting_end_at_ground(&frame->world, &eye->ray, &eye->first);
     nb_air_background(&frame->air, &frame->lighting, &scratch->rays, i, eye->background);
     if (!eye->first.is_ground) return;
     scratch->hits.surface[i] = NB_GROUND;

@@ -9,10 +9,15 @@
 /* Weights below this are left to roulette. */
 #define SMALL_WEIGHT 1e-3
 
-/* Depth that flights through air alone collide by beyond its own: half of it spread as that is, half evenly over pieces. */
+/* Depth that flights through air alone collide by beyond its own: half of it spread as that is, half evenly over pieces. Less
+ * where there are other media on the way, which most light comes from. */
 #define MORE_DEPTH 1.5
+#define MORE_DEPTH_AMID_OTHERS 0.5
 
-/* There stops are so often more than collisions at least, by which weights of those that pass stay small. */
+/* Air that is thinner yet is none. */
+#define MOST_BOOST 1e9
+
+/* There stops are so many times more often than collisions, by which weights of those that pass stay small. */
 #define STOPS_OF_AIR 8
 
 /* A piece of a track, with the rate at which chance stops in it. */
@@ -25,6 +30,7 @@ typedef struct piece {
 typedef struct boosts {
     double depth; /* of such pieces, by their bounds */
     int pieces;
+    double more; /* depth to add */
 } boosts;
 
 double nb_track_reach(const nebel_ray *ray)
@@ -51,7 +57,7 @@ static void start_walk(const nb_track *track, nb_media_part part, nb_media_walk 
 static nebel_result find_boosts(const nb_track *track, double reach, boosts *air)
 {
     nb_media_walk walk;
-    *air = (boosts){0, 0};
+    *air = (boosts){.more = MORE_DEPTH};
     if (!track->is_boosted) return NEBEL_OK;
     start_walk(track, NB_MEDIA_ALL, &walk);
     for (double t = 0; t < reach;) {
@@ -61,6 +67,8 @@ static nebel_result find_boosts(const nb_track *track, double reach, boosts *air
         if (walk.is_air && rate > 0) {
             air->depth += rate * (end - t);
             air->pieces++;
+        } else if (rate > 0) {
+            air->more = MORE_DEPTH_AMID_OTHERS;
         }
         t = end;
     }
@@ -72,7 +80,7 @@ static void set_boost(const boosts *air, double from, piece *p)
 {
     const double depth = p->rate * (p->end - from);
     if (!(depth > 0)) return;
-    p->boost = 1 + 0.5 * MORE_DEPTH * (1 / air->depth + 1 / (air->pieces * depth));
+    p->boost = fmin(1 + 0.5 * air->more * (1 / air->depth + 1 / (air->pieces * depth)), MOST_BOOST);
     p->rate *= STOPS_OF_AIR * p->boost;
 }
 
