@@ -121,17 +121,16 @@ static void expect(const char *what, const estimate *e, int channel, double expe
 
 /* ---- furnaces -------------------------------------------------------------------------------- */
 
-static const nebel_atmosphere_desc white_air = {
-    .airs = {{.scattering = {5e-5, 1e-5, 1e-4},
-              .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .8},
-              .scale_height = 8000},
-             {.scattering = {1e-5, 1e-5, 4e-5},
-              .phase = {.type = NEBEL_PHASE_RAYLEIGH},
-              .profile = NEBEL_AIR_LAYER,
-              .middle = 25000,
-              .width = 15000}},
-    .air_count = 2,
-    .ground_albedo = {1, 1, 1}};
+static const nebel_atmosphere_desc white_air = {.airs = {{.scattering = {5e-5, 1e-5, 1e-4},
+                                                          .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .8},
+                                                          .scale_height = 8000},
+                                                         {.scattering = {1e-5, 1e-5, 4e-5},
+                                                          .phase = {.type = NEBEL_PHASE_RAYLEIGH},
+                                                          .profile = NEBEL_AIR_LAYER,
+                                                          .middle = 25000,
+                                                          .width = 15000}},
+                                                .air_count = 2,
+                                                .ground_albedo = {1, 1, 1}};
 
 /* Light that nothing absorbs is the same everywhere: along the ground, down on it, past it and from within clouds and fog. */
 static void furnace(const nebel_cloud_layer *layer, nebel_snapshot *fog, uint32_t samples)
@@ -217,10 +216,10 @@ static estimate measure_flux(const globe *g, const layer *l, int above, uint32_t
     memset(&e, 0, sizeof e);
     for (uint32_t i = 0; i < paths; i++) {
         const double angle = dice(&numbers, 0, 2 * test_pi), up = sqrt(dice(&numbers, 0, 1)), level = sqrt(1 - up * up);
-        nb_path_eye eye = {.ray = {{0, above ? 1.5e5 : 1, 0}, {level * cos(angle), above ? -up : up, level * sin(angle)}},
-                           .first.t = HUGE_VAL};
+        nb_path_eye eye = {
+            .ray = {{0, above ? 1.5e5 : 1, 0}, {level * cos(angle), above ? -up : up, level * sin(angle)}, HUGE_VAL},
+            .first.t = HUGE_VAL};
         nb_path_light light;
-        eye.ray.t_max = HUGE_VAL;
         nb_meeting_end_at_ground(&world, &eye.ray, &eye.first);
         assert_int_equal(nb_path_trace(&world, &eye, (const uint32_t[4]){i}, &lone, &light), NEBEL_OK);
         e.color[0] += test_pi * light.color[0] / paths;
@@ -259,7 +258,7 @@ static void once_is_what_quadrature_says(void **state)
     static const struct {
         const char *name;
         double height, elevation, azimuth, sun, part;
-    } views[] = {{"earth", 2, 30, 20, 60, .02},  {"earth", 2, 2, 150, 5, .02},      {"earth", 1e4, -40, 70, 10, .02},
+    } views[] = {{"earth", 2, 30, 20, 60, .02}, {"earth", 2, 2, 150, 5, .02},      {"earth", 1e4, -40, 70, 10, .02},
                  {"earth", 2, 20, 10, -4, .1},  {"earth", 4e5, -15.5, 0, 30, .02}, {"mars", 2, 10, 5, 8, .02},
                  {"toy", 1, 25, 90, 40, .02},   {"toy", 300, -60, 90, 20, .02}};
     for (size_t i = 0; i < sizeof views / sizeof *views; i++) {
@@ -291,20 +290,22 @@ static void once_is_what_quadrature_says(void **state)
 /* ---- clouds ---------------------------------------------------------------------------------- */
 
 /* Air that does nothing, for clouds alone. */
-static const nebel_atmosphere_desc bare = {
-    .airs = {{.absorption = {1e-20, 1e-20, 1e-20}, .scale_height = 1e5}}, .air_count = 1};
+static const nebel_atmosphere_desc bare = {.airs = {{.absorption = {1e-20, 1e-20, 1e-20}, .scale_height = 1e5}},
+                                           .air_count = 1};
 
 enum { STEPS = 4000 };
 
 /* The depth of clouds on `length` m of a ray from a place, and the extinction at each step's middle. */
-static double sum_clouds(const globe *g, const double from[3], const double to[3], double length, float extinction[STEPS])
+static double sum_clouds(const globe *g, const double from[3], const double to[3], double length,
+                         float extinction[STEPS])
 {
     static double places[STEPS][3];
     double depth = 0;
     for (int i = 0; i < STEPS; i++)
         for (int c = 0; c < 3; c++) places[i][c] = from[c] + (i + .5) / STEPS * length * to[c];
-    assert_int_equal(nebel_cloud_extinction(g->clouds, 0, 0, STEPS, (const double(*)[3])places, sizeof *places, extinction),
-                     NEBEL_OK);
+    assert_int_equal(
+        nebel_cloud_extinction(g->clouds, 0, 0, STEPS, (const double(*)[3])places, sizeof *places, extinction),
+        NEBEL_OK);
     for (int i = 0; i < STEPS; i++) depth += (double)extinction[i] * length / STEPS;
     return depth;
 }
@@ -405,7 +406,8 @@ static void the_same_for_any_number_of_threads(void **state)
     for (int i = 0; i < 2; i++) {
         nebel_renderer *renderer = NULL;
         const nebel_frame planes = {.color = color[i]};
-        const nebel_frame_desc desc = {.camera = test_camera(0, 100, 0, 1, 100.3, 0), .width = WIDE, .height = HIGH, .samples = 2};
+        const nebel_frame_desc desc = {
+            .camera = test_camera(0, 100, 0, 1, 100.3, 0), .width = WIDE, .height = HIGH, .samples = 2};
         assert_int_equal(nebel_create_renderer(&g.scene, NULL, &(nebel_renderer_desc){.threads = 1 + 2 * i}, &renderer),
                          NEBEL_OK);
         assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_REFERENCE, NULL), NEBEL_OK);
@@ -442,14 +444,10 @@ int main(int count, char **words)
 {
     if (count > 1) effort = (uint32_t)strtoul(words[1], NULL, 10);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(white_air_over_white_ground_is_white),
-        cmocka_unit_test(white_clouds_and_fog_are_white),
-        cmocka_unit_test(flat_air_sends_up_and_down_what_layers_do),
-        cmocka_unit_test(once_is_what_quadrature_says),
-        cmocka_unit_test(clouds_are_what_sums_of_their_density_say),
-        cmocka_unit_test(even_clouds_lose_nothing),
-        cmocka_unit_test(the_ground_has_a_distance_and_a_normal),
-        cmocka_unit_test(odd_cameras),
+        cmocka_unit_test(white_air_over_white_ground_is_white),      cmocka_unit_test(white_clouds_and_fog_are_white),
+        cmocka_unit_test(flat_air_sends_up_and_down_what_layers_do), cmocka_unit_test(once_is_what_quadrature_says),
+        cmocka_unit_test(clouds_are_what_sums_of_their_density_say), cmocka_unit_test(even_clouds_lose_nothing),
+        cmocka_unit_test(the_ground_has_a_distance_and_a_normal),    cmocka_unit_test(odd_cameras),
         cmocka_unit_test(the_same_for_any_number_of_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

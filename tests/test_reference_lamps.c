@@ -49,7 +49,8 @@ static void follow(const trial *t, const nebel_ray *eye, const nb_meeting *at, d
     static nb_lone_ray lone;
     nb_path_light light;
     const uint32_t number[4] = {all->count++};
-    assert_int_equal(nb_path_trace(&t->world, &(nb_path_eye){.ray = *eye, .first = *at}, number, &lone, &light), NEBEL_OK);
+    assert_int_equal(nb_path_trace(&t->world, &(nb_path_eye){.ray = *eye, .first = *at}, number, &lone, &light),
+                     NEBEL_OK);
     all->sum += weight * light.color[0];
     all->square += pow(weight * light.color[0], 2);
 }

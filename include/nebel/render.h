@@ -70,8 +70,8 @@ typedef enum nebel_method {
     NEBEL_METHOD_TWO_PASS, /* the light that it adds and its amount: as VERTEX, but with a response curve or a colour */
     NEBEL_METHOD_ALPHA,    /* a byte of alpha over polygons in one colour, of bytes, too */
     NEBEL_METHOD_D3D9,     /* the fog states of a Direct3D 9 device */
-    NEBEL_METHOD_REFERENCE, /* paths of light, by chance and without bias: docs/reference.md. Fog and surfaces are lit by
-                               each other too; slow */
+    NEBEL_METHOD_REFERENCE, /* paths of light, by chance and without bias: docs/reference.md. Fog, surfaces, air and
+                               clouds are lit by each other too; slow */
     NEBEL_METHOD_COUNT
 } nebel_method;
 

@@ -110,9 +110,10 @@ static nebel_result set_air(nb_frame *frame, const nebel_frame_desc *desc)
     const nebel_scene_data *scene = renderer->scene;
     if (scene->planet_count == 0 || scene->planets[0].atmosphere == NULL) return NEBEL_OK;
     if (renderer->method != NEBEL_METHOD_EXACT && renderer->method != NEBEL_METHOD_REFERENCE)
-        return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
-                       "planets are drawn by the methods exact and reference alone: ask for no other method, or leave the "
-                       "planet out");
+        return nb_fail(
+            &renderer->log, NEBEL_ERROR_UNSUPPORTED,
+            "planets are drawn by the methods exact and reference alone: ask for no other method, or leave the "
+            "planet out");
     if (frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
                        "frame: orthographic cameras see no planets; take a perspective one or a panorama");

@@ -19,8 +19,8 @@ typedef enum nb_media_part { NB_MEDIA_ALL, NB_MEDIA_WITHOUT_AIR } nb_media_part;
 
 /* What is at a place. */
 typedef struct nb_matter {
-    nebel_matter all;      /* of all media together */
-    double fog[3];         /* 1/m: what fog scatters */
+    nebel_matter all; /* of all media together */
+    double fog[3];    /* 1/m: what fog scatters */
     nb_planet_matter planet;
 } nb_matter;
 
@@ -73,7 +73,7 @@ typedef struct nb_ground_hit {
     const nb_world *world; /* NULL: it meets none up to its t_max */
     double t;              /* m; 0 from the ground or below it downwards */
     double normal[3];
-    double place[3];       /* just above the ground, where rays go on */
+    double place[3]; /* just above the ground, where rays go on */
 } nb_ground_hit;
 
 nb_ground_hit nb_media_find_ground(const nb_media *media, const nebel_ray *ray);

@@ -43,7 +43,7 @@ typedef struct path {
     waiting_path waiting[MOST_WAITING];
     int waiting_count;
     double radiance[3];
-    double shone[3]; /* what it had when its first ray ended */
+    double shone[3];     /* what it had when its first ray ended */
     double came_through; /* what its first ray left of light from behind the media */
 } path;
 
@@ -437,15 +437,20 @@ static void gather(const path *p, int is_grey, nb_path_light *light)
 nebel_result nb_path_trace(const nb_path_world *world, const nb_path_eye *eye, const uint32_t number[4],
                            nb_lone_ray *lone, nb_path_light *light)
 {
-    const nb_chance stream = nb_chance_of(number[0], number[1], number[2], number[3]);
+    static const path_share whole[] = {ALL}, parts[] = {SCATTERED, PASSED};
     const int has_air = world->media.planet_count > 0;
+    const path_share *shares = has_air ? parts : whole;
+    const nb_chance stream = nb_chance_of(number[0], number[1], number[2], number[3]);
     memset(light, 0, sizeof *light);
     for (int c = 0; c < (world->is_grey ? 1 : 3); c++) {
         nb_chance chance = stream;
         chance.state += (uint64_t)c << 62;
-        for (int share = has_air ? SCATTERED : ALL; share <= (has_air ? PASSED : ALL); share++) {
-            path p = {.world = world, .eye = eye, .share = share, .lone = lone, .chance = chance, .channel = c,
-                      .ray = eye->ray, .is_first = 1};
+        for (int i = 0; i < (has_air ? 2 : 1); i++) {
+            path p = {.world = world, .eye = eye, .share = shares[i], .lone = lone, .chance = chance};
+            p.channel = c;
+            p.ray = eye->ray;
+            p.is_first = 1;
+            p.promise = 1;
             for (int k = 0; k < 3; k++) p.throughput[k] = world->is_grey || k == c ? 1 : 0;
             const nebel_result result = follow_all(&p);
             if (result != NEBEL_OK) return result;

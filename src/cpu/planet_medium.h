@@ -21,9 +21,9 @@ enum { NB_SHELLS_PER_AIR = 17, NB_MOST_SHELLS = 2 + NEBEL_MAX_AIRS * NB_SHELLS_P
 /* Spheres about the planet's center, from the ground to the top of the air. */
 typedef struct nb_shells {
     int count;
-    double radii[NB_MOST_SHELLS];       /* m, ascending */
-    double air[NB_MOST_SHELLS + 1][3];  /* 1/m: most extinction of air below radii[i], above the one before it */
-    double clouds[NB_MOST_SHELLS + 1];  /* the same of clouds */
+    double radii[NB_MOST_SHELLS];      /* m, ascending */
+    double air[NB_MOST_SHELLS + 1][3]; /* 1/m: most extinction of air below radii[i], above the one before it */
+    double clouds[NB_MOST_SHELLS + 1]; /* the same of clouds */
 } nb_shells;
 
 typedef struct nb_planet_medium {
@@ -37,10 +37,10 @@ typedef struct nb_planet_medium {
 
 /* What is at a place. All 0 outside the air. */
 typedef struct nb_planet_matter {
-    const nb_planet_medium *medium;  /* NULL: outside */
-    double density[NEBEL_MAX_AIRS];  /* of each kind of air, 1 where its coefficients hold */
-    double clouds;                   /* extinction, which is all scattering [1/m] */
-    int layer;                       /* of these clouds */
+    const nb_planet_medium *medium; /* NULL: outside */
+    double density[NEBEL_MAX_AIRS]; /* of each kind of air, 1 where its coefficients hold */
+    double clouds;                  /* extinction, which is all scattering [1/m] */
+    int layer;                      /* of these clouds */
 } nb_planet_matter;
 
 /* A walk along a ray from shell to shell, and what the piece that it is in holds at most. */

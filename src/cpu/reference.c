@@ -31,7 +31,8 @@ static nebel_result set_planets(nb_frame *frame, double time)
     frame->world.disc = frame->air.sun_radius = nb_worlds_disc(scene);
     nb_worlds_disc_light(scene, frame->air.sun_radius, frame->air.sun_light);
     frame->air.pixel = nb_view_pixel(&frame->view, frame->height);
-    if (nb_scene_owns_ambient(scene)) frame->world.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_CONSTANT};
+    if (nb_scene_owns_ambient(scene))
+        frame->world.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_CONSTANT};
     return NEBEL_OK;
 }
 

@@ -143,7 +143,7 @@ typedef struct nb_frame {
     const nebel_layers *layers;   /* NULL: none */
     nebel_cloud_view *cloud_view; /* the same */
     nebel_layer_view layer_view;
-    nb_path_world world; /* of the method REFERENCE */
+    nb_path_world world;       /* of the method REFERENCE */
     nb_planet_medium *planets; /* of the same: those with air; NULL: none */
     uint32_t seed;
 } nb_frame;

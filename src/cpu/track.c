@@ -141,8 +141,7 @@ nebel_result nb_track_fly(const nb_track *track, nb_chance *chance, nb_flight *f
         while (result == NEBEL_OK && (t += draw_way(p.rate, chance)) < p.end) {
             result = nb_track_look(track, t, NB_MEDIA_ALL, &flight->place, &flight->matter);
             if (result != NEBEL_OK) return result;
-            for (int c = 0; c < 3; c++)
-                flight->shone[c] += flight->weight * flight->matter.all.emission[c] / p.rate;
+            for (int c = 0; c < 3; c++) flight->shone[c] += flight->weight * flight->matter.all.emission[c] / p.rate;
             flight->t = t;
             flight->collided = collides(&p, flight->matter.all.extinction[track->channel], chance, &flight->weight);
             if (flight->collided) return NEBEL_OK;

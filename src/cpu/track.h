@@ -19,8 +19,8 @@ typedef struct nb_track {
 } nb_track;
 
 typedef struct nb_flight {
-    int collided; /* else t_max was reached */
-    double t;     /* m; there */
+    int collided;  /* else t_max was reached */
+    double t;      /* m; there */
     double weight; /* of what comes from there, mean 1 for the chances of analog flights */
     nebel_place place;
     nb_matter matter; /* there */
