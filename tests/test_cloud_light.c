@@ -5,9 +5,29 @@
 #include "dice.h"
 #include "near.h"
 
-/* What a slab of drops sends up against the sun's light and down with it, as paths say: the part of the light that comes
- * back, sunlight at a cosine. */
-static double reflected_by_paths(double depth, double cosine, double g, int paths, uint64_t *numbers)
+/* Cosines below which light is scattered with the probability of their number by their count. */
+enum { PARTS = 4096 };
+
+static void invert(const nb_phase *phase, double cosines[PARTS + 1])
+{
+    enum { ANGLES = 100000 };
+    double sum = 0, whole = 0;
+    int next = 0;
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < ANGLES; i++) {
+            /* Finer ahead, where the peak is. */
+            const double part = 1 - (i + .5) / ANGLES, angle = PI * part * part * part;
+            const double light = nb_phase_at(phase, cos(angle)) * sin(angle) * 3 * part * part;
+            if (pass == 0) whole += light;
+            if (pass == 1)
+                for (sum += light; next <= PARTS && sum >= whole * next / PARTS; next++) cosines[next] = cos(angle);
+        }
+    while (next <= PARTS) cosines[next++] = 1;
+}
+
+/* What a slab of drops sends up against the sun's light, as paths say: the part of the light that comes back, sunlight at a cosine. */
+static double reflected_by_paths(double depth, double cosine, const double turns[PARTS + 1], int paths,
+                                 uint64_t *numbers)
 {
     int back = 0;
     for (int i = 0; i < paths; i++) {
@@ -15,8 +35,10 @@ static double reflected_by_paths(double depth, double cosine, double g, int path
         for (;;) {
             z -= mu * log(dice(numbers, 1e-12, 1));
             if (!(z >= 0 && z <= depth)) break;
-            const double s = dice(numbers, -1, 1), f = (1 - g * g) / (1 + g * s);
-            const double turn = (1 + g * g - f * f) / (2 * g), sine = sqrt(fmax(0, 1 - turn * turn));
+            const double place = dice(numbers, 0, PARTS);
+            const int low = (int)place;
+            const double turn = turns[low] + (place - low) * (turns[low + 1] - turns[low]);
+            const double sine = sqrt(fmax(0, 1 - turn * turn));
             mu = turn * mu + sine * sqrt(fmax(0, 1 - mu * mu)) * cos(dice(numbers, 0, 2 * PI));
         }
         back += z < 0;
@@ -24,35 +46,35 @@ static double reflected_by_paths(double depth, double cosine, double g, int path
     return (double)back / paths;
 }
 
-/* The same of the model: its light integrated over the eyes above, in a slab that is seen under a cosine. */
-static double reflected_by_model(const nebel_cloud_view *view, double depth, double cosine)
+/* The same of the model: its light integrated over the eyes above, in a slab that is seen under a cosine; or below, where what comes
+ * through straight or hardly turned is told apart. */
+static double sent_by_model(const nebel_cloud_view *view, double depth, double cosine, int is_above)
 {
-    enum { EYES = 24, TURNS = 16, STEPS = 400 };
+    enum { EYES = 24, TURNS = 96, STEPS = 400 };
     const nb_cloud_light white = {.sun = {1, 1, 1}};
-    const double up[3] = {0, 1, 0};
     double sum = 0;
     for (int i = 0; i < EYES * TURNS; i++) {
         const double out = (i % EYES + .5) / EYES, level = sqrt(1 - out * out), turn = PI * (i / EYES + .5) / TURNS;
         const double sine = sqrt(1 - cosine * cosine);
-        /* The eye looks down; the sun's place is in the x-y plane. */
-        const double direction[3] = {level * cos(turn), -out, level * sin(turn)};
+        /* The sun's place is in the x-y plane. */
+        const double direction[3] = {level * cos(turn), is_above ? -out : out, level * sin(turn)};
         nb_cloud_ray ray = nb_cloud_ray_make(view, direction, 0);
         ray.sun = sine * direction[0] + cosine * direction[1];
         const nb_cloud_layer *layer = &view->clouds->layers[0];
-        const nebel_phase wide = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN,
-                                  .g = layer->mean_cosine / (1 + layer->mean_cosine)};
-        const nb_phase lobe = nb_phase_resolve(&wide);
         ray.phase[0] = (float)nb_phase_at(&layer->phase, ray.sun);
-        ray.wide_phase[0] = (float)nb_phase_at(&lobe, ray.sun);
+        ray.ahead_phase[0] = ray.ahead = 0;
+        ray.wide_phase[0] = nb_smaller(layer->slab->cap, ray.phase[0]);
+        const nb_cloud_sight sight = {(float)cosine, (float)direction[1], (float)ray.sun};
         double radiance = 0;
         const double step = depth / out / STEPS, apart = (double)ray.apart[0];
         for (int k = 0; k < STEPS; k++) {
-            const double way = (k + .5) * step, x = way * out;
+            const double way = (k + .5) * step, x = is_above ? way * out : depth - way * out;
             const nb_cloud_depths depths = {(float)(x / cosine), (float)((depth - x) / cosine), (float)x,
                                             (float)(depth - x)};
-            const nb_cloud_parts parts = nb_cloud_parts_of((float)layer->mean_cosine, &depths);
-            const nb_cloud_source s = nb_cloud_source_of(&ray, 0, &parts, &white, up);
-            radiance += step * (exp(-way) * (double)s.once[1] + exp(-apart * way) * (double)s.often[1]);
+            const nb_cloud_parts parts = nb_cloud_parts_of(layer, &depths, &sight);
+            const nb_cloud_source s = nb_cloud_source_of(&ray, 0, &parts, &white);
+            radiance += step * exp(-apart * way) * (double)s.often[1];
+            if (is_above) radiance += step * exp(-way) * (double)s.once[1];
         }
         sum += radiance * out * 2 * PI / (EYES * TURNS);
     }
@@ -63,21 +85,28 @@ static void test_light_of_slabs(void **state)
 {
     (void)state;
     static const struct {
-        double depth, cosine, off; /* and by what part of the light the model may be wrong */
-    } slabs[] = {{1, 1, .06},  {4, 1, .06},   {16, 1, .06},  {64, 1, .06},
-                 {4, .5, .08}, {16, .5, .08}, {64, .5, .06}, {16, .2, .08}};
+        double depth, cosine;
+    } slabs[] = {{1, 1}, {4, 1}, {16, 1}, {64, 1}, {2, .342}, {4, .5}, {16, .5}, {64, .5}, {16, .2}};
     nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.seed = 1}});
     nebel_cloud_workspace *workspace;
     nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    const double apart = (double)clouds->layers[0].apart;
+    double turns[PARTS + 1];
     uint64_t numbers = 5;
+    invert(&clouds->layers[0].phase, turns);
+    print_message("light of slabs\n depth  cosine  up by paths       up  through  down\n");
     for (size_t i = 0; i < sizeof slabs / sizeof *slabs; i++) {
-        const double truth =
-            reflected_by_paths(slabs[i].depth, slabs[i].cosine, clouds->layers[0].mean_cosine, 20000, &numbers);
-        const double model = reflected_by_model(view, slabs[i].depth, slabs[i].cosine);
-        print_message(
-            "slab of depth %g, sun at a cosine of %g: %.3f of the light comes back by paths, %.3f by the model\n",
-            slabs[i].depth, slabs[i].cosine, truth, model);
-        assert_near(model, truth, slabs[i].off);
+        enum { PATHS = 40000 };
+        const double depth = slabs[i].depth, cosine = slabs[i].cosine;
+        const double truth = reflected_by_paths(depth, cosine, turns, PATHS, &numbers);
+        const double deviation = sqrt(truth * (1 - truth) / PATHS);
+        const double up = sent_by_model(view, depth, cosine, 1),
+                     down = sent_by_model(view, depth, cosine, 0) + exp(-apart * depth / cosine);
+        const double through = (double)nb_cloud_part_through(&clouds->layers[0], (float)(depth / cosine), cosine);
+        print_message("%6g  %6g  %11.4f  %7.4f  %7.4f  %.4f\n", depth, cosine, truth, up, through, down);
+        assert_near(up, truth, .01 + 3 * deviation);
+        assert_near(through, 1 - truth, .005 + 3 * deviation);
+        assert_near(up + down, 1, .01);
     }
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_view(view);

@@ -119,27 +119,26 @@ static nb_fine fine_of(const nb_cloud_layer *layer)
     return (nb_fine){width, first};
 }
 
-static const nb_cloud_parts *parts_under(nebel_cloud_workspace *workspace, int k, nb_cloud_crowd *crowd, int sun)
+static const nb_cloud_depths *depths_under(nebel_cloud_workspace *workspace, int k, nb_cloud_crowd *crowd, int sun)
 {
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
     const nb_fine fine = fine_of(layer);
     const float wide = (float)(AROUND_PART / (double)layer->per_thickness);
-    if (crowd->has_parts[sun]) return crowd->parts[sun];
+    if (crowd->has_depths[sun]) return crowd->depths[sun];
     for (int i = 0; i < crowd->count; i++) {
         const nb_crowd_place *place = &crowd->places[i];
         double to[3], away[3];
         direct(place, (double)suns[sun], place->turn, to);
         for (int c = 0; c < 3; c++) away[c] = -to[c];
-        const nb_cloud_depths depths = {
+        crowd->depths[sun][i] = (nb_cloud_depths){
             .sun = nb_cloud_depth_along(workspace, place->from, to, fine.first, fine.width, 1),
             .away = nb_cloud_depth_along(workspace, place->from, away, wide, wide, 1),
             .up = place->up,
             .down = place->down,
         };
-        crowd->parts[sun][i] = nb_cloud_parts_of((float)layer->mean_cosine, &depths);
     }
-    crowd->has_parts[sun] = 1;
-    return crowd->parts[sun];
+    crowd->has_depths[sun] = 1;
+    return crowd->depths[sun];
 }
 
 /* No ray from below a layer is flatter than one that just passes its base. */
@@ -156,7 +155,7 @@ static const nb_crowd_seen *seen_by(nebel_cloud_workspace *workspace, int k, nb_
 {
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
     const nb_fine fine = fine_of(layer);
-    const float g = (float)layer->mean_cosine, apart = 1 - g * g;
+    const float apart = layer->apart;
     nb_crowd_seen *seen = crowd->seen[view][turn];
     float least = HUGE_VALF;
     if (crowd->has_seen[view][turn]) return seen;
@@ -183,22 +182,25 @@ static void add_parts(nb_cloud_parts *sum, const nb_cloud_parts *parts, float wh
     sum->above += whole * parts->above;
     sum->below += whole * parts->below;
     sum->left_wide += apart * parts->left_wide;
-    sum->mean += apart * parts->mean;
-    sum->to_sun += apart * parts->to_sun;
-    sum->to_up += apart * parts->to_up;
+    sum->often += apart * parts->often;
 }
 
 static const nb_cloud_parts *entry_of(nebel_cloud_workspace *workspace, int k, const int at[3])
 {
+    const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
     nb_cloud_crowd *crowd = &workspace->crowds[k];
     nb_cloud_parts *mean = &crowd->means[at[0]][at[1]][at[2]];
     if (crowd->has_mean[at[0]][at[1]][at[2]]) return mean;
-    const nb_cloud_parts *parts = parts_under(workspace, k, crowd, at[2]);
+    const nb_cloud_depths *depths = depths_under(workspace, k, crowd, at[2]);
     const nb_crowd_seen *seen = seen_by(workspace, k, crowd, at[0], at[1]);
     nb_crowd_seen sum = {0, 0};
     for (int i = 0; i < crowd->count; i++) sum = (nb_crowd_seen){sum.whole + seen[i].whole, sum.apart + seen[i].apart};
-    for (int i = 0; i < crowd->count; i++)
-        add_parts(mean, &parts[i], seen[i].whole / sum.whole, seen[i].apart / sum.apart);
+    for (int i = 0; i < crowd->count; i++) {
+        const float sun = suns[at[2]], rise = (float)steepness_of(layer, &crowd->places[i], at[0]);
+        const float ahead = sun * rise + turns[at[1]] * sqrtf((1 - sun * sun) * (1 - rise * rise));
+        const nb_cloud_parts parts = nb_cloud_parts_of(layer, &depths[i], &(nb_cloud_sight){sun, rise, ahead});
+        add_parts(mean, &parts, seen[i].whole / sum.whole, seen[i].apart / sum.apart);
+    }
     crowd->has_mean[at[0]][at[1]][at[2]] = 1;
     return mean;
 }
@@ -243,7 +245,7 @@ nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int k, const 
                      place_among(turns, NB_CROWD_TURNS, (float)turn, &low[1]),
                      place_among(suns, NB_CROWD_SUNS, (float)sun, &low[2])};
     if (low[0] == NB_CROWD_VIEWS / 2 - 1) part[0] = part_below((float)view, entered);
-    nb_cloud_parts sum = {0, 0, 0, 0, 0, 0, 0};
+    nb_cloud_parts sum = {0, 0, 0, 0, 0};
     for (int corner = 0; corner < 8; corner++) {
         float weight = 1;
         int at[3];
@@ -258,7 +260,7 @@ nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int k, const 
 
 nb_cloud_parts nb_cloud_mix_parts(const nb_cloud_parts *a, const nb_cloud_parts *b, float part)
 {
-    nb_cloud_parts sum = {0, 0, 0, 0, 0, 0, 0};
+    nb_cloud_parts sum = {0, 0, 0, 0, 0};
     add_parts(&sum, a, 1 - part, 1 - part);
     add_parts(&sum, b, part, part);
     return sum;

@@ -193,7 +193,6 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
     const float fine = nb_smaller(width, COLUMN_PART * layer->size),
                 first = nb_smaller(fine, 0.1f / layer->per_thickness);
-    const float cosine = (float)layer->mean_cosine;
     const int count = width > 2 * fine ? MOST_COLUMNS : width > fine ? 2 : 1;
     double across[2][3];
     nb_vector_find_aside(place, across[0]);
@@ -210,10 +209,11 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
         for (int c = 0; c < 3; c++) up[c] = place[c] + u * across[0][c] + v * across[1][c];
         nb_vector_make_unit(up);
         for (int c = 0; c < 3; c++) base[c] = layer->low * up[c];
+        const double cosines[2] = {nb_vector_dot(up, workspace->view->sun.direction), 1};
         nb_way ways[2] = {way_of(base, workspace->view->sun.direction, &to_sun), way_of(base, up, &to_up)};
         find_ways(workspace, is_alone, 2, ways);
         for (int w = 0; w < 2; w++)
-            parts[w] += nb_cloud_part_through((float)ways[w].depth, cosine) / (float)(count * count);
+            parts[w] += nb_cloud_part_through(layer, (float)ways[w].depth, cosines[w]) / (float)(count * count);
     }
 }
 
@@ -238,7 +238,7 @@ static void find_around(nebel_cloud_workspace *workspace, const double place[3],
     nb_way ways[3];
     set_around(workspace, place, &(nb_steps){width, OTHER_GROWTH, width, MOST_STEPS}, ways);
     find_ways(workspace, 0, 3, ways);
-    for (int i = 0; i < 3; i++) depth[i] = (float)ways[i].depth;
+    for (int i = 0; i < 3; i++) depth[i] = sqrtf((float)ways[i].depth);
 }
 
 static void find_to_sun(nebel_cloud_workspace *workspace, const double place[3], float width, float depth[1])
@@ -365,6 +365,7 @@ static void read_lattice(nebel_cloud_workspace *workspace, const nb_in_lattice *
             depth[i] += in->cells[n].weight * (near + part[2] * (far - near));
         }
     }
+    for (int i = 0; i < 3 && in->ways == NB_CLOUD_AROUND; i++) depth[i] *= depth[i];
 }
 
 float nb_cloud_sun_depth_at(nebel_cloud_workspace *workspace, const double place[3], float width)

@@ -2,14 +2,11 @@
  *
  * Scattered once: the sun's light through the air and the optical depth of the way to the sun.
  *
- * Scattered often: what goes on nearly straight, a part g^2 of all, counts as not scattered (Joseph, Wiscombe and
- * Weinman, The Delta-Eddington Approximation for Radiative Flux Transfer, 1976). The place is taken for one in a slab of
- * cloud that absorbs nothing, whose flux F and mean radiance J along its depth x follow
- *
- *     dF/dx = E e^(-x/m)      dJ/dx = -3/(4 pi) ((1 - g') F - g' m E e^(-x/m))
- *
- * with g' = g / (1 + g) and m the cosine at which sunlight enters; nothing else enters on either side. The slab lies
- * across the sunlight where the way up is no shorter, and level where it is. */
+ * Scattered often: what goes on nearly straight counts as not scattered (Wiscombe, The Delta-M Method, 1977). The place is
+ * taken for one in an even slab of cloud that absorbs nothing, with a table of what that sends (cloud_slab.h). The slab lies
+ * across the sunlight where the way up is no shorter, and level where it is. What is scattered once, and then goes on
+ * nearly straight, has the phase function as it is beside its peak (Nakajima and Tanaka, Algorithms for Radiative
+ * Intensity Calculations in Moderately Thick Atmospheres Using a Truncation Approximation, 1988). */
 #include "cloud_view.h"
 
 #include "base/vector.h"
@@ -21,8 +18,6 @@
 #include "formulas/prelude.h"
 
 #include "formulas/elementary.inc"
-
-#define PI_F 3.14159265f
 
 static float falling(float depth)
 {
@@ -91,10 +86,13 @@ nb_cloud_light nb_cloud_clear_light(const nebel_cloud_view *view, const double p
 
 /* ---- the slab -------------------------------------------------------------------------------- */
 
-float nb_cloud_part_through(float depth, float mean_cosine)
+/* A sun that is lower enters slabs at this cosine. */
+#define LOWEST_SUN 0.02f
+
+float nb_cloud_part_through(const nb_cloud_layer *layer, float depth, double sun)
 {
-    const float g = mean_cosine, apart = (1 - g * g) * depth;
-    return (5 - falling(apart)) / (4 + 3 * (1 - g / (1 + g)) * apart);
+    const float cosine = nb_larger(LOWEST_SUN, (float)sun);
+    return nb_slab_through(layer->slab, depth * cosine, cosine);
 }
 
 /* Integral of 3 x^2 - 2 x^3 up to x = 1, and of 1 behind it: nb_cloud_base_thins. */
@@ -179,10 +177,7 @@ nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direct
     memcpy(ray.direction, direction, sizeof ray.direction);
     for (int k = 0; k < view->clouds->layer_count; k++) {
         const nb_cloud_layer *layer = &view->clouds->layers[k];
-        const double g = layer->mean_cosine, wide = g / (1 + g);
-        const nebel_phase phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = wide};
-        const nb_phase lobe = nb_phase_resolve(&phase);
-        ray.wide_phase[k] = (float)nb_phase_at(&lobe, ray.sun);
+        ray.wide_phase[k] = nb_smaller(layer->slab->cap, (float)nb_phase_at(&layer->phase, ray.sun));
         ray.apart[k] = layer->apart;
     }
     set_phases(view, spread, &ray);
@@ -190,40 +185,49 @@ nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direct
     return ray;
 }
 
-nb_cloud_parts nb_cloud_parts_of(float mean_cosine, const nb_cloud_depths *depths)
+/* The slab's normal has the sun's way in the plane of that and straight up: it leads up where the way up is as long as a level slab would
+ * have it, to the sun where it is no shorter than that to the sun. */
+static nb_slab_place slab_of(float apart, const nb_cloud_depths *depths, const nb_cloud_sight *sight)
 {
-    const float g = mean_cosine, wide = g / (1 + g), apart = 1 - g * g;
-    const float m = nb_smaller(1, (depths->up + 0.3f) / (depths->sun + 0.3f));
-    const float x = apart * m * depths->sun, all = x + apart * nb_smaller(m * depths->away, depths->down);
-    const float here = falling(x / m), there = falling(all / m);
-    const float flux = m * (0.25f * (2 + 3 * m) + 0.25f * (2 - 3 * m) * there) / (1 + 0.75f * (1 - wide) * all);
-    const float side = 0.75f / PI_F * wide * (flux - m * here);
+    const float cosine = nb_larger(LOWEST_SUN, sight->sun);
+    const float m = nb_smaller(1, (depths->up + 0.3f * cosine) / (depths->sun + 0.3f));
+    const float level = 1 - sight->sun * sight->sun, aside = sight->rise - sight->sun * sight->ahead;
+    return (nb_slab_place){
+        .above = apart * m * depths->sun,
+        .below = apart * nb_smaller(m * depths->away, depths->down),
+        .sun = m,
+        .rise = m * sight->ahead + (level > 1e-6f ? sqrtf((1 - m * m) / level) * aside : 0),
+        .ahead = sight->ahead,
+    };
+}
+
+nb_cloud_parts nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths,
+                                 const nb_cloud_sight *sight)
+{
+    const float g = (float)layer->mean_cosine;
+    const nb_slab_place place = slab_of(layer->apart, depths, sight);
     const float over = (1 - g) * depths->up, whole = over + (1 - g) * depths->down;
     const float from_above = (0.5f + 0.75f * (whole - over)) / (1 + 0.75f * whole);
     /* Half of the ground that is seen lies in this cloud's shadow. */
-    const float ground = 0.5f + 0.5f * nb_cloud_part_through(depths->up + depths->down, g);
+    const float ground = 0.5f + 0.5f * nb_slab_through(layer->slab, depths->up + depths->down, 1);
     return (nb_cloud_parts){
         .left = falling(depths->sun),
-        .left_wide = falling(apart * depths->sun),
-        .mean = (0.5f * m + 0.75f * m * m - 0.5f * flux - 0.75f * ((1 - wide) * flux * x + m * m * here)) / PI_F,
-        .to_sun = m * side,
-        .to_up = (1 - m) * side,
+        .left_wide = falling(layer->apart * depths->sun),
+        .often = nb_slab_source(layer->slab, &place),
         .above = from_above,
         .below = (1 - from_above) * ground,
     };
 }
 
 nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_parts *parts,
-                                   const nb_cloud_light *light, const double up[3])
+                                   const nb_cloud_light *light)
 {
-    const float apart = ray->apart[layer], rise = (float)nb_vector_dot(ray->direction, up);
-    const float often = nb_larger(0, parts->mean + parts->to_sun * (float)ray->sun + parts->to_up * rise);
-    const float wide = apart * ray->wide_phase[layer];
+    const float wide = ray->wide_phase[layer];
     nb_cloud_source source;
     for (int c = 0; c < 3; c++) {
         source.once[c] = light->sun[c] * parts->left * (ray->phase[layer] - (1 - ray->ahead) * wide);
         source.ahead[c] = light->sun[c] * (ray->ahead_phase[layer] - ray->ahead * wide);
-        source.often[c] = light->sun[c] * apart * (often + parts->left_wide * ray->wide_phase[layer]);
+        source.often[c] = light->sun[c] * (ray->apart[layer] * parts->often + parts->left_wide * wide);
         source.ambient[c] = parts->above * light->above[c] + parts->below * light->below[c];
     }
     return source;

@@ -158,7 +158,8 @@ nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, 
         if (!nb_cloud_pieces(view->low, view->high, from, sun, HUGE_VAL, pieces)) continue;
         for (int c = 0; c < 3; c++) from[c] += pieces[0][0] * sun[c];
         const float depth = nb_cloud_sun_depth_at(workspace, from, (float)fmax(least, 0.005 * pieces[0][0]));
-        if (depth > 0) parts[i] = nb_cloud_part_through(depth, (float)clouds->layers[0].mean_cosine);
+        const double cosine = nb_vector_dot(from, sun) / nb_vector_length(from);
+        if (depth > 0) parts[i] = nb_cloud_part_through(&clouds->layers[0], depth, cosine);
     }
     return NEBEL_OK;
 }

@@ -86,11 +86,21 @@ typedef struct nb_cloud_block {
     float above, highest;
 } nb_cloud_block;
 
-/* What a place has of light, whoever looks at it: of the sun's, what was not scattered, or hardly turned; mean radiance of what
- * was scattered more often, and by how much there is more of it towards the sun and up; of the sky's two halves. */
+/* What a place has of light: of the sun's, what was not scattered, or hardly turned, and what scattering more often sends towards the
+ * eye; of the sky's two halves. */
 typedef struct nb_cloud_parts {
-    float left, left_wide, mean, to_sun, to_up, above, below;
+    float left, left_wide, often, above, below;
 } nb_cloud_parts;
+
+/* Optical depths at a place. */
+typedef struct nb_cloud_depths {
+    float sun, away, up, down;
+} nb_cloud_depths;
+
+/* How a place is seen: cosines of the sun and of the ray to straight up, and between both. */
+typedef struct nb_cloud_sight {
+    float sun, rise, ahead;
+} nb_cloud_sight;
 
 /* A place in clouds; with a direction along the ground, and optical depths. */
 typedef struct nb_crowd_place {
@@ -114,10 +124,10 @@ enum {
 typedef struct nb_cloud_crowd {
     int is_set, count;
     nb_crowd_place places[NB_CROWD_PLACES];
-    nb_cloud_parts parts[NB_CROWD_SUNS][NB_CROWD_PLACES];
+    nb_cloud_depths depths[NB_CROWD_SUNS][NB_CROWD_PLACES];
     nb_crowd_seen seen[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_PLACES];
     nb_cloud_parts means[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_SUNS];
-    uint8_t has_parts[NB_CROWD_SUNS], has_seen[NB_CROWD_VIEWS][NB_CROWD_TURNS],
+    uint8_t has_depths[NB_CROWD_SUNS], has_seen[NB_CROWD_VIEWS][NB_CROWD_TURNS],
         has_mean[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_SUNS];
 } nb_cloud_crowd;
 
@@ -160,11 +170,6 @@ nebel_result nb_cloud_light_make(nebel_cloud_view *view);
 /* Light of clear air at a place from the centre. */
 nb_cloud_light nb_cloud_clear_light(const nebel_cloud_view *view, const double place[3], double radius);
 
-/* Optical depths at a place. */
-typedef struct nb_cloud_depths {
-    float sun, away, up, down;
-} nb_cloud_depths;
-
 /* All along a way; the first step is so long, and what is narrower than a width is seen as a mean. is_alone: of a place that has
  * no neighbours. */
 float nb_cloud_depth_along(nebel_cloud_workspace *workspace, const double from[3], const double unit[3], float first,
@@ -202,15 +207,16 @@ nb_cloud_roof nb_cloud_roof_at(nebel_cloud_workspace *workspace, int layer, cons
 /* Where a ray meets the ground; HUGE_VAL: nowhere. */
 double nb_cloud_to_ground(double radius, const double from[3], const double unit[3]);
 
-/* What comes through a slab of such depth, straight or scattered, for a mean cosine. */
-float nb_cloud_part_through(float depth, float mean_cosine);
+/* What comes through a layer of sunlight whose way through it is so deep, straight or scattered; the sun's cosine to straight up. */
+float nb_cloud_part_through(const nb_cloud_layer *layer, float depth, double sun);
 
 /* Nodes of lattices are as far apart as a layer takes to become dense from its ends on, and depths that are linear between them
  * are too deep there by far: no cloud up or down is denser than its layer's. Only where no other layer lies that way. */
 nb_cloud_depths nb_cloud_bound_depths(const nebel_cloud_view *view, int layer, double radius,
                                       const nb_cloud_depths *depths);
 
-nb_cloud_parts nb_cloud_parts_of(float mean_cosine, const nb_cloud_depths *depths);
+nb_cloud_parts nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths,
+                                 const nb_cloud_sight *sight);
 
 /* What a layer's drops send towards the eye, per unit of extinction. */
 typedef struct nb_cloud_source {
@@ -222,13 +228,13 @@ typedef struct nb_cloud_source {
 
 /* What is the same along a ray. */
 typedef struct nb_cloud_ray {
-    float phase[NEBEL_MAX_CLOUD_LAYERS], wide_phase[NEBEL_MAX_CLOUD_LAYERS]; /* towards the eye */
+    float phase[NEBEL_MAX_CLOUD_LAYERS], wide_phase[NEBEL_MAX_CLOUD_LAYERS]; /* towards the eye; wide: of what leads away */
     /* Of phase that part of light whose way to the sun is the rest of the ray, and how much of what a pixel sees that is; phase has the
      * other. */
     float ahead_phase[NEBEL_MAX_CLOUD_LAYERS], ahead;
     float
         own; /* how much what comes straight from the sun is that of a place's own way, where pixels hide heaps, too */
-    float apart[NEBEL_MAX_CLOUD_LAYERS]; /* 1 - g^2: what part of scattering leads away */
+    float apart[NEBEL_MAX_CLOUD_LAYERS]; /* what part of scattering leads away */
     double sun;                          /* cosine between ray and sun */
     double direction[3];
 } nb_cloud_ray;
@@ -237,7 +243,7 @@ typedef struct nb_cloud_ray {
 nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3], double spread);
 
 nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_parts *parts,
-                                   const nb_cloud_light *light, const double up[3]);
+                                   const nb_cloud_light *light);
 
 /* How much of light is of clouds that a pixel so wide hides: 0 to 1. Always 0 where hardly any cloud is in the layer. */
 float nb_cloud_crowd_part(nebel_cloud_workspace *workspace, int layer, float width);

@@ -28,7 +28,7 @@
 
 /* Optical depth of a piece; and of a stretch of them, whose light is that of its middle. Both grow as less is seen. */
 #define MOST_DEPTH 1
-#define STRETCH_DEPTH 0.65
+#define STRETCH_DEPTH 0.35
 
 /* Halves of a piece whose parts of its depth differ by less than twice that count as one. */
 #define EVEN 0.03
@@ -329,12 +329,14 @@ static void light_stretch(nb_lights *lights, int i)
     nb_walk *walk = lights->walks[i];
     const int k = lights->layers[i];
     const nb_cloud_asked *asked = &lights->asked[i];
-    const double cosine = walk->view->clouds->layers[k].mean_cosine;
+    const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
     const float crowd = lights->crowd[i];
     const nb_cloud_depths depths = nb_cloud_bound_depths(walk->view, k, lights->radius[i], &asked->depths);
     double up[3];
     for (int c = 0; c < 3; c++) up[c] = asked->place[c] / lights->radius[i];
-    nb_cloud_parts parts = nb_cloud_parts_of((float)cosine, &depths);
+    const nb_cloud_sight sight = {(float)nb_vector_dot(up, walk->view->sun.direction),
+                                  (float)nb_vector_dot(up, walk->unit), (float)walk->ray.sun};
+    nb_cloud_parts parts = nb_cloud_parts_of(layer, &depths, &sight);
     if (crowd > 0) {
         const nb_cloud_parts mean = nb_cloud_crowd_at(walk->workspace, k, up, walk->unit, lights->entered[i]);
         const float left = parts.left + crowd * (1 - walk->ray.own) * (mean.left - parts.left);
@@ -342,7 +344,7 @@ static void light_stretch(nb_lights *lights, int i)
         parts.left = left;
     }
     const nb_cloud_light light = nb_cloud_clear_light(walk->view, asked->place, lights->radius[i]);
-    const nb_cloud_source source = nb_cloud_source_of(&walk->ray, k, &parts, &light, up);
+    const nb_cloud_source source = nb_cloud_source_of(&walk->ray, k, &parts, &light);
     const nb_stretch *stretch = &lights->stretches[i];
     double sent[3], ahead[3];
     for (int c = 0; c < 3; c++) {
@@ -410,7 +412,7 @@ static double visible(double left)
 /* How deep the next stretch gets: where nothing more is seen it has no end. */
 static double deepest_stretch(const nb_walk *walk)
 {
-    return walk->tally.left_apart > UNSEEN ? STRETCH_DEPTH / (0.15 + walk->tally.left) : HUGE_VAL;
+    return walk->tally.left_apart > UNSEEN ? STRETCH_DEPTH / (0.3 + walk->tally.left) : HUGE_VAL;
 }
 
 /* Optical depths of a piece: of all scattering, of what leads away, and of what light that goes on along the ray is scattered by. */

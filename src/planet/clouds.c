@@ -395,7 +395,9 @@ static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *des
     layer->per_time = speed / layer->low;
     layer->phase = nb_phase_resolve(&phase);
     layer->mean_cosine = nb_phase_mean_cosine(&layer->phase);
-    layer->apart = (float)(1 - layer->mean_cosine * layer->mean_cosine);
+    layer->slab = nb_slab_make(&clouds->allocator, &layer->phase);
+    if (layer->slab == NULL) return NEBEL_ERROR_MEMORY;
+    layer->apart = layer->slab->apart;
     layer->size = (float)desc->size;
     layer->hidden_height = hidden_heights[desc->kind != NEBEL_CLOUD_CUMULUS] / layer->per_thickness;
     layer->hidden_width = hidden_widths[desc->kind != NEBEL_CLOUD_CUMULUS] * (float)desc->size;
@@ -471,7 +473,10 @@ void nebel_destroy_clouds(nebel_clouds *clouds)
 {
     if (clouds == NULL) return;
     const nebel_allocator allocator = clouds->allocator;
-    for (int i = 0; i < clouds->layer_count; i++) nb_layer_map_free(&allocator, &clouds->layers[i].weather);
+    for (int i = 0; i < clouds->layer_count; i++) {
+        nb_layer_map_free(&allocator, &clouds->layers[i].weather);
+        nb_release(&allocator, clouds->layers[i].slab);
+    }
     nb_cloud_noise_free(&allocator, &clouds->noise);
     nb_release(&allocator, clouds);
 }

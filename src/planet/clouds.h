@@ -3,6 +3,7 @@
 #define NB_PLANET_CLOUDS_H
 
 #include "cloud_noise.h"
+#include "cloud_slab.h"
 #include "layer_map.h"
 
 #include "media/phase.h"
@@ -56,7 +57,8 @@ typedef struct nb_cloud_layer {
     nb_layer_map weather; /* level_count 0: none */
     nb_phase phase;
     double mean_cosine;
-    float apart; /* 1 - g^2 of that: what part of scattering leads away */
+    float apart;   /* what part of scattering leads away */
+    nb_slab *slab; /* light in slabs of such cloud */
 } nb_cloud_layer;
 
 /* How densities are found: see cloud_looks.h. */
