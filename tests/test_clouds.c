@@ -326,7 +326,8 @@ static void test_two_clouds_have_light_of_two_places(void **state)
     double most;
     const double grain = find_grain(&heaps, &sun, &w, &most);
     print_message("two clouds: pixels off the mean of neighbours by %.2g, %.2g at most\n", grain, most);
-    assert_true(grain < .05 && most < .3);
+    /* A pixel beside the heap is the brighter by it the darker the cloud before it is. */
+    assert_true(grain < .04 && most < .4);
 }
 
 /* Rays without a width, to which small billows are as thick as they are: steps in search of clouds may go over some. From within, below
@@ -453,7 +454,7 @@ static void test_thick_cloud_ends_where_it_is_seen(void **state)
 {
     (void)state;
     nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1});
-    const double g = clouds->layers[0].mean_cosine;
+    const double apart = (double)clouds->layers[0].apart;
     nebel_cloud_workspace *workspace;
     nebel_cloud_view *view = view_of(clouds, 0, &workspace);
     for (int i = 0; i < 40; i++) {
@@ -466,7 +467,7 @@ static void test_thick_cloud_ends_where_it_is_seen(void **state)
         assert_true(end < 1e4);
         for (double t = 0; t < end; t += 100) depth -= log(brute_force(clouds, &ray, t, fmin(t + 100, end), 1));
         /* A piece of no more than 1 / 0.15 begins before three hundredths are left of what leads away. */
-        assert_true(depth > 3.5 / (1 - g * g) - .2 && depth < 3.5 / (1 - g * g) + 7);
+        assert_true(depth > 3.5 / apart - .2 && depth < 3.5 / apart + 7);
     }
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_view(view);
@@ -743,7 +744,7 @@ static void test_without_memory(void **state)
         nebel_destroy_cloud_workspace(workspace);
         nebel_destroy_cloud_view(view);
         nebel_destroy_clouds(clouds);
-        assert_true(k < 20);
+        assert_true(k < 24);
     }
 }
 

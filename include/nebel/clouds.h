@@ -9,7 +9,7 @@
  * The extinction of a layer at a place is one formula of the place, the same from everywhere (docs/clouds.md): noise in
  * three dimensions in the planet's axes, so that there is no seam and no pole; who looks from afar gets its mean over
  * what a pixel covers. Transmittance is integrated to a tolerance. Light is first order exact up to the shadow's
- * lattice, and higher orders by a model, delta-Eddington's on a slab: docs/clouds.md says how far off.
+ * lattice, and higher orders by a model, a table of even slabs: docs/clouds.md says how far off.
  *
  * Units are metres; places are those of the scene, y up. Nothing here calls a graphics interface.
  *
@@ -140,9 +140,8 @@ nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, cons
                                 size_t knot_stride);
 
 /* What part of the sun's light comes through clouds to n places, straight or scattered on the way; width as of
- * nebel_cloud_extinction. Nothing tells an error: docs/clouds.md, "Light of clouds", has a table of what slabs send back by
- * paths of light, which this is within 0.01 of where the sun is straight over them, within 0.08 aslant; of heaps it is not
- * known. Errors: ARGUMENT. */
+ * nebel_cloud_extinction. Nothing tells an error: of even layers it is within 0.01, but 0.025 where the sun is less than four
+ * degrees high (docs/clouds.md, "Light of clouds", has the table); of heaps it is not known. Errors: ARGUMENT. */
 nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
                                 size_t place_stride, float *parts);
 

@@ -238,7 +238,7 @@ static void find_around(nebel_cloud_workspace *workspace, const double place[3],
     nb_way ways[3];
     set_around(workspace, place, &(nb_steps){width, OTHER_GROWTH, width, MOST_STEPS}, ways);
     find_ways(workspace, 0, 3, ways);
-    for (int i = 0; i < 3; i++) depth[i] = sqrtf((float)ways[i].depth);
+    for (int i = 0; i < 3; i++) depth[i] = (float)ways[i].depth;
 }
 
 static void find_to_sun(nebel_cloud_workspace *workspace, const double place[3], float width, float depth[1])
@@ -365,7 +365,6 @@ static void read_lattice(nebel_cloud_workspace *workspace, const nb_in_lattice *
             depth[i] += in->cells[n].weight * (near + part[2] * (far - near));
         }
     }
-    for (int i = 0; i < 3 && in->ways == NB_CLOUD_AROUND; i++) depth[i] *= depth[i];
 }
 
 float nb_cloud_sun_depth_at(nebel_cloud_workspace *workspace, const double place[3], float width)

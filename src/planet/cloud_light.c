@@ -187,10 +187,11 @@ nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direct
 
 /* The slab's normal has the sun's way in the plane of that and straight up: it leads up where the way up is as long as a level slab would
  * have it, to the sun where it is no shorter than that to the sun. */
-static nb_slab_place slab_of(float apart, const nb_cloud_depths *depths, const nb_cloud_sight *sight)
+static nb_slab_place slab_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths, const nb_cloud_sight *sight)
 {
     const float cosine = nb_larger(LOWEST_SUN, sight->sun);
-    const float m = nb_smaller(1, (depths->up + 0.3f * cosine) / (depths->sun + 0.3f));
+    const float shallow = layer->shallow, apart = layer->apart;
+    const float m = nb_smaller(1, (depths->up + shallow * cosine) / (depths->sun + shallow));
     const float level = 1 - sight->sun * sight->sun, aside = sight->rise - sight->sun * sight->ahead;
     return (nb_slab_place){
         .above = apart * m * depths->sun,
@@ -205,7 +206,7 @@ nb_cloud_parts nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_dep
                                  const nb_cloud_sight *sight)
 {
     const float g = (float)layer->mean_cosine;
-    const nb_slab_place place = slab_of(layer->apart, depths, sight);
+    const nb_slab_place place = slab_of(layer, depths, sight);
     const float over = (1 - g) * depths->up, whole = over + (1 - g) * depths->down;
     const float from_above = (0.5f + 0.75f * (whole - over)) / (1 + 0.75f * whole);
     /* Half of the ground that is seen lies in this cloud's shadow. */

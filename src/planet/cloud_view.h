@@ -114,9 +114,9 @@ typedef struct nb_crowd_seen {
 } nb_crowd_seen;
 
 enum {
-    NB_CROWD_VIEWS = 10,
+    NB_CROWD_VIEWS = 14,
     NB_CROWD_TURNS = 3,
-    NB_CROWD_SUNS = 10,
+    NB_CROWD_SUNS = 12,
     NB_CROWD_PLACES = 768,
 };
 

@@ -377,6 +377,10 @@ static void set_ranks(const nb_cloud_noise *noise, nb_cloud_layer *layer)
     for (int i = 0; i < NB_CLOUD_RANKS; i++) layer->ranks[i] = sums[i < NB_CLOUD_RANKS - 1 ? 16 * i : LOOKS - 1];
 }
 
+/* Next to a layer's ends depths up are not known well from nodes, which are a twelfth of its height apart at most. */
+#define LEAST_SHALLOW 0.3f
+#define SHALLOW_PART 0.05f
+
 static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *desc, nb_cloud_layer *layer)
 {
     const nebel_phase phase = {.type = NEBEL_PHASE_DROPLETS, .diameter = desc->diameter};
@@ -398,6 +402,7 @@ static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *des
     layer->slab = nb_slab_make(&clouds->allocator, &layer->phase);
     if (layer->slab == NULL) return NEBEL_ERROR_MEMORY;
     layer->apart = layer->slab->apart;
+    layer->shallow = LEAST_SHALLOW + SHALLOW_PART * layer->extinction / layer->per_thickness;
     layer->size = (float)desc->size;
     layer->hidden_height = hidden_heights[desc->kind != NEBEL_CLOUD_CUMULUS] / layer->per_thickness;
     layer->hidden_width = hidden_widths[desc->kind != NEBEL_CLOUD_CUMULUS] * (float)desc->size;

@@ -58,6 +58,7 @@ typedef struct nb_cloud_layer {
     nb_phase phase;
     double mean_cosine;
     float apart;   /* what part of scattering leads away */
+    float shallow; /* optical depth up to which a place counts as one of a level slab, however the way to the sun is */
     nb_slab *slab; /* light in slabs of such cloud */
 } nb_cloud_layer;
 
