@@ -427,6 +427,7 @@ float nb_slab_through(const nb_slab *slab, float depth, float sun)
     const nb_slab_suns suns = find_suns(sun);
     float sum = 0, part = fmaxf(0, times);
     int octave, step = NB_SLAB_FINER - 1, low = -1;
+    if (!(depth > 0)) return 1; /* to the last bit: where there is no cloud all is as without */
     if (times >= 1) {
         const float mantissa = 2 * frexpf(fminf(times, 0x1p62f), &octave);
         while (mantissa < steps[step]) step--;
