@@ -4,44 +4,16 @@
 #include "cloud_help.h"
 #include "dice.h"
 #include "near.h"
-
-/* Cosines below which light is scattered with the probability of their number by their count. */
-enum { PARTS = 4096 };
-
-static void invert(const nb_phase *phase, double cosines[PARTS + 1])
-{
-    enum { ANGLES = 100000 };
-    double sum = 0, whole = 0;
-    int next = 0;
-    for (int pass = 0; pass < 2; pass++)
-        for (int i = 0; i < ANGLES; i++) {
-            /* Finer ahead, where the peak is. */
-            const double part = 1 - (i + .5) / ANGLES, angle = PI * part * part * part;
-            const double light = nb_phase_at(phase, cos(angle)) * sin(angle) * 3 * part * part;
-            if (pass == 0) whole += light;
-            if (pass == 1)
-                for (sum += light; next <= PARTS && sum >= whole * next / PARTS; next++) cosines[next] = cos(angle);
-        }
-    while (next <= PARTS) cosines[next++] = 1;
-}
+#include "slab_paths.h"
 
 /* What a slab of drops sends up against the sun's light, as paths say: the part of the light that comes back, sunlight at a cosine. */
-static double reflected_by_paths(double depth, double cosine, const double turns[PARTS + 1], int paths,
+static double reflected_by_paths(double depth, double cosine, const double turns[SLAB_PARTS + 1], int paths,
                                  uint64_t *numbers)
 {
     int back = 0;
     for (int i = 0; i < paths; i++) {
-        double z = 0, mu = cosine;
-        for (;;) {
-            z -= mu * log(dice(numbers, 1e-12, 1));
-            if (!(z >= 0 && z <= depth)) break;
-            const double place = dice(numbers, 0, PARTS);
-            const int low = (int)place;
-            const double turn = turns[low] + (place - low) * (turns[low + 1] - turns[low]);
-            const double sine = sqrt(fmax(0, 1 - turn * turn));
-            mu = turn * mu + sine * sqrt(fmax(0, 1 - mu * mu)) * cos(dice(numbers, 0, 2 * PI));
-        }
-        back += z < 0;
+        double out;
+        back += slab_path(depth, cosine, turns, numbers, &out) < 0;
     }
     return (double)back / paths;
 }
@@ -91,9 +63,9 @@ static void test_light_of_slabs(void **state)
     nebel_cloud_workspace *workspace;
     nebel_cloud_view *view = view_of(clouds, 0, &workspace);
     const double apart = (double)clouds->layers[0].apart;
-    double turns[PARTS + 1];
+    double turns[SLAB_PARTS + 1];
     uint64_t numbers = 5;
-    invert(&clouds->layers[0].phase, turns);
+    slab_invert(&clouds->layers[0].phase, turns);
     print_message("light of slabs\n depth  cosine  up by paths       up  through  down\n");
     for (size_t i = 0; i < sizeof slabs / sizeof *slabs; i++) {
         enum { PATHS = 40000 };

@@ -37,7 +37,7 @@ enum { TRIES = 24576 };
 /* Rays' cosines to straight up. From above clouds show what the sun lights, from below what is in their shadow, however flat the
  * ray: between the two in the middle nothing is linear (nb_cloud_crowd_at). */
 static const float views[NB_CROWD_VIEWS] = {-1,       -.82f, -.66f, -.5f, -.28f, -.09f, -FLATTEST,
-                                             FLATTEST, .09f,  .28f,  .5f,  .66f,  .82f,  1};
+                                            FLATTEST, .09f,  .28f,  .5f,  .66f,  .82f,  1};
 static const float suns[NB_CROWD_SUNS] = {-.15f, -.05f, 0, .05f, .1f, .2f, .3f, .43f, .55f, .68f, .84f, 1};
 static const float turns[NB_CROWD_TURNS] = {-1, 0, 1}; /* cosines between ray and sun, both seen from straight above */
 

@@ -293,7 +293,8 @@ static void set_source(const nb_slab_solver *solver, int m, int first, nb_slab *
                     for (int i = 0; i < STREAMS; i++)
                         sum += solver->weights[i] * solver->stream[l][i] * (up.at[i][k] + turned(l, m) * down.at[i][k]);
                     const int at = first + l - m;
-                    slab->source[a][b][k][at / 4][at % 4] = (float)(0.5 * (2 * l + 1) * solver->moments[l] * scales[l] * sum);
+                    slab->source[a][b][k][at / 4][at % 4] =
+                        (float)(0.5 * (2 * l + 1) * solver->moments[l] * scales[l] * sum);
                 }
         }
 }
@@ -310,8 +311,7 @@ static void set_through(nb_slab_solver *solver, nb_slab *slab)
                 for (int k = 0; k < SUNS; k++) {
                     double sum = exp(-depth / solver->suns[k]);
                     for (int s = 0; s < STREAMS; s++)
-                        sum += 2 * PI * solver->weights[s] * solver->cosines[s] * layer.down.at[s][k] /
-                               solver->suns[k];
+                        sum += 2 * PI * solver->weights[s] * solver->cosines[s] * layer.down.at[s][k] / solver->suns[k];
                     slab->through[i][k] = (float)(1 / sum);
                 }
                 i += NB_SLAB_FINER;

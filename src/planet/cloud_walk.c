@@ -314,9 +314,9 @@ static nb_cloud_grain grain_of(const nb_walk *walk, int k, double width)
                  flatness = hidden > 0 ? width / hidden : 1, nodes = NODES_PART * thickness;
     return (nb_cloud_grain){
         .width = (float)width,
-        .first = (float)nb_max(
-            nb_min(0.02 * thickness, 2 * hidden),
-            nb_min(0.1 * thickness, nb_min(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
+        .first =
+            (float)nb_max(nb_min(0.02 * thickness, 2 * hidden),
+                          nb_min(0.1 * thickness, nb_min(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
         /* Wider lattices than the layer is high would show through it, also where heaps are far wider than that. */
         .wide = (float)nb_max(nb_min(20 * width, nb_min(nb_max(2 * width, nodes), 0.8 * thickness)),
                               nb_min(0.08 * walk->least, nodes)),
