@@ -5,6 +5,7 @@ and nothing else."""
 import os
 import pathlib
 import random
+import re
 import resource
 import shutil
 import signal
@@ -378,7 +379,7 @@ class RanksTest(RanksCase):
                     status, seen = self.ranks(f"{kind[0]}-{number}", number, kind)
                     self.assertEqual(status, 0, seen)
                     self.assertEqual(self.contents(f"{kind[0]}-{number}"), expected)
-                    self.assertEqual(seen.count("\n"), 1, f"one summary: {seen}")
+                    self.assertEqual(len(re.findall(r"^nebel: .* s$", seen, re.M)), 1, f"one summary: {seen}")
                     self.assertIn(f"{kind[2]} {'bands' if '--bands' in kind[1] else 'pictures'}, ", seen)
 
     def test_resume(self):
