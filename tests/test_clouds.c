@@ -326,7 +326,7 @@ static void test_two_clouds_have_light_of_two_places(void **state)
     double most;
     const double grain = find_grain(&heaps, &sun, &w, &most);
     print_message("two clouds: pixels off the mean of neighbours by %.2g, %.2g at most\n", grain, most);
-    /* A pixel beside the heap is the brighter by it the darker the cloud before it is. */
+    /* The heap's edge is far brighter than the cloud before it. With one light for both it was 0.056, 0.43 at most. */
     assert_true(grain < .04 && most < .4);
 }
 
