@@ -57,7 +57,7 @@ static double most_density(const nebel_air *air, double low, double high)
 static void add_shell(nb_shells *shells, double radius, double top)
 {
     int i = shells->count;
-    if (!(radius < top) || shells->count == NB_MOST_SHELLS) return;
+    if (!(radius < top) || shells->count == NB_MEDIUM_SHELLS) return;
     for (int k = 0; k < i; k++)
         if (shells->radii[k] == radius) return;
     for (; i > 0 && shells->radii[i - 1] > radius; i--) shells->radii[i] = shells->radii[i - 1];

@@ -16,14 +16,14 @@ typedef struct nb_turns {
     double cosines[NB_TURNS + 1]; /* from -1 to 1 */
 } nb_turns;
 
-enum { NB_SHELLS_PER_AIR = 17, NB_MOST_SHELLS = 2 + NEBEL_MAX_AIRS * NB_SHELLS_PER_AIR + 2 * NEBEL_MAX_CLOUD_LAYERS };
+enum { NB_SHELLS_PER_AIR = 17, NB_MEDIUM_SHELLS = 2 + NEBEL_MAX_AIRS * NB_SHELLS_PER_AIR + 2 * NEBEL_MAX_CLOUD_LAYERS };
 
 /* Spheres about the planet's center, from the ground to the top of the air. */
 typedef struct nb_shells {
     int count;
-    double radii[NB_MOST_SHELLS];      /* m, ascending */
-    double air[NB_MOST_SHELLS + 1][3]; /* 1/m: most extinction of air below radii[i], above the one before it */
-    double clouds[NB_MOST_SHELLS + 1]; /* the same of clouds */
+    double radii[NB_MEDIUM_SHELLS];      /* m, ascending */
+    double air[NB_MEDIUM_SHELLS + 1][3]; /* 1/m: most extinction of air below radii[i], above the one before it */
+    double clouds[NB_MEDIUM_SHELLS + 1]; /* the same of clouds */
 } nb_shells;
 
 typedef struct nb_planet_medium {
