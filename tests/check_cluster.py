@@ -272,7 +272,7 @@ class ResumeTest(ClusterCase):
     def test_ctrl_c_loses_what_is_in_work(self):
         if not self.has_films:
             return
-        kind = ("f.webp", ["--frames", "0-39", "--size", "160x90", "--quality", "100"], 40)
+        kind = ("f.webp", ["--frames", "0-39", "--size", "640x360", "--quality", "100", "--threads", "1"], 40)
         expected = self.expected(kind)
         self.folder_of("a")
         process, seen = self.run_on_terminal("a/f.webp", *kind[1], "--resume", interrupt_after=rb"frame ([4-9]|\d\d) of")
