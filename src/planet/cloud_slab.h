@@ -17,8 +17,8 @@ enum {
     NB_SLAB_THROUGH = NB_SLAB_FINER * NB_SLAB_OCTAVES,
 };
 
-/* Four numbers that are counted together. */
-typedef float nb_slab_four __attribute__((vector_size(16)));
+/* Four numbers that are counted together; allocators need not align them. */
+typedef float nb_slab_four __attribute__((vector_size(16), aligned(4)));
 
 /* Depths are scaled: a part 1 - `apart` of all scattering goes straight on and is left out (delta-M: Wiscombe 1977). */
 typedef struct nb_slab {
