@@ -6,7 +6,7 @@
 
 #include "cloud_help.h"
 
-/* As even as the parameters allow: heaps are far wider than all that is seen, on a ball that is as good as flat. */
+/* As even as the parameters allow: clouds are far wider than all that is seen, on a ball that is as good as flat. */
 #define FLAT_RADIUS 6.36e9
 #define BASE 1000.0
 #define TOP 2000.0
