@@ -103,12 +103,17 @@ static bool is_empty(const exr_attr_box2i_t *window)
 static nebel_result check_header(decoder *in)
 {
     exr_storage_t storage;
+    exr_compression_t compression;
     if (!is_good(in, exr_get_storage(in->exr, 0, &storage)) ||
+        !is_good(in, exr_get_compression(in->exr, 0, &compression)) ||
         !is_good(in, exr_get_data_window(in->exr, 0, &in->data)) ||
         !is_good(in, exr_get_display_window(in->exr, 0, &in->display)) ||
         !is_good(in, exr_get_channels(in->exr, 0, &in->channels)) || is_empty(&in->data) || is_empty(&in->display) ||
         in->channels->num_channels < 1)
         return fail_format(in);
+    /* OpenEXR 3.1.5 decodes them, without an error, to other numbers than were written. */
+    if (compression == EXR_COMPRESSION_B44 || compression == EXR_COMPRESSION_B44A)
+        return fail_unsupported(in, "that are compressed in this way (B44, B44A)");
     if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED) return fail_unsupported(in, "with deep data");
     for (int i = 0; i < in->channels->num_channels; i++)
         if (in->channels->entries[i].x_sampling != 1 || in->channels->entries[i].y_sampling != 1)
