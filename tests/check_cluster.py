@@ -38,6 +38,13 @@ def ranks_are_missing():
 MISSING = ranks_are_missing()
 
 
+def change_bit(path):
+    """As a disk does that fails: the file keeps its size."""
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 4
+    path.write_bytes(data)
+
+
 class ClusterCase(PictureCase):
     """A triangle in fog that fades, seen from a camera that turns."""
 
@@ -232,12 +239,12 @@ class ResumeTest(ClusterCase):
         (folder / "f4.png").write_bytes(b"")
         (folder / "f5.png").write_bytes(expected["f6.png"])
         (folder / "f6.png").write_bytes(b"a picture of somebody else's")
+        change_bit(folder / "f7.png")
         done = self.run_in(folder.name, PICTURES, "--resume")
         self.assert_done(done)
-        self.assertIn(f"{FRAMES} pictures, 2 of them there already", done.err)
+        self.assertIn(f"{FRAMES} pictures, 1 of them there already", done.err)
         self.assertEqual(self.contents(folder.name), expected)
-        after = self.stamps(folder.name)
-        self.assertEqual([after[name] for name in ("f0.png", "f7.png")], [before[name] for name in ("f0.png", "f7.png")])
+        self.assertEqual(self.stamps(folder.name)["f0.png"], before["f0.png"])
 
     def test_parts_are_whole_or_made_again(self):
         kinds = [kind for kind in self.kinds() if kind != PICTURES]
@@ -247,11 +254,14 @@ class ResumeTest(ClusterCase):
                 self.assert_done(self.run_in("a", kind, "--shard", "0/2"))
                 parts = sorted((self.folder / "a" / (kind[0] + ".parts")).iterdir())
                 self.assertEqual(len(parts), (kind[2] + 1) // 2)
-                parts[0].write_bytes(parts[0].read_bytes()[:-20])
+                broken = len(parts) // 2
+                change_bit(parts[0])
+                if broken > 1:
+                    parts[1].write_bytes(parts[1].read_bytes()[:-20])
                 (parts[0].parent / ".nebel-0123456789abcdef.tmp").write_bytes(b"half")
                 done = self.run_in("a", kind, "--resume")
                 self.assert_done(done)
-                self.assertIn(f"{kind[2]} {'pictures' if kind == FILM else 'bands'}, {len(parts) - 1} of them there already", done.err)
+                self.assertIn(f"{kind[2]} {'pictures' if kind == FILM else 'bands'}, {len(parts) - min(broken, 2)} of them there already", done.err)
                 self.assertEqual(self.contents("a"), expected)
                 shutil.rmtree(self.folder / "a")
 

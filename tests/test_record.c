@@ -241,6 +241,55 @@ static void test_files_that_are_not_whole_have_no_record(void **state)
     assert_int_equal(remove(in_folder("pipe.png")), 0);
 }
 
+static void write_file(const char *path, const unsigned char *bytes, size_t size)
+{
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, size, file), size);
+    assert_int_equal(fclose(file), 0);
+}
+
+/* A file of which a byte behind the first ones has changed has no record, or still the same picture. */
+static void try_changed_bytes(const char *path, size_t first)
+{
+    char found[NEBEL_MAX_RECORD + 1];
+    uint64_t seed = 9;
+    size_t size, lost = 0;
+    unsigned char *bytes = read_file(path, &size);
+    nebel_image before, after;
+    assert_int_equal(nebel_read_image(path, &(nebel_scene_desc){0}, &before), NEBEL_OK);
+    for (int i = 0; i < 300; i++) {
+        const size_t at = first + (size_t)(dice(&seed, 0, 1) * (double)(size - first));
+        const unsigned char was = bytes[at];
+        bytes[at] ^= (unsigned char)(1 << (int)dice(&seed, 0, 8));
+        write_file(path, bytes, size);
+        bytes[at] = was;
+        assert_int_equal(nebel_read_record(path, found), NEBEL_OK);
+        lost += strcmp(found, record) != 0;
+        if (strcmp(found, record) != 0) continue;
+        assert_int_equal(nebel_read_image(path, &(nebel_scene_desc){0}, &after), NEBEL_OK);
+        assert_memory_equal(before.samples, after.samples,
+                            sizeof(float) * before.width * before.height * before.channel_count);
+        nebel_free_image(&(nebel_scene_desc){0}, &after);
+    }
+    assert_true(lost > 280); /* a few bits are padding */
+    nebel_free_image(&(nebel_scene_desc){0}, &before);
+    free(bytes);
+}
+
+static void test_pictures_with_changed_bytes_have_no_record(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < WIDTH * HEIGHT * 4; i++) samples[i] = (float)(i % 1000) / 1000; /* compresses */
+    for (size_t i = 0; i < 2; i++) {
+        const nebel_image_desc desc = desc_of(record);
+        const char *path = numbered("changed", i);
+        assert_int_equal(write_rows(path, &desc, 64), NEBEL_OK);
+        try_changed_bytes(path, i == 1 ? 1000 : 0); /* OpenEXR has no checksum of its headers */
+        assert_int_equal(remove(path), 0);
+    }
+}
+
 /* ---- films ----------------------------------------------------------------------------------- */
 
 static nebel_result make_film(const char *path, uint32_t count, const char *with)
@@ -287,10 +336,14 @@ static void test_films_have_records(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rows_make_the_same_file), cmocka_unit_test(test_a_picture_is_whole_or_not_there),
-        cmocka_unit_test(test_memory_that_is_out),      cmocka_unit_test(test_records_come_back),
-        cmocka_unit_test(test_bad_records_are_refused), cmocka_unit_test(test_files_that_are_not_whole_have_no_record),
+        cmocka_unit_test(test_rows_make_the_same_file),
+        cmocka_unit_test(test_a_picture_is_whole_or_not_there),
+        cmocka_unit_test(test_memory_that_is_out),
+        cmocka_unit_test(test_records_come_back),
+        cmocka_unit_test(test_bad_records_are_refused),
+        cmocka_unit_test(test_files_that_are_not_whole_have_no_record),
         cmocka_unit_test(test_films_have_records),
+        cmocka_unit_test(test_pictures_with_changed_bytes_have_no_record),
     };
     return cmocka_run_group_tests(tests, make_samples, remove_folder);
 }

@@ -441,8 +441,9 @@ nebel_result nebel_finish_image(nebel_image_writer *writer);
 /* What was not finished is given up, without a trace. NULL is fine. */
 void nebel_destroy_image_writer(nebel_image_writer *writer);
 
-/* Reads the record of a picture or a film, as far as it needs to: headers, not pixels. "" where there is no such file, no record, or where the
- * file is not whole: it ends before what its headers say. Thread safe. Errors: ARGUMENT. */
+/* Reads the record of a picture or a film. "" if there is no such file, if it has no record or if it is not whole: it ends before
+ * what its headers say, or a checksum is wrong. PNG has checksums of everything, OpenEXR of the pixels that it compresses, WebP has none.
+ * Thread safe. Errors: ARGUMENT. */
 nebel_result nebel_read_record(const char *path, char record[NEBEL_MAX_RECORD + 1]);
 
 /* Whether nebel_write_image is likely to succeed at `path`, to be asked before the work: the ending is known, and a

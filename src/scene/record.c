@@ -1,5 +1,5 @@
-/* The records of pictures and films: what they were made from. Files are walked by their headers; pixels are not
- * looked at. */
+/* The records of pictures and films: what they were made from. Files are walked by their headers, and their checksums are
+ * compared; pixels are not looked at. */
 #define _POSIX_C_SOURCE 200809L
 #include "scene/film.h"
 #include "scene/writer.h"
@@ -9,6 +9,10 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
+
+/* Bytes that are looked at in one go. */
+enum { PIECE = 16384 };
 
 typedef struct reader {
     int file;
@@ -16,8 +20,8 @@ typedef struct reader {
     char *record; /* room for NEBEL_MAX_RECORD and the end */
 } reader;
 
-/* A file of more parts is not ours. */
-enum { MAX_PARTS = 1 << 22 };
+/* A file of more parts or channels is not ours. */
+enum { MAX_PARTS = 1 << 22, MAX_CHANNELS = 1024 };
 
 static bool read_at(const reader *in, uint64_t at, void *bytes, size_t size)
 {
@@ -57,6 +61,21 @@ static bool take_text(const reader *in, uint64_t at, uint32_t size)
     return memcmp(found, key, sizeof key) != 0 || take(in, at + sizeof key, size - (uint32_t)sizeof key);
 }
 
+/* The checksum of a chunk counts its kind and its data, and stands behind them. */
+static bool has_png_checksum(const reader *in, uint64_t at, uint32_t size)
+{
+    unsigned char bytes[PIECE];
+    uLong sum = crc32(0, NULL, 0);
+    for (uint64_t left = 4 + (uint64_t)size; left > 0;) {
+        const size_t step = left < PIECE ? (size_t)left : PIECE;
+        if (!read_at(in, at, bytes, step)) return false;
+        sum = crc32(sum, bytes, (uInt)step);
+        at += step;
+        left -= step;
+    }
+    return read_at(in, at, bytes, 4) && number_be(bytes) == sum;
+}
+
 /* True where the file is whole. */
 static bool walk_png(const reader *in)
 {
@@ -65,13 +84,14 @@ static bool walk_png(const reader *in)
     for (int i = 0; i < MAX_PARTS && read_at(in, at, head, sizeof head); i++) {
         const uint32_t size = number_be(head);
         if (memcmp(head + 4, "tEXt", 4) == 0 && !take_text(in, at + 8, size)) return false;
+        if (!has_png_checksum(in, at + 4, size)) return false;
         at += 12 + (uint64_t)size;
         if (memcmp(head + 4, "IEND", 4) == 0) return at <= in->size;
     }
     return false;
 }
 
-/* ---- OpenEXR: attributes, then the place of the last block ------------------------------------- */
+/* ---- OpenEXR: attributes, then the blocks as the table of their places names them ----------------- */
 
 /* Text up to its 0; the place behind that, 0 where it is longer. */
 static uint64_t read_name(const reader *in, uint64_t at, char name[256])
@@ -84,8 +104,22 @@ static uint64_t read_name(const reader *in, uint64_t at, char name[256])
 }
 
 typedef struct exr_facts {
-    uint32_t rows, block_rows;
+    uint32_t top, width, rows, block_rows, channels;
 } exr_facts;
+
+/* A list has a name, its 0 and 16 bytes for each channel, and a 0. */
+static bool count_channels(const reader *in, uint64_t at, uint32_t size, exr_facts *facts)
+{
+    char name[256];
+    const uint64_t end = at + size;
+    for (facts->channels = 0; facts->channels < MAX_CHANNELS; facts->channels++) {
+        at = read_name(in, at, name);
+        if (at == 0 || at > end) return false;
+        if (name[0] == '\0') return true;
+        at += 16;
+    }
+    return false;
+}
 
 static bool take_attribute(const reader *in, const char *name, uint64_t at, uint32_t size, exr_facts *facts)
 {
@@ -93,8 +127,11 @@ static bool take_attribute(const reader *in, const char *name, uint64_t at, uint
     if (strcmp(name, NB_RECORD_KEY) == 0) return take(in, at, size);
     if (strcmp(name, "dataWindow") == 0) {
         if (size != sizeof bytes || !read_at(in, at, bytes, sizeof bytes)) return false;
-        facts->rows = number_le(bytes + 12) - number_le(bytes + 4) + 1;
+        facts->top = number_le(bytes + 4);
+        facts->width = number_le(bytes + 8) - number_le(bytes) + 1;
+        facts->rows = number_le(bytes + 12) - facts->top + 1;
     }
+    if (strcmp(name, "channels") == 0) return count_channels(in, at, size, facts);
     if (strcmp(name, "compression") == 0) {
         if (size != 1 || !read_at(in, at, bytes, 1)) return false;
         facts->block_rows = bytes[0] == 3 ? 16 : 0; /* that of our files, ZIP */
@@ -102,15 +139,58 @@ static bool take_attribute(const reader *in, const char *name, uint64_t at, uint
     return true;
 }
 
-static bool holds_last_block(const reader *in, uint64_t table, const exr_facts *facts)
+/* Whether `size` bytes from there on decompress to `wanted` bytes and have their checksum. */
+static bool decompresses(const reader *in, uint64_t at, uint32_t size, uint64_t wanted, z_stream *zip)
 {
+    unsigned char packed[PIECE], bytes[PIECE];
+    int found = inflateReset(zip);
+    for (uint64_t left = size; left > 0 && found == Z_OK;) {
+        const size_t step = left < PIECE ? (size_t)left : PIECE;
+        if (!read_at(in, at, packed, step)) return false;
+        at += step;
+        left -= step;
+        zip->next_in = packed;
+        zip->avail_in = (uInt)step;
+        do {
+            zip->next_out = bytes;
+            zip->avail_out = PIECE;
+            found = inflate(zip, Z_NO_FLUSH);
+        } while (found == Z_OK && zip->avail_out == 0 && zip->total_out <= wanted);
+        if (found == Z_BUF_ERROR) found = Z_OK; /* it waits for more */
+    }
+    return found == Z_STREAM_END && zip->total_out == wanted;
+}
+
+/* Blocks stand one behind the other. One that is as large as its pixels is not compressed, and has no checksum. */
+static bool hold_blocks(const reader *in, uint64_t table, const exr_facts *facts, z_stream *zip)
+{
+    const uint64_t count = facts->rows / facts->block_rows + (facts->rows % facts->block_rows != 0);
+    uint64_t free_from = table + 8 * count;
     unsigned char bytes[8];
-    if (facts->rows == 0 || facts->block_rows == 0) return false;
-    const uint64_t last = (facts->rows - 1) / facts->block_rows;
-    if (!read_at(in, table + 8 * last, bytes, sizeof bytes)) return false;
-    const uint64_t block = number_le(bytes) | (uint64_t)number_le(bytes + 4) << 32;
-    if (block <= table || !read_at(in, block, bytes, sizeof bytes)) return false;
-    return number_le(bytes + 4) <= in->size - block - 8;
+    for (uint64_t i = 0; i < count; i++) {
+        const uint64_t rows_left = facts->rows - i * facts->block_rows;
+        const uint64_t rows = rows_left < facts->block_rows ? rows_left : facts->block_rows;
+        const uint64_t pixels = rows * facts->width * facts->channels * sizeof(float);
+        if (!read_at(in, table + 8 * i, bytes, sizeof bytes)) return false;
+        const uint64_t block = number_le(bytes) | (uint64_t)number_le(bytes + 4) << 32;
+        if (block < free_from || !read_at(in, block, bytes, sizeof bytes)) return false;
+        const uint32_t size = number_le(bytes + 4);
+        if (number_le(bytes) != facts->top + (uint32_t)(i * facts->block_rows)) return false;
+        if (size > in->size - block - 8) return false;
+        if (size != pixels && !decompresses(in, block + 8, size, pixels, zip)) return false;
+        free_from = block + 8 + size;
+    }
+    return true;
+}
+
+static bool check_blocks(const reader *in, uint64_t table, const exr_facts *facts)
+{
+    z_stream zip = {0};
+    if (facts->rows == 0 || facts->width == 0 || facts->block_rows == 0) return false;
+    if (inflateInit(&zip) != Z_OK) return false;
+    const bool good = hold_blocks(in, table, facts, &zip);
+    (void)inflateEnd(&zip);
+    return good;
 }
 
 static bool walk_exr(const reader *in)
@@ -122,7 +202,7 @@ static bool walk_exr(const reader *in)
     for (int i = 0; i < MAX_PARTS; i++) {
         at = read_name(in, at, name);
         if (at == 0) return false;
-        if (name[0] == '\0') return holds_last_block(in, at, &facts);
+        if (name[0] == '\0') return check_blocks(in, at, &facts);
         at = read_name(in, at, type);
         if (at == 0 || !read_at(in, at, size, sizeof size)) return false;
         if (!take_attribute(in, name, at + 4, number_le(size), &facts)) return false;
