@@ -528,6 +528,22 @@ class NamesTest(Case):
                           "no file matches 'left/*_right.png'")
         self.assertEqual(self.outputs(), [])
 
+    def test_results_that_are_one_file_by_two_names(self):
+        (self.folder / "out/real").mkdir()
+        (self.folder / "out/link").symlink_to("real")
+        (self.folder / "out/real/other.png").symlink_to("one.png")
+        call = ("left/ulm/1_left.png", "--depth", "depth/ulm/1_depth.pfm", *self.common)
+        for one, two in (("out/one.png", "./out/one.png"), ("out/one.png", "out//one.png"), ("one.png", str(self.folder / "one.png")),
+                         ("out/real/one.png", "out/link/one.png"), ("out/real/one.png", "out/link/../link/one.png"),
+                         ("out/link/new/a/one.png", "out/real/new/./a/one.png"), ("out/real/n/one.png", "out/real/m/../n/one.png"),
+                         ("out/real/one.png", "out/real/other.png")):
+            with self.subTest(two):
+                done = self.fog(*call, "-o", one, "--transmittance", two)
+                self.assert_error(done, 2, "written twice", one, two)
+        self.assertEqual(self.outputs(), [])
+        self.assert_done(self.fog(*call, "-o", "out/link/a/one.png", "--transmittance", "out/real/b/one.png"))
+        self.assert_done(self.fog(*call, "-o", "/dev/null", "--transmittance", "/dev/null"))
+
     def test_what_is_read_is_not_written(self):
         (self.folder / "link.png").symlink_to("left/ulm/1_left.png")
         depth = ("--depth", "depth/ulm/0_depth.pfm")

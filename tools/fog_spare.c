@@ -3,6 +3,7 @@
 #include "fog_spare.h"
 
 #include "fog_record.h"
+#include "fog_twice.h"
 #include "report.h"
 
 #include <stdint.h>
@@ -13,35 +14,6 @@
 static int fail_memory(void)
 {
     return nb_report_failure("fog: out of memory");
-}
-
-/* ---- results of one name --------------------------------------------------------------------- */
-
-static int compare_texts(const void *a, const void *b)
-{
-    return strcmp(*(const char *const *)a, *(const char *const *)b);
-}
-
-/* Two results of one name would write over each other. */
-static int check_twice(const nb_fog_list *list)
-{
-    const char **const results = malloc((2 * list->count + 1) * sizeof *results);
-    if (results == NULL) return fail_memory();
-    size_t count = 0;
-    int status = NB_DONE;
-    for (size_t i = 0; i < list->count; i++) {
-        results[count++] = list->files[i].output;
-        if (list->files[i].transmittance != NULL) results[count++] = list->files[i].transmittance;
-    }
-    qsort(results, count, sizeof *results, compare_texts);
-    for (size_t i = 1; i < count && status == NB_DONE; i++)
-        if (strcmp(results[i - 1], results[i]) == 0 && strcmp(results[i], "/dev/null") != 0)
-            status = nb_report_misuse("fog",
-                                      "fog: --output: '%s' would be written twice; put a * where the pictures' "
-                                      "names differ",
-                                      results[i]);
-    free(results);
-    return status;
 }
 
 /* ---- results in the place of what is read ---------------------------------------------------- */
@@ -156,6 +128,6 @@ int nb_fog_spare(nb_fog_list *list, const char *scene, const nebel_scene_data *c
     refuse(list, &all);
     free(all.places);
     remove_results(list);
-    status = check_twice(list);
+    status = nb_fog_check_twice(list);
     return status == NB_DONE ? check_refused(list) : status;
 }
