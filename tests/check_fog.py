@@ -470,6 +470,12 @@ class NamesTest(Case):
             wanted = expected(self.picture, np.full((HEIGHT, WIDTH), math.exp(-0.02 * (10 + i))))
             self.assert_bytes(self.folder / f"out/ulm/{i}_foggy.png", wanted, LINEAR_TOLERANCE)
 
+    def test_links_that_lead_to_nothing_are_errors_of_their_own(self):
+        (self.folder / "left/ulm/9_left.png").symlink_to("../elsewhere/9.png")
+        (self.folder / "left/ulm/folder_left.png").mkdir()
+        done = self.fog("left/*/*_left.png", "--depth", "depth/ulm/0_depth.pfm", "-o", "out/*/*_foggy.png", *self.common)
+        self.assert_error(done, 1, "cannot read the picture \"left/ulm/9_left.png\": No such file", "6 pictures, 1 failed")
+
     def test_folders_of_results_are_made(self):
         done = self.fog("left/*/*_left.png", "--depth", "depth/*/*_depth.pfm", "-o", "out/*/a/b/*.png", "--transmittance", "t/*/*.png",
                         *self.common)

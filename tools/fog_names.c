@@ -191,13 +191,21 @@ static int read_folder(const char *folder, const char *pattern, names *all)
     DIR *const open = opendir(folder[0] != '\0' ? folder : ".");
     if (open == NULL) return nb_report_failure("fog: cannot read the folder \"%s\": %s", folder, strerror(errno));
     int good = 1;
-    for (const struct dirent *entry = readdir(open); entry != NULL && good; entry = readdir(open)) {
+    int error = 0;
+    for (;;) {
         parts unused = {.count = 0};
+        errno = 0;
+        const struct dirent *const entry = good ? readdir(open) : NULL;
+        if (entry == NULL) {
+            error = errno;
+            break;
+        }
         if ((entry->d_name[0] != '.' || pattern[0] == '.') && match(pattern, entry->d_name, &unused))
             good = add_name(all, entry->d_name);
     }
     (void)closedir(open);
     if (!good) return fail_memory();
+    if (error != 0) return nb_report_failure("fog: cannot read the folder \"%s\": %s", folder, strerror(error));
     if (all->count > 0) qsort(all->names, all->count, sizeof *all->names, compare_names);
     return NB_DONE;
 }
@@ -211,7 +219,10 @@ static int enter(const nb_fog_patterns *patterns, const char *path, const char *
 {
     struct stat status;
     const char *const slash = strchr(pattern, '/');
-    if (stat(path, &status) != 0) return NB_DONE; /* it has gone */
+    if (stat(path, &status) != 0) {
+        const int is_there = slash == NULL && lstat(path, &status) == 0; /* a link to nothing: reading it says so */
+        return is_there ? add_files(patterns, path, of, list) : NB_DONE;
+    }
     if (slash == NULL) return S_ISDIR(status.st_mode) ? NB_DONE : add_files(patterns, path, of, list);
     return S_ISDIR(status.st_mode) ? walk(patterns, path, slash, of, list) : NB_DONE;
 }

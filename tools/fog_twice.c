@@ -89,8 +89,8 @@ static char *read_link(const char *path, size_t size)
         return NULL;
     }
     if (target[0] == '/' || slash == NULL) return target;
-    char *const before = strndup(path, (size_t)(slash - path)), *const next =
-                                                                    before != NULL ? join(before, target) : NULL;
+    char *const before = strndup(path, (size_t)(slash - path));
+    char *const next = before != NULL ? join(before, target) : NULL;
     free(before);
     free(target);
     return next;
