@@ -610,6 +610,8 @@ class BadInputTest(Case):
         self.refuse(npy[:-1], "d.npy", INTRINSICS, "ends too early")
         self.refuse(npy[:60], "d.npy", INTRINSICS, "header")
         self.refuse(b"Pf\n99999999 99999999\n-1\n", "d.pfm", INTRINSICS, "at most 2^28 pixels")
+        for scale in (b"0", b"nan", b"inf", b"abc", b"--1", b"1,0"):  # its sign is the order of bytes
+            self.refuse(files.pfm(good).replace(b"\n-1.0\n", b"\n" + scale + b"\n"), "d.pfm", INTRINSICS, "width, height and scale")
         self.refuse(files.pfm(good).replace(b"Pf", b"PF"), "d.pfm", INTRINSICS, "in color")
         self.refuse(self.npy("d.npy", np.asfortranarray(good)), "", INTRINSICS, "Fortran")
         self.refuse(self.npy("d.npy", good[..., None]), "", INTRINSICS, "two dimensions")
@@ -622,16 +624,22 @@ class BadInputTest(Case):
     def test_cameras(self):
         depth = self.npy("d.npy", np.ones((HEIGHT, WIDTH), np.float32))
         city = '{"intrinsic": {"fx": %s, "fy": 1, "u0": 1, "v0": 1}, "extrinsic": {"baseline": 1}}'
-        for text, word in (("nan 1 1 1", "not a camera"), ("1 2 3", "fx fy cx cy"), ("0 1 1 1", "focal"), ("-5 1 1 1", "focal"),
+        for text, word in (("nan 1 1 1", "not a camera"), ("1 2 3", "fx fy cx cy"), ("0 1 1 1", "focal"), ("-5 1 1 1", "focal"), ("1e-300 1 1 1", "focal"),
                            ("1e400 1 1 1", "focal"), ("1 1 inf 1", "not a camera"), ("", "fx fy cx cy"), ("\0", "no text"),
                            ("1 1 1 1 -2", "baseline"), (city % "0", "focal"), (city % '"7"', "intrinsic"),
                            (city % "NaN", "c.txt:1:"), ("P2: 1 2 3\n", "12 numbers"), ("camera_matrix:\n data: [1, 2", "9 numbers"),
                            ("1 2 3 4 5 6", "fx fy cx cy")):
             self.refuse(depth, "", ("--camera", self.write("c.txt", text)), word)
-        for option, value in (("intrinsics", "nan,1,1,1"), ("intrinsics", "1,1,1"), ("intrinsics", "0,1,1,1"),
+        for option, value in (("intrinsics", "nan,1,1,1"), ("intrinsics", "1,1,1"), ("intrinsics", "0,1,1,1"), ("intrinsics", "1,1e-300,1,1"),
                               ("intrinsics", "1,1,1,1,1"), ("hfov", "180"), ("hfov", "nan")):
             self.refuse(depth, "", (f"--{option}", value), option, status=2)
         self.refuse(depth, "", (*INTRINSICS, "--hfov", 50), "another way", status=2)
+
+    def test_a_picture_that_is_too_wide_is_named(self):
+        image = self.write("wide.png", files.png(np.zeros((1, 65537, 3), np.uint8)))
+        depth = self.write("wide.pfm", files.pfm(np.ones((1, 65537), np.float32)))
+        done = self.fog(image, "--depth", depth, *INTRINSICS, "--visibility", 9, "-o", self.out, "--airlight", "1,1,1")
+        self.assert_error(done, 1, "wide.png: ", "width and height must be 1 to 65536")
 
     def test_pictures(self):
         depth = ("--depth", self.npy("d.npy", np.ones((8, 16), np.float32)), *INTRINSICS, "--visibility", 50)

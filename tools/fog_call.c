@@ -152,9 +152,9 @@ static void read_camera(nb_arguments *arguments, nb_fog_call *wanted)
         nb_options_refuse(arguments, values[HFOV] != NULL ? HFOV : INTRINSICS,
                           "has no place here: the camera is given in another way, too");
     if (values[INTRINSICS] != NULL) {
-        if (!read_list(arguments, INTRINSICS, 4, -1e9, 1e9, numbers) || !(numbers[0] > 0 && numbers[1] > 0))
+        if (!read_list(arguments, INTRINSICS, 4, -1e9, 1e9, numbers) || !(numbers[0] >= 1e-6 && numbers[1] >= 1e-6))
             nb_options_reject(arguments, INTRINSICS,
-                              "is not four numbers with commas between them, the first two more than 0");
+                              "is not four numbers with commas between them, the first two from 1e-6 on");
         wanted->has_intrinsics = 1;
         wanted->intrinsics = (nebel_intrinsics){numbers[0], numbers[1], numbers[2], numbers[3], 0};
     }

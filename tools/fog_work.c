@@ -48,6 +48,15 @@ static int judge(work *w, const char *path, nebel_result result)
     return w->listener->kept[0] != '\0' ? NB_FAILED : fail(w, "%s: %s", path, nebel_result_text(result));
 }
 
+/* The same of a call that does not know of the file, and cannot name it. */
+static int judge_for(work *w, const char *path, nebel_result result)
+{
+    char said[sizeof w->listener->kept];
+    if (result == NEBEL_OK || w->listener->kept[0] == '\0') return judge(w, path, result);
+    memcpy(said, w->listener->kept, sizeof said);
+    return fail(w, "%s: %s", path, said);
+}
+
 /* ---- what is read ---------------------------------------------------------------------------- */
 
 static int is_float(const work *w)
@@ -150,7 +159,7 @@ static int find_airlight(work *w)
         if (wanted->airlight[c] > 1)
             return fail(w, "%s: --airlight is at most 1 for pictures of whole numbers", w->files->image);
     if (wanted->has_airlight) return NB_DONE;
-    return judge(w, w->files->image, nebel_estimate_airlight(&w->host, &w->photograph, w->tale->airlight));
+    return judge_for(w, w->files->image, nebel_estimate_airlight(&w->host, &w->photograph, w->tale->airlight));
 }
 
 /* Fog of one density everywhere. */
@@ -170,7 +179,7 @@ static int make_fog(work *w)
     if (result == NEBEL_OK) result = nebel_add_volume(fog, &volume, NULL);
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, &w->own_fog);
     nebel_destroy_fog(fog);
-    return judge(w, w->files->image, result);
+    return judge_for(w, w->files->image, result);
 }
 
 static int choose_fog(work *w)
@@ -242,7 +251,7 @@ static int add_fog(work *w)
     p->transmittance = w->transmittance;
     nb_workers_run(shared->row_threads, fog_rows, (void *)&all);
     for (int i = 0; i < shared->row_threads; i++)
-        if (results[i] != NEBEL_OK) return judge(w, w->files->image, results[i]);
+        if (results[i] != NEBEL_OK) return judge_for(w, w->files->image, results[i]);
     return nb_interrupt_is_requested() ? fail(w, "%s: stopped", w->files->image) : NB_DONE;
 }
 

@@ -80,7 +80,7 @@ typedef struct nebel_intrinsics {
  *     OpenCV YAML              data of camera_matrix or K, 3 x 3
  *     numbers                  fx fy cx cy, then the baseline if it is known; or a matrix of 3 x 3 or 4 x 4
  *
- * Errors: ARGUMENT, FILE, FORMAT, VALUE (focal lengths that are not positive, numbers that are not finite), LIMIT, MEMORY. */
+ * Errors: ARGUMENT, FILE, FORMAT, VALUE (focal lengths that are not 1e-6 to 1e9, numbers that are not finite), LIMIT, MEMORY. */
 nebel_result nebel_read_intrinsics(const char *path, const nebel_scene_desc *desc, nebel_intrinsics *intrinsics);
 
 /* Computes the intrinsics of a camera that sees `degrees`, 0 < degrees < 180, from the left edge of the picture to the right

@@ -191,8 +191,9 @@ static nebel_result read_text(const reader *in, nebel_intrinsics *camera)
 
 static const char *fault_of(const nebel_intrinsics *camera)
 {
-    if (!(camera->fx > 0 && camera->fx <= 1e9 && camera->fy > 0 && camera->fy <= 1e9))
-        return "focal lengths must be more than 0 and at most 1e9 pixels";
+    /* The ways to the pixels, at most 1e9 / 1e-6, are floats. */
+    if (!(camera->fx >= 1e-6 && camera->fx <= 1e9 && camera->fy >= 1e-6 && camera->fy <= 1e9))
+        return "focal lengths must be 1e-6 to 1e9 pixels";
     if (!(fabs(camera->cx) <= 1e9 && fabs(camera->cy) <= 1e9)) return "cx and cy must be finite and at most 1e9";
     if (!(camera->baseline >= 0 && camera->baseline <= 1e9)) return "the baseline must be 0 to 1e9 m";
     return NULL;

@@ -36,6 +36,15 @@ static uint64_t whole_of(const char *word)
     return number;
 }
 
+/* Digits, and what belongs to a number, with one sign at most before it; all but zeros. Its size does not matter, as that of most
+ * files is 1. */
+static bool is_scale(const char *word)
+{
+    const char *const digits = word + (*word == '-' || *word == '+');
+    return strspn(digits, "0123456789.eE+-") == strlen(digits) && strpbrk(digits, "123456789") != NULL &&
+           (isdigit((unsigned char)*digits) || *digits == '.');
+}
+
 static float read_float(const unsigned char *at, bool is_little)
 {
     float number;
@@ -54,7 +63,7 @@ nebel_result nb_pfm_read(const nb_codec *codec, const nb_bytes *bytes, nb_depth_
     read_word(bytes, &at, height);
     read_word(bytes, &at, scale);
     const uint64_t w = whole_of(width), h = whole_of(height);
-    if (w == 0 || h == 0 || scale[0] == '\0') return fail(codec, "its header has no width, height and scale");
+    if (w == 0 || h == 0 || !is_scale(scale)) return fail(codec, "its header has no width, height and scale");
     const nebel_result result = nb_depth_allocate(codec, w, h, NEBEL_DEPTH_FILES_FLOAT, numbers);
     if (result != NEBEL_OK) return result;
     if (bytes->size - at < w * h * sizeof(float)) return fail(codec, "the file ends too early");
