@@ -601,6 +601,8 @@ class BadInputTest(Case):
         self.refuse(files.pfm(good), "d.pfm", (*INTRINSICS, "--depth-format", "kitti"), "floats", "kitti", "--depth-format")
         self.refuse(files.png(good.astype(np.uint8)), "d.png", (*INTRINSICS, "--depth-format", "tum"), "8 bits", "16 bits")
         self.refuse(files.png(good.astype(np.uint16)), "d.png", INTRINSICS, "--depth-scale")
+        self.refuse(files.png(np.ones((HEIGHT, WIDTH, 3), np.uint8)), "d.png", INTRINSICS, "RGB of 8 bits",
+                    "whole numbers of 16 bits, gray or floats or whole numbers of 8 bits, gray")
         self.refuse(files.png(good.astype(np.uint16)), "d.png", (*INTRINSICS, "--depth-format", "cityscapes"), "baseline")
         self.refuse(files.exr({"R": good, "G": good}), "d.exr", INTRINSICS, "which channel", " R G")
         self.refuse(files.exr({"Z": good}), "d.exr", (*INTRINSICS, "--depth-channel", "W"), "no channel W", " Z")

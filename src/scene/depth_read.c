@@ -3,6 +3,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 
 /* From here on floats are infinite: programs that render write 1e10 and the like where nothing is. */
 #define ENDLESS 1e9
@@ -177,10 +178,13 @@ static nebel_result check_files(const nb_codec *codec, const nebel_depth_format 
                  {NEBEL_DEPTH_FILES_24_BIT, "RGB of 8 bits"},
                  {NEBEL_DEPTH_FILES_FLOAT, "floats"},
                  {NEBEL_DEPTH_FILES_8_BIT, "whole numbers of 8 bits, gray"}};
-    const char *has = "", *wants = "";
+    const char *has = "";
+    char wants[128] = "";
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        const size_t size = strlen(wants);
         if (names[i].files == numbers->files) has = names[i].name;
-        if (names[i].files & format->files && *wants == '\0') wants = names[i].name;
+        if (names[i].files & format->files)
+            (void)snprintf(wants + size, sizeof wants - size, "%s%s", size > 0 ? " or " : "", names[i].name);
     }
     if (!(format->files & numbers->files))
         return nb_fail(&codec->log, NEBEL_ERROR_FORMAT,
