@@ -51,6 +51,12 @@ static void write_message(nebel_result result, const char *message, void *user)
     print_message("%d: %s\n", (int)result, message);
 }
 
+static void count_message(nebel_result result, const char *message, void *user)
+{
+    ++*(int *)user;
+    write_message(result, message, NULL);
+}
+
 static void render_cpu(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera, uint32_t samples,
                        picture_pair *pair)
 {
@@ -71,7 +77,7 @@ static void render_gl(const nebel_scene_data *scene, nebel_snapshot *fog, const 
                       const nebel_camera *camera, uint32_t samples, picture_pair *pair)
 {
     nebel_gl_renderer *renderer = NULL;
-    const nebel_gl_renderer_desc desc = {.log = {write_message, NULL}};
+    const nebel_gl_renderer_desc desc = {.log = {count_message, &pair->messages}};
     const nebel_gl_frame_desc frame = {.camera = *camera,
                                        .width = pair->width,
                                        .height = pair->height,

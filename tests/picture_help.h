@@ -14,6 +14,7 @@ typedef struct picture_pair {
     uint32_t width, height;
     double time;      /* of both frames; 0 at first */
     double tolerance; /* of the CPU; 1e-4 at first */
+    int messages;     /* that OpenGL has logged */
     nebel_frame cpu, gl;
 } picture_pair;
 

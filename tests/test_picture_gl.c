@@ -93,6 +93,7 @@ static void check_demo(const nebel_scene *scene, const char *name)
     render_demo(scene, &data->camera, &pair);
     const picture_difference d = check(name, &pair);
     expect_sameness(&d);
+    assert_int_equal(pair.messages, 0);                /* no ray had more loops than the driver allows to all passes */
     if (data->volume_count + data->particle_count > 0) /* else the scene shows factors alone */
         assert_true(d.fogged > DEMO_WIDTH * DEMO_HEIGHT / 16);
     assert_true(d.color < .02);

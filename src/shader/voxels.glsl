@@ -180,6 +180,11 @@ int nb_walk_voxels(inout nb_gathered g, inout nb_piece piece, nb_ray ray, int us
             g.depth += depth;
             t = end;
             way_at = max(way_behind + (way_behind - way_before) * (0.25 / NB_GAUSS_HALF - 0.5), nb_splat3(0.0));
+            if (NB_RESUMES) { /* a ray with more walks than a pass has turns would begin anew in each pass */
+                if (!nb_has_loops(used)) break;
+                g.reached = piece.start + t;
+                nb_keep_gathered(used, g);
+            }
             if (end >= brick_end) {
                 nb_vec3 brick = nb_grid_step(w.brick, bricks, path.inverse);
                 w = nb_enter_brick(profile.first, size, brick, path.from + path.slope * t);
