@@ -2,16 +2,23 @@
 #ifndef SLAB_PATHS_H
 #define SLAB_PATHS_H
 
-#include "media/phase.h"
+#include "planet/cloud_phase.h"
 
 #include "dice.h"
 
 #include <math.h>
 
-/* Cosines below which light is scattered with the probability of their number by their count. */
+static inline double slab_phase(const nb_cloud_phase *phase, double cosine)
+{
+    float values[4];
+    nb_cloud_phase_at(phase, cosine, values);
+    return (double)values[1];
+}
+
+/* Cosines below which green light is scattered with the probability of their number by their count. */
 enum { SLAB_PARTS = 4096 };
 
-static inline void slab_invert(const nb_phase *phase, double cosines[SLAB_PARTS + 1])
+static inline void slab_invert(const nb_cloud_phase *phase, double cosines[SLAB_PARTS + 1])
 {
     enum { ANGLES = 100000 };
     double sum = 0, whole = 0;
@@ -20,7 +27,7 @@ static inline void slab_invert(const nb_phase *phase, double cosines[SLAB_PARTS 
         for (int i = 0; i < ANGLES; i++) {
             /* Finer ahead, where the peak is. */
             const double part = 1 - (i + .5) / ANGLES, angle = 3.14159265358979323846 * part * part * part;
-            const double light = nb_phase_at(phase, cos(angle)) * sin(angle) * 3 * part * part;
+            const double light = slab_phase(phase, cos(angle)) * sin(angle) * 3 * part * part;
             if (pass == 0) whole += light;
             if (pass == 1)
                 for (sum += light; next <= SLAB_PARTS && sum >= whole * next / SLAB_PARTS; next++)

@@ -33,9 +33,9 @@ static double sent_by_model(const nebel_cloud_view *view, double depth, double c
         nb_cloud_ray ray = nb_cloud_ray_make(view, direction, 0);
         ray.sun = sine * direction[0] + cosine * direction[1];
         const nb_cloud_layer *layer = &view->clouds->layers[0];
-        ray.phase[0] = (float)nb_phase_at(&layer->phase, ray.sun);
-        ray.ahead_phase[0] = ray.ahead = 0;
-        ray.wide_phase[0] = nb_smaller(layer->slab->cap, ray.phase[0]);
+        ray.phase[0][1] = (float)slab_phase(&layer->phase, ray.sun);
+        ray.ahead_phase[0][1] = ray.ahead = 0;
+        ray.wide_phase[0][1] = nb_smaller(layer->slab->cap[1], ray.phase[0][1]);
         const nb_cloud_sight sight = {(float)cosine, (float)direction[1], (float)ray.sun};
         double radiance = 0;
         const double step = depth / out / STEPS, apart = (double)ray.apart[0];

@@ -390,8 +390,10 @@ static double once_before_sun(const nb_before_sun *scene, const nebel_ray *ray, 
         depth += passed;
         light += passed * (double)nb_cloud_clear_light(scene->view, place, nb_vector_length(place)).sun[1];
     }
-    return light * exp(-depth) *
-           nb_phase_at(&layer->phase, nb_vector_dot(ray->direction, scene->sun) / nb_vector_length(ray->direction));
+    float phase[4];
+    nb_cloud_phase_at(&layer->phase, nb_vector_dot(ray->direction, scene->sun) / nb_vector_length(ray->direction),
+                      phase);
+    return light * exp(-depth) * (double)phase[1];
 }
 
 static void compare_straight_before_sun(nebel_cloud_kind kind, double degrees)

@@ -52,7 +52,7 @@ typedef struct nebel_cloud_layer {
         size; /* m, of the largest heaps: half of the distance from one to the next; 1e-3 to 1e9, at most NEBEL_MAX_CLOUD_RADII */
     double detail;    /* how deep billows cut into them, to 1; NEBEL_CLOUD_NONE: not at all */
     double variation; /* how much more clouds are here than there, over ten sizes and more, to 1, or NONE */
-    double diameter;  /* um, of drops: 5 to 50 */
+    double diameter;  /* um, of drops, twice their effective radius: 4 to 50 */
     uint32_t seed;    /* of the noise */
     double wind
         [2]; /* m per unit of time, within 1e12, along x and z at the ground place over the centre: the shell turns */
@@ -86,6 +86,12 @@ void nebel_destroy_clouds(nebel_clouds *clouds);
  * in the units of the wind, within -1e12 and 1e12. Any thread. Errors: ARGUMENT. */
 nebel_result nebel_cloud_extinction(const nebel_clouds *clouds, double time, double width, size_t n,
                                     const double (*places)[3], size_t place_stride, float *extinction);
+
+/* The phase function of a layer's drops, 1/sr for red, green and blue (light of 680, 550 and 440 nm), at n cosines within -1 and 1 of the
+ * angle by which light is turned. Cumulus and stratus: Mie's theory for water, sizes of a gamma distribution with an effective
+ * variance of 0.1, by a table; cirrus: NEBEL_PHASE_DROPLETS. docs/clouds.md says how far off. Any thread. Errors: ARGUMENT. */
+nebel_result nebel_cloud_phase(const nebel_clouds *clouds, uint32_t layer, size_t n, const double *cosines,
+                               double (*phases)[3]);
 
 /* ---- light ----------------------------------------------------------------------------------- */
 

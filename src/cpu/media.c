@@ -25,6 +25,7 @@ int nb_media_are_grey(const nb_media *media)
             for (int c = 0; c < 3; c++) extinction[c] = desc->airs[k].scattering[c] + desc->airs[k].absorption[c];
             if (!is_grey(extinction)) return 0;
         }
+        if (!nb_planet_medium_is_grey(&media->planets[i])) return 0;
     }
     return media->fog == NULL || nebel_is_fog_grey(media->fog);
 }
@@ -148,8 +149,7 @@ static void choose_of_planet(const nb_planet_matter *planet, double all, int cha
     }
     if (!(planet->clouds > 0)) return;
     const double clouds[3] = {planet->clouds, planet->clouds, planet->clouds};
-    *scatterer = (nb_scatterer){.phase = medium->drops[planet->layer].phase,
-                                .turns = &medium->drops[planet->layer],
+    *scatterer = (nb_scatterer){.turns = &medium->drops[planet->layer][channel >= 0 ? channel : 0],
                                 .probability = part_of(clouds, channel) / all};
     memcpy(scatterer->scattering, clouds, sizeof clouds);
 }
@@ -173,6 +173,12 @@ nebel_result nb_media_choose(const nb_media *media, const nebel_place *place, co
     scatterer->probability = chosen.probability * (fog / all);
     memcpy(scatterer->scattering, chosen.scattering, sizeof chosen.scattering);
     return NEBEL_OK;
+}
+
+double nb_scatterer_value(const nb_scatterer *scatterer, double cosine)
+{
+    return scatterer->turns != NULL ? nb_turns_value(scatterer->turns, cosine)
+                                    : nebel_phase_value(&scatterer->phase, cosine);
 }
 
 /* ---- grounds --------------------------------------------------------------------------------- */

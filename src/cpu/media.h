@@ -39,7 +39,7 @@ typedef struct nb_media_walk {
 
 /* What scatters at a place, one of several media. */
 typedef struct nb_scatterer {
-    nebel_phase phase;
+    nebel_phase phase;     /* where there are no turns */
     const nb_turns *turns; /* NULL: directions are drawn by nebel_phase_sample */
     double scattering[3];  /* 1/m */
     double probability;    /* of the choice; 0: nothing scatters there */
@@ -62,6 +62,9 @@ nebel_result nb_media_walk_to(nb_media_walk *walk, double t);
 /* One of the media at a place, the more often the more it scatters of the channel, -1: of all. */
 nebel_result nb_media_choose(const nb_media *media, const nebel_place *place, const nb_matter *matter, int channel,
                              double chance, nb_scatterer *scatterer);
+
+/* Its phase function, 1/sr: of the channel by which it was chosen. */
+double nb_scatterer_value(const nb_scatterer *scatterer, double cosine);
 
 /* What the air of all planets leaves of light along a ray up to its t_max: the closed form of nebel_trace_air. */
 double nb_media_air_transmittance(const nb_media *media, const nebel_ray *ray, int channel);

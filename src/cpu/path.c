@@ -146,13 +146,13 @@ static chosen_lamp choose_lamp(path *p, const double place[3])
 }
 
 /* `share` of the light of lamps that comes to a place in fog, times what the phase function sends along the path. */
-static nebel_result add_scattered(path *p, const double place[3], const nebel_phase *phase, const double share[3])
+static nebel_result add_scattered(path *p, const double place[3], const nb_scatterer *scatterer, const double share[3])
 {
     const chosen_lamp chosen = choose_lamp(p, place);
     if (chosen.lamp == NULL) return NEBEL_OK;
     const nb_lamp_sight *sight = &chosen.sight;
     const double cosine = fmin(fmax(nb_vector_dot(p->ray.direction, sight->direction), -1), 1);
-    const double value = nebel_phase_value(phase, cosine) * sight->fluence / chosen.probability;
+    const double value = nb_scatterer_value(scatterer, cosine) * sight->fluence / chosen.probability;
     double light[3];
     for (int c = 0; c < 3; c++) light[c] = chosen.lamp->intensity[c] * share[c];
     return add_arriving(p, place, sight->direction, sight->reach, sight->shadowed, light, value);
@@ -177,12 +177,13 @@ static double density_of(const path *p, const lit_ray *lit, double extinction, d
 }
 
 /* Where a flight collides, once the throughput is that of what is scattered there. */
-static nebel_result add_colliding_light(path *p, const lit_ray *lit, const nb_flight *flight, const nebel_phase *phase)
+static nebel_result add_colliding_light(path *p, const lit_ray *lit, const nb_flight *flight,
+                                        const nb_scatterer *scatterer)
 {
     if (!(lit->sum > 0)) return NEBEL_OK;
     const double extinction = flight->matter.all.extinction[p->channel];
     const double share = extinction / density_of(p, lit, extinction, flight->t);
-    return add_scattered(p, flight->place.position, phase, (const double[3]){share, share, share});
+    return add_scattered(p, flight->place.position, scatterer, (const double[3]){share, share, share});
 }
 
 /* Where a lamp sees the ray pass. */
@@ -207,7 +208,7 @@ static nebel_result add_passing_light(path *p, const lit_ray *lit)
     if (result != NEBEL_OK || transmittance == 0) return result;
     const double density = density_of(p, lit, matter.all.extinction[p->channel], way.ray.t_max);
     for (int c = 0; c < 3; c++) share[c] = transmittance * scatterer.scattering[c] / scatterer.probability / density;
-    return add_scattered(p, place.position, &scatterer.phase, share);
+    return add_scattered(p, place.position, &scatterer, share);
 }
 
 /* At a surface. */
@@ -262,11 +263,11 @@ static void head(path *p, const double place[3], const double direction[3], doub
 static double weigh(path *p, const nb_turns *turns, double part, const double direction[3])
 {
     const double cosine = cosine_between(p->ray.direction, direction);
-    const double value = nebel_phase_value(&turns->phase, cosine);
+    const double value = nb_turns_value(turns, cosine);
     p->promise = 1;
     if (part == 0) return value / nb_turns_density(turns, cosine);
     const double sunward = cosine_between(p->world->to_sun, direction);
-    p->promise = fmax(1, nebel_phase_value(&turns->phase, sunward));
+    p->promise = fmax(1, nb_turns_value(turns, sunward));
     return value / (nb_turns_density(turns, cosine) + part * nb_turns_density(turns, sunward));
 }
 
@@ -315,8 +316,8 @@ static nebel_result scatter(path *p, const lit_ray *lit, const nb_flight *flight
     }
     if (scatterer.probability == 0) return NEBEL_OK;
     const double cosine = cosine_between(p->ray.direction, world->to_sun);
-    result = add_sunlight(p, flight->place.position, nebel_phase_value(&scatterer.phase, cosine));
-    if (result == NEBEL_OK) result = add_colliding_light(p, lit, flight, &scatterer.phase);
+    result = add_sunlight(p, flight->place.position, nb_scatterer_value(&scatterer, cosine));
+    if (result == NEBEL_OK) result = add_colliding_light(p, lit, flight, &scatterer);
     turn(p, &scatterer, flight->place.position);
     return result;
 }

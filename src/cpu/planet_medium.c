@@ -19,6 +19,39 @@ static void set_turns(nb_turns *turns, const nebel_phase *phase)
     turns->cosines[NB_TURNS] = 1;
 }
 
+/* Parts of light by steps in the angle, which are finer ahead: third powers of evenly spread numbers. */
+static void set_drops(nb_turns *turns, const nebel_clouds *clouds, uint32_t layer, int color)
+{
+    enum { STEPS = 20000 };
+    double sum = 0, whole = 0;
+    int next = 1;
+    turns->clouds = clouds;
+    turns->layer = layer;
+    turns->color = color;
+    turns->is_peaked = nb_turns_value(turns, 1) > PEAK;
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < STEPS; i++) {
+            const double part = 1 - (i + 0.5) / STEPS, angle = PI * part * part * part, cosine = cos(angle);
+            const double light = nb_turns_value(turns, cosine) * sin(angle) * part * part;
+            if (pass == 0) whole += light;
+            if (pass == 1)
+                for (sum += light; next < NB_TURNS && sum >= whole * next / NB_TURNS; next++)
+                    turns->cosines[next] = cosine;
+        }
+    while (next < NB_TURNS) turns->cosines[next++] = 1;
+    turns->cosines[0] = -1;
+    turns->cosines[NB_TURNS] = 1;
+}
+
+double nb_turns_value(const nb_turns *turns, double cosine)
+{
+    double values[3] = {0, 0, 0};
+    if (turns->clouds == NULL) return nebel_phase_value(&turns->phase, cosine);
+    /* Cosines and layers are in order, so that it cannot fail. */
+    (void)nebel_cloud_phase(turns->clouds, turns->layer, 1, &cosine, &values);
+    return values[turns->color];
+}
+
 double nb_turns_draw(const nb_turns *turns, double chance)
 {
     const double place = chance * NB_TURNS;
@@ -121,8 +154,7 @@ static void set_clouds(nb_planet_medium *medium, const nebel_planet *planet)
     medium->layer_count = planet->clouds != NULL ? planet->cloud_layer_count : 0;
     for (uint32_t k = 0; k < medium->layer_count; k++) {
         (void)nebel_resolve_cloud_layer(planet->air.thickness, &planet->cloud_layers[k], NULL, &medium->layers[k]);
-        const nebel_phase drops = {.type = NEBEL_PHASE_DROPLETS, .diameter = medium->layers[k].diameter};
-        set_turns(&medium->drops[k], &drops);
+        for (int c = 0; c < 3; c++) set_drops(&medium->drops[k][c], planet->clouds, k, c);
     }
 }
 
@@ -143,6 +175,13 @@ void nb_planet_medium_set(nb_planet_medium *medium, const nebel_planet *planet, 
     cut_clouds(medium, &medium->sheets, top);
     end_shells(medium, top, 1, &medium->shells);
     end_shells(medium, top, 0, &medium->sheets);
+}
+
+int nb_planet_medium_is_grey(const nb_planet_medium *medium)
+{
+    for (uint32_t k = 0; k < medium->layer_count; k++)
+        if (medium->layers[k].kind != NEBEL_CLOUD_CIRRUS) return 0;
+    return 1;
 }
 
 /* ---- places ---------------------------------------------------------------------------------- */

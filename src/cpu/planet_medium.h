@@ -12,6 +12,9 @@ enum { NB_TURNS = 1024 };
 /* A phase function for sampling: between two neighboring cosines all are drawn alike, each pair as often as another. */
 typedef struct nb_turns {
     nebel_phase phase;
+    const nebel_clouds *clouds; /* NULL: phase; else that of a color of a layer of clouds */
+    uint32_t layer;
+    int color;
     int is_peaked;                /* light goes on nearly straight far more often than elsewhere */
     double cosines[NB_TURNS + 1]; /* from -1 to 1 */
 } nb_turns;
@@ -31,8 +34,8 @@ typedef struct nb_planet_medium {
     double time; /* of clouds */
     nebel_cloud_layer layers[NEBEL_MAX_CLOUD_LAYERS];
     uint32_t layer_count;
-    nb_shells shells, sheets; /* sheets: of clouds alone */
-    nb_turns airs[NEBEL_MAX_AIRS], drops[NEBEL_MAX_CLOUD_LAYERS];
+    nb_shells shells, sheets;                                        /* sheets: of clouds alone */
+    nb_turns airs[NEBEL_MAX_AIRS], drops[NEBEL_MAX_CLOUD_LAYERS][3]; /* drops: by color */
 } nb_planet_medium;
 
 /* What is at a place. All 0 outside the air. */
@@ -64,6 +67,12 @@ void nb_planet_walk_start(const nb_planet_medium *medium, const nebel_ray *ray, 
 
 /* Goes on to the piece that holds t, which is not before the one that the walk is in. */
 void nb_planet_walk_to(nb_planet_walk *walk, double t);
+
+/* Whether clouds scatter all colors alike: those of ice do. */
+int nb_planet_medium_is_grey(const nb_planet_medium *medium);
+
+/* The phase function, 1/sr. */
+double nb_turns_value(const nb_turns *turns, double cosine);
 
 /* Draws a cosine. */
 double nb_turns_draw(const nb_turns *turns, double chance);

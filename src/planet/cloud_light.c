@@ -144,9 +144,13 @@ static void add_direction(const nebel_cloud_view *view, double cosine, double we
     const double ahead = part_within(cosine, AHEAD_ANGLE, ASIDE_ANGLE);
     ray->ahead += (float)(weight * ahead);
     for (int k = 0; k < view->clouds->layer_count; k++) {
-        const double phase = weight * nb_phase_at(&view->clouds->layers[k].phase, cosine);
-        ray->phase[k] += (float)((1 - ahead) * phase);
-        ray->ahead_phase[k] += (float)(ahead * phase);
+        float values[4];
+        nb_cloud_phase_at(&view->clouds->layers[k].phase, cosine, values);
+        for (int c = 0; c < 3; c++) {
+            const double phase = weight * (double)values[c];
+            ray->phase[k][c] += (float)((1 - ahead) * phase);
+            ray->ahead_phase[k][c] += (float)(ahead * phase);
+        }
     }
 }
 
@@ -177,7 +181,9 @@ nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direct
     memcpy(ray.direction, direction, sizeof ray.direction);
     for (int k = 0; k < view->clouds->layer_count; k++) {
         const nb_cloud_layer *layer = &view->clouds->layers[k];
-        ray.wide_phase[k] = nb_smaller(layer->slab->cap, (float)nb_phase_at(&layer->phase, ray.sun));
+        float values[4];
+        nb_cloud_phase_at(&layer->phase, ray.sun, values);
+        for (int c = 0; c < 3; c++) ray.wide_phase[k][c] = nb_smaller(layer->slab->cap[c], values[c]);
         ray.apart[k] = layer->apart;
     }
     set_phases(view, spread, &ray);
@@ -205,7 +211,7 @@ static nb_slab_place slab_of(const nb_cloud_layer *layer, const nb_cloud_depths 
 nb_cloud_parts nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths,
                                  const nb_cloud_sight *sight)
 {
-    const float g = (float)layer->mean_cosine;
+    const float g = (float)layer->phase.moments[1];
     const nb_slab_place place = slab_of(layer, depths, sight);
     const float over = (1 - g) * depths->up, whole = over + (1 - g) * depths->down;
     const float from_above = (0.5f + 0.75f * (whole - over)) / (1 + 0.75f * whole);
@@ -223,11 +229,11 @@ nb_cloud_parts nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_dep
 nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_parts *parts,
                                    const nb_cloud_light *light)
 {
-    const float wide = ray->wide_phase[layer];
     nb_cloud_source source;
     for (int c = 0; c < 3; c++) {
-        source.once[c] = light->sun[c] * parts->left * (ray->phase[layer] - (1 - ray->ahead) * wide);
-        source.ahead[c] = light->sun[c] * (ray->ahead_phase[layer] - ray->ahead * wide);
+        const float wide = ray->wide_phase[layer][c];
+        source.once[c] = light->sun[c] * parts->left * (ray->phase[layer][c] - (1 - ray->ahead) * wide);
+        source.ahead[c] = light->sun[c] * (ray->ahead_phase[layer][c] - ray->ahead * wide);
         source.often[c] = light->sun[c] * (ray->apart[layer] * parts->often + parts->left_wide * wide);
         source.ambient[c] = parts->above * light->above[c] + parts->below * light->below[c];
     }

@@ -13,6 +13,9 @@
 
 enum { STREAMS = 8, SUNS = NB_SLAB_SUNS, ORDERS = NB_SLAB_ORDERS, DEPTHS = NB_SLAB_DEPTHS };
 
+/* Of what comes through: under a low sun a peak of fewer moments is so wide that half of it leads out of a thin slab. */
+enum { THROUGH_ORDERS = 16 };
+
 /* Scaled depths of the table begin here, and from the second on double. */
 #define FIRST_DEPTH 0.0625
 
@@ -27,46 +30,34 @@ enum { HALVINGS = 22 };
 
 /* Cosines of suns: squares of evenly spread numbers. */
 #define FIRST_ROOT 0.14142136
-#define ROOT_STEP ((1 - FIRST_ROOT) / (SUNS - 1))
+
+static double root_of(int i, int count)
+{
+    return FIRST_ROOT + i * (1 - FIRST_ROOT) / (count - 1);
+}
 
 /* ---- phase function -------------------------------------------------------------------------- */
 
-/* Moment l of a lobe, times its weight. Without alpha it is g^l; c^2 takes it to the moments next to it by
- * (2 l + 1) c P_l = (l + 1) P_l+1 + l P_l-1. */
-static double moment_of_lobe(const nb_lobe *lobe, int l)
+/* The integral over the sphere of a color of the phase function held below a cap, by angles that are finer ahead. */
+static double capped(const nb_cloud_phase *phase, int color, double cap)
 {
-    const double g = lobe->g, plain = pow(g, l), up = (l + 1.0) / (2 * l + 1), down = (double)l / (2 * l + 1);
-    const double over = (l + 2.0) / (2 * l + 3) * g * g * plain + (l + 1.0) / (2 * l + 3) * plain;
-    const double under = l == 0 ? 0 : l / (2 * l - 1.0) * plain + (l > 1 ? (l - 1.0) / (2 * l - 1) * pow(g, l - 2) : 0);
-    const double squared = up * over + down * under, alpha = lobe->alpha;
-    return lobe->weight * (plain + alpha * squared) / (1 + alpha * (1 + 2 * g * g) / 3);
-}
-
-static double moment_of(const nb_phase *phase, int l)
-{
-    double sum = 0;
-    for (int i = 0; i < phase->lobe_count; i++) sum += moment_of_lobe(&phase->lobes[i], l);
-    return sum;
-}
-
-/* The integral over the sphere of the phase function held below a cap, by angles that are finer ahead. */
-static double capped(const nb_phase *phase, double cap)
-{
-    enum { ANGLES = 256 };
+    enum { ANGLES = 512 };
     double sum = 0;
     for (int i = 0; i < ANGLES; i++) {
         const double part = (i + 0.5) / ANGLES, angle = PI * part * part, wide = 2 * PI * part / ANGLES;
-        sum += 2 * PI * sin(angle) * wide * fmin(cap, nb_phase_at(phase, cos(angle)));
+        float values[4];
+        nb_cloud_phase_at(phase, cos(angle), values);
+        sum += 2 * PI * sin(angle) * wide * fmin(cap, (double)values[color]);
     }
     return sum;
 }
 
-static double find_cap(const nb_phase *phase, double part)
+static double find_cap(const nb_cloud_phase *phase, int color, double part)
 {
-    double low = 0, high = nb_phase_at(phase, 1);
+    double low = 0, high = (double)phase->values[0][color];
     for (int i = 0; i < 30; i++) {
         const double middle = low > 0 ? sqrt(low * high) : 0.25 * high;
-        *(capped(phase, middle) > part ? &high : &low) = middle;
+        *(capped(phase, color, middle) > part ? &high : &low) = middle;
     }
     return high;
 }
@@ -78,6 +69,7 @@ typedef struct nb_square {
     double at[STREAMS][STREAMS];
 } nb_square;
 _Static_assert((int)STREAMS == (int)SUNS, "squares");
+_Static_assert((int)THROUGH_ORDERS < (int)NB_CLOUD_PHASE_MOMENTS, "moments");
 
 /* Of a slab and one cosine around the normal: what comes back and goes on by streams, and what the sun's light sends up and
  * down. A slab of even cloud is the same from both sides. */
@@ -87,38 +79,39 @@ typedef struct nb_slab_layer {
 
 /* What all slabs have in common. */
 typedef struct nb_slab_solver {
-    double moments[ORDERS]; /* of the scaled phase function */
+    int orders;
+    double moments[THROUGH_ORDERS]; /* of the scaled phase function, so many */
     double cosines[STREAMS], weights[STREAMS], suns[SUNS];
     /* Of the order m of a cosine around the normal: Legendre's functions of streams up, and of sunlight, which goes down; the latter
      * without the m-th power of the sine. */
-    double stream[ORDERS][STREAMS], sun[ORDERS][SUNS];
+    double stream[THROUGH_ORDERS][STREAMS], sun[THROUGH_ORDERS][SUNS];
     nb_slab_layer layers[DEPTHS];
 } nb_slab_solver;
 
-/* Legendre's functions of the degrees m to ORDERS - 1 at x; the square of each has the mean 1 / (2 l + 1) over the sphere, where
+/* Legendre's functions of the degrees m to orders - 1 at x; the square of each has the mean 1 / (2 l + 1) over the sphere, where
  * `power` is the m-th power of the sine. */
-static void legendre(int m, double x, double power, double values[ORDERS])
+static void legendre(int m, int orders, double x, double power, double values[THROUGH_ORDERS])
 {
     for (int k = 1; k <= m; k++) power *= sqrt((2 * k - 1.0) / (2 * k));
     for (int l = 0; l < m; l++) values[l] = 0;
     values[m] = power;
-    if (m + 1 < ORDERS) values[m + 1] = sqrt(2 * m + 1.0) * x * power;
-    for (int l = m + 2; l < ORDERS; l++)
+    if (m + 1 < orders) values[m + 1] = sqrt(2 * m + 1.0) * x * power;
+    for (int l = m + 2; l < orders; l++)
         values[l] = ((2 * l - 1) * x * values[l - 1] - sqrt((l - 1.0) * (l - 1) - m * m) * values[l - 2]) /
                     sqrt((double)l * l - m * m);
 }
 
 static void set_functions(int m, nb_slab_solver *solver)
 {
-    double values[ORDERS];
+    double values[THROUGH_ORDERS];
     for (int i = 0; i < STREAMS; i++) {
         const double x = solver->cosines[i];
-        legendre(m, x, pow(1 - x * x, 0.5 * m), values);
-        for (int l = 0; l < ORDERS; l++) solver->stream[l][i] = values[l];
+        legendre(m, solver->orders, x, pow(1 - x * x, 0.5 * m), values);
+        for (int l = 0; l < solver->orders; l++) solver->stream[l][i] = values[l];
     }
     for (int k = 0; k < SUNS; k++) {
-        legendre(m, -solver->suns[k], 1, values);
-        for (int l = 0; l < ORDERS; l++) solver->sun[l][k] = values[l];
+        legendre(m, solver->orders, -solver->suns[k], 1, values);
+        for (int l = 0; l < solver->orders; l++) solver->sun[l][k] = values[l];
     }
 }
 
@@ -133,7 +126,7 @@ static void set_thin(const nb_slab_solver *solver, int m, double depth, nb_slab_
     memset(thin, 0, sizeof *thin);
     for (int i = 0; i < STREAMS; i++) {
         const double way = depth / solver->cosines[i];
-        for (int l = m; l < ORDERS; l++) {
+        for (int l = m; l < solver->orders; l++) {
             const double sent = way * (2 * l + 1) * solver->moments[l] * solver->stream[l][i], sign = turned(l, m);
             for (int j = 0; j < STREAMS; j++) {
                 const double part = 0.5 * sent * solver->stream[l][j] * solver->weights[j];
@@ -237,18 +230,17 @@ static double depth_of(int i)
     return i == 0 ? 0 : ldexp(FIRST_DEPTH, i - 1);
 }
 
-static void set_solver(const nb_phase *phase, double straight, nb_slab_solver *solver)
+static void set_solver(const nb_cloud_phase *phase, int orders, nb_slab_solver *solver)
 {
     const nb_rule rule = nb_rule_make(STREAMS);
-    for (int l = 0; l < ORDERS; l++) solver->moments[l] = (moment_of(phase, l) - straight) / (1 - straight);
+    const double straight = phase->moments[orders];
+    solver->orders = orders;
+    for (int l = 0; l < orders; l++) solver->moments[l] = (phase->moments[l] - straight) / (1 - straight);
     for (int i = 0; i < STREAMS; i++) {
         solver->cosines[i] = 0.5 + 0.5 * rule.nodes[i];
         solver->weights[i] = 0.5 * rule.weights[i];
     }
-    for (int k = 0; k < SUNS; k++) {
-        const double root = FIRST_ROOT + k * ROOT_STEP;
-        solver->suns[k] = root * root;
-    }
+    for (int k = 0; k < SUNS; k++) solver->suns[k] = pow(root_of(k, SUNS), 2);
 }
 
 static void set_layers(int m, nb_slab_solver *solver)
@@ -264,10 +256,10 @@ static void set_layers(int m, nb_slab_solver *solver)
 }
 
 /* Legendre's functions by those that nb_slab_source adds up, without the power of the sine. */
-static void find_scales(int m, double scales[ORDERS])
+static void find_scales(int m, double scales[THROUGH_ORDERS])
 {
     double before = 0, plain = 1;
-    legendre(m, 1, 1, scales);
+    legendre(m, ORDERS, 1, 1, scales);
     for (int l = m; l < ORDERS; l++) {
         scales[l] /= plain;
         const double next = ((2 * l + 1) * plain - (l + m) * before) / (l + 1 - m);
@@ -279,7 +271,7 @@ static void find_scales(int m, double scales[ORDERS])
 /* Coefficients of the degrees m to ORDERS - 1 lie one behind the other, those of m = 0 first. */
 static void set_source(const nb_slab_solver *solver, int m, int first, nb_slab *slab)
 {
-    double scales[ORDERS];
+    double scales[THROUGH_ORDERS];
     find_scales(m, scales);
     for (int a = 0; a < DEPTHS; a++)
         for (int b = 0; b < DEPTHS; b++) {
@@ -299,9 +291,11 @@ static void set_source(const nb_slab_solver *solver, int m, int first, nb_slab *
         }
 }
 
-/* Depths that are not powers of 2, by slabs of their own. */
-static void set_through(nb_slab_solver *solver, nb_slab *slab)
+/* Depths that are not powers of 2, by slabs of their own; every second sun. */
+static void set_half_of_through(nb_slab_solver *solver, int half, nb_slab *slab)
 {
+    for (int k = 0; k < SUNS; k++) solver->suns[k] = pow(root_of(2 * k + half, NB_SLAB_THROUGH_SUNS), 2);
+    set_functions(0, solver);
     for (int n = 0; n < NB_SLAB_FINER; n++) {
         double depth = FIRST_THROUGH * exp2((double)n / NB_SLAB_FINER - HALVINGS);
         nb_slab_layer layer;
@@ -312,7 +306,7 @@ static void set_through(nb_slab_solver *solver, nb_slab *slab)
                     double sum = exp(-depth / solver->suns[k]);
                     for (int s = 0; s < STREAMS; s++)
                         sum += 2 * PI * solver->weights[s] * solver->cosines[s] * layer.down.at[s][k] / solver->suns[k];
-                    slab->through[i][k] = (float)(1 / sum);
+                    slab->through[i][2 * k + half] = (float)(1 / sum);
                 }
                 i += NB_SLAB_FINER;
             }
@@ -321,18 +315,20 @@ static void set_through(nb_slab_solver *solver, nb_slab *slab)
     }
 }
 
-nb_slab *nb_slab_make(const nebel_allocator *allocator, const nb_phase *phase)
+nb_slab *nb_slab_make(const nebel_allocator *allocator, const nb_cloud_phase *phase)
 {
-    const double straight = moment_of(phase, ORDERS);
+    const double straight = phase->moments[ORDERS];
     nb_slab_solver *solver = nb_allocate(allocator, 1, sizeof *solver);
     nb_slab *slab = nb_allocate(allocator, 1, sizeof *slab);
     if (solver != NULL && slab != NULL) {
         slab->apart = (float)(1 - straight);
-        slab->cap = (float)find_cap(phase, 1 - straight);
-        set_solver(phase, straight, solver);
+        for (int c = 0; c < 3; c++) slab->cap[c] = (float)find_cap(phase, c, 1 - straight);
+        slab->through_apart = (float)(1 - phase->moments[THROUGH_ORDERS]);
+        set_solver(phase, THROUGH_ORDERS, solver);
+        for (int half = 0; half < 2; half++) set_half_of_through(solver, half, slab);
+        set_solver(phase, ORDERS, solver);
         for (int m = 0, first = 0; m < ORDERS; first += ORDERS - m, m++) {
             set_functions(m, solver);
-            if (m == 0) set_through(solver, slab);
             set_layers(m, solver);
             set_source(solver, m, first, slab);
         }
@@ -357,10 +353,11 @@ typedef struct nb_slab_suns {
     float weights[3];
 } nb_slab_suns;
 
-static nb_slab_suns find_suns(float sun)
+static inline nb_slab_suns find_suns(float sun, int count)
 {
-    const float place = (sqrtf(sun) - (float)FIRST_ROOT) / (float)ROOT_STEP, held = fmaxf(0, fminf(SUNS - 1, place));
-    const int low = (int)fminf(SUNS - 3, held);
+    const float place = (sqrtf(sun) - (float)FIRST_ROOT) * ((float)(count - 1) / (float)(1 - FIRST_ROOT));
+    const float held = fmaxf(0, fminf((float)(count - 1), place));
+    const int low = (int)fminf((float)(count - 3), held);
     const float x = held - (float)low;
     return (nb_slab_suns){low, {0.5f * (1 - x) * (2 - x), x * (2 - x), 0.5f * x * (x - 1)}};
 }
@@ -401,7 +398,7 @@ static float sum_functions(const float coefficients[NB_SLAB_COEFFICIENTS], float
 float nb_slab_source(const nb_slab *slab, const nb_slab_place *place)
 {
     const nb_slab_node above = depth_node(place->above), below = depth_node(place->below);
-    const nb_slab_suns suns = find_suns(place->sun);
+    const nb_slab_suns suns = find_suns(place->sun, SUNS);
     nb_slab_four sum[NB_SLAB_COEFFICIENTS / 4] = {{0}};
     float coefficients[NB_SLAB_COEFFICIENTS];
     for (int corner = 0; corner < 4; corner++) {
@@ -423,8 +420,8 @@ float nb_slab_source(const nb_slab *slab, const nb_slab_place *place)
 float nb_slab_through(const nb_slab *slab, float depth, float sun)
 {
     static const float steps[NB_SLAB_FINER + 1] = {1, 1.18920712f, 1.41421356f, 1.68179283f, 2};
-    const float times = slab->apart * depth / (float)FIRST_THROUGH;
-    const nb_slab_suns suns = find_suns(sun);
+    const float times = slab->through_apart * depth / (float)FIRST_THROUGH;
+    const nb_slab_suns suns = find_suns(sun, NB_SLAB_THROUGH_SUNS);
     float sum = 0, part = fmaxf(0, times);
     int octave, step = NB_SLAB_FINER - 1, low = -1;
     if (!(depth > 0)) return 1; /* to the last bit: where there is no cloud all is as without */

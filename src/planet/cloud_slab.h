@@ -3,8 +3,9 @@
 #ifndef NB_PLANET_CLOUD_SLAB_H
 #define NB_PLANET_CLOUD_SLAB_H
 
+#include "cloud_phase.h"
+
 #include "base/base.h"
-#include "media/phase.h"
 
 enum {
     NB_SLAB_ORDERS = 8, /* moments of the phase function, from 0 on */
@@ -14,6 +15,7 @@ enum {
     /* Depths of what comes through: so many from one to twice that, from 2^-8 to 2^8. */
     NB_SLAB_FINER = 4,
     NB_SLAB_OCTAVES = 16,
+    NB_SLAB_THROUGH_SUNS = 2 * NB_SLAB_SUNS,
     NB_SLAB_THROUGH = NB_SLAB_FINER * NB_SLAB_OCTAVES,
 };
 
@@ -22,15 +24,16 @@ typedef float nb_slab_four __attribute__((vector_size(16), aligned(4)));
 
 /* Depths are scaled: a part 1 - `apart` of all scattering goes straight on and is left out (delta-M: Wiscombe 1977). */
 typedef struct nb_slab {
-    float apart;
-    float cap; /* the phase function held below that is the part of scattering that does not go straight on */
+    float apart, through_apart; /* through_apart: of depths of what comes through */
+    float
+        cap[3]; /* each color's phase function held below that is the part of scattering that does not go straight on */
     /* By depth above, depth below and sun: coefficients of the source function (nb_slab_source). */
     nb_slab_four source[NB_SLAB_DEPTHS][NB_SLAB_DEPTHS][NB_SLAB_SUNS][NB_SLAB_COEFFICIENTS / 4];
-    float through[NB_SLAB_THROUGH][NB_SLAB_SUNS]; /* 1 by the part of light that comes through */
+    float through[NB_SLAB_THROUGH][NB_SLAB_THROUGH_SUNS]; /* 1 by the part of light that comes through */
 } nb_slab;
 
 /* NULL: out of memory. */
-nb_slab *nb_slab_make(const nebel_allocator *allocator, const nb_phase *phase);
+nb_slab *nb_slab_make(const nebel_allocator *allocator, const nb_cloud_phase *phase);
 
 /* A place in a slab under the sun, and a way to look at it. */
 typedef struct nb_slab_place {

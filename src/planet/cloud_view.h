@@ -228,11 +228,11 @@ typedef struct nb_cloud_source {
 
 /* What is the same along a ray. */
 typedef struct nb_cloud_ray {
-    float phase[NEBEL_MAX_CLOUD_LAYERS],
-        wide_phase[NEBEL_MAX_CLOUD_LAYERS]; /* towards the eye; wide: of what leads away */
+    float phase[NEBEL_MAX_CLOUD_LAYERS][3],
+        wide_phase[NEBEL_MAX_CLOUD_LAYERS][3]; /* towards the eye; wide: of what leads away */
     /* Of phase that part of light whose way to the sun is the rest of the ray, and how much of what a pixel sees that is; phase has the
      * other. */
-    float ahead_phase[NEBEL_MAX_CLOUD_LAYERS], ahead;
+    float ahead_phase[NEBEL_MAX_CLOUD_LAYERS][3], ahead;
     float
         own; /* how much what comes straight from the sun is that of a place's own way, where pixels hide heaps, too */
     float apart[NEBEL_MAX_CLOUD_LAYERS]; /* what part of scattering leads away */

@@ -277,8 +277,8 @@ static nebel_result check_looks(const nebel_cloud_layer *layer, const nebel_log 
         return refuse(log, "size", layer->size, " m", "within 1e-3 and 1e9");
     if (!is_part(layer->detail)) return refuse(log, "detail", layer->detail, "", part);
     if (!is_part(layer->variation)) return refuse(log, "variation", layer->variation, "", part);
-    if (!(layer->diameter >= 5 && layer->diameter <= NEBEL_MAX_DROPLET))
-        return refuse(log, "diameter", layer->diameter, " um", "within 5 and 50");
+    if (!(layer->diameter >= 4 && layer->diameter <= NEBEL_MAX_DROPLET))
+        return refuse(log, "diameter", layer->diameter, " um", "within 4 and 50");
     for (int i = 0; i < 2; i++)
         if (!(fabs(layer->wind[i]) <= 1e12)) return refuse(log, "wind", layer->wind[i], " m", "within -1e12 and 1e12");
     const char *fault = nb_map_fault(&layer->weather, 1);
@@ -383,7 +383,6 @@ static void set_ranks(const nb_cloud_noise *noise, nb_cloud_layer *layer)
 
 static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *desc, nb_cloud_layer *layer)
 {
-    const nebel_phase phase = {.type = NEBEL_PHASE_DROPLETS, .diameter = desc->diameter};
     const double radius = clouds->atmosphere->airs.radius, speed = hypot(desc->wind[0], desc->wind[1]);
     layer->kind = desc->kind;
     layer->low = radius + desc->base;
@@ -397,8 +396,7 @@ static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *des
     layer->axis[0] = speed > 0 ? desc->wind[1] / speed : 1;
     layer->axis[2] = speed > 0 ? -desc->wind[0] / speed : 0;
     layer->per_time = speed / layer->low;
-    layer->phase = nb_phase_resolve(&phase);
-    layer->mean_cosine = nb_phase_mean_cosine(&layer->phase);
+    nb_cloud_phase_make(desc->kind, desc->diameter, &layer->phase);
     layer->slab = nb_slab_make(&clouds->allocator, &layer->phase);
     if (layer->slab == NULL) return NEBEL_ERROR_MEMORY;
     layer->apart = layer->slab->apart;
@@ -516,5 +514,20 @@ nebel_result nebel_cloud_extinction(const nebel_clouds *clouds, double time, dou
     }
     for (int k = 0; k < clouds->layer_count; k++)
         add_layer(clouds, k, time, (float)width, n, places, place_stride, extinction);
+    return NEBEL_OK;
+}
+
+nebel_result nebel_cloud_phase(const nebel_clouds *clouds, uint32_t layer, size_t n, const double *cosines,
+                               double (*phases)[3])
+{
+    if (clouds == NULL || layer >= (uint32_t)clouds->layer_count || (n > 0 && (cosines == NULL || phases == NULL)))
+        return NEBEL_ERROR_ARGUMENT;
+    for (size_t i = 0; i < n; i++)
+        if (!(fabs(cosines[i]) <= 1)) return NEBEL_ERROR_ARGUMENT;
+    for (size_t i = 0; i < n; i++) {
+        float values[4];
+        nb_cloud_phase_at(&clouds->layers[layer].phase, cosines[i], values);
+        for (int c = 0; c < 3; c++) phases[i][c] = (double)values[c];
+    }
     return NEBEL_OK;
 }

@@ -6,8 +6,6 @@
 #include "cloud_slab.h"
 #include "layer_map.h"
 
-#include "media/phase.h"
-
 #include <nebel/clouds.h>
 
 enum {
@@ -55,11 +53,10 @@ typedef struct nb_cloud_layer {
     nb_cloud_grid grids[NB_CLOUD_GRIDS];
     float coverage;
     nb_layer_map weather; /* level_count 0: none */
-    nb_phase phase;
-    double mean_cosine;
-    float apart;   /* what part of scattering leads away */
+    float apart;          /* what part of scattering leads away */
     float shallow; /* optical depth up to which a place counts as one of a level slab, however the way to the sun is */
     nb_slab *slab; /* light in slabs of such cloud */
+    nb_cloud_phase phase;
 } nb_cloud_layer;
 
 /* How densities are found: see cloud_looks.h. */

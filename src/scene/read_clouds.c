@@ -26,7 +26,7 @@ static bool read_numbers(nb_scene_reader *in, const nb_json_node *const *found, 
     static const nb_range amount_range = {
         .low = 1e-12, .high = NEBEL_MAX_AIR_EXTINCTION, .dimension = NB_PER_LENGTH, .text = "an amount"};
     static const nb_range diameter_range = {
-        .low = 5, .high = NEBEL_MAX_DROPLET, .text = "a number of micrometres from 5 to 50"};
+        .low = 4, .high = NEBEL_MAX_DROPLET, .text = "a number of micrometres from 4 to 50"};
     static const nb_range wind_range = {.low = -1e12, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
     nb_json *json = in->json;
     if (!nb_value_number(json, found[BASE], &height_range, &layer->base) ||
