@@ -219,6 +219,45 @@ static void thin_air_has_its_light(void **state)
     }
 }
 
+/* Haze that scatters forward, of any depth, under any sun and seen from anywhere. The error that is told says something: in the mean it
+ * is no more than a part of the light. */
+static void haze_has_its_light(void **state)
+{
+    enum { SCENES = 24 };
+    static const double most[NEBEL_AIR_QUALITY_COUNT] = {[NEBEL_AIR_FAST] = 0.3, [NEBEL_AIR_PRECISE] = 0.2};
+    double told[NEBEL_AIR_QUALITY_COUNT] = {0}, off[NEBEL_AIR_QUALITY_COUNT] = {0};
+    size_t count = 0;
+    (void)state;
+    chance_state = UINT64_C(88172645463325252);
+    for (size_t i = 0; i < SCENES; i++) {
+        const double turn = PI * chance(), up = copysign(0.08 + 0.92 * chance(), chance() - 0.5);
+        const double level = sqrt(1 - up * up), depth = 0.1 * pow(40, chance()), g = 0.3 + 0.55 * chance();
+        const scene view = {depth, g, 0.1 + 0.9 * chance(), {level * cos(turn), up, level * sin(turn)}, up < 0};
+        const nebel_air of = {.scale_height = SCALE, .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = g}};
+        double mean[2];
+        if (!nb_test_tries(i, SCENES)) continue;
+        walk_often(&view, mean);
+        count++;
+        for (int q = 0; q < NEBEL_AIR_QUALITY_COUNT; q++) {
+            nebel_atmosphere *air = make_of(&of, depth, SCALE, (nebel_air_quality)q);
+            const nebel_light light = trace(air, view.cosine, view.is_above ? 1e5 : 0, view.direction);
+            const double apart = fabs((double)light.in_scattering[0] - mean[0]);
+            if (apart > (double)light.error + 3.5 * mean[1])
+                fail_msg("quality %d, depth %g, g %g, sun %g, view %g %g %g: %g, not %g, told %g, by chance %g", q,
+                         depth, g, view.cosine, view.direction[0], up, view.direction[2],
+                         (double)light.in_scattering[0], mean[0], (double)light.error, mean[1]);
+            told[q] += (double)light.error / mean[0];
+            off[q] += fmax(0, apart - mean[1]) / mean[0];
+            nebel_destroy_atmosphere(air);
+        }
+    }
+    for (int q = 0; q < NEBEL_AIR_QUALITY_COUNT; q++) {
+        print_message("haze, quality %d: off %.1f %%, told %.1f %% in the mean of %zu\n", q,
+                      100 * off[q] / (double)count, 100 * told[q] / (double)count, count);
+        assert_true(told[q] <= most[q] * (double)count);
+    }
+}
+
 /* Three degrees from the sun haze sends light that it scattered more than once by orders that no table keeps. */
 static void error_covers_glow_around_the_sun(void **state)
 {
@@ -240,6 +279,7 @@ int main(void)
         cmocka_unit_test(nothing_is_lost),
         cmocka_unit_test(error_covers_what_chance_finds),
         cmocka_unit_test(thin_air_has_its_light),
+        cmocka_unit_test(haze_has_its_light),
         cmocka_unit_test(error_covers_glow_around_the_sun),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -183,7 +183,7 @@ static void gain_is_that_of_T31(void **state)
             const double weight = 0.5 / 16 * rule->weights[k % 8] * 3 * part * part * fabs(span);
             const nb_track track = {radius, radius * (horizon + span * part * part * part)};
             nb_path path;
-            nb_path_lay(airs, rule, track, fmin(nb_track_enter(track, airs->radius), nb_track_leave(track, airs->top)),
+            nb_path_lay(airs, NULL, rule, track, fmin(nb_track_enter(track, airs->radius), nb_track_leave(track, airs->top)),
                         0, NULL, &path);
             for (int n = 0; n < path.count; n++)
                 for (int c = 0; c < 3; c++) {
@@ -664,7 +664,7 @@ static void try_kernel(const nebel_atmosphere *atmosphere, nb_gather_fn *kernel)
         const double end = fmin(nb_track_enter(track, airs->radius), nb_track_leave(track, airs->top));
         nb_path path;
         nb_node_light light, same;
-        nb_path_lay(airs, &atmosphere->rule, track, end, 0, NULL, &path);
+        nb_path_lay(airs, NULL, &atmosphere->rule, track, end, 0, NULL, &path);
         const nb_gather_job job = {
             .airs = airs,
             .scatter = &atmosphere->scatter,

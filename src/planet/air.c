@@ -23,6 +23,46 @@ int nb_airs_are_empty(const nb_airs *airs)
     return 1;
 }
 
+/* What is scattered straight up, of the color of which it is the most. */
+static double scattering_depth(const nb_airs *airs, const nb_air *air)
+{
+    const double height = airs->top - airs->radius;
+    const double met = air->scale > 0 ? air->scale * (1 - nb_exp(-height / air->scale)) : air->width;
+    return met * fmax(air->scattering[0], fmax(air->scattering[1], air->scattering[2]));
+}
+
+/* In thin air light that peaks turn is seen along level ways alone, and there most of it leaves for the ground or for space. Air of this
+ * depth counts half of its peak: found by paths through the Earth's air, of 0.005, where all of it gives up to 10 % too much along the
+ * horizon and none of it up to 4 % too little. Hazes of 0.1 and more need it all. */
+#define THIN_DEPTH 0.01
+
+static void set_peaks(nb_airs *airs, int orders)
+{
+    for (int k = 0; k < airs->count; k++) {
+        nb_air *air = &airs->airs[k];
+        const double depth = scattering_depth(airs, air);
+        air->peak = depth > 0 ? fmax(0, air->moments[orders]) * depth / (depth + THIN_DEPTH) : 0;
+    }
+}
+
+void nb_airs_smooth(nb_airs *airs, int orders, nb_airs *smooth)
+{
+    set_peaks(airs, orders);
+    *smooth = *airs;
+    smooth->is_smooth = 1;
+    for (int k = 0; k < airs->count; k++) {
+        nb_air *air = &smooth->airs[k];
+        const double peak = airs->airs[k].peak;
+        for (int c = 0; c < 3; c++) {
+            air->scattering[c] = (1 - peak) * airs->airs[k].scattering[c];
+            air->extinction[c] -= peak * airs->airs[k].scattering[c];
+            if (peak * airs->airs[k].scattering[c] > 0) smooth->is_smooth = 0;
+        }
+        for (int l = 0; l <= NB_MOMENTS; l++)
+            air->moments[l] = l < orders ? (airs->airs[k].moments[l] - peak) / (1 - peak) : 0;
+    }
+}
+
 /* ---- shells ---------------------------------------------------------------------------------- */
 
 static int has_shell(const nb_airs *airs, double low, double high)
@@ -90,7 +130,9 @@ double nb_track_enter(nb_track track, double sphere)
 
 static void add_rising(const nb_airs *airs, nb_track track, double length, double depth[3])
 {
-    nb_add_rising(airs, (nb_tracks){track.radius, track.rise}, length, depth);
+    double met[NEBEL_MAX_AIRS] = {0};
+    nb_add_rising(airs, (nb_tracks){track.radius, track.rise}, length, met);
+    for (int c = 0; c < 3; c++) depth[c] += nb_depth_of(airs, met, c);
 }
 
 /* From the lowest place on, up on both sides. */

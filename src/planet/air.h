@@ -17,6 +17,7 @@ typedef struct nb_air {
     double center, width;                /* of a layer */
     nb_phase phase;
     double moments[NB_MOMENTS + 1]; /* of the phase function: the means of Legendre's polynomials */
+    double peak;                    /* by nb_airs_smooth: the part of scattered light that goes nearly straight ahead */
 } nb_air;
 
 enum { NB_MOST_SHELLS = 3 + 3 * NEBEL_MAX_AIRS };
@@ -28,6 +29,7 @@ typedef struct nb_airs {
     int shell_count;
     nb_air airs[NEBEL_MAX_AIRS];
     int count;
+    int is_smooth; /* of nb_airs_smooth: nothing had to be changed */
 } nb_airs;
 
 /* A ray through air: `radius` m from the centre at its start, and how far that is behind the place where the ray is
@@ -40,6 +42,11 @@ double nb_air_density(const nb_air *air, double height);
 
 /* Whether there is no air at all. */
 int nb_airs_are_empty(const nb_airs *airs);
+
+/* Sets the peaks of airs, and air whose phase functions have no more than `orders` moments, and which scatters light that comes often as the other does: the
+ * part of it that goes nearly straight ahead counts as not scattered at all (delta-M: Wiscombe, Journal of the Atmospheric Sciences
+ * 34, 1977). is_smooth says that both are the same. */
+void nb_airs_smooth(nb_airs *airs, int orders, nb_airs *smooth);
 
 /* Sets the shells of airs that have everything else. */
 void nb_airs_cut(nb_airs *airs);

@@ -57,13 +57,16 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
     made->airs.radius = whole.radius;
     made->airs.top = whole.radius + whole.thickness;
     made->airs.count = (int)whole.air_count;
+    for (int c = 0; c < 3; c++) made->ground_albedo[c] = whole.ground_albedo[c];
     for (int i = 0; i < made->airs.count; i++) resolve_air(&whole.airs[i], &made->airs.airs[i]);
     nb_airs_cut(&made->airs);
     nb_vector_ball_middle(whole.ground, whole.radius, made->center);
     made->rule = nb_rule_make(NB_RULE_MOST);
     made->gather = nb_gather_choose(NEBEL_ISA_DEFAULT);
     const nb_parts parts = {whole.run, whole.run_user};
-    result = nb_scatter_make(&allocator, &parts, &made->airs, whole.quality, whole.ground_albedo, &made->scatter);
+    nb_airs_smooth(&made->airs, whole.quality == NEBEL_AIR_PRECISE ? NB_MOMENTS : NB_FEW_MOMENTS, &made->smooth);
+    result = nb_scatter_make(&allocator, &parts, &made->airs, &made->smooth, whole.quality, whole.ground_albedo,
+                             &made->scatter);
     made->share_off = (whole.quality == NEBEL_AIR_PRECISE ? 0.02 : 0.1) + made->scatter.missing;
     if (result == NEBEL_OK) {
         *atmosphere = made;

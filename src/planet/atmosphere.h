@@ -8,12 +8,19 @@
 struct nebel_atmosphere {
     nebel_allocator allocator;
     double center[3];
-    nb_airs airs;
+    nb_airs airs, smooth; /* smooth: that by which light scattered often is found */
+    double ground_albedo[3];
     nb_rule rule;
     nb_scatter scatter;
     nb_gather_fn *gather;
     double share_off; /* how much of light that was scattered often may be wrong for want of entries and directions */
 };
+
+/* NULL where no air has a peak. */
+static inline const nb_airs *nb_atmosphere_smooth(const nebel_atmosphere *atmosphere)
+{
+    return atmosphere->smooth.is_smooth ? NULL : &atmosphere->smooth;
+}
 
 /* In units of what was scattered once: what quadrature along a ray misses. */
 #define NB_ONCE_OFF 2e-3
@@ -30,12 +37,12 @@ typedef struct nb_gathered {
 /* Where the ray enters and leaves the shadow of the planet, in any order; below 0 where it does not. */
 void nb_find_shadow(const nb_airs *airs, nb_track track, nb_aspect aspect, double cuts[2]);
 
-/* Over the nodes of a path, up to each of `count` ends, ascending; the last one is the path's. Returns what is scattered
- * just where the ray begins, per metre. `aspect` is that of the ray's direction there. */
+/* Over the nodes of a path, up to each of `count` ends, ascending; the last one is the path's, where it leaves the air or meets the
+ * ground. Returns what is scattered just where the ray begins, per metre. `aspect` is that of the ray's direction there. */
 nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path *path,
                            int count, const double ends[], nb_gathered gathered[]);
 
-/* Along a ray that stays within the air up to the last end; at most NB_PATH_CUTS - 2 of them. */
+/* Along a ray that stays within the air up to the last end, as above; at most NB_PATH_CUTS - 2 of them. */
 nb_gathered nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, nb_track track, nb_aspect aspect,
                       int count, const double ends[], nb_gathered gathered[]);
 

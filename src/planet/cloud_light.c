@@ -32,10 +32,12 @@ static nb_cloud_light clear_light(const nebel_cloud_view *view, double radius, d
     const nb_field field = nb_scatter_look_up(&atmosphere->scatter, &atmosphere->airs, radius, sun);
     nb_cloud_light light = {.sun = {0}};
     double direct[3];
-    nb_track_sunlight(&atmosphere->airs, (nb_track){radius, radius * sun}, direct);
+    const double aside = sqrt(fmax(0, 1 - sun * sun));
+    nb_track_sunlight(&atmosphere->smooth, (nb_track){radius, radius * sun}, direct);
     for (int c = 0; c < 3; c++) {
-        const double mean = field.moments[0][c] / (4 * 3.14159265358979323846);
-        const double side = field.moments[1][c] / (2 * 3.14159265358979323846), e = view->sun.irradiance[c];
+        const double mean = field.moments[0][c] / (4 * 3.14159265358979323846), e = view->sun.irradiance[c];
+        const double down = sun * field.moments[1][c] + aside * field.moments[2][c];
+        const double side = down / (2 * 3.14159265358979323846);
         light.sun[c] = (float)(e * direct[c]);
         light.above[c] = (float)(e * fmax(0, mean + side));
         light.below[c] = (float)(e * fmax(0, mean - side));

@@ -77,17 +77,23 @@ static inline nb_real nb_layer_length(const nb_air *air, nb_tracks track, nb_rea
     return sum;
 }
 
-/* Adds the depth of `length` m. */
-static inline void nb_add_rising(const nb_airs *airs, nb_tracks track, nb_real length, nb_real depth[3])
+/* Adds what `length` m meet of each kind of air, in metres of density 1. */
+static inline void nb_add_rising(const nb_airs *airs, nb_tracks track, nb_real length, nb_real met[])
 {
     const nb_real height = track.radius - nb_splat(airs->radius);
     for (int i = 0; i < airs->count; i++) {
         const nb_air *air = &airs->airs[i];
-        const nb_real dense = air->scale > 0 ? nb_density_of(air, height) *
-                                                   nb_air_length(track.radius, track.rise, nb_splat(air->scale), length)
-                                             : nb_layer_length(air, track, height, length);
-        for (int c = 0; c < 3; c++) depth[c] = depth[c] + nb_splat(air->extinction[c]) * dense;
+        met[i] = met[i] + (air->scale > 0 ? nb_density_of(air, height) *
+                                                nb_air_length(track.radius, track.rise, nb_splat(air->scale), length)
+                                          : nb_layer_length(air, track, height, length));
     }
+}
+
+static inline nb_real nb_depth_of(const nb_airs *airs, const nb_real met[], int c)
+{
+    nb_real depth = NB_F(0.0);
+    for (int i = 0; i < airs->count; i++) depth = depth + nb_splat(airs->airs[i].extinction[c]) * met[i];
+    return depth;
 }
 
 /* ---- towards a sun --------------------------------------------------------------------------- */
@@ -98,20 +104,27 @@ static inline nb_mask nb_tracks_are_dark(const nb_airs *airs, nb_tracks track)
     return nb_and(track.rise<NB_F(0.0), nb_half_chord_square(track, nb_splat(airs->radius))> NB_F(0.0));
 }
 
-/* What air leaves of the sun's light: 0 in the shadow of the planet. A ray that goes down first goes up from its lowest
- * place on both sides. */
-static inline void nb_tracks_sunlight(const nb_airs *airs, nb_tracks track, nb_real light[3])
+/* What rays to the sun meet of each kind of air. Returns the mask of those in the shadow of the planet. A ray that goes down first
+ * goes up from its lowest place on both sides. */
+static inline nb_mask nb_tracks_meet(const nb_airs *airs, nb_tracks track, nb_real met[NEBEL_MAX_AIRS])
 {
     const nb_mask dark = nb_tracks_are_dark(airs, track), falls = track.rise < NB_F(0.0);
-    nb_real depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
-    for (int c = 0; c < 3; c++) light[c] = NB_F(0.0);
-    if (nb_all(dark)) return;
+    for (int i = 0; i < airs->count; i++) met[i] = NB_F(0.0);
+    if (nb_all(dark)) return dark;
     const nb_real length = nb_tracks_leave(track, nb_splat(airs->top)), back = nb_select(falls, -track.rise, NB_F(0.0));
     const nb_tracks up = {nb_select(falls, nb_lowest_radius(track), track.radius),
                           nb_select(falls, NB_F(0.0), track.rise)};
-    if (nb_any(nb_and(falls, nb_not(dark)))) nb_add_rising(airs, up, back, depth);
-    nb_add_rising(airs, up, length - back, depth);
-    for (int c = 0; c < 3; c++) light[c] = nb_select(dark, NB_F(0.0), nb_exp(-depth[c]));
+    if (nb_any(nb_and(falls, nb_not(dark)))) nb_add_rising(airs, up, back, met);
+    nb_add_rising(airs, up, length - back, met);
+    return dark;
+}
+
+/* What air leaves of the sun's light: 0 in the shadow of the planet. */
+static inline void nb_tracks_sunlight(const nb_airs *airs, nb_tracks track, nb_real light[3])
+{
+    nb_real met[NEBEL_MAX_AIRS];
+    const nb_mask dark = nb_tracks_meet(airs, track, met);
+    for (int c = 0; c < 3; c++) light[c] = nb_select(dark, NB_F(0.0), nb_exp(-nb_depth_of(airs, met, c)));
 }
 
 #endif

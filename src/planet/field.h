@@ -8,7 +8,7 @@
  * zenith and the sun. */
 enum { NB_FIELD = NB_MOMENTS * (NB_MOMENTS + 1) / 2 };
 
-/* The frame of a field has z up and x towards the sun. Air asks for the orders 0 to 2, dust for those that its phase
+/* The frame of a field has z towards the sun and x towards the zenith. Air asks for the orders 0 to 2, dust for those that its phase
  * function has: `orders` says how many are kept. */
 typedef struct nb_field {
     double moments[NB_FIELD][3];

@@ -1,5 +1,7 @@
 #include "gather.h"
 
+#include "peaks.h"
+
 #include "base/cpu.h"
 #include "base/levels.h"
 
@@ -8,24 +10,13 @@
 /* The sum of orders is about right for hazy air around the sun (docs/planet.md): others may be worse. */
 #define REST_SAFETY 2
 
-/* Phase functions fall from order to order by about the same ratio, and light that was scattered once has it, too: what is left out is the
- * rest of a Henyey and Greenstein function, whose first orders are taken off. In units of the first that is left out, of which no less
- * counts, as others may come from any side. */
+/* Phase functions fall from order to order by about the same ratio, and light that was scattered once has it, too. No less than the first
+ * order that is left out counts, as others may come from any side. Peaks have their own light: what is left out is not missing. */
 static double rest_of(const nb_air *air, int orders, double cosine)
 {
-    const double last = air->moments[orders - 1], next = air->moments[orders];
-    const double ratio = fabs(last) > fabs(next) ? next / last : 0, x = ratio * ratio;
-    const double square = 1 + x * x - 2 * x * cosine;
-    double sum = (1 - x * x) / (square * sqrt(square)), power = 1, p = 1, before = 0;
-    for (int l = 0; l < orders; l++) {
-        const double after = ((2 * l + 1) * cosine * p - l * before) / (l + 1);
-        sum -= (2 * l + 1) * power * p;
-        before = p;
-        p = after;
-        power *= x;
-    }
-    const double first = 2 * orders + 1;
-    return power > 1e-9 ? fmax(first, REST_SAFETY * fabs(sum) / power) : first;
+    const double ratio = nb_peak_ratio(air, orders), next = air->moments[orders];
+    return (next > 0 ? 1 - air->peak / next : 1) *
+           fmax(2 * orders + 1, REST_SAFETY * fabs(nb_peak_rest(ratio * ratio, orders, cosine)));
 }
 
 void nb_gather_aim(nb_gather_job *job)

@@ -5,17 +5,23 @@
 #include "path.h"
 #include "scatter.h"
 
-enum { NB_GATHER_NODES = 64 }; /* at a time */
+enum {
+    NB_GATHER_NODES = 64, /* at a time */
+};
 
 /* For a sun of irradiance 1, what reaches the start of the ray from each node, whose weight is counted: sunlight, for a
  * scattering of 1/m and a phase function of 1; light scattered by all air after that of the table; and about what of this
  * is missing for want of moments, and in twilight for want of entries. */
 typedef struct nb_node_light {
     double sun[3][NB_GATHER_NODES], often[3][NB_GATHER_NODES], missing[3][NB_GATHER_NODES];
+    /* Where there is smooth air: sunlight with what peaks turn of it on its way, and how often in the mean those turn what is scattered. */
+    double radiance[3][NB_GATHER_NODES]; /* of the table at the node itself, in the ray's direction */
+    double ahead[3][NB_GATHER_NODES], turns[3][NB_GATHER_NODES];
 } nb_node_light;
 
 typedef struct nb_gather_job {
     const nb_airs *airs;
+    const nb_airs *smooth;     /* what light scattered often is scattered by, if it is not `airs`; else NULL */
     const nb_scatter *scatter; /* NULL: sunlight alone */
     int wants_sun;
     nb_track track;

@@ -33,7 +33,9 @@ NB_MOMENTS_INLINE nb_between nb_between_heights(const nb_scatter *scatter, const
 NB_MOMENTS_INLINE nb_between nb_between_suns(const nb_scatter *scatter, nb_real sun)
 {
     const double per = 1 / scatter->sun_scale, times = (scatter->suns - 1) / (scatter->last_sun - scatter->first_sun);
-    const nb_real spread = nb_copy_sign(nb_log(NB_F(1.0) + nb_abs(sun) * nb_splat(per)), sun);
+    const nb_real left = nb_sqrt(nb_max(NB_F(0.0), NB_F(1.0) - nb_abs(sun)));
+    const nb_real angle = NB_F(2.0) * nb_abs(sun) / (NB_F(1.0) + left);
+    const nb_real spread = nb_copy_sign(nb_log(NB_F(1.0) + angle * nb_splat(per)), sun);
     return nb_between_of((spread - nb_splat(scatter->first_sun)) * nb_splat(times), scatter->suns);
 }
 
@@ -110,16 +112,17 @@ NB_MOMENTS_INLINE void nb_basis(int orders, nb_real x, nb_real level2, nb_real z
     }
 }
 
-/* Where the sun is in the zenith all sides are alike: what tells them apart is 0. */
+/* In a frame with z towards the sun and x towards the zenith, in which light changes little with the sun's height. Where the sun is in
+ * the zenith all sides are alike: what tells them apart is 0. */
 NB_MOMENTS_INLINE void nb_basis_of(int orders, nb_aspects aspect, nb_real values[NB_FIELD])
 {
     const nb_real side2 = NB_F(1.0) - aspect.height_of_sun * aspect.height_of_sun;
     const nb_mask has_sides = side2 > NB_F(1e-12);
-    const nb_real level2 = nb_max(NB_F(0.0), NB_F(1.0) - aspect.zenith * aspect.zenith), level = nb_sqrt(level2);
+    const nb_real level2 = nb_max(NB_F(0.0), NB_F(1.0) - aspect.sun * aspect.sun), level = nb_sqrt(level2);
     const nb_real x =
-        (aspect.sun - aspect.height_of_sun * aspect.zenith) / nb_sqrt(nb_select(has_sides, side2, NB_F(1.0)));
+        (aspect.zenith - aspect.height_of_sun * aspect.sun) / nb_sqrt(nb_select(has_sides, side2, NB_F(1.0)));
     nb_basis(orders, nb_select(has_sides, nb_clamp(x, -level, level), NB_F(0.0)),
-             nb_select(has_sides, level2, NB_F(0.0)), aspect.zenith, values);
+             nb_select(has_sides, level2, NB_F(0.0)), aspect.sun, values);
 }
 
 #endif

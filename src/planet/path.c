@@ -46,6 +46,17 @@ static void set_node(const nb_airs *airs, nb_track track, double s, double weigh
         path->density[k][i] = nb_air_density(&airs->airs[k], path->radius[i] - airs->radius);
 }
 
+/* What a path leads through, and the rule for its pieces. */
+typedef struct nb_medium {
+    const nb_airs *airs, *smooth;
+    const nb_rule *rule;
+} nb_medium;
+
+/* Optical depth from the start of a ray, of all air and of smooth air. */
+typedef struct nb_depths {
+    double all[3], smooth[3];
+} nb_depths;
+
 static double extinction_at(const nb_airs *airs, const nb_path *path, int i, int c)
 {
     double sum = 0;
@@ -53,26 +64,43 @@ static double extinction_at(const nb_airs *airs, const nb_path *path, int i, int
     return sum;
 }
 
-/* Adds the nodes from a to b; `depth` is that of the ray up to a, and becomes that up to b. */
-static void lay_piece(const nb_airs *airs, const nb_rule *rule, nb_track track, double a, double b, double depth[3],
-                      nb_path *path)
+/* What is left of light behind each node of a piece; `depth` is that of the ray up to it, and becomes that up to its end. */
+static void lose_light(const nb_airs *airs, const nb_rule *rule, double half, const nb_path *path, int c, double *depth,
+                       double left[])
 {
+    double extinction[NB_RULE_MOST], whole = 0;
+    for (int i = 0; i < rule->count; i++) extinction[i] = extinction_at(airs, path, path->count + i, c);
+    for (int i = 0; i < rule->count; i++) {
+        double before = 0;
+        for (int j = 0; j < rule->count; j++) before += rule->before[i][j] * extinction[j];
+        left[path->count + i] = nb_exp(-(*depth + half * before));
+        whole += rule->weights[i] * extinction[i];
+    }
+    *depth += half * whole;
+}
+
+/* Adds the nodes from a to b; `depth` is that of the ray up to a, and becomes that up to b. */
+static void lay_piece(const nb_medium *medium, nb_track track, double a, double b, nb_depths *depth, nb_path *path)
+{
+    const nb_rule *rule = medium->rule;
     const double half = 0.5 * (b - a);
-    const int first = path->count;
     for (int i = 0; i < rule->count; i++)
-        set_node(airs, track, a + half * (1 + rule->nodes[i]), half * rule->weights[i], path, first + i);
+        set_node(medium->airs, track, a + half * (1 + rule->nodes[i]), half * rule->weights[i], path, path->count + i);
     for (int c = 0; c < 3; c++) {
-        double extinction[NB_RULE_MOST], whole = 0;
-        for (int i = 0; i < rule->count; i++) extinction[i] = extinction_at(airs, path, first + i, c);
-        for (int i = 0; i < rule->count; i++) {
-            double before = 0;
-            for (int j = 0; j < rule->count; j++) before += rule->before[i][j] * extinction[j];
-            path->transmittance[c][first + i] = nb_exp(-(depth[c] + half * before));
-            whole += rule->weights[i] * extinction[i];
-        }
-        depth[c] += half * whole;
+        lose_light(medium->airs, rule, half, path, c, &depth->all[c], path->transmittance[c]);
+        if (medium->smooth != NULL) lose_light(medium->smooth, rule, half, path, c, &depth->smooth[c], path->smooth[c]);
     }
     path->count += rule->count;
+}
+
+static void note_end(double s, const nb_depths *depth, nb_path *path)
+{
+    const int i = path->ends++;
+    path->end[i] = s;
+    for (int c = 0; c < 3; c++) {
+        path->end_left[c][i] = nb_exp(-depth->all[c]);
+        path->end_smooth[c][i] = nb_exp(-depth->smooth[c]);
+    }
 }
 
 /* A piece's nodes are too few where more than that is lost within it and something is seen of it, in optical depths. */
@@ -95,20 +123,21 @@ static int is_dark(const double depth[3])
 }
 
 /* Adds the nodes from a to b in pieces that are not too deep, as long as there are halvings left. */
-static void lay_pieces(const nb_airs *airs, const nb_rule *rule, nb_track track, double a, double b, int *halvings,
-                       double depth[3], nb_path *path)
+static void lay_pieces(const nb_medium *medium, nb_track track, double a, double b, int *halvings, nb_depths *depth,
+                       nb_path *path)
 {
     const int first = path->count;
-    double behind[3] = {depth[0], depth[1], depth[2]};
-    lay_piece(airs, rule, track, a, b, behind, path);
-    if (*halvings > 0 && is_too_deep(depth, behind)) {
+    nb_depths behind = *depth;
+    lay_piece(medium, track, a, b, &behind, path);
+    if (*halvings > 0 && is_too_deep(depth->all, behind.all)) {
         --*halvings;
         path->count = first;
-        lay_pieces(airs, rule, track, a, 0.5 * (a + b), halvings, depth, path);
-        lay_pieces(airs, rule, track, 0.5 * (a + b), b, halvings, depth, path);
+        lay_pieces(medium, track, a, 0.5 * (a + b), halvings, depth, path);
+        lay_pieces(medium, track, 0.5 * (a + b), b, halvings, depth, path);
         return;
     }
-    for (int c = 0; c < 3; c++) depth[c] = behind[c];
+    *depth = behind;
+    if (medium->smooth != NULL) note_end(b, depth, path);
 }
 
 static void add_start(const nb_airs *airs, nb_track track, nb_path *path)
@@ -116,21 +145,22 @@ static void add_start(const nb_airs *airs, nb_track track, nb_path *path)
     int i = path->count;
     do {
         set_node(airs, track, 0, 1, path, i);
-        for (int c = 0; c < 3; c++) path->transmittance[c][i] = 1;
+        for (int c = 0; c < 3; c++) path->transmittance[c][i] = path->smooth[c][i] = 1;
     } while (++i % NB_PATH_LANES > 0);
 }
 
-void nb_path_lay(const nb_airs *airs, const nb_rule *rule, nb_track track, double length, int cut_count,
-                 const double cuts[], nb_path *path)
+void nb_path_lay(const nb_airs *airs, const nb_airs *smooth, const nb_rule *rule, nb_track track, double length,
+                 int cut_count, const double cuts[], nb_path *path)
 {
+    const nb_medium medium = {airs, smooth, rule};
     nb_ends ends;
-    double depth[3] = {0, 0, 0};
+    nb_depths depth = {.all = {0}};
     int halvings = NB_PATH_HALVINGS;
-    path->count = 0;
+    path->count = path->ends = 0;
     find_ends(airs, track, length, cut_count, cuts, &ends);
-    for (int i = 1; i < ends.count && !is_dark(depth); i++)
+    for (int i = 1; i < ends.count && !is_dark(smooth != NULL ? depth.smooth : depth.all); i++)
         if (ends.at[i] > ends.at[i - 1])
-            lay_pieces(airs, rule, track, ends.at[i - 1], ends.at[i], &halvings, depth, path);
+            lay_pieces(&medium, track, ends.at[i - 1], ends.at[i], &halvings, &depth, path);
     add_start(airs, track, path);
-    for (int c = 0; c < 3; c++) path->left[c] = nb_exp(-depth[c]);
+    for (int c = 0; c < 3; c++) path->left[c] = nb_exp(-depth.all[c]);
 }

@@ -9,7 +9,8 @@ enum {
     NB_PATH_CUTS = 22,
     NB_PATH_HALVINGS = 24,
     NB_PATH_LANES = 8,
-    NB_PATH_MOST = (2 * NB_MOST_SHELLS + 2 + NB_PATH_CUTS + NB_PATH_HALVINGS) * NB_RULE_MOST + NB_PATH_LANES,
+    NB_PATH_PIECES = 2 * NB_MOST_SHELLS + 2 + NB_PATH_CUTS + NB_PATH_HALVINGS,
+    NB_PATH_MOST = NB_PATH_PIECES * NB_RULE_MOST + NB_PATH_LANES,
 };
 
 /* Nodes in arrays, for kernels that take several at once. Behind the last one is another at the start of the ray, of weight
@@ -20,13 +21,17 @@ typedef struct nb_path {
     double radius[NB_PATH_MOST];           /* m from the planet's centre */
     double weight[NB_PATH_MOST];           /* m */
     double transmittance[3][NB_PATH_MOST]; /* from the start to here */
+    double smooth[3][NB_PATH_MOST];        /* the same of smooth air; not set where the path was laid without */
     double density[NEBEL_MAX_AIRS][NB_PATH_MOST];
     double left[3]; /* transmittance of the whole ray */
+    /* Where there is smooth air: the ends of pieces, cuts among them, and transmittance up to there, of all air and of smooth air. */
+    int ends;
+    double end[NB_PATH_PIECES], end_left[3][NB_PATH_PIECES], end_smooth[3][NB_PATH_PIECES];
 } nb_path;
 
 /* The ray must stay within the air for `length`. It is cut where it is lowest, where it passes shells of air, and at
- * `cuts`, at most NB_PATH_CUTS places in any order; those outside the ray do not count. */
-void nb_path_lay(const nb_airs *airs, const nb_rule *rule, nb_track track, double length, int cut_count,
-                 const double cuts[], nb_path *path);
+ * `cuts`, at most NB_PATH_CUTS places in any order; those outside the ray do not count. smooth: nb_airs_smooth of the airs, or NULL. */
+void nb_path_lay(const nb_airs *airs, const nb_airs *smooth, const nb_rule *rule, nb_track track, double length,
+                 int cut_count, const double cuts[], nb_path *path);
 
 #endif

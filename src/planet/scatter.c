@@ -31,17 +31,18 @@ static double dip(const nb_airs *airs)
     return sqrt((1 - ratio) * (1 + ratio));
 }
 
-/* Entries over the sun's height lie evenly over this. */
+/* Entries over the sun's height lie evenly over this: dense at the horizon, and near the zenith as even as angles. */
 static double spread(double sun, double scale)
 {
-    return copysign(log(1 + fabs(sun) / scale), sun);
+    return copysign(log(1 + 2 * fabs(sun) / (1 + sqrt(fmax(0, 1 - fabs(sun)))) / scale), sun);
 }
 
 static double sun_at(const nb_scatter *scatter, int i)
 {
     const double part = (double)i / (scatter->suns - 1);
     const double place = scatter->first_sun + part * (scatter->last_sun - scatter->first_sun);
-    return copysign(fmin(1, scatter->sun_scale * (exp(fabs(place)) - 1)), place);
+    const double left = fmax(0, 1 - 0.5 * scatter->sun_scale * (exp(fabs(place)) - 1));
+    return copysign(1 - left * left, place);
 }
 
 nb_field nb_scatter_look_up(const nb_scatter *scatter, const nb_airs *airs, double radius, double sun)
@@ -69,18 +70,65 @@ static double to_power(double light)
     return log(fmax(light, 1e-30));
 }
 
-/* Makes a table of moments one that can be looked up. */
-static void seal(nb_scatter *scatter)
+/* Tables that are looked up have so many times as many entries over the sun's height: between those that are made light is not
+ * linear. */
+enum { FINE = 4, MOST_SUNS = 40 };
+
+/* Between the second and the third of four numbers, by the cubic through all; not beyond them. */
+static double between(const double numbers[4], double part)
 {
-    for (int i = 0; i < scatter->heights * scatter->suns; i++)
-        for (int c = 0; c < 3; c++) {
-            double(*moments)[3] = scatter->fields[i].moments;
-            const double all = fmax(moments[0][c], 1e-30);
-            moments[0][c] = to_power(all);
-            for (int m = 1; m < NB_FIELD; m++) moments[m][c] /= all;
+    const double a = part + 1, b = part, c = part - 1, d = part - 2;
+    const double cubic = -b * c * d / 6 * numbers[0] + a * c * d / 2 * numbers[1] - a * b * d / 2 * numbers[2] +
+                         a * b * c / 6 * numbers[3];
+    const double most = fmax(fmax(numbers[0], numbers[1]), fmax(numbers[2], numbers[3]));
+    const double least = fmin(fmin(numbers[0], numbers[1]), fmin(numbers[2], numbers[3]));
+    return fmax(least, fmin(most, cubic));
+}
+
+/* Numbers over the sun's height to those of a finer table, which are `stride` apart. */
+static void refine(int count, const double from[], double *to, size_t stride)
+{
+    for (int i = 0; i < FINE * (count - 1) + 1; i++) {
+        const int first = i / FINE < count - 1 ? i / FINE : count - 2;
+        const double numbers[4] = {first > 0 ? from[first - 1] : 2 * from[0] - from[1], from[first], from[first + 1],
+                                   first < count - 2 ? from[first + 2] : 2 * from[count - 1] - from[count - 2]};
+        to[stride * (size_t)i] = between(numbers, (double)(i - FINE * first) / FINE);
+    }
+}
+
+/* Of one height and colour: logarithms of the first moment, and parts of it. */
+static void seal_row(const nb_scatter *table, int height, int c, nb_scatter *sealed)
+{
+    const nb_field *fields = table->fields + height * table->suns;
+    nb_field *to = sealed->fields + height * sealed->suns;
+    double numbers[MOST_SUNS];
+    for (int m = 0; m < table->orders * (table->orders + 1) / 2; m++) {
+        for (int i = 0; i < table->suns; i++) {
+            const double all = fmax(fields[i].moments[0][c], 1e-30);
+            numbers[i] = m == 0 ? to_power(all) : fields[i].moments[m][c] / all;
         }
-    for (int i = 0; i < scatter->suns; i++)
-        for (int c = 0; c < 3; c++) scatter->ground[i][c] = to_power(scatter->ground[i][c]);
+        refine(table->suns, numbers, &to->moments[m][c], sizeof *to / sizeof(double));
+    }
+}
+
+/* Makes a table of moments one that can be looked up. */
+static void seal(const nb_scatter *table, nb_scatter *sealed)
+{
+    double numbers[MOST_SUNS];
+    for (int c = 0; c < 3; c++) {
+        for (int h = 0; h < table->heights; h++) seal_row(table, h, c, sealed);
+        for (int i = 0; i < table->suns; i++) numbers[i] = to_power(table->ground[i][c]);
+        refine(table->suns, numbers, &sealed->ground[0][c], 3);
+    }
+}
+
+/* The table of no air, which can be looked up. */
+static void darken(nb_scatter *sealed)
+{
+    for (int c = 0; c < 3; c++) {
+        for (size_t i = 0; i < nb_scatter_entries(sealed); i++) sealed->fields[i].moments[0][c] = to_power(0);
+        for (int i = 0; i < sealed->suns; i++) sealed->ground[i][c] = to_power(0);
+    }
 }
 
 /* ---- making ---------------------------------------------------------------------------------- */
@@ -106,7 +154,7 @@ static const nb_effort efforts[NEBEL_AIR_QUALITY_COUNT] = {
 
 typedef struct nb_maker {
     const nb_airs *airs;
-    const nb_scatter *scatter;
+    nb_scatter *sealed; /* of the light to be scattered; in the end of all */
     nb_scatter *next;
     const double *albedo;
     const nb_effort *effort;
@@ -151,7 +199,7 @@ static void add_sunlight(const nb_fan *fan, const double phases[], const nb_node
             double scattered = 0;
             for (int k = 0; k < airs->count; k++)
                 scattered += airs->airs[k].scattering[c] * fan->path.density[k][first + i] * phases[k];
-            light[c] += nodes->sun[c][i] * fmax(0, scattered);
+            light[c] += nodes->sun[c][i] * scattered;
         }
 }
 
@@ -165,7 +213,7 @@ static void gather_air(const nb_fan *fan, nb_aspect aspect, double light[3])
 {
     const nb_maker *maker = fan->maker;
     nb_gather_job job = {.airs = maker->airs,
-                         .scatter = maker->first ? NULL : maker->scatter,
+                         .scatter = maker->first ? NULL : maker->sealed,
                          .wants_sun = maker->first,
                          .track = fan->track,
                          .aspect = aspect,
@@ -194,7 +242,7 @@ static void gather_ground(const nb_fan *fan, nb_aspect aspect, double light[3])
         nb_track_sunlight(airs, (nb_track){airs->radius, airs->radius * sun}, irradiance);
         for (int c = 0; c < 3; c++) irradiance[c] *= fmax(0, sun);
     } else {
-        nb_scatter_look_up_ground(maker->scatter, sun, irradiance);
+        nb_scatter_look_up_ground(maker->sealed, sun, irradiance);
     }
     for (int c = 0; c < 3; c++) light[c] += fan->path.left[c] * maker->albedo[c] / PI * irradiance[c];
 }
@@ -219,7 +267,7 @@ static void add_slope(const nb_maker *maker, int height, double zenith, double w
     const double ground = nb_track_enter(fan.track, airs->radius), level = sqrt(fmax(0, 1 - zenith * zenith));
     fan.hits_ground = ground < HUGE_VAL;
     fan.end = fan.hits_ground ? ground : nb_track_leave(fan.track, airs->top);
-    nb_path_lay(airs, &maker->nodes, fan.track, fan.end, 0, NULL, &fan.path);
+    nb_path_lay(airs, NULL, &maker->nodes, fan.track, fan.end, 0, NULL, &fan.path);
     for (int i = 0; i < effort->suns; i++) {
         const double sun = sun_at(maker->next, i), side = sqrt(fmax(0, 1 - sun * sun));
         for (int k = 0; k < effort->turns; k++) {
@@ -342,34 +390,30 @@ static void clear(nb_scatter *scatter)
 
 /* Tables of a cycle of rounds, one behind the other, the first of which is what it begins with. */
 typedef struct nb_rounds {
-    nb_scatter once, sealed, tables[NB_MOST_ROUNDS + 1];
+    nb_scatter once, sum, tables[NB_MOST_ROUNDS + 1];
     double slowest[3]; /* by nb_orders_extrapolate */
 } nb_rounds;
 
-/* What air and ground make of sunlight, or of all light of a table. */
-static void scatter_again(nb_maker *maker, const nb_parts *parts, const nb_scatter *of, nb_scatter *sealed,
-                          nb_scatter *made)
+/* What air and ground make of sunlight, or of all light of the sealed table. */
+static void scatter_again(nb_maker *maker, const nb_parts *parts, int first, nb_scatter *made)
 {
-    maker->first = of == NULL;
-    if (of != NULL) {
-        copy(of, sealed);
-        seal(sealed);
-    }
-    maker->scatter = sealed;
+    maker->first = first;
     maker->next = made;
     clear(made);
     nb_parts_run(parts, (size_t)made->heights, add_height, maker);
 }
 
 /* Rounds from the first table on, until little may be missing or so many are done. Returns how many those are. */
-static int run_cycle(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds, int done, nb_scatter *sum)
+static int run_cycle(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds, int done)
 {
     const nb_effort *effort = maker->effort;
+    nb_scatter *sum = &rounds->sum;
     sum->missing = HUGE_VAL;
     for (int i = 0; i < NB_MOST_ROUNDS && sum->missing > effort->most_missing; i++, done++) {
         nb_scatter *next = &rounds->tables[i + 1];
         if (done > 0) {
-            scatter_again(maker, parts, &rounds->tables[i], &rounds->sealed, next);
+            seal(&rounds->tables[i], maker->sealed);
+            scatter_again(maker, parts, 0, next);
             add(&rounds->once, next);
         } else {
             copy(&rounds->once, next);
@@ -381,22 +425,37 @@ static int run_cycle(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds, 
 }
 
 /* Each cycle begins where the one before leads. */
-static void sum_orders(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds, nb_scatter *sum)
+static void sum_orders(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds)
 {
     const int most = deepest(maker->airs) > HOPELESS ? FEW_ROUNDS : MOST_ROUNDS;
-    scatter_again(maker, parts, NULL, NULL, &rounds->once);
+    scatter_again(maker, parts, 1, &rounds->once);
     for (int done = 0; done < most;) {
-        done = run_cycle(maker, parts, rounds, done, sum);
-        if (sum->missing <= maker->effort->most_missing) break;
-        copy(sum, &rounds->tables[0]);
+        done = run_cycle(maker, parts, rounds, done);
+        if (rounds->sum.missing <= maker->effort->most_missing) break;
+        copy(&rounds->sum, &rounds->tables[0]);
     }
-    seal(sum);
+    seal(&rounds->sum, maker->sealed);
+    maker->sealed->missing = rounds->sum.missing;
+}
+
+/* Light that peaks of phase functions turn was sunlight so far; on the ground it comes from the sky around the sun. */
+static void add_turned(const nb_airs *airs, const nb_airs *smooth, nb_scatter *scatter)
+{
+    for (int i = 0; i < scatter->suns; i++) {
+        const double sun = sun_at(scatter, i);
+        const nb_track track = {airs->radius, airs->radius * sun};
+        double straight[3], ahead[3];
+        nb_track_sunlight(airs, track, straight);
+        nb_track_sunlight(smooth, track, ahead);
+        for (int c = 0; c < 3; c++)
+            scatter->ground[i][c] = to_power(exp(scatter->ground[i][c]) + fmax(0, sun) * (ahead[c] - straight[c]));
+    }
 }
 
 static nebel_result allocate_rounds(const nebel_allocator *allocator, const nb_scatter *like, nb_rounds *rounds)
 {
     nebel_result result = allocate(allocator, like, &rounds->once);
-    if (result == NEBEL_OK) result = allocate(allocator, like, &rounds->sealed);
+    if (result == NEBEL_OK) result = allocate(allocator, like, &rounds->sum);
     for (int i = 0; i <= NB_MOST_ROUNDS && result == NEBEL_OK; i++)
         result = allocate(allocator, like, &rounds->tables[i]);
     return result;
@@ -405,32 +464,37 @@ static nebel_result allocate_rounds(const nebel_allocator *allocator, const nb_s
 static void free_rounds(const nebel_allocator *allocator, nb_rounds *rounds)
 {
     nb_scatter_free(allocator, &rounds->once);
-    nb_scatter_free(allocator, &rounds->sealed);
+    nb_scatter_free(allocator, &rounds->sum);
     for (int i = 0; i <= NB_MOST_ROUNDS; i++) nb_scatter_free(allocator, &rounds->tables[i]);
 }
 
 nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *parts, const nb_airs *airs,
-                             nebel_air_quality quality, const double albedo[3], nb_scatter *scatter)
+                             const nb_airs *smooth, nebel_air_quality quality, const double albedo[3],
+                             nb_scatter *scatter)
 {
     const nb_effort *effort = &efforts[quality];
-    nb_maker maker = {.airs = airs,
+    nb_maker maker = {.airs = smooth,
                       .albedo = albedo,
                       .effort = effort,
+                      .sealed = scatter,
                       .slopes = nb_rule_make(effort->slopes),
                       .nodes = nb_rule_make(effort->nodes),
                       .gather = nb_gather_choose(NEBEL_ISA_DEFAULT)};
     for (int k = 0; k < effort->turns; k++) maker.turn_cosines[k] = cos(PI * (k + 0.5) / effort->turns);
-    const nb_scatter layout = layout_of(airs, effort);
+    const nb_scatter layout = layout_of(smooth, effort);
+    nb_scatter fine = layout;
     nb_rounds rounds = {.once = {.heights = 0}};
-    nebel_result result = allocate(allocator, &layout, scatter);
+    fine.suns = FINE * (layout.suns - 1) + 1;
+    nebel_result result = allocate(allocator, &fine, scatter);
     if (result != NEBEL_OK) return result;
-    if (nb_airs_are_empty(airs)) {
-        seal(scatter);
+    if (nb_airs_are_empty(smooth)) {
+        darken(scatter);
         return NEBEL_OK;
     }
     result = allocate_rounds(allocator, &layout, &rounds);
-    if (result == NEBEL_OK) sum_orders(&maker, parts, &rounds, scatter);
-    scatter->missing += find_unresolved(airs, scatter);
+    if (result == NEBEL_OK) sum_orders(&maker, parts, &rounds);
+    if (result == NEBEL_OK && !smooth->is_smooth) add_turned(airs, smooth, scatter);
+    scatter->missing += find_unresolved(smooth, scatter);
     free_rounds(allocator, &rounds);
     return result;
 }

@@ -24,9 +24,10 @@ static inline size_t nb_scatter_entries(const nb_scatter *scatter)
 nb_field nb_scatter_look_up(const nb_scatter *scatter, const nb_airs *airs, double radius, double sun);
 void nb_scatter_look_up_ground(const nb_scatter *scatter, double sun, double irradiance[3]);
 
-/* Makes the table; `albedo` is the ground's. Errors: MEMORY. */
+/* Makes the table; `albedo` is the ground's; smooth: nb_airs_smooth of the airs. Errors: MEMORY. */
 nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *parts, const nb_airs *airs,
-                             nebel_air_quality quality, const double albedo[3], nb_scatter *scatter);
+                             const nb_airs *smooth, nebel_air_quality quality, const double albedo[3],
+                             nb_scatter *scatter);
 void nb_scatter_free(const nebel_allocator *allocator, nb_scatter *scatter);
 
 #endif

@@ -1,6 +1,8 @@
 /* Light along rays through air, and at places. */
 #include "atmosphere.h"
 
+#include "peaks.h"
+
 #include "base/stride.h"
 #include "base/vector.h"
 
@@ -11,6 +13,8 @@
 #include "formulas/prelude.h"
 
 #include "formulas/elementary.inc"
+
+#define PI 3.14159265358979323846
 
 /* ---- along a ray ----------------------------------------------------------------------------- */
 
@@ -27,11 +31,12 @@ void nb_find_shadow(const nb_airs *airs, nb_track track, nb_aspect aspect, doubl
     cuts[1] = c / q;
 }
 
-/* Nodes of a path whose light is at hand. */
+/* Nodes of a path whose light is at hand, and what phase functions give of it. */
 typedef struct nb_gathering {
     const nebel_atmosphere *atmosphere;
     nb_gather_job job;
     nb_node_light light;
+    nb_peaks peaks;
 } nb_gathering;
 
 static int smaller(int a, int b)
@@ -39,26 +44,8 @@ static int smaller(int a, int b)
     return a < b ? a : b;
 }
 
-/* Adds the light of nodes `from` to `to` - 1, which are at hand. */
-static void add_nodes(const nb_gathering *gathering, int from, int to, nb_gathered *sum)
-{
-    const nb_gather_job *job = &gathering->job;
-    const nb_node_light *light = &gathering->light;
-    for (int c = 0; c < 3; c++) {
-        for (int k = 0; k < job->airs->count; k++) {
-            const double scattering = job->airs->airs[k].scattering[c];
-            for (int i = from; i < to && scattering > 0; i++)
-                sum->once[k][c] += light->sun[c][i - job->first] * (scattering * job->path->density[k][i]);
-        }
-        for (int i = from; i < to; i++) {
-            sum->often[c] += light->often[c][i - job->first];
-            sum->missing[c] += light->missing[c][i - job->first];
-        }
-    }
-}
-
-/* The same of any nodes that are not before those at hand. */
-static void gather_nodes(nb_gathering *gathering, int from, int to, nb_gathered *sum)
+/* Adds the light of any nodes that are not before those at hand. */
+static void gather_nodes(nb_gathering *gathering, int from, int to, nb_peak_sums *sums)
 {
     nb_gather_job *job = &gathering->job;
     while (from < to) {
@@ -68,9 +55,15 @@ static void gather_nodes(nb_gathering *gathering, int from, int to, nb_gathered 
             gathering->atmosphere->gather(job, &gathering->light);
         }
         const int next = smaller(to, job->first + job->count);
-        add_nodes(gathering, from, next, sum);
+        nb_peaks_add(&gathering->peaks, job, &gathering->light, from, next, sums);
         from = next;
     }
+}
+
+/* Of a node that is at hand. */
+static void radiance_at(const nb_gathering *gathering, int node, double radiance[3])
+{
+    for (int c = 0; c < 3; c++) radiance[c] = gathering->light.radiance[c][node - gathering->job.first];
 }
 
 /* The first node from `from` on that is not before `end`. */
@@ -80,29 +73,154 @@ static int node_at(const nb_path *path, int from, double end)
     return from;
 }
 
+/* ---- light from behind an end ---------------------------------------------------------------- */
+
+/* Of the ground, if the path ends there and not where it leaves the air, what comes to the start through smooth air. */
+static void find_ground(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path *path,
+                        double way, double light[3])
+{
+    const nb_airs *airs = &atmosphere->airs;
+    for (int c = 0; c < 3; c++) light[c] = 0;
+    if (nb_track_ahead(track, way).radius > 0.5 * (airs->radius + airs->top)) return;
+    const double sun = fmax(-1, fmin(1, (track.radius * aspect.height_of_sun + way * aspect.sun) / airs->radius));
+    double sky[3], straight[3];
+    nb_scatter_look_up_ground(&atmosphere->scatter, sun, sky);
+    nb_track_sunlight(airs, (nb_track){airs->radius, airs->radius * sun}, straight);
+    for (int c = 0; c < 3; c++)
+        light[c] = path->end_smooth[c][path->ends - 1] * atmosphere->ground_albedo[c] / PI *
+                   (sky[c] + fmax(0, sun) * straight[c]);
+}
+
+/* What is behind an end: light of nodes and of the ground, and about the radiance in front of it. */
+typedef struct nb_behind {
+    nb_peak_sums sums;
+    double ground[3], radiance[3];
+    int is_nothing; /* but the ground, or what is beyond the air */
+} nb_behind;
+
+/* The part of a path before an end. */
+static nb_peak_part part_before(const nb_path *path, double end)
+{
+    nb_peak_part part = {.is_start = 0};
+    int i = 0;
+    while (i < path->ends - 1 && path->end[i] < end) i++;
+    for (int c = 0; c < 3; c++) {
+        const double left = path->end_left[c][i], smooth = path->end_smooth[c][i];
+        part.turned[c] = smooth > 0 ? 1 - left / smooth : 0;
+        part.smooth[c] = smooth;
+        part.turns[c] = left > 0 ? log(smooth / left) : 0;
+    }
+    return part;
+}
+
+/* The first meter, as if it were like the ray's start. */
+static nb_peak_part first_meter(const nb_gathering *gathering)
+{
+    const nb_path *path = gathering->job.path;
+    nb_peak_part part = {.is_start = 1};
+    for (int k = 0; k < gathering->peaks.air_count; k++)
+        for (int c = 0; c < 3; c++)
+            part.turns[c] +=
+                gathering->peaks.peak[k] * gathering->job.airs->airs[k].scattering[c] * path->density[k][path->count];
+    memcpy(part.turned, part.turns, sizeof part.turned);
+    for (int c = 0; c < 3; c++) part.smooth[c] = 1;
+    return part;
+}
+
+/* ---- along a path ---------------------------------------------------------------------------- */
+
+static void subtract(const nb_peak_sums *from, const nb_peak_sums *sums, nb_peak_sums *rest)
+{
+    const double *a = (const double *)from, *b = (const double *)sums;
+    for (size_t i = 0; i < sizeof *rest / sizeof(double); i++) ((double *)rest)[i] = a[i] - b[i];
+}
+
+/* Behind an end may be something that hides what is behind it. That is much where a dusk stands behind clouds: for a sun this far below
+ * the horizon (of its sine) light from behind counts as no brighter than all air makes it in the mean, and for one this far above it as
+ * it is. */
+#define DUSK 0.05
+
+/* What of the light from behind counts; `mean` is the radiance of the field in the ray's direction. */
+static double hold_back(double sun, double light, double mean)
+{
+    const double day = fmax(0, fmin(1, 0.5 + 0.5 * sun / DUSK));
+    return light - (1 - day) * fmax(0, light - mean);
+}
+
+/* Light of the nodes before an end; part: NULL if nothing is behind it that peaks could turn. */
+static nb_gathered finish(const nb_gathering *gathering, const nb_peak_sums *before, const nb_peak_part *part,
+                          const nb_behind *behind)
+{
+    const nb_peak_light front = nb_peaks_before(&gathering->peaks, before);
+    nb_peak_light back = {{0, 0, 0}, {0, 0, 0}};
+    nb_gathered gathered;
+    if (part != NULL) back = nb_peaks_behind(&gathering->peaks, &behind->sums, behind->ground, part);
+    for (int k = 0; k < NEBEL_MAX_AIRS; k++)
+        for (int c = 0; c < 3; c++) gathered.once[k][c] = before->powers[k][c][0];
+    for (int c = 0; c < 3; c++) {
+        double held = back.light[c];
+        if (part != NULL && !behind->is_nothing)
+            held = hold_back(gathering->job.aspect.height_of_sun, back.light[c],
+                             part->turned[c] * part->smooth[c] * behind->radiance[c]);
+        gathered.often[c] = front.light[c] + held;
+        gathered.missing[c] = front.missing[c] + back.missing[c] + (back.light[c] - held);
+    }
+    return gathered;
+}
+
+/* Sums up to each end. `radiance` is that of the field in front of each. */
+static void sum_nodes(nb_gathering *gathering, int count, const double ends[], nb_peak_sums sums[],
+                      double radiance[][3])
+{
+    const nb_path *path = gathering->job.path;
+    memset(&sums[0], 0, sizeof sums[0]);
+    memset(radiance[0], 0, sizeof radiance[0]);
+    for (int k = 0, i = 0; k < count; k++) {
+        const int to = k + 1 == count ? path->count : node_at(path, i, ends[k]);
+        if (k > 0) {
+            sums[k] = sums[k - 1];
+            memcpy(radiance[k], radiance[k - 1], sizeof radiance[k]);
+        }
+        gather_nodes(gathering, i, to, &sums[k]);
+        if (to > i) radiance_at(gathering, to - 1, radiance[k]);
+        i = to;
+    }
+}
+
 nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path *path,
                            int count, const double ends[], nb_gathered gathered[])
 {
     nb_gathering gathering;
-    nb_gathered sum, start;
-    memset(&sum, 0, sizeof sum);
-    memset(&start, 0, sizeof start);
+    nb_peak_sums sums[NB_PATH_CUTS + 1], start;
+    double radiance[NB_PATH_CUTS + 1][3];
+    nb_behind behind;
     gathering.atmosphere = atmosphere;
     gathering.job = (nb_gather_job){.airs = &atmosphere->airs,
+                                    .smooth = nb_atmosphere_smooth(atmosphere),
                                     .scatter = &atmosphere->scatter,
                                     .wants_sun = 1,
                                     .track = track,
                                     .aspect = aspect,
                                     .path = path};
     nb_gather_aim(&gathering.job);
-    for (int k = 0, i = 0; k < count; k++) {
-        const int to = k + 1 == count ? path->count : node_at(path, i, ends[k]);
-        gather_nodes(&gathering, i, to, &sum);
-        gathered[k] = sum;
-        i = to;
+    gathering.peaks = nb_peaks_aim(&gathering.job);
+    sum_nodes(&gathering, count, ends, sums, radiance);
+    const int turns = gathering.job.smooth != NULL && path->ends > 0;
+    if (turns) find_ground(atmosphere, track, aspect, path, ends[count - 1], behind.ground);
+    for (int k = 0; k < count; k++) {
+        const nb_peak_part part = turns ? part_before(path, ends[k]) : (nb_peak_part){0};
+        subtract(&sums[count - 1], &sums[k], &behind.sums);
+        memcpy(behind.radiance, radiance[k], sizeof behind.radiance);
+        behind.is_nothing = k + 1 == count;
+        gathered[k] = finish(&gathering, &sums[k], turns ? &part : NULL, &behind);
     }
+    const nb_peak_part part = first_meter(&gathering);
+    memset(&start, 0, sizeof start);
     gather_nodes(&gathering, path->count, path->count + 1, &start);
-    return start;
+    radiance_at(&gathering, path->count, behind.radiance);
+    behind.sums = sums[count - 1];
+    behind.is_nothing = 0;
+    return finish(&gathering, &start, turns ? &part : NULL, &behind);
 }
 
 nb_gathered nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, nb_track track, nb_aspect aspect,
@@ -112,7 +230,8 @@ nb_gathered nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, n
     nb_path path;
     nb_find_shadow(&atmosphere->airs, track, aspect, cuts);
     memcpy(cuts + 2, ends, (size_t)count * sizeof *ends);
-    nb_path_lay(&atmosphere->airs, rule, track, ends[count - 1], 2 + count, cuts, &path);
+    nb_path_lay(&atmosphere->airs, nb_atmosphere_smooth(atmosphere), rule, track, ends[count - 1], 2 + count, cuts,
+                &path);
     return nb_gather_path(atmosphere, track, aspect, &path, count, ends, gathered);
 }
 
@@ -173,6 +292,7 @@ static double place_over(const nebel_atmosphere *atmosphere, const double place[
 typedef struct nb_inside {
     nb_track track;
     double height_of_sun, length;
+    double end; /* of the ray in the air, however long it is */
 } nb_inside;
 
 /* Rays from outside are counted from where they pass the centre, so that their distance loses no digits. */
@@ -195,8 +315,8 @@ static nb_inside find_inside(const nebel_atmosphere *atmosphere, const double st
         inside.track = (nb_track){airs->top, -half};
     }
     inside.height_of_sun = bound_cosine(nb_vector_dot(from, sun) / inside.track.radius);
-    const double end = fmin(nb_track_enter(inside.track, airs->radius), nb_track_leave(inside.track, airs->top));
-    inside.length = fmax(0, fmin(left, end));
+    inside.end = fmin(nb_track_enter(inside.track, airs->radius), nb_track_leave(inside.track, airs->top));
+    inside.length = fmax(0, fmin(left, inside.end));
     return inside;
 }
 
@@ -213,15 +333,16 @@ static void trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, cons
     for (int c = 0; c < 3; c++) light->transmittance[c] = nb_exp(-depth[c]);
     light->error = NB_LIGHT_ROUNDING;
     if (!(fmax(sun->irradiance[0], fmax(sun->irradiance[1], sun->irradiance[2])) > 0)) return;
-    nb_gathered gathered;
+    nb_gathered gathered[2];
+    const double ends[2] = {inside.length, inside.end};
     const nb_aspect aspect = {bound_cosine(inside.track.rise / inside.track.radius),
                               bound_cosine(nb_vector_dot(unit, sun->direction)), inside.height_of_sun};
     double once[3];
-    nb_gather(atmosphere, &atmosphere->rule, inside.track, aspect, 1, &inside.length, &gathered);
-    nb_gathered_once(atmosphere, &gathered, aspect.sun, once);
+    nb_gather(atmosphere, &atmosphere->rule, inside.track, aspect, inside.length < inside.end ? 2 : 1, ends, gathered);
+    nb_gathered_once(atmosphere, &gathered[0], aspect.sun, once);
     for (int c = 0; c < 3; c++) {
-        light->in_scattering[c] = sun->irradiance[c] * (once[c] + gathered.often[c]);
-        const double off = nb_gathered_off(atmosphere, &gathered, once, c);
+        light->in_scattering[c] = sun->irradiance[c] * (once[c] + gathered[0].often[c]);
+        const double off = nb_gathered_off(atmosphere, &gathered[0], once, c);
         light->error = fmax(light->error, sun->irradiance[c] * off + NB_LIGHT_ROUNDING);
     }
 }

@@ -120,7 +120,8 @@ static void set_row(const nebel_air_view *view, double number, double before, nb
             row->reach.span * nb_level_end(row->reach.dense, row->reach.soft, (level + 1 - before) / view->levels);
     if (before > 0)
         row->ends[0] = 0.5 * row->reach.span * nb_level_end(row->reach.dense, row->reach.soft, 1.0 / view->levels);
-    nb_path_lay(airs, &view->rule, row->track, row->reach.span, view->levels, row->ends, &row->path);
+    nb_path_lay(airs, nb_atmosphere_smooth(view->atmosphere), &view->rule, row->track, row->reach.span, view->levels,
+                row->ends, &row->path);
 }
 
 static void fill_row(void *data, size_t number)

@@ -165,7 +165,8 @@ nebel_ground nebel_find_ground(nb_vec3 direction)
     int at = int(parts.z) + int(place.x);
     ground.sun = irradiance * nb_toward(NEBEL_AIR_WORD(at).xyz, NEBEL_AIR_WORD(at + 1).xyz, place.y);
     if (!(cosine > 0.0)) ground.sun = nb_splat3(0.0);
-    float spread = nb_copy_sign(nb_log(1.0 + abs(cosine) * skies.x), cosine);
+    float angle = 2.0 * abs(cosine) / (1.0 + sqrt(max(0.0, 1.0 - abs(cosine))));
+    float spread = nb_copy_sign(nb_log(1.0 + angle * skies.x), cosine);
     place = nb_air_place(clamp((spread - skies.y) * skies.z, 0.0, skies.w - 1.0), skies.w);
     at = int(parts.w) + int(place.x);
     nb_vec3 power = nb_toward(NEBEL_AIR_WORD(at).xyz, NEBEL_AIR_WORD(at + 1).xyz, place.y);

@@ -1,0 +1,62 @@
+/* Light that forward peaks of phase functions turn: it goes nearly straight on, and smooth air (nb_airs_smooth) lets it pass. */
+#ifndef NB_PLANET_PEAKS_H
+#define NB_PLANET_PEAKS_H
+
+#include "gather.h"
+
+/* The share of scattered light that peaks turn n times, n - 1 of them on the way to or from a node, is t^(n - 1) / n! of the sunlight
+ * that comes straight, if they turn it t times in the mean; n is at most NB_PEAK_POWERS, and once more for the rest. */
+enum { NB_PEAK_POWERS = 8 };
+
+/* Sums over nodes of a ray, for phase functions of 1. */
+typedef struct nb_peak_sums {
+    double often[3], missing[3];     /* as of nb_node_light */
+    double ahead[NEBEL_MAX_AIRS][3]; /* scattering times sunlight ahead */
+    /* Scattering times straight sunlight times powers of t, from 0 on, and behind them the rest of the series. */
+    double powers[NEBEL_MAX_AIRS][3][NB_PEAK_POWERS + 1];
+} nb_peak_sums;
+
+/* What phase functions give towards a ray, of sunlight. */
+typedef struct nb_peaks {
+    int air_count;
+    double peak[NEBEL_MAX_AIRS]; /* the part of what is scattered that the peak turns; 0: there is none */
+    double smooth[NEBEL_MAX_AIRS];
+    double turned[NEBEL_MAX_AIRS]
+                 [NB_PEAK_POWERS + 1]; /* per power; the first is not used: light scattered once has its own */
+} nb_peaks;
+
+/* The part of a ray in front of the light behind it: an end, or the first meter. */
+typedef struct nb_peak_part {
+    int is_start;
+    double turns[3];  /* by peaks, in the mean; of the start per meter */
+    double smooth[3]; /* transmittance of smooth air */
+    double turned[3]; /* the part of what comes through smooth air that peaks turn; of the start per meter */
+} nb_peak_part;
+
+/* Orders of moments behind those that are kept of a function of Henyey and Greenstein, in units of the first of them. */
+double nb_peak_rest(double g, int orders, double cosine);
+
+/* The ratio of the first moment that is not kept to the last one that is; 0 unless it is smaller. */
+double nb_peak_ratio(const nb_air *air, int orders);
+
+/* All 0 where there is no smooth air. */
+nb_peaks nb_peaks_aim(const nb_gather_job *job);
+
+/* Adds nodes `from` to `to` - 1, of which the light is at hand. smooth: what nb_gather_job says. */
+void nb_peaks_add(const nb_peaks *peaks, const nb_gather_job *job, const nb_node_light *light, int from, int to,
+                  nb_peak_sums *sums);
+
+/* Light and what may be wrong of it. */
+typedef struct nb_peak_light {
+    double light[3], missing[3];
+} nb_peak_light;
+
+/* What is scattered often, of the nodes before an end: light of smooth air, and sunlight that peaks turn. */
+nb_peak_light nb_peaks_before(const nb_peaks *peaks, const nb_peak_sums *before);
+
+/* What peaks turn, before an end, of light that comes from behind it: scattered by the nodes there, and sent by the ground, which has come
+ * through smooth air to the ray's start. Before the end and behind it this adds up to the whole ray, wherever the end is. */
+nb_peak_light nb_peaks_behind(const nb_peaks *peaks, const nb_peak_sums *behind, const double ground[3],
+                              const nb_peak_part *part);
+
+#endif
