@@ -22,6 +22,7 @@ from picture_files import read_exr
 
 NEBEL = os.environ["NEBEL"]
 RADII = {"earth": 6.36e6, "mars": 3.3895e6, "toy": 1e3, "haze": 6.36e6}
+FIELD = 0.01  # of view, degrees
 DEPTHS = {"earth": 1e5, "mars": 1.2e5, "toy": 125, "haze": 1e5}
 
 
@@ -49,15 +50,16 @@ class View:
         horizon = -math.degrees(math.acos(radius / (radius + self.height)))
         past_air = -math.degrees(math.acos(min(1, (radius + deep) / (radius + self.height))))
         highest = past_air if self.height > deep else 90
-        self.elevation = horizon + (highest - horizon) * dice.random() ** 2
+        # Off the horizon, so that all of the picture is on one side of it.
+        self.elevation = horizon + 2 * FIELD + (highest - horizon) * dice.random() ** 2
         if dice.random() < 0.3:
-            self.elevation = horizon + (-90 - horizon) * dice.random() ** 2
+            self.elevation = horizon - 2 * FIELD + (-90 - horizon) * dice.random() ** 2
 
     def scene(self, quality):
         sun, up, turn = (math.radians(x) for x in (self.sun, self.elevation, self.azimuth))
         ahead = [math.cos(up) * math.cos(turn), math.sin(up), math.cos(up) * math.sin(turn)]
         camera = {"position": [0, self.height, 0], "look_at": [ahead[0], self.height + ahead[1], ahead[2]],
-                  "up": [1, 0, 0] if abs(ahead[1]) > 0.9 else [0, 1, 0], "vertical_fov": 0.01}
+                  "up": [1, 0, 0] if abs(ahead[1]) > 0.9 else [0, 1, 0], "vertical_fov": FIELD}
         return {"nebel": 1, "fog": [], "camera": camera, "planet": {**planet_of(self.name), "quality": quality},
                 "sun": {"direction": [math.cos(sun), math.sin(sun), 0], "irradiance": 1}}
 
