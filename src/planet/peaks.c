@@ -110,9 +110,6 @@ void nb_peaks_add(const nb_peaks *peaks, const nb_gather_job *job, const nb_node
 /* What is off of light that peaks turn. Measured on flat haze of depths 0.1 to 4 and g up to 0.9 the most is 0.65 (test_dense_air). */
 #define TURNED_OFF 0.7
 
-/* What is off of light that peaks turn and that comes from many sides. */
-#define SPREAD_OFF 0.2
-
 nb_peak_light nb_peaks_before(const nb_peaks *peaks, const nb_peak_sums *before)
 {
     nb_peak_light sum;
@@ -134,35 +131,16 @@ nb_peak_light nb_peaks_before(const nb_peaks *peaks, const nb_peak_sums *before)
     return sum;
 }
 
-/* How much less power m is behind the end, where the turns before it do not count. */
-static double turned_before(const double powers[NB_PEAK_POWERS + 1], int m, const nb_peak_part *part, int c)
+void nb_peaks_behind(const nb_peaks *peaks, const nb_peak_sums *behind, const double ground[3], double light[3])
 {
-    double sum = 0, factor = -1;
-    if (m == NB_PEAK_POWERS) return part->turned[c] * powers[m];
-    if (part->is_start) return part->turns[c] * m * powers[m - 1];
-    for (int p = m - 1; p >= 0; p--) {
-        factor *= -part->turns[c] * (p + 1) / (m - p);
-        sum += factor * powers[p];
-    }
-    return sum;
-}
-
-nb_peak_light nb_peaks_behind(const nb_peaks *peaks, const nb_peak_sums *behind, const double ground[3],
-                              const nb_peak_part *part)
-{
-    nb_peak_light sum;
     for (int c = 0; c < 3; c++) {
-        double spread = behind->often[c] + ground[c], turned = 0, size = 0;
+        light[c] = behind->often[c] + ground[c];
         for (int k = 0; k < peaks->air_count; k++) {
-            spread += behind->ahead[k][c] * peaks->smooth[k];
-            for (int m = 1; m <= NB_PEAK_POWERS && peaks->peak[k] > 0; m++) {
-                const double light = turned_before(behind->powers[k][c], m, part, c) * peaks->turned[k][m];
-                turned += light;
-                size += fabs(light);
-            }
+            const double *powers = behind->powers[k][c];
+            light[c] += behind->ahead[k][c] * peaks->smooth[k];
+            for (int m = 1; m < NB_PEAK_POWERS && peaks->peak[k] > 0; m++)
+                light[c] += m * powers[m - 1] * peaks->turned[k][m];
+            light[c] += powers[NB_PEAK_POWERS] * peaks->turned[k][NB_PEAK_POWERS];
         }
-        sum.light[c] = part->turned[c] * spread + turned;
-        sum.missing[c] = part->turned[c] * (behind->missing[c] + SPREAD_OFF * fabs(spread)) + TURNED_OFF * size;
     }
-    return sum;
 }

@@ -25,14 +25,6 @@ typedef struct nb_peaks {
                  [NB_PEAK_POWERS + 1]; /* per power; the first is not used: light scattered once has its own */
 } nb_peaks;
 
-/* The part of a ray in front of the light behind it: an end, or the first meter. */
-typedef struct nb_peak_part {
-    int is_start;
-    double turns[3];  /* by peaks, in the mean; of the start per meter */
-    double smooth[3]; /* transmittance of smooth air */
-    double turned[3]; /* the part of what comes through smooth air that peaks turn; of the start per meter */
-} nb_peak_part;
-
 /* Orders of moments behind those that are kept of a function of Henyey and Greenstein, in units of the first of them. */
 double nb_peak_rest(double g, int orders, double cosine);
 
@@ -54,9 +46,8 @@ typedef struct nb_peak_light {
 /* What is scattered often, of the nodes before an end: light of smooth air, and sunlight that peaks turn. */
 nb_peak_light nb_peaks_before(const nb_peaks *peaks, const nb_peak_sums *before);
 
-/* What peaks turn, before an end, of light that comes from behind it: scattered by the nodes there, and sent by the ground, which has come
- * through smooth air to the ray's start. Before the end and behind it this adds up to the whole ray, wherever the end is. */
-nb_peak_light nb_peaks_behind(const nb_peaks *peaks, const nb_peak_sums *behind, const double ground[3],
-                              const nb_peak_part *part);
+/* Light that comes from behind an end, as it comes to the ray's start through smooth air: of the nodes there, turned once more, and of the
+ * ground. */
+void nb_peaks_behind(const nb_peaks *peaks, const nb_peak_sums *behind, const double ground[3], double light[3]);
 
 #endif

@@ -75,6 +75,15 @@ static int node_at(const nb_path *path, int from, double end)
 
 /* ---- light from behind an end ---------------------------------------------------------------- */
 
+/* Light that peaks turn before an end comes from behind it, from directions around the ray's. What is there may not be air: a hill, or
+ * clouds. So it is taken from the field in front of the end, which is as smooth: with the light of the very direction the horizon and a dusk
+ * would be seen through hills and clouds. `error` tells how far the light of the air behind is from that. */
+typedef struct nb_behind {
+    double turned[3];   /* of light from there, the part that peaks turn; at the start per meter */
+    double smooth[3];   /* transmittance of smooth air up to there */
+    double radiance[3]; /* of the field */
+} nb_behind;
+
 /* Of the ground, if the path ends there and not where it leaves the air, what comes to the start through smooth air. */
 static void find_ground(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path *path,
                         double way, double light[3])
@@ -91,40 +100,29 @@ static void find_ground(const nebel_atmosphere *atmosphere, nb_track track, nb_a
                    (sky[c] + fmax(0, sun) * straight[c]);
 }
 
-/* What is behind an end: light of nodes and of the ground, and about the radiance in front of it. */
-typedef struct nb_behind {
-    nb_peak_sums sums;
-    double ground[3], radiance[3];
-    int is_nothing; /* but the ground, or what is beyond the air */
-} nb_behind;
-
-/* The part of a path before an end. */
-static nb_peak_part part_before(const nb_path *path, double end)
+static nb_behind behind_end(const nb_path *path, double end, const double radiance[3])
 {
-    nb_peak_part part = {.is_start = 0};
+    nb_behind behind;
     int i = 0;
     while (i < path->ends - 1 && path->end[i] < end) i++;
     for (int c = 0; c < 3; c++) {
-        const double left = path->end_left[c][i], smooth = path->end_smooth[c][i];
-        part.turned[c] = smooth > 0 ? 1 - left / smooth : 0;
-        part.smooth[c] = smooth;
-        part.turns[c] = left > 0 ? log(smooth / left) : 0;
+        behind.smooth[c] = path->end_smooth[c][i];
+        behind.turned[c] = path->end_smooth[c][i] - path->end_left[c][i];
+        behind.radiance[c] = radiance[c];
     }
-    return part;
+    return behind;
 }
 
-/* The first meter, as if it were like the ray's start. */
-static nb_peak_part first_meter(const nb_gathering *gathering)
+static nb_behind behind_start(const nb_gathering *gathering)
 {
     const nb_path *path = gathering->job.path;
-    nb_peak_part part = {.is_start = 1};
+    nb_behind behind = {.smooth = {1, 1, 1}};
     for (int k = 0; k < gathering->peaks.air_count; k++)
         for (int c = 0; c < 3; c++)
-            part.turns[c] +=
+            behind.turned[c] +=
                 gathering->peaks.peak[k] * gathering->job.airs->airs[k].scattering[c] * path->density[k][path->count];
-    memcpy(part.turned, part.turns, sizeof part.turned);
-    for (int c = 0; c < 3; c++) part.smooth[c] = 1;
-    return part;
+    radiance_at(gathering, path->count, behind.radiance);
+    return behind;
 }
 
 /* ---- along a path ---------------------------------------------------------------------------- */
@@ -135,37 +133,42 @@ static void subtract(const nb_peak_sums *from, const nb_peak_sums *sums, nb_peak
     for (size_t i = 0; i < sizeof *rest / sizeof(double); i++) ((double *)rest)[i] = a[i] - b[i];
 }
 
-/* Behind an end may be something that hides what is behind it. That is much where a dusk stands behind clouds: for a sun this far below
- * the horizon (of its sine) light from behind counts as no brighter than all air makes it in the mean, and for one this far above it as
- * it is. */
-#define DUSK 0.05
-
-/* What of the light from behind counts; `mean` is the radiance of the field in the ray's direction. */
-static double hold_back(double sun, double light, double mean)
+static nb_gathered finish(const nb_gathering *gathering, const nb_peak_sums *before)
 {
-    const double day = fmax(0, fmin(1, 0.5 + 0.5 * sun / DUSK));
-    return light - (1 - day) * fmax(0, light - mean);
-}
-
-/* Light of the nodes before an end; part: NULL if nothing is behind it that peaks could turn. */
-static nb_gathered finish(const nb_gathering *gathering, const nb_peak_sums *before, const nb_peak_part *part,
-                          const nb_behind *behind)
-{
-    const nb_peak_light front = nb_peaks_before(&gathering->peaks, before);
-    nb_peak_light back = {{0, 0, 0}, {0, 0, 0}};
+    const nb_peak_light light = nb_peaks_before(&gathering->peaks, before);
     nb_gathered gathered;
-    if (part != NULL) back = nb_peaks_behind(&gathering->peaks, &behind->sums, behind->ground, part);
     for (int k = 0; k < NEBEL_MAX_AIRS; k++)
         for (int c = 0; c < 3; c++) gathered.once[k][c] = before->powers[k][c][0];
-    for (int c = 0; c < 3; c++) {
-        double held = back.light[c];
-        if (part != NULL && !behind->is_nothing)
-            held = hold_back(gathering->job.aspect.height_of_sun, back.light[c],
-                             part->turned[c] * part->smooth[c] * behind->radiance[c]);
-        gathered.often[c] = front.light[c] + held;
-        gathered.missing[c] = front.missing[c] + back.missing[c] + (back.light[c] - held);
-    }
+    memcpy(gathered.often, light.light, sizeof gathered.often);
+    memcpy(gathered.missing, light.missing, sizeof gathered.missing);
     return gathered;
+}
+
+/* Adds what peaks turn of light from behind an end. `sums` are those of the nodes there. */
+static void add_behind(const nb_gathering *gathering, const nb_behind *behind, const nb_peak_sums *sums,
+                       const double ground[3], nb_gathered *gathered)
+{
+    double light[3];
+    nb_peaks_behind(&gathering->peaks, sums, ground, light);
+    for (int c = 0; c < 3; c++) {
+        const double radiance = behind->smooth[c] > 0 ? light[c] / behind->smooth[c] : 0;
+        gathered->often[c] += behind->turned[c] * behind->radiance[c];
+        gathered->missing[c] += behind->turned[c] * fabs(radiance - behind->radiance[c]);
+    }
+}
+
+/* Of what peaks turn of the ground's light, what may come from beside it. */
+#define GROUND_OFF 0.2
+
+/* Adds what peaks turn of the ground's light. */
+static void add_ground(const nb_path *path, const double ground[3], nb_gathered *gathered)
+{
+    for (int c = 0; c < 3; c++) {
+        const double smooth = path->end_smooth[c][path->ends - 1], left = path->end_left[c][path->ends - 1];
+        const double turned = smooth > 0 ? (1 - left / smooth) * ground[c] : 0;
+        gathered->often[c] += turned;
+        gathered->missing[c] += GROUND_OFF * turned;
+    }
 }
 
 /* Sums up to each end. `radiance` is that of the field in front of each. */
@@ -192,8 +195,7 @@ nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, n
 {
     nb_gathering gathering;
     nb_peak_sums sums[NB_PATH_CUTS + 1], start;
-    double radiance[NB_PATH_CUTS + 1][3];
-    nb_behind behind;
+    double radiance[NB_PATH_CUTS + 1][3], ground[3];
     gathering.atmosphere = atmosphere;
     gathering.job = (nb_gather_job){.airs = &atmosphere->airs,
                                     .smooth = nb_atmosphere_smooth(atmosphere),
@@ -205,22 +207,22 @@ nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, n
     nb_gather_aim(&gathering.job);
     gathering.peaks = nb_peaks_aim(&gathering.job);
     sum_nodes(&gathering, count, ends, sums, radiance);
-    const int turns = gathering.job.smooth != NULL && path->ends > 0;
-    if (turns) find_ground(atmosphere, track, aspect, path, ends[count - 1], behind.ground);
-    for (int k = 0; k < count; k++) {
-        const nb_peak_part part = turns ? part_before(path, ends[k]) : (nb_peak_part){0};
-        subtract(&sums[count - 1], &sums[k], &behind.sums);
-        memcpy(behind.radiance, radiance[k], sizeof behind.radiance);
-        behind.is_nothing = k + 1 == count;
-        gathered[k] = finish(&gathering, &sums[k], turns ? &part : NULL, &behind);
-    }
-    const nb_peak_part part = first_meter(&gathering);
     memset(&start, 0, sizeof start);
     gather_nodes(&gathering, path->count, path->count + 1, &start);
-    radiance_at(&gathering, path->count, behind.radiance);
-    behind.sums = sums[count - 1];
-    behind.is_nothing = 0;
-    return finish(&gathering, &start, turns ? &part : NULL, &behind);
+    nb_gathered first = finish(&gathering, &start);
+    for (int k = 0; k < count; k++) gathered[k] = finish(&gathering, &sums[k]);
+    if (gathering.job.smooth == NULL || path->ends == 0) return first;
+    find_ground(atmosphere, track, aspect, path, ends[count - 1], ground);
+    for (int k = 0; k + 1 < count; k++) {
+        const nb_behind behind = behind_end(path, ends[k], radiance[k]);
+        nb_peak_sums rest;
+        subtract(&sums[count - 1], &sums[k], &rest);
+        add_behind(&gathering, &behind, &rest, ground, &gathered[k]);
+    }
+    add_ground(path, ground, &gathered[count - 1]);
+    const nb_behind behind = behind_start(&gathering);
+    add_behind(&gathering, &behind, &sums[count - 1], ground, &first);
+    return first;
 }
 
 nb_gathered nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, nb_track track, nb_aspect aspect,
