@@ -983,6 +983,35 @@ class InfoTest(PictureCase):
             self.assertIn(line + "\n", done.out)
         self.assertNotIn("warning", done.out)
 
+    def test_cameras_lights_particles_and_cells(self):
+        """Each kind of entry that a scene may have has its line."""
+        place = {"position": [0, 0, 6], "look_at": [0, 0, 0]}
+        sky = {"type": "gradient", "zenith": [0.1, 0.2, 0.3], "horizon": 0.5, "ground": 0}
+        keys = [{"frame": 2}, {"frame": 12, "position": [0, 1, 6]}]
+        rooms = [{"shape": {"type": "box", "min": [x, -2, -2], "max": [x + 2, 2, 2]}, "density": x + 2, "name": f"room{x}"}
+                 for x in (-2, 0)]
+        door = {"cells": ["room-2", "room0"], "polygon": [[0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]]}
+        self.assert_done(nebel("render", self.scene, "-o", self.folder / "sky.exr", "-s", "8x4", "-q"))
+        scenes = (({"camera": {**place, "projection": "orthographic", "view_height": 7, "turntable": {"frames": 9}}},
+                   ["camera: at 0 0 6, towards 0 0 0, orthographic, view height 7 m", "motion: once around in 9 frames"]),
+                  ({"camera": {**place, "projection": "panorama", "keys": keys}, "ambient": sky, "background": "ambient"},
+                   ["camera: at 0 0 6, towards 0 0 0, panorama", "motion: 2 keys, frames 2 to 12", "background: ambient",
+                    "ambient: gradient, zenith 0.1 0.2 0.3, horizon 0.5 0.5 0.5, ground 0 0 0"]),
+                  ({"ambient": {"type": "environment", "file": "sky.exr", "rotation": 90, "intensity": 2},
+                    "sun": {"direction": [0, 1, 0], "irradiance": 1, "keys": [{"frame": 1}, {"frame": 3, "direction": [1, 1, 0]}]}},
+                   ["sun: 2 keys, frames 1 to 3"]),
+                  ({"nebula": [{"points": {"file": "triangle.obj"}, "size": [0.4, 0.5], "emission": 1},
+                               {"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 2}, "count": 12, "size": [0.4, 0.5], "emission": 1}]},
+                   ["nebula: 3 particles at the vertices of a model", "nebula: 12 particles in a shape of type sphere"]),
+                  ({"cells": {"cells": rooms, "portals": [door]}}, ["cells: 2, 1 of them with fog, 1 portal"]))
+        for entries, lines in scenes:
+            done = nebel("info", self.write_scene("all.json", [], **entries))
+            self.assert_done(done)
+            for line in lines:
+                self.assertIn(line + "\n", done.out)
+            if "ambient" in entries and "file" in entries["ambient"]:
+                self.assertRegex(done.out, r"(?m)^ambient: environment .*sky\.exr, rotation 90 degrees, intensity 2$")
+
     def test_visibility_from_the_camera(self):
         scene = self.write_scene("clear.json", [{"shape": {"type": "world"}, "visibility": 60, "source": 1}])
         self.assertIn("visibility: 60 m", nebel("info", scene).out)

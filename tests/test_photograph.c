@@ -342,6 +342,57 @@ static void test_airlight_of_any_size_is_found(void **state)
     }
 }
 
+/* What is asked for must fit the format, and the picture must hold single numbers. */
+static void test_depth_that_is_no_depth(void **state)
+{
+    (void)state;
+    static const float values[4] = {.1f, .2f, .3f, .4f};
+    static uint16_t color[12] = {1, 2, 3};
+    static const struct {
+        nebel_depth_source source;
+        nebel_result result;
+    } cases[] = {{{.format = "kitti"}, NEBEL_OK},
+                 {{.scale = .5}, NEBEL_OK},
+                 {{.format = "paper"}, NEBEL_ERROR_ARGUMENT},
+                 {{.scale = -1}, NEBEL_ERROR_ARGUMENT},
+                 {{.scale = 1e10}, NEBEL_ERROR_ARGUMENT},
+                 {{.format = "kitti", .scale = 2}, NEBEL_ERROR_ARGUMENT},
+                 {{.format = "cityscapes", .measure = NEBEL_MEASURE_RADIAL}, NEBEL_ERROR_ARGUMENT}};
+    const nebel_scene_desc desc = {.log = {NULL, NULL}};
+    const char *const path = in_folder("out.png");
+    nebel_depth_map map;
+    assert_int_equal(nebel_write_gray(path, &desc, 2, 2, values, NULL), NEBEL_OK);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        assert_int_equal(nebel_read_depth(path, &cases[i].source, &desc, &map), cases[i].result);
+        nebel_free_depth(&desc, &map);
+    }
+    const nebel_photograph photograph = {2, 2, NEBEL_PIXEL_RGB16, (unsigned char *)color};
+    assert_int_equal(nebel_write_photograph(path, &desc, &photograph, NULL), NEBEL_OK);
+    assert_int_equal(nebel_read_depth(path, &cases[0].source, &desc, &map), NEBEL_ERROR_UNSUPPORTED);
+}
+
+/* Light above 1 is no less than stored color; a number that is none has no light. */
+static void test_airlight_of_light_is_that_of_the_haze(void **state)
+{
+    (void)state;
+    enum { ACROSS = 48, DOWN = 32 };
+    static float light[4 * ACROSS * DOWN];
+    static const float haze[3] = {4.5f, 3.75f, 3.25f};
+    const nebel_scene_desc desc = {.log = {NULL, NULL}};
+    nebel_photograph photograph = {ACROSS, DOWN, NEBEL_PIXEL_RGBA_FLOAT, (unsigned char *)light};
+    double airlight[3];
+    for (int i = 0; i < ACROSS * DOWN; i++)
+        for (int c = 0; c < 3; c++)
+            light[4 * i + c] = i % ACROSS >= 20 && i / ACROSS < 24 ? haze[c] : .01f * (float)roll(300);
+    light[0] = NAN;
+    assert_int_equal(nebel_estimate_airlight(&desc, &photograph, airlight), NEBEL_OK);
+    for (int c = 0; c < 3; c++) assert_true((float)airlight[c] == haze[c]);
+    photograph.type = NEBEL_PIXEL_RGBA_HALF;
+    assert_int_equal(nebel_estimate_airlight(&desc, &photograph, airlight), NEBEL_ERROR_ARGUMENT);
+    photograph = (nebel_photograph){ACROSS, 0, NEBEL_PIXEL_RGBA_FLOAT, (unsigned char *)light};
+    assert_int_equal(nebel_estimate_airlight(&desc, &photograph, airlight), NEBEL_ERROR_ARGUMENT);
+}
+
 /* ---- rays ------------------------------------------------------------------------------------ */
 
 static void test_cameras_look_through_their_pixels(void **state)
@@ -374,7 +425,9 @@ int main(void)
         cmocka_unit_test(test_every_kind_of_camera_file),
         cmocka_unit_test(test_every_failing_allocation_is_survived),
         cmocka_unit_test(test_damaged_files_are_errors_or_pictures),
+        cmocka_unit_test(test_depth_that_is_no_depth),
         cmocka_unit_test(test_airlight_of_any_size_is_found),
+        cmocka_unit_test(test_airlight_of_light_is_that_of_the_haze),
         cmocka_unit_test(test_cameras_look_through_their_pixels),
     };
     return cmocka_run_group_tests(tests, make_files, remove_files);
