@@ -88,14 +88,16 @@ static void render_demo(const nebel_scene *scene, const nebel_camera *camera, pi
 
 static void check_demo(const nebel_scene *scene, const char *name)
 {
-    picture_pair pair = picture_make(DEMO_WIDTH, DEMO_HEIGHT);
+    /* Each pixel of this cloud walks through dense noise, over and over: a quarter of them shows the same. */
+    const uint32_t coarse = strcmp(name, "cloud.json") == 0 ? 2 : 1, width = DEMO_WIDTH / coarse;
+    picture_pair pair = picture_make(width, DEMO_HEIGHT / coarse);
     const nebel_scene_data *const data = nebel_scene_contents(scene);
     render_demo(scene, &data->camera, &pair);
     const picture_difference d = check(name, &pair);
     expect_sameness(&d);
     assert_int_equal(pair.messages, 0);                /* no ray had more loops than the driver allows to all passes */
     if (data->volume_count + data->particle_count > 0) /* else the scene shows factors alone */
-        assert_true(d.fogged > DEMO_WIDTH * DEMO_HEIGHT / 16);
+        assert_true(d.fogged > width * pair.height / 16);
     assert_true(d.color < .02);
     expect_same_light(&pair, 0);
     picture_free(&pair);
