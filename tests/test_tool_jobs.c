@@ -99,6 +99,51 @@ static void test_progress_counts_what_there_was_to_do(void **state)
     assert_int_equal(all, 6);
 }
 
+static int is_third(void *user, uint64_t item)
+{
+    *(uint64_t *)user += 1;
+    return item % 3 == 0;
+}
+
+static int is_late(void *user, uint64_t item)
+{
+    *(uint64_t *)user += 1;
+    return item >= 40;
+}
+
+/* What will be found there later is no work, unless what was found so far was no good. */
+static void test_progress_counts_what_is_there_ahead(void **state)
+{
+    (void)state;
+    nb_jobs_is_there_fn *const finds[] = {is_third, is_late};
+    for (int k = 0; k < 2; k++)
+        for (int is_good = 0; is_good < 2; is_good++) {
+            nb_jobs jobs = nb_jobs_of(&(nb_shard){0});
+            uint64_t item, done, all, asked = 0;
+            nb_jobs_survey(&jobs, 120, finds[k], &asked);
+            assert_int_equal(asked, 120);
+            assert_int_equal(nb_jobs_begin(&jobs, 120, 1, 0, ""), 0);
+            (void)nb_jobs_share(&jobs, 0, &done, &all);
+            assert_int_equal(all, k == 0 ? 80 : 40);
+            while (nb_jobs_take(&jobs, &item)) {
+                const int is_there = finds[k](&asked, item);
+                if (is_there && !is_good) nb_jobs_note_replaced(&jobs);
+                (void)nb_jobs_finish(&jobs, item, is_there && is_good);
+                (void)nb_jobs_share(&jobs, 0, &done, &all);
+                const int is_known = is_good || k == 0 || item >= 40;
+                if (is_known) assert_int_equal(all, !is_good ? 120 : k == 0 ? 80 : 40);
+            }
+            assert_int_equal(done, all);
+        }
+    nb_jobs shard = nb_jobs_of(&(nb_shard){1, 3});
+    uint64_t asked = 0, done, all;
+    nb_jobs_survey(&shard, 120, is_late, &asked);
+    assert_int_equal(asked, 40);
+    assert_int_equal(nb_jobs_begin(&shard, 120, 1, 0, ""), 0);
+    (void)nb_jobs_share(&shard, 0, &done, &all);
+    assert_int_equal(all, 13); /* 1, 4 ... 37 */
+}
+
 static int compare_doubles(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
@@ -130,6 +175,7 @@ int main(void)
         cmocka_unit_test(test_files_are_their_bytes_and_their_size),
         cmocka_unit_test(test_shards_share_all_items),
         cmocka_unit_test(test_progress_counts_what_there_was_to_do),
+        cmocka_unit_test(test_progress_counts_what_is_there_ahead),
         cmocka_unit_test(test_times_divide_the_span),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -102,6 +102,7 @@ static int take_next(crew *all, uint64_t *item)
 static void count_done(crew *all, uint64_t item, const nb_fog_tale *tale)
 {
     (void)nb_jobs_finish(&all->jobs, item, tale->is_kept);
+    if (tale->has_replaced) nb_jobs_note_replaced(&all->jobs);
     all->jobs.sums[PIXELS] += tale->pixels;
     all->jobs.sums[UNKNOWN] += tale->unknown;
     all->jobs.sums[INFINITE] += tale->infinite;
@@ -242,6 +243,12 @@ static int sign(crew *all)
     return NB_DONE;
 }
 
+static int is_there(void *user, uint64_t item)
+{
+    const crew *const all = user;
+    return nb_fog_names_are_made(&all->list.files[item]);
+}
+
 /* What all processes need, and whether they agree on what that is. */
 static int prepare(crew *all)
 {
@@ -251,6 +258,8 @@ static int prepare(crew *all)
     status = nb_fog_list_copy_first(&all->jobs, status, &all->list);
     if (status == NB_DONE) status = sign(all);
     if (all->shared.start != NULL) nb_fog_record_name_job(&all->start, all->shared.wanted, name);
+    if (status == NB_DONE && all->shared.wanted->resume && !all->shared.wanted->quiet)
+        nb_jobs_survey(&all->jobs, all->list.count, is_there, all);
     return nb_jobs_begin(&all->jobs, all->list.count, 1, status, name);
 }
 

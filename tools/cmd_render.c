@@ -389,8 +389,10 @@ static int do_item(studio *all, uint64_t number)
 {
     all->item = nb_render_out_item(&all->out, number);
     const int is_there = nb_render_out_has(&all->out, &all->item);
+    const int has_replaced = !is_there && all->wanted->resume && nb_render_out_is_made(&all->out, number);
     const int status = is_there ? NB_DONE : make_item(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
+    if (has_replaced) nb_jobs_note_replaced(&all->jobs);
     return nb_jobs_finish(&all->jobs, number, is_there) ? nb_render_out_join(&all->out, &all->item) : NB_DONE;
 }
 
@@ -650,6 +652,12 @@ static void summarize(const studio *all, double seconds)
                       wanted->samples > 1 ? "s" : "", span);
 }
 
+static int is_made(void *user, uint64_t item)
+{
+    const studio *const all = user;
+    return nb_render_out_is_made(&all->out, item);
+}
+
 /* Before the items: what all processes need, and whether they agree on what that is. */
 static int prepare(studio *all)
 {
@@ -661,6 +669,8 @@ static int prepare(studio *all)
         status = nb_render_out_sign(&all->out, nebel_scene_contents(all->loaded.scene));
     if (nb_interrupt_is_requested()) return status;
     nb_render_out_name_job(&all->out, name);
+    if (status == NB_DONE && all->wanted->resume && !all->wanted->quiet)
+        nb_jobs_survey(&all->jobs, nb_render_out_count_items(&all->out), is_made, all);
     return nb_jobs_begin(&all->jobs, nb_render_out_count_items(&all->out), nb_render_out_group(&all->out), status,
                          name);
 }

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 enum { MOST_STARS = 8 };
 
@@ -69,6 +70,12 @@ char **nb_fog_names_of(nb_fog_files *files, int i)
 void nb_fog_names_free_one(nb_fog_files *files)
 {
     for (int i = 0; i < NB_FOG_NAMES; i++) free(*nb_fog_names_of(files, i));
+}
+
+int nb_fog_names_are_made(const nb_fog_files *files)
+{
+    return access(files->output, F_OK) == 0 &&
+           (files->transmittance == NULL || access(files->transmittance, F_OK) == 0);
 }
 
 void nb_fog_names_free(nb_fog_list *list)

@@ -44,6 +44,9 @@ int nb_fog_names_list(const nb_fog_patterns *patterns, const char *scene, const 
 /* What there is to say of a refused result, by its name. */
 #define NB_FOG_REFUSAL "cannot write \"%s\": it is one of the files that are read; name another file"
 
+/* Whether there is something by the names of all results. */
+int nb_fog_names_are_made(const nb_fog_files *files);
+
 /* Fine with what a failed call left. */
 void nb_fog_names_free(nb_fog_list *list);
 

@@ -331,6 +331,7 @@ static void find_needs(work *w)
     if (w->needs_transmittance)
         w->needs_transmittance = !nb_record_is_in(files->transmittance, w->records.transmittance);
     w->tale->is_kept = !w->needs_picture && !w->needs_transmittance;
+    w->tale->has_replaced = !w->tale->is_kept && nb_fog_names_are_made(files);
 }
 
 /* ---- all of it ------------------------------------------------------------------------------- */

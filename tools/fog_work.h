@@ -23,6 +23,7 @@ typedef struct nb_fog_tale {
     size_t pixels, unknown, infinite; /* the latter two of the pixels */
     double airlight[3];               /* as the picture stores it */
     int is_kept;                      /* all was there already, and nothing was done */
+    int has_replaced;                 /* all was there already, but not made from the same */
     int cannot_write;                 /* why it has failed */
 } nb_fog_tale;
 

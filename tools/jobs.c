@@ -116,6 +116,12 @@ int nb_jobs_finish(nb_jobs *jobs, uint64_t item, int is_kept)
     return nb_ranks_add(NB_RANKS_FIRST_GROUP + group, 1) + 1 == size;
 }
 
+void nb_jobs_note_replaced(nb_jobs *jobs)
+{
+    jobs->replaced++;
+    if (jobs->is_joined) (void)nb_ranks_add(NB_RANKS_REPLACED, 1);
+}
+
 void nb_jobs_fail(nb_jobs *jobs)
 {
     jobs->failed++;
@@ -130,6 +136,7 @@ void nb_jobs_answer(const nb_jobs *jobs)
 static void sum_up(nb_jobs *jobs)
 {
     jobs->all_made = jobs->is_joined ? nb_ranks_add(NB_RANKS_MADE, 0) : jobs->made;
+    jobs->all_replaced = jobs->is_joined ? nb_ranks_add(NB_RANKS_REPLACED, 0) : jobs->replaced;
     jobs->all_kept = jobs->is_joined ? nb_ranks_add(NB_RANKS_KEPT, 0) : jobs->kept;
     jobs->all_failed = jobs->is_joined ? nb_ranks_add(NB_RANKS_FAILED, 0) : jobs->failed;
 }
@@ -146,12 +153,31 @@ uint64_t nb_jobs_even_share(const nb_jobs *jobs)
     return (count_own(jobs) + processes - 1) / processes;
 }
 
+void nb_jobs_survey(nb_jobs *jobs, uint64_t count, nb_jobs_is_there_fn *is_there, void *user)
+{
+    jobs->found = 0;
+    for (uint64_t item = jobs->shard.number; item < count; item += step_of(jobs))
+        jobs->found += is_there(user, item) != 0;
+}
+
+/* How many of the items that are not reached yet will be kept. */
+static uint64_t expect_kept(const nb_jobs *jobs, uint64_t count)
+{
+    const uint64_t judged = jobs->all_kept + jobs->all_replaced,
+                   seen = jobs->all_made + jobs->all_kept + jobs->all_failed;
+    if (jobs->found <= judged || seen >= count) return 0;
+    const uint64_t found = jobs->found - judged, left = count - seen;
+    const double good = judged > 0 ? (double)jobs->all_kept / (double)judged : 1;
+    const uint64_t kept = (uint64_t)(good * (double)found + 0.5);
+    return kept < left ? kept : left;
+}
+
 double nb_jobs_share(nb_jobs *jobs, double of_item, uint64_t *done, uint64_t *all)
 {
     sum_up(jobs);
     const uint64_t count = jobs->is_joined ? jobs->count : count_own(jobs);
     *done = jobs->all_made + jobs->all_failed;
-    *all = count - jobs->all_kept;
+    *all = count - jobs->all_kept - expect_kept(jobs, count);
     return *all > 0 ? ((double)*done + of_item) / (double)*all : 1;
 }
 

@@ -51,7 +51,9 @@ typedef struct nb_jobs {
     uint64_t count, group;
     uint64_t next;               /* of its own, where it has not joined */
     uint64_t made, kept, failed; /* by it; kept are those that were there already */
-    uint64_t all_made, all_kept, all_failed;
+    uint64_t replaced;           /* of those made, where something was there that could not be kept */
+    uint64_t all_made, all_replaced, all_kept, all_failed;
+    uint64_t found;              /* before the work: items of which something was there, good or not */
     uint64_t sums[NB_JOBS_SUMS]; /* its own, until nb_jobs_end makes them those of all */
 } nb_jobs;
 
@@ -72,6 +74,11 @@ int nb_jobs_are_shared(const nb_jobs *jobs);
  * not have the same. */
 int nb_jobs_begin(nb_jobs *jobs, uint64_t count, uint64_t group, int status, const char *same);
 
+/* With --resume, before nb_jobs_begin, by the process that shows how far the work is: looks which of the `count` items it counts have
+ * something there. So the time left counts what need not be done before it is reached. */
+typedef int nb_jobs_is_there_fn(void *user, uint64_t item);
+void nb_jobs_survey(nb_jobs *jobs, uint64_t count, nb_jobs_is_there_fn *is_there, void *user);
+
 /* A note where srun started several of these processes and none knows of the others: each does the whole work. */
 void nb_jobs_note_copies(const nb_jobs *jobs);
 
@@ -85,6 +92,9 @@ int nb_jobs_take(nb_jobs *jobs, uint64_t *item);
  * told so, when all items are done; a shard, when its own are. */
 int nb_jobs_finish(nb_jobs *jobs, uint64_t item, int is_kept);
 
+/* An item that was made has replaced something. */
+void nb_jobs_note_replaced(nb_jobs *jobs);
+
 /* An item could not be done, and the process goes on with others. */
 void nb_jobs_fail(nb_jobs *jobs);
 
@@ -92,7 +102,8 @@ void nb_jobs_fail(nb_jobs *jobs);
 void nb_jobs_answer(const nb_jobs *jobs);
 
 /* The share, 0 to 1, that is done of what there was to do, with that of the item in work; how many items are done,
- * and of how many. Those that failed are done, those that were there already do not count. Of all processes that joined. */
+ * and of how many. Those that failed are done, those that were there already do not count; as many of those that are not reached yet
+ * as the survey found, in the ratio of those that were good so far. Of all processes that joined. */
 double nb_jobs_share(nb_jobs *jobs, double of_item, uint64_t *done, uint64_t *all);
 
 /* Shows it: "frame 3 of 96", where there are several. */

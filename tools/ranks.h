@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 /* What shares the work of a job. Behind them stands one counter for each group of items. */
-enum { NB_RANKS_NEXT, NB_RANKS_MADE, NB_RANKS_KEPT, NB_RANKS_FAILED, NB_RANKS_FIRST_GROUP };
+enum { NB_RANKS_NEXT, NB_RANKS_MADE, NB_RANKS_REPLACED, NB_RANKS_KEPT, NB_RANKS_FAILED, NB_RANKS_FIRST_GROUP };
 
 /* The library of MPI, "Open MPI 4.1.4"; NULL: this build has none. */
 const char *nb_ranks_library(void);

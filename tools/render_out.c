@@ -12,6 +12,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 /* Pixels of a band where nobody says how many rows it has: a few megabytes, and seconds of work. */
 enum { BAND_PIXELS = 1 << 18 };
@@ -280,6 +281,22 @@ int nb_render_out_has(nb_render_out *out, const nb_render_item *item)
     }
     free(name);
     return has;
+}
+
+int nb_render_out_is_made(const nb_render_out *out, uint64_t item)
+{
+    group of = {out, first_of(out, item)};
+    const uint32_t frame = nb_render_out_item(out, item).frame;
+    char *const name = name_picture(out->wanted, frame);
+    int is_made = name != NULL && access(name, F_OK) == 0;
+    if (name != NULL && !is_made && out->part_count > 0) {
+        const nb_parts parts = parts_of(&of, name);
+        char *const part = nb_parts_name(&parts, (uint32_t)(item - of.first));
+        is_made = part != NULL && access(part, F_OK) == 0;
+        free(part);
+    }
+    free(name);
+    return is_made;
 }
 
 /* ---- writing --------------------------------------------------------------------------------- */

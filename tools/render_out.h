@@ -55,6 +55,9 @@ void nb_render_out_name_job(const nb_render_out *out, char name[NEBEL_MAX_RECORD
 /* Whether an item is there already, made from the same; never without --resume. */
 int nb_render_out_has(nb_render_out *out, const nb_render_item *item);
 
+/* Whether something is there by the name of an item or of its file, good or not. */
+int nb_render_out_is_made(const nb_render_out *out, uint64_t item);
+
 /* Writes an item. `image` is as large as its window. */
 int nb_render_out_write(nb_render_out *out, const nb_render_item *item, const nebel_image *image);
 
