@@ -378,7 +378,9 @@ class FogRanksTest(FogCase, RanksCase):
                     self.assertEqual(status, 0, seen)
                     self.assertEqual(self.contents(name), expected)
                     self.assertEqual(seen.count(f": {COUNT} pictures, "), 1, f"one summary: {seen}")
-                    self.assertEqual(seen.count("depth: 0.1 % unknown, filled in; 0.0 % without end; ") + seen.count("\n"), 3, seen)
+                    lines = [line for line in seen.splitlines() if not re.match(r"nebel: picture \d of \d, ", line)]  # on a busy machine
+                    self.assertEqual(len(lines), 2, seen)
+                    self.assertIn("depth: 0.1 % unknown, filled in; 0.0 % without end; ", lines[1])
 
     def test_the_first_rank_reports_for_all(self):
         """In a log: lines, the first after two seconds. What is stopped then has whole pictures."""
