@@ -15,10 +15,13 @@ from check_cli import FOG, nebel
 from view_case import LEAVING, ROUNDING, WAIT, Manager, Viewer, ViewTest
 
 
+FULL = ("--size", "560x420")
+
+
 class PicturesTest(ViewTest):
     def test_the_picture_is_that_of_render(self):
-        self.assert_done(self.render("render.png", "--device", "gl", "--size", "560x420"))
-        viewer = Viewer(self)
+        self.assert_done(self.render("render.png", "--device", "gl", *FULL))
+        viewer = Viewer(self, *FULL)
         picture = viewer.take_picture()
         self.assertTrue(self.same(picture, self.folder / "render.png", ROUNDING))
         compared = nebel("compare", picture, self.folder / "render.png").out
@@ -31,11 +34,11 @@ class PicturesTest(ViewTest):
         self.assertIn("need a file each", done.err)
 
     def test_screenshot_of_the_window(self):
-        done = nebel("view", self.scene, "--size", "560x420", "--screenshot", "window.png", cwd=self.folder,
+        done = nebel("view", self.scene, *FULL, "--screenshot", "window.png", cwd=self.folder,
                      env={"DISPLAY": self.screen.name})
         self.assert_done(done)
         self.assertEqual(done.err, "")
-        self.assert_done(self.render("render.png", "--device", "gl", "--size", "560x420"))
+        self.assert_done(self.render("render.png", "--device", "gl", *FULL))
         self.assertFalse(self.same(self.folder / "window.png", self.folder / "render.png", ROUNDING))
 
     def test_what_goes_wrong_at_the_start(self):
@@ -50,13 +53,13 @@ class CameraTest(ViewTest):
     def test_mouse_keys_and_home(self):
         viewer = Viewer(self)
         first = viewer.take_picture()
-        viewer.drag(400, 300, 450, 280)
+        viewer.drag(200, 150, 225, 140)
         turned = viewer.take_picture()
         self.assertFalse(self.same(first, turned, ROUNDING), "a drag turns")
         viewer.key("Home")
         self.assertTrue(self.same(first, viewer.take_picture(), ROUNDING), "Home brings the camera back")
-        ways = {"pan": lambda: viewer.drag(400, 300, 450, 280, 2), "look": lambda: viewer.drag(400, 300, 450, 280, 3),
-                "wheel": lambda: viewer.xdotool("mousemove", "--window", viewer.window, 400, 300, "click", 4),
+        ways = {"pan": lambda: viewer.drag(200, 150, 225, 140, 2), "look": lambda: viewer.drag(200, 150, 225, 140, 3),
+                "wheel": lambda: viewer.xdotool("mousemove", "--window", viewer.window, 200, 150, "click", 4),
                 "fly": lambda: viewer.xdotool("keydown", "w", "sleep", 0.2, "keyup", "w")}
         for name, act in ways.items():
             with self.subTest(name):
@@ -71,7 +74,7 @@ class CameraTest(ViewTest):
         """The wheel goes as far back as forth, while the viewer can take nothing."""
         viewer = Viewer(self)
         first = viewer.take_picture()
-        viewer.xdotool("mousemove", "--window", viewer.window, 500, 300)
+        viewer.xdotool("mousemove", "--window", viewer.window, 250, 150)
         viewer.settle()
         for buttons in ((4,), (5,), (5, 4)):
             viewer.process.send_signal(signal.SIGSTOP)
@@ -138,13 +141,13 @@ class DriverTest(ViewTest):
 
 class SizeTest(ViewTest):
     def test_controls_are_as_large_as_wanted(self):
-        viewer = Viewer(self)
+        viewer = Viewer(self, *FULL)
         small = viewer.place("Save")
         viewer.end()
         for wanted, dpi, words in ((2, 96, ["--ui-scale", 2]), (2, 192, []), (1.5, 144, []), (1, 192, ["--ui-scale", 1])):
             with self.subTest(dpi=dpi, words=words):
                 self.screen.set_dpi(dpi)
-                viewer = Viewer(self, *words)
+                viewer = Viewer(self, *FULL, *words)
                 large = viewer.place("Save")
                 self.assertAlmostEqual(large[3] / small[3], wanted, delta=0.1 * wanted)
                 self.assertAlmostEqual(large[2] / small[2], wanted, delta=0.1 * wanted)
@@ -185,9 +188,9 @@ class SizeTest(ViewTest):
 class CompareTest(ViewTest):
     def test_both_renderers_draw_the_same(self):
         black = self.write_scene("black.json", [])
-        self.assert_done(nebel("render", black, "-o", "black.png", "--size", "560x420", cwd=self.folder))
+        self.assert_done(nebel("render", black, "-o", "black.png", *FULL, cwd=self.folder))
         black = self.folder / "black.png"
-        viewer = Viewer(self)
+        viewer = Viewer(self, *FULL)
         for plane in (1, 2, 3, 4):
             with self.subTest(plane=plane):
                 viewer.key(plane)

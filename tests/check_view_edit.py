@@ -15,6 +15,10 @@ from view_case import LEAVING, ROUNDING, Viewer, ViewTest
 # sqrt(0.05) / 255 in the mean square; the light does not matter.
 ROUNDING_TOGETHER = 0.001
 
+# A tall window with controls of half the size, which are all seen: drawing takes a quarter of the time.
+TALL = "200x450"
+SMALL_CONTROLS = ("--ui-scale", 0.5)
+
 # Where a surface cuts a ball, a disc is there as a whole or not at all. In its middle particles of this absorption hide nearly all:
 # from nothing to half of that is a quarter of the range at least, in the sRGB of a PNG.
 HALF_A_DISC = 0.05
@@ -86,7 +90,7 @@ class FogTest(ViewTest):
         viewer.end()
 
     def test_why_nothing_is_saved(self):
-        viewer = Viewer(self, "--size", "400x900")
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
         good = self.scene.read_text()
         viewer.say("scene.json:1:", lambda: self.scene.write_text("{"))
         viewer.say("view: nothing is saved", lambda: viewer.key("ctrl+s"))
@@ -104,7 +108,7 @@ class FogTest(ViewTest):
         viewer.end()
 
     def test_small_numbers_keep_their_digits(self):
-        viewer = Viewer(self, "--size", "400x900")
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
         for colour, typed in enumerate(("2.996e-05", "1.2345e-05", "1.5e-05")):
             viewer.type("fog[0].extinction", typed, 0.1 + 0.2 * colour)
         self.assertEqual(viewer.save()["fog"][0]["extinction"], [2.996e-05, 1.2345e-05, 1.5e-05])
@@ -113,7 +117,7 @@ class FogTest(ViewTest):
     def test_the_file_changes(self):
         viewer = Viewer(self)
         first = viewer.take_picture()
-        viewer.drag(400, 300, 450, 280)
+        viewer.drag(200, 150, 225, 140)
         turned = viewer.take_picture()
         again = f"view: read {self.scene} again"
         viewer.say(again, lambda: self.scene.write_text(self.scene.read_text() + " "))
@@ -137,7 +141,7 @@ class FogTest(ViewTest):
 
 class EditTest(ViewTest):
     def test_volumes_come_go_and_come_back(self):
-        viewer = Viewer(self, "--size", "400x900")
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
         first = self.scene.read_text()
         viewer.press("fog[0].Duplicate")
         viewer.press("fog[0].open")
@@ -158,7 +162,7 @@ class EditTest(ViewTest):
         viewer.end()
 
     def draw_tall(self, name, *words):
-        self.assert_done(self.render(name, "--device", "gl", "--size", "400x900", *words))
+        self.assert_done(self.render(name, "--device", "gl", "--size", TALL, *words))
         return self.folder / name
 
     def test_parts_planes_and_what_has_no_number(self):
@@ -166,7 +170,7 @@ class EditTest(ViewTest):
         shape = {"type": "union", "shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 2},
                                              {"type": "convex", "planes": planes}]}
         self.scene = self.write_scene("scene.json", [{"shape": shape, "visibility": 8, "cutoff": 90, "source": 0.5}])
-        viewer = Viewer(self, "--size", "400x900")
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
         viewer.type("fog[0].parts[0].radius", "1.5")
         viewer.press("fog[0].parts[0].open")
         viewer.type("fog[0].parts[1].planes[1].distance", "3")
@@ -193,6 +197,35 @@ class EditTest(ViewTest):
             self.assertAlmostEqual(is_now, wanted)
         viewer.end()
 
+    def test_shapes_and_densities_become_others(self):
+        """With numbers of their own, so that the file can be read again."""
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
+        for name in ("half space", "ellipsoid", "cylinder", "capsule", "cone", "sphere"):
+            viewer.choose("fog[0].shape", name)
+            self.assertEqual(viewer.save()["fog"][0]["shape"]["type"], name.replace(" ", "_"))
+        for name in ("height", "linear", "radial", "gaussian", "soft edge"):
+            viewer.choose("fog[0].density", name)
+            self.assertEqual(viewer.save()["fog"][0]["density"]["type"], name.replace(" ", "_"))
+        self.assert_done(nebel("info", self.scene))
+        viewer.end()
+
+    def test_planes_and_parts_come_and_go(self):
+        parts = [{"type": "sphere", "center": [0, 0, 0], "radius": 2}, {"type": "convex", "planes": [[1, 0, 0, 2], [0, 1, 0, 2]]}]
+        self.scene = self.write_scene("scene.json", [{**FOG, "shape": {"type": "union", "shapes": parts}}])
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
+        viewer.press("fog[0].parts[0].open")
+        viewer.press("fog[0].parts[1].Add a plane")
+        viewer.press("fog[0].parts[1].planes[0].x")
+        self.assertEqual(viewer.save()["fog"][0]["shape"]["shapes"][1]["planes"], [[0, 1, 0, 2], [0, -1, 0, 3]])
+        viewer.press("fog[0].parts[1].open")
+        viewer.press("fog[0].Add a part")
+        viewer.press("fog[0].parts[0].open")
+        viewer.press("fog[0].parts[0].Remove this part")
+        shapes = viewer.save()["fog"][0]["shape"]["shapes"]
+        self.assertEqual([shape["type"] for shape in shapes], ["convex", "convex"])
+        self.assertEqual(shapes[0], shapes[1])
+        viewer.end()
+
     def test_nebulae_cells_and_the_files_of_a_scene(self):
         cell = {"name": "room", "shape": {"type": "box", "min": [-2, -2, -2], "max": [-1, 2, 2]}, "density": 0.5, "color": 0.2}
         nebula = {"name": "dust", "shape": {"type": "sphere", "center": [0, 0, -3], "radius": 2}, "count": 12,
@@ -200,7 +233,7 @@ class EditTest(ViewTest):
         self.scene = self.write_scene("scene.json", [FOG], models=[{"file": "triangle.obj"}], nebula=[nebula],
                                       camera={"position": [0, 0, 6], "look_at": [0, 0, 0]}, max_opacity=0.4, ambient=1,
                                       sun={"direction": [0, 0, 1], "irradiance": 3}, cells={"cells": [cell]})
-        viewer = Viewer(self, "--size", "400x740")
+        viewer = Viewer(self, "--size", "200x370", *SMALL_CONTROLS)
         viewer.type("samples", "1")
         balls = viewer.take_picture()
         self.assertTrue(self.same(balls, self.draw_small("balls.png"), ROUNDING), "the limit of all fog counts, too")
@@ -228,7 +261,7 @@ class EditTest(ViewTest):
         viewer.end()
 
     def draw_small(self, name, *words):
-        self.assert_done(self.render(name, "--device", "gl", "--size", "400x740", "--samples", 1, *words))
+        self.assert_done(self.render(name, "--device", "gl", "--size", "200x370", "--samples", 1, *words))
         return self.folder / name
 
     def test_a_file_that_somebody_else_has_changed(self):
@@ -250,11 +283,11 @@ class KeysTest(ViewTest):
     """Fog that moves."""
 
     def draw_at(self, name, frame):
-        self.assert_done(self.render(name, "--device", "gl", "--size", "400x900", "--samples", 1, "--frame", frame))
+        self.assert_done(self.render(name, "--device", "gl", "--size", TALL, "--samples", 1, "--frame", frame))
         return self.folder / name
 
     def test_keys_come_change_and_go(self):
-        viewer = Viewer(self, "--size", "400x900")
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
         viewer.type("samples", "1")
         viewer.press("fog[0].keys")
         viewer.press("fog[0].Add a key here")
@@ -281,7 +314,7 @@ class KeysTest(ViewTest):
     def test_keys_of_the_camera(self):
         self.scene = self.write_scene("scene.json", [FOG], camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
         before = self.scene.read_text()
-        viewer = Viewer(self, "--size", "400x900")
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
         viewer.type("samples", "1")
         viewer.press("fog[0].open")
         viewer.press("Camera")
@@ -313,7 +346,7 @@ class KeysTest(ViewTest):
         noise = {"type": "noise", "size": [24, 24, 8], "cells": [4, 4, 2]}
         fog = {"shape": {"type": "box", "min": [-3, -3, -2], "max": [3, 3, 0]}, "extinction": 0.6, "source": 0.8, "density": noise}
         self.scene = self.write_scene("scene.json", [fog], camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
-        viewer = Viewer(self, "--size", "400x900")
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
         viewer.type("samples", "1")
         first = viewer.take_picture()
         wanted = {"cells": [6, 4, 2], "size": [32, 24, 8], "octaves": 2, "gain": 0.75, "coverage": 0.5, "edge": [0.25, 0, 0], "seed": 5,
@@ -352,11 +385,11 @@ class SceneTest(ViewTest):
     """What stands around the fog."""
 
     def draw_like(self, name, *words):
-        self.assert_done(self.render(name, "--size", "400x900", "--samples", 1, *words))
+        self.assert_done(self.render(name, "--size", TALL, "--samples", 1, *words))
         return self.folder / name
 
     def open(self, *words):
-        viewer = Viewer(self, "--size", "400x900", *words)
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS, *words)
         viewer.type("samples", "1")
         viewer.press("fog[0].open")
         return viewer
@@ -383,7 +416,7 @@ class SceneTest(ViewTest):
         fog = {"shape": {"type": "box", "min": [-3, -3, -3], "max": [3, 3, 3]}, "extinction": 0.2, "albedo": 0.9}
         self.scene = self.write_scene("scene.json", [fog], lights=lamps, models=[{"file": "triangle.obj"}],
                                       camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
-        viewer = self.open("--size", "200x450", "--ui-scale", 0.5)
+        viewer = self.open("--size", TALL, *SMALL_CONTROLS)
         first = viewer.take_picture()
         viewer.press("lights[0].open")
         viewer.type("lights[0].strength", "8")
@@ -403,8 +436,8 @@ class SceneTest(ViewTest):
         self.assertEqual(saved[0], {**lamps[0], "position": [1.5, 1, 1], "intensity": [8, 4, 2], "radius": 0.5})
         self.assertEqual((saved[1]["inner_angle"], saved[1]["name"]), (40, "stage"), "no further than the outer one")
         self.assertAlmostEqual(saved[1]["direction"][1], math.sin(math.radians(30)), 12)
-        self.assertTrue(self.same(drawn, self.draw_like("gl.png", "--device", "gl", "--size", "200x450"), ROUNDING_TOGETHER))
-        self.assertTrue(self.same(by_cpu, self.draw_like("cpu.png", "--size", "200x450"), ROUNDING_TOGETHER))
+        self.assertTrue(self.same(drawn, self.draw_like("gl.png", "--device", "gl", "--size", TALL), ROUNDING_TOGETHER))
+        self.assertTrue(self.same(by_cpu, self.draw_like("cpu.png", "--size", TALL), ROUNDING_TOGETHER))
         viewer.key("ctrl+z")
         viewer.settle()
         viewer.say(LEAVING, lambda: viewer.key("ctrl+q"))
@@ -461,7 +494,7 @@ class SceneTest(ViewTest):
 
     def test_a_preset_fills_in_what_a_fog_is(self):
         self.scene = self.write_scene("scene.json", [{**FOG, "source": 0.5}], ambient=1)
-        viewer = Viewer(self, "--size", "400x900")
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
         viewer.type("samples", "1")
         before = viewer.take_picture()
         viewer.choose("fog[0].preset", "heavy_advection")
@@ -482,7 +515,7 @@ class SceneTest(ViewTest):
         scene = json.loads(self.scene.read_text())
         del scene["fog"][0]["source"]
         self.scene.write_text(json.dumps(scene))
-        viewer = Viewer(self, "--size", "400x900")
+        viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
         viewer.type("samples", "1")
         viewer.type("fog[0].contrast", "0.02")
         viewer.choose("fog[0].phase", "Henyey-Greenstein")

@@ -23,6 +23,10 @@ WAIT = 120  # s; software OpenGL on a busy machine
 LEAVING = "view: changes are not saved"
 PAUSE = 0.05  # s, between events, as a hand would leave
 
+# What most tests open: all controls are seen, and drawing takes a quarter of the time that it takes in a window twice as wide.
+SIZE = "280x210"
+SMALL_WINDOW = ("--size", SIZE, "--ui-scale", 0.5)
+
 
 def find_missing():
     missing = [name for name in ("Xvfb", "xdotool") if shutil.which(name) is None]
@@ -62,7 +66,7 @@ class Screen:
 
 
 class Viewer:
-    """A viewer that is used with mouse and keys."""
+    """A viewer that is used with mouse and keys; without words its window is a SMALL_WINDOW."""
 
     def __init__(self, case, *words, env=None):
         self.case = case
@@ -71,7 +75,7 @@ class Viewer:
         self.environment = {**os.environ, "DISPLAY": case.screen.name, **(env or {})}
         with self.log.open("wb") as log:
             self.process = subprocess.Popen(
-                [NEBEL, "view", str(case.scene), "--size", "560x420", "--controls", str(self.controls), *map(str, words)],
+                [NEBEL, "view", str(case.scene), "--controls", str(self.controls), *map(str, words or SMALL_WINDOW)],
                 stderr=log, env=self.environment, cwd=case.folder)
         case.addCleanup(self.close)
         self.wait(self.controls.exists, "a window")
@@ -250,7 +254,7 @@ class ViewTest(PictureCase):
         cls.addClassCleanup(cls.screen.close)
 
     def draw(self, name):
-        self.assert_done(self.render(name, "--device", "gl", "--size", "560x420"))
+        self.assert_done(self.render(name, "--device", "gl", "--size", SIZE))
         return self.folder / name
 
     def largest_difference(self, a, b):
