@@ -200,12 +200,25 @@ class EditTest(ViewTest):
     def test_shapes_and_densities_become_others(self):
         """With numbers of their own, so that the file can be read again."""
         viewer = Viewer(self, "--size", TALL, *SMALL_CONTROLS)
-        for name in ("half space", "ellipsoid", "cylinder", "capsule", "cone", "sphere"):
+        for name in ("half space", "ellipsoid", "cylinder", "capsule", "cone"):
             viewer.choose("fog[0].shape", name)
             self.assertEqual(viewer.save()["fog"][0]["shape"]["type"], name.replace(" ", "_"))
+        for name, parts in (("convex", "planes"), ("union", "shapes"), ("intersection", "shapes")):
+            viewer.press("fog[0].shape")
+            x, y, _, height = viewer.place("fog[0].shape: cone")
+            viewer.xdotool("mousemove", "--window", viewer.window, x + 9, y + height // 2, "click", "--repeat", 9, 5)
+            viewer.press(f"fog[0].shape: {name}")
+            shape = viewer.save()["fog"][0]["shape"]
+            self.assertEqual((shape["type"], len(shape[parts])), (name, 6 if parts == "planes" else 2))
+        viewer.choose("fog[0].shape", "sphere")
         for name in ("height", "linear", "radial", "gaussian", "soft edge"):
             viewer.choose("fog[0].density", name)
             self.assertEqual(viewer.save()["fog"][0]["density"]["type"], name.replace(" ", "_"))
+        viewer.press("Add a volume")
+        fog = viewer.save()["fog"]
+        self.assertEqual([volume["shape"]["type"] for volume in fog], ["sphere", "box"])
+        for low, high in zip(fog[1]["shape"]["min"], fog[1]["shape"]["max"]):
+            self.assertAlmostEqual(low, -high, msg="around the origin, where the camera looks")
         self.assert_done(nebel("info", self.scene))
         viewer.end()
 
