@@ -28,7 +28,7 @@
 
 /* Optical depth of a piece; and of a stretch of them, whose light is that of its middle. Both grow as less is seen. */
 #define MOST_DEPTH 1
-#define STRETCH_DEPTH 0.35
+#define STRETCH_DEPTH 0.31
 
 /* Halves of a piece whose parts of its depth differ by less than twice that count as one. */
 #define EVEN 0.03
@@ -306,7 +306,7 @@ struct nb_party {
     nb_lights lights;
 };
 
-/* How finely light is found. */
+/* How finely light is found: in sheets it changes within less of their height than in heaps. */
 static nb_cloud_grain grain_of(const nb_walk *walk, int k, double width)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
@@ -315,7 +315,7 @@ static nb_cloud_grain grain_of(const nb_walk *walk, int k, double width)
     return (nb_cloud_grain){
         .width = (float)width,
         .first =
-            (float)nb_max(nb_min(0.02 * thickness, 2 * hidden),
+            (float)nb_max(nb_min((layer->kind == NEBEL_CLOUD_CUMULUS ? 0.03 : 0.02) * thickness, 2 * hidden),
                           nb_min(0.1 * thickness, nb_min(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
         /* Wider lattices than the layer is high would show through it, also where heaps are far wider than that. */
         .wide = (float)nb_max(nb_min(20 * width, nb_min(nb_max(2 * width, nodes), 0.8 * thickness)),
@@ -413,7 +413,7 @@ static double visible(double left)
 /* How deep the next stretch gets: where nothing more is seen it has no end. */
 static double deepest_stretch(const nb_walk *walk)
 {
-    return walk->tally.left_apart > UNSEEN ? STRETCH_DEPTH / (0.3 + walk->tally.left) : HUGE_VAL;
+    return walk->tally.left_apart > UNSEEN ? STRETCH_DEPTH / (0.15 + walk->tally.left) : HUGE_VAL;
 }
 
 /* Optical depths of a piece: of all scattering, of what leads away, and of what light that goes on along the ray is scattered by. */
