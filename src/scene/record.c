@@ -86,7 +86,7 @@ static bool walk_png(const reader *in)
         if (memcmp(head + 4, "tEXt", 4) == 0 && !take_text(in, at + 8, size)) return false;
         if (!has_png_checksum(in, at + 4, size)) return false;
         at += 12 + (uint64_t)size;
-        if (memcmp(head + 4, "IEND", 4) == 0) return at <= in->size;
+        if (memcmp(head + 4, "IEND", 4) == 0) return true;
     }
     return false;
 }
