@@ -1,6 +1,7 @@
 /* Even layers of clouds against plane-parallel slabs of the same drops and depth: what comes through, what is seen of them from
  * above, below and aslant, and that all light goes up or down. Numbers are of slabs in 64 streams (adding and doubling, delta-M, exact single
- * scattering) in NumPy, apart from this code, with Mie's phase function at 550 nm; paths of light agree within a standard error. */
+ * scattering) in NumPy, apart from this code, with Mie's phase function at 550 nm; paths of light
+ * through the thinnest, the only ones tried, agree within 1.5 standard errors. */
 #include "even_layer.h"
 #include "near.h"
 
