@@ -403,7 +403,6 @@ static void dusk_does_not_shine_through_at_the_horizon(void **state)
         if (!nb_test_tries((size_t)i, 8)) continue;
         const nebel_camera camera = planet_camera(60, .125 * i * 2 * tan(30 * test_pi / 180) / HEIGHT);
         test_picture picture = render(&w, &camera, 2, 4, 0);
-        if (i < 2) for (int y = 0; y < HEIGHT; y++) print_message("%d: %d %.5f\n", i, y, row_light(&picture, y));
         for (int y = 1; y + 1 < HEIGHT; y++)
             most = fmax(most, row_light(&picture, y) / fmax(row_light(&picture, y - 1), row_light(&picture, y + 1)));
         test_picture_free(&picture);
