@@ -43,9 +43,9 @@ double nb_air_density(const nb_air *air, double height);
 /* Whether there is no air at all. */
 int nb_airs_are_empty(const nb_airs *airs);
 
-/* Sets the peaks of airs, and air whose phase functions have no more than `orders` moments, and which scatters light that comes often as the other does: the
- * part of it that goes nearly straight ahead counts as not scattered at all (delta-M: Wiscombe, Journal of the Atmospheric Sciences
- * 34, 1977). is_smooth says that both are the same. */
+/* Sets the peaks of airs, and `smooth` to air whose phase functions have no more than `orders` moments. It scatters light that comes from
+ * all sides as the other does: the part that goes nearly straight ahead counts as not scattered at all (delta-M: Wiscombe, Journal of the
+ * Atmospheric Sciences 34, 1977). is_smooth says that both are the same. */
 void nb_airs_smooth(nb_airs *airs, int orders, nb_airs *smooth);
 
 /* Sets the shells of airs that have everything else. */

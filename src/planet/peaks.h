@@ -34,7 +34,7 @@ double nb_peak_ratio(const nb_air *air, int orders);
 /* All 0 where there is no smooth air. */
 nb_peaks nb_peaks_aim(const nb_gather_job *job);
 
-/* Adds nodes `from` to `to` - 1, of which the light is at hand. smooth: what nb_gather_job says. */
+/* Adds nodes `from` to `to` - 1, of which the light is at hand. */
 void nb_peaks_add(const nb_peaks *peaks, const nb_gather_job *job, const nb_node_light *light, int from, int to,
                   nb_peak_sums *sums);
 
