@@ -364,12 +364,18 @@ static int join_parts(const nb_render_out *out, const nb_parts *parts, uint32_t 
                                 : nb_parts_join_picture(parts, out->wanted->width, out->wanted->height, record);
 }
 
-/* With the lock: another process may have joined them meanwhile. */
+/* With the lock: another process may have joined the parts meanwhile. If it was removing their folder when the lock was made there, it left
+ * the folder. */
 static int join_and_remove(const nb_render_out *out, const nb_parts *parts, uint32_t frame)
 {
-    if (!nb_parts_have_all(parts)) return NB_DONE;
-    const int status = join_parts(out, parts, frame);
-    if (status == NB_DONE && !nb_interrupt_is_requested()) nb_parts_remove(parts);
+    int is_joined = 0, status = NB_DONE;
+    if (nb_parts_have_all(parts)) {
+        status = join_parts(out, parts, frame);
+        is_joined = status == NB_DONE && !nb_interrupt_is_requested();
+    } else {
+        is_joined = has_file(out, parts->file, frame);
+    }
+    if (is_joined) nb_parts_remove(parts);
     return status;
 }
 
