@@ -306,7 +306,7 @@ struct nb_party {
     nb_lights lights;
 };
 
-/* How finely light is found: in sheets it changes within less of their height than in heaps. */
+/* How finely light is found: in sheets it changes within less of their height than in cumulus. */
 static nb_cloud_grain grain_of(const nb_walk *walk, int k, double width)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];

@@ -64,7 +64,7 @@ static double extinction_at(const nb_airs *airs, const nb_path *path, int i, int
     return sum;
 }
 
-/* What is left of light behind each node of a piece; `depth` is that of the ray up to it, and becomes that up to its end. */
+/* Sets the transmittance up to each node of a piece. `depth` is the optical depth up to the piece, and becomes that up to its end. */
 static void lose_light(const nb_airs *airs, const nb_rule *rule, double half, const nb_path *path, int c, double *depth,
                        double left[])
 {

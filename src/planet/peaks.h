@@ -21,8 +21,8 @@ typedef struct nb_peaks {
     int air_count;
     double peak[NEBEL_MAX_AIRS]; /* the part of what is scattered that the peak turns; 0: there is none */
     double smooth[NEBEL_MAX_AIRS];
-    double turned[NEBEL_MAX_AIRS]
-                 [NB_PEAK_POWERS + 1]; /* per power; the first is not used: light scattered once has its own */
+    /* Per power; the first is not used: light scattered once has its own phase function. */
+    double turned[NEBEL_MAX_AIRS][NB_PEAK_POWERS + 1];
 } nb_peaks;
 
 /* Orders of moments behind those that are kept of a function of Henyey and Greenstein, in units of the first of them. */
