@@ -23,12 +23,12 @@ static double run_rays(void *user)
     const nebel_trace_desc desc = {.precision = question->precision,
                                    .transmittance_only = question->transmittance_only};
     nebel_ray rays[RAYS];
-    nebel_light lights[RAYS];
+    nebel_transfer transfers[RAYS];
     for (int i = 0; i < RAYS; i++)
         rays[i] = (nebel_ray){{0, 1.7, 0}, {.02 * (i % 4) - .03, .02 * (i / 4) - .03, -1}, HUGE_VAL};
     const double start = nb_clock_cpu();
     for (int i = 0; i < question->repetitions; i++)
-        if (nebel_trace(question->fog, &desc, RAYS, rays, sizeof rays[0], lights, sizeof lights[0]) != NEBEL_OK)
+        if (nebel_trace(question->fog, &desc, RAYS, rays, sizeof rays[0], transfers, sizeof transfers[0]) != NEBEL_OK)
             return -1;
     return (nb_clock_cpu() - start) / (RAYS * question->repetitions);
 }

@@ -46,7 +46,7 @@ static engine open_engine(const nebel_snapshot *snapshot)
                                  "out vec4 pixel;\n"
                                  "void main()\n"
                                  "{\n"
-                                 "    nebel_light fog = nebel_trace(vec3(0.0), normalize(place), length(place));\n"
+                                 "    nebel_transfer fog = nebel_trace(vec3(0.0), normalize(place), length(place));\n"
                                  "    pixel = vec4(fog.transmittance * color + fog.in_scattering, 1.0);\n"
                                  "}\n"};
     snprintf(head, sizeof head, "#version 330 core\n#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n",

@@ -20,23 +20,23 @@ static nebel_snapshot *make_fog(const march_input *in, int backwards)
     return snapshot;
 }
 
-static void check_light(const nebel_light *light)
+static void check_light(const nebel_transfer *transfer)
 {
     for (int c = 0; c < 3; c++) {
-        demand(light->transmittance[c] >= 0 && light->transmittance[c] <= 1);
-        demand(isfinite(light->in_scattering[c]) && light->in_scattering[c] >= 0);
+        demand(transfer->transmittance[c] >= 0 && transfer->transmittance[c] <= 1);
+        demand(isfinite(transfer->in_scattering[c]) && transfer->in_scattering[c] >= 0);
     }
-    demand(isfinite(light->error) && light->error >= 0);
+    demand(isfinite(transfer->error) && transfer->error >= 0);
 }
 
 static void trace(const nebel_snapshot *fog, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
-                  nebel_light *lights)
+                  nebel_transfer *transfers)
 {
-    demand(nebel_trace(fog, desc, n, rays, sizeof *rays, lights, sizeof *lights) == NEBEL_OK);
-    for (size_t i = 0; i < n; i++) check_light(&lights[i]);
+    demand(nebel_trace(fog, desc, n, rays, sizeof *rays, transfers, sizeof *transfers) == NEBEL_OK);
+    for (size_t i = 0; i < n; i++) check_light(&transfers[i]);
 }
 
-static void check_same(const nebel_light *a, const nebel_light *b)
+static void check_same(const nebel_transfer *a, const nebel_transfer *b)
 {
     for (int c = 0; c < 3; c++)
         demand(a->transmittance[c] == b->transmittance[c] && a->in_scattering[c] == b->in_scattering[c]);
@@ -45,9 +45,9 @@ static void check_same(const nebel_light *a, const nebel_light *b)
 
 /* Results are the same bits for every way of splitting the rays into calls, and for every instruction set. */
 static void check_calls(const nebel_snapshot *fog, const nebel_trace_desc *desc, const march_input *in,
-                        const nebel_light *together)
+                        const nebel_transfer *together)
 {
-    nebel_light others[MOST_RAYS];
+    nebel_transfer others[MOST_RAYS];
     nebel_ray turned[MOST_RAYS];
     const size_t n = in->ray_count;
     for (size_t i = 0; i < n; i++) {
@@ -63,7 +63,7 @@ static void check_calls(const nebel_snapshot *fog, const nebel_trace_desc *desc,
     for (size_t i = 0; i < n; i++) check_same(&others[i], &together[i]);
 }
 
-static void check_near(const nebel_light *a, const nebel_light *b)
+static void check_near(const nebel_transfer *a, const nebel_transfer *b)
 {
     const double error = a->error + b->error;
     for (int c = 0; c < 3; c++) {
@@ -82,31 +82,32 @@ static int has_distances(const march_input *in)
 }
 
 /* The ray in two pieces, one after the other. */
-static void check_pieces(const nebel_snapshot *fog, const nebel_ray *ray, const nebel_light *whole)
+static void check_pieces(const nebel_snapshot *fog, const nebel_ray *ray, const nebel_transfer *whole)
 {
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_DOUBLE};
     nebel_ray pieces[2] = {*ray, *ray};
-    nebel_light lights[2], joined = {.error = 0};
+    nebel_transfer transfers[2], joined = {.error = 0};
     const double *d = ray->direction, length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), half = ray->t_max / 2;
     /* Rays along a face may take either side of it. */
     for (int i = 0; i < 3; i++)
         if (d[i] == 0) return;
     pieces[0].t_max = pieces[1].t_max = half;
     for (int i = 0; i < 3; i++) pieces[1].origin[i] += d[i] / length * half;
-    trace(fog, &desc, 2, pieces, lights);
+    trace(fog, &desc, 2, pieces, transfers);
     for (int c = 0; c < 3; c++) {
-        joined.transmittance[c] = lights[0].transmittance[c] * lights[1].transmittance[c];
-        joined.in_scattering[c] = lights[0].in_scattering[c] + lights[0].transmittance[c] * lights[1].in_scattering[c];
-        joined.error = fmax(joined.error, lights[0].error * (1 + lights[1].in_scattering[c]));
+        joined.transmittance[c] = transfers[0].transmittance[c] * transfers[1].transmittance[c];
+        joined.in_scattering[c] =
+            transfers[0].in_scattering[c] + transfers[0].transmittance[c] * transfers[1].in_scattering[c];
+        joined.error = fmax(joined.error, transfers[0].error * (1 + transfers[1].in_scattering[c]));
     }
-    joined.error = 2 * (joined.error + lights[1].error);
+    joined.error = 2 * (joined.error + transfers[1].error);
     check_near(&joined, whole);
 }
 
 static void check(const nebel_snapshot *fog, const nebel_snapshot *backwards, const march_input *in)
 {
     const nebel_trace_desc narrow = {.precision = NEBEL_PRECISION_FLOAT}, wide = {.precision = NEBEL_PRECISION_DOUBLE};
-    nebel_light floats[MOST_RAYS], doubles[MOST_RAYS], others[MOST_RAYS];
+    nebel_transfer floats[MOST_RAYS], doubles[MOST_RAYS], others[MOST_RAYS];
     trace(fog, &narrow, in->ray_count, in->rays, floats);
     check_calls(fog, &narrow, in, floats);
     trace(fog, &wide, in->ray_count, in->rays, doubles);

@@ -34,22 +34,22 @@ text() {
 
 calls='
     nebel_sight sight = nebel_see(place.xy, place.z);
-    nebel_light light = nebel_trace(sight.origin, sight.direction, sight.t_max);
-    nebel_light listed = nebel_trace_list(sight.origin, sight.direction, sight.t_max, 3, 4);
-    light.transmittance *= nebel_transmit(sight.origin, sight.direction, 2.0);
-    light.transmittance *= nebel_transmit_list(sight.origin, sight.direction, 3.0, 0, 1);
-    light.in_scattering += listed.transmittance * listed.in_scattering;
-    nebel_blend blend = nebel_blend_over(place, 0.5, light);
-    blend.source += nebel_blend_premultiplied(place, 0.5, light).source + nebel_blend_additive(place, light).source;
-    blend.factor *= nebel_blend_multiply(place, light).factor * nebel_blend_screen(place, light).factor;
+    nebel_transfer transfer = nebel_trace(sight.origin, sight.direction, sight.t_max);
+    nebel_transfer listed = nebel_trace_list(sight.origin, sight.direction, sight.t_max, 3, 4);
+    transfer.transmittance *= nebel_transmit(sight.origin, sight.direction, 2.0);
+    transfer.transmittance *= nebel_transmit_list(sight.origin, sight.direction, 3.0, 0, 1);
+    transfer.in_scattering += listed.transmittance * listed.in_scattering;
+    nebel_blend blend = nebel_blend_over(place, 0.5, transfer);
+    blend.source += nebel_blend_premultiplied(place, 0.5, transfer).source + nebel_blend_additive(place, transfer).source;
+    blend.factor *= nebel_blend_multiply(place, transfer).factor * nebel_blend_screen(place, transfer).factor;
     float way = nebel_ball_length(sight.origin, sight.direction, sight.t_max, place, 2.0, 3);
     way += nebel_gaussian_length(sight.origin, sight.direction, sight.t_max, place, 3.0, 1.0);
-    blend.factor *= nebel_blend_medium(nebel_medium_light(way, place, place), light).factor;
-    nebel_light air = nebel_trace_air(sight.direction, sight.t_max);
+    blend.factor *= nebel_blend_medium(nebel_medium_light(way, place, place), transfer).factor;
+    nebel_transfer air = nebel_trace_air(sight.direction, sight.t_max);
     nebel_ground ground = nebel_find_ground(sight.direction);
-    light.in_scattering += air.transmittance * air.in_scattering + ground.distance * ground.normal + ground.sun + ground.sky;
-    light.in_scattering += nebel_environment_radiance(sight.direction) * nebel_environment_reflected(place);
-    light.in_scattering += nebel_blend_grey(blend).xyz * nebel_five_taps(place.xy, place.z, nebel_default_taps());'
+    transfer.in_scattering += air.transmittance * air.in_scattering + ground.distance * ground.normal + ground.sun + ground.sky;
+    transfer.in_scattering += nebel_environment_radiance(sight.direction) * nebel_environment_reflected(place);
+    transfer.in_scattering += nebel_blend_grey(blend).xyz * nebel_five_taps(place.xy, place.z, nebel_default_taps());'
 
 # try_opengl DIALECT VERSION DEFINES
 try_opengl() {

@@ -29,15 +29,15 @@ int main(void)
     const nebel_volume_desc sphere = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 1, -5}, .radius = 2},
                                       .extinction = {.5, .5, .5}, .source = {.7, .7, .8}};
     const nebel_ray ray = {.origin = {0, 1, 0}, .direction = {0, 0, -1}, .t_max = 100};
-    nebel_light light;
+    nebel_transfer transfer;
     if (nebel_create_fog(&(nebel_fog_desc){0}, &fog) != NEBEL_OK || nebel_add_volume(fog, &sphere, NULL) != NEBEL_OK ||
         nebel_commit_fog(fog, &now) != NEBEL_OK ||
-        nebel_trace(now, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light) != NEBEL_OK)
+        nebel_trace(now, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer) != NEBEL_OK)
         return 1;
     nebel_release_snapshot(now);
     nebel_destroy_fog(fog);
-    printf("nebel %s: transmittance %.6f\n", nebel_version(), light.transmittance[0]);
-    return fabs(light.transmittance[0] - exp(-2.0)) < 1e-9 ? 0 : 1;
+    printf("nebel %s: transmittance %.6f\n", nebel_version(), transfer.transmittance[0]);
+    return fabs(transfer.transmittance[0] - exp(-2.0)) < 1e-9 ? 0 : 1;
 }
 C
 cat >"$work/consumer/layers.c" <<'C'

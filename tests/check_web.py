@@ -29,7 +29,7 @@ out vec4 color;
 void main()
 {
     nebel_sight sight = nebel_see(gl_FragCoord.xy, place.x);
-    nebel_light fog = nebel_trace(sight.origin, sight.direction, sight.t_max);
+    nebel_transfer fog = nebel_trace(sight.origin, sight.direction, sight.t_max);
     color = vec4(fog.transmittance + fog.in_scattering, 1.0);
 }"""
 CALLS = ONE_CALL.replace("fog.transmittance +", "fog.transmittance * nebel_transmit(sight.origin, sight.direction, place.y) +")
@@ -49,8 +49,8 @@ out vec4 color;
 void main()
 {
     nebel_sight sight = nebel_see(gl_FragCoord.xy, place.x);
-    nebel_light fog = nebel_trace_list(sight.origin, sight.direction, sight.t_max, 3, 4);
-    nebel_light air = nebel_trace_air(sight.direction, sight.t_max);
+    nebel_transfer fog = nebel_trace_list(sight.origin, sight.direction, sight.t_max, 3, 4);
+    nebel_transfer air = nebel_trace_air(sight.direction, sight.t_max);
     nebel_ground ground = nebel_find_ground(sight.direction);
     float length = nebel_ball_length(sight.origin, sight.direction, sight.t_max, place.xyz, 2.0, 3);
     length += nebel_gaussian_length(sight.origin, sight.direction, sight.t_max, place.xyz, 3.0, 1.0);

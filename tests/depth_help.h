@@ -21,17 +21,17 @@ static const nebel_ray along = {{0, .5, .25}, {1, 0, 0}, DEPTH_RAY_LENGTH};
 
 static inline double depth_in(const nebel_snapshot *fog, nebel_precision precision, int ignore)
 {
-    nebel_light light;
+    nebel_transfer transfer;
     const nebel_trace_desc desc = {.precision = precision, .ignore_distances = ignore};
-    assert_int_equal(nebel_trace(fog, &desc, 1, &along, sizeof along, &light, sizeof light), NEBEL_OK);
-    return -log(light.transmittance[1]);
+    assert_int_equal(nebel_trace(fog, &desc, 1, &along, sizeof along, &transfer, sizeof transfer), NEBEL_OK);
+    return -log(transfer.transmittance[1]);
 }
 
 static inline double depth_in_planes(const nebel_snapshot *fog, int ignore)
 {
     const nebel_ray_planes rays = {.origin = {0, .5, .25}, .direction = {1, 0, 0}, .t_max = &(float){DEPTH_RAY_LENGTH}};
     float transmittance;
-    const nebel_light_planes light = {.transmittance = {NULL, &transmittance, NULL}};
+    const nebel_transfer_planes light = {.transmittance = {NULL, &transmittance, NULL}};
     const nebel_trace_desc desc = {.ignore_distances = ignore};
     assert_int_equal(nebel_trace_planes(fog, &desc, 1, &rays, &light), NEBEL_OK);
     return -log((double)transmittance);

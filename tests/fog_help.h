@@ -102,7 +102,7 @@ static inline nebel_snapshot *fog_commit(const nebel_fog_desc *desc, const nebel
 }
 
 /* The largest difference of two numbers; infinite where one is a NaN. */
-static inline double fog_difference(const nebel_light *a, const nebel_light *b)
+static inline double fog_difference(const nebel_transfer *a, const nebel_transfer *b)
 {
     double most = 0;
     for (int c = 0; c < 3; c++) {

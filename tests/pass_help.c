@@ -228,17 +228,18 @@ static double distance(const pass_picture *p, const line *ray, double x, double 
     }
 }
 
-nebel_light pass_trace(const nebel_snapshot *fog, const pass_picture *picture, int x, int y)
+nebel_transfer pass_trace(const nebel_snapshot *fog, const pass_picture *picture, int x, int y)
 {
     nebel_ray ray;
-    nebel_light light;
+    nebel_transfer transfer;
     const line way = line_of(&picture->view, x + .5, y + .5);
     const double depth = (double)picture->stored[(uint32_t)y * picture->view.width + (uint32_t)x];
     for (int i = 0; i < 3; i++) ray.origin[i] = (double)way.origin[i], ray.direction[i] = (double)way.direction[i];
     ray.t_max = distance(picture, &way, x + .5, y + .5, depth);
     assert_int_equal(
-        nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-6}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-    return light;
+        nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-6}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+        NEBEL_OK);
+    return transfer;
 }
 
 /* ---- comparison ------------------------------------------------------------------------------ */

@@ -68,7 +68,7 @@ nebel_view pass_view(int kind, range clip, double yaw, double pitch);
 void pass_fill(pass_picture *picture);
 
 /* What nebel_trace says in double about the ray of a pixel up to what is stored there. */
-nebel_light pass_trace(const nebel_snapshot *fog, const pass_picture *picture, int x, int y);
+nebel_transfer pass_trace(const nebel_snapshot *fog, const pass_picture *picture, int x, int y);
 
 /* ---- comparison ------------------------------------------------------------------------------ */
 

@@ -29,7 +29,7 @@ typedef struct answer {
 static item items[RAYS];
 static answer answers[RAYS];
 static nebel_ray rays[RAYS];
-static nebel_light lights[RAYS];
+static nebel_transfer transfers[RAYS];
 
 /* ---- words to the shader --------------------------------------------------------------------- */
 
@@ -41,7 +41,7 @@ typedef struct tracer {
     unsigned program, buffer, texture, voxels;
 } tracer;
 
-static const char trace_body[] = "nebel_light l = nebel_trace(in0.xyz, in1.xyz, in0.w);\n"
+static const char trace_body[] = "nebel_transfer l = nebel_trace(in0.xyz, in1.xyz, in0.w);\n"
                                  "out0 = vec4(l.transmittance, 0.0); out1 = vec4(l.in_scattering, 0.0);\n";
 
 static inline void open_tracer(tracer *t, nb_gl_language language, word_store store, const char *defines,
@@ -161,22 +161,22 @@ static inline void camera_rays(const double eye[3], const double middle[3], uint
 
 /* ---- comparison ------------------------------------------------------------------------------ */
 
-static inline double worst_of(const answer *a, const nebel_light *light, double scale)
+static inline double worst_of(const answer *a, const nebel_transfer *transfer, double scale)
 {
     double worst = 0;
     for (int c = 0; c < 3; c++) {
-        const double t = fabs((double)a->transmittance[c] - light->transmittance[c]);
-        const double s = fabs((double)a->in_scattering[c] - light->in_scattering[c]) / scale;
+        const double t = fabs((double)a->transmittance[c] - transfer->transmittance[c]);
+        const double s = fabs((double)a->in_scattering[c] - transfer->in_scattering[c]) / scale;
         if (!(t <= 2) || !(s <= 1e9)) return HUGE_VAL;
         worst = fmax(worst, fmax(t, s));
     }
     return worst;
 }
 
-static inline int is_foggy(const nebel_light *light)
+static inline int is_foggy(const nebel_transfer *transfer)
 {
     for (int c = 0; c < 3; c++)
-        if (light->transmittance[c] < 1 || light->in_scattering[c] > 0) return 1;
+        if (transfer->transmittance[c] < 1 || transfer->in_scattering[c] > 0) return 1;
     return 0;
 }
 
@@ -193,7 +193,7 @@ static inline double conditioning(const nebel_snapshot *snapshot, const nebel_tr
 {
     enum { NEAR = 80 };
     nebel_ray near[NEAR];
-    nebel_light light[NEAR + 1];
+    nebel_transfer transfer[NEAR + 1];
     double far = 1;
     for (int k = 0; k < 3; k++) far = fmax(far, fabs(ray->origin[k] - eye[k]));
     for (int i = 0; i < NEAR; i++) {
@@ -203,13 +203,13 @@ static inline double conditioning(const nebel_snapshot *snapshot, const nebel_tr
             if (i >= 8) near[i].origin[k] += (i >> (k + 3) & 1 ? 3e-7 : -3e-7) * far;
         }
     }
-    assert_int_equal(nebel_trace(snapshot, desc, 1, ray, sizeof *ray, &light[NEAR], sizeof *light), NEBEL_OK);
-    assert_int_equal(nebel_trace(snapshot, desc, NEAR, near, sizeof *near, light, sizeof *light), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, desc, 1, ray, sizeof *ray, &transfer[NEAR], sizeof *transfer), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, desc, NEAR, near, sizeof *near, transfer, sizeof *transfer), NEBEL_OK);
     double most = 0;
     for (int i = 0; i < NEAR; i++)
         for (int c = 0; c < 3; c++) {
-            most = fmax(most, fabs(light[i].transmittance[c] - light[NEAR].transmittance[c]));
-            most = fmax(most, fabs(light[i].in_scattering[c] - light[NEAR].in_scattering[c]) / scale);
+            most = fmax(most, fabs(transfer[i].transmittance[c] - transfer[NEAR].transmittance[c]));
+            most = fmax(most, fabs(transfer[i].in_scattering[c] - transfer[NEAR].in_scattering[c]) / scale);
         }
     return most;
 }
@@ -221,14 +221,14 @@ static double differences[RAYS];
 static inline void compare(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, const double eye[3],
                            double scale, int hostile, const char *name)
 {
-    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
     size_t foggy = 0;
     double worst = 0, worst_silhouette = 0;
     for (int i = 0; i < RAYS; i++) {
-        if (lights[i].error > 1e-3 * scale) continue; /* the reference does not know either */
-        const double off = worst_of(&answers[i], &lights[i], scale);
+        if (transfers[i].error > 1e-3 * scale) continue; /* the reference does not know either */
+        const double off = worst_of(&answers[i], &transfers[i], scale);
         const int silhouette = off > .25 / 255 && off < 2 * conditioning(snapshot, desc, &rays[i], eye, scale);
-        if (is_foggy(&lights[i]) && !(silhouette && hostile)) differences[foggy++] = off;
+        if (is_foggy(&transfers[i]) && !(silhouette && hostile)) differences[foggy++] = off;
         if (silhouette) {
             worst_silhouette = fmax(worst_silhouette, off);
             continue;
@@ -237,8 +237,8 @@ static inline void compare(const nebel_snapshot *snapshot, const nebel_trace_des
         if (off > 3. / 255)
             fail_msg("%s, ray %d (%.9g %.9g %.9g, %.9g): off by %g: transmittance %g for %g, light %g for %g", name, i,
                      rays[i].direction[0], rays[i].direction[1], rays[i].direction[2], rays[i].t_max, off,
-                     (double)answers[i].transmittance[0], lights[i].transmittance[0],
-                     (double)answers[i].in_scattering[0], lights[i].in_scattering[0]);
+                     (double)answers[i].transmittance[0], transfers[i].transmittance[0],
+                     (double)answers[i].in_scattering[0], transfers[i].in_scattering[0]);
     }
     qsort(differences, foggy, sizeof *differences, ascending);
     const double most = foggy > 0 ? differences[(foggy - 1) * 999 / 1000] : 0;

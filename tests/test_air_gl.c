@@ -27,7 +27,7 @@ static unsigned compile(nb_gl *gl)
     const char *const texts[] = {"#define NEBEL_AIR\n",
                                  nebel_shader_text(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330), NULL};
     const char *const body = "vec3 way = normalize(in0.xyz);\n"
-                             "nebel_light air = nebel_trace_air(way, in0.w);\n"
+                             "nebel_transfer air = nebel_trace_air(way, in0.w);\n"
                              "nebel_ground ground = nebel_find_ground(way);\n"
                              "out0 = vec4(air.transmittance, ground.distance); out1 = vec4(air.in_scattering, 0.0);\n"
                              "out2 = vec4(ground.normal, 0.0); out3 = vec4(ground.sun, 0.0);\n"
@@ -80,7 +80,7 @@ static void aim(const nebel_atmosphere_desc *planet, double height, int ends, ui
 static void ask(const nebel_air_view *view, answers *a)
 {
     const double *const direction[3] = {a->direction[0], a->direction[1], a->direction[2]};
-    const nebel_light_planes lights = {
+    const nebel_transfer_planes lights = {
         .transmittance = {a->transmittance[0], a->transmittance[1], a->transmittance[2]},
         .in_scattering = {a->in_scattering[0], a->in_scattering[1], a->in_scattering[2]}};
     const nebel_ground_planes ground = {.distance = a->distance,

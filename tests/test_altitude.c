@@ -138,12 +138,12 @@ static nebel_volume_desc fog_of(const nebel_density *density, double extinction,
         .density = *density, .extinction = {extinction, extinction, extinction}, .source = {source, source, source}};
 }
 
-static nebel_light trace(const nebel_snapshot *fog, nebel_precision precision, const nebel_ray *ray)
+static nebel_transfer trace(const nebel_snapshot *fog, nebel_precision precision, const nebel_ray *ray)
 {
-    nebel_light light;
+    nebel_transfer transfer;
     const nebel_trace_desc desc = {.precision = precision};
-    assert_int_equal(nebel_trace(fog, &desc, 1, ray, sizeof *ray, &light, sizeof light), NEBEL_OK);
-    return light;
+    assert_int_equal(nebel_trace(fog, &desc, 1, ray, sizeof *ray, &transfer, sizeof transfer), NEBEL_OK);
+    return transfer;
 }
 
 static void print_ray(const nebel_density *d, const nebel_ray *r)
@@ -188,15 +188,15 @@ static void expect_depths(nebel_precision precision, uint64_t seed, double most_
         if (!(extinction < NEBEL_MAX_AMOUNT)) continue;
         const nebel_volume_desc volume = fog_of(&density, extinction, 1);
         nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, &volume, 1);
-        const nebel_light light = trace(fog, precision, &ray);
-        const double off = fabs(light.transmittance[0] - (double)expl(-(long double)extinction * integral));
-        const double dim = fabs(light.transmittance[0] + light.in_scattering[0] - 1);
+        const nebel_transfer transfer = trace(fog, precision, &ray);
+        const double off = fabs(transfer.transmittance[0] - (double)expl(-(long double)extinction * integral));
+        const double dim = fabs(transfer.transmittance[0] + transfer.in_scattering[0] - 1);
         thick++;
-        worst = fmax(worst, off / light.error);
-        largest_error = fmax(largest_error, light.error);
-        if (off > light.error || dim > light.error || light.error > most_error) {
+        worst = fmax(worst, off / transfer.error);
+        largest_error = fmax(largest_error, transfer.error);
+        if (off > transfer.error || dim > transfer.error || transfer.error > most_error) {
             print_ray(&density, &ray);
-            printf("off %g, source %g, error %g of %g\n", off, dim, light.error, light.transmittance[0]);
+            printf("off %g, source %g, error %g of %g\n", off, dim, transfer.error, transfer.transmittance[0]);
             fail();
         }
         nebel_release_snapshot(fog);
@@ -232,15 +232,15 @@ static void test_large_balls_are_flat(void **state)
         const nebel_volume_desc volumes[2] = {fog_of(&round, .01, .7), fog_of(&flat, .01, .7)};
         nebel_ray ray = {{0, dice(&dice_state, -50, 300), 0}, {1, dice(&dice_state, -1, 1), .3}, 0};
         ray.t_max = dice(&dice_state, 0, 1000);
-        nebel_light lights[2];
+        nebel_transfer transfers[2];
         for (int k = 0; k < 2; k++) {
             nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, &volumes[k], 1);
-            lights[k] = trace(fog, NEBEL_PRECISION_DOUBLE, &ray);
+            transfers[k] = trace(fog, NEBEL_PRECISION_DOUBLE, &ray);
             nebel_release_snapshot(fog);
         }
         /* the height of 1e15 m in long double has digits of 6e-5 m */
-        assert_true(fog_difference(&lights[0], &lights[1]) <= lights[0].error + lights[1].error);
-        assert_true(lights[0].error < 3e-2);
+        assert_true(fog_difference(&transfers[0], &transfers[1]) <= transfers[0].error + transfers[1].error);
+        assert_true(transfers[0].error < 3e-2);
     }
 }
 
@@ -260,8 +260,8 @@ static void test_parts_make_the_whole(void **state)
     for (size_t i = 0; i < nb_test_count(4000); i++) {
         nebel_ray ray = random_ray(&dice_state, &mist);
         const nebel_precision precision = i % 2 ? NEBEL_PRECISION_FLOAT : NEBEL_PRECISION_DOUBLE;
-        const nebel_light a = trace(one, precision, &ray), b = trace(two, precision, &ray),
-                          c = trace(again, precision, &ray);
+        const nebel_transfer a = trace(one, precision, &ray), b = trace(two, precision, &ray),
+                             c = trace(again, precision, &ray);
         assert_true(fog_difference(&a, &b) <= a.error + b.error);
         assert_memory_equal(&b, &c, sizeof b);
     }
@@ -280,9 +280,9 @@ static void test_mist_stands_still(void **state)
     double last = 0;
     for (int i = 0; i < 200; i++) {
         const nebel_ray ray = {{EARTH + 2 + 1e-4 * i, -EARTH, 0}, {-1, 3, 1}, 30};
-        const nebel_light light = trace(fog, NEBEL_PRECISION_FLOAT, &ray);
-        if (i > 0) assert_true(fabs(light.transmittance[0] - last) <= 1e-5);
-        last = light.transmittance[0];
+        const nebel_transfer transfer = trace(fog, NEBEL_PRECISION_FLOAT, &ray);
+        if (i > 0) assert_true(fabs(transfer.transmittance[0] - last) <= 1e-5);
+        last = transfer.transmittance[0];
     }
     nebel_release_snapshot(fog);
 }
@@ -347,8 +347,8 @@ static void test_sunlight(void **state)
             const double glow = .9 * 4 / (4 * 3.14159265358979323846);
             const double truth =
                 extrapolated(&mist, extinction, suns[k], glow, &cases[i].ray, cases[i].from, cases[i].to);
-            const nebel_light exact = trace(snapshot, NEBEL_PRECISION_DOUBLE, &cases[i].ray);
-            const nebel_light fast = trace(snapshot, NEBEL_PRECISION_FLOAT, &cases[i].ray);
+            const nebel_transfer exact = trace(snapshot, NEBEL_PRECISION_DOUBLE, &cases[i].ray);
+            const nebel_transfer fast = trace(snapshot, NEBEL_PRECISION_FLOAT, &cases[i].ray);
             printf("sun %zu, ray %zu: %.9g, off %.2g in double, %.2g in float, told %.2g\n", k, i, truth,
                    fabs(exact.in_scattering[0] - truth), fabs(fast.in_scattering[0] - truth), exact.error);
             assert_true(fabs(exact.in_scattering[0] - truth) <= exact.error + 1e-6);
@@ -387,12 +387,13 @@ static void test_mixed_light(void **state)
         const double truth = (double)(sum[1] + (sum[1] - sum[0]) / 3);
         nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, volumes, 2);
         for (int precision = 0; precision < 2; precision++) {
-            const nebel_light light = trace(fog, precision ? NEBEL_PRECISION_FLOAT : NEBEL_PRECISION_DOUBLE, &ray);
-            const double off = fabs(light.in_scattering[0] - truth);
+            const nebel_transfer transfer =
+                trace(fog, precision ? NEBEL_PRECISION_FLOAT : NEBEL_PRECISION_DOUBLE, &ray);
+            const double off = fabs(transfer.in_scattering[0] - truth);
             worst = fmax(worst, off);
-            if (off > light.error + 2e-6) print_ray(&low, &ray);
-            assert_true(off <= light.error + 2e-6);
-            assert_true(light.error <= .006);
+            if (off > transfer.error + 2e-6) print_ray(&low, &ray);
+            assert_true(off <= transfer.error + 2e-6);
+            assert_true(transfer.error <= .006);
         }
         nebel_release_snapshot(fog);
     }
@@ -477,7 +478,7 @@ static void test_centre(void **state)
     for (int precision = 0; precision < 2; precision++) {
         const nebel_precision p = precision ? NEBEL_PRECISION_FLOAT : NEBEL_PRECISION_DOUBLE;
         const nebel_ray from_it = {{0, -2, 0}, {1, 0, 0}, HUGE_VAL}, through = {{0, -100, 0}, {0, 1, 0}, HUGE_VAL};
-        const nebel_light half = trace(fog, p, &from_it), whole = trace(fog, p, &through);
+        const nebel_transfer half = trace(fog, p, &from_it), whole = trace(fog, p, &through);
         assert_true(fabs(half.transmittance[0] - exp(-.25 * 3.05)) <= half.error);
         assert_true(fabs(whole.transmittance[0] - exp(-.25 * 6.1)) <= whole.error);
         assert_true(half.error < 1e-5 && whole.error < 1e-5);

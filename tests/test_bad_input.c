@@ -271,11 +271,11 @@ static void test_limits_are_legal_and_one_more_is_not(void **unused)
     nebel_snapshot *snapshot = NULL;
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     const nebel_ray ray = {{-3, 0, 0}, {1, 0, 0}, 9};
-    nebel_light light;
-    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light),
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
                      NEBEL_OK);
     /* three balls of diameter 2, each counted once, and a body of planes around such a ball */
-    assert_true(light.transmittance[0] < exp(-8) && light.transmittance[0] > exp(-8.05));
+    assert_true(transfer.transmittance[0] < exp(-8) && transfer.transmittance[0] > exp(-8.05));
     nebel_release_snapshot(snapshot);
 
     assert_int_equal(messages.count, 0);
@@ -304,12 +304,12 @@ static void test_the_smallest_and_largest_sizes_are_legal(void **unused)
     };
     nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, sizeof volumes / sizeof volumes[0]);
     const nebel_ray ray = {{-1e15, 0, 0}, {1, 0, 0}, ENDLESS};
-    nebel_light light;
-    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light),
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
                      NEBEL_OK);
-    assert_true(fabs(light.transmittance[0] - exp(-2e-6)) <= light.error); /* its chord is lost 1e15 m away */
-    assert_true(fabs(light.transmittance[1] - exp(-2)) < 1e-12);
-    assert_true(fabs(light.transmittance[2] - exp(-2)) < 1e-12);
+    assert_true(fabs(transfer.transmittance[0] - exp(-2e-6)) <= transfer.error); /* its chord is lost 1e15 m away */
+    assert_true(fabs(transfer.transmittance[1] - exp(-2)) < 1e-12);
+    assert_true(fabs(transfer.transmittance[2] - exp(-2)) < 1e-12);
     nebel_release_snapshot(snapshot);
 }
 
@@ -367,13 +367,13 @@ static void test_null_arguments_are_refused(void **unused)
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
 
     const nebel_ray ray = {{0, 0, 0}, {0, 0, 1}, 1};
-    nebel_light light;
+    nebel_transfer transfer;
     double distance;
     const nebel_trace_desc trace = {0};
-    assert_int_equal(nebel_trace(NULL, &trace, 1, &ray, sizeof ray, &light, sizeof light), ARGUMENT);
-    assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-    assert_int_equal(nebel_trace(snapshot, &trace, 1, NULL, sizeof ray, &light, sizeof light), ARGUMENT);
-    assert_int_equal(nebel_trace(snapshot, &trace, 1, &ray, sizeof ray, NULL, sizeof light), ARGUMENT);
+    assert_int_equal(nebel_trace(NULL, &trace, 1, &ray, sizeof ray, &transfer, sizeof transfer), ARGUMENT);
+    assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, &trace, 1, NULL, sizeof ray, &transfer, sizeof transfer), ARGUMENT);
+    assert_int_equal(nebel_trace(snapshot, &trace, 1, &ray, sizeof ray, NULL, sizeof transfer), ARGUMENT);
     assert_int_equal(nebel_trace(snapshot, &trace, 0, NULL, 0, NULL, 0), NEBEL_OK);
     assert_int_equal(nebel_find_transmittance(NULL, .5, 0, 1, &ray, sizeof ray, &distance), ARGUMENT);
     assert_int_equal(nebel_find_transmittance(snapshot, .5, 0, 1, NULL, sizeof ray, &distance), ARGUMENT);
@@ -433,7 +433,7 @@ static void test_wrong_rays_are_refused_by_number_and_name(void **unused)
     for (size_t i = 0; i < sizeof bad_rays / sizeof bad_rays[0]; i++)
         for (size_t place = 0; place < COUNT; place += 13) {
             nebel_ray rays[COUNT];
-            nebel_light lights[COUNT];
+            nebel_transfer transfers[COUNT];
             double distances[COUNT];
             size_t failed = COUNT;
             char number[32];
@@ -441,7 +441,7 @@ static void test_wrong_rays_are_refused_by_number_and_name(void **unused)
             rays[place] = bad_rays[i].ray;
             snprintf(number, sizeof number, "ray %zu:", place);
             const nebel_trace_desc trace = {.precision = (nebel_precision)(i % 2), .failed_ray = &failed};
-            assert_int_equal(nebel_trace(snapshot, &trace, COUNT, rays, sizeof rays[0], lights, sizeof lights[0]),
+            assert_int_equal(nebel_trace(snapshot, &trace, COUNT, rays, sizeof rays[0], transfers, sizeof transfers[0]),
                              ARGUMENT);
             assert_int_equal(failed, place);
             assert_non_null(strstr(messages.text, number));
@@ -464,11 +464,12 @@ static void test_directions_of_any_length_are_the_same_direction(void **unused)
         for (int precision = 0; precision < 2; precision++) {
             const nebel_ray rays[] = {{{-3, 0, 0}, {lengths[i], 0, 0}, 10},
                                       {{-3, -3, 0}, {lengths[i], lengths[i], 0}, 10}};
-            nebel_light lights[2];
+            nebel_transfer transfers[2];
             const nebel_trace_desc desc = {.precision = (nebel_precision)precision};
-            assert_int_equal(nebel_trace(snapshot, &desc, 2, rays, sizeof rays[0], lights, sizeof lights[0]), NEBEL_OK);
+            assert_int_equal(nebel_trace(snapshot, &desc, 2, rays, sizeof rays[0], transfers, sizeof transfers[0]),
+                             NEBEL_OK);
             for (int r = 0; r < 2; r++)
-                assert_true(fabs(lights[r].transmittance[0] - exp(-1)) < (precision == 0 ? 1e-15 : 1e-6));
+                assert_true(fabs(transfers[r].transmittance[0] - exp(-1)) < (precision == 0 ? 1e-15 : 1e-6));
         }
     nebel_release_snapshot(snapshot);
 }
@@ -480,11 +481,11 @@ static void test_wrong_queries_are_refused(void **unused)
     const nebel_fog_desc fog = {.log = fog_messages_log(&messages)};
     nebel_snapshot *const snapshot = fog_commit(&fog, &(nebel_volume_desc){.extinction = {1, 1, 1}}, 1);
     const nebel_ray ray = {{0, 0, 0}, {0, 0, 1}, 1};
-    nebel_light light;
+    nebel_transfer transfer;
     const double tolerances[] = {-1, -1e-300, NOT_A_NUMBER, ENDLESS};
     for (size_t i = 0; i < sizeof tolerances / sizeof tolerances[0]; i++) {
         const nebel_trace_desc desc = {.tolerance = tolerances[i]};
-        assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &light, sizeof light), ARGUMENT);
+        assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), ARGUMENT);
         assert_non_null(strstr(messages.text, "tolerance"));
     }
     const double transmittances[] = {0, 1, -1, 2, NOT_A_NUMBER};
@@ -521,11 +522,11 @@ static void test_instruction_sets_that_are_not_here_are_unsupported(void **unuse
     const nebel_segments segments = {.from = point, .to = point};
     size_t refused = 0;
     for (int isa = -1; isa <= NEBEL_ISA_COUNT + 1; isa++) {
-        nebel_light light;
+        nebel_transfer transfer;
         float out;
         const nebel_result expected = nebel_isa_available((nebel_isa)isa) ? NEBEL_OK : NEBEL_ERROR_UNSUPPORTED;
         const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa};
-        assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &light, sizeof light), expected);
+        assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), expected);
         assert_int_equal(nebel_transmit_segments(snapshot, (nebel_isa)isa, 0, 1, &segments, &out, 0), expected);
         refused += expected != NEBEL_OK;
     }
@@ -593,18 +594,18 @@ static void test_light_without_end_is_an_error_of_that_ray(void **unused)
         for (int precision = 0; precision < 2; precision++)
             for (size_t place = 0; place < 20; place += 7) {
                 nebel_ray rays[20];
-                nebel_light lights[20];
+                nebel_transfer transfers[20];
                 size_t failed = 99;
                 for (int k = 0; k < 20; k++) rays[k] = (nebel_ray){{0, 0, 0}, {0, 0, 1}, 3};
                 rays[place] = c->ray;
                 const nebel_trace_desc desc = {.precision = (nebel_precision)precision, .failed_ray = &failed};
                 const nebel_result result =
-                    nebel_trace(snapshot, &desc, 20, rays, sizeof rays[0], lights, sizeof lights[0]);
+                    nebel_trace(snapshot, &desc, 20, rays, sizeof rays[0], transfers, sizeof transfers[0]);
                 if (result != c->result) print_message("endless %zu, precision %d: %d\n", i, precision, (int)result);
                 assert_int_equal(result, c->result);
                 assert_int_equal(failed, result == NEBEL_OK ? 99 : place);
                 assert_true((messages.count > 0) == (result != NEBEL_OK));
-                if (result == NEBEL_OK) assert_true(isfinite(lights[place].in_scattering[1]));
+                if (result == NEBEL_OK) assert_true(isfinite(transfers[place].in_scattering[1]));
             }
         nebel_release_snapshot(snapshot);
     }
@@ -626,14 +627,15 @@ static void test_opaque_fog_shows_its_source(void **unused)
             const double ends[] = {1, 100, 1e15, ENDLESS};
             for (int k = 0; k < 4; k++) {
                 const nebel_ray ray = {{0, 0, 0}, {1, 2, 3}, ends[k]};
-                nebel_light light;
+                nebel_transfer transfer;
                 const nebel_trace_desc desc = {.precision = (nebel_precision)precision};
-                assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+                assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                                 NEBEL_OK);
                 for (int c = 0; c < 3; c++) {
-                    assert_true(light.transmittance[c] == 0);
-                    assert_true(fabs(light.in_scattering[c] - (c + 1)) <= light.error);
+                    assert_true(transfer.transmittance[c] == 0);
+                    assert_true(fabs(transfer.in_scattering[c] - (c + 1)) <= transfer.error);
                 }
-                assert_true(light.error < (precision == 0 ? 1e-13 : 2e-5));
+                assert_true(transfer.error < (precision == 0 ? 1e-13 : 2e-5));
             }
             nebel_release_snapshot(snapshot);
         }

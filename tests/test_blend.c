@@ -38,13 +38,14 @@ static surface random_surface(uint64_t *state, double distance)
     return s;
 }
 
-static nebel_light trace_between(const nebel_snapshot *fog, double from, double to)
+static nebel_transfer trace_between(const nebel_snapshot *fog, double from, double to)
 {
     const nebel_ray ray = {{0, 0, -from}, {0, 0, -1}, to - from};
-    nebel_light light;
+    nebel_transfer transfer;
     assert_int_equal(
-        nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-12}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-    return light;
+        nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-12}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+        NEBEL_OK);
+    return transfer;
 }
 
 static nebel_snapshot *random_banks(uint64_t *state)
@@ -69,7 +70,7 @@ static void carry_light(const nebel_snapshot *fog, const surface *surfaces, cons
     double light[3] = {background[0], background[1], background[2]}, far = 200;
     for (int i = LAYERS; i >= 0; i--) {
         const double near = i > 0 ? surfaces[i - 1].distance : 0;
-        const nebel_light between = trace_between(fog, near, far);
+        const nebel_transfer between = trace_between(fog, near, far);
         for (int c = 0; c < 3; c++) {
             light[c] = between.transmittance[c] * light[c] + between.in_scattering[c];
             if (i > 0) light[c] = cover(&surfaces[i - 1], c, light[c]);
@@ -81,10 +82,10 @@ static void carry_light(const nebel_snapshot *fog, const surface *surfaces, cons
 
 static void draw(const nebel_snapshot *fog, const surface *surfaces, const double background[3], double pixel[3])
 {
-    const nebel_light whole = trace_between(fog, 0, 200);
+    const nebel_transfer whole = trace_between(fog, 0, 200);
     for (int c = 0; c < 3; c++) pixel[c] = whole.transmittance[c] * background[c] + whole.in_scattering[c];
     for (int i = LAYERS; i-- > 0;) {
-        const nebel_light before = trace_between(fog, 0, surfaces[i].distance);
+        const nebel_transfer before = trace_between(fog, 0, surfaces[i].distance);
         const nebel_blend blend = nebel_blend_surface(surfaces[i].mode, surfaces[i].color, surfaces[i].alpha, &before);
         for (int c = 0; c < 3; c++) pixel[c] = blend.source[c] + blend.factor[c] * pixel[c];
     }
@@ -110,7 +111,7 @@ static void test_drawing_equals_carrying(void **unused)
 static void test_no_fog_is_the_mode_itself(void **unused)
 {
     (void)unused;
-    const nebel_light clear = {{1, 1, 1}, {0, 0, 0}, 0};
+    const nebel_transfer clear = {{1, 1, 1}, {0, 0, 0}, 0};
     uint64_t state = 3;
     for (int n = 0; n < 1000; n++) {
         const surface s = random_surface(&state, 0);
@@ -124,7 +125,7 @@ static void test_no_fog_is_the_mode_itself(void **unused)
 static void test_opaque_fog_hides_all(void **unused)
 {
     (void)unused;
-    const nebel_light opaque = {{0, 0, 0}, {.5, .6, .7}, 0};
+    const nebel_transfer opaque = {{0, 0, 0}, {.5, .6, .7}, 0};
     uint64_t state = 5;
     for (int n = 0; n < 1000; n++) {
         const surface s = random_surface(&state, 0);
@@ -140,7 +141,8 @@ static void test_an_unknown_mode_draws_nothing(void **unused)
 {
     (void)unused;
     const double color[3] = {1, 1, 1};
-    const nebel_blend blend = nebel_blend_surface(NEBEL_BLEND_COUNT, color, 1, &(nebel_light){{1, 1, 1}, {0, 0, 0}, 0});
+    const nebel_blend blend =
+        nebel_blend_surface(NEBEL_BLEND_COUNT, color, 1, &(nebel_transfer){{1, 1, 1}, {0, 0, 0}, 0});
     for (int c = 0; c < 3; c++) {
         assert_true(blend.source[c] == 0);
         assert_true(blend.factor[c] == 1);

@@ -303,13 +303,13 @@ static void compare_with_trace(const nebel_cells *cells, const nebel_snapshot *s
         square += ray.direction[i] * ray.direction[i];
     }
     ray.t_max = sqrt(square);
-    nebel_light light;
-    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light),
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
                      NEBEL_OK);
     const nebel_cell_fog fog = ask_at(cells, &view, to[0], to[1], to[2]);
     for (int c = 0; c < 3; c++) {
-        assert_near(1 - fog.alpha, light.transmittance[c], 1e-12);
-        assert_near(fog.color[c], light.in_scattering[c], 1e-12);
+        assert_near(1 - fog.alpha, transfer.transmittance[c], 1e-12);
+        assert_near(fog.color[c], transfer.in_scattering[c], 1e-12);
     }
 }
 
@@ -350,9 +350,9 @@ static void test_a_ray_in_a_face(void **state)
     for (int i = 0; i < 3; i++) {
         const nebel_cell_view view = {.eye = {xs[i], 0, -5}};
         const nebel_ray ray = {.origin = {xs[i], 0, -5}, .direction = {0, 0, 1}, .t_max = 6};
-        nebel_light light;
-        nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light);
-        assert_near(1 - alpha_at(cells, &view, xs[i], 0, 1), light.transmittance[0], 1e-15);
+        nebel_transfer transfer;
+        nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer);
+        assert_near(1 - alpha_at(cells, &view, xs[i], 0, 1), transfer.transmittance[0], 1e-15);
     }
     nebel_destroy_cells(cells);
     nebel_release_snapshot(snapshot);

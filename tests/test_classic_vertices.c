@@ -65,10 +65,10 @@ static float fog_one(const nebel_snapshot *snapshot, const nebel_vertex_desc *de
 
 /* ---- right, for all fog ---------------------------------------------------------------------- */
 
-static nebel_light trace_vertex(const nebel_snapshot *snapshot, const nebel_vertices *v, const float point[3])
+static nebel_transfer trace_vertex(const nebel_snapshot *snapshot, const nebel_vertices *v, const float point[3])
 {
     nebel_ray ray = {.t_max = 0};
-    nebel_light light;
+    nebel_transfer transfer;
     double square = 0;
     for (int k = 0; k < 3; k++) {
         ray.origin[k] = v->eye[k];
@@ -76,9 +76,9 @@ static nebel_light trace_vertex(const nebel_snapshot *snapshot, const nebel_vert
         square += ray.direction[k] * ray.direction[k];
     }
     ray.t_max = sqrt(square);
-    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light),
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
                      NEBEL_OK);
-    return light;
+    return transfer;
 }
 
 /* The double trace is integrated to the tolerance, too; float rounds lengths of up to 60 m. */
@@ -100,13 +100,13 @@ static void test_vertices_in_any_fog_are_what_the_trace_says(void **unused)
         fog_points(snapshot, &desc, &vertices, NEBEL_VERTEX_FACTOR, factor);
         fog_points(snapshot, &desc, &vertices, NEBEL_VERTEX_RGBA_FLOAT, color);
         for (int i = 0; i < COUNT; i += 7) {
-            const nebel_light light = trace_vertex(snapshot, &vertices, p.at[i]);
-            double scale = 1, most = light.error + 2 * NEBEL_DEFAULT_TOLERANCE;
-            for (int c = 0; c < 3; c++) scale = fmax(scale, light.in_scattering[c]);
-            assert_true(fabs((double)factor[i] - light.transmittance[desc.channel]) <= most);
-            assert_true(fabs((double)color[i][3] - (1 - light.transmittance[desc.channel])) <= most);
+            const nebel_transfer transfer = trace_vertex(snapshot, &vertices, p.at[i]);
+            double scale = 1, most = transfer.error + 2 * NEBEL_DEFAULT_TOLERANCE;
+            for (int c = 0; c < 3; c++) scale = fmax(scale, transfer.in_scattering[c]);
+            assert_true(fabs((double)factor[i] - transfer.transmittance[desc.channel]) <= most);
+            assert_true(fabs((double)color[i][3] - (1 - transfer.transmittance[desc.channel])) <= most);
             for (int c = 0; c < 3; c++)
-                assert_true(fabs((double)color[i][c] - light.in_scattering[c]) <= most * 4 * scale);
+                assert_true(fabs((double)color[i][c] - transfer.in_scattering[c]) <= most * 4 * scale);
         }
         nebel_release_snapshot(snapshot);
     }
@@ -152,10 +152,10 @@ static void test_boxes_of_several_colors_have_their_own_light(void **unused)
             fog_points(snapshot, &(nebel_vertex_desc){.channel = channel}, &vertices, NEBEL_VERTEX_FACTOR, factor);
             fog_points(snapshot, &(nebel_vertex_desc){.channel = channel}, &vertices, NEBEL_VERTEX_RGBA_FLOAT, color);
             for (int i = 0; i < COUNT; i++) {
-                const nebel_light light = trace_vertex(snapshot, &vertices, p.at[i]);
-                assert_true(fabs((double)factor[i] - light.transmittance[channel]) <= 2e-5);
-                assert_true(fabs(1 - (double)color[i][3] - light.transmittance[channel]) <= 2e-5);
-                for (int c = 0; c < 3; c++) assert_true(fabs((double)color[i][c] - light.in_scattering[c]) <= 2e-5);
+                const nebel_transfer transfer = trace_vertex(snapshot, &vertices, p.at[i]);
+                assert_true(fabs((double)factor[i] - transfer.transmittance[channel]) <= 2e-5);
+                assert_true(fabs(1 - (double)color[i][3] - transfer.transmittance[channel]) <= 2e-5);
+                for (int c = 0; c < 3; c++) assert_true(fabs((double)color[i][c] - transfer.in_scattering[c]) <= 2e-5);
             }
         }
         nebel_release_snapshot(snapshot);

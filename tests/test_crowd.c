@@ -26,7 +26,7 @@ static int compare_doubles(const void *a, const void *b)
 }
 
 /* The light of balls around one centre, seen through it from far away. */
-static nebel_light light_of_shells(const shell *shells, size_t n)
+static nebel_transfer light_of_shells(const shell *shells, size_t n)
 {
     static double ends[2 * BALLS];
     for (size_t i = 0; i < n; i++) {
@@ -34,7 +34,7 @@ static nebel_light light_of_shells(const shell *shells, size_t n)
         ends[2 * i + 1] = shells[i].radius;
     }
     qsort(ends, 2 * n, sizeof ends[0], compare_doubles);
-    nebel_light light = {{1, 1, 1}, {0, 0, 0}, 0};
+    nebel_transfer transfer = {{1, 1, 1}, {0, 0, 0}, 0};
     for (size_t j = 0; j + 1 < 2 * n; j++) {
         const double middle = .5 * (ends[j] + ends[j + 1]);
         double extinction = 0, gain = 0;
@@ -44,10 +44,10 @@ static nebel_light light_of_shells(const shell *shells, size_t n)
             gain += shells[i].extinction * shells[i].source;
         }
         const double opacity = -expm1(-extinction * (ends[j + 1] - ends[j]));
-        light.in_scattering[0] += light.transmittance[0] * gain / extinction * opacity;
-        light.transmittance[0] *= 1 - opacity;
+        transfer.in_scattering[0] += transfer.transmittance[0] * gain / extinction * opacity;
+        transfer.transmittance[0] *= 1 - opacity;
     }
-    return light;
+    return transfer;
 }
 
 static nebel_volume_desc volume_of(const shell *s)
@@ -70,18 +70,18 @@ static void test_media_over_each_other_give_the_closed_form(void **unused)
             shells[i] = (shell){dice(&state, 1, 10), dice(&state, 0, .4 / (double)counts[k]), dice(&state, 0, 3)};
             volumes[i] = volume_of(&shells[i]);
         }
-        const nebel_light truth = light_of_shells(shells, counts[k]);
+        const nebel_transfer truth = light_of_shells(shells, counts[k]);
         nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, counts[k]);
         const nebel_ray ray = {{-50, 0, 0}, {1, 0, 0}, 100};
         for (int precision = 0; precision < 2; precision++) {
-            nebel_light light;
+            nebel_transfer transfer;
             const nebel_trace_desc desc = {.precision = (nebel_precision)precision};
-            assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-            const double off = fmax(fabs(light.transmittance[0] - truth.transmittance[0]),
-                                    fabs(light.in_scattering[0] - truth.in_scattering[0]));
-            assert_true(off <= light.error + 1e-14);
+            assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+            const double off = fmax(fabs(transfer.transmittance[0] - truth.transmittance[0]),
+                                    fabs(transfer.in_scattering[0] - truth.in_scattering[0]));
+            assert_true(off <= transfer.error + 1e-14);
             assert_true(off < (precision == 0 ? 1e-13 : 1e-5));
-            assert_true(light.error < (precision == 0 ? 1e-11 : 1e-2));
+            assert_true(transfer.error < (precision == 0 ? 1e-11 : 1e-2));
         }
         nebel_release_snapshot(snapshot);
     }
@@ -152,16 +152,17 @@ static void test_a_crowd_is_as_one_among_other_fog(void **unused)
     (void)unused;
     nebel_snapshot *const crowd = commit_balls(TWINS), *const single = commit_balls(1);
     nebel_ray rays[RAYS];
-    nebel_light lights[RAYS], truth[RAYS];
+    nebel_transfer transfers[RAYS], truth[RAYS];
     make_rays(rays);
     const nebel_trace_desc fine = {.tolerance = 1e-9};
     assert_int_equal(nebel_trace(single, &fine, RAYS, rays, sizeof rays[0], truth, sizeof truth[0]), NEBEL_OK);
     for (int precision = 0; precision < 2; precision++) {
         const nebel_trace_desc desc = {.precision = (nebel_precision)precision, .tolerance = 1e-4};
-        assert_int_equal(nebel_trace(crowd, &desc, RAYS, rays, sizeof rays[0], lights, sizeof lights[0]), NEBEL_OK);
+        assert_int_equal(nebel_trace(crowd, &desc, RAYS, rays, sizeof rays[0], transfers, sizeof transfers[0]),
+                         NEBEL_OK);
         for (int i = 0; i < RAYS; i++) {
-            assert_true(fog_difference(&lights[i], &truth[i]) <= lights[i].error + truth[i].error);
-            assert_true(lights[i].error <= 2e-4 + (precision == 0 ? 1e-8 : 1e-4));
+            assert_true(fog_difference(&transfers[i], &truth[i]) <= transfers[i].error + truth[i].error);
+            assert_true(transfers[i].error <= 2e-4 + (precision == 0 ? 1e-8 : 1e-4));
         }
     }
     double there[RAYS], wanted[RAYS];
@@ -193,7 +194,7 @@ static void test_neither_company_nor_order_changes_a_bit(void **unused)
     (void)unused;
     nebel_snapshot *const onion = commit_onion(1), *const shuffled = commit_onion(7);
     nebel_ray rays[RAYS];
-    nebel_light alone[RAYS], together[RAYS];
+    nebel_transfer alone[RAYS], together[RAYS];
     for (int i = 0; i < RAYS; i++) {
         const double off = 5.2 * (i * 17 % RAYS) / RAYS; /* of 500 balls 0 to 500 */
         rays[i] = (nebel_ray){{-20, off, .001 * i}, {1, 0, 0}, i % 5 ? HUGE_VAL : 21};
@@ -201,7 +202,7 @@ static void test_neither_company_nor_order_changes_a_bit(void **unused)
     for (int isa = NEBEL_ISA_DEFAULT; isa < NEBEL_ISA_COUNT; isa++) {
         if (!nebel_isa_available((nebel_isa)isa)) continue;
         const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa};
-        nebel_light *const now = isa == NEBEL_ISA_DEFAULT ? alone : together;
+        nebel_transfer *const now = isa == NEBEL_ISA_DEFAULT ? alone : together;
         for (int i = 0; i < RAYS && isa == NEBEL_ISA_DEFAULT; i++)
             assert_int_equal(nebel_trace(onion, &desc, 1, &rays[i], sizeof rays[0], &alone[i], sizeof alone[0]),
                              NEBEL_OK);

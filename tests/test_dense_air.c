@@ -27,14 +27,14 @@ static nebel_sun sun_of(double cosine)
     return (nebel_sun){.direction = {sqrt(1 - cosine * cosine), cosine, 0}, .irradiance = {1, 1, 1}};
 }
 
-static nebel_light trace(const nebel_atmosphere *air, double cosine, double height, const double direction[3])
+static nebel_transfer trace(const nebel_atmosphere *air, double cosine, double height, const double direction[3])
 {
     const nebel_sun sun = sun_of(cosine);
     const nebel_ray ray = {
         .origin = {0, height, 0}, .direction = {direction[0], direction[1], direction[2]}, .t_max = HUGE_VAL};
-    nebel_light light;
-    assert_int_equal(nebel_trace_air(air, &sun, 1, &ray, 0, &light, 0), NEBEL_OK);
-    return light;
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace_air(air, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+    return transfer;
 }
 
 /* ---- energy ---------------------------------------------------------------------------------- */
@@ -52,11 +52,11 @@ static double part_returned(double depth, nebel_air_quality quality)
     for (int i = 0; i < SLOPES; i++)
         for (int k = 0; k < TURNS; k++) {
             const double down = (i + 0.5) / SLOPES, side = sqrt(1 - down * down), turn = PI * (k + 0.5) / TURNS;
-            const nebel_light light =
+            const nebel_transfer transfer =
                 trace(air, cosine, 1e5, (const double[3]){side * cos(turn), -down, side * sin(turn)});
             const double below =
-                (double)light.transmittance[0] / PI * ((double)ground.sun[0] * cosine + (double)ground.sky[0]);
-            flux += ((double)light.in_scattering[0] + below) * down * 2 * PI / (SLOPES * TURNS);
+                (double)transfer.transmittance[0] / PI * ((double)ground.sun[0] * cosine + (double)ground.sky[0]);
+            flux += ((double)transfer.in_scattering[0] + below) * down * 2 * PI / (SLOPES * TURNS);
         }
     nebel_destroy_atmosphere(air);
     return flux / cosine;
@@ -155,13 +155,13 @@ static void assert_told(const scene *of, nebel_atmosphere *air, double most, con
 {
     double mean[2];
     walk_often(of, mean);
-    const nebel_light light = trace(air, of->cosine, of->is_above ? 1e5 : 0, of->direction);
-    const double off = (double)light.in_scattering[0] - mean[0];
+    const nebel_transfer transfer = trace(air, of->cosine, of->is_above ? 1e5 : 0, of->direction);
+    const double off = (double)transfer.in_scattering[0] - mean[0];
     print_message("%s, depth %g, g %g: %.5f, off %.5f, told %.5f, by chance %.5f\n", what, of->depth, of->g, mean[0],
-                  off, (double)light.error, mean[1]);
-    assert_true(fabs(off) <= (double)light.error + 3 * mean[1]);
+                  off, (double)transfer.error, mean[1]);
+    assert_true(fabs(off) <= (double)transfer.error + 3 * mean[1]);
     /* Else it would say nothing. */
-    assert_true((double)light.error <= most * mean[0]);
+    assert_true((double)transfer.error <= most * mean[0]);
 }
 
 static void error_covers_what_chance_finds(void **state)
@@ -240,13 +240,13 @@ static void haze_has_its_light(void **state)
         count++;
         for (int q = 0; q < NEBEL_AIR_QUALITY_COUNT; q++) {
             nebel_atmosphere *air = make_of(&of, depth, SCALE, (nebel_air_quality)q);
-            const nebel_light light = trace(air, view.cosine, view.is_above ? 1e5 : 0, view.direction);
-            const double apart = fabs((double)light.in_scattering[0] - mean[0]);
-            if (apart > (double)light.error + 3.5 * mean[1])
+            const nebel_transfer transfer = trace(air, view.cosine, view.is_above ? 1e5 : 0, view.direction);
+            const double apart = fabs((double)transfer.in_scattering[0] - mean[0]);
+            if (apart > (double)transfer.error + 3.5 * mean[1])
                 fail_msg("quality %d, depth %g, g %g, sun %g, view %g %g %g: %g, not %g, told %g, by chance %g", q,
                          depth, g, view.cosine, view.direction[0], up, view.direction[2],
-                         (double)light.in_scattering[0], mean[0], (double)light.error, mean[1]);
-            told[q] += (double)light.error / mean[0];
+                         (double)transfer.in_scattering[0], mean[0], (double)transfer.error, mean[1]);
+            told[q] += (double)transfer.error / mean[0];
             off[q] += fmax(0, apart - mean[1]) / mean[0];
             nebel_destroy_atmosphere(air);
         }

@@ -84,7 +84,7 @@ static double flux_at(const nebel_snapshot *snapshot, const light *l, double hei
     find_rule(nodes, weights);
     for (int i = 0; i < COSINES; i++) {
         nebel_ray rays[TURNS];
-        nebel_light lights[TURNS];
+        nebel_transfer out[TURNS];
         const double sine = sqrt(1 - nodes[i] * nodes[i]);
         for (int k = 0; k < TURNS; k++) {
             const double angle = pi * (k + .5) / TURNS;
@@ -92,9 +92,9 @@ static double flux_at(const nebel_snapshot *snapshot, const light *l, double hei
                 {0, height, 0}, {sine * cos(angle), down ? nodes[i] : -nodes[i], sine * sin(angle)}, HUGE_VAL};
         }
         const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .tolerance = 1e-4};
-        assert_int_equal(nebel_trace(snapshot, &desc, TURNS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+        assert_int_equal(nebel_trace(snapshot, &desc, TURNS, rays, sizeof *rays, out, sizeof *out), NEBEL_OK);
         for (int k = 0; k < TURNS; k++)
-            sum += weights[i] * nodes[i] * 2 * pi / TURNS * lights[k].in_scattering[1] / l->cosine;
+            sum += weights[i] * nodes[i] * 2 * pi / TURNS * out[k].in_scattering[1] / l->cosine;
     }
     return sum;
 }
@@ -224,7 +224,7 @@ static double seen_in_even_light(const layer *l, const nebel_diffusion_desc *dif
     const nebel_volume_desc volume = layer_of(&l->light, l->depth);
     nebel_snapshot *snapshot = commit_under(&even, &volume, diffusion);
     const nebel_ray ray = {{0, 2, 0}, {sqrt(1 - l->light.cosine * l->light.cosine), -l->light.cosine, 0}, HUGE_VAL};
-    nebel_light out;
+    nebel_transfer out;
     assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
     nebel_release_snapshot(snapshot);
     return out.in_scattering[0];
@@ -256,7 +256,7 @@ static void test_endless_depth_in_even_light(void **unused)
         volume.shape = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE, .point = {3, 20, 4}, .normal = {0, 1, 0}};
         nebel_snapshot *snapshot = commit_under(&even, &volume, &by_default);
         const nebel_ray ray = {{0, 21, 0}, {sqrt(1 - l.cosine * l.cosine), -l.cosine, 0}, HUGE_VAL};
-        nebel_light out;
+        nebel_transfer out;
         assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
         nebel_release_snapshot(snapshot);
         assert_true(fabs(out.in_scattering[0] - spaces[i].reflected) < .02);
@@ -282,7 +282,7 @@ static void test_height_fog_reflects_as_a_layer(void **unused)
             const double cosine = nodes[k / TURNS], sine = sqrt(1 - cosine * cosine),
                          angle = pi * (k % TURNS + .5) / TURNS;
             const nebel_ray ray = {{0, 2000, 0}, {sine * cos(angle), -cosine, sine * sin(angle)}, 1993 / cosine};
-            nebel_light out;
+            nebel_transfer out;
             const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT};
             assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
             sum += weights[k / TURNS] * cosine * 2 * pi / TURNS * out.in_scattering[0] / l->light.cosine;
@@ -343,16 +343,16 @@ static void set_rays(nebel_ray rays[RAYS])
         rays[i] = (nebel_ray){{9, 2 + .02 * i, -4}, {-8, .03 * i - 2, 7 + .01 * i}, i % 5 ? HUGE_VAL : .2 * i};
 }
 
-static void trace_some(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t count, nebel_light *lights)
+static void trace_some(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t count, nebel_transfer *to)
 {
     nebel_ray rays[RAYS];
     set_rays(rays);
-    assert_int_equal(nebel_trace(snapshot, desc, count, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, desc, count, rays, sizeof *rays, to, sizeof *to), NEBEL_OK);
 }
 
-static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_light lights[RAYS])
+static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_transfer transfers[RAYS])
 {
-    trace_some(snapshot, desc, RAYS, lights);
+    trace_some(snapshot, desc, RAYS, transfers);
 }
 
 static void test_white_fog_under_a_white_sky_is_white(void **unused)
@@ -360,17 +360,17 @@ static void test_white_fog_under_a_white_sky_is_white(void **unused)
     (void)unused;
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    nebel_light lights[RAYS];
+    nebel_transfer transfers[RAYS];
     const nebel_volume_desc volume = ball(&white, 3);
     const nebel_fog_desc desc = {.ambient = {1, 1, 1}};
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
     assert_int_equal(nebel_set_diffusion(fog, &by_default), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    trace(snapshot, &(nebel_trace_desc){0}, lights);
+    trace(snapshot, &(nebel_trace_desc){0}, transfers);
     for (int i = 0; i < RAYS; i++)
         for (int c = 0; c < 3; c++)
-            assert_true(fabs(lights[i].transmittance[c] + lights[i].in_scattering[c] - 1) < 1e-9);
+            assert_true(fabs(transfers[i].transmittance[c] + transfers[i].in_scattering[c] - 1) < 1e-9);
     nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
 }
@@ -387,11 +387,11 @@ static void test_white_fog_over_white_ground_is_white(void **unused)
     const nebel_volume_desc *volumes[] = {&level, &body};
     for (int k = 0; k < 2; k++) {
         nebel_snapshot *snapshot = commit_under(&sky, volumes[k], &on_ground);
-        nebel_light lights[RAYS];
-        trace(snapshot, &(nebel_trace_desc){0}, lights);
+        nebel_transfer transfers[RAYS];
+        trace(snapshot, &(nebel_trace_desc){0}, transfers);
         for (int i = 0; i < RAYS; i++)
             for (int c = 0; c < 3; c++)
-                assert_true(fabs(2 * lights[i].transmittance[c] + lights[i].in_scattering[c] - 2) < 1e-6);
+                assert_true(fabs(2 * transfers[i].transmittance[c] + transfers[i].in_scattering[c] - 2) < 1e-6);
         nebel_release_snapshot(snapshot);
     }
 }
@@ -401,15 +401,15 @@ static void test_transmittance_stays_and_light_is_added(void **unused)
     (void)unused;
     const nebel_volume_desc volume = ball(&white, 3);
     nebel_snapshot *once = commit(&white, &volume, NULL), *all = commit(&white, &volume, &by_default);
-    nebel_light lights[2][RAYS];
+    nebel_transfer transfers[2][RAYS];
     double more = 0;
-    trace(once, &(nebel_trace_desc){0}, lights[0]);
-    trace(all, &(nebel_trace_desc){0}, lights[1]);
+    trace(once, &(nebel_trace_desc){0}, transfers[0]);
+    trace(all, &(nebel_trace_desc){0}, transfers[1]);
     for (int i = 0; i < RAYS; i++)
         for (int c = 0; c < 3; c++) {
-            assert_true(lights[0][i].transmittance[c] == lights[1][i].transmittance[c]);
-            assert_true(lights[0][i].in_scattering[c] <= lights[1][i].in_scattering[c]);
-            more = fmax(more, lights[1][i].in_scattering[c] - lights[0][i].in_scattering[c]);
+            assert_true(transfers[0][i].transmittance[c] == transfers[1][i].transmittance[c]);
+            assert_true(transfers[0][i].in_scattering[c] <= transfers[1][i].in_scattering[c]);
+            more = fmax(more, transfers[1][i].in_scattering[c] - transfers[0][i].in_scattering[c]);
         }
     assert_true(more > .03);
     nebel_release_snapshot(once);
@@ -418,7 +418,7 @@ static void test_transmittance_stays_and_light_is_added(void **unused)
 
 static void assert_same_bits(const nebel_snapshot *snapshot)
 {
-    nebel_light first[RAYS], other[RAYS];
+    nebel_transfer first[RAYS], other[RAYS];
     nebel_ray rays[RAYS];
     nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
     const size_t count = nb_test_count(RAYS) > 34 ? nb_test_count(RAYS) : 34;
@@ -482,7 +482,7 @@ static void find_intensity(const nebel_snapshot *snapshot, double intensity[3])
     for (int i = 0; i < side * side; i++) {
         const double x = 2. * (i % side + .5) / side - 1, y = 2. * ((int)(i / side) + .5) / side - 1;
         const nebel_ray ray = {{x, y, 3}, {0, 0, -1}, 6};
-        nebel_light seen;
+        nebel_transfer seen;
         assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &seen, sizeof seen), NEBEL_OK);
         for (int c = 0; c < 3; c++) intensity[c] += seen.in_scattering[c] * 4 / (side * side);
     }
@@ -549,13 +549,13 @@ static void test_cells_do_not_matter_much(void **unused)
 {
     (void)unused;
     const nebel_volume_desc volume = ball(&white, 3);
-    nebel_light lights[2][RAYS];
+    nebel_transfer transfers[2][RAYS];
     for (int k = 0; k < 2; k++) {
         nebel_snapshot *snapshot = commit(&white, &volume, &(nebel_diffusion_desc){.cells = k ? 65536 : 8000});
-        trace(snapshot, &(nebel_trace_desc){0}, lights[k]);
+        trace(snapshot, &(nebel_trace_desc){0}, transfers[k]);
         nebel_release_snapshot(snapshot);
     }
-    for (int i = 0; i < RAYS; i++) assert_true(fog_difference(&lights[0][i], &lights[1][i]) < .01);
+    for (int i = 0; i < RAYS; i++) assert_true(fog_difference(&transfers[0][i], &transfers[1][i]) < .01);
 }
 
 /* Fog without an end, and a body in it. */
@@ -566,17 +566,17 @@ static void test_bodies_in_height_fog(void **unused)
     haze.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 20};
     nebel_fog *fog = start(&white, &haze, &(nebel_diffusion_desc){.has_ground = 1});
     nebel_snapshot *alone = NULL, *both = NULL;
-    nebel_light lights[2][2];
+    nebel_transfer transfers[2][2];
     const nebel_volume_desc body = ball(&white, 1);
     assert_int_equal(nebel_commit_fog(fog, &alone), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &body, NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &both), NEBEL_OK);
     /* One ray through the body, one far from it. */
     const nebel_ray rays[] = {{{1, 2, 40}, {0, 0, -1}, 60}, {{500, 2, 40}, {0, 0, -1}, 60}};
-    assert_int_equal(nebel_trace(alone, NULL, 2, rays, sizeof *rays, lights[0], sizeof *lights[0]), NEBEL_OK);
-    assert_int_equal(nebel_trace(both, NULL, 2, rays, sizeof *rays, lights[1], sizeof *lights[1]), NEBEL_OK);
-    assert_true(lights[1][0].in_scattering[0] > lights[0][0].in_scattering[0] + .01);
-    assert_true(fabs(lights[1][1].in_scattering[0] / lights[0][1].in_scattering[0] - 1) < .05);
+    assert_int_equal(nebel_trace(alone, NULL, 2, rays, sizeof *rays, transfers[0], sizeof *transfers[0]), NEBEL_OK);
+    assert_int_equal(nebel_trace(both, NULL, 2, rays, sizeof *rays, transfers[1], sizeof *transfers[1]), NEBEL_OK);
+    assert_true(transfers[1][0].in_scattering[0] > transfers[0][0].in_scattering[0] + .01);
+    assert_true(fabs(transfers[1][1].in_scattering[0] / transfers[0][1].in_scattering[0] - 1) < .05);
     nebel_release_snapshot(alone);
     nebel_release_snapshot(both);
     nebel_destroy_fog(fog);
@@ -638,9 +638,9 @@ static void test_fog_without_light(void **unused)
     nebel_volume_desc volumes[] = {volume_of(&white, 1), ball(&white, 0), ball(&white, 1e6), ball(&white, 1e-9)};
     for (size_t i = 0; i < sizeof volumes / sizeof *volumes; i++) {
         nebel_snapshot *snapshot = commit(&white, &volumes[i], &by_default);
-        nebel_light lights[RAYS];
-        trace(snapshot, &(nebel_trace_desc){0}, lights);
-        for (int k = 0; k < RAYS; k++) assert_true(lights[k].in_scattering[0] >= 0 && lights[k].in_scattering[0] < 2);
+        nebel_transfer all[RAYS];
+        trace(snapshot, &(nebel_trace_desc){0}, all);
+        for (int k = 0; k < RAYS; k++) assert_true(all[k].in_scattering[0] >= 0 && all[k].in_scattering[0] < 2);
         nebel_release_snapshot(snapshot);
     }
 }
@@ -668,7 +668,7 @@ static void test_random_fog(void **unused)
         const nebel_result result = nebel_commit_fog(made, &snapshot);
         assert_true(result == NEBEL_OK || result == NEBEL_ERROR_UNSUPPORTED);
         for (uint64_t i = 0; i < 20 && result == NEBEL_OK; i++) {
-            nebel_light out;
+            nebel_transfer out;
             const nebel_ray ray = random_fog_ray(&fog, i);
             const nebel_trace_desc in_float = {.precision = NEBEL_PRECISION_FLOAT};
             const nebel_result traced = nebel_trace(snapshot, &in_float, 1, &ray, sizeof ray, &out, sizeof out);
@@ -698,7 +698,7 @@ static void test_far_away(void **unused)
             const nebel_ray ray = {{i % 3 ? at : 0, i % 5 ? 2e13 : -at, i % 4 ? -at : 3},
                                    {i % 7 - 3, i % 11 ? .01 : -1, i % 13 - 6.5},
                                    HUGE_VAL};
-            nebel_light out;
+            nebel_transfer out;
             assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
             assert_true(out.in_scattering[0] >= 0 && isfinite(out.in_scattering[0]));
         }
@@ -723,13 +723,13 @@ static void test_lamps_far_away(void **unused)
     for (size_t i = 0; i < 3 * sizeof volumes / sizeof *volumes; i++) {
         nebel_fog *fog = start(&white, &volumes[i / 3], &(nebel_diffusion_desc){.cells = 1000, .has_ground = i < 3});
         nebel_snapshot *snapshot = NULL;
-        nebel_light lights[RAYS];
+        nebel_transfer transfers[RAYS];
         assert_int_equal(nebel_set_lamps(fog, i % 3 + 1, far), NEBEL_OK);
         assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-        trace(snapshot, &(nebel_trace_desc){0}, lights);
+        trace(snapshot, &(nebel_trace_desc){0}, transfers);
         for (int k = 0; k < RAYS; k++)
             for (int c = 0; c < 3; c++)
-                assert_true(lights[k].in_scattering[c] >= 0 && isfinite(lights[k].in_scattering[c]));
+                assert_true(transfers[k].in_scattering[c] >= 0 && isfinite(transfers[k].in_scattering[c]));
         nebel_release_snapshot(snapshot);
         nebel_destroy_fog(fog);
     }

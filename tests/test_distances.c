@@ -64,10 +64,11 @@ static void test_profiles_are_cut_where_the_distances_are(void **unused)
                                    .cutoff = 7};
     nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){0}, &fog, 1);
     const nebel_ray up = {{5, 1, 0}, {3, 4, 0}, HUGE_VAL};
-    nebel_light light;
-    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &up, sizeof up, &light, sizeof light), NEBEL_OK);
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &up, sizeof up, &transfer, sizeof transfer),
+                     NEBEL_OK);
     const double depth = .3 * 2 / .8 * (exp(-(1 + .8 * 2) / 2) - exp(-(1 + .8 * 7) / 2));
-    assert_true(fabs(light.transmittance[0] - exp(-depth)) < 1e-14);
+    assert_true(fabs(transfer.transmittance[0] - exp(-depth)) < 1e-14);
     nebel_release_snapshot(snapshot);
 }
 
@@ -76,14 +77,14 @@ static void test_endless_light_may_be_cut_off(void **unused)
     (void)unused;
     nebel_volume_desc glow = {.emission = {1, 2, 3}, .cutoff = 50};
     const nebel_ray ray = {{0, 0, 0}, {0, 0, -1}, HUGE_VAL};
-    nebel_light light;
+    nebel_transfer transfer;
     for (int endless = 0; endless < 2; endless++) {
         if (endless) glow.cutoff = 0;
         nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){0}, &glow, 1);
         const nebel_result result =
-            nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light);
+            nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer);
         assert_int_equal(result, endless ? NEBEL_ERROR_UNBOUNDED : NEBEL_OK);
-        if (!endless) assert_true(fabs(light.in_scattering[2] - 150) < 1e-9);
+        if (!endless) assert_true(fabs(transfer.in_scattering[2] - 150) < 1e-9);
         nebel_release_snapshot(snapshot);
     }
 }
@@ -101,15 +102,15 @@ static void test_random_fog_is_that_of_the_ray_between(void **unused)
         for (size_t i = 0; i < fog.count; i++) fog.volumes[i].cutoff = 12;
         nebel_snapshot *const cut = fog_commit(&desc, fog.volumes, fog.count);
         for (uint64_t r = 0; r < 20; r++) {
-            nebel_light light[2];
+            nebel_transfer transfer[2];
             nebel_ray ray = random_fog_ray(&fog, r);
             const nebel_trace_desc how = {.precision = (nebel_precision)(r % 2), .tolerance = 1e-5};
-            assert_int_equal(nebel_trace(cut, &how, 1, &ray, sizeof ray, &light[0], sizeof *light), NEBEL_OK);
+            assert_int_equal(nebel_trace(cut, &how, 1, &ray, sizeof ray, &transfer[0], sizeof *transfer), NEBEL_OK);
             ray.t_max = fmin(ray.t_max, 12);
-            assert_int_equal(nebel_trace(plain, &how, 1, &ray, sizeof ray, &light[1], sizeof *light), NEBEL_OK);
+            assert_int_equal(nebel_trace(plain, &how, 1, &ray, sizeof ray, &transfer[1], sizeof *transfer), NEBEL_OK);
             for (int c = 0; c < 3; c++) {
-                assert_true(light[0].transmittance[c] == light[1].transmittance[c]);
-                assert_true(light[0].in_scattering[c] == light[1].in_scattering[c]);
+                assert_true(transfer[0].transmittance[c] == transfer[1].transmittance[c]);
+                assert_true(transfer[0].in_scattering[c] == transfer[1].in_scattering[c]);
             }
         }
         nebel_release_snapshot(plain);

@@ -15,10 +15,11 @@
 static double depth_along(const nebel_volume_desc *volume, const nebel_ray *ray)
 {
     nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, volume, 1);
-    nebel_light light;
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, ray, sizeof *ray, &light, sizeof light), NEBEL_OK);
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, ray, sizeof *ray, &transfer, sizeof transfer),
+                     NEBEL_OK);
     nebel_release_snapshot(fog);
-    return -log(light.transmittance[0]) / .2;
+    return -log(transfer.transmittance[0]) / .2;
 }
 
 static void assert_near(double a, double b)
@@ -100,16 +101,17 @@ static void test_rays_level_with_a_plane_know_their_light(void **unused)
     for (int i = 0; i < 200; i++) {
         const double along[3] = {sin(i), cos(i), sin(3 * i)}, depth = .8 * (i + .5) / 200;
         nebel_ray ray = {.t_max = HUGE_VAL};
-        nebel_light light;
+        nebel_transfer transfer;
         for (int k = 0; k < 3; k++) {
             const int a = (k + 1) % 3, b = (k + 2) % 3;
             ray.origin[k] = -depth * normal[k];
             ray.direction[k] = along[a] * normal[b] - along[b] * normal[a] + (i % 2 ? 1e-15 : -1e-15) * normal[k];
         }
-        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-        if (light.error > 1e-8) print_message("ray %d: error %g\n", i, light.error);
-        assert_true(light.error < 1e-8);
-        for (int c = 0; c < 3; c++) assert_true(fabs(light.in_scattering[c] - half.source[c]) <= light.error);
+        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                         NEBEL_OK);
+        if (transfer.error > 1e-8) print_message("ray %d: error %g\n", i, transfer.error);
+        assert_true(transfer.error < 1e-8);
+        for (int c = 0; c < 3; c++) assert_true(fabs(transfer.in_scattering[c] - half.source[c]) <= transfer.error);
     }
     nebel_release_snapshot(fog);
 }

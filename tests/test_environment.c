@@ -49,9 +49,9 @@ static nebel_snapshot *commit(const nebel_environment *environment, const nebel_
 static void ask(const nebel_snapshot *snapshot, const double direction[3], double scattered[3])
 {
     const nebel_ray ray = {.direction = {direction[0], direction[1], direction[2]}, .t_max = 100};
-    nebel_light light;
-    assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, 0, &light, 0), NEBEL_OK);
-    memcpy(scattered, light.in_scattering, sizeof light.in_scattering);
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+    memcpy(scattered, transfer.in_scattering, sizeof transfer.in_scattering);
 }
 
 static nebel_environment_map *make_map(size_t height, float (*radiance)(size_t x, size_t y, int c, size_t height))
@@ -351,7 +351,7 @@ static void expect_contracts(const nebel_environment *environment)
 {
     nebel_snapshot *snapshot = commit_many(environment);
     static nebel_ray rays[RAYS];
-    static nebel_light exact[RAYS], first[RAYS], lights[RAYS];
+    static nebel_transfer exact[RAYS], first[RAYS], transfers[RAYS];
     throw_rays(rays);
     nebel_trace_desc desc = {.precision = NEBEL_PRECISION_DOUBLE};
     assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, exact, sizeof *exact), NEBEL_OK);
@@ -363,15 +363,17 @@ static void expect_contracts(const nebel_environment *environment)
     for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
         if (!nebel_isa_available((nebel_isa)isa)) continue;
         desc.isa = (nebel_isa)isa;
-        assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
-        assert_memory_equal(lights, first, sizeof first);
+        assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers),
+                         NEBEL_OK);
+        assert_memory_equal(transfers, first, sizeof first);
         for (size_t i = 0; i < nb_test_count(RAYS); i++)
-            assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &lights[i], 0), NEBEL_OK);
-        assert_memory_equal(lights, first, sizeof first);
+            assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &transfers[i], 0), NEBEL_OK);
+        assert_memory_equal(transfers, first, sizeof first);
         desc.transmittance_only = 1;
-        assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+        assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers),
+                         NEBEL_OK);
         for (int i = 0; i < RAYS; i++)
-            assert_memory_equal(lights[i].transmittance, first[i].transmittance, sizeof first[i].transmittance);
+            assert_memory_equal(transfers[i].transmittance, first[i].transmittance, sizeof first[i].transmittance);
         desc.transmittance_only = 0;
     }
     nebel_release_snapshot(snapshot);

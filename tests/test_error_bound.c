@@ -91,16 +91,17 @@ typedef struct truth {
     double T[3], S[3], uncertainty;
 } truth;
 
-static void judge(mode *m, size_t i, const random_fog *fog, const nebel_light *light, const truth *is)
+static void judge(mode *m, size_t i, const random_fog *fog, const nebel_transfer *transfer, const truth *is)
 {
-    const double wrong = apart(light->transmittance, light->in_scattering, is->T, is->S);
+    const double wrong = apart(transfer->transmittance, transfer->in_scattering, is->T, is->S);
     const double surely = wrong - is->uncertainty, promised = m->tolerance * largest_radiance(fog) + m->extra;
     m->cases++;
-    m->dishonest += !(light->error >= surely);
-    keep_worst(surely / fmax(light->error, 1e-300), i, &m->worst_ratio, &m->worst_ratio_case);
-    if (light->error <= promised) return;
+    m->dishonest += !(transfer->error >= surely);
+    keep_worst(surely / fmax(transfer->error, 1e-300), i, &m->worst_ratio, &m->worst_ratio_case);
+    if (transfer->error <= promised) return;
     m->excessive++;
-    keep_worst(isnan(light->error) ? HUGE_VAL : light->error / promised, i, &m->worst_excess, &m->worst_excess_case);
+    keep_worst(isnan(transfer->error) ? HUGE_VAL : transfer->error / promised, i, &m->worst_excess,
+               &m->worst_excess_case);
 }
 
 /* In half of the fog of unions and intersections one volume replaces others and one excludes them. */
@@ -119,14 +120,14 @@ static void try_fog(size_t from, size_t to)
 {
     static random_fog fog;
     nebel_ray rays[RAYS_PER_FOG];
-    nebel_light lights[MODES][RAYS_PER_FOG];
+    nebel_transfer transfers[MODES][RAYS_PER_FOG];
     make_fog(&fog, from);
     for (size_t i = from; i < to; i++) rays[i - from] = random_fog_ray(&fog, i % RAYS_PER_FOG);
     nebel_snapshot *const snapshot = commit(&fog);
     for (int m = 0; m < MODES; m++) {
         const nebel_trace_desc desc = {.precision = modes[m].precision, .tolerance = modes[m].tolerance};
         const nebel_result result =
-            nebel_trace(snapshot, &desc, to - from, rays, sizeof *rays, lights[m], sizeof *lights[m]);
+            nebel_trace(snapshot, &desc, to - from, rays, sizeof *rays, transfers[m], sizeof *transfers[m]);
         if (result != NEBEL_OK) print_message("case %zu, %s: %s\n", from, modes[m].name, nebel_result_text(result));
         assert_int_equal(result, NEBEL_OK);
     }
@@ -139,7 +140,7 @@ static void try_fog(size_t from, size_t to)
             continue;
         }
         worst_uncertainty = fmax(worst_uncertainty, is.uncertainty);
-        for (int m = 0; m < MODES; m++) judge(&modes[m], i, &fog, &lights[m][i - from], &is);
+        for (int m = 0; m < MODES; m++) judge(&modes[m], i, &fog, &transfers[m][i - from], &is);
     }
     nebel_release_snapshot(snapshot);
 }
@@ -151,18 +152,19 @@ static void print_case(const char *why, const mode *m, size_t i)
     make_fog(&fog, i);
     const nebel_ray ray = random_fog_ray(&fog, i % RAYS_PER_FOG);
     nebel_snapshot *const snapshot = commit(&fog);
-    nebel_light light;
+    nebel_transfer transfer;
     double T[3], S[3], uncertainty;
     const nebel_trace_desc desc = {.precision = m->precision, .tolerance = m->tolerance};
-    nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &light, sizeof light);
+    nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer);
     oracle_trace(fog.volumes, fog.count, fog.ambient, &ray, T, S, &uncertainty);
     oracle_limit(fog.max_opacity, T, S, &uncertainty);
     nebel_release_snapshot(snapshot);
     printf("\n%s, %s: case %zu (kind %d, seed %zu, ray %zu)\n", m->name, why, i, (int)kind_of(i), (size_t)seed_of(i),
            i % RAYS_PER_FOG);
     random_fog_print(stdout, &fog, &ray);
-    printf("trace  T %.17g %.17g %.17g S %.17g %.17g %.17g error %g\n", light.transmittance[0], light.transmittance[1],
-           light.transmittance[2], light.in_scattering[0], light.in_scattering[1], light.in_scattering[2], light.error);
+    printf("trace  T %.17g %.17g %.17g S %.17g %.17g %.17g error %g\n", transfer.transmittance[0],
+           transfer.transmittance[1], transfer.transmittance[2], transfer.in_scattering[0], transfer.in_scattering[1],
+           transfer.in_scattering[2], transfer.error);
     printf("oracle T %.17g %.17g %.17g S %.17g %.17g %.17g uncertainty %g\n", T[0], T[1], T[2], S[0], S[1], S[2],
            uncertainty);
 }

@@ -219,23 +219,23 @@ static nebel_snapshot *commit(const scene *s, size_t *refused)
     return snapshot;
 }
 
-static int is_light(const nebel_light *light)
+static int is_light(const nebel_transfer *transfer)
 {
-    int good = light->error >= 0 && isfinite(light->error);
+    int good = transfer->error >= 0 && isfinite(transfer->error);
     for (int c = 0; c < 3; c++) {
-        const double T = light->transmittance[c], S = light->in_scattering[c];
+        const double T = transfer->transmittance[c], S = transfer->in_scattering[c];
         good = good && T >= 0 && T <= 1 && S >= 0 && isfinite(S);
     }
     return good;
 }
 
-static void say(uint64_t seed, const char *what, const nebel_ray *ray, const nebel_light *light)
+static void say(uint64_t seed, const char *what, const nebel_ray *ray, const nebel_transfer *transfer)
 {
     print_message("scene %llu, %s: ray %g %g %g  %g %g %g  %g\n", (unsigned long long)seed, what, ray->origin[0],
                   ray->origin[1], ray->origin[2], ray->direction[0], ray->direction[1], ray->direction[2], ray->t_max);
-    print_message("    T %g %g %g S %g %g %g error %g\n", light->transmittance[0], light->transmittance[1],
-                  light->transmittance[2], light->in_scattering[0], light->in_scattering[1], light->in_scattering[2],
-                  light->error);
+    print_message("    T %g %g %g S %g %g %g error %g\n", transfer->transmittance[0], transfer->transmittance[1],
+                  transfer->transmittance[2], transfer->in_scattering[0], transfer->in_scattering[1],
+                  transfer->in_scattering[2], transfer->error);
 }
 
 static int may_be_unbounded(const scene *s, const nebel_ray *ray)
@@ -253,13 +253,13 @@ typedef struct tally {
 
 /* One ray; on OK the light in *light. */
 static int try_ray(const scene *s, uint64_t seed, const nebel_snapshot *snapshot, nebel_precision precision,
-                   const nebel_ray *ray, nebel_light *light, tally *sum)
+                   const nebel_ray *ray, nebel_transfer *transfer, tally *sum)
 {
     static const char *const names[] = {"double", "float"};
     size_t failed = 99;
     const double tolerances[] = {0, 1e-5, 10};
     const nebel_trace_desc desc = {.precision = precision, .tolerance = tolerances[seed % 3], .failed_ray = &failed};
-    const nebel_result result = nebel_trace(snapshot, &desc, 1, ray, sizeof *ray, light, sizeof *light);
+    const nebel_result result = nebel_trace(snapshot, &desc, 1, ray, sizeof *ray, transfer, sizeof *transfer);
     if (result == NEBEL_ERROR_UNBOUNDED) {
         sum->unbounded++;
         assert_int_equal(failed, 0);
@@ -268,9 +268,9 @@ static int try_ray(const scene *s, uint64_t seed, const nebel_snapshot *snapshot
     }
     assert_int_equal(result, NEBEL_OK);
     sum->rays++;
-    if (is_light(light)) return 1;
+    if (is_light(transfer)) return 1;
     sum->wrong++;
-    say(seed, names[precision], ray, light);
+    say(seed, names[precision], ray, transfer);
     return 0;
 }
 
@@ -281,14 +281,14 @@ static void try_scene(uint64_t seed, tally *sum)
     nebel_snapshot *const snapshot = commit(&s, &sum->refused);
     for (int r = 0; r < RAYS; r++) {
         const nebel_ray ray = make_ray(&s);
-        nebel_light exact, light;
+        nebel_transfer exact, transfer;
         const int good = try_ray(&s, seed, snapshot, NEBEL_PRECISION_DOUBLE, &ray, &exact, sum);
-        if (!try_ray(&s, seed, snapshot, NEBEL_PRECISION_FLOAT, &ray, &light, sum) || !good) continue;
+        if (!try_ray(&s, seed, snapshot, NEBEL_PRECISION_FLOAT, &ray, &transfer, sum) || !good) continue;
         if (!compares_precisions) continue;
-        if (fog_difference(&exact, &light) <= exact.error + light.error) continue;
+        if (fog_difference(&exact, &transfer) <= exact.error + transfer.error) continue;
         sum->wrong++;
         say(seed, "double and float disagree", &ray, &exact);
-        say(seed, "beyond their errors", &ray, &light);
+        say(seed, "beyond their errors", &ray, &transfer);
     }
     nebel_release_snapshot(snapshot);
 }
@@ -365,14 +365,14 @@ static void test_a_wall_of_fog_is_seen_behind_thin_fog(void **unused)
     const double through = exp(-1e-6 * 2e5), expected = 1.4 * (1 - through) + .3 * through;
     nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, volumes, 2);
     for (int p = 0; p < 2; p++) {
-        nebel_light light;
+        nebel_transfer transfer;
         const nebel_trace_desc desc = {.precision = precisions[p]};
-        assert_int_equal(nebel_trace(fog, &desc, 1, &down, sizeof down, &light, sizeof light), NEBEL_OK);
+        assert_int_equal(nebel_trace(fog, &desc, 1, &down, sizeof down, &transfer, sizeof transfer), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
-            assert_true(light.transmittance[c] <= light.error);
-            assert_true(fabs(light.in_scattering[c] - expected) <= light.error + 1e-15);
+            assert_true(transfer.transmittance[c] <= transfer.error);
+            assert_true(fabs(transfer.in_scattering[c] - expected) <= transfer.error + 1e-15);
         }
-        assert_true(light.error < 1e-4);
+        assert_true(transfer.error < 1e-4);
     }
     nebel_release_snapshot(fog);
 }
@@ -395,7 +395,7 @@ static void test_endless_rays_pass_slivers_between_a_face_and_a_density(void **u
     uint64_t dices = 34;
     for (int i = 0; i < 40; i++) {
         nebel_ray ray = {{.4, 7.6, 19}, {dice(&dices, -1, 1), dice(&dices, -2, -.2), dice(&dices, -1, 1)}, 1e6};
-        nebel_light finite, endless;
+        nebel_transfer finite, endless;
         assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &finite, sizeof finite), NEBEL_OK);
         ray.t_max = HUGE_VAL;
         assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &endless, sizeof endless), NEBEL_OK);

@@ -13,14 +13,14 @@ static double find(const nebel_snapshot *snapshot, double transmittance, int cha
     return distance;
 }
 
-static nebel_light trace_to(const nebel_snapshot *snapshot, const nebel_ray *ray, double end)
+static nebel_transfer trace_to(const nebel_snapshot *snapshot, const nebel_ray *ray, double end)
 {
     nebel_ray shorter = *ray;
-    nebel_light light;
+    nebel_transfer transfer;
     shorter.t_max = end;
     const nebel_trace_desc desc = {.transmittance_only = 1};
-    assert_int_equal(nebel_trace(snapshot, &desc, 1, &shorter, sizeof shorter, &light, sizeof light), NEBEL_OK);
-    return light;
+    assert_int_equal(nebel_trace(snapshot, &desc, 1, &shorter, sizeof shorter, &transfer, sizeof transfer), NEBEL_OK);
+    return transfer;
 }
 
 /* ---- against known distances ----------------------------------------------------------------- */
@@ -157,8 +157,8 @@ static void check(const random_fog *fog, const nebel_snapshot *snapshot, const n
 {
     const double distance = find(snapshot, wanted, channel, ray);
     const int found = distance < HUGE_VAL;
-    const nebel_light before = trace_to(snapshot, ray, found ? distance * (1 - 1e-12) : ray->t_max);
-    const nebel_light behind = trace_to(snapshot, ray, found ? distance * (1 + 1e-12) : ray->t_max);
+    const nebel_transfer before = trace_to(snapshot, ray, found ? distance * (1 - 1e-12) : ray->t_max);
+    const nebel_transfer behind = trace_to(snapshot, ray, found ? distance * (1 + 1e-12) : ray->t_max);
     int good = before.transmittance[channel] >= wanted * (1 - 1e-15) - before.error;
     if (found) good = good && distance >= 0 && distance <= ray->t_max;
     if (found) good = good && behind.transmittance[channel] <= wanted * (1 + 1e-15) + behind.error;

@@ -47,7 +47,7 @@ enum { PROBES = 5 };
 
 typedef struct fingerprint {
     size_t count;
-    nebel_light lights[PROBES];
+    nebel_transfer transfers[PROBES];
 } fingerprint;
 
 static fingerprint look_at(const nebel_snapshot *snapshot)
@@ -60,8 +60,8 @@ static fingerprint look_at(const nebel_snapshot *snapshot)
     fingerprint print;
     memset(&print, 0, sizeof print);
     print.count = nebel_snapshot_volume_count(snapshot);
-    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, PROBES, rays, sizeof rays[0], print.lights,
-                                 sizeof print.lights[0]),
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, PROBES, rays, sizeof rays[0], print.transfers,
+                                 sizeof print.transfers[0]),
                      NEBEL_OK);
     return print;
 }
@@ -255,12 +255,12 @@ static void make_rays(nebel_ray rays[RAYS])
 static nebel_result trace(bench *b, nebel_precision precision)
 {
     nebel_ray rays[RAYS];
-    nebel_light lights[RAYS];
+    nebel_transfer transfers[RAYS];
     size_t failed = RAYS;
     make_rays(rays);
     const nebel_trace_desc desc = {.precision = precision, .failed_ray = &failed};
     const nebel_result result =
-        nebel_trace(b->snapshot, &desc, b->ray_count, rays, sizeof rays[0], lights, sizeof lights[0]);
+        nebel_trace(b->snapshot, &desc, b->ray_count, rays, sizeof rays[0], transfers, sizeof transfers[0]);
     assert_true((result == NEBEL_OK) == (failed == RAYS));
     return result;
 }
@@ -453,10 +453,10 @@ static void test_ambient_light_reaches_later_snapshots_only(void **unused)
     const fingerprint bright = look_at_fog(fog);
     for (int i = 0; i < PROBES; i++)
         for (int c = 0; c < 3; c++) {
-            const double T = bright.lights[i].transmittance[c];
-            assert_true(dark.lights[i].transmittance[c] == T);
-            assert_true(dark.lights[i].in_scattering[c] == 0);
-            assert_true(fabs(bright.lights[i].in_scattering[c] - lit.albedo[c] * ambient[c] * (1 - T)) < 1e-14);
+            const double T = bright.transfers[i].transmittance[c];
+            assert_true(dark.transfers[i].transmittance[c] == T);
+            assert_true(dark.transfers[i].in_scattering[c] == 0);
+            assert_true(fabs(bright.transfers[i].in_scattering[c] - lit.albedo[c] * ambient[c] * (1 - T)) < 1e-14);
         }
     nebel_destroy_fog(fog);
 }
@@ -485,8 +485,8 @@ static void test_empty_descriptions_are_valid(void **unused)
     assert_int_equal(clear.count, 1);
     for (int i = 0; i < PROBES; i++)
         for (int c = 0; c < 3; c++) {
-            assert_true(nothing.lights[i].transmittance[c] == 1 && nothing.lights[i].in_scattering[c] == 0);
-            assert_true(clear.lights[i].transmittance[c] == 1 && clear.lights[i].in_scattering[c] == 0);
+            assert_true(nothing.transfers[i].transmittance[c] == 1 && nothing.transfers[i].in_scattering[c] == 0);
+            assert_true(clear.transfers[i].transmittance[c] == 1 && clear.transfers[i].in_scattering[c] == 0);
         }
     nebel_destroy_fog(fog);
 }

@@ -32,7 +32,7 @@ static void write_gltf(const char *members)
 
 enum { RAYS = 3000 };
 
-static void trace(const nebel_scene *scene, nebel_light *lights)
+static void trace(const nebel_scene *scene, nebel_transfer *transfers)
 {
     static nebel_ray rays[RAYS];
     nebel_snapshot *fog = NULL;
@@ -44,15 +44,15 @@ static void trace(const nebel_scene *scene, nebel_light *lights)
             (nebel_ray){{16 * numbers[0], 16 * numbers[1], 16 * numbers[2]}, {numbers[3], numbers[4], numbers[5]}, 30};
     }
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(
-        nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-12}, RAYS, rays, sizeof *rays, lights, sizeof *lights),
-        NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-12}, RAYS, rays, sizeof *rays, transfers,
+                                 sizeof *transfers),
+                     NEBEL_OK);
     nebel_release_snapshot(fog);
 }
 
 static void assert_same_fog(const char *members, const char *model, const char *fog)
 {
-    static nebel_light got[RAYS], wanted[RAYS];
+    static nebel_transfer got[RAYS], wanted[RAYS];
     char text[2000];
     write_gltf(members);
     nebel_scene *node = parse_good(model);

@@ -220,12 +220,12 @@ static nebel_ray random_ray(uint64_t *state)
     return ray;
 }
 
-static nebel_light trace(const nebel_snapshot *fog, nebel_precision precision, double tolerance, const nebel_ray *ray)
+static nebel_transfer trace(const nebel_snapshot *fog, nebel_precision digits, double tolerance, const nebel_ray *ray)
 {
-    nebel_light light;
-    const nebel_trace_desc desc = {.precision = precision, .tolerance = tolerance};
-    assert_int_equal(nebel_trace(fog, &desc, 1, ray, sizeof *ray, &light, sizeof light), NEBEL_OK);
-    return light;
+    nebel_transfer transfer;
+    const nebel_trace_desc desc = {.precision = digits, .tolerance = tolerance};
+    assert_int_equal(nebel_trace(fog, &desc, 1, ray, sizeof *ray, &transfer, sizeof transfer), NEBEL_OK);
+    return transfer;
 }
 
 /* ---- tests ----------------------------------------------------------------------------------- */
@@ -247,10 +247,10 @@ static void depth_is_that_of_T39(void **state)
     nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &v, 1);
     nebel_release_grid(v.density.grid);
     const nebel_ray ray = {.origin = {0, .4, 2.7}, .direction = {3, 2.2, -2.4}, .t_max = 4.427188724235731};
-    const nebel_light exact = trace(fog, NEBEL_PRECISION_DOUBLE, 0, &ray);
+    const nebel_transfer exact = trace(fog, NEBEL_PRECISION_DOUBLE, 0, &ray);
     assert_near(-log(exact.transmittance[0]), 1.805295396947395, 1e-12 * 1.8);
     assert_true(exact.error < 1e-12);
-    const nebel_light fast = trace(fog, NEBEL_PRECISION_FLOAT, 0, &ray);
+    const nebel_transfer fast = trace(fog, NEBEL_PRECISION_FLOAT, 0, &ray);
     assert_near(-log(fast.transmittance[0]), 1.805295396947395, 3e-6);
     nebel_release_snapshot(fog);
 }
@@ -268,13 +268,13 @@ static void check_depth(uint64_t seed, nebel_filter filter)
         const line l = line_of_ray(&ray);
         const long double transmittance = expl(-.4L * depth_of(&b, &l));
         for (int p = 0; p < 2; p++) {
-            const nebel_light light = trace(fog, (nebel_precision)p, 0, &ray);
-            const double off = fabs((double)((long double)light.transmittance[1] - transmittance));
-            const double dark = fabs((double)((long double)light.in_scattering[1] - (1 - transmittance)));
-            assert_true(light.error <= (p == 0 ? 1e-11 : 1e-5));
-            if (!(off <= light.error && dark <= light.error && off <= (p == 0 ? 1e-12 : 1e-6)))
+            const nebel_transfer transfer = trace(fog, (nebel_precision)p, 0, &ray);
+            const double off = fabs((double)((long double)transfer.transmittance[1] - transmittance));
+            const double dark = fabs((double)((long double)transfer.in_scattering[1] - (1 - transmittance)));
+            assert_true(transfer.error <= (p == 0 ? 1e-11 : 1e-5));
+            if (!(off <= transfer.error && dark <= transfer.error && off <= (p == 0 ? 1e-12 : 1e-6)))
                 fail_msg("seed %d ray %d precision %d: off by %g and %g, said %g", (int)seed, i, p, off, dark,
-                         light.error);
+                         transfer.error);
         }
     }
     nebel_release_snapshot(fog);
@@ -312,14 +312,14 @@ static void check_light(uint64_t seed, nebel_filter filter, double tolerance)
         const line l = line_of_ray(&ray);
         light_of(blocks, extinction, source, 2, &l, &transmittance, &radiance);
         for (int p = 0; p < 2; p++) {
-            const nebel_light light = trace(fog, (nebel_precision)p, tolerance, &ray);
-            const nebel_light same = trace(other, (nebel_precision)p, tolerance, &ray);
-            const double off = fmax(fabs((double)((long double)light.transmittance[0] - transmittance)),
-                                    fabs((double)((long double)light.in_scattering[0] - radiance)));
-            assert_true(light.error <= tolerance + (p == 0 ? 1e-8 : 1e-4));
-            if (!(off <= light.error))
-                fail_msg("seed %d ray %d precision %d: off by %g, said %g", (int)seed, i, p, off, light.error);
-            assert_memory_equal(&light, &same, sizeof light);
+            const nebel_transfer transfer = trace(fog, (nebel_precision)p, tolerance, &ray);
+            const nebel_transfer same = trace(other, (nebel_precision)p, tolerance, &ray);
+            const double off = fmax(fabs((double)((long double)transfer.transmittance[0] - transmittance)),
+                                    fabs((double)((long double)transfer.in_scattering[0] - radiance)));
+            assert_true(transfer.error <= tolerance + (p == 0 ? 1e-8 : 1e-4));
+            if (!(off <= transfer.error))
+                fail_msg("seed %d ray %d precision %d: off by %g, said %g", (int)seed, i, p, off, transfer.error);
+            assert_memory_equal(&transfer, &same, sizeof transfer);
         }
     }
     nebel_release_snapshot(fog);
@@ -400,11 +400,11 @@ static void check_sunlight(uint64_t seed, nebel_filter filter, double tolerance)
         const double doubt = fabs((double)(truth - rough)) + 2e-6; /* the edges of shadows lie anywhere */
         assert_true(doubt < 1e-3);
         for (int p = 0; p < 2; p++) {
-            const nebel_light light = trace(fog, (nebel_precision)p, tolerance, &ray);
-            const double off = fabs((double)((long double)light.in_scattering[0] - truth));
-            assert_true(light.error <= tolerance + (p == 0 ? 1e-8 : 1e-4));
-            if (!(off <= light.error + doubt))
-                fail_msg("seed %d ray %d precision %d: off by %g, said %g", (int)seed, i, p, off, light.error);
+            const nebel_transfer transfer = trace(fog, (nebel_precision)p, tolerance, &ray);
+            const double off = fabs((double)((long double)transfer.in_scattering[0] - truth));
+            assert_true(transfer.error <= tolerance + (p == 0 ? 1e-8 : 1e-4));
+            if (!(off <= transfer.error + doubt))
+                fail_msg("seed %d ray %d precision %d: off by %g, said %g", (int)seed, i, p, off, transfer.error);
         }
     }
     nebel_release_snapshot(fog);
@@ -432,8 +432,8 @@ static void shadows_of_surfaces_part_the_sunlight(void **test)
         nebel_snapshot *fog = lone_fog(&state, &b, (nebel_filter)(seed % 2), sun);
         const nebel_ray ray = random_ray(&state);
         const nebel_lit_pieces pieces[2] = {{lit, toggles}, {dark, toggles}};
-        nebel_light part[2];
-        const nebel_light all = trace(fog, NEBEL_PRECISION_FLOAT, 1e-4, &ray);
+        nebel_transfer part[2];
+        const nebel_transfer all = trace(fog, NEBEL_PRECISION_FLOAT, 1e-4, &ray);
         for (int i = 0; i < 2; i++) {
             const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .tolerance = 1e-4, .sunlit = &pieces[i]};
             assert_int_equal(nebel_trace(fog, &desc, 1, &ray, sizeof ray, &part[i], sizeof part[i]), NEBEL_OK);
@@ -444,10 +444,10 @@ static void shadows_of_surfaces_part_the_sunlight(void **test)
     }
 }
 
-static void trace_at(const nebel_snapshot *fog, nebel_isa isa, size_t n, const nebel_ray *rays, nebel_light *lights)
+static void trace_at(const nebel_snapshot *fog, nebel_isa isa, size_t n, const nebel_ray *rays, nebel_transfer *to)
 {
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = isa, .tolerance = 1e-5};
-    assert_int_equal(nebel_trace(fog, &desc, n, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, &desc, n, rays, sizeof *rays, to, sizeof *to), NEBEL_OK);
 }
 
 /* Turned boxes, mirrored ones, fog of other kinds, and the sun. */
@@ -484,13 +484,13 @@ static void bits_do_not_depend_on_company(void **test)
         nebel_snapshot *fog = seed < 12 ? mixed_fog(&state, seed % 3 == 2 ? .5 : 0)
                                         : lone_fog(&state, &lone, (nebel_filter)(seed % 2), sun);
         nebel_ray rays[RAYS];
-        nebel_light alone[RAYS], together[RAYS];
+        nebel_transfer alone[RAYS], all[RAYS];
         for (int i = 0; i < RAYS; i++) rays[i] = random_ray(&state);
         for (size_t i = 0; i < RAYS; i++) trace_at(fog, NEBEL_ISA_SCALAR, 1, &rays[i], &alone[i]);
         for (int isa = 1; isa < NEBEL_ISA_COUNT; isa++) {
             if (!nebel_isa_available((nebel_isa)isa)) continue;
-            trace_at(fog, (nebel_isa)isa, RAYS, rays, together);
-            for (int i = 0; i < RAYS; i++) assert_memory_equal(&together[i], &alone[i], offsetof(nebel_light, error));
+            trace_at(fog, (nebel_isa)isa, RAYS, rays, all);
+            for (int i = 0; i < RAYS; i++) assert_memory_equal(&all[i], &alone[i], offsetof(nebel_transfer, error));
         }
         nebel_release_snapshot(fog);
     }
@@ -505,8 +505,8 @@ static void float_is_near_double(void **test)
         nebel_snapshot *fog = mixed_fog(&state, 0);
         for (int i = 0; i < 20; i++) {
             const nebel_ray ray = random_ray(&state);
-            const nebel_light fine = trace(fog, NEBEL_PRECISION_DOUBLE, 1e-9, &ray);
-            const nebel_light fast = trace(fog, NEBEL_PRECISION_FLOAT, 1e-5, &ray);
+            const nebel_transfer fine = trace(fog, NEBEL_PRECISION_DOUBLE, 1e-9, &ray);
+            const nebel_transfer fast = trace(fog, NEBEL_PRECISION_FLOAT, 1e-5, &ray);
             assert_true(fine.error <= 1.2e-8);
             assert_true(fast.error <= 1.1e-4);
             assert_true(fog_difference(&fine, &fast) <= fine.error + fast.error);
@@ -535,8 +535,8 @@ static void equal_voxels_are_constant_density(void **test)
     uint64_t state = 7;
     for (int i = 0; i < 50; i++) {
         const nebel_ray ray = random_ray(&state);
-        const nebel_light a = trace(fog, NEBEL_PRECISION_DOUBLE, 1e-4, &ray);
-        const nebel_light b = trace(plain, NEBEL_PRECISION_DOUBLE, 1e-4, &ray);
+        const nebel_transfer a = trace(fog, NEBEL_PRECISION_DOUBLE, 1e-4, &ray);
+        const nebel_transfer b = trace(plain, NEBEL_PRECISION_DOUBLE, 1e-4, &ray);
         assert_true(fog_difference(&a, &b) <= a.error + b.error);
         assert_near(a.transmittance[0], b.transmittance[0], 1e-14);
     }
@@ -572,10 +572,10 @@ static void types_agree(void **test)
     }
     for (int i = 0; i < 30; i++) {
         const nebel_ray ray = random_ray(&state);
-        const nebel_light a = trace(fog[0], NEBEL_PRECISION_DOUBLE, 0, &ray);
+        const nebel_transfer a = trace(fog[0], NEBEL_PRECISION_DOUBLE, 0, &ray);
         for (int k = 1; k < 3; k++)
             for (int isa = NEBEL_ISA_DEFAULT; isa < NEBEL_ISA_COUNT; isa++) {
-                nebel_light b = trace(fog[k], NEBEL_PRECISION_DOUBLE, 0, &ray);
+                nebel_transfer b = trace(fog[k], NEBEL_PRECISION_DOUBLE, 0, &ray);
                 if (isa > 0 && nebel_isa_available((nebel_isa)isa)) trace_at(fog[k], (nebel_isa)isa, 1, &ray, &b);
                 assert_near(a.transmittance[0], b.transmittance[0], isa > 0 ? 1e-6 : 1e-14);
             }

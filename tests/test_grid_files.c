@@ -42,7 +42,7 @@ static double through(nebel_grid *grid, int axis, double u, double v)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    nebel_light light;
+    nebel_transfer transfer;
     const nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_BOX, .max = {1, 1, 1}},
                                       .density = {.type = NEBEL_DENSITY_GRID, .grid = grid},
                                       .extinction = {1, 1, 1}};
@@ -54,10 +54,10 @@ static double through(nebel_grid *grid, int axis, double u, double v)
     assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
     nebel_destroy_fog(fog);
     nebel_release_snapshot(snapshot);
-    return light.transmittance[0];
+    return transfer.transmittance[0];
 }
 
 static nebel_grid *load(const nebel_grid_file *file)
@@ -353,12 +353,12 @@ static void scenes_give_back_all_memory(void **state)
 static double light_at_frame(const nebel_scene *scene, double frame)
 {
     nebel_snapshot *fog = NULL;
-    nebel_light light;
+    nebel_transfer transfer;
     const nebel_ray ray = {.origin = {-1, .4, .6}, .direction = {1, 0, 0}, .t_max = 3};
     assert_int_equal(nebel_commit_scene_fog_at(scene, frame, &fog), NEBEL_OK);
-    assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
     nebel_release_snapshot(fog);
-    return light.transmittance[0];
+    return transfer.transmittance[0];
 }
 
 /* The noise of a frame is that which the core makes with what has drifted and passed until then. */

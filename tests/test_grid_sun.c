@@ -153,15 +153,15 @@ static void check_rays(uint64_t seed, double tolerance)
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .tolerance = tolerance};
     for (int i = 0; i < RAYS; i++) {
         const nebel_ray ray = random_ray(&state, &c);
-        nebel_light light;
-        assert_int_equal(nebel_trace(fog, &desc, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-        if (light.transmittance[0] == 1) continue;
-        const double off = fabs(light.in_scattering[0] - brute_light(&c, &ray, PARTS));
-        if (off <= light.error) continue;
+        nebel_transfer transfer;
+        assert_int_equal(nebel_trace(fog, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+        if (transfer.transmittance[0] == 1) continue;
+        const double off = fabs(transfer.in_scattering[0] - brute_light(&c, &ray, PARTS));
+        if (off <= transfer.error) continue;
         const double truth = brute_light(&c, &ray, 8 * PARTS), rough = brute_light(&c, &ray, 4 * PARTS);
-        const double still = fabs(light.in_scattering[0] - truth), doubt = fabs(truth - rough) + 1e-6;
-        if (!(still <= light.error + doubt))
-            fail_msg("seed %d ray %d: off by %g, said %g", (int)seed, i, still, light.error);
+        const double still = fabs(transfer.in_scattering[0] - truth), doubt = fabs(truth - rough) + 1e-6;
+        if (!(still <= transfer.error + doubt))
+            fail_msg("seed %d ray %d: off by %g, said %g", (int)seed, i, still, transfer.error);
     }
     nebel_release_snapshot(fog);
     nebel_release_grid(c.grid);
@@ -185,7 +185,7 @@ static void check_transmittance(uint64_t seed)
     const cloud c = random_cloud(&state);
     nebel_snapshot *fog = fog_of(&c);
     nebel_ray_planes rays = {.offset_stride = sizeof(float), .direction_stride = sizeof(float)};
-    nebel_light_planes dark = {.transmittance_stride = sizeof(float)}, lit = dark;
+    nebel_transfer_planes dark = {.transmittance_stride = sizeof(float)}, lit = dark;
     const nebel_lit_pieces pieces = {first, toggles};
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .sunlit = &pieces};
     lit.in_scattering_stride = sizeof(float);

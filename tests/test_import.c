@@ -12,14 +12,15 @@ static void assert_grey(const double *got, double wanted)
     assert_vector(got, wanted, wanted, wanted);
 }
 
-static nebel_light light_along(const nebel_scene *scene, const nebel_ray *ray)
+static nebel_transfer light_along(const nebel_scene *scene, const nebel_ray *ray)
 {
     nebel_snapshot *fog = NULL;
-    nebel_light light;
+    nebel_transfer transfer;
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, ray, sizeof *ray, &light, sizeof light), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, ray, sizeof *ray, &transfer, sizeof transfer),
+                     NEBEL_OK);
     nebel_release_snapshot(fog);
-    return light;
+    return transfer;
 }
 
 static const nebel_volume_desc *import(const char *text, size_t count, nebel_scene **scene)
@@ -89,9 +90,9 @@ static void test_unreal_start_and_largest_opacity(void **state)
     for (int i = 0; i < 4; i++) {
         const double x = places[i][0] / 100, y = (places[i][1] - 150) / 100;
         const double transmittance = unreal_transmittance((const double[]){0, 150}, places[i], 700, .8);
-        const nebel_light light = light_along(scene, &(nebel_ray){{0, 1.5, 0}, {x, y, 0}, hypot(x, y)});
-        assert_near(light.transmittance[0], transmittance, 1e-14);
-        for (int c = 0; c < 3; c++) assert_near(light.in_scattering[c], (c + 1) * (1 - transmittance), 1e-14);
+        const nebel_transfer transfer = light_along(scene, &(nebel_ray){{0, 1.5, 0}, {x, y, 0}, hypot(x, y)});
+        assert_near(transfer.transmittance[0], transmittance, 1e-14);
+        for (int c = 0; c < 3; c++) assert_near(transfer.in_scattering[c], (c + 1) * (1 - transmittance), 1e-14);
     }
     nebel_destroy_scene(scene);
     (void)import(IMPORT("\"type\": \"unreal_height_fog\", \"FogMaxOpacity\": 0"), 0, &scene);
@@ -288,14 +289,14 @@ static void test_hdrp_fades_of_each_axis(void **state)
         &scene);
     for (int i = 0; i < 9; i++) {
         const double y = .95 * (i % 3), z = 2.1 * (i / 3);
-        const nebel_light light = light_along(scene, &(nebel_ray){{-9, y, z}, {1, 0, 0}, 20});
-        assert_number(light.transmittance[0], exp(-hdrp_depth(y, z) / 4));
+        const nebel_transfer transfer = light_along(scene, &(nebel_ray){{-9, y, z}, {1, 0, 0}, 20});
+        assert_number(transfer.transmittance[0], exp(-hdrp_depth(y, z) / 4));
     }
     nebel_destroy_scene(scene);
     (void)import(IMPORT(LOCAL "\"size\": [10, 4, 10], \"positiveFade\": [0.3, 0, 0], \"negativeFade\": [0.3, 0, 0]"), 1,
                  &scene);
-    const nebel_light light = light_along(scene, &(nebel_ray){{-9, 1.9, 4.9}, {1, 0, 0}, 20});
-    assert_number(light.transmittance[0], exp(-7. / 4));
+    const nebel_transfer transfer = light_along(scene, &(nebel_ray){{-9, 1.9, 4.9}, {1, 0, 0}, 20});
+    assert_number(transfer.transmittance[0], exp(-7. / 4));
     nebel_destroy_scene(scene);
 }
 
@@ -317,8 +318,8 @@ static void test_hdrp_overwrites_what_ranks_below(void **state)
     assert_int_equal(fog[2].operation, NEBEL_OPERATION_ADD);
     assert_int_equal(fog[2].priority, 3);
     /* of 10 m of global fog 4 m are overwritten; the other adds 4 m of its own */
-    const nebel_light light = light_along(scene, &(nebel_ray){{-5, 0, 0}, {1, 0, 0}, 10});
-    assert_number(light.transmittance[0], exp(-6. / 20 - 4. / 4 - 4. / 4));
+    const nebel_transfer transfer = light_along(scene, &(nebel_ray){{-5, 0, 0}, {1, 0, 0}, 10});
+    assert_number(transfer.transmittance[0], exp(-6. / 20 - 4. / 4 - 4. / 4));
     nebel_destroy_scene(scene);
 }
 

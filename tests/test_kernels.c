@@ -151,12 +151,12 @@ static nebel_ray random_ray(int i)
 
 enum { RAYS = 2000 };
 static nebel_ray rays[RAYS];
-static nebel_light expected[RAYS], found[RAYS];
+static nebel_transfer expected[RAYS], found[RAYS];
 
-static nebel_result trace(const nebel_snapshot *fog, nebel_isa isa, size_t first, size_t n, nebel_light *lights)
+static nebel_result trace(const nebel_snapshot *fog, nebel_isa isa, size_t first, size_t n, nebel_transfer *transfers)
 {
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = isa};
-    return nebel_trace(fog, &desc, n, rays + first, sizeof *rays, lights + first, sizeof *lights);
+    return nebel_trace(fog, &desc, n, rays + first, sizeof *rays, transfers + first, sizeof *transfers);
 }
 
 static void print_difference(size_t i, nebel_isa isa)
@@ -309,9 +309,10 @@ static void test_segment_kernel_agrees_with_the_reference(void **state)
             square += ray.direction[c] * ray.direction[c];
         }
         ray.t_max = sqrt(square);
-        nebel_light light;
-        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-        assert_true(fabs((double)out[i] - light.transmittance[1]) < 3e-6);
+        nebel_transfer transfer;
+        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                         NEBEL_OK);
+        assert_true(fabs((double)out[i] - transfer.transmittance[1]) < 3e-6);
     }
     nebel_release_snapshot(fog);
 }

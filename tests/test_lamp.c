@@ -20,11 +20,11 @@ static nebel_snapshot *commit(const nebel_fog_desc *desc, const nebel_volume_des
     return snapshot;
 }
 
-static nebel_light ask(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_ray ray)
+static nebel_transfer ask(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_ray ray)
 {
-    nebel_light light;
-    assert_int_equal(nebel_trace(snapshot, desc, 1, &ray, 0, &light, 0), NEBEL_OK);
-    return light;
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(snapshot, desc, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+    return transfer;
 }
 
 /* ---- even fog -------------------------------------------------------------------------------- */
@@ -41,11 +41,11 @@ static void expect_light(const nebel_snapshot *snapshot, nebel_ray ray, double w
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         const double tolerance = precision == NEBEL_PRECISION_DOUBLE ? 1e-9 : 1e-6;
         const nebel_trace_desc desc = {.precision = (nebel_precision)precision, .tolerance = tolerance};
-        const nebel_light light = ask(snapshot, &desc, ray);
+        const nebel_transfer transfer = ask(snapshot, &desc, ray);
         for (int c = 0; c < 3; c++) {
-            const double off = fabs(light.in_scattering[c] - wanted), rounding = 1e-6 * wanted;
+            const double off = fabs(transfer.in_scattering[c] - wanted), rounding = 1e-6 * wanted;
             assert_true(off <= tolerance + rounding);
-            assert_true(off <= light.error + rounding); /* of the wanted number: it is that of a lamp without size */
+            assert_true(off <= transfer.error + rounding); /* of the wanted number: it is that of a lamp without size */
         }
     }
 }
@@ -85,11 +85,11 @@ static void spots_are_those_of_T19(void **state)
     lamp.inner_angle = lamp.outer_angle = 180; /* a point */
     snapshot = make_airlight(0.02, &lamp);
     const nebel_trace_desc fine = {.tolerance = 1e-9};
-    const nebel_light spot = ask(snapshot, &fine, ray);
+    const nebel_transfer spot = ask(snapshot, &fine, ray);
     nebel_release_snapshot(snapshot);
     lamp.type = NEBEL_LAMP_POINT;
     snapshot = make_airlight(0.02, &lamp);
-    const nebel_light point = ask(snapshot, &fine, ray);
+    const nebel_transfer point = ask(snapshot, &fine, ray);
     assert_true(fog_difference(&spot, &point) < 2e-9);
     nebel_release_snapshot(snapshot);
 }
@@ -141,7 +141,7 @@ static double brute_force(const nebel_snapshot *snapshot, const nebel_volume_des
                           const nebel_lamp *lamp, const nebel_ray *ray)
 {
     static nebel_ray rays[2 * STEPS];
-    static nebel_light lights[2 * STEPS];
+    static nebel_transfer transfers[2 * STEPS];
     static double glow[STEPS];
     const double h = ray->t_max / STEPS;
     for (int i = 0; i < STEPS; i++) {
@@ -154,11 +154,11 @@ static double brute_force(const nebel_snapshot *snapshot, const nebel_volume_des
         rays[2 * i + 1] = (nebel_ray){{place[0], place[1], place[2]}, {towards[0], towards[1], towards[2]}, reach};
     }
     const nebel_trace_desc desc = {.transmittance_only = 1};
-    assert_int_equal(nebel_trace(snapshot, &desc, 2 * (size_t)STEPS, rays, sizeof *rays, lights, sizeof *lights),
+    assert_int_equal(nebel_trace(snapshot, &desc, 2 * (size_t)STEPS, rays, sizeof *rays, transfers, sizeof *transfers),
                      NEBEL_OK);
     double sum = 0;
     for (int i = 0; i < STEPS; i++)
-        sum += glow[i] * h * lights[2 * i].transmittance[0] * lights[2 * i + 1].transmittance[0];
+        sum += glow[i] * h * transfers[2 * i].transmittance[0] * transfers[2 * i + 1].transmittance[0];
     return sum;
 }
 
@@ -192,10 +192,10 @@ static void light_is_that_of_brute_force(void **state)
         nebel_snapshot *snapshot = commit(&(nebel_fog_desc){0}, balls, 2, &lamps[l], 1);
         for (size_t r = 0; r < nb_test_count(RAY_KINDS); r++) {
             const nebel_ray *const ray = &rays[(l + r) % RAY_KINDS];
-            const nebel_light light = ask(snapshot, &(nebel_trace_desc){.tolerance = 1e-6}, *ray);
+            const nebel_transfer transfer = ask(snapshot, &(nebel_trace_desc){.tolerance = 1e-6}, *ray);
             const double sum = brute_force(snapshot, balls, 2, &lamps[l], ray);
-            worst = fmax(worst, fabs(light.in_scattering[0] - sum) / sum);
-            assert_true(light.error <= 1.1e-6);
+            worst = fmax(worst, fabs(transfer.in_scattering[0] - sum) / sum);
+            assert_true(transfer.error <= 1.1e-6);
         }
         nebel_release_snapshot(snapshot);
     }
@@ -247,15 +247,15 @@ static nebel_snapshot *commit_lit(void)
 }
 
 static void trace_some(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t count,
-                       const nebel_ray rays[RAYS], nebel_light lights[RAYS])
+                       const nebel_ray rays[RAYS], nebel_transfer transfers[RAYS])
 {
-    assert_int_equal(nebel_trace(snapshot, desc, count, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, desc, count, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
 }
 
 static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, const nebel_ray rays[RAYS],
-                  nebel_light lights[RAYS])
+                  nebel_transfer transfers[RAYS])
 {
-    trace_some(snapshot, desc, RAYS, rays, lights);
+    trace_some(snapshot, desc, RAYS, rays, transfers);
 }
 
 static void draw_rays(nebel_ray rays[RAYS])
@@ -272,17 +272,18 @@ static void errors_are_told(void **state)
         double worst = 0, slack = 0;
         for (uint64_t seed = 0; seed < SEEDS; seed++) {
             nebel_ray rays[RAYS];
-            nebel_light fine[RAYS], light[RAYS];
+            nebel_transfer fine[RAYS], transfer[RAYS];
             make_lit((random_fog_kind)kind, seed);
             nebel_snapshot *snapshot = commit_lit();
             draw_rays(rays);
             trace_some(snapshot, &(nebel_trace_desc){.tolerance = 2e-5}, count, rays, fine);
             for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-                trace_some(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, count, rays, light);
+                trace_some(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, count, rays,
+                           transfer);
                 for (size_t i = 0; i < count; i++) {
-                    const double off = fog_difference(&light[i], &fine[i]);
-                    worst = fmax(worst, (off - fine[i].error) / light[i].error);
-                    slack = fmax(slack, light[i].error);
+                    const double off = fog_difference(&transfer[i], &fine[i]);
+                    worst = fmax(worst, (off - fine[i].error) / transfer[i].error);
+                    slack = fmax(slack, transfer[i].error);
                 }
             }
             nebel_release_snapshot(snapshot);
@@ -301,7 +302,7 @@ static void light_is_the_same_in_any_set_and_split(void **state)
         uint32_t first[RAYS + 1] = {0};
         uint64_t numbers = (uint64_t)kind + 5;
         nebel_ray rays[RAYS];
-        nebel_light all[RAYS], expected[RAYS], other[RAYS];
+        nebel_transfer all[RAYS], expected[RAYS], other[RAYS];
         make_lit((random_fog_kind)kind, 4);
         nebel_snapshot *snapshot = commit_lit();
         draw_rays(rays);
@@ -345,13 +346,13 @@ static void pieces_add_up(void **state)
     const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 60};
     nebel_snapshot *snapshot = make_airlight(0.03, &lamp);
     (void)state;
-    nebel_light light[3];
+    nebel_transfer transfer[3];
     for (int i = 0; i < 3; i++)
-        light[i] = ask(snapshot, &(nebel_trace_desc){.tolerance = 1e-8, .lamplit = i < 2 ? &pieces[i] : NULL}, ray);
+        transfer[i] = ask(snapshot, &(nebel_trace_desc){.tolerance = 1e-8, .lamplit = i < 2 ? &pieces[i] : NULL}, ray);
     for (int c = 0; c < 3; c++) {
-        const double both = light[0].in_scattering[c] + light[1].in_scattering[c];
-        assert_true(light[1].in_scattering[c] > 0.05 * light[2].in_scattering[c]);
-        assert_true(fabs(both - light[2].in_scattering[c]) < 3e-8);
+        const double both = transfer[0].in_scattering[c] + transfer[1].in_scattering[c];
+        assert_true(transfer[1].in_scattering[c] > 0.05 * transfer[2].in_scattering[c]);
+        assert_true(fabs(both - transfer[2].in_scattering[c]) < 3e-8);
     }
     nebel_release_snapshot(snapshot);
 }
@@ -374,14 +375,14 @@ static void hard_rays_are_answered(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof rays / sizeof rays[0]; i++)
         for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-            const nebel_light light =
+            const nebel_transfer transfer =
                 ask(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, rays[i]);
-            for (int c = 0; c < 3; c++) assert_true(light.in_scattering[c] >= 0 && light.in_scattering[c] < 1e4);
-            assert_true(light.error >= 0 && light.error < 0.01);
+            for (int c = 0; c < 3; c++) assert_true(transfer.in_scattering[c] >= 0 && transfer.in_scattering[c] < 1e4);
+            assert_true(transfer.error >= 0 && transfer.error < 0.01);
         }
-    const nebel_light away = ask(snapshot, NULL, rays[6]);
+    const nebel_transfer away = ask(snapshot, NULL, rays[6]);
     near = make_airlight(0.02, &(nebel_lamp){.position = {0, 5, 0}, .intensity = {100, 100, 100}});
-    const nebel_light here = ask(near, NULL, (nebel_ray){{-20, 5, 0}, {0, 1, 0}, HUGE_VAL});
+    const nebel_transfer here = ask(near, NULL, (nebel_ray){{-20, 5, 0}, {0, 1, 0}, HUGE_VAL});
     assert_true(fog_difference(&away, &here) < 1e-9);
     nebel_release_snapshot(snapshot);
     nebel_release_snapshot(near);
@@ -447,10 +448,10 @@ static void lost_memory_is_survived(void **state)
     }
     assert_int_equal(result, NEBEL_OK);
     memory.fail_first = memory.fail_count = 1;
-    nebel_light light;
+    nebel_transfer transfer;
     const nebel_trace_desc asked = {.lamplit = &pieces};
-    assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &light, 0), NEBEL_ERROR_MEMORY);
-    assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &light, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &transfer, 0), NEBEL_ERROR_MEMORY);
+    assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &transfer, 0), NEBEL_OK);
     nebel_destroy_fog(made);
     nebel_release_snapshot(snapshot);
     assert_int_equal(memory.live, 0);

@@ -184,16 +184,16 @@ static nebel_ray level_ray(uint64_t *state, const nebel_shape *s)
 /* Of the rays how many have an answer in float that is farther from that in double than both say. */
 static size_t count_dishonest(const nebel_volume_desc *volume, const nebel_ray rays[RAYS])
 {
-    static nebel_light lights[RAYS], truth[RAYS];
+    static nebel_transfer transfers[RAYS], truth[RAYS];
     nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, volume, 1);
     nebel_trace_desc desc = {.precision = NEBEL_PRECISION_DOUBLE};
     assert_int_equal(nebel_trace(fog, &desc, RAYS, rays, sizeof *rays, truth, sizeof *truth), NEBEL_OK);
     desc.precision = NEBEL_PRECISION_FLOAT;
-    assert_int_equal(nebel_trace(fog, &desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, &desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
     nebel_release_snapshot(fog);
     size_t wrong = 0;
     for (int i = 0; i < RAYS; i++)
-        wrong += !(fog_difference(&lights[i], &truth[i]) <= lights[i].error + truth[i].error);
+        wrong += !(fog_difference(&transfers[i], &truth[i]) <= transfers[i].error + truth[i].error);
     return wrong;
 }
 

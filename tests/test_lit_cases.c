@@ -24,14 +24,14 @@ static void light_of_small_places_is_within_the_error(void **state)
         const lit_case *c = &lit_cases[i];
         nebel_snapshot *snapshot = commit_case(c);
         for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-            nebel_light light;
+            nebel_transfer transfer;
             const nebel_trace_desc desc = {.precision = (nebel_precision)precision, .tolerance = c->tolerance};
-            assert_int_equal(nebel_trace(snapshot, &desc, 1, &c->ray, 0, &light, 0), NEBEL_OK);
-            const double off = fabs(light.in_scattering[0] - c->right), digits = 5e-6 * c->right;
-            if (off <= light.error + digits) continue;
+            assert_int_equal(nebel_trace(snapshot, &desc, 1, &c->ray, 0, &transfer, 0), NEBEL_OK);
+            const double off = fabs(transfer.in_scattering[0] - c->right), digits = 5e-6 * c->right;
+            if (off <= transfer.error + digits) continue;
             print_message("%s, %s: %g for %g, error %g\n", c->name,
-                          precision == NEBEL_PRECISION_DOUBLE ? "double" : "float", light.in_scattering[0], c->right,
-                          light.error);
+                          precision == NEBEL_PRECISION_DOUBLE ? "double" : "float", transfer.in_scattering[0], c->right,
+                          transfer.error);
             wrong++;
         }
         nebel_release_snapshot(snapshot);
@@ -103,7 +103,7 @@ static void compare_with_alone(const nebel_snapshot *snapshot, const nebel_ray r
     for (int isa = NEBEL_ISA_DEFAULT; isa < NEBEL_ISA_COUNT; isa++) {
         if (!nebel_isa_available((nebel_isa)isa)) continue;
         const nebel_trace_desc asked = {.precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa};
-        nebel_light both[2], alone[2];
+        nebel_transfer both[2], alone[2];
         assert_int_equal(nebel_trace(snapshot, &asked, 2, rays, sizeof *rays, both, sizeof *both), NEBEL_OK);
         for (int i = 0; i < 2; i++)
             assert_int_equal(nebel_trace(snapshot, &asked, 1, &rays[i], 0, &alone[i], 0), NEBEL_OK);

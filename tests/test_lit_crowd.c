@@ -182,12 +182,12 @@ static void scattering_at(const nebel_snapshot *snapshot, const nebel_ray *ray, 
 }
 
 /* Transmittance of a ray to or from the eye. */
-static nebel_light pass_through(const nebel_snapshot *snapshot, const nebel_ray *ray, int from_eye)
+static nebel_transfer pass_through(const nebel_snapshot *snapshot, const nebel_ray *ray, int from_eye)
 {
     const nebel_trace_desc asked = {.transmittance_only = 1, .ignore_distances = !from_eye};
-    nebel_light light;
-    assert_int_equal(nebel_trace(snapshot, &asked, 1, ray, 0, &light, 0), NEBEL_OK);
-    return light;
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(snapshot, &asked, 1, ray, 0, &transfer, 0), NEBEL_OK);
+    return transfer;
 }
 
 typedef struct forced {
@@ -212,7 +212,7 @@ static forced light_by_force(const crowd *of, const nebel_snapshot *snapshot, co
         there.t_max = from.distance;
         scattering_at(snapshot, ray, t, all);
         scattering_at(turned, ray, t, some);
-        const nebel_light seen = pass_through(snapshot, &here, 1), lit = pass_through(snapshot, &there, 0);
+        const nebel_transfer seen = pass_through(snapshot, &here, 1), lit = pass_through(snapshot, &there, 0);
         const double forward = phase_value(0.5, dot(ray->direction, from.towards));
         const int shines = dark == NULL || t < (double)dark[0] || t >= (double)dark[1];
         for (int c = 0; c < 3; c++) {
@@ -240,16 +240,16 @@ static nebel_snapshot *commit_turned(const crowd *of)
 /* ---- tests ----------------------------------------------------------------------------------- */
 
 static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, const nebel_ray *rays,
-                  nebel_light *lights)
+                  nebel_transfer *transfers)
 {
-    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
 }
 
 /* Alone and in any company. */
 static void expect_the_same_bits(const nebel_snapshot *snapshot, const nebel_trace_desc *asked, const nebel_ray *rays,
-                                 const nebel_light *expected)
+                                 const nebel_transfer *expected)
 {
-    nebel_light other[RAYS];
+    nebel_transfer other[RAYS];
     nebel_trace_desc desc = *asked;
     for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
         if (!nebel_isa_available(desc.isa)) continue;
@@ -269,7 +269,7 @@ static void expect_brute_force(size_t count, int mixed, int light, int in_shadow
     static crowd of;
     uint32_t first[RAYS + 1];
     nebel_ray rays[RAYS];
-    nebel_light lights[RAYS];
+    nebel_transfer transfers[RAYS];
     forced force[FORCED];
     const int forced_rays = (int)nb_test_count(FORCED);
     for (uint32_t i = 0; i <= RAYS; i++) first[i] = 2 * i;
@@ -285,14 +285,14 @@ static void expect_brute_force(size_t count, int mixed, int light, int in_shadow
             nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = fine ? 2e-5 : 0};
             if (in_shadow && light == 0) asked.sunlit = &pieces;
             if (in_shadow && light > 0) asked.lamplit = &pieces;
-            trace(snapshot, &asked, rays, lights);
-            if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_bits(snapshot, &asked, rays, lights);
+            trace(snapshot, &asked, rays, transfers);
+            if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_bits(snapshot, &asked, rays, transfers);
             for (int i = 0; i < forced_rays; i++) {
-                assert_true(lights[i].error < (fine ? 2e-5 : 1e-3));
+                assert_true(transfers[i].error < (fine ? 2e-5 : 1e-3));
                 for (int c = 0; c < 3; c++) {
                     assert_true(force[i].light[c] > 100 * force[i].off[c]);
-                    const double off = fabs(lights[i].in_scattering[c] - force[i].light[c]);
-                    assert_true(off <= lights[i].error + force[i].off[c]);
+                    const double off = fabs(transfers[i].in_scattering[c] - force[i].light[c]);
+                    assert_true(off <= transfers[i].error + force[i].off[c]);
                 }
             }
         }
@@ -341,10 +341,10 @@ static void expect_light_through_slits(int boxes, double slit)
     for (int way = 0; way < 3; way++) {
         const nebel_trace_desc asked = {.precision = way == 2 ? NEBEL_PRECISION_FLOAT : NEBEL_PRECISION_DOUBLE,
                                         .tolerance = way == 1 ? 1e-5 : 0};
-        nebel_light light;
-        assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &light, 0), NEBEL_OK);
-        assert_true(light.error < (way == 1 ? 1e-5 : 1e-3));
-        assert_true(fabs(light.in_scattering[0] - right) <= light.error);
+        nebel_transfer transfer;
+        assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+        assert_true(transfer.error < (way == 1 ? 1e-5 : 1e-3));
+        assert_true(fabs(transfer.in_scattering[0] - right) <= transfer.error);
     }
     nebel_release_snapshot(snapshot);
 }
@@ -367,7 +367,7 @@ static void bodies_far_away_change_nothing(void **state)
     enum { MANY = 70 };
     nebel_volume_desc bodies[MANY];
     nebel_snapshot *fog[2];
-    nebel_light lights[2][FORCED];
+    nebel_transfer transfers[2][FORCED];
     nebel_ray rays[RAYS];
     for (int i = 0; i < MANY; i++)
         bodies[i] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1}, .extinction = {1, 1, 1}};
@@ -380,12 +380,12 @@ static void bodies_far_away_change_nothing(void **state)
     for (int precision = 0; precision < 2; precision++) {
         const nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = 1e-3};
         for (int k = 0; k < 2; k++)
-            assert_int_equal(nebel_trace(fog[k], &asked, FORCED, rays, sizeof *rays, lights[k], sizeof **lights),
+            assert_int_equal(nebel_trace(fog[k], &asked, FORCED, rays, sizeof *rays, transfers[k], sizeof **transfers),
                              NEBEL_OK);
         for (int i = 0; i < FORCED; i++) {
-            const double few = lights[0][i].error, many = lights[1][i].error;
-            assert_true(lights[1][i].in_scattering[0] > 1e-3);
-            assert_true(fog_difference(&lights[0][i], &lights[1][i]) == 0);
+            const double few = transfers[0][i].error, many = transfers[1][i].error;
+            assert_true(transfers[1][i].in_scattering[0] > 1e-3);
+            assert_true(fog_difference(&transfers[0][i], &transfers[1][i]) == 0);
             assert_true(many >= few && many <= 1.1 * few);
         }
     }

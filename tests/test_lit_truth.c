@@ -36,15 +36,15 @@ static size_t undecided;
 /* ---- the same bits --------------------------------------------------------------------------- */
 
 static void ask(const nebel_snapshot *snapshot, way_to_ask way, nebel_isa isa, size_t n, const nebel_ray *rays,
-                nebel_light *lights)
+                nebel_transfer *transfers)
 {
     const nebel_trace_desc desc = {.precision = way == ASK_FLOAT ? NEBEL_PRECISION_FLOAT : NEBEL_PRECISION_DOUBLE,
                                    .isa = isa,
                                    .tolerance = way == ASK_FINE ? 1e-5 : 0};
-    assert_int_equal(nebel_trace(snapshot, &desc, n, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, &desc, n, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
 }
 
-static void compare_bits(tally *t, const char *how, const nebel_light *a, const nebel_light *b)
+static void compare_bits(tally *t, const char *how, const nebel_transfer *a, const nebel_transfer *b)
 {
     t->rays++;
     if (memcmp(a, b, sizeof *a) == 0) return;
@@ -53,45 +53,45 @@ static void compare_bits(tally *t, const char *how, const nebel_light *a, const 
                   b->in_scattering[0], b->error, a->transmittance[0], a->in_scattering[0], a->error);
 }
 
-static void compare_orders(const nebel_snapshot *snapshot, int n, const nebel_ray *rays, const nebel_light *lights,
-                           tally *t)
+static void compare_orders(const nebel_snapshot *snapshot, int n, const nebel_ray *rays,
+                           const nebel_transfer *transfers, tally *t)
 {
     const size_t count = (size_t)n, some = count / 3;
     nebel_ray shuffled[RAYS];
-    nebel_light again[RAYS];
+    nebel_transfer again[RAYS];
     for (int i = 0; i < n; i++) shuffled[i * 7 % n] = rays[i];
     ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, count, shuffled, again);
-    for (int i = 0; i < n; i++) compare_bits(t, "shuffled", &lights[i], &again[i * 7 % n]);
+    for (int i = 0; i < n; i++) compare_bits(t, "shuffled", &transfers[i], &again[i * 7 % n]);
     for (int i = 0; i < n; i++) ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, 1, &rays[i], &again[i]);
-    for (int i = 0; i < n; i++) compare_bits(t, "alone", &lights[i], &again[i]);
+    for (int i = 0; i < n; i++) compare_bits(t, "alone", &transfers[i], &again[i]);
     ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, some, rays, again);
     ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, count - some, rays + some, again + some);
-    for (int i = 0; i < n; i++) compare_bits(t, "split", &lights[i], &again[i]);
+    for (int i = 0; i < n; i++) compare_bits(t, "split", &transfers[i], &again[i]);
 }
 
-static void compare_all_bits(const nebel_snapshot *snapshot, int n, const nebel_ray *rays, const nebel_light *lights,
-                             tally *t)
+static void compare_all_bits(const nebel_snapshot *snapshot, int n, const nebel_ray *rays,
+                             const nebel_transfer *transfers, tally *t)
 {
-    nebel_light again[RAYS];
-    compare_orders(snapshot, n, rays, lights, t);
+    nebel_transfer again[RAYS];
+    compare_orders(snapshot, n, rays, transfers, t);
     for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
         if (!nebel_isa_available((nebel_isa)isa)) continue;
         ask(snapshot, ASK_FLOAT, (nebel_isa)isa, (size_t)n, rays, again);
-        for (int i = 0; i < n; i++) compare_bits(t, nebel_isa_name((nebel_isa)isa), &lights[i], &again[i]);
+        for (int i = 0; i < n; i++) compare_bits(t, nebel_isa_name((nebel_isa)isa), &transfers[i], &again[i]);
     }
 }
 
 /* ---- against the oracle ---------------------------------------------------------------------- */
 
-static void print_case(lit_kind kind, lit_source source, uint64_t seed, int i, way_to_ask way, const nebel_light *light,
-                       const lit_truth *is)
+static void print_case(lit_kind kind, lit_source source, uint64_t seed, int i, way_to_ask way,
+                       const nebel_transfer *transfer, const lit_truth *is)
 {
     print_message("%s, %s, seed %llu, ray %d, %s: %.9g %.9g %.9g, not %.9g %.9g %.9g (+- %.1e); T %.9g, not %.9g; "
                   "error %.3g\n",
                   lit_kind_names[kind], source == LIT_BY_LAMPS ? "lamps" : "sun", (unsigned long long)seed, i,
-                  way_names[way], light->in_scattering[0], light->in_scattering[1], light->in_scattering[2],
+                  way_names[way], transfer->in_scattering[0], transfer->in_scattering[1], transfer->in_scattering[2],
                   is->in_scattering[0], is->in_scattering[1], is->in_scattering[2], is->uncertainty,
-                  light->transmittance[0], is->transmittance[0], light->error);
+                  transfer->transmittance[0], is->transmittance[0], transfer->error);
 }
 
 static double largest(const double v[3])
@@ -113,17 +113,17 @@ static double apart(const double a[3], const double b[3])
 }
 
 /* As a multiple of what may be: more than 1 is a violation. */
-static double violation(const nebel_light *light, const lit_truth *is)
+static double violation(const nebel_transfer *transfer, const lit_truth *is)
 {
-    const double light_off = apart(light->in_scattering, is->in_scattering) / (light->error + slack_of(is));
-    const double way_off = apart(light->transmittance, is->transmittance) / (light->error + 1e-9);
-    return isnan(light->error) ? HUGE_VAL : fmax(light_off, way_off);
+    const double light_off = apart(transfer->in_scattering, is->in_scattering) / (transfer->error + slack_of(is));
+    const double way_off = apart(transfer->transmittance, is->transmittance) / (transfer->error + 1e-9);
+    return isnan(transfer->error) ? HUGE_VAL : fmax(light_off, way_off);
 }
 
-static int all_hold(nebel_light lights[ASK_COUNT][RAYS], int i, const lit_truth *is)
+static int all_hold(nebel_transfer transfers[ASK_COUNT][RAYS], int i, const lit_truth *is)
 {
     int hold = 1;
-    for (int way = 0; way < ASK_COUNT; way++) hold = hold && violation(&lights[way][i], is) <= 1;
+    for (int way = 0; way < ASK_COUNT; way++) hold = hold && violation(&transfers[way][i], is) <= 1;
     return hold;
 }
 
@@ -132,12 +132,12 @@ static int all_hold(nebel_light lights[ASK_COUNT][RAYS], int i, const lit_truth 
 
 /* Where it seems wrong the oracle looks again, more closely. So it does at some of the rays in any case, and must then see
  * what it saw before. Returns 0 where it does not know. */
-static int find_truth(const lit_fog *fog, const nebel_ray *ray, nebel_light lights[ASK_COUNT][RAYS], int i,
+static int find_truth(const lit_fog *fog, const nebel_ray *ray, nebel_transfer transfers[ASK_COUNT][RAYS], int i,
                       lit_truth *is)
 {
     static size_t asked;
     if (!lit_oracle_trace(fog, ray, LIT_QUICK, is)) return 0;
-    const int holds = all_hold(lights, i, is);
+    const int holds = all_hold(transfers, i, is);
     if (holds && asked++ % CLOSE_EVERY != 0) return 1;
     const lit_truth quick = *is;
     if (!lit_oracle_trace(fog, ray, LIT_CLOSE, is)) return 0;
@@ -152,17 +152,17 @@ static int find_truth(const lit_fog *fog, const nebel_ray *ray, nebel_light ligh
     return 1;
 }
 
-static void judge(lit_kind kind, lit_source source, uint64_t seed, int i, nebel_light lights[ASK_COUNT][RAYS],
+static void judge(lit_kind kind, lit_source source, uint64_t seed, int i, nebel_transfer transfers[ASK_COUNT][RAYS],
                   const lit_truth *is)
 {
     for (int way = 0; way < ASK_COUNT; way++) {
         tally *t = &tallies[kind][source][way];
-        const double off = violation(&lights[way][i], is);
+        const double off = violation(&transfers[way][i], is);
         t->rays++;
         t->worst = fmax(t->worst, off);
         if (off <= 1) continue;
         t->wrong++;
-        print_case(kind, source, seed, i, (way_to_ask)way, &lights[way][i], is);
+        print_case(kind, source, seed, i, (way_to_ask)way, &transfers[way][i], is);
     }
 }
 
@@ -171,7 +171,7 @@ static void try_fog(lit_kind kind, lit_source source, uint64_t seed)
     static lit_draw draw;
     static lit_fog fog;
     nebel_ray rays[RAYS];
-    nebel_light lights[ASK_COUNT][RAYS];
+    nebel_transfer transfers[ASK_COUNT][RAYS];
     const int n = lit_ray_count(kind);
     lit_draw_fog(&draw, kind, source, seed);
     lit_draw_rays(seed, rays);
@@ -179,12 +179,12 @@ static void try_fog(lit_kind kind, lit_source source, uint64_t seed)
     assert_non_null(snapshot);
     lit_fog_prepare(&draw.scene, &fog);
     for (int way = 0; way < ASK_COUNT; way++)
-        ask(snapshot, (way_to_ask)way, NEBEL_ISA_DEFAULT, (size_t)n, rays, lights[way]);
-    compare_all_bits(snapshot, n, rays, lights[ASK_FLOAT], &bits[kind][source]);
+        ask(snapshot, (way_to_ask)way, NEBEL_ISA_DEFAULT, (size_t)n, rays, transfers[way]);
+    compare_all_bits(snapshot, n, rays, transfers[ASK_FLOAT], &bits[kind][source]);
     for (int i = 0; i < n; i++) {
         lit_truth is;
-        if (find_truth(&fog, &rays[i], lights, i, &is))
-            judge(kind, source, seed, i, lights, &is);
+        if (find_truth(&fog, &rays[i], transfers, i, &is))
+            judge(kind, source, seed, i, transfers, &is);
         else
             undecided++;
     }

@@ -26,7 +26,7 @@ enum { VECTOR = 16, MAX_TURNS = 24000 };
 static const char counted_body[] =
     "nb_progress progress = nb_open_progress();\n"
     "nb_media media = nb_media_of(0, int(NEBEL_WORD(0).x), false);\n"
-    "nebel_light l = nb_trace_further(progress, nb_ray_up_to(in0.xyz, in1.xyz, in0.w, true), media, true, true);\n"
+    "nebel_transfer l = nb_trace_further(progress, nb_ray_up_to(in0.xyz, in1.xyz, in0.w, true), media, true, true);\n"
     "out0 = vec4(l.transmittance, float(progress.turns)); out1 = vec4(l.in_scattering, 0.0);\n";
 
 /* The most extinction that a ray meets before nothing is seen, at places of each piece of it. */
@@ -71,7 +71,7 @@ static void judge(const lit_fog *lit, lit_kind kind, lit_source source, uint64_t
 {
     static const double origin[3];
     tally *t = &tallies[kind][source];
-    nebel_light truth = {.error = 0};
+    nebel_transfer truth = {.error = 0};
     memcpy(truth.transmittance, is->transmittance, sizeof truth.transmittance);
     memcpy(truth.in_scattering, is->in_scattering, sizeof truth.in_scattering);
     const double scale = fmax(1, fmax(fmax(is->in_scattering[0], is->in_scattering[1]), is->in_scattering[2]));

@@ -70,16 +70,16 @@ static void assert_right(const nebel_snapshot *snapshot, const ball *balls, size
         *met += length > 0 ? 1 : 0;
     }
     for (int precision = 0; precision < 2; precision++) {
-        nebel_light light;
+        nebel_transfer transfer;
         const nebel_trace_desc desc = {.precision = (nebel_precision)precision};
-        assert_int_equal(nebel_trace(snapshot, &desc, 1, ray, sizeof *ray, &light, sizeof light), NEBEL_OK);
-        const double slack = precision == 0 ? 1e-12 : 1e-6 + light.error;
+        assert_int_equal(nebel_trace(snapshot, &desc, 1, ray, sizeof *ray, &transfer, sizeof transfer), NEBEL_OK);
+        const double slack = precision == 0 ? 1e-12 : 1e-6 + transfer.error;
         for (int c = 0; c < 2; c++) {
             const double T = exp(-(c + 1) * depth);
-            assert_true(fabs(light.transmittance[c] - T) <= slack);
-            assert_true(fabs(light.in_scattering[c] - (c + 1) * (1 - T)) <= 4 * slack);
+            assert_true(fabs(transfer.transmittance[c] - T) <= slack);
+            assert_true(fabs(transfer.in_scattering[c] - (c + 1) * (1 - T)) <= 4 * slack);
         }
-        assert_true(light.transmittance[2] == 1 && light.in_scattering[2] == 0);
+        assert_true(transfer.transmittance[2] == 1 && transfer.in_scattering[2] == 0);
     }
 }
 
@@ -159,23 +159,24 @@ static void test_thousands_of_volumes_on_one_ray_are_exact_in_any_order(void **u
     make_crowd(crowd);
     nebel_snapshot *const snapshot = commit_crowd(crowd, 1), *const shuffled = commit_crowd(crowd, 1009);
     nebel_ray rays[5];
-    nebel_light lights[5], again[5];
+    nebel_transfer transfers[5], again[5];
     double distances[5];
     for (int i = 0; i < 5; i++) rays[i] = (nebel_ray){{-20, .3 * i, -.2 * i}, {1, 0, 0}, i % 2 ? HUGE_VAL : 20.5};
     for (int precision = 0; precision < 2; precision++) {
         const nebel_trace_desc desc = {.precision = (nebel_precision)precision};
         const double start = seconds();
-        assert_int_equal(nebel_trace(snapshot, &desc, 5, rays, sizeof rays[0], lights, sizeof lights[0]), NEBEL_OK);
+        assert_int_equal(nebel_trace(snapshot, &desc, 5, rays, sizeof rays[0], transfers, sizeof transfers[0]),
+                         NEBEL_OK);
         print_message("%d volumes on a ray: %.1f ms a ray in %s\n", CROWD, (seconds() - start) * 200,
                       precision == 0 ? "double" : "float");
         assert_int_equal(nebel_trace(shuffled, &desc, 5, rays, sizeof rays[0], again, sizeof again[0]), NEBEL_OK);
-        assert_memory_equal(lights, again, sizeof lights);
+        assert_memory_equal(transfers, again, sizeof transfers);
         for (int i = 0; i < 5; i++) {
             double depth = 0;
             for (int k = 0; k < CROWD; k++) depth += chord(&crowd[k], &rays[i]) * crowd[k].extinction;
-            assert_true(fabs(lights[i].transmittance[0] - exp(-depth)) <= lights[i].error);
-            assert_true(fabs(lights[i].in_scattering[1] - 2 * (1 - exp(-2 * depth))) <= lights[i].error);
-            assert_true(lights[i].error < (precision == 0 ? 1e-10 : 5e-2));
+            assert_true(fabs(transfers[i].transmittance[0] - exp(-depth)) <= transfers[i].error);
+            assert_true(fabs(transfers[i].in_scattering[1] - 2 * (1 - exp(-2 * depth))) <= transfers[i].error);
+            assert_true(transfers[i].error < (precision == 0 ? 1e-10 : 5e-2));
             assert_true(depth > .5);
         }
     }

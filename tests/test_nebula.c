@@ -138,10 +138,10 @@ static void test_every_shape_holds_its_particles(void **unused)
             nebel_ray ray = {.direction = {0, 0, 1}, .t_max = 2e-3};
             for (int c = 0; c < 3; c++) ray.origin[c] = particles[i].center[c];
             ray.origin[2] -= 1e-3;
-            nebel_light light;
-            assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light),
+            nebel_transfer transfer;
+            assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
                              NEBEL_OK);
-            assert_true(light.transmittance[0] < .9999);
+            assert_true(transfer.transmittance[0] < .9999);
         }
         nebel_release_snapshot(fog);
     }
@@ -187,13 +187,14 @@ static void test_a_particle_is_exact_fog(void **unused)
         const nebel_volume_desc volume = nebel_particle_volume(&particle);
         nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &volume, 1);
         const nebel_ray ray = {{1, 2, -3}, {0, 0, 1}, HUGE_VAL};
-        nebel_light light;
-        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+        nebel_transfer transfer;
+        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                         NEBEL_OK);
         for (int c = 0; c < 3; c++) {
             const double depth = particle.extinction[c] * particle.radius * chords[p];
-            assert_true(fabs(light.transmittance[c] - exp(-depth)) < 1e-12);
-            assert_true(fabs(light.in_scattering[c] + particle.emission[c] / particle.extinction[c] * expm1(-depth)) <
-                        1e-12);
+            assert_true(fabs(transfer.transmittance[c] - exp(-depth)) < 1e-12);
+            assert_true(fabs(transfer.in_scattering[c] +
+                             particle.emission[c] / particle.extinction[c] * expm1(-depth)) < 1e-12);
         }
         nebel_release_snapshot(fog);
     }
@@ -230,9 +231,9 @@ static void aim(nebel_ray rays[CROWD_RAYS])
 }
 
 static void trace(const nebel_snapshot *fog, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
-                  nebel_light *lights)
+                  nebel_transfer *transfers)
 {
-    assert_int_equal(nebel_trace(fog, desc, n, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, desc, n, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
 }
 
 /* A hundred particles on a ray: the march then looks at those near by alone, and no ray may see whose company it is in.
@@ -241,22 +242,22 @@ static void test_a_crowd_is_integrated_as_one_particle_is(void **unused)
 {
     (void)unused;
     static nebel_ray rays[CROWD_RAYS];
-    static nebel_light truth[CROWD_RAYS], light[CROWD_RAYS], alone;
+    static nebel_transfer truth[CROWD_RAYS], transfer[CROWD_RAYS], alone;
     aim(rays);
     for (int p = 0; p < NEBEL_PARTICLE_COUNT; p++) {
         nebel_snapshot *fog = crowd((nebel_particle_profile)p);
         trace(fog, &(nebel_trace_desc){.tolerance = 1e-9}, CROWD_RAYS, rays, truth);
-        trace(fog, &(nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT}, CROWD_RAYS, rays, light);
+        trace(fog, &(nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT}, CROWD_RAYS, rays, transfer);
         for (int i = 0; i < CROWD_RAYS; i++) {
             for (int c = 0; c < 3; c++) {
-                assert_true(fabs(light[i].transmittance[c] - truth[i].transmittance[c]) <=
-                            light[i].error + truth[i].error);
-                assert_true(fabs(light[i].in_scattering[c] - truth[i].in_scattering[c]) <=
-                            light[i].error + truth[i].error);
+                assert_true(fabs(transfer[i].transmittance[c] - truth[i].transmittance[c]) <=
+                            transfer[i].error + truth[i].error);
+                assert_true(fabs(transfer[i].in_scattering[c] - truth[i].in_scattering[c]) <=
+                            transfer[i].error + truth[i].error);
             }
-            assert_true(light[i].error < .0021 * 10); /* the most radiant particle has 1 / 0.1 */
+            assert_true(transfer[i].error < .0021 * 10); /* the most radiant particle has 1 / 0.1 */
             trace(fog, &(nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT}, 1, &rays[i], &alone);
-            assert_memory_equal(&alone, &light[i], sizeof alone);
+            assert_memory_equal(&alone, &transfer[i], sizeof alone);
         }
         nebel_release_snapshot(fog);
     }
@@ -267,7 +268,7 @@ static void test_a_crowd_may_be_cut_anywhere(void **unused)
 {
     (void)unused;
     static nebel_ray rays[CROWD_RAYS], parts[2 * CROWD_RAYS];
-    static nebel_light whole[CROWD_RAYS], part[2 * CROWD_RAYS];
+    static nebel_transfer whole[CROWD_RAYS], part[2 * CROWD_RAYS];
     nebel_snapshot *fog = crowd(NEBEL_PARTICLE_SOFT);
     aim(rays);
     for (int i = 0; i < CROWD_RAYS; i++) {
@@ -284,7 +285,7 @@ static void test_a_crowd_may_be_cut_anywhere(void **unused)
     trace(fog, &desc, 2 * CROWD_RAYS, parts, part);
     for (int i = 0; i < CROWD_RAYS; i++) {
         for (int c = 0; c < 3; c++) {
-            const nebel_light *near = &part[2 * i], *far = &part[2 * i + 1];
+            const nebel_transfer *near = &part[2 * i], *far = &part[2 * i + 1];
             assert_true(fabs(near->transmittance[c] * far->transmittance[c] - whole[i].transmittance[c]) < 1e-11);
             const double sum = near->in_scattering[c] + near->transmittance[c] * far->in_scattering[c];
             assert_true(fabs(sum - whole[i].in_scattering[c]) < 4e-8);

@@ -63,7 +63,7 @@ static const nebel_trace_desc good_trace_desc = {.tolerance = 0};
 static const nebel_ray good_ray = {{0, 1, 0}, {0, 1, 0}, 1};
 static const nebel_ray_planes good_ray_planes = {.direction = {0, 1, 0}};
 static const nebel_segments good_segments = {.from = floats, .to = floats + 3};
-static const nebel_light good_light = {.transmittance = {1, 1, 1}};
+static const nebel_transfer good_light = {.transmittance = {1, 1, 1}};
 static const nebel_nebula_desc good_nebula_desc = {.shape = {.type = NEBEL_SHAPE_BOX, .max = {1, 1, 1}}, .count = 1};
 static const nebel_place good_place = {.position = {.5, .5, .5}};
 static const nebel_renderer_desc good_renderer_desc = {.threads = 1};
@@ -102,7 +102,7 @@ static struct {
     nebel_volume_id volume_id;
     nebel_sunlit_fog sunlit_fog;
     nebel_split_fog split_fog;
-    nebel_light light;
+    nebel_transfer transfer;
     nebel_particle particle;
     nebel_matter matter;
     nebel_scatterer scatterer;
@@ -128,7 +128,7 @@ static struct {
 } out;
 
 static const nebel_vertex_output good_vertex_output = {NEBEL_VERTEX_FACTOR, out.floats, 0};
-static const nebel_light_planes good_light_planes = {.transmittance = {out.floats, out.floats + 1, out.floats + 2}};
+static const nebel_transfer_planes good_light_planes = {.transmittance = {out.floats, out.floats + 1, out.floats + 2}};
 static const nebel_ground_planes good_ground_planes = {.distance = out.floats,
                                                        .normal = {out.floats + 1, out.floats + 2, out.floats + 3},
                                                        .sun = {out.floats + 4, out.floats + 5, out.floats + 6},

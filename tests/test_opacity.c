@@ -17,22 +17,22 @@ static nebel_snapshot *commit(double max_opacity)
     return fog_commit(&desc, fog.volumes, fog.count);
 }
 
-static void trace(const nebel_snapshot *snapshot, nebel_precision precision, nebel_light lights[RAYS])
+static void trace(const nebel_snapshot *snapshot, nebel_precision precision, nebel_transfer transfers[RAYS])
 {
     nebel_ray rays[RAYS];
     for (uint64_t i = 0; i < RAYS; i++) rays[i] = random_fog_ray(&fog, i);
     const nebel_trace_desc desc = {.precision = precision, .tolerance = 1e-4};
-    assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
 }
 
 /* As nebel.h says it. */
-static void limit(double most, nebel_light *light)
+static void limit(double most, nebel_transfer *transfer)
 {
     for (int c = 0; c < 3; c++) {
-        const double opacity = 1 - light->transmittance[c];
+        const double opacity = 1 - transfer->transmittance[c];
         if (!(opacity > most)) continue;
-        light->transmittance[c] = 1 - most;
-        light->in_scattering[c] *= most / opacity;
+        transfer->transmittance[c] = 1 - most;
+        transfer->in_scattering[c] *= most / opacity;
     }
 }
 
@@ -46,15 +46,15 @@ static void test_light_is_limited_as_a_last_step(void **unused)
         const double most = .02 + .98 * (double)(seed % 17) / 17;
         nebel_snapshot *const plain = commit(0), *const limited = commit(most);
         for (int p = 0; p < 2; p++) {
-            nebel_light lights[2][RAYS];
-            trace(plain, (nebel_precision)p, lights[0]);
-            trace(limited, (nebel_precision)p, lights[1]);
+            nebel_transfer transfers[2][RAYS];
+            trace(plain, (nebel_precision)p, transfers[0]);
+            trace(limited, (nebel_precision)p, transfers[1]);
             for (int i = 0; i < RAYS; i++) {
-                nebel_light *const is = &lights[0][i];
+                nebel_transfer *const is = &transfers[0][i];
                 limited_rays += 1 - is->transmittance[1] > most;
                 limit(most, is);
                 for (int c = 0; c < 3; c++) {
-                    const double T = lights[1][i].transmittance[c], S = lights[1][i].in_scattering[c];
+                    const double T = transfers[1][i].transmittance[c], S = transfers[1][i].in_scattering[c];
                     assert_true(fabs(T - is->transmittance[c]) <= rounding[p]);
                     assert_true(fabs(S - is->in_scattering[c]) <= rounding[p] * (1 + S / most));
                 }
@@ -79,15 +79,15 @@ static void test_planes_give_the_same_bits(void **unused)
                                        .direction_float = {&direction[0], &direction[1], &direction[2]},
                                        .t_max = &(float){60}};
         float T[3], S[3];
-        const nebel_light_planes lights = {.transmittance = {&T[0], &T[1], &T[2]},
-                                           .in_scattering = {&S[0], &S[1], &S[2]}};
-        nebel_light light;
+        const nebel_transfer_planes lights = {.transmittance = {&T[0], &T[1], &T[2]},
+                                              .in_scattering = {&S[0], &S[1], &S[2]}};
+        nebel_transfer transfer;
         const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT};
-        assert_int_equal(nebel_trace(limited, &desc, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+        assert_int_equal(nebel_trace(limited, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
         assert_int_equal(nebel_trace_planes(limited, NULL, 1, &rays, &lights), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
-            assert_true((double)T[c] == light.transmittance[c]);
-            assert_true((double)S[c] == light.in_scattering[c]);
+            assert_true((double)T[c] == transfer.transmittance[c]);
+            assert_true((double)S[c] == transfer.in_scattering[c]);
         }
         nebel_release_snapshot(limited);
     }
@@ -145,15 +145,15 @@ static void test_the_limit_can_be_changed(void **unused)
     const double limits[] = {.5, .75, 1, 0};
     for (int i = 0; i < 4; i++) {
         nebel_snapshot *snapshot = NULL;
-        nebel_light light;
+        nebel_transfer transfer;
         const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 10};
         assert_int_equal(nebel_set_max_opacity(made, limits[i]), NEBEL_OK);
         assert_int_equal(nebel_commit_fog(made, &snapshot), NEBEL_OK);
-        assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light),
+        assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
                          NEBEL_OK);
         const double opacity = i < 2 ? limits[i] : 1 - exp(-4);
-        assert_true(fabs(light.transmittance[0] - (1 - opacity)) < 1e-14);
-        assert_true(fabs(light.in_scattering[0] - opacity) < 1e-14);
+        assert_true(fabs(transfer.transmittance[0] - (1 - opacity)) < 1e-14);
+        assert_true(fabs(transfer.in_scattering[0] - opacity) < 1e-14);
         nebel_release_snapshot(snapshot);
     }
     const double wrong[] = {-.1, 1.1, (double)NAN};

@@ -55,7 +55,7 @@ static void check(const crowd *c, const char *what, nb_gl_language language, int
     pass_fill(&picture);
     const size_t messages = draw(fog, &picture, language, &got);
     for (int i = 0; i < width * height; i++) {
-        const nebel_light wanted = pass_trace(fog, &picture, i % width, i / width);
+        const nebel_transfer wanted = pass_trace(fog, &picture, i % width, i / width);
         const int fogged = wanted.transmittance[0] < 1;
         pass_note(&light, &got.in_scattering[4 * i], wanted.in_scattering, fogged);
         pass_note(&transmittance, &got.transmittance[4 * i], wanted.transmittance, fogged);

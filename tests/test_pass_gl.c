@@ -43,10 +43,10 @@ static void compare_split(const nebel_snapshot *fog, const pass_picture *picture
     for (int y = 0; y < (int)picture->view.height; y++) {
         for (int x = 0; x < (int)picture->view.width; x++) {
             const size_t at = 4 * ((size_t)y * picture->view.width + (size_t)x);
-            const nebel_light light = pass_trace(fog, picture, x, y);
-            const int fogged = light.transmittance[2] < 1 - 1e-4;
-            pass_note(&difference, got->in_scattering + at, light.in_scattering, fogged);
-            pass_note(&difference, got->transmittance + at, light.transmittance, 0);
+            const nebel_transfer transfer = pass_trace(fog, picture, x, y);
+            const int fogged = transfer.transmittance[2] < 1 - 1e-4;
+            pass_note(&difference, got->in_scattering + at, transfer.in_scattering, fogged);
+            pass_note(&difference, got->transmittance + at, transfer.transmittance, 0);
             assert_true(got->in_scattering[at + 3] == 1 && got->transmittance[at + 3] == 1);
         }
     }

@@ -134,12 +134,12 @@ static void expect(const nebel_snapshot *fog, int i, double composed[4], double 
     memset(scattered, 0, 3 * sizeof *scattered);
     memset(through, 0, 3 * sizeof *through);
     for (int s = 0; s < SAMPLES; s++) {
-        const nebel_light light = pass_trace(fog, &pictures[s], i % PASS_WIDTH, i / PASS_WIDTH);
+        const nebel_transfer transfer = pass_trace(fog, &pictures[s], i % PASS_WIDTH, i / PASS_WIDTH);
         const float *const color = colors + 4 * (i * SAMPLES + s);
         for (int c = 0; c < 3; c++) {
-            scattered[c] += light.in_scattering[c] / SAMPLES;
-            through[c] += light.transmittance[c] / SAMPLES;
-            composed[c] += (light.transmittance[c] * (double)color[c] + light.in_scattering[c]) / SAMPLES;
+            scattered[c] += transfer.in_scattering[c] / SAMPLES;
+            through[c] += transfer.transmittance[c] / SAMPLES;
+            composed[c] += (transfer.transmittance[c] * (double)color[c] + transfer.in_scattering[c]) / SAMPLES;
         }
         composed[3] += (double)color[3] / SAMPLES;
     }
@@ -279,11 +279,11 @@ static void expect_blended(const nebel_snapshot *fog, int i, int grey, double wa
 {
     memset(wanted, 0, 3 * sizeof *wanted);
     for (int s = 0; s < SAMPLES; s++) {
-        const nebel_light light = pass_trace(fog, &pictures[s], i % PASS_WIDTH, i / PASS_WIDTH);
-        const double *const t = light.transmittance, mean = (t[0] + t[1] + t[2]) / 3;
+        const nebel_transfer transfer = pass_trace(fog, &pictures[s], i % PASS_WIDTH, i / PASS_WIDTH);
+        const double *const t = transfer.transmittance, mean = (t[0] + t[1] + t[2]) / 3;
         for (int c = 0; c < 3; c++) {
             const double color = (double)colors[4 * (i * SAMPLES + s) + c];
-            wanted[c] += ((grey ? mean : t[c]) * color + light.in_scattering[c]) / SAMPLES;
+            wanted[c] += ((grey ? mean : t[c]) * color + transfer.in_scattering[c]) / SAMPLES;
         }
     }
 }

@@ -47,17 +47,17 @@ static double cover(const surface *s, int c, double behind)
     }
 }
 
-static nebel_light trace_between(const nebel_snapshot *fog, const line *way, double from, double to)
+static nebel_transfer trace_between(const nebel_snapshot *fog, const line *way, double from, double to)
 {
     nebel_ray ray = {.t_max = to - from};
-    nebel_light light;
+    nebel_transfer transfer;
     for (int i = 0; i < 3; i++) {
         ray.direction[i] = (double)way->direction[i];
         ray.origin[i] = (double)way->origin[i] + from * ray.direction[i];
     }
     const nebel_trace_desc exact = {.tolerance = 1e-6};
-    assert_int_equal(nebel_trace(fog, &exact, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-    return light;
+    assert_int_equal(nebel_trace(fog, &exact, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+    return transfer;
 }
 
 /* surfaces[0] is nearest; what is not before `end` is hidden. */
@@ -68,7 +68,7 @@ static void carry_light(const nebel_snapshot *fog, const line *way, const surfac
     for (int i = LAYERS; i >= 0; i--) {
         const double near = i > 0 ? (double)surfaces[i - 1].distance : 0;
         if (near >= end) continue;
-        const nebel_light between = trace_between(fog, way, near, far);
+        const nebel_transfer between = trace_between(fog, way, near, far);
         for (int c = 0; c < 3; c++) {
             light[c] = between.transmittance[c] * light[c] + between.in_scattering[c];
             if (i > 0) light[c] = cover(&surfaces[i - 1], c, light[c]);
@@ -90,10 +90,10 @@ static const char fragment_text[] =
     "#else\n"
     "layout(location = 0) out highp vec4 source;\n"
     "#endif\n"
-    "nebel_blend blend_of(nebel_light fog)\n"
+    "nebel_blend blend_of(nebel_transfer fog)\n"
     "{\n"
     "    vec3 color = surface_color.rgb;\n"
-    "    nebel_light medium;\n"
+    "    nebel_transfer medium;\n"
     "    medium.transmittance = color;\n"
     "    medium.in_scattering = surface_light.rgb;\n"
     "    if (mode == 0) return nebel_blend_over(color, surface_color.a, fog);\n"

@@ -60,7 +60,7 @@ static unsigned make_program(const nebel_gl_fog *fog)
         "void main()\n"
         "{\n"
         "    nebel_sight s = nebel_see(gl_FragCoord.xy, texelFetch(depth, ivec2(gl_FragCoord.xy), 0).x);\n"
-        "    nebel_light l = nebel_trace(s.origin, s.direction, s.t_max);\n"
+        "    nebel_transfer l = nebel_trace(s.origin, s.direction, s.t_max);\n"
         "    first = vec4(l.in_scattering, 1.0);\n"
         "    second = vec4(l.transmittance, 1.0);\n"
         "}\n";
@@ -133,7 +133,7 @@ static void check(int count, int kind, double most)
     pass_fill(&picture);
     draw(fog, &picture, &got);
     for (int i = 0; i<PASS_PIXELS; i += count> 300 ? 61 : 7) {
-        const nebel_light wanted = pass_trace(fog, &picture, i % PASS_WIDTH, i / PASS_WIDTH);
+        const nebel_transfer wanted = pass_trace(fog, &picture, i % PASS_WIDTH, i / PASS_WIDTH);
         for (int c = 0; c < 3; c++) {
             light = fmax(light, fabs((double)got.in_scattering[4 * i + c] - wanted.in_scattering[c]));
             transmittance = fmax(transmittance, fabs((double)got.transmittance[4 * i + c] - wanted.transmittance[c]));

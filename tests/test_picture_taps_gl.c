@@ -173,14 +173,14 @@ static void place_particles(const nebel_camera *camera, const nebel_particle *pa
 
 /* Returns how many particles are hidden that the ray meets. */
 static int render_pixel(const nebel_camera *camera, const float *depth, int x, int y, const nebel_gl_taps *taps,
-                        nebel_light *light)
+                        nebel_transfer *transfer)
 {
     nebel_ray ray;
     int hidden = 0;
-    *light = (nebel_light){.transmittance = {1, 1, 1}, .in_scattering = {0, 0, 0}};
+    *transfer = (nebel_transfer){.transmittance = {1, 1, 1}, .in_scattering = {0, 0, 0}};
     make_ray(camera, x + .5, y + .5, &ray);
     for (int i = 0; i < PARTICLES; i++) {
-        nebel_light l;
+        nebel_transfer l;
         const nebel_trace_desc exact = {.tolerance = 1e-6};
         assert_int_equal(nebel_trace(places[i].alone, &exact, 1, &ray, sizeof ray, &l, sizeof l), NEBEL_OK);
         if (l.transmittance[0] == 1 && l.transmittance[1] == 1 && l.transmittance[2] == 1) continue;
@@ -189,9 +189,9 @@ static int render_pixel(const nebel_camera *camera, const float *depth, int x, i
             continue;
         }
         for (int c = 0; c < 3; c++) {
-            light->in_scattering[c] =
-                taps->brightness * l.in_scattering[c] + l.transmittance[c] * light->in_scattering[c];
-            light->transmittance[c] *= l.transmittance[c];
+            transfer->in_scattering[c] =
+                taps->brightness * l.in_scattering[c] + l.transmittance[c] * transfer->in_scattering[c];
+            transfer->transmittance[c] *= l.transmittance[c];
         }
     }
     return hidden;
@@ -211,14 +211,14 @@ static void check(nb_gl_language language, nebel_projection projection, int grey
     draw(language, &camera, particles, taps, &got);
     place_particles(&camera, particles);
     for (int i = 0; i < PIXELS; i++) {
-        nebel_light light;
+        nebel_transfer transfer;
         double off = 0;
-        hidden += render_pixel(&camera, got.depth, i % WIDTH, i / WIDTH, &used, &light) > 0;
+        hidden += render_pixel(&camera, got.depth, i % WIDTH, i / WIDTH, &used, &transfer) > 0;
         for (int c = 0; c < 3; c++) {
-            off = fmax(off, fabs((double)got.transmittance[3 * i + c] - light.transmittance[c]));
-            off = fmax(off, fabs((double)got.in_scattering[3 * i + c] - light.in_scattering[c]));
+            off = fmax(off, fabs((double)got.transmittance[3 * i + c] - transfer.transmittance[c]));
+            off = fmax(off, fabs((double)got.in_scattering[3 * i + c] - transfer.in_scattering[c]));
         }
-        fogged += light.transmittance[0] < 1;
+        fogged += transfer.transmittance[0] < 1;
         beyond += off > 2e-3;
         worst = fmax(worst, off);
     }

@@ -270,12 +270,13 @@ static void test_lit_boxes_show_their_light(void **state)
     assert_int_equal(nebel_fog_pixels(now, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
     for (int i = 0; i < PIXELS; i++) {
         nebel_ray ray = {.t_max = (double)depth[i]};
-        nebel_light light;
+        nebel_transfer transfer;
         for (int c = 0; c < 3; c++)
             ray.direction[c] = (double)p.corner[c] + i % WIDTH * (double)p.step_x[c] + i / WIDTH * (double)p.step_y[c];
-        assert_int_equal(nebel_trace(now, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+        assert_int_equal(nebel_trace(now, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                         NEBEL_OK);
         for (int c = 0; c < 3; c++) {
-            const double wanted = light.transmittance[c] * color[4 * i + c] + 255 * light.in_scattering[c];
+            const double wanted = transfer.transmittance[c] * color[4 * i + c] + 255 * transfer.in_scattering[c];
             assert_true(fabs(out[4 * i + c] - fmin(wanted, 255)) < .5 + 255 * NEBEL_DEFAULT_TOLERANCE);
         }
     }

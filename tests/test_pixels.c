@@ -57,9 +57,9 @@ static nebel_snapshot *make_fog(int boxes, int tinted)
     return snapshot;
 }
 
-static double expected_byte(const nebel_light *light, int c, int pixel)
+static double expected_byte(const nebel_transfer *transfer, int c, int pixel)
 {
-    return light->transmittance[c] * color[4 * pixel + c] + 255 * fmin(light->in_scattering[c], 1);
+    return transfer->transmittance[c] * color[4 * pixel + c] + 255 * fmin(transfer->in_scattering[c], 1);
 }
 
 /* Half a step; 255 times the rounding of the weight, 2^-16, and of transmittance in float, 3e-6; and of the radiance,
@@ -77,9 +77,10 @@ static void assert_fogged(const nebel_snapshot *fog, const nebel_pixels *p)
             square += ray.direction[c] * ray.direction[c];
         }
         ray.t_max = (double)depth[i] * (p->depth_type == NEBEL_DEPTH_RAY ? 1 : sqrt(square));
-        nebel_light light;
-        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-        for (int c = 0; c < 3; c++) assert_true(fabs(out[4 * i + c] - expected_byte(&light, c, i)) < largest_error);
+        nebel_transfer transfer;
+        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                         NEBEL_OK);
+        for (int c = 0; c < 3; c++) assert_true(fabs(out[4 * i + c] - expected_byte(&transfer, c, i)) < largest_error);
         assert_int_equal(out[4 * i + 3], color[4 * i + 3]);
     }
 }

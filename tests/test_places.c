@@ -84,14 +84,14 @@ static int compare_with_ray(const nebel_snapshot *snapshot, nebel_place place, c
         if (!are_alike(&here, &there)) return 0;
     }
     const nebel_ray ray = {{place.position[0], place.position[1], place.position[2]}, {d[0], d[1], d[2]}, h};
-    nebel_light light;
+    nebel_transfer transfer;
     const nebel_trace_desc exact = {.tolerance = 1e-9, .ignore_distances = 1};
-    assert_int_equal(nebel_trace(snapshot, &exact, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, &exact, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
     for (int c = 0; c < 3; c++) {
         const double depth = h * here.extinction[c];
         const double shone = h * (here.emission[c] + here.scattering[c] * fog.ambient[c]) * (1 - depth / 2);
-        assert_true(fabs(1 - light.transmittance[c] - depth) <= 5e-3 * depth + 1e-12);
-        assert_true(fabs(light.in_scattering[c] - shone) <= 5e-3 * shone + 1e-11);
+        assert_true(fabs(1 - transfer.transmittance[c] - depth) <= 5e-3 * depth + 1e-12);
+        assert_true(fabs(transfer.in_scattering[c] - shone) <= 5e-3 * shone + 1e-11);
     }
     return densest > 0;
 }
@@ -237,9 +237,9 @@ static void bounds_are_near(void **state)
             const nebel_ray piece = {.direction = {rays[i]->direction[0], rays[i]->direction[1], rays[i]->direction[2]},
                                      .origin = {0, place_on(rays[i], from).position[1], 0},
                                      .t_max = bound.end - from};
-            nebel_light light;
-            assert_int_equal(nebel_trace(mist, NULL, 1, &piece, sizeof piece, &light, sizeof light), NEBEL_OK);
-            const double real = -log(light.transmittance[0]), bounded = bound.extinction[0] * (bound.end - from);
+            nebel_transfer transfer;
+            assert_int_equal(nebel_trace(mist, NULL, 1, &piece, sizeof piece, &transfer, sizeof transfer), NEBEL_OK);
+            const double real = -log(transfer.transmittance[0]), bounded = bound.extinction[0] * (bound.end - from);
             if (isfinite(bounded) && isfinite(real)) assert_true(bounded <= 2 * real + 0.51);
             depth += isfinite(bounded) ? bounded : 0;
         }

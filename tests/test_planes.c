@@ -88,11 +88,11 @@ static nebel_ray_planes planes_of(const ray_numbers *numbers, sharing shared, in
     return planes;
 }
 
-static nebel_light_planes lights_of(light_numbers *numbers, int wants_light, int wants_error, size_t stride)
+static nebel_transfer_planes lights_of(light_numbers *numbers, int wants_light, int wants_error, size_t stride)
 {
-    nebel_light_planes planes = {.transmittance_stride = stride * sizeof(float),
-                                 .in_scattering_stride = stride == 1 ? 0 : stride * sizeof(float),
-                                 .error_stride = stride * sizeof(float)};
+    nebel_transfer_planes planes = {.transmittance_stride = stride * sizeof(float),
+                                    .in_scattering_stride = stride == 1 ? 0 : stride * sizeof(float),
+                                    .error_stride = stride * sizeof(float)};
     for (int c = 0; c < 3; c++) {
         planes.transmittance[c] = numbers->transmittance + c * STRIDE * RAYS;
         planes.in_scattering[c] = wants_light ? numbers->in_scattering + c * STRIDE * RAYS : NULL;
@@ -109,7 +109,7 @@ static int is(float found, double expected)
 }
 
 static int is_same_light(const light_numbers *found, size_t at, int wants_light, int wants_error,
-                         const nebel_light *expected)
+                         const nebel_transfer *expected)
 {
     int same = is(found->error[at], wants_error ? expected->error : (double)untouched);
     for (size_t c = 0; c < 3; c++) {
@@ -134,7 +134,7 @@ static void compare(const random_fog *fog, const nebel_snapshot *snapshot, shari
     const int fine = (int)(variant & 1), wants_light = (variant & 2) != 0, wants_error = (variant & 4) != 0;
     const size_t stride = variant & 8 ? STRIDE : 1, n = RAYS - (size_t)((variant >> 4) % 11);
     nebel_ray rays[RAYS];
-    nebel_light expected[RAYS];
+    nebel_transfer expected[RAYS];
     make_rays(fog, shared, fine, stride, &numbers, rays);
     nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT,
                              .isa = NEBEL_ISA_SCALAR,
@@ -144,7 +144,7 @@ static void compare(const random_fog *fog, const nebel_snapshot *snapshot, shari
     const nebel_ray_planes from = planes_of(&numbers, shared, fine, stride);
     for (desc.isa = NEBEL_ISA_SCALAR; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
         if (!nebel_isa_available(desc.isa)) continue;
-        const nebel_light_planes to = lights_of(&found, wants_light, wants_error, stride);
+        const nebel_transfer_planes to = lights_of(&found, wants_light, wants_error, stride);
         assert_int_equal(nebel_trace_planes(snapshot, &desc, n, &from, &to), wanted);
         for (size_t i = 0; i < n && wanted == NEBEL_OK; i++) {
             if (is_same_light(&found, stride * i, wants_light, wants_error, &expected[i])) continue;
@@ -191,15 +191,16 @@ static void test_odd_strides_and_unknown_precisions_are_refused(void **state)
     (void)state;
     nebel_snapshot *fog = one_box();
     const nebel_ray rays[2] = {{.direction = {0, 0, -1}}, {.direction = {0, 0, -1}}};
-    nebel_light lights[2];
+    nebel_transfer transfers[2];
     const nebel_trace_desc unknown = {.precision = (nebel_precision)7};
     const size_t odd = sizeof *rays + 1;
     double distances[2];
-    assert_int_equal(nebel_trace(fog, NULL, 2, rays, odd, lights, sizeof *lights), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace(fog, NULL, 2, rays, sizeof *rays, lights, 3), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace(fog, NULL, 2, rays, odd, transfers, sizeof *transfers), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace(fog, NULL, 2, rays, sizeof *rays, transfers, 3), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_find_transmittance(fog, 0.5, 0, 2, rays, odd, distances), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace(fog, &unknown, 2, rays, sizeof *rays, lights, sizeof *lights), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace(fog, NULL, 2, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, &unknown, 2, rays, sizeof *rays, transfers, sizeof *transfers),
+                     NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace(fog, NULL, 2, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
     nebel_release_snapshot(fog);
 }
 
@@ -209,7 +210,7 @@ static void test_faults_are_named(void **state)
     nebel_snapshot *fog = one_box();
     const float zero[RAYS] = {0}, one[RAYS] = {1};
     float out[RAYS];
-    const nebel_light_planes to = {.transmittance = {out}};
+    const nebel_transfer_planes to = {.transmittance = {out}};
     const nebel_ray_planes faults[] = {
         {.direction = {0, 0, 0}},
         {.direction = {0, (double)NAN, 0}},
@@ -232,7 +233,7 @@ static void test_faults_are_named(void **state)
     assert_int_equal(nebel_trace_planes(fog, NULL, 1, &right, NULL), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace_planes(fog, &(nebel_trace_desc){.tolerance = (double)NAN}, 1, &right, &to),
                      NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_planes(fog, NULL, 1, &right, &(nebel_light_planes){0}), NEBEL_OK);
+    assert_int_equal(nebel_trace_planes(fog, NULL, 1, &right, &(nebel_transfer_planes){0}), NEBEL_OK);
     assert_int_equal(nebel_trace_planes(fog, NULL, 0, &right, &to), NEBEL_OK);
     assert_int_equal(nebel_trace_planes(fog, NULL, RAYS, &right, &to), NEBEL_OK);
     for (int i = 0; i < RAYS; i++) assert_true(fabs((double)out[i] - exp(-8)) < 1e-9);
@@ -262,8 +263,9 @@ static void test_a_ray_that_is_none_is_found(void **state)
                 .offset = {offset, offset, offset}, .direction_float = {way[0], way[1], way[2]}, .t_max = t_max};
             size_t failed = RAYS;
             const nebel_trace_desc desc = {.failed_ray = &failed};
-            assert_int_equal(nebel_trace_planes(fog, &desc, RAYS, &from, &(nebel_light_planes){.transmittance = {out}}),
-                             NEBEL_ERROR_ARGUMENT);
+            assert_int_equal(
+                nebel_trace_planes(fog, &desc, RAYS, &from, &(nebel_transfer_planes){.transmittance = {out}}),
+                NEBEL_ERROR_ARGUMENT);
             assert_int_equal(failed, bad);
         }
     }
@@ -280,7 +282,7 @@ static void compare_masked(const random_fog *fog, const nebel_snapshot *snapshot
     make_rays(fog, shared, 0, 1, &numbers, rays);
     for (size_t i = first; i < RAYS; i += 5) numbers.t_max[i] = 0;
     const nebel_ray_planes from = planes_of(&numbers, shared, 0, 1);
-    const nebel_light_planes to = lights_of(&plain, 1, wants_error, 1);
+    const nebel_transfer_planes to = lights_of(&plain, 1, wants_error, 1);
     assert_int_equal(nebel_trace_planes(snapshot, NULL, RAYS, &from, &to), NEBEL_OK);
     for (size_t i = first; i < RAYS; i += 5) {
         numbers.offset[i] = NAN;
@@ -288,7 +290,7 @@ static void compare_masked(const random_fog *fog, const nebel_snapshot *snapshot
         for (size_t c = 1; c < 3; c++) numbers.way[c * STRIDE * RAYS + i] = 0;
         assert_true(is(plain.transmittance[i], 1) && is(plain.in_scattering[i], 0));
     }
-    const nebel_light_planes to_masked = lights_of(&masked, 1, wants_error, 1);
+    const nebel_transfer_planes to_masked = lights_of(&masked, 1, wants_error, 1);
     assert_int_equal(nebel_trace_planes(snapshot, NULL, RAYS, &from, &to_masked), NEBEL_OK);
     assert_memory_equal(&masked, &plain, sizeof plain);
 }

@@ -129,11 +129,11 @@ static nebel_atmosphere *make(const nebel_atmosphere_desc *desc)
     return atmosphere;
 }
 
-static nebel_light trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, nebel_ray ray)
+static nebel_transfer trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, nebel_ray ray)
 {
-    nebel_light light;
-    assert_int_equal(nebel_trace_air(atmosphere, sun, 1, &ray, 0, &light, 0), NEBEL_OK);
-    return light;
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace_air(atmosphere, sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+    return transfer;
 }
 
 static void transmittance_is_that_of_T30(void **state)
@@ -154,10 +154,10 @@ static void transmittance_is_that_of_T30(void **state)
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         const double angle = rows[i].zenith * DEGREES;
         const nebel_ray ray = {{0, 1e3 * rows[i].height, 0}, {sin(angle), cos(angle), 0}, (double)INFINITY};
-        const nebel_light light = trace(earth, NULL, ray);
+        const nebel_transfer transfer = trace(earth, NULL, ray);
         for (int c = 0; c < 3; c++) {
-            expect_near("transmittance", light.transmittance[c], rows[i].left[c], 1e-6);
-            assert_true(light.in_scattering[c] == 0);
+            expect_near("transmittance", transfer.transmittance[c], rows[i].left[c], 1e-6);
+            assert_true(transfer.in_scattering[c] == 0);
         }
     }
     nebel_destroy_atmosphere(earth);
@@ -274,7 +274,7 @@ static const double skies[][10] = {
 
 /* Where a ray meets the ground the truth has the ground's light, too: once of the sun, else of the sky as well. */
 static void add_ground(const nebel_atmosphere *atmosphere, const nebel_sun *sun, const nebel_ray *ray,
-                       const nebel_light *light, double once[3], double all[3])
+                       const nebel_transfer *transfer, double once[3], double all[3])
 {
     const double radius = atmosphere->airs.radius, height = ray->origin[1];
     const nb_track track = {radius + height, (radius + height) * ray->direction[1]};
@@ -289,8 +289,8 @@ static void add_ground(const nebel_atmosphere *atmosphere, const nebel_sun *sun,
     nebel_air_light arrives;
     assert_int_equal(nebel_light_air(atmosphere, sun, 1, (const double(*)[3])place, 0, &arrives, 0), NEBEL_OK);
     for (int c = 0; c < 3; c++) {
-        once[c] += light->transmittance[c] * 0.1 / PI * cosine * arrives.sun[c];
-        all[c] += light->transmittance[c] * 0.1 / PI * (cosine * arrives.sun[c] + arrives.sky[c]);
+        once[c] += transfer->transmittance[c] * 0.1 / PI * cosine * arrives.sun[c];
+        all[c] += transfer->transmittance[c] * 0.1 / PI * (cosine * arrives.sun[c] + arrives.sky[c]);
     }
 }
 
@@ -309,7 +309,7 @@ static void skies_are_those_of_T41(void **state)
             const nebel_ray ray = {{0, 1e3 * row[3], 0},
                                    {sin(zenith) * cos(azimuth), cos(zenith), sin(zenith) * sin(azimuth)},
                                    (double)INFINITY};
-            const nebel_light light = trace(earth, &sun, ray);
+            const nebel_transfer transfer = trace(earth, &sun, ray);
             const nb_track track = {earth->airs.radius + ray.origin[1],
                                     (earth->airs.radius + ray.origin[1]) * cos(zenith)};
             const double cosine = ray.direction[0] * sun.direction[0] + ray.direction[1] * sun.direction[1];
@@ -319,13 +319,13 @@ static void skies_are_those_of_T41(void **state)
             nb_gather(earth, &earth->rule, track, (nb_aspect){cos(zenith), cosine, cos(low)}, 1, &end, &gathered);
             nb_gathered_once(earth, &gathered, cosine, once);
             double all[3];
-            memcpy(all, light.in_scattering, sizeof all);
-            add_ground(earth, &sun, &ray, &light, once, all);
+            memcpy(all, transfer.in_scattering, sizeof all);
+            add_ground(earth, &sun, &ray, &transfer, once, all);
             for (int c = 0; c < 3; c++) {
                 worst_once = fmax(worst_once, fabs(once[c] / row[4 + c] - 1));
                 worst = fmax(worst, fabs(all[c] / row[7 + c] - 1));
                 /* Of the truth 4 standard errors of 8e-4 are not known. */
-                worst_told = fmax(worst_told, (fabs(all[c] - row[7 + c]) - 3.2e-3 * row[7 + c]) / light.error);
+                worst_told = fmax(worst_told, (fabs(all[c] - row[7 + c]) - 3.2e-3 * row[7 + c]) / transfer.error);
             }
         }
         print_message("quality %d: once %.2e off, all orders %.2e, %.2f of the error told\n", quality, worst_once,
@@ -386,7 +386,7 @@ static void qualities_agree(void **state)
             const nebel_ray ray = {{0, desc.thickness * (i % 3) / 5, 0},
                                    {sin(zenith) * cos(azimuth), cos(zenith), sin(zenith) * sin(azimuth)},
                                    (double)INFINITY};
-            const nebel_light a = trace(fast, &sun, ray), b = trace(precise, &sun, ray);
+            const nebel_transfer a = trace(fast, &sun, ray), b = trace(precise, &sun, ray);
             for (int c = 0; c < 3; c++) {
                 worst = fmax(worst, fabs(a.in_scattering[c] - b.in_scattering[c]) / (a.error + b.error));
                 most = fmax(
@@ -426,7 +426,7 @@ static void check_furnace(nebel_air_quality quality)
         const nb_track track = {6.36e6 + height, (6.36e6 + height) * cos(angle)};
         const double way = nb_track_enter(track, 6.36e6);
         double light[3] = {0, 0, 0}, ground[3] = {0, 0, 0};
-        nebel_light clear = {.error = 0};
+        nebel_transfer clear = {.error = 0};
         for (int k = 0; k < RINGS * TURNS; k++) {
             const double z = 2 * (k / TURNS + 0.5) / RINGS - 1, turn = 2 * PI * (k % TURNS + 0.5) / TURNS,
                          weight = 4 * PI / (RINGS * TURNS);
@@ -478,13 +478,14 @@ static void odd_rays_have_answers(void **state)
                     nebel_ray ray = {.t_max = reach[r]};
                     memcpy(ray.origin, places[p], sizeof ray.origin);
                     memcpy(ray.direction, ways[w], sizeof ray.direction);
-                    const nebel_light light = trace(air, &sun, ray);
+                    const nebel_transfer transfer = trace(air, &sun, ray);
                     for (int c = 0; c < 3; c++) {
-                        assert_true(light.transmittance[c] >= 0 && light.transmittance[c] <= 1);
-                        assert_true(light.in_scattering[c] >= 0 && light.in_scattering[c] < 1);
-                        if (reach[r] == 0) assert_true(light.transmittance[c] == 1 && light.in_scattering[c] == 0);
+                        assert_true(transfer.transmittance[c] >= 0 && transfer.transmittance[c] <= 1);
+                        assert_true(transfer.in_scattering[c] >= 0 && transfer.in_scattering[c] < 1);
+                        if (reach[r] == 0)
+                            assert_true(transfer.transmittance[c] == 1 && transfer.in_scattering[c] == 0);
                     }
-                    assert_true(light.error >= 0 && light.error < 1);
+                    assert_true(transfer.error >= 0 && transfer.error < 1);
                 }
         nebel_destroy_atmosphere(air);
     }
@@ -502,7 +503,7 @@ static void below_the_ground_is_on_it(void **state)
         const nebel_ray on = {{0, 0, 0}, {.2, 1, -.4}, HUGE_VAL};
         const nebel_ray below = {{0, -depths[k], 0}, {.2, 1, -.4}, HUGE_VAL};
         const double places[2][3] = {{0, 0, 0}, {0, -depths[k], 0}};
-        nebel_light wanted, got;
+        nebel_transfer wanted, got;
         nebel_air_light light[2];
         assert_int_equal(nebel_trace_air(air, &sun, 1, &on, 0, &wanted, 0), NEBEL_OK);
         assert_int_equal(nebel_trace_air(air, &sun, 1, &below, 0, &got, 0), NEBEL_OK);
@@ -563,8 +564,8 @@ static void distance_changes_nothing(void **state)
     const nebel_sun sun = {.direction = {1, 0.2, 0}, .irradiance = {1, 1, 1}};
     for (int i = 0; i < 20; i++) {
         const double x = 6.4e6 * i / 19 + 1e4;
-        const nebel_light near_by = trace(earth, &sun, (nebel_ray){{x, 1e6, 0}, {0, -1, 0}, (double)INFINITY});
-        const nebel_light far_away = trace(earth, &sun, (nebel_ray){{x, 1e14, 0}, {0, -1, 0}, (double)INFINITY});
+        const nebel_transfer near_by = trace(earth, &sun, (nebel_ray){{x, 1e6, 0}, {0, -1, 0}, (double)INFINITY});
+        const nebel_transfer far_away = trace(earth, &sun, (nebel_ray){{x, 1e14, 0}, {0, -1, 0}, (double)INFINITY});
         for (int c = 0; c < 3; c++) {
             assert_true(fabs(near_by.transmittance[c] - far_away.transmittance[c]) <= 1e-5);
             assert_true(fabs(near_by.in_scattering[c] - far_away.in_scattering[c]) <= 1e-6);
@@ -596,10 +597,10 @@ static void rays_end_within_hazy_air(void **state)
             rest.t_max = ray.t_max - first.t_max;
             for (int c = 0; c < 3; c++) rest.origin[c] += first.t_max * ray.direction[c];
             if (hypot(hypot(rest.origin[0], rest.origin[1] + known->radius), rest.origin[2]) < known->radius) continue;
-            const nebel_light whole = trace(air, &sun, ray), a = trace(air, &sun, first), b = trace(air, &sun, rest);
-            const nebel_light above = trace(air, &sun, near);
+            const nebel_transfer whole = trace(air, &sun, ray), a = trace(air, &sun, first), b = trace(air, &sun, rest);
+            const nebel_transfer above = trace(air, &sun, near);
             near.direction[1] = -2e-4;
-            const nebel_light below = trace(air, &sun, near);
+            const nebel_transfer below = trace(air, &sun, near);
             for (int c = 0; c < 3; c++) {
                 const double off =
                     fabs(a.in_scattering[c] + a.transmittance[c] * b.in_scattering[c] - whole.in_scattering[c]);
@@ -644,19 +645,19 @@ static void bad_numbers_are_refused(void **state)
     expect_fault(&(nebel_atmosphere_desc){.air_count = NEBEL_MAX_AIRS + 1});
     expect_fault(&(nebel_atmosphere_desc){.quality = NEBEL_AIR_QUALITY_COUNT});
     nebel_atmosphere *earth = make(&(nebel_atmosphere_desc){.radius = 0});
-    nebel_light light;
+    nebel_transfer transfer;
     const nebel_ray good = {{0, 0, 0}, {0, 1, 0}, 1}, still = {{0, 0, 0}, {0, 0, 0}, 1},
                     back = {{0, 0, 0}, {0, 1, 0}, -1};
     const nebel_sun none = {.irradiance = {1}}, dark = {.direction = {0}}, negative = {{0, 1, 0}, {-1}};
-    assert_int_equal(nebel_trace_air(earth, &none, 1, &good, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_air(earth, &negative, 1, &good, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_air(earth, &dark, 1, &still, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_air(earth, &dark, 1, &back, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_air(NULL, &dark, 1, &good, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_air(earth, &none, 1, &good, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_air(earth, &negative, 1, &good, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_air(earth, &dark, 1, &still, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_air(earth, &dark, 1, &back, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_air(NULL, &dark, 1, &good, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
     const nebel_ray last_is_bad[2] = {good, back};
-    light.error = -7;
-    assert_int_equal(nebel_trace_air(earth, &dark, 2, last_is_bad, sizeof good, &light, 0), NEBEL_ERROR_ARGUMENT);
-    assert_true(light.error == -7);
+    transfer.error = -7;
+    assert_int_equal(nebel_trace_air(earth, &dark, 2, last_is_bad, sizeof good, &transfer, 0), NEBEL_ERROR_ARGUMENT);
+    assert_true(transfer.error == -7);
     assert_int_equal(nebel_trace_air(earth, NULL, 0, NULL, 0, NULL, 0), NEBEL_OK);
     nebel_destroy_atmosphere(earth);
     nebel_destroy_atmosphere(NULL);

@@ -17,7 +17,7 @@ typedef struct bundle {
     double direction[3][RAYS];
     float t_max[RAYS];
     float transmittance[3][RAYS], in_scattering[3][RAYS], error[RAYS];
-    nebel_light exact[RAYS];
+    nebel_transfer exact[RAYS];
 } bundle;
 
 /* 0 to 1; the same in every run. */
@@ -72,7 +72,7 @@ static void aim(bundle *rays, const nebel_atmosphere_desc *desc, double height, 
 static void trace_both(bundle *rays, const nebel_air_view_desc *desc, const nebel_air_view *view)
 {
     const double *const direction[3] = {rays->direction[0], rays->direction[1], rays->direction[2]};
-    const nebel_light_planes lights = {
+    const nebel_transfer_planes lights = {
         .transmittance = {rays->transmittance[0], rays->transmittance[1], rays->transmittance[2]},
         .in_scattering = {rays->in_scattering[0], rays->in_scattering[1], rays->in_scattering[2]},
         .error = rays->error};
@@ -287,8 +287,8 @@ static void thin_air_is_passed_up_to_the_ground(void **state)
     }
     assert_int_equal(nebel_find_ground(view, COUNT, along, &(nebel_ground_planes){.distance = distance}), NEBEL_OK);
     for (int k = 0; k < 2; k++) {
-        const nebel_light_planes lights = {.transmittance = {left[k][0], left[k][1], left[k][2]},
-                                           .in_scattering = {light[k][0], light[k][1], light[k][2]}};
+        const nebel_transfer_planes lights = {.transmittance = {left[k][0], left[k][1], left[k][2]},
+                                              .in_scattering = {light[k][0], light[k][1], light[k][2]}};
         assert_int_equal(nebel_trace_air_view(view, COUNT, along, k == 0 ? distance : NULL, &lights), NEBEL_OK);
     }
     assert_true(left[1][2][0] < .9f && left[1][2][0] > .1f);
@@ -413,9 +413,9 @@ static void odd_places_have_answers(void **state)
                     const double *const direction[3] = {&ways[w][0], &ways[w][1], &ways[w][2]};
                     const float reach = 10;
                     float left[3], light[3], error, distance, sun[3], sky[3];
-                    const nebel_light_planes lights = {.transmittance = {&left[0], &left[1], &left[2]},
-                                                       .in_scattering = {&light[0], &light[1], &light[2]},
-                                                       .error = &error};
+                    const nebel_transfer_planes lights = {.transmittance = {&left[0], &left[1], &left[2]},
+                                                          .in_scattering = {&light[0], &light[1], &light[2]},
+                                                          .error = &error};
                     const nebel_ground_planes ground = {
                         .distance = &distance, .sun = {&sun[0], &sun[1], &sun[2]}, .sky = {&sky[0], &sky[1], &sky[2]}};
                     assert_int_equal(nebel_trace_air_view(view, 1, direction, levels ? &reach : NULL, &lights),
@@ -458,7 +458,7 @@ static void bad_calls_are_refused(void **state)
     const double x[1] = {1}, *const directions[3] = {x, NULL, x};
     float distance;
     assert_int_equal(nebel_create_air_view(&(nebel_air_view_desc){.atmosphere = air}, &view), NEBEL_OK);
-    assert_int_equal(nebel_trace_air_view(view, 1, directions, NULL, &(nebel_light_planes){.error = NULL}),
+    assert_int_equal(nebel_trace_air_view(view, 1, directions, NULL, &(nebel_transfer_planes){.error = NULL}),
                      NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_find_ground(view, 1, directions, &(nebel_ground_planes){.distance = &distance}),
                      NEBEL_ERROR_ARGUMENT);
@@ -479,8 +479,8 @@ static void ends_that_are_none_count_as_zero(void **state)
     static bundle rays;
     static float bad[3][2], zero[3][2], error[2];
     const double *const direction[3] = {rays.direction[0], rays.direction[1], rays.direction[2]};
-    const nebel_light_planes told = {.in_scattering = {bad[0], bad[1], bad[2]}, .error = error},
-                             wanted = {.in_scattering = {zero[0], zero[1], zero[2]}};
+    const nebel_transfer_planes told = {.in_scattering = {bad[0], bad[1], bad[2]}, .error = error},
+                                wanted = {.in_scattering = {zero[0], zero[1], zero[2]}};
     nebel_atmosphere *earth = make("earth");
     nebel_air_view *view;
     const nebel_air_view_desc desc = {
@@ -504,7 +504,7 @@ typedef struct answers {
 static void ask(nebel_air_view *view, nebel_isa isa, const bundle *rays, int ends, answers *a)
 {
     const double *const direction[3] = {rays->direction[0], rays->direction[1], rays->direction[2]};
-    nebel_light_planes lights = {.error = a->error};
+    nebel_transfer_planes lights = {.error = a->error};
     nebel_ground_planes ground = {.distance = a->distance};
     memset(a, 0, sizeof *a);
     for (int c = 0; c < 3; c++) {

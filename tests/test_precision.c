@@ -14,7 +14,7 @@ enum { RAYS = 200, WORDS = 20000, PARTICLES = 100 };
 
 /* All that the library computes in long double. */
 typedef struct answers {
-    nebel_light lights[2][RAYS]; /* in double, in float */
+    nebel_transfer transfers[2][RAYS]; /* in double, in float */
     double distances[RAYS];
     nebel_word words[WORDS];
     nebel_particle particles[PARTICLES];
@@ -27,7 +27,7 @@ static void ask(const random_fog *fog, const nebel_ray rays[RAYS], answers *got)
     nebel_snapshot *snapshot = fog_commit(&desc, fog->volumes, fog->count);
     for (int k = 0; k < 2; k++) {
         const nebel_trace_desc how = {.precision = k == 0 ? NEBEL_PRECISION_DOUBLE : NEBEL_PRECISION_FLOAT};
-        nebel_trace(snapshot, &how, RAYS, rays, sizeof *rays, got->lights[k], sizeof *got->lights[k]);
+        nebel_trace(snapshot, &how, RAYS, rays, sizeof *rays, got->transfers[k], sizeof *got->transfers[k]);
     }
     nebel_find_transmittance(snapshot, 0.5, 0, RAYS, rays, sizeof *rays, got->distances);
     const double eye[] = {1 / 3.0, 2 / 7.0, 3 / 11.0};

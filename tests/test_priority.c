@@ -56,7 +56,8 @@ enum { RAYS = 64 };
 
 static random_fog fog;
 
-static void trace_all(const nebel_volume_desc *volumes, size_t n, nebel_precision precision, nebel_light lights[RAYS])
+static void trace_all(const nebel_volume_desc *volumes, size_t n, nebel_precision precision,
+                      nebel_transfer transfers[RAYS])
 {
     nebel_ray rays[RAYS];
     for (uint64_t i = 0; i < RAYS; i++) rays[i] = random_fog_ray(&fog, i);
@@ -64,14 +65,14 @@ static void trace_all(const nebel_volume_desc *volumes, size_t n, nebel_precisio
     memcpy(desc.ambient, fog.ambient, sizeof desc.ambient);
     nebel_snapshot *const snapshot = fog_commit(&desc, volumes, n);
     const nebel_trace_desc how = {.precision = precision, .tolerance = 1e-5};
-    assert_int_equal(nebel_trace(snapshot, &how, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, &how, RAYS, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
     nebel_release_snapshot(snapshot);
 }
 
 static void assert_same_light(const nebel_volume_desc *a, size_t a_count, const nebel_volume_desc *b, size_t b_count)
 {
     for (int p = NEBEL_PRECISION_DOUBLE; p <= NEBEL_PRECISION_FLOAT; p++) {
-        nebel_light first[RAYS], second[RAYS];
+        nebel_transfer first[RAYS], second[RAYS];
         trace_all(a, a_count, (nebel_precision)p, first);
         trace_all(b, b_count, (nebel_precision)p, second);
         for (int i = 0; i < RAYS; i++) {

@@ -19,24 +19,24 @@ static nebel_snapshot *commit(const double ambient[3], const nebel_volume_desc *
 }
 
 static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
-                  nebel_light *lights)
+                  nebel_transfer *transfers)
 {
-    memset(lights, 0, n * sizeof *lights);
-    assert_int_equal(nebel_trace(snapshot, desc, n, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    memset(transfers, 0, n * sizeof *transfers);
+    assert_int_equal(nebel_trace(snapshot, desc, n, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
 }
 
 static void trace_as(const nebel_trace_desc *desc, const random_fog *fog, const nebel_volume_desc *volumes, size_t n,
-                     const nebel_ray rays[RAYS], nebel_light lights[RAYS])
+                     const nebel_ray rays[RAYS], nebel_transfer transfers[RAYS])
 {
     nebel_snapshot *const snapshot = commit(fog->ambient, volumes, n);
-    trace(snapshot, desc, RAYS, rays, lights);
+    trace(snapshot, desc, RAYS, rays, transfers);
     nebel_release_snapshot(snapshot);
 }
 
 static void trace_volumes(const random_fog *fog, const nebel_volume_desc *volumes, size_t n, nebel_precision precision,
-                          const nebel_ray rays[RAYS], nebel_light lights[RAYS])
+                          const nebel_ray rays[RAYS], nebel_transfer transfers[RAYS])
 {
-    trace_as(&(nebel_trace_desc){.precision = precision, .tolerance = 1e-5}, fog, volumes, n, rays, lights);
+    trace_as(&(nebel_trace_desc){.precision = precision, .tolerance = 1e-5}, fog, volumes, n, rays, transfers);
 }
 
 static void make(random_fog *fog, random_fog_kind kind, uint64_t seed, nebel_ray rays[RAYS])
@@ -46,20 +46,20 @@ static void make(random_fog *fog, random_fog_kind kind, uint64_t seed, nebel_ray
 }
 
 /* Says what differs, so that it can be seen again. */
-static void report(const char *what, const random_fog *fog, const nebel_ray *ray, const nebel_light *a,
-                   const nebel_light *b)
+static void report(const char *what, const random_fog *fog, const nebel_ray *ray, const nebel_transfer *a,
+                   const nebel_transfer *b)
 {
     printf("\n%s: kind %d, seed %zu: differs by %g\n", what, (int)fog->kind, (size_t)fog->seed, fog_difference(a, b));
     random_fog_print(stdout, fog, ray);
     for (int i = 0; i < 2; i++) {
-        const nebel_light *const l = i == 0 ? a : b;
+        const nebel_transfer *const l = i == 0 ? a : b;
         printf("T %.17g %.17g %.17g S %.17g %.17g %.17g error %g\n", l->transmittance[0], l->transmittance[1],
                l->transmittance[2], l->in_scattering[0], l->in_scattering[1], l->in_scattering[2], l->error);
     }
 }
 
-static void assert_same_bits(const char *what, const random_fog *fog, const nebel_ray *rays, const nebel_light *a,
-                             const nebel_light *b)
+static void assert_same_bits(const char *what, const random_fog *fog, const nebel_ray *rays, const nebel_transfer *a,
+                             const nebel_transfer *b)
 {
     for (int i = 0; i < RAYS; i++) {
         if (memcmp(&a[i], &b[i], sizeof a[i]) != 0) report(what, fog, &rays[i], &a[i], &b[i]);
@@ -87,15 +87,15 @@ static void test_the_order_of_submission_changes_no_bit(void **unused)
     (void)unused;
     for (int trial = 0; trial < RANDOM_FOG_KIND_COUNT * 12; trial++) {
         nebel_ray rays[RAYS];
-        nebel_light lights[RAYS], again[RAYS];
+        nebel_transfer transfers[RAYS], again[RAYS];
         nebel_volume_desc shuffled[RANDOM_FOG_VOLUMES];
         make(&fog, (random_fog_kind)(trial % RANDOM_FOG_KIND_COUNT), 1000 + (uint64_t)trial, rays);
         for (int p = 0; p < 2; p++) {
-            trace_volumes(&fog, fog.volumes, fog.count, precisions[p], rays, lights);
+            trace_volumes(&fog, fog.volumes, fog.count, precisions[p], rays, transfers);
             for (uint64_t order = 0; order < 3; order++) {
                 shuffle(&fog, order + (uint64_t)trial * 3, shuffled);
                 trace_volumes(&fog, shuffled, fog.count, precisions[p], rays, again);
-                assert_same_bits("another order", &fog, rays, lights, again);
+                assert_same_bits("another order", &fog, rays, transfers, again);
             }
         }
     }
@@ -106,17 +106,17 @@ static void test_instruction_sets_and_grouping_change_no_bit(void **unused)
     (void)unused;
     for (int trial = 0; trial < RANDOM_FOG_KIND_COUNT * 12; trial++) {
         nebel_ray rays[RAYS];
-        nebel_light lights[RAYS], again[RAYS];
+        nebel_transfer transfers[RAYS], again[RAYS];
         make(&fog, (random_fog_kind)(trial % RANDOM_FOG_KIND_COUNT), 2000 + (uint64_t)trial, rays);
         nebel_snapshot *const snapshot = commit(fog.ambient, fog.volumes, fog.count);
         for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
             if (!nebel_isa_available((nebel_isa)isa)) continue;
             const nebel_trace_desc desc = {
                 .precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa, .tolerance = 1e-5};
-            trace(snapshot, &desc, RAYS, rays, isa == NEBEL_ISA_SCALAR ? lights : again);
-            if (isa != NEBEL_ISA_SCALAR) assert_same_bits(nebel_isa_name((nebel_isa)isa), &fog, rays, lights, again);
+            trace(snapshot, &desc, RAYS, rays, isa == NEBEL_ISA_SCALAR ? transfers : again);
+            if (isa != NEBEL_ISA_SCALAR) assert_same_bits(nebel_isa_name((nebel_isa)isa), &fog, rays, transfers, again);
             for (int i = 0; i < RAYS; i++) trace(snapshot, &desc, 1, &rays[i], &again[i]);
-            assert_same_bits("one by one", &fog, rays, lights, again);
+            assert_same_bits("one by one", &fog, rays, transfers, again);
         }
         nebel_release_snapshot(snapshot);
     }
@@ -171,19 +171,19 @@ static void assert_cut_is_invisible(const char *what, size_t index, const nebel_
                                     const nebel_ray rays[RAYS], double tolerance, const double allowed[2])
 {
     nebel_volume_desc cut[RANDOM_FOG_VOLUMES + 1];
-    nebel_light lights[RAYS], again[RAYS];
+    nebel_transfer transfers[RAYS], again[RAYS];
     memcpy(cut, fog.volumes, fog.count * sizeof *cut);
     cut[index] = halves[0];
     cut[fog.count] = halves[1];
     for (int p = 0; p < 2; p++) {
         const nebel_trace_desc desc = {.precision = precisions[p], .tolerance = tolerance};
-        trace_as(&desc, &fog, fog.volumes, fog.count, rays, lights);
+        trace_as(&desc, &fog, fog.volumes, fog.count, rays, transfers);
         trace_as(&desc, &fog, cut, fog.count + 1, rays, again);
         for (int i = 0; i < RAYS; i++) {
-            const double apart = fog_difference(&lights[i], &again[i]);
+            const double apart = fog_difference(&transfers[i], &again[i]);
             if (!(apart <= allowed[p])) {
                 printf("%s, %s: volume %zu\n", what, p == 0 ? "double" : "float", index);
-                report("cut", &fog, &rays[i], &lights[i], &again[i]);
+                report("cut", &fog, &rays[i], &transfers[i], &again[i]);
             }
             assert_true(apart <= allowed[p]);
         }
@@ -290,7 +290,7 @@ static void test_cutting_a_ray_in_two_changes_no_more_than_the_stated_errors(voi
     (void)unused;
     for (int trial = 0; trial < RANDOM_FOG_KIND_COUNT * 20; trial++) {
         nebel_ray rays[RAYS], near[RAYS], far[RAYS];
-        nebel_light whole[RAYS], first[RAYS], second[RAYS];
+        nebel_transfer whole[RAYS], first[RAYS], second[RAYS];
         make(&fog, (random_fog_kind)(trial % RANDOM_FOG_FAR), 4000 + (uint64_t)trial, rays);
         for (int i = 0; i < RAYS; i++) {
             const double *const d = rays[i].direction;
@@ -307,7 +307,7 @@ static void test_cutting_a_ray_in_two_changes_no_more_than_the_stated_errors(voi
         trace(snapshot, &desc, RAYS, far, second);
         nebel_release_snapshot(snapshot);
         for (int i = 0; i < RAYS; i++) {
-            nebel_light joined = {.error = first[i].error + 3 * second[i].error};
+            nebel_transfer joined = {.error = first[i].error + 3 * second[i].error};
             for (int c = 0; c < 3; c++) {
                 const double T = first[i].transmittance[c];
                 joined.transmittance[c] = T * second[i].transmittance[c];
@@ -393,7 +393,7 @@ static void test_moving_everything_by_1e7_m_changes_only_rounding(void **unused)
     static const double allowed[] = {1e-9, 1e-5};
     for (int trial = 0; trial < 400; trial++) {
         nebel_ray rays[RAYS];
-        nebel_light here[2][RAYS], there[RAYS];
+        nebel_transfer here[2][RAYS], there[RAYS];
         make_near((random_fog_kind)(trial % (RANDOM_FOG_EXCLUDE + 1)), 5000 + (uint64_t)trial, rays);
         for (int p = 0; p < 2; p++) trace_volumes(&fog, fog.volumes, fog.count, precisions[p], rays, here[p]);
         for (size_t i = 0; i < fog.count; i++) shift_volume(&fog.volumes[i], shift);

@@ -274,14 +274,14 @@ static void once_is_what_quadrature_says(void **state)
         shine(&g, views[i].sun, 1 / DIM);
         const nebel_ray ray = ray_of(views[i].height, views[i].elevation, views[i].azimuth);
         nebel_sun sun = {.irradiance = {1 / DIM, 1 / DIM, 1 / DIM}};
-        nebel_light light;
+        nebel_transfer transfer;
         memcpy(sun.direction, g.scene.sun_direction, sizeof sun.direction);
-        assert_int_equal(nebel_trace_air(g.atmosphere, &sun, 1, &ray, 0, &light, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_air(g.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
         const estimate e = look(&g, NULL, &ray, 40, 1);
         for (int c = 0; c < 3; c++) {
-            const double expected = (double)light.in_scattering[c];
+            const double expected = (double)transfer.in_scattering[c];
             expect(views[i].name, &e, c, expected, 1e-3 * expected, views[i].part);
-            assert_true(fabs(e.transmittance[c] - (double)light.transmittance[c]) < 1e-6);
+            assert_true(fabs(e.transmittance[c] - (double)transfer.transmittance[c]) < 1e-6);
         }
         end(&g);
     }

@@ -274,10 +274,11 @@ static void test_pixels_look_where_they_should(void **state)
                 {{0, 0, 0},
                  {cos(latitude) * sin(longitude), sin(latitude), -cos(latitude) * cos(longitude)},
                  HUGE_VAL}};
-            nebel_light light;
-            assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &rays[p], sizeof *rays, &light, sizeof light),
-                             NEBEL_OK);
-            assert_true(fabs((double)picture.planes.color[3 * i] - light.in_scattering[0]) < 2e-4);
+            nebel_transfer transfer;
+            assert_int_equal(
+                nebel_trace(fog, &(nebel_trace_desc){0}, 1, &rays[p], sizeof *rays, &transfer, sizeof transfer),
+                NEBEL_OK);
+            assert_true(fabs((double)picture.planes.color[3 * i] - transfer.in_scattering[0]) < 2e-4);
         }
     }
     test_picture_free(&picture);

@@ -32,10 +32,10 @@ static nebel_result render(const nebel_scene_data *scene, nebel_snapshot *fog, n
 }
 
 /* The exact fog of the way to a corner. */
-static nebel_light trace_corner(const nebel_snapshot *fog, const nebel_camera *camera, size_t v)
+static nebel_transfer trace_corner(const nebel_snapshot *fog, const nebel_camera *camera, size_t v)
 {
     nebel_ray ray = {.t_max = 0};
-    nebel_light light;
+    nebel_transfer transfer;
     double square = 0;
     for (size_t i = 0; i < 3; i++) {
         ray.origin[i] = camera->position[i];
@@ -43,8 +43,9 @@ static nebel_light trace_corner(const nebel_snapshot *fog, const nebel_camera *c
         square += ray.direction[i] * ray.direction[i];
     }
     ray.t_max = sqrt(square);
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-    return light;
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                     NEBEL_OK);
+    return transfer;
 }
 
 /* ---- fog at vertices ------------------------------------------------------------------------- */
@@ -59,9 +60,9 @@ static void test_vertices_are_exact_and_linear_between(void **state)
     test_picture picture = test_picture_make(40, 30);
     double hidden[4], red[4], farthest = 0;
     for (size_t v = 0; v < 4; v++) {
-        const nebel_light light = trace_corner(fog, &camera, v);
-        hidden[v] = 1 - light.transmittance[0];
-        red[v] = light.in_scattering[0];
+        const nebel_transfer transfer = trace_corner(fog, &camera, v);
+        hidden[v] = 1 - transfer.transmittance[0];
+        red[v] = transfer.in_scattering[0];
         farthest = fmax(farthest, hidden[v]);
     }
     assert_true(farthest > .1);

@@ -2,26 +2,26 @@
 #include "render_clouds_help.h"
 #include "test_render_scene.h"
 
-static nebel_light air_to(const world *w, const nebel_sun *sun, nebel_ray ray, double t)
+static nebel_transfer air_to(const world *w, const nebel_sun *sun, nebel_ray ray, double t)
 {
-    nebel_light light;
+    nebel_transfer transfer;
     ray.t_max = t;
-    assert_int_equal(nebel_trace_air(w->atmosphere, sun, 1, &ray, 0, &light, 0), NEBEL_OK);
-    return light;
+    assert_int_equal(nebel_trace_air(w->atmosphere, sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+    return transfer;
 }
 
 /* Air up to t in the shade of clouds. */
-static nebel_light shaded_to(const world *w, const nebel_sun *sun, const nebel_ray *ray, const nebel_air_shade *shade,
-                             double t)
+static nebel_transfer shaded_to(const world *w, const nebel_sun *sun, const nebel_ray *ray,
+                                const nebel_air_shade *shade, double t)
 {
-    nebel_light light = air_to(w, sun, *ray, t);
+    nebel_transfer transfer = air_to(w, sun, *ray, t);
     for (uint32_t k = 0; k < shade->count && (double)shade->t[k] < t; k++) {
-        const nebel_light a = air_to(w, sun, *ray, (double)shade->t[k]),
-                          b = air_to(w, sun, *ray, fmin(t, (double)shade->t[k + 1]));
+        const nebel_transfer a = air_to(w, sun, *ray, (double)shade->t[k]),
+                             b = air_to(w, sun, *ray, fmin(t, (double)shade->t[k + 1]));
         for (int c = 0; c < 3; c++)
-            light.in_scattering[c] -= (1 - (double)shade->part[k][c]) * (b.in_scattering[c] - a.in_scattering[c]);
+            transfer.in_scattering[c] -= (1 - (double)shade->part[k][c]) * (b.in_scattering[c] - a.in_scattering[c]);
     }
-    return light;
+    return transfer;
 }
 
 /* The table of air in pictures is off by up to 2.7e-2 for rays that end in it. Clouds and air in short pieces: sum of T_air dS_cloud + T_cloud dS_air, with clouds as a straight line between knots. */
@@ -29,9 +29,9 @@ static void compose(const world *w, const nebel_sun *sun, const nebel_ray *ray, 
                     const nebel_air_shade *shade, double light[3])
 {
     enum { STEPS = 24 };
-    const nebel_light all = shaded_to(w, sun, ray, shade, HUGE_VAL);
+    const nebel_transfer all = shaded_to(w, sun, ray, shade, HUGE_VAL);
     const uint32_t last = knots->count - 1;
-    nebel_light before = shaded_to(w, sun, ray, shade, knots->count > 0 ? (double)knots->t[0] : 0);
+    nebel_transfer before = shaded_to(w, sun, ray, shade, knots->count > 0 ? (double)knots->t[0] : 0);
     for (int c = 0; c < 3; c++) light[c] = knots->count > 0 ? before.in_scattering[c] : 0;
     for (uint32_t k = 1; k < knots->count; k++)
         for (int i = 1; i <= STEPS; i++) {
@@ -39,7 +39,7 @@ static void compose(const world *w, const nebel_sun *sun, const nebel_ray *ray, 
                          t = (double)knots->t[k - 1] * (1 - part) + (double)knots->t[k] * part;
             const double left = (double)knots->transmittance[k - 1] +
                                 (part - .5 / STEPS) * (double)(knots->transmittance[k] - knots->transmittance[k - 1]);
-            const nebel_light here = shaded_to(w, sun, ray, shade, t);
+            const nebel_transfer here = shaded_to(w, sun, ray, shade, t);
             for (int c = 0; c < 3; c++)
                 light[c] += left * (here.in_scattering[c] - before.in_scattering[c]) +
                             .5 * (here.transmittance[c] + before.transmittance[c]) / STEPS *
@@ -154,7 +154,7 @@ static void clouds_end_at_surfaces(void **state)
                                             &(double){2 * tan(30 * test_pi / 180) / HEIGHT / length}, 0, &knots, 0),
                          NEBEL_OK);
         const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
-        const nebel_light air = air_to(&w, &sun, ray, ray.t_max);
+        const nebel_transfer air = air_to(&w, &sun, ray, ray.t_max);
         cloudy += left > .05 && left < .95;
         worst = fmax(worst, fabs((double)picture.planes.transmittance[3 * i + 1] - left * air.transmittance[1]));
     }
@@ -287,7 +287,7 @@ static void compare_ball(const world *w, const ball *b, nebel_cloud_workspace *w
         for (int c = 0; c < 3; c++) unit.direction[c] /= length;
         meet_ball(b, &unit, ends);
         if (!(ends[1] > ends[0])) continue;
-        const nebel_light air = air_to(w, &sun, ray, HUGE_VAL);
+        const nebel_transfer air = air_to(w, &sun, ray, HUGE_VAL);
         if (!have_same_knots(workspace, &ray, spread, clear->planes.in_scattering + 3 * i, 1e-4 + air.in_scattering[0],
                              &knots))
             continue;

@@ -269,7 +269,7 @@ static steps step_along(const world *w, const nb_daylight *daylight, const nebel
         const double from = ends[0] + (ends[1] - ends[0]) * i / STEPS,
                      to = ends[0] + (ends[1] - ends[0]) * (i + 1) / STEPS;
         double middle[3];
-        nebel_light air, sun, sky;
+        nebel_transfer air, sun, sky;
         for (int c = 0; c < 3; c++) {
             ray.origin[c] = whole.origin[c] + from * unit[c];
             middle[c] = whole.origin[c] + .5 * (from + to) * unit[c];

@@ -45,7 +45,7 @@ static int look(const world *w, const nebel_ray *ray, double depth, double light
 {
     const double radius = w->planet.air.radius;
     double place[1][3], cosine = 0;
-    nebel_light air;
+    nebel_transfer air;
     nebel_air_light arrives;
     assert_int_equal(nebel_trace_air(w->atmosphere, &w->sun, 1, ray, 0, &air, 0), NEBEL_OK);
     memcpy(light, air.in_scattering, 3 * sizeof *light);

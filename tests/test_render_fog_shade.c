@@ -172,7 +172,7 @@ static void step_along(const world *w, const nebel_snapshot *by_sun, const nebel
         const double from = end * i * i / (double)(STEPS * STEPS),
                      to = end * (i + 1) * (i + 1) / (double)(STEPS * STEPS);
         double middle[3];
-        nebel_light sun, sky;
+        nebel_transfer sun, sky;
         for (int c = 0; c < 3; c++) {
             ray.origin[c] = whole.origin[c] + from * whole.direction[c];
             middle[c] = whole.origin[c] + .5 * (from + to) * whole.direction[c];

@@ -87,13 +87,13 @@ static nebel_ray ray_of(const nebel_camera *camera, uint32_t x, uint32_t y, doub
     return ray;
 }
 
-static nebel_light fog_up_to(const nebel_snapshot *fog, const nebel_ray *ray, double t)
+static nebel_transfer fog_up_to(const nebel_snapshot *fog, const nebel_ray *ray, double t)
 {
-    nebel_light light = {.transmittance = {1, 1, 1}};
+    nebel_transfer transfer = {.transmittance = {1, 1, 1}};
     nebel_ray piece = *ray;
     piece.t_max = t;
-    if (fog != NULL) assert_int_equal(nebel_trace(fog, NULL, 1, &piece, 0, &light, 0), NEBEL_OK);
-    return light;
+    if (fog != NULL) assert_int_equal(nebel_trace(fog, NULL, 1, &piece, 0, &transfer, 0), NEBEL_OK);
+    return transfer;
 }
 
 /* From behind to the front: each piece of fog takes away from what is behind it and adds its own. */
@@ -105,7 +105,7 @@ static void compose(const world *w, const nebel_snapshot *fog, const nebel_ray *
     for (int c = 0; c < 3; c++) color[c] = has_ground ? 0 : w->scene.background[c];
     for (uint32_t k = hits->count + 1; k-- > 0;) {
         const double near = k > 0 ? hits->hits[k - 1].t : 0;
-        const nebel_light before = fog_up_to(fog, ray, near), all = fog_up_to(fog, ray, far);
+        const nebel_transfer before = fog_up_to(fog, ray, near), all = fog_up_to(fog, ray, far);
         const int is_ground_piece = k == hits->count && has_ground;
         for (int c = 0; c < 3; c++) {
             const double left = is_ground_piece ? 1 : all.transmittance[c] / before.transmittance[c];

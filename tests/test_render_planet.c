@@ -118,9 +118,9 @@ static void sky_and_ground_are_those_of_the_air(void **state)
         int ground = 0, untold = 0;
         for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
             const nebel_ray ray = planet_ray(&camera, views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
-            nebel_light light;
+            nebel_transfer transfer;
             double behind[3], way;
-            assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &light, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
             light_ground(&w, &ray, &sun, behind, &way);
             const double depth = (double)picture.planes.depth[i];
             if (fabs(way) < HUGE_VAL) assert_true(fabs(depth - way) <= 1e-5 * way + 1e-3);
@@ -128,7 +128,7 @@ static void sky_and_ground_are_those_of_the_air(void **state)
             ground += way < HUGE_VAL;
             double off = 0;
             for (int c = 0; c < 3; c++) {
-                const double exact = light.in_scattering[c] + light.transmittance[c] * behind[c];
+                const double exact = transfer.in_scattering[c] + transfer.transmittance[c] * behind[c];
                 off = fmax(off, fabs((double)picture.planes.color[3 * i + (uint32_t)c] - exact));
                 brightest = fmax(brightest, exact);
             }
@@ -173,13 +173,13 @@ static void models_are_seen_through_air(void **state)
     test_picture picture = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 1, 1);
     const uint32_t middle = HEIGHT / 2 * WIDTH + WIDTH / 2;
     const nebel_ray ray = {{0, 20, 0}, {0, 0, -1}, 2000};
-    nebel_light light;
-    assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &light, 0), NEBEL_OK);
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
     assert_true(fabs((double)picture.planes.depth[middle] - 2000) < 1);
     for (int c = 0; c < 3; c++) {
         const double lit = w.planet.sun_left[c] * sun.irradiance[c] * .8 / test_pi;
-        const double exact = light.transmittance[c] * lit + light.in_scattering[c];
-        assert_true(light.in_scattering[c] > .004 && light.transmittance[c] < .995);
+        const double exact = transfer.transmittance[c] * lit + transfer.in_scattering[c];
+        assert_true(transfer.in_scattering[c] > .004 && transfer.transmittance[c] < .995);
         assert_true(fabs((double)picture.planes.color[3 * middle + (uint32_t)c] - exact) <
                     fmin(.01 * exact, (double)picture.planes.error[middle] * 2 + 1e-4));
     }
@@ -210,12 +210,13 @@ static void models_take_the_light_of_their_place(void **state)
         const uint32_t middle = HEIGHT / 2 * WIDTH + WIDTH / 2;
         const nebel_ray ray = {{0, height, 20 - distance}, {0, 0, -1}, 20};
         const double place[1][3] = {{0, height, -distance}};
-        nebel_light light;
+        nebel_transfer transfer;
         nebel_air_light there;
-        assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &light, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
         assert_int_equal(nebel_light_air(w.atmosphere, &sun, 1, place, 0, &there, 0), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
-            const double exact = light.transmittance[c] * there.sun[c] * to_sun[2] / test_pi + light.in_scattering[c];
+            const double exact =
+                transfer.transmittance[c] * there.sun[c] * to_sun[2] / test_pi + transfer.in_scattering[c];
             print_message("%g m up, %g m off: %.4g of %.4g\n", height, distance,
                           (double)picture.planes.color[3 * middle + (uint32_t)c], exact);
             assert_true(fabs((double)picture.planes.color[3 * middle + (uint32_t)c] - exact) < .01 * exact + 1e-5);
@@ -266,7 +267,7 @@ static void look_around(const world *w, const double to_sun[3], double height_of
 {
     enum { SLOPES = 48, TURNS = 48 };
     static nebel_ray rays[SLOPES * TURNS];
-    static nebel_light found[SLOPES * TURNS];
+    static nebel_transfer found[SLOPES * TURNS];
     const nebel_sun white = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
     const double level = sqrt(1 - height_of_sun * height_of_sun), radius = w->planet.air.radius;
     double other[3] = {to_sun[1], -to_sun[0], 0}, up[3], ahead[3], across[3];
@@ -347,7 +348,7 @@ static void step_along(const world *w, const nebel_snapshot *fog, nebel_ray ray,
     }
     for (int i = 0; i < STEPS; i++) {
         const double next = end * pow((i + 1.0) / STEPS, 3);
-        nebel_light air, of_fog;
+        nebel_transfer air, of_fog;
         ray.t_max = next - at;
         for (int c = 0; c < 3; c++) ray.origin[c] = whole.origin[c] + at * unit[c];
         assert_int_equal(nebel_trace_air(w->atmosphere, &sun, 1, &ray, 0, &air, 0), NEBEL_OK);
@@ -375,7 +376,7 @@ static void air_and_fog_share_a_ray(void **state)
         const nebel_ray ray = planet_ray(&camera, pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
         const nebel_sun sun = sun_of(&w);
         double light[3], behind[3], way;
-        nebel_light air, alone;
+        nebel_transfer air, alone;
         light_ground(&w, &ray, &sun, behind, &way);
         nebel_ray ending = ray;
         ending.t_max = fmin(way, 1.5e6);

@@ -99,7 +99,7 @@ static double look(const worlds *s, const nebel_ray *camera_ray, double light[3]
     memset(light, 0, 3 * sizeof *light);
     for (size_t k = 0; k < s->count; k++) {
         nebel_ray ray = *camera_ray;
-        nebel_light part;
+        nebel_transfer part;
         ray.t_max = end;
         assert_int_equal(nebel_trace_air(s->atmospheres[order[k]], &s->sun, 1, &ray, 0, &part, 0), NEBEL_OK);
         for (int c = 0; c < 3; c++) {

@@ -324,10 +324,11 @@ static void test_the_fog_of_the_scene_answers_rays(void **state)
     nebel_destroy_scene(scene);
     assert_int_equal(nebel_snapshot_volume_count(fog), 2);
     const nebel_ray ray = {.direction = {0, 0, -1}, .t_max = 10};
-    nebel_light light;
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-    assert_true(fabs(light.transmittance[0] - exp(-.8)) < 1e-12);
-    assert_true(fabs(light.in_scattering[0] - .5 * (1 - exp(-.8))) < 1e-12);
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                     NEBEL_OK);
+    assert_true(fabs(transfer.transmittance[0] - exp(-.8)) < 1e-12);
+    assert_true(fabs(transfer.in_scattering[0] - .5 * (1 - exp(-.8))) < 1e-12);
     nebel_release_snapshot(fog);
 }
 
@@ -341,10 +342,11 @@ static void test_the_fog_of_the_scene_hides_no_more_than_it_may(void **state)
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
     nebel_destroy_scene(scene);
     const nebel_ray ray = {.direction = {0, 0, -1}, .t_max = 10};
-    nebel_light light;
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-    assert_true(fabs(light.transmittance[0] - .6) < 1e-12);
-    assert_true(fabs(light.in_scattering[0] - .5 * .4) < 1e-12);
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                     NEBEL_OK);
+    assert_true(fabs(transfer.transmittance[0] - .6) < 1e-12);
+    assert_true(fabs(transfer.in_scattering[0] - .5 * .4) < 1e-12);
     nebel_release_snapshot(fog);
 }
 

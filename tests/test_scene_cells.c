@@ -104,10 +104,11 @@ static void test_cells_are_exact_fog_too(void **state)
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
     assert_int_equal(nebel_snapshot_volume_count(fog), 2);
     const nebel_ray ray = {.origin = {1, 1, 1}, .direction = {1, 0, 0}, .t_max = 6};
-    nebel_light light;
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-    assert_number(light.transmittance[0], exp(-.6 - .3));
-    assert_number(light.in_scattering[2], exp(-.6) * (1 - exp(-.3)));
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                     NEBEL_OK);
+    assert_number(transfer.transmittance[0], exp(-.6 - .3));
+    assert_number(transfer.in_scattering[2], exp(-.6) * (1 - exp(-.3)));
     nebel_release_snapshot(fog);
     nebel_destroy_scene(scene);
 }

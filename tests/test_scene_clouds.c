@@ -142,16 +142,16 @@ static void test_fog_has_their_shadow(void **state)
     assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
     for (int frame = 0; frame < 24; frame++) {
         nebel_snapshot *fog;
-        nebel_light light;
+        nebel_transfer transfer;
         assert_int_equal(nebel_commit_scene_fog_at(scene, frame, &fog), NEBEL_OK);
-        assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-        darkest = fmin(darkest, light.in_scattering[1]);
-        brightest = fmax(brightest, light.in_scattering[1]);
+        assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+        darkest = fmin(darkest, transfer.in_scattering[1]);
+        brightest = fmax(brightest, transfer.in_scattering[1]);
         /* What a caller who makes fog of its own asks for. */
         nebel_sun sunlight;
         assert_int_equal(nebel_find_scene_sunlight(scene, frame, &sunlight), NEBEL_OK);
-        if (frame == 0) per_sunlight = light.in_scattering[1] / sunlight.irradiance[1];
-        assert_near(light.in_scattering[1], per_sunlight * sunlight.irradiance[1], 1e-6);
+        if (frame == 0) per_sunlight = transfer.in_scattering[1] / sunlight.irradiance[1];
+        assert_near(transfer.in_scattering[1], per_sunlight * sunlight.irradiance[1], 1e-6);
         assert_true(sunlight.irradiance[1] < 3 * nebel_scene_contents(scene)->planets->sun_left[1] * (1 + 1e-12));
         nebel_release_snapshot(fog);
     }

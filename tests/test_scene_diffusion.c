@@ -40,12 +40,12 @@ static void test_defaults(void **state)
 static double light_of(const nebel_scene *scene)
 {
     nebel_snapshot *fog = NULL;
-    nebel_light light;
+    nebel_transfer transfer;
     const nebel_ray ray = {{0, 0, 9}, {0, 0, -1}, 20};
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
     nebel_release_snapshot(fog);
-    return light.in_scattering[0];
+    return transfer.in_scattering[0];
 }
 
 static void test_a_program_may_say_otherwise(void **state)

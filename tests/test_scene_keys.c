@@ -141,15 +141,16 @@ static void test_what_would_vanish_keeps_the_nearer_key(void **state)
 
 /* ---- snapshots ------------------------------------------------------------------------------- */
 
-static nebel_light trace(const nebel_scene *scene, double frame)
+static nebel_transfer trace(const nebel_scene *scene, double frame)
 {
     const nebel_ray ray = {{-9, .25, .5}, {1, .1, -.05}, 30};
     nebel_snapshot *fog = NULL;
-    nebel_light light;
+    nebel_transfer transfer;
     assert_int_equal(nebel_commit_scene_fog_at(scene, frame, &fog), NEBEL_OK);
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                     NEBEL_OK);
     nebel_release_snapshot(fog);
-    return light;
+    return transfer;
 }
 
 static void test_a_snapshot_is_that_of_its_frame(void **state)
@@ -166,7 +167,7 @@ static void test_a_snapshot_is_that_of_its_frame(void **state)
     const nebel_scene *still[4] = {early, early, middle, late};
     const double frames[4] = {0, 4, 6, 8};
     for (int i = 0; i < 4; i++) {
-        const nebel_light got = trace(moving, frames[i]), wanted = trace(still[i], 0);
+        const nebel_transfer got = trace(moving, frames[i]), wanted = trace(still[i], 0);
         assert_true(wanted.transmittance[0] < .9);
         for (int c = 0; c < 3; c++) assert_true(got.transmittance[c] == wanted.transmittance[c]);
         for (int c = 0; c < 3; c++) assert_true(got.in_scattering[c] == wanted.in_scattering[c]);

@@ -94,15 +94,15 @@ static const char lit_fog[] =
     "\"sphere\", \"center\": [0, 10, 0], \"radius\": 5}, \"extinction\": 0.1, \"albedo\": 1}]}";
 
 /* What a ray through the ball sees. */
-static nebel_light light_of(const nebel_scene *scene)
+static nebel_transfer light_of(const nebel_scene *scene)
 {
     nebel_snapshot *fog = NULL;
-    nebel_light light;
+    nebel_transfer transfer;
     const nebel_ray ray = {{0, 10, 9}, {0, 0, -1}, 20};
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
     nebel_release_snapshot(fog);
-    return light;
+    return transfer;
 }
 
 /* With ambient light of its own, 0, fog is lit by what the air leaves of the sun; without, by the sky as well. */
@@ -110,25 +110,25 @@ static void test_air_lights_fog(void **state)
 {
     (void)state;
     char text[600];
-    nebel_light dimmed = {.error = 0};
+    nebel_transfer dimmed = {.error = 0};
     for (int with_sky = 0; with_sky < 2; with_sky++) {
         (void)snprintf(text, sizeof text, lit_fog, with_sky ? "" : "\"ambient\": 0,");
         nebel_scene *scene = parse_good(text);
         const nebel_scene_data *data = nebel_scene_contents(scene);
-        const nebel_light clear = light_of(scene);
+        const nebel_transfer clear = light_of(scene);
         assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
         assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
-        const nebel_light light = light_of(scene);
+        const nebel_transfer transfer = light_of(scene);
         assert_non_null(data->planets[0].atmosphere);
         assert_number(data->sun_irradiance[0], 4);
         assert_int_equal(data->environment.type, with_sky ? NEBEL_ENVIRONMENT_MAP : NEBEL_ENVIRONMENT_CONSTANT);
         for (int c = 0; c < 3; c++) {
             const double left = data->planets[0].sun_left[c];
             assert_true(left > .3 && left < 1);
-            if (!with_sky) assert_near(light.in_scattering[c], clear.in_scattering[c] * left, 1e-6);
-            if (with_sky) assert_true(light.in_scattering[c] > 1.02 * dimmed.in_scattering[c]);
+            if (!with_sky) assert_near(transfer.in_scattering[c], clear.in_scattering[c] * left, 1e-6);
+            if (with_sky) assert_true(transfer.in_scattering[c] > 1.02 * dimmed.in_scattering[c]);
         }
-        dimmed = light;
+        dimmed = transfer;
         nebel_destroy_scene(scene);
     }
     assert_int_equal(nebel_load_scene_planet(NULL), NEBEL_ERROR_ARGUMENT);
@@ -148,11 +148,11 @@ static void test_sky_is_that_of_the_air(void **state)
     static const double ways[][3] = {{0, 1, 0}, {1, 1, 0}, {-1, .5, .3}, {0, .3, -1}, {.2, .6, 1}};
     for (int i = 0; i < 5; i++) {
         const nebel_ray ray = {{0, 0, 0}, {ways[i][0], ways[i][1], ways[i][2]}, (double)INFINITY};
-        nebel_light light;
+        nebel_transfer transfer;
         double seen[3];
-        assert_int_equal(nebel_trace_air(data->planets[0].atmosphere, &sun, 1, &ray, 0, &light, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_air(data->planets[0].atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
         nebel_environment_radiance(&data->environment, ways[i], seen);
-        for (int c = 0; c < 3; c++) assert_near(seen[c] / light.in_scattering[c], 1, .03);
+        for (int c = 0; c < 3; c++) assert_near(seen[c] / transfer.in_scattering[c], 1, .03);
     }
     static const double origin[1][3] = {{0, 0, 0}}, down[3] = {0, -1, 0};
     nebel_air_light arrives;
@@ -256,15 +256,16 @@ static void test_several(void **state)
     const nebel_ray rays[2] = {{{-3e6, 8.4e6, 1e5}, {1, .1, 0}, (double)INFINITY},
                                {{0, 8.3e6 + 1.7374e6 + 50, 0}, {1, -.00001, 0}, (double)INFINITY}};
     const double places[2][3] = {{1.8e6, 8.3e6, 0}, {-1.8e6, 8.3e6, 0}};
-    nebel_light light[2];
+    nebel_transfer transfer[2];
     nebel_air_light there[2];
-    assert_int_equal(nebel_trace_air(data->planets[1].atmosphere, &sun, 2, rays, sizeof *rays, light, sizeof *light),
-                     NEBEL_OK);
+    assert_int_equal(
+        nebel_trace_air(data->planets[1].atmosphere, &sun, 2, rays, sizeof *rays, transfer, sizeof *transfer),
+        NEBEL_OK);
     assert_int_equal(
         nebel_light_air(data->planets[1].atmosphere, &sun, 2, places, sizeof *places, there, sizeof *there), NEBEL_OK);
     for (int c = 0; c < 3; c++) {
         for (int i = 0; i < 2; i++) {
-            assert_true(light[i].transmittance[c] == 1 && light[i].in_scattering[c] == 0);
+            assert_true(transfer[i].transmittance[c] == 1 && transfer[i].in_scattering[c] == 0);
             assert_true(there[i].sky[c] >= 0 && there[i].sky[c] < 1e-20);
         }
         assert_number(there[0].sun[c], sun.irradiance[c]);

@@ -120,7 +120,7 @@ static double random_number(uint32_t *seed)
 
 enum { RAYS = 2000 };
 
-static void trace_at(const nebel_scene *scene, double frame, nebel_light *lights)
+static void trace_at(const nebel_scene *scene, double frame, nebel_transfer *transfers)
 {
     nebel_snapshot *fog = NULL;
     nebel_ray rays[RAYS];
@@ -131,20 +131,20 @@ static void trace_at(const nebel_scene *scene, double frame, nebel_light *lights
         for (int k = 0; k < 3; k++) rays[i].origin[k] = 24 * random_number(&seed) - 12;
         for (int k = 0; k < 3; k++) rays[i].direction[k] = random_number(&seed) - .5;
     }
-    assert_int_equal(
-        nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-13}, RAYS, rays, sizeof *rays, lights, sizeof *lights),
-        NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-13}, RAYS, rays, sizeof *rays, transfers,
+                                 sizeof *transfers),
+                     NEBEL_OK);
     nebel_release_snapshot(fog);
 }
 
-static void trace(const nebel_scene *scene, nebel_light *lights)
+static void trace(const nebel_scene *scene, nebel_transfer *transfers)
 {
-    trace_at(scene, 0, lights);
+    trace_at(scene, 0, transfers);
 }
 
 static void assert_same_light(const char *template)
 {
-    static nebel_light wanted[RAYS], got[RAYS];
+    static nebel_transfer wanted[RAYS], got[RAYS];
     nebel_scene *scene = parse_in(template, &ours);
     trace(scene, wanted);
     nebel_destroy_scene(scene);
@@ -235,7 +235,7 @@ static void assert_same_noise(const nebel_scene_noise *got, const nebel_scene_no
 /* The voxels of two grids, by fog in them. */
 static void assert_same_grid(nebel_grid *got, nebel_grid *wanted)
 {
-    nebel_light lights[2][RAYS];
+    nebel_transfer transfers[2][RAYS];
     nebel_grid *const grids[2] = {got, wanted};
     for (int i = 0; i < 2; i++) {
         const nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-9, -9, -9}, .max = {9, 9, 9}},
@@ -247,18 +247,18 @@ static void assert_same_grid(nebel_grid *got, nebel_grid *wanted)
             nebel_ray ray = {.t_max = HUGE_VAL};
             for (int k = 0; k < 3; k++) ray.origin[k] = 24 * random_number(&seed) - 12;
             for (int k = 0; k < 3; k++) ray.direction[k] = random_number(&seed) - .5;
-            assert_int_equal(nebel_trace(fog, NULL, 1, &ray, 0, &lights[i][r], 0), NEBEL_OK);
+            assert_int_equal(nebel_trace(fog, NULL, 1, &ray, 0, &transfers[i][r], 0), NEBEL_OK);
         }
         nebel_release_snapshot(fog);
     }
-    for (int r = 0; r < RAYS; r++) assert_same(lights[0][r].transmittance, lights[1][r].transmittance, 3, 1);
+    for (int r = 0; r < RAYS; r++) assert_same(transfers[0][r].transmittance, transfers[1][r].transmittance, 3, 1);
 }
 
 /* Noise lies along the axes of the file, drifts along them, and is told and changed along ours. */
 static void test_noise(void **state)
 {
     (void)state;
-    static nebel_light wanted[2][RAYS], got[RAYS];
+    static nebel_transfer wanted[2][RAYS], got[RAYS];
     nebel_scene_noise noise, there;
     nebel_grid *changed, *same;
     nebel_scene *ours_too = parse_in(BOX_IN "\"source\": 1, \"density\": " NOISE "}]}", &ours);
@@ -302,7 +302,7 @@ static void write_voxels(const char *name, bool z_up)
 static void test_voxels(void **state)
 {
     (void)state;
-    static nebel_light wanted[RAYS], got[RAYS];
+    static nebel_transfer wanted[RAYS], got[RAYS];
     static const char grid[] = BOX_IN "\"source\": 1, \"density\": {\"type\": \"grid\", \"file\": "
                                       "\"test_scene_space.raw\", \"size\": S(2 3 4), \"voxels\": \"float\"}}]}";
     write_voxels("test_scene_space.raw", false);
@@ -323,7 +323,7 @@ static void test_voxels(void **state)
 static void test_noise_in_nodes(void **state)
 {
     (void)state;
-    static nebel_light wanted[RAYS], got[RAYS];
+    static nebel_transfer wanted[RAYS], got[RAYS];
     write_file(
         "test_scene_space.gltf",
         "{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}], \"nodes\": [{\"scale\": "

@@ -75,7 +75,7 @@ static void test_it_lights_fog(void **state)
         assert_int_equal(nebel_commit_scene_fog(scene, &moved), NEBEL_OK);
         assert_int_equal(nebel_commit_scene_fog(other, &standing), NEBEL_OK);
         const nebel_ray ray = {{.3, 0, 5}, {0, .05, -1}, (double)INFINITY};
-        nebel_light a, b;
+        nebel_transfer a, b;
         assert_int_equal(nebel_trace(moved, &(nebel_trace_desc){0}, 1, &ray, 0, &a, 0), NEBEL_OK);
         assert_int_equal(nebel_trace(standing, &(nebel_trace_desc){0}, 1, &ray, 0, &b, 0), NEBEL_OK);
         assert_true(b.in_scattering[2] > 0);

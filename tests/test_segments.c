@@ -25,11 +25,11 @@ static points random_points(uint64_t *state, double size)
     return p;
 }
 
-static nebel_light trace_segment(const nebel_snapshot *snapshot, const double origin[3], const float from[3],
-                                 const float to[3])
+static nebel_transfer trace_segment(const nebel_snapshot *snapshot, const double origin[3], const float from[3],
+                                    const float to[3])
 {
     nebel_ray ray = {.t_max = 0};
-    nebel_light light;
+    nebel_transfer transfer;
     double square = 0;
     for (int k = 0; k < 3; k++) {
         ray.origin[k] = origin[k] + (double)from[k];
@@ -39,8 +39,8 @@ static nebel_light trace_segment(const nebel_snapshot *snapshot, const double or
     if (square == 0) ray.direction[0] = 1;
     ray.t_max = sqrt(square);
     const nebel_trace_desc desc = {.transmittance_only = 1};
-    assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-    return light;
+    assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+    return transfer;
 }
 
 static void transmit(const nebel_snapshot *snapshot, nebel_isa isa, int channel, const nebel_segments *segments,
@@ -68,10 +68,10 @@ static void test_segments_through_any_fog_are_what_the_trace_says(void **unused)
         const int channel = (int)(seed % 3);
         transmit(snapshot, NEBEL_ISA_DEFAULT, channel, &segments, out);
         for (int i = 0; i < COUNT; i++) {
-            const nebel_light light = trace_segment(snapshot, segments.origin, from.at[i], to.at[i]);
-            const double apart = fabs(light.transmittance[channel] - (double)out[i]);
-            if (apart > light.error + 3e-5) random_fog_print(stdout, &fog, &(nebel_ray){0});
-            assert_true(apart <= light.error + 3e-5);
+            const nebel_transfer transfer = trace_segment(snapshot, segments.origin, from.at[i], to.at[i]);
+            const double apart = fabs(transfer.transmittance[channel] - (double)out[i]);
+            if (apart > transfer.error + 3e-5) random_fog_print(stdout, &fog, &(nebel_ray){0});
+            assert_true(apart <= transfer.error + 3e-5);
         }
         nebel_release_snapshot(snapshot);
     }
@@ -104,8 +104,8 @@ static void test_boxes_are_right_near_and_far_from_the_worlds_origin(void **unus
         float out[COUNT];
         transmit(snapshot, NEBEL_ISA_DEFAULT, 1, &segments, out);
         for (int i = 0; i < COUNT; i++) {
-            const nebel_light light = trace_segment(snapshot, shift, from.at[i], to.at[i]);
-            assert_true(fabs(light.transmittance[1] - (double)out[i]) <= 2e-5);
+            const nebel_transfer transfer = trace_segment(snapshot, shift, from.at[i], to.at[i]);
+            assert_true(fabs(transfer.transmittance[1] - (double)out[i]) <= 2e-5);
         }
         nebel_release_snapshot(snapshot);
     }

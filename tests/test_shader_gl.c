@@ -309,10 +309,11 @@ static void test_silhouettes_from_afar(void **state)
         pack_and_upload(&t, snapshot, eye);
         evaluate(&t);
         const nebel_trace_desc desc = {.tolerance = 1e-5};
-        assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+        assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers),
+                         NEBEL_OK);
         for (int i = 0; i < RAYS; i++) {
-            const double off = worst_of(&answers[i], &lights[i], 1);
-            double *w = lights[i].transmittance[0] > .99 ? &edge : &worst;
+            const double off = worst_of(&answers[i], &transfers[i], 1);
+            double *w = transfers[i].transmittance[0] > .99 ? &edge : &worst;
             *w = fmax(*w, off);
         }
         print_message("ball of 1 m at %g m: worst %.1e within, %.1e at the edge\n", distance, worst, edge);
@@ -364,7 +365,7 @@ static void test_eyes_and_orders(void **state)
     nb_gl_close(&t.gl);
 }
 
-static const char list_body[] = "nebel_light l = nebel_trace_list(in0.xyz, in1.xyz, in0.w, 0, int(in1.w));\n"
+static const char list_body[] = "nebel_transfer l = nebel_trace_list(in0.xyz, in1.xyz, in0.w, 0, int(in1.w));\n"
                                 "out0 = vec4(l.transmittance, 0.0); out1 = vec4(l.in_scattering, 0.0);\n";
 
 /* A full ascending list is all the fog; the list of every second volume is the fog of those. */

@@ -41,13 +41,13 @@ static nebel_snapshot *commit_sunlit(void)
 }
 
 /* In-scattering of the ray as if it ended at t. */
-static nebel_light light_up_to(const nebel_snapshot *snapshot, nebel_ray ray, double t)
+static nebel_transfer light_up_to(const nebel_snapshot *snapshot, nebel_ray ray, double t)
 {
     const nebel_trace_desc desc = {.tolerance = 1e-5};
-    nebel_light light;
+    nebel_transfer transfer;
     ray.t_max = fmax(t, 0);
-    assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-    return light;
+    assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+    return transfer;
 }
 
 /* Where the ray crosses the border of the shadow, which it does once at most; its end where it does not. */
@@ -62,9 +62,9 @@ static void check_ray(const nebel_snapshot *snapshot, int i)
 {
     const nebel_ray *const ray = &rays[i];
     const double border = border_of(ray), doubt = border < ray->t_max ? .26 : 0;
-    const nebel_light least = light_up_to(snapshot, *ray, border - doubt);
-    const nebel_light most = light_up_to(snapshot, *ray, fmin(border + doubt, ray->t_max));
-    const nebel_light all = light_up_to(snapshot, *ray, ray->t_max);
+    const nebel_transfer least = light_up_to(snapshot, *ray, border - doubt);
+    const nebel_transfer most = light_up_to(snapshot, *ray, fmin(border + doubt, ray->t_max));
+    const nebel_transfer all = light_up_to(snapshot, *ray, ray->t_max);
     for (int c = 0; c < 3; c++) {
         const double got = (double)answers[i].in_scattering[c];
         assert_true(got > least.in_scattering[c] - 5e-4 && got < most.in_scattering[c] + 5e-4);

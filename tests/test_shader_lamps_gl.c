@@ -57,7 +57,7 @@ static nebel_snapshot *commit_haze(const nebel_phase *phase, const setting *s)
 }
 
 /* As a share of the ray's own light, or of a hundredth of what is bright where that is more. */
-static double lamplight_off(const answer *got, const nebel_light *wanted, double bright)
+static double lamplight_off(const answer *got, const nebel_transfer *wanted, double bright)
 {
     double most = 0;
     for (int c = 0; c < 3; c++) {
@@ -77,9 +77,9 @@ static void try_setting(tracer *t, int phase, const setting *s)
     strew_rays(s);
     pack_and_upload(t, snapshot, eye);
     evaluate(t);
-    assert_int_equal(nebel_trace(snapshot, &truth, count, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
-    for (size_t i = 0; i < count; i++) brightest = fmax(brightest, lights[i].in_scattering[0]);
-    for (size_t i = 0; i < count; i++) differences[i] = lamplight_off(&answers[i], &lights[i], fmin(brightest, 1));
+    assert_int_equal(nebel_trace(snapshot, &truth, count, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
+    for (size_t i = 0; i < count; i++) brightest = fmax(brightest, transfers[i].in_scattering[0]);
+    for (size_t i = 0; i < count; i++) differences[i] = lamplight_off(&answers[i], &transfers[i], fmin(brightest, 1));
     qsort(differences, count, sizeof *differences, ascending);
     print_message("%s, lamp %s: light up to %.3g; median %.1e, 95 %% %.1e, worst %.1e\n", phase_names[phase], s->name,
                   brightest, differences[count / 2], differences[count * 95 / 100], differences[count - 1]);

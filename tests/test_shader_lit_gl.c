@@ -112,11 +112,11 @@ static void grazing_lamplight_is_found_beside_voxels(void **state)
                       .lamp = {.position = {far, .4, 0}, .intensity = LIT_GRAY(far * far * 100)},
                       .ray = {{0, 5, 0}, {0, -1, 0}, HUGE_VAL}};
         nebel_snapshot *snapshot = commit_case(&c, 1);
-        assert_int_equal(nebel_trace(snapshot, &precise, 1, &c.ray, 0, lights, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace(snapshot, &precise, 1, &c.ray, 0, transfers, 0), NEBEL_OK);
         nebel_release_snapshot(snapshot);
-        c.right = lights[0].in_scattering[0];
+        c.right = transfers[0].in_scattering[0];
         const double light = trace_case(&t, &c, 1), off = fabs(light - c.right);
-        print_message("%g: %g for %g +- %g, off %g\n", far, light, c.right, lights[0].error, off / c.right);
+        print_message("%g: %g for %g +- %g, off %g\n", far, light, c.right, transfers[0].error, off / c.right);
         wrong += !(off <= (c.right + .1) / 255);
     }
     nb_gl_close(&t.gl);

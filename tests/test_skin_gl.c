@@ -158,11 +158,11 @@ static size_t tried[TYPES][2][EYE_PLACES], wrong, ill;
 static void judge(const skin *s, const nebel_snapshot *snapshot, uint64_t seed)
 {
     const nebel_trace_desc truth = {.tolerance = 1e-4};
-    assert_int_equal(nebel_trace(snapshot, &truth, EACH, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, &truth, EACH, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
     for (int i = 0; i < EACH; i++) {
-        const double *is = lights[i].in_scattering, scale = fmax(1, fmax(is[0], fmax(is[1], is[2])));
-        const double off = worst_of(&answers[i], &lights[i], scale);
-        if (lights[i].error > 1e-3 * scale) continue; /* the reference does not know either */
+        const double *is = transfers[i].in_scattering, scale = fmax(1, fmax(is[0], fmax(is[1], is[2])));
+        const double off = worst_of(&answers[i], &transfers[i], scale);
+        if (transfers[i].error > 1e-3 * scale) continue; /* the reference does not know either */
         if (off > 1. / 255 && off < 2 * conditioning(snapshot, &truth, &rays[i], s->eye, scale)) {
             ill++;
             continue;

@@ -43,14 +43,14 @@ static nebel_snapshot *commit(size_t count, const nebel_volume_desc *given, int 
     return snapshot;
 }
 
-static void look(const nebel_snapshot *snapshot, nebel_light lights[RAYS])
+static void look(const nebel_snapshot *snapshot, nebel_transfer transfers[RAYS])
 {
     nebel_ray rays[RAYS];
     for (int i = 0; i < RAYS; i++)
         rays[i] = (nebel_ray){{0, 2, 4}, {-.9 + .075 * i, .02 * (i % 5) - .04, -1}, i % 3 == 0 ? 10 : HUGE_VAL};
-    assert_int_equal(
-        nebel_trace(snapshot, &(nebel_trace_desc){.tolerance = 1e-7}, RAYS, rays, sizeof *rays, lights, sizeof *lights),
-        NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){.tolerance = 1e-7}, RAYS, rays, sizeof *rays, transfers,
+                                 sizeof *transfers),
+                     NEBEL_OK);
 }
 
 static void parts_add_up(void **state)
@@ -59,7 +59,7 @@ static void parts_add_up(void **state)
     for (int is_diffuse = 0; is_diffuse < 2; is_diffuse++) {
         nebel_snapshot *snapshot = commit(3, volumes, is_diffuse, NULL);
         nebel_split_fog split, brighter;
-        nebel_light whole[RAYS], sun[RAYS], sky[RAYS], own[RAYS], bright[RAYS];
+        nebel_transfer whole[RAYS], sun[RAYS], sky[RAYS], own[RAYS], bright[RAYS];
         assert_int_equal(nebel_split_light(snapshot, &suns[0], &split), NEBEL_OK);
         assert_int_equal(nebel_split_light(snapshot, &suns[1], &brighter), NEBEL_OK);
         look(snapshot, whole);
@@ -96,7 +96,7 @@ static void another_sun_takes_the_place_of_the_first(void **state)
     (void)state;
     nebel_snapshot *snapshot = commit(3, volumes, 0, NULL), *lit = snapshot;
     nebel_split_fog split;
-    nebel_light whole[RAYS], sun[RAYS], sky[RAYS], own[RAYS];
+    nebel_transfer whole[RAYS], sun[RAYS], sky[RAYS], own[RAYS];
     assert_int_equal(nebel_relight(NULL, &suns[1], &lit), NEBEL_ERROR_ARGUMENT);
     assert_null(lit);
     assert_int_equal(nebel_relight(snapshot, NULL, &lit), NEBEL_ERROR_ARGUMENT);

@@ -46,15 +46,16 @@ static void layers_are_those_of_T16(void **state)
         const nebel_ray rays[] = {{{0, 20, 0}, {0, -l->view, across}, HUGE_VAL},
                                   {{0, -5, 0}, {0, l->view, across}, HUGE_VAL}};
         for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-            nebel_light lights[2];
+            nebel_transfer transfers[2];
             const nebel_trace_desc desc = {.precision = (nebel_precision)precision,
                                            .tolerance = precision == NEBEL_PRECISION_DOUBLE ? 1e-9 : 1e-5};
-            assert_int_equal(nebel_trace(snapshot, &desc, 2, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+            assert_int_equal(nebel_trace(snapshot, &desc, 2, rays, sizeof *rays, transfers, sizeof *transfers),
+                             NEBEL_OK);
             const double may = precision == NEBEL_PRECISION_DOUBLE ? 1e-10 : 1e-6;
-            assert_true(fabs(lights[0].in_scattering[0] - l->reflected) < may);
-            assert_true(fabs(lights[1].in_scattering[1] - l->transmitted) < may);
-            assert_true(lights[0].error >= fabs(lights[0].in_scattering[0] - l->reflected));
-            assert_true(lights[1].error >= fabs(lights[1].in_scattering[0] - l->transmitted));
+            assert_true(fabs(transfers[0].in_scattering[0] - l->reflected) < may);
+            assert_true(fabs(transfers[1].in_scattering[1] - l->transmitted) < may);
+            assert_true(transfers[0].error >= fabs(transfers[0].in_scattering[0] - l->reflected));
+            assert_true(transfers[1].error >= fabs(transfers[1].in_scattering[0] - l->transmitted));
         }
         nebel_release_snapshot(snapshot);
     }
@@ -86,15 +87,15 @@ static void make_sunlit(random_fog_kind kind, uint64_t seed)
 }
 
 static void trace_some(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t count, nebel_ray rays[RAYS],
-                       nebel_light lights[RAYS])
+                       nebel_transfer transfers[RAYS])
 {
-    assert_int_equal(nebel_trace(snapshot, desc, count, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, desc, count, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
 }
 
 static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_ray rays[RAYS],
-                  nebel_light lights[RAYS])
+                  nebel_transfer transfers[RAYS])
 {
-    trace_some(snapshot, desc, RAYS, rays, lights);
+    trace_some(snapshot, desc, RAYS, rays, transfers);
 }
 
 static void draw_rays(nebel_ray rays[RAYS])
@@ -102,7 +103,7 @@ static void draw_rays(nebel_ray rays[RAYS])
     for (uint64_t i = 0; i < RAYS; i++) rays[i] = random_fog_ray(&fog, i);
 }
 
-static double apart(const nebel_light *a, const nebel_light *b)
+static double apart(const nebel_transfer *a, const nebel_transfer *b)
 {
     double most = 0;
     for (int c = 0; c < 3; c++) {
@@ -131,18 +132,20 @@ static void errors_are_told(void **state)
         double worst = 0, slack = 0;
         for (uint64_t seed = 0; seed < SEEDS; seed++) {
             nebel_ray rays[RAYS];
-            nebel_light fine[RAYS], light[RAYS];
+            nebel_transfer fine[RAYS], transfer[RAYS];
             make_sunlit((random_fog_kind)kind, seed);
             nebel_snapshot *snapshot = fog_commit(&sky, fog.volumes, fog.count);
             draw_rays(rays);
             trace_some(snapshot, &(nebel_trace_desc){.tolerance = 2e-6}, count, rays, fine);
             for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-                trace_some(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, count, rays, light);
+                trace_some(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, count, rays,
+                           transfer);
                 for (size_t i = 0; i < count; i++) {
-                    const double off = apart(&light[i], &fine[i]);
-                    worst = fmax(worst, (off - fine[i].error) / light[i].error);
-                    slack = fmax(slack, light[i].error);
-                    if (precision == NEBEL_PRECISION_DOUBLE) assert_true(light[i].error <= 0.002 * brightest() + 1e-8);
+                    const double off = apart(&transfer[i], &fine[i]);
+                    worst = fmax(worst, (off - fine[i].error) / transfer[i].error);
+                    slack = fmax(slack, transfer[i].error);
+                    if (precision == NEBEL_PRECISION_DOUBLE)
+                        assert_true(transfer[i].error <= 0.002 * brightest() + 1e-8);
                 }
             }
             nebel_release_snapshot(snapshot);
@@ -157,7 +160,7 @@ static void light_is_the_same_in_any_order_and_set(void **state)
     (void)state;
     for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
         nebel_ray rays[RAYS];
-        nebel_light first[RAYS], other[RAYS];
+        nebel_transfer first[RAYS], other[RAYS];
         make_sunlit((random_fog_kind)kind, 3);
         nebel_snapshot *snapshot = fog_commit(&sky, fog.volumes, fog.count);
         draw_rays(rays);
@@ -221,25 +224,26 @@ static void pieces_are_those_of_the_closed_form(void **state)
     (void)state;
     for (int i = 0; i < CASES; i++) rays[i] = (nebel_ray){{0, 4, 0}, {1, 0, 0}, 20};
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-        nebel_light lights[CASES];
+        nebel_transfer transfers[CASES];
         const nebel_trace_desc desc = {.precision = (nebel_precision)precision, .tolerance = 1e-7, .sunlit = &pieces};
-        assert_int_equal(nebel_trace(snapshot, &desc, CASES, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+        assert_int_equal(nebel_trace(snapshot, &desc, CASES, rays, sizeof *rays, transfers, sizeof *transfers),
+                         NEBEL_OK);
         for (int i = 0; i < CASES; i++)
             for (int c = 0; c < 3; c++) {
                 double sum = 0;
                 for (size_t k = 0; k < lit[i].count; k++)
                     sum += slab_light(c, lit[i].ends[2 * k], i == 2 ? 20 : lit[i].ends[2 * k + 1]);
-                assert_true(fabs(lights[i].in_scattering[c] - sum) < 2e-7);
-                assert_true(lights[i].transmittance[c] == lights[4].transmittance[c]);
+                assert_true(fabs(transfers[i].in_scattering[c] - sum) < 2e-7);
+                assert_true(transfers[i].transmittance[c] == transfers[4].transmittance[c]);
             }
     }
     for (int i = 0; i < MANY; i++) comb[i] = (float)i * 0.00390625f; /* to the end of the ray, and no rounding */
     double sum = 0;
     for (int i = 1; i < MANY; i += 2) sum += slab_light(0, (double)comb[i], (double)comb[i + 1]);
     const nebel_lit_pieces thin = {(const uint32_t[]){0, MANY}, comb};
-    nebel_light light;
-    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){.sunlit = &thin}, 1, rays, 0, &light, 0), NEBEL_OK);
-    assert_true(fabs(light.in_scattering[0] - sum) < 1e-6);
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){.sunlit = &thin}, 1, rays, 0, &transfer, 0), NEBEL_OK);
+    assert_true(fabs(transfer.in_scattering[0] - sum) < 1e-6);
     nebel_release_snapshot(snapshot);
 }
 
@@ -253,10 +257,10 @@ static void pieces_that_are_none_are_refused(void **state)
     nebel_snapshot *snapshot = make_slab();
     (void)state;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        nebel_light lights[2];
+        nebel_transfer transfers[2];
         size_t failed = 9;
         const nebel_trace_desc desc = {.sunlit = &wrong[i], .failed_ray = &failed};
-        assert_int_equal(nebel_trace(snapshot, &desc, 2, rays, sizeof *rays, lights, sizeof *lights),
+        assert_int_equal(nebel_trace(snapshot, &desc, 2, rays, sizeof *rays, transfers, sizeof *transfers),
                          NEBEL_ERROR_ARGUMENT);
         assert_int_equal(failed, i < 4 ? 1 : i == 4 ? 9 : 0);
     }
@@ -272,7 +276,7 @@ static void pieces_are_the_same_in_any_set_and_split(void **state)
         uint32_t first[RAYS + 1] = {0};
         uint64_t numbers = (uint64_t)kind + 5;
         nebel_ray rays[RAYS];
-        nebel_light all[RAYS], expected[RAYS], other[RAYS];
+        nebel_transfer all[RAYS], expected[RAYS], other[RAYS];
         make_sunlit((random_fog_kind)kind, 4);
         nebel_snapshot *snapshot = fog_commit(&sky, fog.volumes, fog.count);
         draw_rays(rays);
@@ -301,7 +305,7 @@ static void pieces_are_the_same_in_any_set_and_split(void **state)
             }
             assert_memory_equal(expected, other, sizeof expected);
         }
-        nebel_light fine[RAYS], reference[RAYS];
+        nebel_transfer fine[RAYS], reference[RAYS];
         trace(snapshot, &(nebel_trace_desc){.tolerance = 2e-6, .sunlit = &pieces}, rays, fine);
         trace(snapshot, &(nebel_trace_desc){.sunlit = &pieces}, rays, reference);
         for (int i = 0; i < RAYS; i++) {
@@ -367,9 +371,9 @@ static size_t make_bodies(uint64_t *numbers, int kind, nebel_volume_desc volumes
 }
 
 static void expect_the_same_in_any_set(const nebel_snapshot *snapshot, const nebel_trace_desc *asked, size_t count,
-                                       nebel_ray rays[RAYS], const nebel_light expected[RAYS])
+                                       nebel_ray rays[RAYS], const nebel_transfer expected[RAYS])
 {
-    nebel_light other[RAYS];
+    nebel_transfer other[RAYS];
     nebel_trace_desc desc = *asked;
     for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
         if (!nebel_isa_available(desc.isa)) continue;
@@ -390,7 +394,7 @@ static void closed_forms_are_what_marches_find(void **state)
         uint64_t numbers = 77 * seed + 1;
         nebel_volume_desc volumes[BODIES + 1];
         nebel_ray rays[RAYS];
-        nebel_light closed[RAYS], marched[RAYS];
+        nebel_transfer closed[RAYS], marched[RAYS];
         const int kind = (int)(seed % 4);
         const size_t count = make_bodies(&numbers, kind, volumes);
         const nebel_fog_desc desc = {
@@ -525,7 +529,7 @@ static void expect_brute_force(const nebel_fog_desc *desc, const nebel_lamp *lam
     static nebel_volume_desc balls[MOST_BALLS];
     uint64_t numbers = 31 + count;
     nebel_ray rays[RAYS];
-    nebel_light lights[RAYS];
+    nebel_transfer transfers[RAYS];
     forced fine[BALL_RAYS];
     double off[BALL_RAYS];
     nebel_fog *made = NULL;
@@ -547,11 +551,12 @@ static void expect_brute_force(const nebel_fog_desc *desc, const nebel_lamp *lam
     nebel_destroy_fog(made);
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         const nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = 1e-5};
-        trace_some(snapshot, &asked, ray_count, rays, lights);
-        if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_in_any_set(snapshot, &asked, ray_count, rays, lights);
+        trace_some(snapshot, &asked, ray_count, rays, transfers);
+        if (precision == NEBEL_PRECISION_FLOAT)
+            expect_the_same_in_any_set(snapshot, &asked, ray_count, rays, transfers);
         for (int i = 0; i < forced_rays; i++) {
-            const double wrong = fabs(lights[i].in_scattering[i % 3] - fine[i].light);
-            assert_true(wrong <= lights[i].error + off[i]);
+            const double wrong = fabs(transfers[i].in_scattering[i % 3] - fine[i].light);
+            assert_true(wrong <= transfers[i].error + off[i]);
             assert_true(wrong < most);
         }
     }
@@ -643,16 +648,18 @@ static void endless_fog_is_answered(void **state)
     const nebel_fog_desc desc = {.sun = {.direction = {0.2, 1, 0.1}, .irradiance = {5, 5, 5}}};
     nebel_volume_desc volume = {.extinction = {0.01, 0.02, 0.03}, .albedo = {1, 1, 1}};
     const nebel_ray rays[] = {{{0, 2, 0}, {0.3, -0.1, 1}, HUGE_VAL}, {{0, 2, 0}, {0.3, 0.2, 1}, HUGE_VAL}};
-    nebel_light lights[2];
+    nebel_transfer transfers[2];
     (void)state;
     nebel_snapshot *world = fog_commit(&desc, &volume, 1);
-    assert_int_equal(nebel_trace(world, &(nebel_trace_desc){0}, 2, rays, sizeof *rays, lights, sizeof *lights), 0);
-    for (int c = 0; c < 3; c++) assert_true(lights[0].in_scattering[c] <= lights[0].error);
+    assert_int_equal(nebel_trace(world, &(nebel_trace_desc){0}, 2, rays, sizeof *rays, transfers, sizeof *transfers),
+                     0);
+    for (int c = 0; c < 3; c++) assert_true(transfers[0].in_scattering[c] <= transfers[0].error);
     nebel_release_snapshot(world);
     volume.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 20};
     nebel_snapshot *height = fog_commit(&desc, &volume, 1);
-    assert_int_equal(nebel_trace(height, &(nebel_trace_desc){0}, 2, rays, sizeof *rays, lights, sizeof *lights), 0);
-    for (int c = 0; c < 3; c++) assert_true(lights[1].in_scattering[c] > 0.05 && lights[1].error < 0.0021);
+    assert_int_equal(nebel_trace(height, &(nebel_trace_desc){0}, 2, rays, sizeof *rays, transfers, sizeof *transfers),
+                     0);
+    for (int c = 0; c < 3; c++) assert_true(transfers[1].in_scattering[c] > 0.05 && transfers[1].error < 0.0021);
     nebel_release_snapshot(height);
 }
 
@@ -671,19 +678,19 @@ static void expect_no_loss(const nebel_volume_desc volumes[CROWD])
     const size_t live = memory.live;
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         const nebel_trace_desc asked = {.precision = (nebel_precision)precision};
-        nebel_light light;
+        nebel_transfer transfer;
         nebel_result result = NEBEL_ERROR_MEMORY;
         size_t failed = 0;
         for (size_t k = 1; result == NEBEL_ERROR_MEMORY; k++) {
             memory.fail_first = k;
             memory.fail_count = 1;
-            result = nebel_trace(snapshot, &asked, 1, &ray, 0, &light, 0);
+            result = nebel_trace(snapshot, &asked, 1, &ray, 0, &transfer, 0);
             failed += result == NEBEL_ERROR_MEMORY;
             assert_int_equal(memory.live, live);
         }
         assert_int_equal(result, NEBEL_OK);
         assert_true(failed >= 2);
-        assert_true(light.in_scattering[0] > 0);
+        assert_true(transfer.in_scattering[0] > 0);
         memory.fail_first = 0;
     }
     nebel_release_snapshot(snapshot);

@@ -56,7 +56,7 @@ static nebel_snapshot *commit(size_t count, const nebel_volume_desc *volumes)
 static double exact_factor(const nebel_snapshot *fog, const double eye[3], const double place[3])
 {
     nebel_ray ray = {.t_max = 0};
-    nebel_light light;
+    nebel_transfer transfer;
     double square = 0;
     for (int i = 0; i < 3; i++) {
         ray.origin[i] = eye[i];
@@ -65,8 +65,9 @@ static double exact_factor(const nebel_snapshot *fog, const double eye[3], const
     }
     ray.t_max = sqrt(square);
     assert_int_equal(
-        nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-7}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-    return light.transmittance[0];
+        nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-7}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+        NEBEL_OK);
+    return transfer.transmittance[0];
 }
 
 static double uniform(void)

@@ -11,7 +11,7 @@
 enum { THREADS = 4, ROUNDS = 20, RAYS = 53 };
 
 typedef struct answers {
-    nebel_light exact[RAYS], lights[RAYS];
+    nebel_transfer exact[RAYS], transfers[RAYS];
     double distances[RAYS];
     float transmittances[RAYS];
     size_t failures;
@@ -30,8 +30,9 @@ static void ask(const nebel_snapshot *snapshot, const question *q, answers *a)
     const nebel_segments segments = {.from = from, .to = &q->to[0][0], .to_stride = sizeof q->to[0]};
     const nebel_trace_desc in_float = {.precision = NEBEL_PRECISION_FLOAT};
     const nebel_result results[] = {
-        nebel_trace(snapshot, &(nebel_trace_desc){0}, RAYS, q->rays, sizeof(nebel_ray), a->exact, sizeof(nebel_light)),
-        nebel_trace(snapshot, &in_float, RAYS, q->rays, sizeof(nebel_ray), a->lights, sizeof(nebel_light)),
+        nebel_trace(snapshot, &(nebel_trace_desc){0}, RAYS, q->rays, sizeof(nebel_ray), a->exact,
+                    sizeof(nebel_transfer)),
+        nebel_trace(snapshot, &in_float, RAYS, q->rays, sizeof(nebel_ray), a->transfers, sizeof(nebel_transfer)),
         nebel_find_transmittance(snapshot, .5, 1, RAYS, q->rays, sizeof(nebel_ray), a->distances),
         nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 2, RAYS, &segments, a->transmittances, 0)};
     for (size_t i = 0; i < sizeof results / sizeof results[0]; i++) a->failures += results[i] != NEBEL_OK;

@@ -182,10 +182,10 @@ static void try_view(const nebel_snapshot *snapshot, const nebel_view *view, uin
         const size_t k = (size_t)(pixel[1] / size) * columns + (size_t)(pixel[0] / size);
         sum->listed += entries[2 * k + 1];
         for (size_t v = 0; v < fog.count; v++) {
-            nebel_light light;
+            nebel_transfer transfer;
             const nebel_trace_desc desc = {.transmittance_only = 1};
-            assert_int_equal(nebel_trace(alone[v], &desc, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-            if (!(light.transmittance[0] < 1)) continue;
+            assert_int_equal(nebel_trace(alone[v], &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+            if (!(transfer.transmittance[0] < 1)) continue;
             sum->met++;
             if (!is_listed(entries, k, (uint32_t)v))
                 fail_msg("tile %zu of %u pixels misses volume %zu (%g %g)", k, size, v, pixel[0], pixel[1]);

@@ -33,7 +33,7 @@ static const char particle_body[] =
     "int profile = int(in1.w);\n"
     "float way = profile < 4 ? nebel_ball_length(in0.xyz, in1.xyz, in0.w, in2.xyz, in2.w, profile)\n"
     "    : nebel_gaussian_length(in0.xyz, in1.xyz, in0.w, in2.xyz, profile == 4 ? in2.w : 1e18, in3.w);\n"
-    "nebel_light l = nebel_medium_light(way, in3.xyz, in4.xyz);\n"
+    "nebel_transfer l = nebel_medium_light(way, in3.xyz, in4.xyz);\n"
     "out0 = vec4(l.transmittance, 0.0); out1 = vec4(l.in_scattering, 0.0);\n";
 
 /* A ray from anywhere near the particle, inside of it too, towards anywhere in it, to an end before, in or behind it.
@@ -58,11 +58,11 @@ static particle random_particle(uint64_t *state)
     return p;
 }
 
-static nebel_light trace_particle(const particle *p)
+static nebel_transfer trace_particle(const particle *p)
 {
     nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = (double)p->radius}};
     nebel_ray ray = {.t_max = (double)p->t_max};
-    nebel_light light;
+    nebel_transfer transfer;
     const int profile = (int)p->profile;
     if (profile == ENDLESS) volume.shape = (nebel_shape){.type = NEBEL_SHAPE_WORLD};
     if (profile >= 1) volume.density = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = profile};
@@ -77,9 +77,9 @@ static nebel_light trace_particle(const particle *p)
     }
     nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &volume, 1);
     const nebel_trace_desc exact = {.tolerance = 1e-9};
-    assert_int_equal(nebel_trace(fog, &exact, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, &exact, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
     nebel_release_snapshot(fog);
-    return light;
+    return transfer;
 }
 
 static void try_particles(nb_gl_language language)
@@ -98,7 +98,7 @@ static void try_particles(nb_gl_language language)
     if (!nb_gl_evaluate(&gl, program, PARTICLES, particles[0].origin, lights[0].transmittance))
         fail_msg("%s", gl.fault);
     for (int n = 0; n < PARTICLES; n++) {
-        const nebel_light wanted = trace_particle(&particles[n]);
+        const nebel_transfer wanted = trace_particle(&particles[n]);
         double off = 0;
         for (int c = 0; c < 3; c++) {
             off = fmax(off, fabs((double)lights[n].transmittance[c] - wanted.transmittance[c]));

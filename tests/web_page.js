@@ -11,7 +11,7 @@ layout(location = 1) out vec4 inScattering;
 void main()
 {
     nebel_sight sight = nebel_see(gl_FragCoord.xy, texelFetch(distances, ivec2(gl_FragCoord.xy), 0).x);
-    nebel_light fog = nebel_trace(sight.origin, sight.direction, sight.t_max);
+    nebel_transfer fog = nebel_trace(sight.origin, sight.direction, sight.t_max);
     transmittance = vec4(fog.transmittance, 1.0);
     inScattering = vec4(fog.in_scattering, 1.0);
 }`;

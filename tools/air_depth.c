@@ -21,11 +21,11 @@ void nb_find_air_depth(const nebel_planet *planet, double depth[3])
 {
     const double *const ground = planet->air.ground;
     const nebel_ray up = {{ground[0], ground[1], ground[2]}, {0, 1, 0}, (double)INFINITY};
-    nebel_light light;
+    nebel_transfer transfer;
     for (int c = 0; c < 3; c++) depth[c] = 0;
-    if (planet->atmosphere == NULL || nebel_trace_air(planet->atmosphere, NULL, 1, &up, 0, &light, 0) != NEBEL_OK)
+    if (planet->atmosphere == NULL || nebel_trace_air(planet->atmosphere, NULL, 1, &up, 0, &transfer, 0) != NEBEL_OK)
         return;
-    for (int c = 0; c < 3; c++) depth[c] = 0 - log(light.transmittance[c]);
+    for (int c = 0; c < 3; c++) depth[c] = 0 - log(transfer.transmittance[c]);
 }
 
 const char *nb_find_deep_air(const double depth[3])

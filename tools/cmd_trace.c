@@ -113,7 +113,7 @@ typedef struct work {
     const nebel_snapshot *fog;
     nebel_trace_desc desc;
     const nb_rays *rays;
-    nebel_light *lights;
+    nebel_transfer *transfers;
     atomic_size_t next_block;
     atomic_size_t first_failed; /* the lowest ray that is an error; the number of rays: none */
 } work;
@@ -131,7 +131,7 @@ static nebel_result trace(const work *shared, size_t first, size_t count, size_t
     *failed = 0;
     desc.failed_ray = failed;
     return nebel_trace(shared->fog, &desc, count, &shared->rays->entries[first].ray, sizeof(nb_rays_entry),
-                       &shared->lights[first], sizeof(nebel_light));
+                       &shared->transfers[first], sizeof(nebel_transfer));
 }
 
 static void trace_blocks(int worker, int count, void *user)
@@ -162,13 +162,13 @@ static int report_ray(const work *shared, size_t ray, nb_report_listener *listen
 }
 
 /* The results, or NULL after a message. */
-static nebel_light *trace_all(const nebel_snapshot *fog, const nb_rays *rays, const settings *wanted,
-                              nb_report_listener *listener)
+static nebel_transfer *trace_all(const nebel_snapshot *fog, const nb_rays *rays, const settings *wanted,
+                                 nb_report_listener *listener)
 {
     work shared = {.fog = fog, .desc = wanted->trace, .rays = rays};
-    shared.lights =
-        rays->count < SIZE_MAX / sizeof(nebel_light) ? malloc((rays->count + 1) * sizeof(nebel_light)) : NULL;
-    if (shared.lights == NULL) {
+    shared.transfers =
+        rays->count < SIZE_MAX / sizeof(nebel_transfer) ? malloc((rays->count + 1) * sizeof(nebel_transfer)) : NULL;
+    if (shared.transfers == NULL) {
         (void)nb_report_failure("standard input: out of memory for %zu rays; trace them in parts", rays->count);
         return NULL;
     }
@@ -177,9 +177,9 @@ static nebel_light *trace_all(const nebel_snapshot *fog, const nb_rays *rays, co
     listener->mode = NB_REPORT_DROP;
     nb_workers_run(wanted->threads, trace_blocks, &shared);
     const size_t failed = atomic_load(&shared.first_failed);
-    if (failed == rays->count) return shared.lights;
+    if (failed == rays->count) return shared.transfers;
     (void)report_ray(&shared, failed, listener);
-    free(shared.lights);
+    free(shared.transfers);
     return NULL;
 }
 
@@ -189,7 +189,7 @@ enum { COLUMNS = 7, SHARE = 2048, LINE_SIZE = COLUMNS * (NB_SHORTEST_SIZE + 1) }
 
 /* Each worker writes the text of SHARE results, which then go out in order. */
 typedef struct page {
-    const nebel_light *lights;
+    const nebel_transfer *transfers;
     size_t count; /* results on this page */
     nebel_precision precision;
     char *text; /* workers * SHARE * LINE_SIZE */
@@ -211,12 +211,12 @@ static double bound_of_floats(const double numbers[COLUMNS - 1], double bound)
     return (double)nextafterf((float)(bound + largest * (double)(FLT_EPSILON / 2)), HUGE_VALF);
 }
 
-static size_t write_light(const nebel_light *light, nebel_precision precision, char *text)
+static size_t write_light(const nebel_transfer *transfer, nebel_precision precision, char *text)
 {
     double numbers[COLUMNS];
-    memcpy(numbers, light->transmittance, sizeof light->transmittance);
-    memcpy(numbers + 3, light->in_scattering, sizeof light->in_scattering);
-    numbers[6] = precision == NEBEL_PRECISION_FLOAT ? bound_of_floats(numbers, light->error) : light->error;
+    memcpy(numbers, transfer->transmittance, sizeof transfer->transmittance);
+    memcpy(numbers + 3, transfer->in_scattering, sizeof transfer->in_scattering);
+    numbers[6] = precision == NEBEL_PRECISION_FLOAT ? bound_of_floats(numbers, transfer->error) : transfer->error;
     size_t size = 0;
     for (int i = 0; i < COLUMNS; i++) {
         size += write_number(numbers[i], precision, text + size);
@@ -233,7 +233,7 @@ static void write_share(int worker, int count, void *user)
     char *const text = shared->text + first * LINE_SIZE;
     size_t size = 0;
     for (size_t i = first; i < first + SHARE && i < shared->count; i++) {
-        size += write_light(&shared->lights[i], shared->precision, text + size);
+        size += write_light(&shared->transfers[i], shared->precision, text + size);
     }
     shared->sizes[worker] = size;
 }
@@ -249,7 +249,7 @@ static int write_page(page *shared, int workers)
     return error;
 }
 
-static int write_lights(const nebel_light *lights, size_t count, const settings *wanted)
+static int write_lights(const nebel_transfer *transfers, size_t count, const settings *wanted)
 {
     static const char header[] = "T_r,T_g,T_b,S_r,S_g,S_b,error\n";
     const size_t step = (size_t)wanted->threads * SHARE;
@@ -258,7 +258,7 @@ static int write_lights(const nebel_light *lights, size_t count, const settings 
     nb_shortest_prepare();
     int error = nb_output_write(STDOUT_FILENO, header, sizeof header - 1);
     for (size_t first = 0; first < count && error == 0; first += step) {
-        shared.lights = lights + first;
+        shared.transfers = transfers + first;
         shared.count = count - first < step ? count - first : step;
         error = write_page(&shared, wanted->threads);
     }
@@ -314,9 +314,9 @@ static int trace_scene(const char *path, settings *wanted, nb_rays *rays)
     status = read_rays(rays);
     if (status == NB_DONE) {
         wanted->threads = useful_threads(rays->count, wanted->threads);
-        nebel_light *const lights = trace_all(loaded.fog, rays, wanted, &listener);
-        status = lights != NULL ? write_lights(lights, rays->count, wanted) : NB_FAILED;
-        free(lights);
+        nebel_transfer *const transfers = trace_all(loaded.fog, rays, wanted, &listener);
+        status = transfers != NULL ? write_lights(transfers, rays->count, wanted) : NB_FAILED;
+        free(transfers);
     }
     nb_load_free(&loaded);
     return status;

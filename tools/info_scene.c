@@ -226,13 +226,13 @@ static void print_cells(const nebel_cells_desc *cells)
 /* What fog and the air of all planets leave up to a distance. */
 static double left_at(const nebel_scene_data *scene, const nebel_snapshot *fog, nebel_ray ray, double distance)
 {
-    nebel_light light;
+    nebel_transfer transfer;
     ray.t_max = distance;
-    double left = nebel_trace(fog, NULL, 1, &ray, 0, &light, 0) == NEBEL_OK ? light.transmittance[1] : 0;
+    double left = nebel_trace(fog, NULL, 1, &ray, 0, &transfer, 0) == NEBEL_OK ? transfer.transmittance[1] : 0;
     for (size_t i = 0; i < scene->planet_count; i++)
         if (scene->planets[i].atmosphere != NULL &&
-            nebel_trace_air(scene->planets[i].atmosphere, NULL, 1, &ray, 0, &light, 0) == NEBEL_OK)
-            left *= light.transmittance[1];
+            nebel_trace_air(scene->planets[i].atmosphere, NULL, 1, &ray, 0, &transfer, 0) == NEBEL_OK)
+            left *= transfer.transmittance[1];
     return left;
 }
 

@@ -19,9 +19,9 @@
  *     nebel_commit_fog(fog, &now);
  *
  *     const nebel_ray ray = {.origin = {0, 1, 0}, .direction = {0, 0, -1}, .t_max = 100};
- *     nebel_light light;
- *     nebel_trace(now, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light);
- *     // light.transmittance = exp(-.5 * 4), light.in_scattering = source * (1 - transmittance)
+ *     nebel_transfer transfer;
+ *     nebel_trace(now, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer);
+ *     // transfer.transmittance = exp(-.5 * 4), transfer.in_scattering = source * (1 - transmittance)
  *
  *     nebel_release_snapshot(now);
  *     nebel_destroy_fog(fog);
@@ -566,7 +566,7 @@ typedef struct nebel_ray {
     double t_max;        /* m, >= 0; INFINITY is legal, and ends at 1e18 m */
 } nebel_ray;
 
-typedef struct nebel_light {
+typedef struct nebel_transfer {
     double transmittance[3]; /* RGB, 0..1 */
     double in_scattering[3]; /* RGB radiance, >= 0 */
     double
@@ -579,7 +579,7 @@ typedef struct nebel_light {
                      light from height fog that grows beyond 1e18 times its extinction and lets light through.
                      Voxels that the sun lights: an estimate, which none of 13,700 rays through random voxels exceeded;
                      light that reaches between cells of many optical depths each may escape it */
-} nebel_light;
+} nebel_transfer;
 
 typedef enum nebel_precision {
     NEBEL_PRECISION_DOUBLE = 0, /* the reference: 64 bit, one ray after the other */
@@ -615,13 +615,13 @@ typedef struct nebel_trace_desc {
 
 #define NEBEL_DEFAULT_TOLERANCE 0.002
 
-/* What the fog does along each of n rays. `ray_stride` and `light_stride` are in bytes, multiples
+/* What the fog does along each of n rays. `ray_stride` and `transfer_stride` are in bytes, multiples
  * of the alignment of what they part. desc NULL: the same as all
- * zero. rays and lights must not overlap. A ray with t_max 0 gives transmittance 1, in-scattering 0. Float results are the same bits for every isa and
+ * zero. rays and transfers must not overlap. A ray with t_max 0 gives transmittance 1, in-scattering 0. Float results are the same bits for every isa and
  * for every way of splitting the rays into calls. Any thread. Errors: ARGUMENT (NULL, an unknown precision, an odd stride, a tolerance or a ray that is NaN,
  * infinite where it must not be, of no direction, of negative t_max; toggles that descend, are negative or NaN),
  * UNSUPPORTED (isa not available), UNBOUNDED (emission in an endless volume that does not absorb), MEMORY (scratch for
- * very many volumes on one ray). On an error the contents of lights are undefined.
+ * very many volumes on one ray). On an error the contents of transfers are undefined.
  *
  * Cost of a ray that meets n of N volumes, at most k of them in one place: O(n + log N) to find them where they lie
  * apart, O(N) where all lie over each other. Then O(n log n), however they overlap, for volumes of constant density
@@ -631,7 +631,7 @@ typedef struct nebel_trace_desc {
  * as much again at each place where they are looked at; where nine volumes or more add, of no voxels, altitudes or parts, for O(N)
  * at once and the j of N in whose shadow it is at each place, of which there are not more for more volumes. */
 nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
-                         size_t ray_stride, nebel_light *lights, size_t light_stride);
+                         size_t ray_stride, nebel_transfer *transfers, size_t transfer_stride);
 
 /* Visibility: how far one sees along each ray until the transmittance of `channel` (0 red, 1 green, 2 blue) falls to
  * `transmittance` (0 < transmittance < 1): distances[i] in metres, INFINITY where it does not within t_max. In double
@@ -662,7 +662,7 @@ typedef struct nebel_ray_planes {
 /* Light in caller memory: planes like those of the rays, whose elements beyond n stay as they are. Every plane may be
  * NULL: not wanted. What is not wanted is not computed as far as possible; the error in particular costs more than the
  * light of a box. */
-typedef struct nebel_light_planes {
+typedef struct nebel_transfer_planes {
     float *transmittance[3]; /* RGB, 0..1 */
     size_t transmittance_stride;
     float *in_scattering[3]; /* RGB radiance, >= 0 */
@@ -670,15 +670,15 @@ typedef struct nebel_light_planes {
     float *error; /* bound of the absolute error: of all six numbers where a plane of in_scattering is given, else of
                      transmittance */
     size_t error_stride;
-} nebel_light_planes;
+} nebel_transfer_planes;
 
 /* What the fog does along each of n rays, as nebel_trace in float does: the same rays give the same bits of
  * transmittance and in-scattering, and with in-scattering wanted the same error. Of desc (NULL: the same as all zero)
- * `isa`, `tolerance`, `failed_ray`, `ignore_distances`, `sunlit` and `lamplit` are read. rays and lights must not overlap. Same
+ * `isa`, `tolerance`, `failed_ray`, `ignore_distances`, `sunlit` and `lamplit` are read. rays and transfers must not overlap. Same
  * bits for every isa and for every way of splitting the rays into calls; a few hundred rays are enough for a call to be
  * worth it. Any thread. Errors as nebel_trace. */
 nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
-                                const nebel_ray_planes *rays, const nebel_light_planes *lights);
+                                const nebel_ray_planes *rays, const nebel_transfer_planes *transfers);
 
 /* ---- segments in, transmittances out: the hot path of an engine ------------------------------ */
 
@@ -779,7 +779,7 @@ typedef struct nebel_blend {
  * to the front, as long as all of them and the pixel were fogged by the same fog. alpha is read by OVER and
  * PREMULTIPLIED alone. An unknown mode leaves the pixel as it is. Linear light. Source of the formulas:
  * src/formulas/blend.inc. Any thread. */
-nebel_blend nebel_blend_surface(nebel_blend_mode mode, const double color[3], double alpha, const nebel_light *fog);
+nebel_blend nebel_blend_surface(nebel_blend_mode mode, const double color[3], double alpha, const nebel_transfer *fog);
 
 /* ---- standard fog factors -------------------------------------------------------------------- */
 

@@ -5,7 +5,7 @@
  *
  *     const nebel_sun sun = {.direction = {0.6, 0.3, 0}, .irradiance = {1, 1, 1}};
  *     const nebel_ray ray = {{0, 1.7, 0}, {1, 0.1, 0}, INFINITY};
- *     nebel_light light;
+ *     nebel_transfer transfer;
  *     nebel_trace_air(air, &sun, 1, &ray, 0, &light, 0);          // light.in_scattering is the sky
  *
  * The planet is a ball; its air is up to NEBEL_MAX_AIRS kinds of it over each other, each of which thins out with height,
@@ -94,9 +94,9 @@ void nebel_destroy_atmosphere(nebel_atmosphere *atmosphere);
  * below the ground counts as that on it straight above, the centre as that at y, here and below. The light of the ground
  * itself is not in it. Strides are in bytes. sun NULL: no light. `error` is what the quality promises: see
  * docs/planet.md. Any thread. Errors: ARGUMENT (NULL, a sun or a ray that is NaN, infinite where it must not be, of no
- * direction, of negative t_max); then no lights are written. */
+ * direction, of negative t_max); then no transfers are written. */
 nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n, const nebel_ray *rays,
-                             size_t ray_stride, nebel_light *lights, size_t light_stride);
+                             size_t ray_stride, nebel_transfer *transfers, size_t transfer_stride);
 
 /* Light that arrives at a place. */
 typedef struct nebel_air_light {
@@ -141,7 +141,7 @@ void nebel_destroy_air_view(nebel_air_view *view);
  * length from 1e-150 to 1e150; those of none meet no air. `error` adds what the table misses, estimated from its own differences, to what
  * nebel_trace_air tells. Any thread. Errors: ARGUMENT (NULL, a component of the direction too). */
 nebel_result nebel_trace_air_view(const nebel_air_view *view, size_t n, const double *const direction[3],
-                                  const float *t_max, const nebel_light_planes *lights);
+                                  const float *t_max, const nebel_transfer_planes *lights);
 
 /* Where rays meet the ground, and the light there. Planes without gaps; each may be NULL. */
 typedef struct nebel_ground_planes {

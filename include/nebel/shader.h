@@ -6,7 +6,7 @@
  *     // upload the words into a uniform block of 16 KiB or a float texture, put nebel_shader_text() behind
  *     // your #version line, and
  *
- *     nebel_light fog = nebel_trace(vec3(0), direction, distance);          // in the shader
+ *     nebel_transfer fog = nebel_trace(vec3(0), direction, distance);          // in the shader
  *     color = fog.transmittance * color + fog.in_scattering;
  *
  * The text is made of the formulas that the C library is compiled from. It has no #version line, and every name in it
@@ -17,11 +17,11 @@
  * What the text declares, in every dialect (vec3 is float3 in HLSL); the functions along a ray are macros, so that a
  * program holds those that it calls, once for each call:
  *
- *     struct nebel_light { vec3 transmittance; vec3 in_scattering; };
- *     nebel_light nebel_trace(vec3 origin, vec3 direction, float t_max);
+ *     struct nebel_transfer { vec3 transmittance; vec3 in_scattering; };
+ *     nebel_transfer nebel_trace(vec3 origin, vec3 direction, float t_max);
  *         Light along origin + t direction, 0 <= t <= t_max: origin in metres relative to the packed eye, direction of
  *         unit length, t_max in metres, 1e18 or more for an endless ray. All volumes, exact overlap, any number.
- *     nebel_light nebel_trace_list(vec3 origin, vec3 direction, float t_max, int first, int count);
+ *     nebel_transfer nebel_trace_list(vec3 origin, vec3 direction, float t_max, int first, int count);
  *         The same for the volumes NEBEL_INDEX(first) ... NEBEL_INDEX(first + count - 1) alone, ascending: see
  *         nebel_tiles.
  *     vec3 nebel_transmit(vec3 origin, vec3 direction, float t_max);
@@ -54,12 +54,12 @@
  * particles need. Blending, for each mode as nebel_blend_surface does it:
  *
  *     struct nebel_blend { vec3 source; vec3 factor; };
- *     nebel_blend nebel_blend_over(vec3 color, float alpha, nebel_light fog);
- *     nebel_blend nebel_blend_premultiplied(vec3 color, float alpha, nebel_light fog);
- *     nebel_blend nebel_blend_additive(vec3 color, nebel_light fog);
- *     nebel_blend nebel_blend_multiply(vec3 color, nebel_light fog);
- *     nebel_blend nebel_blend_screen(vec3 color, nebel_light fog);
- *     nebel_blend nebel_blend_medium(nebel_light medium, nebel_light fog);
+ *     nebel_blend nebel_blend_over(vec3 color, float alpha, nebel_transfer fog);
+ *     nebel_blend nebel_blend_premultiplied(vec3 color, float alpha, nebel_transfer fog);
+ *     nebel_blend nebel_blend_additive(vec3 color, nebel_transfer fog);
+ *     nebel_blend nebel_blend_multiply(vec3 color, nebel_transfer fog);
+ *     nebel_blend nebel_blend_screen(vec3 color, nebel_transfer fog);
+ *     nebel_blend nebel_blend_medium(nebel_transfer medium, nebel_transfer fog);
  *         Over a picture that has its fog already: `fog` is nebel_trace up to the surface, and the pixel becomes
  *         source + factor * pixel. MEDIUM is a particle: the pixel behind times its transmittance, plus its own
  *         in-scattering. With two outputs, location 0 index 0 and 1, all modes are drawn from the back to the front by
@@ -81,7 +81,7 @@
  *         exp(-distance^2 / (2 sigma^2)) within the radius (1e18: without bound). With the t_max of nebel_see, that is
  *         with the opaque surface's depth, edges are soft because they are right. Radius and sigma > 0. Positions are
  *         floats: a particle 10,000 radii away still has its digits.
- *     nebel_light nebel_medium_light(float length, vec3 extinction, vec3 light);
+ *     nebel_transfer nebel_medium_light(float length, vec3 extinction, vec3 light);
  *         What so much of a medium does to light: extinction and radiance per metre where the density is 1 [1/m].
  *
  * The classic comparison of a particle with the opaque depth around:
@@ -130,7 +130,7 @@
  * `uniform highp sampler2D nebel_air_texture;` (rows of NEBEL_TEXTURE_WIDTH texels RGBA32F), the text also declares the
  * air of a planet, for rays of unit length from the place that the view was made for:
  *
- *     nebel_light nebel_trace_air(vec3 direction, float t_max);
+ *     nebel_transfer nebel_trace_air(vec3 direction, float t_max);
  *         What nebel_trace_air_view says; t_max 1e18 or more: to the ground or the end of the air.
  *     struct nebel_ground { float distance; vec3 normal; vec3 sun; vec3 sky; };
  *     nebel_ground nebel_find_ground(vec3 direction);

@@ -15,7 +15,7 @@ typedef struct nb_cloud_haze {
 typedef struct nb_cloud_rays {
     double along[3][NEBEL_MAX_CLOUD_KNOTS];
     const double *direction[3];
-    nebel_light_planes lights; /* of the haze */
+    nebel_transfer_planes lights; /* of the haze */
 } nb_cloud_rays;
 
 static inline void nb_cloud_haze_ask(const nebel_cloud_knots *knots, const double direction[3], nb_cloud_haze *haze,

@@ -140,7 +140,7 @@ static inline void nb_daylight_around(const nebel_planet *planet, const nebel_su
     const nebel_atmosphere_desc *const air = &planet->air;
     double center[3], axes[3][3], ground[3];
     nebel_ray rays[SLOPES * TURNS];
-    nebel_light found[SLOPES * TURNS];
+    nebel_transfer found[SLOPES * TURNS];
     nb_vector_ball_middle(air->ground, air->radius, center);
     nb_daylight_turn(center, sun->direction, place, axes);
     for (int c = 0; c < 3; c++) ground[c] = center[c] + air->radius * axes[0][c];

@@ -177,7 +177,7 @@ typedef struct nb_worlds_part {
     float left[3][NB_WORLDS_RAYS], light[3][NB_WORLDS_RAYS], error[NB_WORLDS_RAYS];
 } nb_worlds_part;
 
-static inline void nb_worlds_lay_behind(const nb_worlds_part *part, size_t n, const nebel_light_planes *lights)
+static inline void nb_worlds_lay_behind(const nb_worlds_part *part, size_t n, const nebel_transfer_planes *lights)
 {
     for (size_t i = 0; i < n; i++) {
         float most = 0;
@@ -193,10 +193,10 @@ static inline void nb_worlds_lay_behind(const nb_worlds_part *part, size_t n, co
 /* nebel_trace_air_view, through the air of all; at most NB_WORLDS_RAYS rays. */
 static inline nebel_result nb_worlds_trace(const nb_world *worlds, int count, size_t n,
                                            const double *const direction[3], const float *t_max,
-                                           const nebel_light_planes *lights)
+                                           const nebel_transfer_planes *lights)
 {
     nb_worlds_part part;
-    nebel_light_planes planes = {.error = part.error};
+    nebel_transfer_planes planes = {.error = part.error};
     for (int c = 0; c < 3; c++) {
         planes.transmittance[c] = part.left[c];
         planes.in_scattering[c] = part.light[c];

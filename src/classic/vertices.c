@@ -103,7 +103,7 @@ static nebel_result trace_block(const call *c, block *b)
     const float *const points = gather_points(&c->vertices, b);
     for (size_t i = 0; i < b->count; i++) set_ray(c, points + 3 * i, b, i);
     nebel_ray_planes rays = {.t_max = b->t_max};
-    nebel_light_planes lights = {0};
+    nebel_transfer_planes lights = {0};
     lights.transmittance[c->desc.channel] = b->factor;
     for (int k = 0; k < 3; k++) {
         rays.origin[k] = c->vertices.eye[k];

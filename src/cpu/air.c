@@ -64,7 +64,7 @@ void nb_air_free(nb_air *air)
 /* ---- along rays ------------------------------------------------------------------------------ */
 
 nebel_result nb_air_trace(const nb_air *air, size_t n, const double *const direction[3], const float *t_max,
-                          const nebel_light_planes *lights)
+                          const nebel_transfer_planes *lights)
 {
     return nb_worlds_trace(air->worlds, air->count, n, direction, t_max, lights);
 }

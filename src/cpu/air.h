@@ -91,7 +91,7 @@ nebel_air_light nb_air_ask(const nb_air *air, const double place[3]);
 
 /* nebel_trace_air_view, through the air of all planets; at most NB_BATCH rays. */
 nebel_result nb_air_trace(const nb_air *air, size_t n, const double *const direction[3], const float *t_max,
-                          const nebel_light_planes *lights);
+                          const nebel_transfer_planes *lights);
 
 /* Where the nearest ground is seen, to scratch->ground; what lies behind it is no hit any more. `advance` as of nb_view. */
 void nb_air_find_ground(const nb_air *air, double advance, const nb_rays *rays, const int *inside, nb_hits *hits,

@@ -63,9 +63,9 @@ static nebel_ray_planes camera_rays(const nb_frame *frame, nb_scratch *scratch)
     return planes;
 }
 
-static nebel_light_planes light_samples(const nb_frame *frame, nb_light_samples *samples)
+static nebel_transfer_planes light_samples(const nb_frame *frame, nb_light_samples *samples)
 {
-    nebel_light_planes planes = {.error = frame->planes->error != NULL ? samples->error : NULL};
+    nebel_transfer_planes planes = {.error = frame->planes->error != NULL ? samples->error : NULL};
     for (int c = 0; c < 3; c++) {
         planes.transmittance[c] = samples->transmittance[c];
         planes.in_scattering[c] = samples->in_scattering[c];
@@ -106,7 +106,7 @@ static nebel_result trace_haze(const nb_frame *frame, nb_scratch *scratch)
     set_clear(samples);
     if (!frame->air.has_fog) return nb_haze_add(frame, NULL, NULL, scratch);
     const nebel_ray_planes rays = camera_rays(frame, scratch);
-    const nebel_light_planes lights = light_samples(frame, samples);
+    const nebel_transfer_planes lights = light_samples(frame, samples);
     nebel_trace_desc trace = frame->trace;
     nebel_lit_pieces pieces;
     nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
@@ -132,7 +132,7 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
     if (has_shells) end_at_ground(scratch->shells.ground, scratch->distance);
     if (!has_fog) return nb_haze_add(frame, NULL, NULL, scratch);
     const nebel_ray_planes rays = camera_rays(frame, scratch);
-    const nebel_light_planes lights = light_samples(frame, samples);
+    const nebel_transfer_planes lights = light_samples(frame, samples);
     nebel_trace_desc trace = frame->trace;
     nebel_lit_pieces pieces;
     const nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
@@ -183,7 +183,7 @@ static nebel_result trace_sun_fog(const nb_frame *frame, nb_scratch *scratch, fl
 {
     const nb_starts starts = starts_of(frame, scratch);
     nebel_ray_planes rays = {.t_max = scratch->distance};
-    nebel_light_planes lights = {.error = NULL};
+    nebel_transfer_planes lights = {.error = NULL};
     for (int c = 0; c < 3; c++) {
         rays.origin[c] = starts.origin[c];
         rays.offset[c] = starts.offset[c];
@@ -239,7 +239,7 @@ static nebel_result trace_lamp_fog(const nb_frame *frame, const nb_starts *start
 {
     nb_lamp_ways *ways = &scratch->lamp;
     nebel_ray_planes rays = {.t_max = ways->reach};
-    nebel_light_planes lights = {.error = NULL};
+    nebel_transfer_planes lights = {.error = NULL};
     for (int c = 0; c < 3; c++) {
         rays.origin[c] = starts->origin[c];
         rays.offset[c] = starts->offset[c];

@@ -41,7 +41,7 @@ static void ask(const nb_cloud_scratch *clouds, uint32_t lane, uint32_t count, c
 static nebel_result trace(const nb_frame *frame, nb_air_asked *asked)
 {
     const double *const direction[3] = {asked->direction[0], asked->direction[1], asked->direction[2]};
-    nebel_light_planes lights = {.error = NULL};
+    nebel_transfer_planes lights = {.error = NULL};
     for (int c = 0; c < 3; c++) {
         lights.transmittance[c] = asked->left[c];
         lights.in_scattering[c] = asked->light[c];

@@ -110,20 +110,20 @@ static nebel_result trace_part(const nebel_snapshot *fog, const nebel_ray_planes
                                float *error, float *const light[3])
 {
     float own[NB_BATCH];
-    const nebel_light_planes lights = {.in_scattering = {light[0], light[1], light[2]},
-                                       .error = error != NULL ? own : NULL};
+    const nebel_transfer_planes lights = {.in_scattering = {light[0], light[1], light[2]},
+                                          .error = error != NULL ? own : NULL};
     const nebel_result result = nebel_trace_planes(fog, trace, NB_BATCH, rays, &lights);
     for (int i = 0; i < NB_BATCH && error != NULL && result == NEBEL_OK; i++) error[i] += own[i];
     return result;
 }
 
 nebel_result nb_daylit_fog_trace(const nb_frame *frame, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
-                                 const nebel_light_planes *lights, nb_air_knots *knot)
+                                 const nebel_transfer_planes *lights, nb_air_knots *knot)
 {
     const nebel_split_fog *fog = &frame->air.fog;
     if (!nb_daylit_fog_is(&frame->air)) return nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, rays, lights);
     nebel_trace_desc by_sky = *trace, by_sun = *trace;
-    nebel_light_planes with_sky = *lights;
+    nebel_transfer_planes with_sky = *lights;
     by_sky.sunlit = by_sky.lamplit = by_sun.lamplit = NULL;
     for (int c = 0; c < 3; c++) with_sky.in_scattering[c] = knot->fog_sky[c];
     nebel_result result = nebel_trace_planes(fog->sky, &by_sky, NB_BATCH, rays, &with_sky);

@@ -295,7 +295,7 @@ static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fo
     const double *const direction[3] = {scratch->rays.direction[0], scratch->rays.direction[1],
                                         scratch->rays.direction[2]};
     nebel_ray_planes rays = *fog;
-    nebel_light_planes lights = {.error = NULL}, air = {.error = knot->air_error};
+    nebel_transfer_planes lights = {.error = NULL}, air = {.error = knot->air_error};
     rays.t_max = knot->at;
     for (int c = 0; c < 3; c++) {
         lights.transmittance[c] = knot->fog_left[c];
@@ -427,7 +427,7 @@ nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, con
     nb_air_knots *first = &scratch->air.knots[0];
     const double *const direction[3] = {scratch->rays.direction[0], scratch->rays.direction[1],
                                         scratch->rays.direction[2]};
-    nebel_light_planes lights = {.error = first->air_error};
+    nebel_transfer_planes lights = {.error = first->air_error};
     for (int c = 0; c < 3; c++) {
         lights.transmittance[c] = first->air_left[c];
         lights.in_scattering[c] = first->air_light[c];

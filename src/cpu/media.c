@@ -108,11 +108,11 @@ double nb_media_air_transmittance(const nb_media *media, const nebel_ray *ray, i
 {
     double left = 1;
     for (int i = 0; i < media->planet_count; i++) {
-        nebel_light light;
-        memset(&light, 0, sizeof light);
+        nebel_transfer transfer;
+        memset(&transfer, 0, sizeof transfer);
         /* Rays are in order, so that it cannot fail. */
-        (void)nebel_trace_air(media->planets[i].world.planet->atmosphere, NULL, 1, ray, 0, &light, 0);
-        left *= (double)light.transmittance[channel];
+        (void)nebel_trace_air(media->planets[i].world.planet->atmosphere, NULL, 1, ray, 0, &transfer, 0);
+        left *= (double)transfer.transmittance[channel];
     }
     return left;
 }

@@ -98,7 +98,7 @@ static nebel_result trace_shell(const nb_frame *frame, const nebel_ray_planes *f
                                 nb_shell_scratch *shells, uint32_t number)
 {
     nebel_ray_planes rays = *fog;
-    nebel_light_planes lights = {.error = NULL};
+    nebel_transfer_planes lights = {.error = NULL};
     for (int i = 0; i < NB_BATCH; i++)
         shells->distance[i] = number < shells->hits[i].count ? (float)shells->hits[i].hits[number].t : 0;
     rays.t_max = shells->distance;

@@ -70,15 +70,15 @@ const char nb_air_worlds_text[] =
     "    }\n"
     "    begin = min(begin, end);\n"
     "}\n"
-    "nebel_light airs_up_to(float t)\n"
+    "nebel_transfer airs_up_to(float t)\n"
     "{\n"
-    "    nebel_light all;\n"
+    "    nebel_transfer all;\n"
     "    all.transmittance = vec3(1.0);\n"
     "    all.in_scattering = vec3(0.0);\n"
     "    for (int k = 0; k < SCENE_WORLDS; k++) {\n"
     "        if (world_words[k].z == 0) continue;\n"
     "        choose_world(k);\n"
-    "        nebel_light one = nb_air_light(world_rays[k], t);\n"
+    "        nebel_transfer one = nb_air_light(world_rays[k], t);\n"
     "        all.in_scattering += all.transmittance * one.in_scattering;\n"
     "        all.transmittance *= one.transmittance;\n"
     "    }\n"
@@ -189,7 +189,7 @@ const char nb_air_places_text[] =
  * mean of their shade over the piece, too, which may be off by as much as shade is anywhere on it. */
 const char nb_air_pieces_text[] =
     "#ifndef PASS_CLOUDS\n"
-    "nebel_light pass_air(float t) { return airs_up_to(t); }\n"
+    "nebel_transfer pass_air(float t) { return airs_up_to(t); }\n"
     "#endif\n"
     "#ifdef PASS_SHADE\n"
     "#define PASS_KNOTS 192\n"
@@ -199,9 +199,9 @@ const char nb_air_pieces_text[] =
     "void pass_leave_fog_shade(float at) { }\n"
     "pass_shade pass_fog_shade_between(float a, float b) { return pass_shade(vec2(1.0), vec2(0.0), 0.0); }\n"
     "#endif\n"
-    "struct pass_knot { float at; nebel_light fog; nebel_light air; vec3 sun; vec3 sky; };\n" /* the last two: of daylight */
+    "struct pass_knot { float at; nebel_transfer fog; nebel_transfer air; vec3 sun; vec3 sky; };\n" /* the last two: of daylight */
     /* Goes on with the fog of a ray, up to t. */
-    "nebel_light pass_on(inout nb_progress progress, nebel_sight sight, int entry, float t)\n"
+    "nebel_transfer pass_on(inout nb_progress progress, nebel_sight sight, int entry, float t)\n"
     "{\n"
     "    if (!nb_is_ray(sight.origin, sight.direction, t)) return nb_clear();\n"
     "#ifdef NEBEL_TILES\n"
@@ -260,7 +260,7 @@ const char nb_air_pieces_text[] =
     "}\n";
 
 const char nb_air_haze_text[] =
-    "nebel_light pass_haze(nebel_sight sight, int entry)\n"
+    "nebel_transfer pass_haze(nebel_sight sight, int entry)\n"
     "{\n"
     "    nb_progress progress = nb_open_progress();\n"
     "    pass_knot from, here;\n"
@@ -271,7 +271,7 @@ const char nb_air_haze_text[] =
     "#endif\n"
     "    begin = min(begin, sight.t_max);\n"
     "    end = min(end, sight.t_max);\n"
-    "    nebel_light air = airs_up_to(end);\n"
+    "    nebel_transfer air = airs_up_to(end);\n"
     "    float brightest = pass_largest(air.in_scattering);\n"
     "    float counts = max(brightest, pass_largest(1.0 - air.transmittance));\n"
     "    float tolerance = 1e-3 * max(1.0, brightest);\n"
@@ -330,7 +330,7 @@ const char nb_air_haze_text[] =
     "            pass_leave_fog_shade(from.at);\n"
     "        }\n"
     "    }\n"
-    "    nebel_light all;\n"
+    "    nebel_transfer all;\n"
     "    all.transmittance = from.fog.transmittance * from.air.transmittance;\n"
     "    all.in_scattering = max(light, 0.0);\n"
     "    return all;\n"

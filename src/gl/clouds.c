@@ -207,7 +207,7 @@ static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray
     float left[3][NB_SHADED_PIECES], light[3][NB_SHADED_PIECES];
     double along[3][NB_SHADED_PIECES];
     const double *const direction[3] = {along[0], along[1], along[2]};
-    nebel_light_planes lights = {.error = NULL};
+    nebel_transfer_planes lights = {.error = NULL};
     pixel->first_piece = (uint32_t)part->piece_count;
     pixel->piece_count = 0;
     nebel_result result = nebel_shade_air(part->workspace, 1, ray, 0, &shade, 0);

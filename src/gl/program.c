@@ -74,7 +74,7 @@ static const char fragment_text[] =
     "}\n";
 
 static const char whole_text[] =
-    "nebel_light pass_fog(vec2 pixel, vec4 place)\n"
+    "nebel_transfer pass_fog(vec2 pixel, vec4 place)\n"
     "{\n"
     "    nebel_sight sight = pass_sight(pixel, place.x);\n"
     "#ifdef PASS_CLOUDS\n"
@@ -103,7 +103,7 @@ static const char whole_text[] =
     "#endif\n"
     "}\n"
     "\n"
-    "vec4 pass_over(nebel_light fog, ivec2 texel, int s)\n"
+    "vec4 pass_over(nebel_transfer fog, ivec2 texel, int s)\n"
     "{\n"
     "#ifdef PASS_COMPOSE\n"
     "    vec4 color = texelFetch(pass_color, texel, s);\n"
@@ -121,7 +121,7 @@ static const char whole_text[] =
     "    vec3 transmittance = vec3(0.0), in_scattering = vec3(0.0);\n"
     "    vec4 composed = vec4(0.0);\n"
     "    for (int s = pass_sample_range.x; s < pass_sample_range.y; s++) {\n"
-    "        nebel_light fog = pass_fog(low + pass_sample_places[s], texelFetch(pass_depth, texel, s));\n"
+    "        nebel_transfer fog = pass_fog(low + pass_sample_places[s], texelFetch(pass_depth, texel, s));\n"
     "        transmittance += fog.transmittance;\n"
     "        in_scattering += fog.in_scattering;\n"
     "        composed += pass_over(fog, texel, s);\n"
@@ -129,7 +129,7 @@ static const char whole_text[] =
     "    float share = 1.0 / float(pass_sample_range.y - pass_sample_range.x);\n"
     "    pass_write(share * transmittance, share * in_scattering, share * composed);\n"
     "#else\n"
-    "    nebel_light fog = pass_fog(low + 0.5, texelFetch(pass_depth, texel, 0));\n"
+    "    nebel_transfer fog = pass_fog(low + 0.5, texelFetch(pass_depth, texel, 0));\n"
     "    pass_write(fog.transmittance, fog.in_scattering, pass_over(fog, texel, 0));\n"
     "#endif\n"
     "}\n";

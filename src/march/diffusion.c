@@ -23,7 +23,7 @@ static nebel_result trace_sun(const nb_diffusion *d, const nebel_snapshot *fog, 
     const nb_lattice *l = &d->lattice;
     float offset[3][BATCH];
     nebel_ray_planes rays = {.t_max = NULL};
-    nebel_light_planes lights = {.error = NULL};
+    nebel_transfer_planes lights = {.error = NULL};
     for (int a = 0; a < 3; a++) {
         rays.origin[a] = l->low[a] + (l->high[a] - l->low[a]) / 2;
         rays.direction[a] = d->to_sun[a];

@@ -63,7 +63,7 @@ static double way_to_ground(const nb_lattice *l, const nebel_ray *ray)
 static nebel_result add_ground(const survey *v, nebel_ray rays[NB_DIFFUSION_RAYS],
                                const double weights[NB_DIFFUSION_RAYS], power *sum)
 {
-    nebel_light lights[NB_DIFFUSION_RAYS];
+    nebel_transfer transfers[NB_DIFFUSION_RAYS];
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .transmittance_only = 1, .ignore_distances = 1};
     double seen[NB_DIFFUSION_RAYS];
     for (int k = 0; k < NB_DIFFUSION_RAYS; k++) {
@@ -71,9 +71,9 @@ static nebel_result add_ground(const survey *v, nebel_ray rays[NB_DIFFUSION_RAYS
         seen[k] = isfinite(rays[k].t_max) ? weights[k] : 0;
     }
     const nebel_result result =
-        nebel_trace(v->diffusion->scaled, &desc, NB_DIFFUSION_RAYS, rays, sizeof *rays, lights, sizeof *lights);
+        nebel_trace(v->diffusion->scaled, &desc, NB_DIFFUSION_RAYS, rays, sizeof *rays, transfers, sizeof *transfers);
     for (int k = 0; k < NB_DIFFUSION_RAYS && result == NEBEL_OK; k++)
-        for (int c = 0; c < 3; c++) sum->rest[c] += seen[k] * v->ground[c] * lights[k].transmittance[c];
+        for (int c = 0; c < 3; c++) sum->rest[c] += seen[k] * v->ground[c] * transfers[k].transmittance[c];
     return result;
 }
 

@@ -95,9 +95,9 @@ static double vertical_depth(const nebel_snapshot *scaled, double x, double y, d
 {
     const nebel_ray up = {{x, y, z}, {0, 1, 0}, HUGE_VAL};
     const nebel_trace_desc desc = {.transmittance_only = 1, .ignore_distances = 1};
-    nebel_light light;
-    if (nebel_trace(scaled, &desc, 1, &up, sizeof up, &light, sizeof light) != NEBEL_OK) return 0;
-    const double most = fmax(light.transmittance[0], fmax(light.transmittance[1], light.transmittance[2]));
+    nebel_transfer transfer;
+    if (nebel_trace(scaled, &desc, 1, &up, sizeof up, &transfer, sizeof transfer) != NEBEL_OK) return 0;
+    const double most = fmax(transfer.transmittance[0], fmax(transfer.transmittance[1], transfer.transmittance[2]));
     return most > 0 ? -nb_log(most) : HUGE_VAL;
 }
 

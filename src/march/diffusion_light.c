@@ -370,7 +370,7 @@ static int prepare(block *b)
 static nebel_result ask(block *b, const nebel_snapshot *fog, float out[3][BLOCK])
 {
     nebel_ray_planes rays = {.t_max = b->length};
-    nebel_light_planes lights = {.error = NULL};
+    nebel_transfer_planes lights = {.error = NULL};
     for (int a = 0; a < 3; a++) {
         rays.origin[a] = b->middle[a];
         rays.offset[a] = b->offset[a];
@@ -426,11 +426,11 @@ static nebel_ray ray_of(const nb_trace_job *job, size_t i)
 static void add(const nb_trace_job *job, size_t i, int c, double light)
 {
     if (job->light_planes == NULL) {
-        nebel_light *out = nb_stride_to(job->lights, job->light_stride, i);
+        nebel_transfer *out = nb_stride_to(job->transfers, job->transfer_stride, i);
         out->in_scattering[c] = fmax(out->in_scattering[c] + light, 0);
         return;
     }
-    const nebel_light_planes *planes = job->light_planes;
+    const nebel_transfer_planes *planes = job->light_planes;
     if (planes->in_scattering[c] == NULL) return;
     float *out = nb_stride_to(planes->in_scattering[c], planes->in_scattering_stride, i);
     *out = fmaxf(*out + (float)light, 0);

@@ -85,9 +85,9 @@ static double depth_along(const nebel_snapshot *scaled, const double from[3], co
 {
     const nebel_ray ray = {{from[0], from[1], from[2]}, {direction[0], direction[1], direction[2]}, length};
     const nebel_trace_desc desc = {.transmittance_only = 1, .ignore_distances = 1};
-    nebel_light light;
-    if (nebel_trace(scaled, &desc, 1, &ray, sizeof ray, &light, sizeof light) != NEBEL_OK) return 0;
-    const double most = most_of(light.transmittance);
+    nebel_transfer transfer;
+    if (nebel_trace(scaled, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer) != NEBEL_OK) return 0;
+    const double most = most_of(transfer.transmittance);
     return most > 0 ? -nb_log(most) : HUGE_VAL;
 }
 
@@ -411,7 +411,7 @@ static void look(const nb_lattice *l, const nb_lamp *lamp, size_t first, view *v
 static nebel_result ask(const nb_lattice *l, const nebel_snapshot *fog, view *v, float out[3][BATCH])
 {
     nebel_ray_planes rays = {.t_max = v->length};
-    nebel_light_planes lights = {.error = NULL};
+    nebel_transfer_planes lights = {.error = NULL};
     for (int a = 0; a < 3; a++) {
         rays.origin[a] = l->low[a] + (l->high[a] - l->low[a]) / 2;
         rays.offset[a] = v->offset[a];

@@ -189,7 +189,7 @@ static nebel_result trace_piece(const piece *at)
     }
     nb_picture_job job = make_job(at);
     nebel_ray_planes rays = {.origin = {p->eye[0], p->eye[1], p->eye[2]}, .t_max = all.t_max};
-    nebel_light_planes lights = {0};
+    nebel_transfer_planes lights = {0};
     for (int c = 0; c < 3; c++) {
         rays.direction_double[c] = all.direction[c];
         job.transmittance[c] = lights.transmittance[c] = all.transmittance[c];

@@ -47,7 +47,7 @@ static nebel_result trace_segments(const nebel_snapshot *snapshot, nebel_isa isa
                                    .ignore_distances = segments->ignore_distances};
     for (size_t first = 0; first < n; first += BATCH) {
         nebel_ray rays[BATCH];
-        nebel_light lights[BATCH];
+        nebel_transfer transfers[BATCH];
         const size_t count = n - first < BATCH ? n - first : BATCH;
         for (size_t i = 0; i < count; i++) {
             rays[i] = ray_of_segment(segments, nb_stride_from(segments->from, segments->from_stride, first + i),
@@ -56,10 +56,11 @@ static nebel_result trace_segments(const nebel_snapshot *snapshot, nebel_isa isa
                 return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segment %zu: must start at most 1e15 m away",
                                first + i);
         }
-        const nebel_result result = nebel_trace(snapshot, &desc, count, rays, sizeof *rays, lights, sizeof *lights);
+        const nebel_result result =
+            nebel_trace(snapshot, &desc, count, rays, sizeof *rays, transfers, sizeof *transfers);
         if (result != NEBEL_OK) return result;
         for (size_t i = 0; i < count; i++)
-            *(float *)nb_stride_to(out, out_stride, first + i) = (float)lights[i].transmittance[channel];
+            *(float *)nb_stride_to(out, out_stride, first + i) = (float)transfers[i].transmittance[channel];
     }
     return NEBEL_OK;
 }

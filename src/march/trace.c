@@ -168,7 +168,7 @@ static nebel_result check_shadows(const nebel_snapshot *snapshot, const nebel_tr
 #define FLOAT_ROUNDING 1e-4
 #define DOUBLE_ROUNDING 1e-8
 
-/* Asks `kernel`, NULL where there is none, about a job that says where rays and lights are. */
+/* Asks `kernel`, NULL where there is none, about a job that says where rays and transfers are. */
 static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, nb_trace_fn *kernel,
                         nb_trace_job *job)
 {
@@ -199,15 +199,16 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
 }
 
 nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
-                         size_t ray_stride, nebel_light *lights, size_t light_stride)
+                         size_t ray_stride, nebel_transfer *transfers, size_t transfer_stride)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_trace_desc plain = {0};
     if (desc == NULL) desc = &plain;
-    if (n > 0 && lights == NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "trace: lights must not be NULL");
-    if (light_stride % _Alignof(nebel_light) != 0)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "lights: stride %zu: must be a multiple of %zu",
-                       light_stride, _Alignof(nebel_light));
+    if (n > 0 && transfers == NULL)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "trace: transfers must not be NULL");
+    if (transfer_stride % _Alignof(nebel_transfer) != 0)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "transfers: stride %zu: must be a multiple of %zu",
+                       transfer_stride, _Alignof(nebel_transfer));
     const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, desc->failed_ray);
     if (valid != NEBEL_OK) return valid;
     if (desc->precision != NEBEL_PRECISION_DOUBLE && desc->precision != NEBEL_PRECISION_FLOAT)
@@ -218,8 +219,8 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
                         .wants_error = 1,
                         .rays = rays,
                         .ray_stride = ray_stride,
-                        .lights = lights,
-                        .light_stride = light_stride};
+                        .transfers = transfers,
+                        .transfer_stride = transfer_stride};
     return run(snapshot, desc, n, is_float ? kernels[nb_cpu_choose(desc->isa)] : nb_trace_double, &job);
 }
 
@@ -245,10 +246,10 @@ static const char *fault_of_planes(const nebel_ray_planes *rays)
     return fault_of_ray(&common);
 }
 
-static const char *fault_of_strides(const nebel_ray_planes *rays, const nebel_light_planes *lights)
+static const char *fault_of_strides(const nebel_ray_planes *rays, const nebel_transfer_planes *transfers)
 {
-    const size_t of_floats[] = {rays->offset_stride, rays->t_max_stride, lights->transmittance_stride,
-                                lights->in_scattering_stride, lights->error_stride};
+    const size_t of_floats[] = {rays->offset_stride, rays->t_max_stride, transfers->transmittance_stride,
+                                transfers->in_scattering_stride, transfers->error_stride};
     const size_t direction = rays->direction_double[0] != NULL ? sizeof(double) : sizeof(float);
     int fits = rays->direction_stride % direction == 0;
     for (size_t i = 0; i < sizeof of_floats / sizeof *of_floats; i++) fits = fits && of_floats[i] % sizeof(float) == 0;
@@ -261,15 +262,15 @@ static void set_stride(size_t *stride, size_t packed)
 }
 
 nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
-                                const nebel_ray_planes *rays, const nebel_light_planes *lights)
+                                const nebel_ray_planes *rays, const nebel_transfer_planes *transfers)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (rays == NULL || lights == NULL)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "planes: rays and lights must not be NULL");
+    if (rays == NULL || transfers == NULL)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "planes: rays and transfers must not be NULL");
     const char *fault = fault_of_planes(rays);
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "planes: %s", fault);
     nebel_ray_planes from = *rays;
-    nebel_light_planes to = *lights;
+    nebel_transfer_planes to = *transfers;
     set_stride(&from.offset_stride, sizeof(float));
     set_stride(&from.direction_stride, from.direction_double[0] != NULL ? sizeof(double) : sizeof(float));
     set_stride(&from.t_max_stride, sizeof(float));

@@ -25,9 +25,9 @@ static const uint32_t *toggles_of(const nb_trace_job *job, size_t i)
 
 #if !defined(NB_DOUBLE)
 
-static double settle_lane(const nb_trace_job *job, size_t i, const nebel_ray *ray, const nebel_light *light)
+static double settle_lane(const nb_trace_job *job, size_t i, const nebel_ray *ray, const nebel_transfer *transfer)
 {
-    nebel_light truth;
+    nebel_transfer truth;
     nb_trace_job one = {.snapshot = job->snapshot,
                         .budget = job->budget,
                         .promised = job->promised,
@@ -41,16 +41,16 @@ static double settle_lane(const nb_trace_job *job, size_t i, const nebel_ray *ra
                         .count = 1,
                         .rays = ray,
                         .ray_stride = sizeof *ray,
-                        .lights = &truth,
-                        .light_stride = sizeof truth};
-    if (nb_trace_double(&one) != NEBEL_OK) return light->error;
+                        .transfers = &truth,
+                        .transfer_stride = sizeof truth};
+    if (nb_trace_double(&one) != NEBEL_OK) return transfer->error;
     double apart = 0;
     for (int c = 0; c < 3; c++) {
-        apart = fmax(apart, fabs(light->transmittance[c] - truth.transmittance[c]));
-        if (!job->transmittance_only) apart = fmax(apart, fabs(light->in_scattering[c] - truth.in_scattering[c]));
+        apart = fmax(apart, fabs(transfer->transmittance[c] - truth.transmittance[c]));
+        if (!job->transmittance_only) apart = fmax(apart, fabs(transfer->in_scattering[c] - truth.in_scattering[c]));
     }
     const double bound = (apart + truth.error) * (1 + 2 * (double)FLT_EPSILON); /* it will be rounded to float */
-    return bound < light->error ? bound : light->error;
+    return bound < transfer->error ? bound : transfer->error;
 }
 
 /* The error where the lanes in doubt are settled; `rays` are those of the packet that was answered last. */
@@ -63,12 +63,12 @@ static nb_real settle_doubts(const nb_trace_job *job, const gathered *g, nb_real
     nb_store_lanes(lane, error);
     for (size_t i = 0; i < count; i++) {
         if (!nb_lane(doubtful, i)) continue;
-        nebel_light light = {.error = (double)lane[i]};
+        nebel_transfer transfer = {.error = (double)lane[i]};
         for (int c = 0; c < 3; c++) {
-            light.transmittance[c] = (double)nb_lane(g->transmittance[c], i);
-            light.in_scattering[c] = (double)nb_lane(g->radiance[c], i);
+            transfer.transmittance[c] = (double)nb_lane(g->transmittance[c], i);
+            transfer.in_scattering[c] = (double)nb_lane(g->radiance[c], i);
         }
-        lane[i] = (nb_scalar)settle_lane(job, job->failed + i, nb_stride_from(rays, stride, i), &light);
+        lane[i] = (nb_scalar)settle_lane(job, job->failed + i, nb_stride_from(rays, stride, i), &transfer);
     }
     return nb_load_lanes(lane);
 }
@@ -90,7 +90,7 @@ static nebel_result ask_again(nb_trace_job *job, size_t i)
     one.first_toggle = toggles_of(job, i);
     one.first_lamplit = job->first_lamplit + i;
     one.rays = nb_stride_from(job->rays, job->ray_stride, i);
-    one.lights = nb_stride_to(job->lights, job->light_stride, i);
+    one.transfers = nb_stride_to(job->transfers, job->transfer_stride, i);
     job->failed = i;
     return nb_trace_quad(&one);
 }

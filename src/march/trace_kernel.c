@@ -515,12 +515,12 @@ static void store_light(const nb_trace_job *job, const gathered *g, nb_real erro
     }
     nb_store_lanes(lane[6], error);
     for (size_t i = 0; i < count; i++) {
-        nebel_light *light = nb_stride_to(job->lights, job->light_stride, first + i);
+        nebel_transfer *transfer = nb_stride_to(job->transfers, job->transfer_stride, first + i);
         for (int c = 0; c < 3; c++) {
-            light->transmittance[c] = (double)lane[c][i];
-            light->in_scattering[c] = (double)lane[3 + c][i];
+            transfer->transmittance[c] = (double)lane[c][i];
+            transfer->in_scattering[c] = (double)lane[3 + c][i];
         }
-        light->error = (double)lane[6][i];
+        transfer->error = (double)lane[6][i];
     }
 }
 

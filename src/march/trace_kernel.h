@@ -14,10 +14,10 @@ typedef struct nb_trace_job {
     int ignore_distances;
     size_t count;
     const nebel_ray *rays; /* checked; strides in bytes */
-    size_t ray_stride, light_stride;
-    nebel_light *lights;
+    size_t ray_stride, transfer_stride;
+    nebel_transfer *transfers;
     const nebel_ray_planes *ray_planes; /* NULL: structures. What all rays share is checked, no stride is 0 */
-    const nebel_light_planes *light_planes;
+    const nebel_transfer_planes *light_planes;
     const uint32_t *first_toggle; /* of each ray in `toggles`, and one more; NULL: the sun reaches all of every ray */
     const float *toggles;         /* checked */
     const nebel_lit_pieces *lamplit; /* of each lamp; NULL: every lamp reaches all of every ray. Checked */

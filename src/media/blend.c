@@ -25,7 +25,7 @@ static nb_blend blend_channel(nebel_blend_mode mode, double color, double alpha,
     }
 }
 
-nebel_blend nebel_blend_surface(nebel_blend_mode mode, const double color[3], double alpha, const nebel_light *fog)
+nebel_blend nebel_blend_surface(nebel_blend_mode mode, const double color[3], double alpha, const nebel_transfer *fog)
 {
     nebel_blend blend = {.factor = {1, 1, 1}}; /* leaves the pixel as it is */
     if (color == NULL || fog == NULL) return blend;

@@ -58,7 +58,7 @@ static int has_directions(const double *const direction[3])
 }
 
 nebel_result nebel_trace_air_view(const nebel_air_view *view, size_t n, const double *const direction[3],
-                                  const float *t_max, const nebel_light_planes *lights)
+                                  const float *t_max, const nebel_transfer_planes *lights)
 {
     if (view == NULL || !has_directions(direction) || lights == NULL) return NEBEL_ERROR_ARGUMENT;
     const nb_look_table table = table_of(view);

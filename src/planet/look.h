@@ -25,7 +25,7 @@ typedef struct nb_look_job {
     size_t count;
     const double *direction[3];
     const float *t_max; /* NULL: as far as they go */
-    nebel_light_planes lights;
+    nebel_transfer_planes lights;
     nebel_ground_planes ground;
 } nb_look_job;
 

@@ -313,7 +313,7 @@ static inline nb_real light_of(const nb_look_table *table, const nb_looks *looks
 
 static void look_along(const nb_look_job *job)
 {
-    const nebel_light_planes *lights = &job->lights;
+    const nebel_transfer_planes *lights = &job->lights;
     for (size_t first = 0; first < job->count; first += NB_WIDTH) {
         const nb_part part = part_from(job, first);
         const nb_looks looks = looks_along(job, part);

@@ -325,15 +325,15 @@ static nb_inside find_inside(const nebel_atmosphere *atmosphere, const double st
 /* ---- the face -------------------------------------------------------------------------------- */
 
 static void trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, const nebel_ray *ray, const double unit[3],
-                  nebel_light *light)
+                  nebel_transfer *transfer)
 {
-    *light = (nebel_light){.transmittance = {1, 1, 1}};
+    *transfer = (nebel_transfer){.transmittance = {1, 1, 1}};
     const nb_inside inside = find_inside(atmosphere, ray->origin, unit, ray->t_max, sun->direction);
     if (!(inside.length > 0)) return;
     double depth[3];
     nb_track_depth(&atmosphere->airs, inside.track, inside.length, depth);
-    for (int c = 0; c < 3; c++) light->transmittance[c] = nb_exp(-depth[c]);
-    light->error = NB_LIGHT_ROUNDING;
+    for (int c = 0; c < 3; c++) transfer->transmittance[c] = nb_exp(-depth[c]);
+    transfer->error = NB_LIGHT_ROUNDING;
     if (!(fmax(sun->irradiance[0], fmax(sun->irradiance[1], sun->irradiance[2])) > 0)) return;
     nb_gathered gathered[2];
     const double ends[2] = {inside.length, inside.end};
@@ -343,9 +343,9 @@ static void trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, cons
     nb_gather(atmosphere, &atmosphere->rule, inside.track, aspect, inside.length < inside.end ? 2 : 1, ends, gathered);
     nb_gathered_once(atmosphere, &gathered[0], aspect.sun, once);
     for (int c = 0; c < 3; c++) {
-        light->in_scattering[c] = sun->irradiance[c] * (once[c] + gathered[0].often[c]);
+        transfer->in_scattering[c] = sun->irradiance[c] * (once[c] + gathered[0].often[c]);
         const double off = nb_gathered_off(atmosphere, &gathered[0], once, c);
-        light->error = fmax(light->error, sun->irradiance[c] * off + NB_LIGHT_ROUNDING);
+        transfer->error = fmax(transfer->error, sun->irradiance[c] * off + NB_LIGHT_ROUNDING);
     }
 }
 
@@ -363,10 +363,10 @@ int nb_air_is_ray(const nebel_ray *ray, double unit[3])
 }
 
 nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n, const nebel_ray *rays,
-                             size_t ray_stride, nebel_light *lights, size_t light_stride)
+                             size_t ray_stride, nebel_transfer *transfers, size_t transfer_stride)
 {
     nebel_sun resolved;
-    if (atmosphere == NULL || (n > 0 && (rays == NULL || lights == NULL))) return NEBEL_ERROR_ARGUMENT;
+    if (atmosphere == NULL || (n > 0 && (rays == NULL || transfers == NULL))) return NEBEL_ERROR_ARGUMENT;
     if (!nb_air_resolve_sun(sun, &resolved)) return NEBEL_ERROR_ARGUMENT;
     double unit[3];
     for (size_t i = 0; i < n; i++)
@@ -374,7 +374,7 @@ nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun
     for (size_t i = 0; i < n; i++) {
         const nebel_ray *ray = nb_stride_from(rays, ray_stride, i);
         (void)nb_air_is_ray(ray, unit);
-        trace(atmosphere, &resolved, ray, unit, nb_stride_to(lights, light_stride, i));
+        trace(atmosphere, &resolved, ray, unit, nb_stride_to(transfers, transfer_stride, i));
     }
     return NEBEL_OK;
 }

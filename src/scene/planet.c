@@ -34,7 +34,7 @@ static void aim(int row, nb_sky_row *looks)
 static void look(const nebel_air_view *view, nb_sky_row *looks)
 {
     const double *const direction[3] = {looks->direction[0], looks->direction[1], looks->direction[2]};
-    const nebel_light_planes lights = {
+    const nebel_transfer_planes lights = {
         .transmittance = {looks->transmittance[0], looks->transmittance[1], looks->transmittance[2]},
         .in_scattering = {looks->light[0], looks->light[1], looks->light[2]}};
     const nebel_ground_planes ground = {.distance = looks->distance,

@@ -101,11 +101,11 @@ nb_vec3 nb_air_mean(nb_air_ray ray, int at, int across, int down)
            NEBEL_AIR_WORD(at + down).xyz * ray.weights.z + NEBEL_AIR_WORD(at + down + across).xyz * ray.weights.w;
 }
 
-nebel_light nb_air_light(nb_air_ray ray, float t_max)
+nebel_transfer nb_air_light(nb_air_ray ray, float t_max)
 {
-    nebel_light light;
-    light.transmittance = nb_splat3(1.0);
-    light.in_scattering = nb_splat3(0.0);
+    nebel_transfer transfer;
+    transfer.transmittance = nb_splat3(1.0);
+    transfer.in_scattering = nb_splat3(0.0);
     float along = t_max - ray.begin;
     if (along > ray.span - 2.4e-7 * t_max) along = ray.span; /* float does not tell it from the end */
     if (along > 0.0) {
@@ -135,7 +135,7 @@ nebel_light nb_air_light(nb_air_ray ray, float t_max)
     return light;
 }
 
-nebel_light nebel_trace_air(nb_vec3 direction, float t_max)
+nebel_transfer nebel_trace_air(nb_vec3 direction, float t_max)
 {
     return nb_air_light(nb_find_air(direction), t_max);
 }

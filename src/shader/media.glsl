@@ -16,7 +16,7 @@
 #endif
 #define NB_HAS(feature) ((int(NEBEL_FEATURES) & (feature)) != 0) /* a host may write 123 or 123u */
 
-struct nebel_light {
+struct nebel_transfer {
     nb_vec3 transmittance;
     nb_vec3 in_scattering;
 };

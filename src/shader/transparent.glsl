@@ -16,7 +16,7 @@ nebel_blend nb_blend_join(nb_blend x, nb_blend y, nb_blend z)
     return blend;
 }
 
-nebel_blend nebel_blend_over(nb_vec3 color, float alpha, nebel_light fog)
+nebel_blend nebel_blend_over(nb_vec3 color, float alpha, nebel_transfer fog)
 {
     nb_vec3 t = fog.transmittance;
     nb_vec3 s = fog.in_scattering;
@@ -24,7 +24,7 @@ nebel_blend nebel_blend_over(nb_vec3 color, float alpha, nebel_light fog)
                          nb_blend_over(color.z, alpha, t.z, s.z));
 }
 
-nebel_blend nebel_blend_premultiplied(nb_vec3 color, float alpha, nebel_light fog)
+nebel_blend nebel_blend_premultiplied(nb_vec3 color, float alpha, nebel_transfer fog)
 {
     nb_vec3 t = fog.transmittance;
     nb_vec3 s = fog.in_scattering;
@@ -32,19 +32,19 @@ nebel_blend nebel_blend_premultiplied(nb_vec3 color, float alpha, nebel_light fo
                          nb_blend_premultiplied(color.z, alpha, t.z, s.z));
 }
 
-nebel_blend nebel_blend_additive(nb_vec3 color, nebel_light fog)
+nebel_blend nebel_blend_additive(nb_vec3 color, nebel_transfer fog)
 {
     nb_vec3 t = fog.transmittance;
     return nb_blend_join(nb_blend_additive(color.x, t.x), nb_blend_additive(color.y, t.y), nb_blend_additive(color.z, t.z));
 }
 
-nebel_blend nebel_blend_multiply(nb_vec3 color, nebel_light fog)
+nebel_blend nebel_blend_multiply(nb_vec3 color, nebel_transfer fog)
 {
     nb_vec3 s = fog.in_scattering;
     return nb_blend_join(nb_blend_multiply(color.x, s.x), nb_blend_multiply(color.y, s.y), nb_blend_multiply(color.z, s.z));
 }
 
-nebel_blend nebel_blend_screen(nb_vec3 color, nebel_light fog)
+nebel_blend nebel_blend_screen(nb_vec3 color, nebel_transfer fog)
 {
     nb_vec3 t = fog.transmittance;
     nb_vec3 s = fog.in_scattering;
@@ -53,7 +53,7 @@ nebel_blend nebel_blend_screen(nb_vec3 color, nebel_light fog)
 }
 
 /* b(L) = in_scattering + transmittance L: premultiplied, with an alpha for each colour */
-nebel_blend nebel_blend_medium(nebel_light medium, nebel_light fog)
+nebel_blend nebel_blend_medium(nebel_transfer medium, nebel_transfer fog)
 {
     nb_vec3 c = medium.in_scattering;
     nb_vec3 a = nb_splat3(1.0) - medium.transmittance;
@@ -128,10 +128,10 @@ float nebel_gaussian_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_v
     return nb_gaussian_piece(nb_approach_of(origin - center, direction, t_max, min(radius, NB_FAR)), sigma);
 }
 
-nebel_light nebel_medium_light(float length, nb_vec3 extinction, nb_vec3 light)
+nebel_transfer nebel_medium_light(float length, nb_vec3 extinction, nb_vec3 light)
 {
     nb_attenuation attenuation = nb_attenuate(extinction * length);
-    nebel_light medium;
+    nebel_transfer medium;
     medium.transmittance = attenuation.left;
     medium.in_scattering = min(light * length * attenuation.mean, nb_splat3(NEBEL_MOST_LIGHT));
     return medium;

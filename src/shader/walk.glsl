@@ -193,16 +193,16 @@ bool nb_is_fresh(int turns) { return true; }
 /* ---- the face -------------------------------------------------------------------------------- */
 
 /* See nebel_set_max_opacity. */
-nebel_light nb_limit_opacity(nebel_light light, float most)
+nebel_transfer nb_limit_opacity(nebel_transfer transfer, float most)
 {
-    nb_vec3 opacity = nb_splat3(1.0) - light.transmittance;
-    light.in_scattering *= nb_vec3(most / max(opacity.x, most), most / max(opacity.y, most), most / max(opacity.z, most));
-    light.transmittance = max(light.transmittance, nb_splat3(1.0 - most));
-    return light;
+    nb_vec3 opacity = nb_splat3(1.0) - transfer.transmittance;
+    transfer.in_scattering *= nb_vec3(most / max(opacity.x, most), most / max(opacity.y, most), most / max(opacity.z, most));
+    transfer.transmittance = max(transfer.transmittance, nb_splat3(1.0 - most));
+    return transfer;
 }
 
 /* Goes on with a ray. `last`: what is left of it counts as even. */
-nebel_light nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bool lit, bool last)
+nebel_transfer nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bool lit, bool last)
 {
     int first = media.first;
     int count = media.count;
@@ -211,9 +211,9 @@ nebel_light nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bo
     int turns = before + count; /* of the sums */
     nb_media_sum sum = nb_sum_media(ray, first, count, listed);
     nb_attenuation attenuation = nb_attenuate(sum.depth);
-    nebel_light light;
-    light.transmittance = attenuation.left;
-    light.in_scattering = sum.light * attenuation.mean;
+    nebel_transfer transfer;
+    transfer.transmittance = attenuation.left;
+    transfer.in_scattering = sum.light * attenuation.mean;
     bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
     bool mixed = (NB_HAS(NB_HAS_MIXED) && sum.mixed) || (NB_HAS(NB_HAS_SUN) && sum.scatters);
     bool walks = lit && (covers || mixed);
@@ -222,7 +222,7 @@ nebel_light nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bo
         nb_vec3 depth = nb_depth_of(ray, media, turns);
         sum.light *= depth / max(sum.depth, nb_splat3(NB_TINY)); /* what is not walked is as bright as all together */
         sum.depth = depth;
-        light.transmittance = nb_exp3(-depth);
+        transfer.transmittance = nb_exp3(-depth);
     }
 #endif
 #if NB_DECLARES(NB_HAS_COVER | NB_HAS_MIXED | NB_HAS_SUN)
@@ -288,24 +288,24 @@ bool nb_is_ray(nb_vec3 origin, nb_vec3 direction, float t_max)
     return t_max > 0.0 && square > 0.0 && nb_is_number(dot(origin, origin) + square + t_max);
 }
 
-nebel_light nb_clear()
+nebel_transfer nb_clear()
 {
-    nebel_light light;
-    light.transmittance = nb_splat3(1.0);
-    light.in_scattering = nb_splat3(0.0);
-    return light;
+    nebel_transfer transfer;
+    transfer.transmittance = nb_splat3(1.0);
+    transfer.in_scattering = nb_splat3(0.0);
+    return transfer;
 }
 
 #ifndef NEBEL_RESUMES
 /* `lit`: in-scattering is asked for, too. `from_eye`: distances along the ray count. */
-nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count, bool listed, bool lit,
+nebel_transfer nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count, bool listed, bool lit,
                            bool from_eye)
 {
-    nebel_light light = nb_clear();
+    nebel_transfer transfer = nb_clear();
     if (nb_is_ray(origin, direction, t_max)) {
         nb_progress progress = nb_open_progress();
         nb_ray ray = nb_ray_up_to(origin, direction, t_max, from_eye);
-        light = nb_trace_further(progress, ray, nb_media_of(first, count, listed), lit, true);
+        transfer = nb_trace_further(progress, ray, nb_media_of(first, count, listed), lit, true);
     }
     return light;
 }
@@ -342,12 +342,12 @@ nb_progress nb_read_progress(nb_progress_words words)
     return p;
 }
 
-nb_progress_words nb_write_progress(nb_progress p, nebel_light light)
+nb_progress_words nb_write_progress(nb_progress p, nebel_transfer transfer)
 {
     nb_progress_words words;
     if (p.stage == NB_STAGE_DONE) {
-        words.word[0] = nb_vec4(light.in_scattering, 0.0);
-        words.word[1] = nb_vec4(light.transmittance, float(p.stage));
+        words.word[0] = nb_vec4(transfer.in_scattering, 0.0);
+        words.word[1] = nb_vec4(transfer.transmittance, float(p.stage));
         words.word[2] = nb_vec4(0.0, 0.0, 0.0, 0.0);
         words.word[3] = words.word[2];
     } else if (p.stage == NB_STAGE_WALK) {
@@ -366,13 +366,13 @@ nb_progress_words nb_write_progress(nb_progress p, nebel_light light)
 
 nb_progress_words nb_resume(nb_progress_words words, nb_vec3 origin, nb_vec3 direction, float t_max, nb_media media, bool last)
 {
-    nebel_light light = nb_clear();
+    nebel_transfer transfer = nb_clear();
     nb_progress progress = nb_read_progress(words);
     if (nb_is_ray(origin, direction, t_max))
-        light = nb_trace_further(progress, nb_ray_up_to(origin, direction, t_max, true), media, true, last);
+        transfer = nb_trace_further(progress, nb_ray_up_to(origin, direction, t_max, true), media, true, last);
     else
         progress.stage = NB_STAGE_DONE;
-    return nb_write_progress(progress, light);
+    return nb_write_progress(progress, transfer);
 }
 #endif
 

@@ -80,12 +80,12 @@ static uint64_t trace(const nebel_snapshot *snapshot, nebel_precision precision,
 {
     for (int i = 0; i < RAYS; i++) {
         nebel_ray ray = {.t_max = i % 5 ? uniform(1, 20) : HUGE_VAL};
-        nebel_light light;
+        nebel_transfer transfer;
         place(ray.origin, 6);
         place(ray.direction, 1);
-        require(nebel_trace(snapshot, &(nebel_trace_desc){.precision = precision}, 1, &ray, sizeof ray, &light,
-                            sizeof light));
-        hash = mix(mix(hash, light.transmittance, 3), light.in_scattering, 3);
+        require(nebel_trace(snapshot, &(nebel_trace_desc){.precision = precision}, 1, &ray, sizeof ray, &transfer,
+                            sizeof transfer));
+        hash = mix(mix(hash, transfer.transmittance, 3), transfer.in_scattering, 3);
     }
     return hash;
 }

@@ -364,10 +364,12 @@ static void test_fog_volumes_arrive_through_specular_alpha(void **state)
         if (i % GRID == GRID - 1 || i / GRID == GRID - 1) continue; /* on the edge of the picture */
         const double x = (double)places[i][0], y = (double)places[i][1], z = (double)places[i][2];
         const nebel_ray ray = {.direction = {x, y, z}, .t_max = sqrt(x * x + y * y + z * z)};
-        nebel_light light;
-        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-        expect_blend(picture.pixels[i / GRID * STEP][i % GRID * STEP], light.transmittance[0], half_byte + float_noise);
-        foggy += light.transmittance[0] < .9;
+        nebel_transfer transfer;
+        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                         NEBEL_OK);
+        expect_blend(picture.pixels[i / GRID * STEP][i % GRID * STEP], transfer.transmittance[0],
+                     half_byte + float_noise);
+        foggy += transfer.transmittance[0] < .9;
         assert_int_equal(vertices[i].specular & 0xffffff, 0x112233);
     }
     assert_true(foggy > 10);
@@ -384,9 +386,9 @@ static void test_a_device_takes_no_digits(void **state)
     enum { RAYS = 100 };
     nebel_snapshot *fog = make_fog();
     nebel_ray rays[RAYS];
-    nebel_light lights[2][RAYS];
+    nebel_transfer transfers[2][RAYS];
     uint64_t seed = 4;
-    memset(lights, 0, sizeof lights);
+    memset(transfers, 0, sizeof transfers);
     for (int i = 0; i < RAYS; i++)
         rays[i] = (nebel_ray){.direction = {dice(&seed, -.3, .3), dice(&seed, -.3, .3), 1}, .t_max = HUGE_VAL};
     unsigned short word[2];
@@ -396,11 +398,12 @@ static void test_a_device_takes_no_digits(void **state)
         if (i == 1) d3d9_open(&another, D3DFMT_A8R8G8B8);
         __asm__ volatile("fnstcw %0" : "=m"(word[i]));
         assert_int_equal(
-            nebel_trace(fog, &(nebel_trace_desc){0}, RAYS, rays, sizeof *rays, lights[i], sizeof *lights[i]), NEBEL_OK);
+            nebel_trace(fog, &(nebel_trace_desc){0}, RAYS, rays, sizeof *rays, transfers[i], sizeof *transfers[i]),
+            NEBEL_OK);
         if (i == 1) d3d9_close(&another);
     }
     print_message("x87 control word %x, with a device %x\n", word[0], word[1]);
-    assert_memory_equal(lights[0], lights[1], sizeof lights[0]);
+    assert_memory_equal(transfers[0], transfers[1], sizeof transfers[0]);
     nebel_release_snapshot(fog);
 }
 

@@ -40,9 +40,10 @@ static int predict_colors(void)
         for (int k = 0; k < 3; k++) ray.direction[k] = (double)v->place[k] - eye[k];
         ray.t_max = sqrt(ray.direction[0] * ray.direction[0] + ray.direction[1] * ray.direction[1] +
                          ray.direction[2] * ray.direction[2]);
-        nebel_light light;
-        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
-        const double f = light.transmittance[0];
+        nebel_transfer transfer;
+        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
+                         NEBEL_OK);
+        const double f = transfer.transmittance[0];
         for (int c = 0; c < 3; c++)
             colors[i][c] = f * (v->diffuse >> (16 - 8 * c) & 255) + (1 - f) * (fog_color >> (16 - 8 * c) & 255);
         foggy += f < .5;
