@@ -31,7 +31,7 @@ static double run_cells(void *user)
     nb_row *const row = user;
     const double start = nb_clock_cpu();
     for (int i = 0; i < row->rounds; i++)
-        if (nebel_fog_cells(row->cells, &view, POINTS, row->points, 0, row->fog, 0) != NEBEL_OK) return -1;
+        if (nebel_compute_cell_fog(row->cells, &view, POINTS, row->points, 0, row->fog, 0) != NEBEL_OK) return -1;
     return nb_clock_cpu() - start;
 }
 

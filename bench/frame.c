@@ -104,8 +104,8 @@ static int prepare(nb_studio *studio, nb_bench_fog fog, double density, nb_setup
 {
     *setup = (nb_setup){.studio = studio, .fog = nb_bench_fog_commit(fog, &studio->scene.data), .density = density};
     if (fog != NB_FOG_NONE && setup->fog == NULL) return -1;
-    const nebel_renderer_desc desc = {.threads = 1};
-    return nebel_create_renderer(&studio->scene.data, setup->fog, &desc, &setup->renderer) == NEBEL_OK ? 0 : -1;
+    const nebel_cpu_renderer_desc desc = {.thread_count = 1};
+    return nebel_create_cpu_renderer(&studio->scene.data, setup->fog, &desc, &setup->renderer) == NEBEL_OK ? 0 : -1;
 }
 
 static const char *measure(nb_studio *studio, nb_setup *setups, int repetitions, nb_figures *figures)

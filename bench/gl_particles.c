@@ -68,7 +68,8 @@ static int make_program(nb_drawing *d)
     attach(d->program, GL_FRAGMENT_SHADER, sprite_fragment);
     glLinkProgram(d->program);
     glGetProgramiv(d->program, GL_LINK_STATUS, &good);
-    if (!good || nebel_gl_camera_view(&d->sky.camera, d->sky.width, d->sky.height, NULL, &view) != NEBEL_OK) return -1;
+    if (!good || nebel_view_from_camera(&d->sky.camera, d->sky.width, d->sky.height, NULL, &view) != NEBEL_OK)
+        return -1;
     for (int i = 0; i < 16; i++) {
         matrices[0][i] = (float)view.eye_from_world[i];
         matrices[1][i] = (float)view.clip_from_eye[i];
@@ -178,7 +179,7 @@ static int make_renderers(nb_drawing *d)
                                     .triangle_count = 2,
                                     .base_color = {.5f, .5f, .5f},
                                     .texture = -1};
-    const nebel_gl_renderer_desc desc = {.shadow_size = 0};
+    const nebel_gl_renderer_desc desc = {.shadow_map_size = 0};
     d->scene.camera = d->sky.camera;
     d->walled = d->scene;
     d->walled.meshes = &wall;

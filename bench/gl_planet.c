@@ -11,7 +11,7 @@
 
 typedef struct nb_gl_planet_bench {
     nebel_atmosphere *air;
-    nebel_layers *layers;
+    nebel_textured_planet *layers;
     nebel_planet planet, layered;
     nebel_scene_data scene, layered_scene;
     nebel_gl_renderer *renderer, *layered_renderer;
@@ -78,27 +78,30 @@ static double run_flight(void *user)
 /* The Earth with two shells of clouds and its air, as tutorials draw it. */
 static int set_up_layers(nb_gl_planet_bench *b)
 {
-    b->layered = (nebel_planet){.model = NEBEL_PLANET_LAYERS, .shells = {.cloud_count = 2}, .sun_left = {1, 1, 1}};
-    if (nebel_create_layers(&b->layered.shells, &b->layers) != NEBEL_OK) return -1;
-    b->layered.layers = b->layers;
+    b->layered = (nebel_planet){
+        .model = NEBEL_PLANET_TEXTURED, .textured_desc = {.cloud_shell_count = 2}, .sun_left = {1, 1, 1}};
+    if (nebel_create_textured_planet(&b->layered.textured_desc, &b->layers) != NEBEL_OK) return -1;
+    b->layered.textured = b->layers;
     b->layered_scene = b->scene;
     b->layered_scene.planets = &b->layered;
-    const nebel_gl_renderer_desc usual = {.shadow_size = 0};
+    const nebel_gl_renderer_desc usual = {.shadow_map_size = 0};
     return nebel_create_gl_renderer(&b->layered_scene, NULL, &usual, &b->layered_renderer) == NEBEL_OK ? 0 : -1;
 }
 
 static int set_up(const nb_bench_desc *desc, nb_gl_planet_bench *b)
 {
     static const double to_sun[3] = {0.5, 0.75, -0.43};
-    const nebel_gl_renderer_desc usual = {.shadow_size = 0};
+    const nebel_gl_renderer_desc usual = {.shadow_map_size = 0};
     b->frame = (nebel_gl_frame_desc){
         .camera = {.position = {0, 1.7, 0}, .look_at = {0, 5, -20}, .up = {0, 1, 0}, .vertical_fov = 60},
         .width = desc->quick ? 160 : NB_BENCH_WIDTH,
         .height = desc->quick ? 88 : NB_BENCH_HEIGHT,
         .samples = 1};
-    if (nebel_create_atmosphere(nebel_find_atmosphere("earth"), &b->air) != NEBEL_OK) return -1;
-    b->planet = (nebel_planet){
-        .air = *nebel_find_atmosphere("earth"), .sun_diameter = 0.5334, .atmosphere = b->air, .sun_left = {1, 1, 1}};
+    if (nebel_create_atmosphere(nebel_lookup_atmosphere("earth"), &b->air) != NEBEL_OK) return -1;
+    b->planet = (nebel_planet){.atmosphere_desc = *nebel_lookup_atmosphere("earth"),
+                               .sun_angular_diameter = 0.5334,
+                               .atmosphere = b->air,
+                               .sun_left = {1, 1, 1}};
     b->scene =
         (nebel_scene_data){.has_sun = 1, .sun_irradiance = {12, 12, 12}, .planet_count = 1, .planets = &b->planet};
     memcpy(b->scene.sun_direction, to_sun, sizeof to_sun);
@@ -144,7 +147,7 @@ const char *nb_bench_opengl_planet(const nb_bench_desc *desc, nb_figures *figure
     if (fault == NULL) nb_bench_published_planet(figures);
     nebel_destroy_gl_renderer(b.layered_renderer);
     nebel_destroy_gl_renderer(b.renderer);
-    nebel_destroy_layers(b.layers);
+    nebel_destroy_textured_planet(b.layers);
     nebel_destroy_atmosphere(b.air);
     glDeleteTextures(2, b.textures);
     glDeleteFramebuffers(2, b.framebuffers);

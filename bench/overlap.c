@@ -85,8 +85,8 @@ static nebel_volume_desc lit_ball(int i, int count, int is_scattered)
 
 static nebel_snapshot *commit_lit(int count, int is_scattered, int lamps)
 {
-    const nebel_lamp around[2] = {{.position = {3, 5, -18}, .intensity = {40, 40, 30}, .radius = .2},
-                                  {.position = {-4, -1, -23}, .intensity = {30, 40, 40}, .radius = .2}};
+    const nebel_light around[2] = {{.position = {3, 5, -18}, .intensity = {40, 40, 30}, .radius = .2},
+                                   {.position = {-4, -1, -23}, .intensity = {30, 40, 40}, .radius = .2}};
     nebel_fog_desc desc = {.sun = {.direction = {.6, .64, .48}}};
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;

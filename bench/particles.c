@@ -36,7 +36,7 @@ static nebel_snapshot *commit(const nb_sky *sky)
     nebel_snapshot *snapshot = NULL;
     nebel_result result = nebel_create_fog(&(nebel_fog_desc){0}, &fog);
     for (size_t i = 0; i < sky->count && result == NEBEL_OK; i++) {
-        const nebel_volume_desc volume = nebel_particle_volume(&sky->particles[i]);
+        const nebel_volume_desc volume = nebel_volume_from_particle(&sky->particles[i]);
         result = nebel_add_volume(fog, &volume, NULL);
     }
     if (result == NEBEL_OK) (void)nebel_commit_fog(fog, &snapshot);
@@ -72,7 +72,8 @@ static const char *measure(nb_drawing *d, int repetitions, nb_figures *figures)
     d->fog = commit(sky);
     const double committed = nb_clock_wall() - start;
     if (d->fog == NULL) return out_of_memory;
-    if (nebel_create_renderer(&d->scene, d->fog, &(nebel_renderer_desc){0}, &d->renderer) != NEBEL_OK) return failed;
+    if (nebel_create_cpu_renderer(&d->scene, d->fog, &(nebel_cpu_renderer_desc){0}, &d->renderer) != NEBEL_OK)
+        return failed;
     nb_contest contest = {.run = run_frame, .user = d};
     if (nb_measure(&contest, 1, repetitions) != 0) return failed;
     const double covered = nb_sky_covered(sky, d->transmittance), overlap = nb_sky_pixels(sky) / covered;

@@ -81,7 +81,8 @@ static int render(const nb_gallery *gallery, float *color, float *depth)
     nebel_renderer *renderer = NULL;
     const nebel_frame_desc desc = {
         .camera = gallery->scene.data.camera, .width = gallery->width, .height = gallery->height, .samples = 1};
-    nebel_result result = nebel_create_renderer(&gallery->scene.data, NULL, &(nebel_renderer_desc){0}, &renderer);
+    nebel_result result =
+        nebel_create_cpu_renderer(&gallery->scene.data, NULL, &(nebel_cpu_renderer_desc){0}, &renderer);
     if (result == NEBEL_OK) {
         result = nebel_render_frame(renderer, &desc, &(nebel_frame){.color = color, .depth = depth});
     }
@@ -112,7 +113,7 @@ static int fill_frames(nb_gallery *gallery)
         if (f > 0) memcpy(own, gallery->memory, 2 * sizeof *own * count);
         frame->depth = (const float *)own;
         frame->color = (const uint8_t *)(own + count);
-        frame->out = (uint8_t *)(own + 2 * count);
+        frame->output = (uint8_t *)(own + 2 * count);
     }
     return status;
 }
@@ -123,8 +124,8 @@ static void copy_rows(const nebel_pixels *frame, uint32_t first_row, uint32_t ro
 {
     const size_t first = (size_t)first_row * frame->width, count = (size_t)row_count * frame->width;
     nb_stream_two_to_one((const uint32_t *)(const void *)frame->depth + first,
-                         (const uint32_t *)(const void *)frame->color + first, (uint32_t *)(void *)frame->out + first,
-                         count);
+                         (const uint32_t *)(const void *)frame->color + first,
+                         (uint32_t *)(void *)frame->output + first, count);
 }
 
 /* `isa` below 0: copies. */
@@ -140,7 +141,7 @@ static int pass_rows(const nb_gallery *gallery, int isa, int share, int shares)
         if (isa < 0) {
             copy_rows(&frame, first, last - first);
         } else {
-            faults += nebel_fog_pixels(gallery->fog, (nebel_isa)isa, &frame) != NEBEL_OK;
+            faults += nebel_apply_fog_to_pixels(gallery->fog, (nebel_isa)isa, &frame) != NEBEL_OK;
         }
     }
     return faults;

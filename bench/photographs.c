@@ -122,11 +122,11 @@ static nebel_result add_fog(const nb_darkroom *room, const float *depth, int srg
                            .height = room->height,
                            .depth = depth,
                            .color = color,
-                           .out = out,
+                           .output = out,
                            .type = NEBEL_PIXEL_RGB8,
                            .srgb = srgb};
     const nebel_result result = nebel_aim_pixels(&pixels, &room->camera, NULL);
-    return result == NEBEL_OK ? nebel_fog_pixels(room->fog, NEBEL_ISA_DEFAULT, &pixels) : result;
+    return result == NEBEL_OK ? nebel_apply_fog_to_pixels(room->fog, NEBEL_ISA_DEFAULT, &pixels) : result;
 }
 
 static double run_fog(void *user)

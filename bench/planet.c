@@ -28,7 +28,7 @@ static double run_atmosphere(void *user)
     nebel_atmosphere *made;
     (void)user;
     const double start = nb_clock_cpu();
-    if (nebel_create_atmosphere(nebel_find_atmosphere("earth"), &made) != NEBEL_OK) return -1;
+    if (nebel_create_atmosphere(nebel_lookup_atmosphere("earth"), &made) != NEBEL_OK) return -1;
     const double seconds = nb_clock_cpu() - start;
     nebel_destroy_atmosphere(made);
     return seconds;
@@ -36,13 +36,13 @@ static double run_atmosphere(void *user)
 
 static double time_view(const nb_planet_bench *bench, double height, int distances)
 {
-    const nebel_air_view_desc desc = {
-        .atmosphere = bench->air, .sun = sun, .position = {0, height, 0}, .has_distances = distances};
-    nebel_air_view *view;
+    const nebel_sky_view_desc desc = {
+        .atmosphere = bench->air, .sun = sun, .position = {0, height, 0}, .has_ray_ends = distances};
+    nebel_sky_view *view;
     const double start = nb_clock_cpu();
-    if (nebel_create_air_view(&desc, &view) != NEBEL_OK) return -1;
+    if (nebel_create_sky_view(&desc, &view) != NEBEL_OK) return -1;
     const double seconds = nb_clock_cpu() - start;
-    nebel_destroy_air_view(view);
+    nebel_destroy_sky_view(view);
     return seconds;
 }
 
@@ -60,19 +60,20 @@ static double run_levels(void *user)
 static double run_tables(void *user)
 {
     int threads = 2;
-    nebel_atmosphere_desc air = *nebel_find_atmosphere("earth");
-    nebel_air_view_desc desc = {.sun = sun, .position = {0, 1.7, 0}, .run = nebel_run_parts, .run_user = &threads};
+    nebel_atmosphere_desc air = *nebel_lookup_atmosphere("earth");
+    nebel_sky_view_desc desc = {
+        .sun = sun, .position = {0, 1.7, 0}, .run = nebel_parallel_for_openmp, .run_user = &threads};
     nebel_atmosphere *made;
-    nebel_air_view *view;
+    nebel_sky_view *view;
     (void)user;
-    air.run = nebel_run_parts;
+    air.run = nebel_parallel_for_openmp;
     air.run_user = &threads;
     const double start = nb_clock_cpu();
     if (nebel_create_atmosphere(&air, &made) != NEBEL_OK) return -1;
     desc.atmosphere = made;
-    const nebel_result result = nebel_create_air_view(&desc, &view);
+    const nebel_result result = nebel_create_sky_view(&desc, &view);
     const double seconds = nb_clock_cpu() - start;
-    nebel_destroy_air_view(view);
+    nebel_destroy_sky_view(view);
     nebel_destroy_atmosphere(made);
     return result == NEBEL_OK ? seconds : -1;
 }
@@ -104,24 +105,24 @@ static double run_nothing(void *user)
 static int set_up(const nb_bench_desc *desc, nb_planet_bench *bench)
 {
     static const nebel_scene_data nothing = {.planet_count = 0};
-    const nebel_renderer_desc alone = {.threads = 1};
+    const nebel_cpu_renderer_desc alone = {.thread_count = 1};
     bench->frame = (nebel_frame_desc){
         .camera = {.position = {0, 1.7, 0}, .look_at = {0, 5, -20}, .up = {0, 1, 0}, .vertical_fov = 60},
         .width = desc->quick ? 160 : NB_BENCH_WIDTH,
         .height = desc->quick ? 88 : NB_BENCH_HEIGHT,
         .samples = 1};
     bench->color = malloc((size_t)bench->frame.width * bench->frame.height * 3 * sizeof *bench->color);
-    if (bench->color == NULL || nebel_create_atmosphere(nebel_find_atmosphere("earth"), &bench->air) != NEBEL_OK)
+    if (bench->color == NULL || nebel_create_atmosphere(nebel_lookup_atmosphere("earth"), &bench->air) != NEBEL_OK)
         return -1;
-    bench->planet = (nebel_planet){.air = *nebel_find_atmosphere("earth"),
-                                   .sun_diameter = 0.5334,
+    bench->planet = (nebel_planet){.atmosphere_desc = *nebel_lookup_atmosphere("earth"),
+                                   .sun_angular_diameter = 0.5334,
                                    .atmosphere = bench->air,
                                    .sun_left = {1, 1, 1}};
     bench->scene = (nebel_scene_data){.has_sun = 1, .planet_count = 1, .planets = &bench->planet};
     memcpy(bench->scene.sun_direction, sun.direction, sizeof sun.direction);
     memcpy(bench->scene.sun_irradiance, sun.irradiance, sizeof sun.irradiance);
-    return nebel_create_renderer(&bench->scene, NULL, &alone, &bench->sky) == NEBEL_OK &&
-                   nebel_create_renderer(&nothing, NULL, &alone, &bench->nothing) == NEBEL_OK
+    return nebel_create_cpu_renderer(&bench->scene, NULL, &alone, &bench->sky) == NEBEL_OK &&
+                   nebel_create_cpu_renderer(&nothing, NULL, &alone, &bench->nothing) == NEBEL_OK
                ? 0
                : -1;
 }
@@ -176,7 +177,8 @@ static const char *measure_clouds(const nb_bench_desc *desc, nb_planet_bench *be
     cloudy.planet.clouds = clouds;
     cloudy.scene.planets = &cloudy.planet;
     double seconds = -1;
-    if (nebel_create_renderer(&cloudy.scene, NULL, &(nebel_renderer_desc){.threads = 1}, &renderer) == NEBEL_OK)
+    if (nebel_create_cpu_renderer(&cloudy.scene, NULL, &(nebel_cpu_renderer_desc){.thread_count = 1}, &renderer) ==
+        NEBEL_OK)
         seconds = time_frame(&cloudy, renderer);
     nebel_destroy_renderer(renderer);
     nebel_destroy_clouds(clouds);

@@ -82,8 +82,8 @@ static double run_kernel(void *user)
     const nebel_segments segments = {.from = eye, .to = c->field->points};
     const double start = nb_clock_cpu();
     for (int i = 0; i < c->field->rounds; i++) {
-        if (nebel_transmit_segments(c->field->fog, c->isa, 0, c->field->count, &segments, c->field->found, 0) !=
-            NEBEL_OK) {
+        if (nebel_compute_segment_transmittance(c->field->fog, c->isa, 0, c->field->count, &segments, c->field->found,
+                                                0) != NEBEL_OK) {
             return -1;
         }
     }

@@ -12,13 +12,13 @@ static int strew(nb_sky *sky)
     static const double colors[3][3] = {{.2, .1, .8}, {.9, .3, .4}, {1, .8, .5}};
     const nebel_nebula_desc desc = {.shape = {.type = NEBEL_SHAPE_ELLIPSOID, .radii = {8, 4.5, 4}},
                                     .count = sky->count,
-                                    .size = {.08, .16},
+                                    .radius_range = {.08, .16},
                                     .absorption = {.5, .7, .9},
                                     .emission = {.6, .6, .6},
                                     .colors = colors,
                                     .color_count = 3,
                                     .turbulence = 2};
-    return nebel_scatter_nebula(&desc, sky->particles) == NEBEL_OK ? 0 : -1;
+    return nebel_generate_nebula(&desc, sky->particles) == NEBEL_OK ? 0 : -1;
 }
 
 int nb_sky_make(int quick, nb_sky *sky)

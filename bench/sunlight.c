@@ -89,8 +89,8 @@ static int prepare(const nb_bench_desc *desc, nb_bench_fog fog, nb_setup *setup)
     setup->color = malloc(3 * sizeof(float) * setup->width * setup->height);
     if (setup->floor == NULL || setup->fog == NULL || setup->color == NULL || setup->memory == NULL) return -1;
     memset(setup->memory, 1, setup->fog_bytes);
-    const nebel_renderer_desc renderer = {.threads = 1};
-    return nebel_create_renderer(&setup->scene.data, setup->fog, &renderer, &setup->renderer) == NEBEL_OK ? 0 : -1;
+    const nebel_cpu_renderer_desc renderer = {.thread_count = 1};
+    return nebel_create_cpu_renderer(&setup->scene.data, setup->fog, &renderer, &setup->renderer) == NEBEL_OK ? 0 : -1;
 }
 
 static void tear_down(nb_setup *setup)

@@ -27,7 +27,7 @@ static double run_tessellation(void *user)
     const double start = nb_clock_cpu();
     const nebel_result result = nebel_tessellate(cut->fog, &desc, &ground, &made);
     const double seconds = nb_clock_cpu() - start;
-    const int met = result == NEBEL_OK && made->over_count == 0;
+    const int met = result == NEBEL_OK && made->unresolved_count == 0;
     if (met) cut->triangle_count = made->triangle_count;
     nebel_destroy_tessellation(made);
     return met ? seconds : -1;

@@ -44,7 +44,8 @@ static nebel_result fog_mesh(const nb_entry *entry)
         output.data = mesh->found[0].color;
         vertices.position_stride = output.stride = sizeof *mesh->found;
     }
-    return nebel_fog_vertices(mesh->fog, &(nebel_vertex_desc){.isa = entry->isa}, mesh->count, &vertices, &output, 1);
+    return nebel_compute_vertex_fog(mesh->fog, &(nebel_vertex_desc){.isa = entry->isa}, mesh->count, &vertices, &output,
+                                    1);
 }
 
 static double run_kernel(void *user)

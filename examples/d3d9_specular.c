@@ -44,8 +44,8 @@ static nebel_result fog_vertices(const nebel_snapshot *fog, engine *host)
 {
     nebel_vertices points = {.positions = host->vertices->place, .position_stride = sizeof(engine_vertex)};
     const nebel_vertex_output alpha = {NEBEL_VERTEX_SPECULAR_ALPHA, &host->vertices->specular, sizeof(engine_vertex)};
-    const nebel_result found = nebel_find_eye(host->view, points.eye);
-    return found == NEBEL_OK ? nebel_fog_vertices(fog, NULL, VERTICES, &points, &alpha, 1) : found;
+    const nebel_result found = nebel_compute_object_eye(host->view, points.eye);
+    return found == NEBEL_OK ? nebel_compute_vertex_fog(fog, NULL, VERTICES, &points, &alpha, 1) : found;
 }
 
 int main(int argc, char **argv)

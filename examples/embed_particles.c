@@ -17,15 +17,15 @@ static void draw_particles(unsigned program, const engine *host, const nebel_gl 
                            int classic)
 {
     particle particles[PARTICLES];
-    nebel_gl_fog fog;
+    nebel_gl_fog_resources fog;
     nebel_rays rays;
     particles_place(particles, host->eye);
-    nebel_gl_get_fog(passes, &fog);
-    nebel_view_rays(view, NULL, &rays);
+    nebel_gl_get_fog_resources(passes, &fog);
+    nebel_compute_view_rays(view, NULL, &rays);
     glUseProgram(program);
     engine_set_matrix(program, "eye_from_world", host->eye_from_world);
     engine_set_matrix(program, "clip_from_eye", host->clip_from_eye);
-    glUniform4fv(glGetUniformLocation(program, "nebel_rays"), NEBEL_RAY_WORDS, rays.words[0].v);
+    glUniform4fv(glGetUniformLocation(program, "nebel_rays"), NEBEL_RAY_TEXELS, rays.texels[0].v);
     glUniform4fv(glGetUniformLocation(program, "balls"), PARTICLES, particles[0].center);
     glUniform1i(glGetUniformLocation(program, "classic"), classic);
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog.block);

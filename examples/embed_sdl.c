@@ -29,9 +29,9 @@ static SDL_Window *open_window(void)
 /* Packed for the eye of this frame, into the uniform block that the text declares. */
 static nebel_result upload_fog(const nebel_snapshot *snapshot, const double eye[3])
 {
-    static nebel_word words[NEBEL_BLOCK_WORDS]; /* more fog than this goes into a texture: NEBEL_TEXTURE */
+    static nebel_texel_f32 words[NEBEL_BLOCK_TEXELS]; /* more fog than this goes into a texture: NEBEL_FOG_TEXTURE */
     size_t count;
-    const nebel_result result = nebel_pack_fog(snapshot, eye, words, NEBEL_BLOCK_WORDS, &count);
+    const nebel_result result = nebel_pack_fog(snapshot, eye, words, NEBEL_BLOCK_TEXELS, &count);
     glBufferData(GL_UNIFORM_BUFFER, sizeof words, words, GL_STREAM_DRAW);
     return result;
 }
@@ -40,7 +40,7 @@ static nebel_result upload_fog(const nebel_snapshot *snapshot, const double eye[
 static engine open_engine(const nebel_snapshot *snapshot)
 {
     char head[128];
-    const char *const texts[] = {head, nebel_shader_text(NEBEL_DIALECT_GLSL_330),
+    const char *const texts[] = {head, nebel_get_shader_source(NEBEL_DIALECT_GLSL_330),
                                  "flat in vec3 color;\n"
                                  "in vec3 place;\n"
                                  "out vec4 pixel;\n"
@@ -49,7 +49,7 @@ static engine open_engine(const nebel_snapshot *snapshot)
                                  "    nebel_transfer fog = nebel_trace(vec3(0.0), normalize(place), length(place));\n"
                                  "    pixel = vec4(fog.transmittance * color + fog.in_scattering, 1.0);\n"
                                  "}\n"};
-    snprintf(head, sizeof head, "#version 330 core\n#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n",
+    snprintf(head, sizeof head, "#version 330 core\n#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES %u\n",
              nebel_pack_features(snapshot));
     host_say_compiling("embed_sdl");
     return engine_open(3, texts);

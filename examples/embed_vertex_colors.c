@@ -21,8 +21,8 @@ static nebel_result fog_vertices(const nebel_snapshot *fog, engine *host)
     const nebel_ray_planes rays = {.origin = {host->eye[0], host->eye[1], host->eye[2]},
                                    .direction_float = {way[0], way[1], way[2]},
                                    .t_max = length};
-    const nebel_transfer_planes lights = {.transmittance = {t[0], t[1], t[2]}, .in_scattering = {s[0], s[1], s[2]}};
-    const nebel_result result = nebel_trace_planes(fog, NULL, host->count, &rays, &lights);
+    const nebel_transfer_planes transfers = {.transmittance = {t[0], t[1], t[2]}, .in_scattering = {s[0], s[1], s[2]}};
+    const nebel_result result = nebel_trace_planes(fog, NULL, host->count, &rays, &transfers);
     for (size_t i = 0; i < host->count; i++) {
         engine_vertex *const v = &host->vertices[i];
         for (int c = 0; c < 3; c++) v->color[c] = t[c][i] * v->surface[c] + s[c][i];

@@ -21,7 +21,7 @@ static const char *const particle_vertex_text =
     "    vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;\n"
     "    gl_Position = clip_from_eye * vec4(mat3(eye_from_world) * ball.xyz + vec3(1.3 * ball.w * corner, 0.0), 1.0);\n"
     "}\n";
-/* Before nebel_shader_text: what it should declare, and the depth along the axis of engine.h; below 0 there is nothing.
+/* Before nebel_get_shader_source: what it should declare, and the depth along the axis of engine.h; below 0 there is nothing.
  */
 static const char *const particle_defines =
     "#version 330 core\n"
@@ -38,12 +38,12 @@ static const char *const particle_fragment_text =
     "layout(location = 0, index = 1) out vec4 factor;\n"
     "void main()\n"
     "{\n"
-    "    nebel_sight sight = nebel_see(gl_FragCoord.xy, texelFetch(depth, ivec2(gl_FragCoord.xy), 0).x);\n"
+    "    nebel_view_ray sight = nebel_make_view_ray(gl_FragCoord.xy, texelFetch(depth, ivec2(gl_FragCoord.xy), 0).x);\n"
     "    vec2 place = gl_FragCoord.xy / vec2(textureSize(depth, 0));\n"
     "    float shown = classic ? nebel_five_taps(place, 1.0 / gl_FragCoord.w, nebel_default_taps()) : 1.0;\n"
     "    float end = classic ? 1e18 : sight.t_max;\n"
-    "    float way = shown * nebel_ball_length(sight.origin, sight.direction, end, ball.xyz, ball.w, 2);\n"
-    "    nebel_transfer smoke = nebel_medium_light(way, vec3(2.0, 2.5, 3.0), vec3(1.8, 1.6, 1.4));\n"
+    "    float way = shown * nebel_sphere_path_length(sight.origin, sight.direction, end, ball.xyz, ball.w, 2);\n"
+    "    nebel_transfer smoke = nebel_medium_transfer(way, vec3(2.0, 2.5, 3.0), vec3(1.8, 1.6, 1.4));\n"
     "    nebel_transfer fog = nebel_trace(sight.origin, sight.direction, min(sight.t_max, length(ball.xyz)));\n"
     "    nebel_blend blend = nebel_blend_medium(smoke, fog);\n"
     "    source = vec4(blend.source, 0.0);\n"
@@ -54,7 +54,7 @@ static const char *const particle_fragment_text =
 static inline unsigned particles_open(const nebel_snapshot *snapshot)
 {
     char features[40];
-    const char *const texts[] = {particle_defines, features, nebel_shader_text(NEBEL_DIALECT_GLSL_330),
+    const char *const texts[] = {particle_defines, features, nebel_get_shader_source(NEBEL_DIALECT_GLSL_330),
                                  particle_fragment_text};
     const unsigned program = glCreateProgram();
     snprintf(features, sizeof features, "#define NEBEL_FEATURES %u\n", nebel_pack_features(snapshot));

@@ -44,11 +44,11 @@ static void remove_model(void)
 /* Fog that was read can be had, and is where nodes are: all its numbers are some. */
 static void check_fog(const nebel_scene *scene)
 {
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     nebel_snapshot *fog = NULL;
     for (size_t i = 0; i < data->volume_count; i++) {
         const nebel_transform *place = &data->volumes[i].shape.transform;
-        demand(data->volume_names[i] != NULL && nebel_scene_volume_origin(scene, i) == NEBEL_VOLUME_OF_NODE);
+        demand(data->volume_names[i] != NULL && nebel_get_volume_origin(scene, i) == NEBEL_VOLUME_FROM_NODE);
         for (int k = 0; k < 3; k++) demand(isfinite(place->position[k]) && isfinite(place->scale[k]));
         for (int k = 0; k < 3; k++) demand(data->volumes[i].extinction[k] >= 0);
     }

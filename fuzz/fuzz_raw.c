@@ -23,9 +23,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     demand(memory >= 0 && ftruncate(memory, 0) == 0);
     demand(pwrite(memory, data + 5, size - 5, 0) == (ssize_t)(size - 5));
     (void)snprintf(path, sizeof path, "/proc/self/fd/%d", memory);
-    const nebel_grid_file file = {.file = path,
+    const nebel_grid_file file = {.path = path,
                                   .type = (nebel_voxel_type)(data[0] % 3),
-                                  .filter = (nebel_filter)(data[1] % 2),
+                                  .filter = (nebel_grid_filter)(data[1] % 2),
                                   .size = {data[2] % 33, data[3] % 33, data[4] % 33}};
     const nebel_scene_desc desc = {.allocator = {witness_allocate, witness_release, &seen},
                                    .log = {witness_message, &seen}};

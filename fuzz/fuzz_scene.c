@@ -15,8 +15,8 @@ static void commit(const nebel_scene *scene, double frame)
     nebel_snapshot *fog = NULL;
     const nebel_result result = nebel_commit_scene_fog_at(scene, frame, &fog);
     /* Not all fog can be lit many times. */
-    if (result == NEBEL_ERROR_UNSUPPORTED && nebel_scene_contents(scene)->diffusion != NULL) return;
-    const size_t particles = nebel_scene_contents(scene)->particle_count;
+    if (result == NEBEL_ERROR_UNSUPPORTED && nebel_get_scene_data(scene)->diffusion != NULL) return;
+    const size_t particles = nebel_get_scene_data(scene)->particle_count;
     if (result != NEBEL_OK && !(result == NEBEL_ERROR_VALUE && particles > 0)) abort();
     if ((result == NEBEL_OK) != (fog != NULL)) abort();
     nebel_release_snapshot(fog);
@@ -25,19 +25,19 @@ static void commit(const nebel_scene *scene, double frame)
 /* What a scene promises to its users. That a shape leaves no place for particles is found when they are strewn. */
 static void check_scene(nebel_scene *scene)
 {
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     if (data->diffusion != NULL) {
         nebel_diffusion_desc quick = *data->diffusion;
-        quick.cells = NEBEL_MIN_DIFFUSION_CELLS;
+        quick.max_cells = NEBEL_MIN_DIFFUSION_CELLS;
         if (nebel_set_scene_diffusion(scene, &quick) != NEBEL_OK) abort();
     }
     for (size_t i = 0; i < data->volume_count; i++)
         if (data->volume_names[i] == NULL) abort();
-    const nebel_camera camera = nebel_scene_camera(scene, 12.5);
+    const nebel_camera camera = nebel_get_scene_camera(scene, 12.5);
     if (!(camera.vertical_fov > 0 && camera.vertical_fov < 180 && camera.view_height > 0)) abort();
     if (data->particle_count > MOST_PARTICLES) return;
     commit(scene, 0);
-    if (data->moving_volume_count > 0) commit(scene, 12.5);
+    if (data->animated_volume_count > 0) commit(scene, 12.5);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);

@@ -21,7 +21,7 @@ typedef struct march_input {
     nebel_fog_desc desc;
     size_t count, lamp_count, ray_count;
     nebel_volume_desc volumes[MOST_VOLUMES];
-    nebel_lamp lamps[MOST_LAMPS];
+    nebel_light lamps[MOST_LAMPS];
     nebel_ray rays[MOST_RAYS];
     nebel_shape parts[MOST_WRITTEN][MOST_PARTS], inner[MOST_WRITTEN][MOST_PARTS];
     nebel_plane planes[MOST_WRITTEN * (1 + 2 * MOST_PARTS)][PLANES];
@@ -136,7 +136,7 @@ static inline void take_grid(input *in, march_input *fog, size_t which, nebel_de
     uint8_t voxels[MOST_CELLS * MOST_CELLS * MOST_CELLS];
     nebel_grid_desc desc = {.type = NEBEL_VOXEL_UINT8, .voxels = voxels};
     for (int i = 0; i < 3; i++) desc.size[i] = 1 + take(in) % MOST_CELLS;
-    desc.filter = take(in) % 2 == 0 ? NEBEL_FILTER_LINEAR : NEBEL_FILTER_NEAREST;
+    desc.filter = take(in) % 2 == 0 ? NEBEL_GRID_FILTER_LINEAR : NEBEL_GRID_FILTER_NEAREST;
     for (size_t i = 0; i < sizeof voxels; i++) voxels[i] = (uint8_t)take(in);
     demand(nebel_create_grid(&desc, &fog->grids[which]) == NEBEL_OK);
     density->type = NEBEL_DENSITY_GRID;
@@ -167,7 +167,7 @@ static inline void take_density(input *in, march_input *fog, size_t which, nebel
     for (int i = 0; i < 3; i++) density->to[i] = density->from[i] + take_place(in);
     take_places(in, density->center);
     density->sigma = take_size(in);
-    density->distance = take_size(in);
+    density->edge_width = take_size(in);
     density->radius = 64 + 64 * take_size(in);
     if (density->type != NEBEL_DENSITY_ALTITUDE) return;
     density->center[1] -= density->radius;
@@ -231,8 +231,9 @@ static inline void take_lights(input *in, march_input *fog)
     }
     fog->lamp_count = (which & 4) != 0 ? 1 + take(in) % MOST_LAMPS : 0;
     for (size_t i = 0; i < fog->lamp_count; i++) {
-        nebel_lamp *lamp = &fog->lamps[i];
-        *lamp = (nebel_lamp){.type = take(in) % 2 == 0 ? NEBEL_LAMP_POINT : NEBEL_LAMP_SPOT, .radius = take_size(in)};
+        nebel_light *lamp = &fog->lamps[i];
+        *lamp =
+            (nebel_light){.type = take(in) % 2 == 0 ? NEBEL_LIGHT_POINT : NEBEL_LIGHT_SPOT, .radius = take_size(in)};
         take_places(in, lamp->position);
         take_direction(in, lamp->direction);
         lamp->inner_angle = take(in) / 2.0;

@@ -33,7 +33,7 @@ text() {
 }
 
 calls='
-    nebel_sight sight = nebel_see(place.xy, place.z);
+    nebel_view_ray sight = nebel_make_view_ray(place.xy, place.z);
     nebel_transfer transfer = nebel_trace(sight.origin, sight.direction, sight.t_max);
     nebel_transfer listed = nebel_trace_list(sight.origin, sight.direction, sight.t_max, 3, 4);
     transfer.transmittance *= nebel_transmit(sight.origin, sight.direction, 2.0);
@@ -42,20 +42,20 @@ calls='
     nebel_blend blend = nebel_blend_over(place, 0.5, transfer);
     blend.source += nebel_blend_premultiplied(place, 0.5, transfer).source + nebel_blend_additive(place, transfer).source;
     blend.factor *= nebel_blend_multiply(place, transfer).factor * nebel_blend_screen(place, transfer).factor;
-    float way = nebel_ball_length(sight.origin, sight.direction, sight.t_max, place, 2.0, 3);
-    way += nebel_gaussian_length(sight.origin, sight.direction, sight.t_max, place, 3.0, 1.0);
-    blend.factor *= nebel_blend_medium(nebel_medium_light(way, place, place), transfer).factor;
-    nebel_transfer air = nebel_trace_air(sight.direction, sight.t_max);
-    nebel_ground ground = nebel_find_ground(sight.direction);
+    float way = nebel_sphere_path_length(sight.origin, sight.direction, sight.t_max, place, 2.0, 3);
+    way += nebel_gaussian_path_length(sight.origin, sight.direction, sight.t_max, place, 3.0, 1.0);
+    blend.factor *= nebel_blend_medium(nebel_medium_transfer(way, place, place), transfer).factor;
+    nebel_transfer air = nebel_trace_atmosphere(sight.direction, sight.t_max);
+    nebel_ground ground = nebel_trace_ground(sight.direction);
     transfer.in_scattering += air.transmittance * air.in_scattering + ground.distance * ground.normal + ground.sun + ground.sky;
-    transfer.in_scattering += nebel_environment_radiance(sight.direction) * nebel_environment_reflected(place);
-    transfer.in_scattering += nebel_blend_grey(blend).xyz * nebel_five_taps(place.xy, place.z, nebel_default_taps());'
+    transfer.in_scattering += nebel_evaluate_environment(sight.direction) * nebel_evaluate_environment_diffuse(place);
+    transfer.in_scattering += nebel_blend_gray(blend).xyz * nebel_five_taps(place.xy, place.z, nebel_default_taps());'
 
 # try_opengl DIALECT VERSION DEFINES
 try_opengl() {
     name_file
     {
-        printf '#version %s\n#define NEBEL_VIEW\n#define NEBEL_TILES\n#define NEBEL_TRANSPARENT\n#define NEBEL_AIR\n%b' "$2" "$3"
+        printf '#version %s\n#define NEBEL_VIEW\n#define NEBEL_TILES\n#define NEBEL_TRANSPARENT\n#define NEBEL_SKY_VIEW\n%b' "$2" "$3"
         printf 'uniform highp sampler2D opaque;\n#define NEBEL_OPAQUE_DEPTH(at) texture(opaque, at).x\n'
         text "$1"
         printf 'in highp vec3 place; out highp vec4 color;\nvoid main()\n{%s\n' "$calls"
@@ -66,11 +66,11 @@ try_opengl() {
 
 # Each feature alone, so that nothing calls what is not declared without another.
 alone=()
-for ((bit = 0; bit < 25; bit++)); do alone+=("#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES $((1 << bit))\n"); done
-for defines in "${alone[@]}" "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
+for ((bit = 0; bit < 25; bit++)); do alone+=("#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES $((1 << bit))\n"); done
+for defines in "${alone[@]}" "" "#define NEBEL_FOG_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n" "uniform highp vec4 w[99];\n#define NEBEL_FOG_TEXEL(i) w[i]\n"; do
     try_opengl glsl_330 "330 core" "$defines"
 done
-for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 2097154\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 4194306\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n"; do
+for defines in "" "#define NEBEL_FOG_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES 2097154\n" "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES 4194306\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n"; do
     try_opengl glsl_300_es "300 es" "$defines"
 done
 
@@ -92,12 +92,12 @@ layout(location = 0) in vec3 place;
 layout(location = 0) out vec4 color;
 #define NEBEL_VIEW
 #define NEBEL_TRANSPARENT
-#define NEBEL_WORD(i) words[i]
-#define NEBEL_INDEX(i) int(entries[i])
-#define NEBEL_VOXEL(i) texels[i]
-#define NEBEL_NODE(i) nodes[i]
-#define NEBEL_ENVIRONMENT_WORD(i) lights[i]
-#define NEBEL_AIR_WORD(i) airs[i]
+#define NEBEL_FOG_TEXEL(i) words[i]
+#define NEBEL_TILE_ENTRY(i) int(entries[i])
+#define NEBEL_VOXEL_TEXEL(i) texels[i]
+#define NEBEL_DIFFUSION_TEXEL(i) nodes[i]
+#define NEBEL_ENVIRONMENT_TEXEL(i) lights[i]
+#define NEBEL_SKY_VIEW_TEXEL(i) airs[i]
 #define NEBEL_RAY(i) rays[i]
 #define NEBEL_OPAQUE_DEPTH(at) texture(opaque, at).x
 GLSL
@@ -124,12 +124,12 @@ Texture2D opaque;
 SamplerState opaque_sampler;
 #define NEBEL_VIEW
 #define NEBEL_TRANSPARENT
-#define NEBEL_WORD(i) words[i]
-#define NEBEL_INDEX(i) int(entries[i])
-#define NEBEL_VOXEL(i) texels[i]
-#define NEBEL_NODE(i) nodes[i]
-#define NEBEL_ENVIRONMENT_WORD(i) lights[i]
-#define NEBEL_AIR_WORD(i) airs[i]
+#define NEBEL_FOG_TEXEL(i) words[i]
+#define NEBEL_TILE_ENTRY(i) int(entries[i])
+#define NEBEL_VOXEL_TEXEL(i) texels[i]
+#define NEBEL_DIFFUSION_TEXEL(i) nodes[i]
+#define NEBEL_ENVIRONMENT_TEXEL(i) lights[i]
+#define NEBEL_SKY_VIEW_TEXEL(i) airs[i]
 #define NEBEL_RAY(i) rays[i]
 #define NEBEL_OPAQUE_DEPTH(at) opaque.SampleLevel(opaque_sampler, at, 0.0).x
 HLSL
@@ -141,7 +141,7 @@ HLSL
     verdict "hlsl $1" glslangValidator -D -S frag -e main -V "$file.hlsl" -o "$file.spv"
 }
 
-for defines in "" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 2\n"; do
+for defines in "" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES 2\n"; do
     try_vulkan "$defines"
     try_hlsl "$defines"
 done

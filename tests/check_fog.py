@@ -25,7 +25,7 @@ CAMERA = {"fx": 70.5, "fy": 71.5, "cx": 40.25, "cy": 22.75}
 INTRINSICS = ("--intrinsics", "70.5,71.5,40.25,22.75")
 BASELINE = 0.209313
 
-# Rounding to bytes, and what the header of nebel_fog_pixels says of sRGB.
+# Rounding to bytes, and what the header of nebel_apply_fog_to_pixels says of sRGB.
 LINEAR_TOLERANCE, STORED_TOLERANCE = 0.51, 0.501
 
 

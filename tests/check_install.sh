@@ -46,7 +46,7 @@ cat >"$work/consumer/layers.c" <<'C'
 
 int main(void)
 {
-    printf("%s, %s\n", nebel_scene_libraries(), nebel_renderer_libraries());
+    printf("%s, %s\n", nebel_scene_libraries(), nebel_cpu_libraries());
     return 0;
 }
 C
@@ -64,7 +64,7 @@ int main(int count, char **words)
     const nebel_scene_desc desc = {.model_reader = count > 1 ? words[1] : READER};
     if (nebel_parse_scene(text, strlen(text), "scene.json", &desc, &scene) != NEBEL_OK) return 1;
     const nebel_result result = nebel_load_scene_models(scene);
-    printf("%s: %zu meshes\n", nebel_result_text(result), nebel_scene_contents(scene)->mesh_count);
+    printf("%s: %zu meshes\n", nebel_result_text(result), nebel_get_scene_data(scene)->mesh_count);
     nebel_destroy_scene(scene);
     return result == (count > 1 ? NEBEL_ERROR_FILE : NEBEL_OK) ? 0 : 1;
 }

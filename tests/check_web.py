@@ -28,7 +28,7 @@ uniform vec4 place;
 out vec4 color;
 void main()
 {
-    nebel_sight sight = nebel_see(gl_FragCoord.xy, place.x);
+    nebel_view_ray sight = nebel_make_view_ray(gl_FragCoord.xy, place.x);
     nebel_transfer fog = nebel_trace(sight.origin, sight.direction, sight.t_max);
     color = vec4(fog.transmittance + fog.in_scattering, 1.0);
 }"""
@@ -37,10 +37,10 @@ CALLS = ONE_CALL.replace("fog.transmittance +", "fog.transmittance * nebel_trans
 # What the text declares beside fog along rays.
 OTHER_DEFINES = """#define NEBEL_TILES
 #define NEBEL_TRANSPARENT
-#define NEBEL_AIR
+#define NEBEL_SKY_VIEW
 uniform highp sampler2D opaque;
 #define NEBEL_OPAQUE_DEPTH(at) texture(opaque, at).x
-#define NEBEL_PLAIN_FEATURES
+#define NEBEL_FEATURES_LITERAL
 #define NEBEL_FEATURES 2
 """
 OTHER_CALLS = """
@@ -48,17 +48,17 @@ uniform vec4 place;
 out vec4 color;
 void main()
 {
-    nebel_sight sight = nebel_see(gl_FragCoord.xy, place.x);
+    nebel_view_ray sight = nebel_make_view_ray(gl_FragCoord.xy, place.x);
     nebel_transfer fog = nebel_trace_list(sight.origin, sight.direction, sight.t_max, 3, 4);
-    nebel_transfer air = nebel_trace_air(sight.direction, sight.t_max);
-    nebel_ground ground = nebel_find_ground(sight.direction);
-    float length = nebel_ball_length(sight.origin, sight.direction, sight.t_max, place.xyz, 2.0, 3);
-    length += nebel_gaussian_length(sight.origin, sight.direction, sight.t_max, place.xyz, 3.0, 1.0);
-    nebel_blend blend = nebel_blend_medium(nebel_medium_light(length, place.xyz, place.xyz), fog);
+    nebel_transfer air = nebel_trace_atmosphere(sight.direction, sight.t_max);
+    nebel_ground ground = nebel_trace_ground(sight.direction);
+    float length = nebel_sphere_path_length(sight.origin, sight.direction, sight.t_max, place.xyz, 2.0, 3);
+    length += nebel_gaussian_path_length(sight.origin, sight.direction, sight.t_max, place.xyz, 3.0, 1.0);
+    nebel_blend blend = nebel_blend_medium(nebel_medium_transfer(length, place.xyz, place.xyz), fog);
     blend.source += nebel_blend_over(place.xyz, 0.5, fog).source + nebel_blend_screen(place.xyz, fog).source;
-    color = nebel_blend_grey(blend) * nebel_five_taps(place.xy, place.z, nebel_default_taps());
-    color.xyz += air.transmittance * air.in_scattering + ground.sun + ground.sky + nebel_environment_radiance(ground.normal);
-    color.xyz += nebel_transmit_light_list(sight.origin, sight.direction, place.y, 0, 1);
+    color = nebel_blend_gray(blend) * nebel_five_taps(place.xy, place.z, nebel_default_taps());
+    color.xyz += air.transmittance * air.in_scattering + ground.sun + ground.sky + nebel_evaluate_environment(ground.normal);
+    color.xyz += nebel_transmit_shadow_list(sight.origin, sight.direction, place.y, 0, 1);
 }"""
 
 CHROMIUM = ["chromium", "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -71,7 +71,7 @@ def run(*words, **more):
 
 
 def feature_set(name, features):
-    return {"name": name, "calls": CALLS, "defines": f"#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES {features}\n"}
+    return {"name": name, "calls": CALLS, "defines": f"#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES {features}\n"}
 
 
 def feature_sets(scenes, pictures):

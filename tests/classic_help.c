@@ -133,13 +133,13 @@ static void fog_mesh(classic_mesh *mesh)
     classic_vertex *const v = mesh->vertices;
     nebel_snapshot *const fog = commit_fog();
     nebel_vertices points = {.positions = v[0].place, .position_stride = sizeof *v};
-    assert_int_equal(nebel_find_eye(mesh->eye_from_object.m, points.eye), NEBEL_OK);
+    assert_int_equal(nebel_compute_object_eye(mesh->eye_from_object.m, points.eye), NEBEL_OK);
     const nebel_vertex_output outputs[] = {{NEBEL_VERTEX_COORDINATE, &v[0].coordinate, sizeof *v},
                                            {NEBEL_VERTEX_RGBA_FLOAT, v[0].light, sizeof *v},
                                            {NEBEL_VERTEX_RGBA8, v[0].bytes, sizeof *v},
                                            {NEBEL_VERTEX_ALPHA, v[0].alpha, sizeof *v}};
-    assert_int_equal(nebel_fog_vertices(fog, &(nebel_vertex_desc){.color = classic_color}, CLASSIC_VERTICES, &points,
-                                        outputs, sizeof outputs / sizeof *outputs),
+    assert_int_equal(nebel_compute_vertex_fog(fog, &(nebel_vertex_desc){.color = classic_color}, CLASSIC_VERTICES,
+                                              &points, outputs, sizeof outputs / sizeof *outputs),
                      NEBEL_OK);
     nebel_release_snapshot(fog);
 }
@@ -254,14 +254,14 @@ void classic_draw(nebel_gl_classic_kind kind, classic_mesh *mesh, nebel_vertex_f
     const int one_pass = kind == NEBEL_GL_CLASSIC_FOG_COORD;
     void (*const draw)(const classic_mesh *) = rich ? classic_draw_rich : classic_draw_plain;
     nebel_gl_classic *const classic = classic_create(kind);
-    assert_int_equal(nebel_gl_classic_method(classic), kind);
+    assert_int_equal(nebel_gl_get_classic_method(classic), kind);
     classic_clear();
     classic_set_mesh(mesh);
     if (!one_pass) draw(mesh);
-    assert_int_equal(nebel_gl_begin_classic(classic, classic_color_float), NEBEL_OK);
-    assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_OK);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, classic_color_float), NEBEL_OK);
+    assert_int_equal(nebel_gl_bind_classic_stream(classic, &stream, 0), NEBEL_OK);
     if (one_pass) draw(mesh);
     if (!one_pass) classic_draw_positions(mesh);
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
     nebel_destroy_gl_classic(classic);
 }

@@ -40,7 +40,7 @@ static inline float extinction_at(const nebel_clouds *clouds, double time, doubl
 {
     const double place[1][3] = {{x, y, z}};
     float extinction;
-    assert_int_equal(nebel_cloud_extinction(clouds, time, width, 1, place, 0, &extinction), NEBEL_OK);
+    assert_int_equal(nebel_compute_cloud_extinction(clouds, time, width, 1, place, 0, &extinction), NEBEL_OK);
     return extinction;
 }
 
@@ -51,12 +51,13 @@ static inline float above(const nebel_clouds *clouds, double height, double x, d
     return extinction_at(clouds, 0, width, x * scale, y * scale - RADIUS, z * scale);
 }
 
-static inline nebel_cloud_view *view_of(const nebel_clouds *clouds, double tolerance, nebel_cloud_workspace **workspace)
+static inline nebel_cloud_lighting *view_of(const nebel_clouds *clouds, double tolerance,
+                                            nebel_cloud_workspace **workspace)
 {
-    nebel_cloud_view *view;
-    const nebel_cloud_view_desc desc = {
+    nebel_cloud_lighting *view;
+    const nebel_cloud_lighting_desc desc = {
         .clouds = clouds, .sun = {.direction = {.6, .7, .1}, .irradiance = {5, 4, 3}}, .tolerance = tolerance};
-    assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_OK);
     assert_int_equal(nebel_create_cloud_workspace(view, workspace), NEBEL_OK);
     return view;
 }
@@ -69,7 +70,8 @@ static inline double brute_force(const nebel_clouds *clouds, const nebel_ray *ra
     float extinction;
     for (double t = begin + .5 * step; t < end && depth < 12; t += step) {
         for (int c = 0; c < 3; c++) place[0][c] = ray->origin[c] + t * ray->direction[c];
-        assert_int_equal(nebel_cloud_extinction(clouds, 0, 0, 1, (const double(*)[3])place, 0, &extinction), NEBEL_OK);
+        assert_int_equal(nebel_compute_cloud_extinction(clouds, 0, 0, 1, (const double(*)[3])place, 0, &extinction),
+                         NEBEL_OK);
         depth += step * (double)extinction;
     }
     return exp(-depth);

@@ -15,7 +15,7 @@ typedef struct crowd {
     nebel_volume_desc volumes[CROWD_MOST + 1];
     size_t count, lamp_count;
     nebel_fog_desc desc;
-    nebel_lamp lamps[2];
+    nebel_light lamps[2];
 } crowd;
 
 static inline nebel_volume_desc *crowd_add(crowd *c, nebel_shape shape)
@@ -93,7 +93,7 @@ static inline void crowd_set_lamps(crowd *c)
     crowd_set_albedo(c);
     c->lamp_count = 2;
     for (int i = 0; i < 2; i++) {
-        c->lamps[i] = (nebel_lamp){.intensity = {20 - 5 * i, 15, 10 + 5 * i}, .radius = .1};
+        c->lamps[i] = (nebel_light){.intensity = {20 - 5 * i, 15, 10 + 5 * i}, .radius = .1};
         for (int k = 0; k < 3; k++) c->lamps[i].position[k] = pass_eye[k] + (k == 2 ? -4 - 5 * i : 1 - 2 * i);
     }
 }

@@ -99,7 +99,7 @@ const size_t d3d9_fact_count = sizeof d3d9_facts / sizeof *d3d9_facts;
 static double vertex_factor(const nebel_d3d9_fog *fog, const d3d9_quad *quad, int side)
 {
     const nebel_d3d9_vertex vertex = {.source = quad->source,
-                                      .place = {side ? 1 : -1, 1, quad->z[side] + quad->world},
+                                      .position = {side ? 1 : -1, 1, quad->z[side] + quad->world},
                                       .specular_alpha = quad->alpha[side],
                                       .fog_register = quad->fog_register};
     return nebel_compute_d3d9_vertex_factor(fog, &vertex);

@@ -42,7 +42,8 @@ static inline double depth_of_segment(const nebel_snapshot *fog, int ignore)
     const float from[3] = {0, .5f, .25f}, to[3] = {DEPTH_RAY_LENGTH, .5f, .25f};
     float transmittance;
     const nebel_segments segments = {.from = from, .to = to, .ignore_distances = ignore};
-    assert_int_equal(nebel_transmit_segments(fog, NEBEL_ISA_DEFAULT, 1, 1, &segments, &transmittance, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_segment_transmittance(fog, NEBEL_ISA_DEFAULT, 1, 1, &segments, &transmittance, 0),
+                     NEBEL_OK);
     return -log((double)transmittance);
 }
 
@@ -51,9 +52,14 @@ static inline double depth_of_pixel(const nebel_snapshot *fog)
     const float depth = DEPTH_RAY_LENGTH;
     const uint8_t white[4] = {255, 255, 255, 255};
     uint8_t out[4];
-    const nebel_pixels pixels = {
-        .eye = {0, .5, .25}, .corner = {1, 0, 0}, .width = 1, .height = 1, .depth = &depth, .color = white, .out = out};
-    assert_int_equal(nebel_fog_pixels(fog, NEBEL_ISA_DEFAULT, &pixels), NEBEL_OK);
+    const nebel_pixels pixels = {.eye = {0, .5, .25},
+                                 .corner = {1, 0, 0},
+                                 .width = 1,
+                                 .height = 1,
+                                 .depth = &depth,
+                                 .color = white,
+                                 .output = out};
+    assert_int_equal(nebel_apply_fog_to_pixels(fog, NEBEL_ISA_DEFAULT, &pixels), NEBEL_OK);
     return -log(out[1] / 255.0);
 }
 
@@ -73,9 +79,9 @@ static inline void assert_found(const nebel_snapshot *fog, double depth)
     const double all = exp(-depth), nearly = exp(-depth * (1 - 1e-9));
     nebel_ray far = along;
     far.t_max = 1e3;
-    assert_int_equal(nebel_find_transmittance(fog, all * (1 - 1e-9), 1, 1, &far, sizeof far, &distance), NEBEL_OK);
+    assert_int_equal(nebel_invert_transmittance(fog, all * (1 - 1e-9), 1, 1, &far, sizeof far, &distance), NEBEL_OK);
     assert_true(distance == HUGE_VAL);
-    assert_int_equal(nebel_find_transmittance(fog, nearly, 1, 1, &far, sizeof far, &distance), NEBEL_OK);
+    assert_int_equal(nebel_invert_transmittance(fog, nearly, 1, 1, &far, sizeof far, &distance), NEBEL_OK);
     assert_true(distance <= DEPTH_RAY_LENGTH);
 }
 

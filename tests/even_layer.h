@@ -15,14 +15,14 @@
 typedef struct even {
     nebel_atmosphere *air;
     nebel_clouds *clouds;
-    nebel_cloud_view *view;
+    nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
 } even;
 
 static inline void even_free(even *e)
 {
     nebel_destroy_cloud_workspace(e->workspace);
-    nebel_destroy_cloud_view(e->view);
+    nebel_destroy_cloud_lighting(e->view);
     nebel_destroy_clouds(e->clouds);
     nebel_destroy_atmosphere(e->air);
 }
@@ -32,27 +32,27 @@ static inline void even_make(double extinction, double sun_cosine, even *e)
     /* Air that does nothing over a black ground. */
     const nebel_atmosphere_desc bare = {.radius = FLAT_RADIUS,
                                         .thickness = 1e5,
-                                        .air_count = 1,
-                                        .airs = {{.absorption = {1e-20, 1e-20, 1e-20}, .scale_height = 1e5}}};
+                                        .component_count = 1,
+                                        .components = {{.absorption = {1e-20, 1e-20, 1e-20}, .scale_height = 1e5}}};
     assert_int_equal(nebel_create_atmosphere(&bare, &e->air), NEBEL_OK);
     const nebel_clouds_desc desc = {.atmosphere = e->air,
                                     .layer_count = 1,
-                                    .layers = {{.kind = NEBEL_CLOUD_STRATUS,
+                                    .layers = {{.type = NEBEL_CLOUD_STRATUS,
                                                 .base = BASE,
                                                 .top = TOP,
                                                 .coverage = 1,
                                                 .extinction = extinction,
-                                                .size = 1e5,
-                                                .detail = NEBEL_CLOUD_NONE,
-                                                .variation = NEBEL_CLOUD_NONE,
-                                                .diameter = DIAMETER,
+                                                .cell_size = 1e5,
+                                                .erosion = NEBEL_CLOUD_NONE,
+                                                .patchiness = NEBEL_CLOUD_NONE,
+                                                .droplet_diameter = DIAMETER,
                                                 .seed = 1}}};
     assert_int_equal(nebel_create_clouds(&desc, &e->clouds), NEBEL_OK);
-    const nebel_cloud_view_desc view = {
+    const nebel_cloud_lighting_desc view = {
         .clouds = e->clouds,
         .sun = {.direction = {sqrt(1 - sun_cosine * sun_cosine), sun_cosine, 0}, .irradiance = {1, 1, 1}},
         .tolerance = 1e-4};
-    assert_int_equal(nebel_create_cloud_view(&view, &e->view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_lighting(&view, &e->view), NEBEL_OK);
     assert_int_equal(nebel_create_cloud_workspace(e->view, &e->workspace), NEBEL_OK);
 }
 
@@ -75,9 +75,9 @@ static inline double column(double sun_cosine)
 static inline double share_of_sun(const even *e)
 {
     float part;
-    assert_int_equal(
-        nebel_shade_clouds(e->workspace, 100, 1, (const double(*)[3])(const double[1][3]){{0, 10, 0}}, 0, &part),
-        NEBEL_OK);
+    assert_int_equal(nebel_compute_cloud_sun_transmittance(
+                         e->workspace, 100, 1, (const double(*)[3])(const double[1][3]){{0, 10, 0}}, 0, &part),
+                     NEBEL_OK);
     return (double)part;
 }
 
@@ -89,7 +89,7 @@ static inline double radiance(const even *e, double down, double around)
     const double height = down > 0 ? TOP + 500 : BASE - 500, way = (height - middle) / down, spread = 1e-4;
     const nebel_ray ray = {
         {-way * level * around, height, -way * level * side}, {level * around, -down, level * side}, HUGE_VAL};
-    nebel_cloud_knots knots;
+    nebel_cloud_transfer knots;
     assert_int_equal(nebel_trace_clouds(e->workspace, 1, &ray, 0, &spread, 0, &knots, 0), NEBEL_OK);
     assert_true(knots.count > 0);
     return (double)knots.in_scattering[knots.count - 1][1];

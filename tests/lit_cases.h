@@ -10,8 +10,8 @@
 typedef struct lit_case {
     const char *name;
     nebel_volume_desc volume;
-    nebel_sun sun;   /* of one colour; none: the lamp */
-    nebel_lamp lamp; /* the same */
+    nebel_sun sun;    /* of one colour; none: the lamp */
+    nebel_light lamp; /* the same */
     nebel_ray ray;
     double right; /* radiance, to six digits */
     double tolerance;

@@ -104,7 +104,7 @@ double lit_density_at(const lit_medium *m, double t)
     const nebel_shape *s = &m->volume->shape;
     double p[3];
     if (d->type == NEBEL_DENSITY_CONSTANT) return 1;
-    if (d->type == NEBEL_DENSITY_SOFT_EDGE) return lit_edge_at(s, d->distance, &m->local, t);
+    if (d->type == NEBEL_DENSITY_SOFT_EDGE) return lit_edge_at(s, d->edge_width, &m->local, t);
     const int is_local = d->type == NEBEL_DENSITY_RADIAL || d->type == NEBEL_DENSITY_GRID;
     at(is_local ? &m->local : m->world, t, p);
     switch (d->type) {
@@ -182,7 +182,7 @@ void lit_density_cut(const lit_medium *m, double a, double b, lit_cuts *cuts)
         cut_altitude(m, a, b, cuts);
         return;
     case NEBEL_DENSITY_SOFT_EDGE:
-        lit_edge_cut(&m->volume->shape, d->distance, &m->local, a, b, cuts);
+        lit_edge_cut(&m->volume->shape, d->edge_width, &m->local, a, b, cuts);
         return;
     case NEBEL_DENSITY_GRID:
         cut_grid(m, a, b, cuts);
@@ -285,6 +285,6 @@ double lit_density_amount(const lit_medium *m, double a, double b)
     if (d->type == NEBEL_DENSITY_HEIGHT) return amount_of_height(d, m->world, a, b);
     if (d->type == NEBEL_DENSITY_GAUSSIAN) return amount_of_gaussian(d, m->world, a, b);
     if (d->type == NEBEL_DENSITY_SOFT_EDGE && lit_edge_has_faces(s))
-        return lit_edge_amount_of_faces(s, d->distance, &m->local, a, b);
+        return lit_edge_amount_of_faces(s, d->edge_width, &m->local, a, b);
     return sum_of_pieces(m, a, b);
 }

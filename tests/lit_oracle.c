@@ -18,17 +18,17 @@ static double smoothed(double cosine, double outer, double inner)
     return s * s * (3 - 2 * s);
 }
 
-static double radius_of(const nebel_lamp *lamp)
+static double radius_of(const nebel_light *lamp)
 {
     return lamp->radius > 0 ? lamp->radius : 1e-3;
 }
 
 /* What arrives of a lamp without fog, at a place from which it is seen in the direction `towards`. */
-static double fluence_of(const nebel_lamp *lamp, double distance, const double towards[3])
+static double fluence_of(const nebel_light *lamp, double distance, const double towards[3])
 {
     const double radius = radius_of(lamp), square = fmax(distance * distance, radius * radius);
     const double fluence = 2 / (square * (1 + sqrt(fmax(0, 1 - radius * radius / square))));
-    if (lamp->type != NEBEL_LAMP_SPOT) return fluence;
+    if (lamp->type != NEBEL_LIGHT_SPOT) return fluence;
     const double cosine = -lit_dot(towards, lamp->direction) / sqrt(lit_dot(lamp->direction, lamp->direction));
     return fluence * smoothed(cosine, cos(lamp->outer_angle * degree), cos(lamp->inner_angle * degree));
 }
@@ -39,7 +39,7 @@ static void look_at_light(const lit_fog *fog, int light, const lit_line *l, doub
 {
     lit_line way;
     double depth[3], end = HUGE_VAL, fluence = 1;
-    const nebel_lamp *lamp = light >= 0 ? &fog->scene->lamps[light] : NULL;
+    const nebel_light *lamp = light >= 0 ? &fog->scene->lamps[light] : NULL;
     for (int k = 0; k < 3; k++) {
         way.o[k] = l->o[k] + t * l->d[k];
         way.d[k] = lamp != NULL ? lamp->position[k] - way.o[k] : fog->scene->sun.direction[k];
@@ -108,7 +108,7 @@ static void light_at(walk *w, double t, double value[3])
         const double density = lit_fog_density(w->fog, w->there.volumes[i], w->ray, t);
         if (w->light == OWN) add_own(w, v, density, glow);
         if (w->light == OWN || !(v->albedo[0] + v->albedo[1] + v->albedo[2] > 0)) continue;
-        const double scattered = nebel_phase_value(&v->phase, cosine) * density;
+        const double scattered = nebel_evaluate_phase(&v->phase, cosine) * density;
         for (int c = 0; c < 3; c++) glow[c] += v->extinction[c] * v->albedo[c] * scattered;
     }
     for (int c = 0; c < 3; c++) value[c] = glow[c] * exp(-depth[c]) * arriving[c];
@@ -195,7 +195,7 @@ static void refine(walk *w, double a, double b, const part *whole, double allowe
 /* ---- panels ---------------------------------------------------------------------------------- */
 
 /* Where the ray crosses the cone of all directions at an angle from the lamp's axis. */
-static void cut_cone(const nebel_lamp *lamp, double angle, const lit_line *l, lit_cuts *cuts)
+static void cut_cone(const nebel_light *lamp, double angle, const lit_line *l, lit_cuts *cuts)
 {
     double p[3];
     const double cosine = cos(angle * degree), share = cosine * cosine * lit_dot(lamp->direction, lamp->direction);
@@ -209,7 +209,7 @@ static void cut_cone(const nebel_lamp *lamp, double angle, const lit_line *l, li
     lit_add_cut(cuts, c / sum);
 }
 
-static void cut_at_lamp(const nebel_lamp *lamp, const lit_line *l, lit_cuts *cuts)
+static void cut_at_lamp(const nebel_light *lamp, const lit_line *l, lit_cuts *cuts)
 {
     double p[3];
     for (int k = 0; k < 3; k++) p[k] = lamp->position[k] - l->o[k];
@@ -218,7 +218,7 @@ static void cut_at_lamp(const nebel_lamp *lamp, const lit_line *l, lit_cuts *cut
     lit_add_cut(cuts, nearest);
     if (square > 0) lit_add_cut(cuts, nearest - sqrt(square));
     if (square > 0) lit_add_cut(cuts, nearest + sqrt(square));
-    if (lamp->type != NEBEL_LAMP_SPOT) return;
+    if (lamp->type != NEBEL_LIGHT_SPOT) return;
     cut_cone(lamp, lamp->outer_angle, l, cuts);
     cut_cone(lamp, lamp->inner_angle, l, cuts);
 }

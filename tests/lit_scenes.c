@@ -31,7 +31,7 @@ static nebel_phase draw_phase(uint64_t *dices)
     nebel_phase phase = {.type = (nebel_phase_type)dice_below(dices, NEBEL_PHASE_COUNT)};
     phase.g = dice(dices, -0.9, 0.9);
     phase.alpha = dice(dices, 0, 2);
-    phase.diameter = power_of_ten(dices, -1, log10(NEBEL_MAX_DROPLET));
+    phase.diameter = power_of_ten(dices, -1, log10(NEBEL_MAX_DROPLET_DIAMETER));
     return phase;
 }
 
@@ -61,10 +61,10 @@ static void draw_sun(uint64_t *dices, nebel_sun *sun)
     for (int c = 0; c < 3; c++) sun->irradiance[c] = 3 - c;
 }
 
-static void draw_lamp(uint64_t *dices, nebel_lamp *lamp)
+static void draw_lamp(uint64_t *dices, nebel_light *lamp)
 {
-    *lamp = (nebel_lamp){.type = one_of(dices, 3) ? NEBEL_LAMP_SPOT : NEBEL_LAMP_POINT,
-                         .radius = one_of(dices, 2) ? 0 : dice(dices, 0.01, 1)};
+    *lamp = (nebel_light){.type = one_of(dices, 3) ? NEBEL_LIGHT_SPOT : NEBEL_LIGHT_POINT,
+                          .radius = one_of(dices, 2) ? 0 : dice(dices, 0.01, 1)};
     lamp->outer_angle = dice(dices, 5, one_of(dices, 4) ? 180 : 80);
     lamp->inner_angle = lamp->outer_angle * (one_of(dices, 4) ? 1 : dice(dices, 0, 1));
     for (int k = 0; k < 3; k++) {
@@ -102,7 +102,8 @@ static void draw_voxels(uint64_t *dices, lit_draw *draw)
     draw->scene.is_nearest = one_of(dices, 3);
     const nebel_grid_desc desc = {.size = {LIT_SIDE, LIT_SIDE, LIT_SIDE},
                                   .voxels = draw->voxels,
-                                  .filter = draw->scene.is_nearest ? NEBEL_FILTER_NEAREST : NEBEL_FILTER_LINEAR};
+                                  .filter =
+                                      draw->scene.is_nearest ? NEBEL_GRID_FILTER_NEAREST : NEBEL_GRID_FILTER_LINEAR};
     nebel_create_grid(&desc, &draw->grid);
     *v = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX},
                              .density = {.type = NEBEL_DENSITY_GRID, .grid = draw->grid}};
@@ -131,7 +132,7 @@ static void draw_soft_edges(uint64_t *dices, lit_draw *draw)
 {
     nebel_volume_desc *v = &draw->volumes[0];
     draw_shape(dices, shapes[dice_below(dices, LIT_KIND_WORLD)], draw, v);
-    v->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = power_of_ten(dices, -1.5, 0.8)};
+    v->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = power_of_ten(dices, -1.5, 0.8)};
     draw->count = 1;
 }
 
@@ -140,7 +141,7 @@ static void draw_altitude(uint64_t *dices, lit_draw *draw)
 {
     nebel_volume_desc *v = &draw->volumes[0];
     const double scale_height = power_of_ten(dices, -0.5, 1);
-    const double radius = fmax(power_of_ten(dices, 1.5, 6.8), 1.5 * NEBEL_MIN_CURVATURE * scale_height);
+    const double radius = fmax(power_of_ten(dices, 1.5, 6.8), 1.5 * NEBEL_MIN_ALTITUDE_RATIO * scale_height);
     draw_shape(dices, one_of(dices, 2) ? NEBEL_SHAPE_WORLD : shapes[dice_below(dices, LIT_KIND_WORLD)], draw, v);
     v->density = (nebel_density){.type = NEBEL_DENSITY_ALTITUDE,
                                  .below = one_of(dices, 2) ? NEBEL_BELOW_GROW : NEBEL_BELOW_CONSTANT,

@@ -43,7 +43,7 @@ typedef struct lit_draw {
     random_fog random;
     nebel_volume_desc volumes[LIT_CROWD];
     size_t count;
-    nebel_lamp lamps[LIT_MAX_LAMPS];
+    nebel_light lamps[LIT_MAX_LAMPS];
     float voxels[LIT_SIDE * LIT_SIDE * LIT_SIDE];
     nebel_grid *grid;
 } lit_draw;

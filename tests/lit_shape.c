@@ -28,7 +28,7 @@ static void undo(const nebel_transform *t, double p[3], int is_point)
 }
 
 /* A part's transform goes before its whole's: `chain` are those of the wholes, the outermost first. */
-enum { MAX_CHAIN = NEBEL_MAX_DEPTH + 1 };
+enum { MAX_CHAIN = NEBEL_MAX_SHAPE_NESTING + 1 };
 
 static void set_rows(const nebel_transform *const *chain, int depth, lit_leaf *leaf)
 {

@@ -56,7 +56,7 @@ static inline void assert_broken(const char *members, nebel_result wanted, const
     nebel_scene *scene = load(members, &result, &kept);
     if (result != wanted || strstr(kept.last, message) == NULL) fail_msg("gave %d: %s", result, kept.last);
     assert_non_null(strstr(kept.last, "scene.json:1:"));
-    assert_int_equal(nebel_scene_contents(scene)->mesh_count, 0);
+    assert_int_equal(nebel_get_scene_data(scene)->mesh_count, 0);
     nebel_destroy_scene(scene);
 }
 

@@ -11,25 +11,25 @@ import re
 import sys
 
 # Good values by type; those of output are members of `out`, those of objects members of `made`.
-OBJECTS = ["cells", "fog", "snapshot", "environment_map", "grid", "layers", "atmosphere", "air_view", "clouds", "cloud_view",
-           "cloud_workspace", "scene", "renderer", "film", "image_writer", "gl", "gl_classic", "gl_renderer"]
+OBJECTS = ["cells", "fog", "snapshot", "environment_map", "grid", "textured_planet", "atmosphere", "sky_view", "clouds", "cloud_lighting",
+           "cloud_workspace", "scene", "renderer", "movie", "image_writer", "gl", "gl_classic", "gl_renderer"]
 INPUTS = ["cell", "cells_desc", "cell_view", "cell_point", "factor_desc", "d3d9_fog", "d3d9_vertex", "curve", "vertex_desc", "vertices",
-          "vertex_output", "tessellation_desc", "triangles", "cloud_layer", "log", "clouds_desc", "cloud_view_desc", "ray",
-          "diffusion_desc", "environment_map_desc", "environment", "map_desc", "map", "layers_desc", "layer_view", "grid_desc",
-          "noise_desc", "phase", "droplet_sizes", "fog_desc", "volume_desc", "sun", "lamp", "trace_desc", "ray_planes", "light_planes",
-          "segments", "pixels", "light", "particle", "nebula_desc", "place", "atmosphere_desc", "air_view_desc", "ground_planes",
-          "renderer_desc", "method_desc", "frame_desc", "frame", "scene_desc", "planet", "model", "camera_key", "sun_key", "volume_key",
-          "scene_noise", "image", "image_desc", "film_desc", "grid_file", "view", "depth_desc", "camera", "gl_desc", "gl_pass", "gl_classic_desc",
+          "vertex_output", "tessellation_desc", "triangles", "cloud_layer", "log", "clouds_desc", "cloud_lighting_desc", "ray",
+          "diffusion_desc", "environment_map_desc", "environment", "planet_map_desc", "planet_map", "textured_planet_desc", "textured_planet_query", "grid_desc",
+          "noise_desc", "phase", "droplet_distribution", "fog_desc", "volume_desc", "sun", "light", "trace_desc", "ray_planes", "transfer_planes",
+          "segments", "pixels", "transfer", "particle", "nebula_desc", "sample_point", "atmosphere_desc", "sky_view_desc", "ground_planes",
+          "cpu_renderer_desc", "method_desc", "frame_desc", "frame", "scene_desc", "planet", "scene_model", "camera_key", "sun_key", "volume_key",
+          "scene_noise", "image", "image_desc", "movie_desc", "grid_file", "view", "depth_desc", "camera", "gl_desc", "gl_pass", "gl_classic_desc",
           "gl_renderer_desc", "gl_frame_desc", "gl_planes", "photograph", "intrinsics", "depth_source"]
-OUTPUTS = ["cell_fog", "cell_layer", "factor_desc", "d3d9_fog", "curve", "vertex_desc", "cloud_layer", "cloud_knots", "air_shade",
-           "fog_shade", "map", "layer_hits", "droplet_sums", "volume_id", "sunlit_fog", "split_fog", "light", "particle", "matter",
-           "scatterer", "bound", "atmosphere_desc", "air_light", "sun", "environment", "scene_noise", "image", "rays", "view_error", "word", "texel",
-           "gl_fog", "gl_textures", "view", "photograph", "intrinsics", "pixels", "depth_map"]
+OUTPUTS = ["cell_fog", "cell_segment", "factor_desc", "d3d9_fog", "curve", "vertex_desc", "cloud_layer", "cloud_transfer", "air_shadow",
+           "fog_shadow", "planet_map", "shell_hits", "droplet_properties", "volume_id", "sunlit_fog", "split_fog", "transfer", "particle", "medium_properties",
+           "scatterer", "majorant_segment", "atmosphere_desc", "irradiance", "sun", "environment", "scene_noise", "image", "rays", "view_error", "texel_f32", "texel_u32",
+           "gl_fog_resources", "gl_textures", "view", "photograph", "intrinsics", "pixels", "depth_map"]
 FRESH = OBJECTS + ["particle", "tessellation"]
 POINTERS = {"const char": '"test_null"', "const float": "floats", "float": "out.floats", "double": "&out.number", "const double": "numbers", "size_t": "&out.count",
             "const size_t": "&zero", "uint32_t": "out.entries", "void": "&out"}
 VALUES = {"nebel_isa": "NEBEL_ISA_DEFAULT", "nebel_method": "NEBEL_METHOD_VERTEX", "nebel_cell_stage": "NEBEL_CELLS_PER_VERTEX",
-          "nebel_blend_mode": "NEBEL_BLEND_OVER", "nebel_dialect": "NEBEL_DIALECT_GLSL_330", "nebel_volume_id": "made.id",
+          "nebel_blend_mode": "NEBEL_BLEND_OVER", "nebel_shader_dialect": "NEBEL_DIALECT_GLSL_330", "nebel_volume_id": "made.id",
           "nebel_result": "NEBEL_OK"}
 NAMED = {"transmittance": ".5", "f": ".5", "chance": ".5", "tile_size": "16", "capacity": "64", "size": "2", "n": "1", "count": "1",
          "output_count": "1", "room": "1", "parts": "1", "width": "1", "height": "1", "thickness": "1e5", "scale": "1"}
@@ -65,7 +65,7 @@ def of_structure(kind, is_const):
     if is_const and kind in INPUTS:
         return f"&good_{kind}"
     if not is_const and kind in OUTPUTS:
-        return f"out.{kind}" if kind in ("word", "texel") else f"&out.{kind}"
+        return f"out.{kind}" if kind in ("texel_f32", "texel_u32") else f"&out.{kind}"
     return None
 
 

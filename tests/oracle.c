@@ -163,7 +163,7 @@ static void place_radial(volume *v, const oracle_line *ray)
 static void place_edge(trace *tr, volume *v, const oracle_line *ray)
 {
     real cuts[ORACLE_EDGE_CUTS];
-    v->edge = oracle_edge_of(&v->desc->shape, v->desc->density.distance, ray);
+    v->edge = oracle_edge_of(&v->desc->shape, v->desc->density.edge_width, ray);
     const size_t n = oracle_edge_cuts(&v->edge, cuts);
     for (size_t i = 0; i < n; i++) add_cut(tr, cuts[i]);
 }
@@ -174,7 +174,7 @@ static void place_soft_edge(trace *tr, volume *v, const oracle_line *ray)
     const nebel_shape *const shape = &v->desc->shape;
     const oracle_line l = oracle_to_local(&shape->transform, ray);
     for (int k = 0; k < 3; k++) {
-        const real low = REAL(shape->min[k]), high = REAL(shape->max[k]), w = REAL(v->desc->density.distance);
+        const real low = REAL(shape->min[k]), high = REAL(shape->max[k]), w = REAL(v->desc->density.edge_width);
         const real start = l.o[k] - (low + high) / 2, flat = (high - low) / 2 - w;
         set_line(v, k, start, l.d[k]);
         add_kink(tr, start, l.d[k], 0);
@@ -226,7 +226,7 @@ static void soft_edge_at(const volume *v, long double a, double h, double densit
         const long double half = (LONG(shape->max[k]) - LONG(shape->min[k])) / 2;
         for (int i = 0; i < NODES; i++) {
             const double depth = (double)(half - fabsl(start + slope * LONG(h * node[i])));
-            density[i] *= fmin(1, fmax(0, depth) / v->desc->density.distance);
+            density[i] *= fmin(1, fmax(0, depth) / v->desc->density.edge_width);
         }
     }
 }

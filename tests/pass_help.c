@@ -183,12 +183,12 @@ static float store(const pass_picture *p, const line *ray, double t)
     for (int i = 0; i < 3; i++) point[i] = (double)(ray->origin[i] + (long double)t * ray->direction[i]);
     const int inside = !isinf(t) && project(&p->view, p->clip, point, place, &n);
     for (int i = 0; i < 3; i++) eye -= p->view.eye_from_world[4 * i + 2] * (point[i] - pass_eye[i]);
-    switch (p->depth.kind) {
-    case NEBEL_DEPTH_KIND_AXIS:
+    switch (p->depth.encoding) {
+    case NEBEL_DEPTH_ENCODING_AXIAL:
         return isinf(t) ? 0 : (float)eye;
-    case NEBEL_DEPTH_KIND_DISTANCE:
+    case NEBEL_DEPTH_ENCODING_RADIAL:
         return isinf(t) ? -1 : (float)t;
-    case NEBEL_DEPTH_KIND_LOGARITHM:
+    case NEBEL_DEPTH_ENCODING_LOGARITHMIC:
         return isinf(t) ? 1 : (float)(log1p(p->depth.log_scale * eye) / log1p(p->depth.log_scale * p->depth.log_far));
     default:
         return (float)stored(p->clip, first, last, inside ? n : p->clip.reversed ? p->clip.low : 1);
@@ -210,15 +210,15 @@ static double distance(const pass_picture *p, const line *ray, double x, double 
     const double first = p->depth.range[0], last = p->depth.range[1] != first ? p->depth.range[1] : 1;
     const double far = p->clip.reversed ? first : last;
     long double point[3], along = 0, cosine = 0;
-    switch (p->depth.kind) {
-    case NEBEL_DEPTH_KIND_AXIS:
-    case NEBEL_DEPTH_KIND_LOGARITHM:
-        if (p->depth.kind == NEBEL_DEPTH_KIND_AXIS ? depth <= 0 : depth == 1) return HUGE_VAL;
-        if (p->depth.kind == NEBEL_DEPTH_KIND_LOGARITHM)
+    switch (p->depth.encoding) {
+    case NEBEL_DEPTH_ENCODING_AXIAL:
+    case NEBEL_DEPTH_ENCODING_LOGARITHMIC:
+        if (p->depth.encoding == NEBEL_DEPTH_ENCODING_AXIAL ? depth <= 0 : depth == 1) return HUGE_VAL;
+        if (p->depth.encoding == NEBEL_DEPTH_ENCODING_LOGARITHMIC)
             depth = expm1(depth * log1p(p->depth.log_scale * p->depth.log_far)) / p->depth.log_scale;
         for (int i = 0; i < 3; i++) cosine -= (long double)p->view.eye_from_world[4 * i + 2] * ray->direction[i];
         return (double)((long double)depth / cosine);
-    case NEBEL_DEPTH_KIND_DISTANCE:
+    case NEBEL_DEPTH_ENCODING_RADIAL:
         return depth <= 0 ? HUGE_VAL : depth;
     default:
         if (depth == (double)(float)far) return HUGE_VAL;

@@ -61,14 +61,14 @@ static void render_cpu(const nebel_scene_data *scene, nebel_snapshot *fog, const
                        picture_pair *pair)
 {
     nebel_renderer *renderer = NULL;
-    const nebel_renderer_desc desc = {.log = {write_message, NULL}};
+    const nebel_cpu_renderer_desc desc = {.log = {write_message, NULL}};
     const nebel_frame_desc frame = {.camera = *camera,
                                     .width = pair->width,
                                     .height = pair->height,
                                     .samples = samples,
                                     .tolerance = pair->tolerance,
                                     .time = pair->time};
-    assert_int_equal(nebel_create_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &pair->cpu), NEBEL_OK);
     nebel_destroy_renderer(renderer);
 }

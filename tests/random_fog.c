@@ -131,7 +131,7 @@ static void make_density(uint64_t *state, const nebel_shape *shape, nebel_densit
     places(state, -8, 8, d->center);
     d->power = 1 + dice_below(state, 3);
     d->sigma = dice(state, 1.5, 6);
-    d->distance = dice(state, .3, 4);
+    d->edge_width = dice(state, .3, 4);
     /* by digits that are there already, so that other numbers stay what they were */
     const int has_surface = shape->type != NEBEL_SHAPE_WORLD && shape->type < NEBEL_SHAPE_UNION;
     if (has_surface && d->type != NEBEL_DENSITY_RADIAL && fmod(d->sigma * 1e3, 1) < .4)
@@ -614,7 +614,7 @@ static void print_density(FILE *to, const nebel_density *d)
         print_number(to, "sigma", d->sigma);
         break;
     case NEBEL_DENSITY_SOFT_EDGE:
-        print_number(to, "distance", d->distance);
+        print_number(to, "distance", d->edge_width);
         break;
     default:
         break;

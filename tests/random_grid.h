@@ -22,7 +22,7 @@ static inline nebel_grid *random_grid(uint64_t *state)
     const int kind = dice_below(state, 3);
     nebel_grid_desc desc = {.type = types[kind],
                             .voxels = voxels[kind],
-                            .filter = dice_below(state, 3) == 0 ? NEBEL_FILTER_NEAREST : NEBEL_FILTER_LINEAR};
+                            .filter = dice_below(state, 3) == 0 ? NEBEL_GRID_FILTER_NEAREST : NEBEL_GRID_FILTER_LINEAR};
     nebel_grid *grid = NULL;
     for (int i = 0; i < 3; i++) desc.size[i] = (size_t)(1 + dice_below(state, LONGEST));
     const int falls = dice_below(state, 3) == 0;
@@ -43,13 +43,13 @@ static inline nebel_grid *random_noise(uint64_t *state)
 {
     nebel_grid *grid = NULL;
     const nebel_noise_desc desc = {.size = {24, 20, 32},
-                                   .cells = {dice(state, 1, 5), dice(state, 1, 5), dice(state, 1, 5)},
+                                   .frequency = {dice(state, 1, 5), dice(state, 1, 5), dice(state, 1, 5)},
                                    .octaves = 3,
                                    .coverage = dice(state, .3, 1),
-                                   .edge = {.1, .1, .1},
+                                   .falloff = {.1, .1, .1},
                                    .time = dice(state, 0, 5),
                                    .seed = (uint32_t)dice_next(state)};
-    assert_int_equal(nebel_create_noise(&desc, &grid), NEBEL_OK);
+    assert_int_equal(nebel_create_noise_grid(&desc, &grid), NEBEL_OK);
     return grid;
 }
 

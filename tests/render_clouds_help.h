@@ -42,13 +42,15 @@ static inline int free_air(void **state)
 static inline void make_world_in(double thin, const nebel_cloud_layer *layer, world *w)
 {
     static const double sun[3] = {.6, .64, .48};
-    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"), .sun_left = {1, 1, 1}, .cloud_layer_count = 1}};
-    for (uint32_t k = 0; k < w->planet.air.air_count; k++)
+    *w = (world){.planet = {.atmosphere_desc = *nebel_lookup_atmosphere("earth"),
+                            .sun_left = {1, 1, 1},
+                            .cloud_layer_count = 1}};
+    for (uint32_t k = 0; k < w->planet.atmosphere_desc.component_count; k++)
         for (int c = 0; c < 3; c++) {
-            w->planet.air.airs[k].scattering[c] *= thin;
-            w->planet.air.airs[k].absorption[c] *= thin;
+            w->planet.atmosphere_desc.components[k].scattering[c] *= thin;
+            w->planet.atmosphere_desc.components[k].absorption[c] *= thin;
         }
-    w->atmosphere = keep_air(thin, &w->planet.air);
+    w->atmosphere = keep_air(thin, &w->planet.atmosphere_desc);
     nebel_clouds_desc desc = {.atmosphere = w->atmosphere, .layer_count = 1};
     desc.layers[0] = *layer;
     assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
@@ -71,8 +73,9 @@ static inline void free_world(world *w)
 static inline nebel_renderer *create_renderer(const world *w, nebel_snapshot *fog, int threads)
 {
     nebel_renderer *renderer;
-    assert_int_equal(nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){.threads = threads}, &renderer),
-                     NEBEL_OK);
+    assert_int_equal(
+        nebel_create_cpu_renderer(&w->scene, fog, &(nebel_cpu_renderer_desc){.thread_count = threads}, &renderer),
+        NEBEL_OK);
     return renderer;
 }
 

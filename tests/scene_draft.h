@@ -42,7 +42,7 @@ typedef struct draft {
     const char *names[8];
     nebel_nebula_desc nebulae[4];
     const size_t *sources;
-    nebel_volume_entry *entries; /* NULL: as they were */
+    nebel_volume_track *entries; /* NULL: as they were */
 } draft;
 
 static inline draft open_draft(const char *text)
@@ -52,7 +52,7 @@ static inline draft open_draft(const char *text)
     draft d = {0};
     write_file(text);
     if (nebel_load_scene(file_path(), &desc, &d.scene) != NEBEL_OK) fail_msg("%s", kept.last);
-    d.data = *nebel_scene_contents(d.scene);
+    d.data = *nebel_get_scene_data(d.scene);
     for (size_t i = 0; i < d.data.volume_count; i++) {
         d.volumes[i] = d.data.volumes[i];
         d.names[i] = d.data.volume_names[i];
@@ -68,9 +68,9 @@ static inline nebel_result save(draft *d, journal *kept)
     d->data.volumes = d->volumes;
     d->data.volume_names = d->names;
     d->data.nebulae = d->nebulae;
-    d->data.volume_entries = d->entries;
+    d->data.volume_tracks = d->entries;
     const nebel_result result =
-        nebel_save_scene(file_path(), &desc, nebel_scene_contents(d->scene), &d->data, d->sources);
+        nebel_save_scene(file_path(), &desc, nebel_get_scene_data(d->scene), &d->data, d->sources);
     assert_int_equal(m.live, 0);
     nebel_destroy_scene(d->scene);
     return result;

@@ -49,9 +49,9 @@ static inline void open_tracer(tracer *t, nb_gl_language language, word_store st
 {
     *t = (tracer){.store = store};
     if (!nb_gl_open(&t->gl, language)) fail_msg("%s", t->gl.fault);
-    const nebel_dialect dialect = language == NB_GL_330 ? NEBEL_DIALECT_GLSL_330 : NEBEL_DIALECT_GLSL_300_ES;
-    const char *const texts[] = {store == TEXTURE ? "#define NEBEL_TEXTURE\n" : "", defines, nebel_shader_text(dialect),
-                                 NULL};
+    const nebel_shader_dialect dialect = language == NB_GL_330 ? NEBEL_DIALECT_GLSL_330 : NEBEL_DIALECT_GLSL_300_ES;
+    const char *const texts[] = {store == TEXTURE ? "#define NEBEL_FOG_TEXTURE\n" : "", defines,
+                                 nebel_get_shader_source(dialect), NULL};
     t->program = nb_gl_compile_texts(&t->gl, texts, body, 2, 2);
     if (!t->program) fail_msg("%s", t->gl.fault);
     glGenBuffers(1, &t->buffer);
@@ -78,7 +78,7 @@ static inline void upload_voxels(tracer *t, const nebel_snapshot *snapshot)
 {
     size_t count = 0;
     assert_int_equal(nebel_pack_voxels(snapshot, NULL, 0, &count), NEBEL_OK);
-    nebel_texel *texels = calloc(count, sizeof *texels);
+    nebel_texel_u32 *texels = calloc(count, sizeof *texels);
     assert_non_null(texels);
     assert_int_equal(nebel_pack_voxels(snapshot, texels, count, &count), NEBEL_OK);
     glActiveTexture(GL_TEXTURE1);
@@ -89,12 +89,12 @@ static inline void upload_voxels(tracer *t, const nebel_snapshot *snapshot)
     free(texels);
 }
 
-static inline void upload(tracer *t, const nebel_word *words, size_t count)
+static inline void upload(tracer *t, const nebel_texel_f32 *words, size_t count)
 {
     if (t->store == BLOCK) {
-        assert_true(count <= NEBEL_BLOCK_WORDS);
+        assert_true(count <= NEBEL_BLOCK_TEXELS);
         glBindBuffer(GL_UNIFORM_BUFFER, t->buffer);
-        glBufferData(GL_UNIFORM_BUFFER, NEBEL_BLOCK_WORDS * sizeof *words, NULL, GL_STATIC_DRAW);
+        glBufferData(GL_UNIFORM_BUFFER, NEBEL_BLOCK_TEXELS * sizeof *words, NULL, GL_STATIC_DRAW);
         glBufferSubData(GL_UNIFORM_BUFFER, 0, (GLsizeiptr)(count * sizeof *words), words);
         glBindBufferBase(GL_UNIFORM_BUFFER, 0, t->buffer);
         glUniformBlockBinding(t->program, glGetUniformBlockIndex(t->program, "nebel_fog_block"), 0);
@@ -107,7 +107,7 @@ static inline void pack_and_upload(tracer *t, const nebel_snapshot *snapshot, co
 {
     size_t count = 0;
     assert_int_equal(nebel_pack_fog(snapshot, eye, NULL, 0, &count), NEBEL_OK);
-    nebel_word *words = malloc(count * sizeof *words);
+    nebel_texel_f32 *words = malloc(count * sizeof *words);
     assert_non_null(words);
     assert_int_equal(nebel_pack_fog(snapshot, eye, words, count, &count), NEBEL_OK);
     upload(t, words, count);

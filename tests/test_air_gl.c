@@ -1,4 +1,4 @@
-/* The air of planets in shaders against nebel_trace_air_view and nebel_find_ground: heights from below the ground to a billion
+/* The air of planets in shaders against nebel_trace_sky_view and nebel_trace_ground: heights from below the ground to a billion
  * metres, three planets, in GLSL 3.30 and GLSL ES 3.00. */
 #include "dice.h"
 #include "gl_harness.h"
@@ -24,11 +24,12 @@ typedef struct answers {
 static unsigned compile(nb_gl *gl)
 {
     const int es = gl->language == NB_GL_300ES;
-    const char *const texts[] = {"#define NEBEL_AIR\n",
-                                 nebel_shader_text(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330), NULL};
+    const char *const texts[] = {"#define NEBEL_SKY_VIEW\n",
+                                 nebel_get_shader_source(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330),
+                                 NULL};
     const char *const body = "vec3 way = normalize(in0.xyz);\n"
-                             "nebel_transfer air = nebel_trace_air(way, in0.w);\n"
-                             "nebel_ground ground = nebel_find_ground(way);\n"
+                             "nebel_transfer air = nebel_trace_atmosphere(way, in0.w);\n"
+                             "nebel_ground ground = nebel_trace_ground(way);\n"
                              "out0 = vec4(air.transmittance, ground.distance); out1 = vec4(air.in_scattering, 0.0);\n"
                              "out2 = vec4(ground.normal, 0.0); out3 = vec4(ground.sun, 0.0);\n"
                              "out4 = vec4(ground.sky, 0.0);\n";
@@ -47,15 +48,15 @@ static unsigned make_texture(void)
     return name;
 }
 
-static void upload(const nebel_air_view *view)
+static void upload(const nebel_sky_view *view)
 {
     size_t count = 0;
-    assert_int_equal(nebel_pack_air_view(view, NULL, 0, &count), NEBEL_OK);
+    assert_int_equal(nebel_pack_sky_view(view, NULL, 0, &count), NEBEL_OK);
     const size_t rows = (count + NEBEL_TEXTURE_WIDTH - 1) / NEBEL_TEXTURE_WIDTH;
-    nebel_word *words = calloc(rows * NEBEL_TEXTURE_WIDTH, sizeof *words);
+    nebel_texel_f32 *words = calloc(rows * NEBEL_TEXTURE_WIDTH, sizeof *words);
     assert_non_null(words);
-    assert_int_equal(nebel_pack_air_view(view, words, count - 1, &count), NEBEL_ERROR_LIMIT);
-    assert_int_equal(nebel_pack_air_view(view, words, count, &count), NEBEL_OK);
+    assert_int_equal(nebel_pack_sky_view(view, words, count - 1, &count), NEBEL_ERROR_LIMIT);
+    assert_int_equal(nebel_pack_sky_view(view, words, count, &count), NEBEL_OK);
     glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, NEBEL_TEXTURE_WIDTH, (GLsizei)rows, 0, GL_RGBA, GL_FLOAT, words);
     free(words);
 }
@@ -77,18 +78,18 @@ static void aim(const nebel_atmosphere_desc *planet, double height, int ends, ui
     }
 }
 
-static void ask(const nebel_air_view *view, answers *a)
+static void ask(const nebel_sky_view *view, answers *a)
 {
     const double *const direction[3] = {a->direction[0], a->direction[1], a->direction[2]};
-    const nebel_transfer_planes lights = {
+    const nebel_transfer_planes transfers = {
         .transmittance = {a->transmittance[0], a->transmittance[1], a->transmittance[2]},
         .in_scattering = {a->in_scattering[0], a->in_scattering[1], a->in_scattering[2]}};
     const nebel_ground_planes ground = {.distance = a->distance,
                                         .normal = {a->normal[0], a->normal[1], a->normal[2]},
                                         .sun = {a->sun[0], a->sun[1], a->sun[2]},
                                         .sky = {a->sky[0], a->sky[1], a->sky[2]}};
-    assert_int_equal(nebel_trace_air_view(view, RAYS, direction, a->t_max, &lights), NEBEL_OK);
-    assert_int_equal(nebel_find_ground(view, RAYS, direction, &ground), NEBEL_OK);
+    assert_int_equal(nebel_trace_sky_view(view, RAYS, direction, a->t_max, &transfers), NEBEL_OK);
+    assert_int_equal(nebel_trace_ground(view, RAYS, direction, &ground), NEBEL_OK);
 }
 
 /* Of transmittance; of light as a part of the brightest; of the ground's light as a part of the sun's, normal and, as a part of it, distance. */
@@ -146,13 +147,13 @@ static void check_place(nb_gl *gl, unsigned program, const nebel_atmosphere *air
     uint64_t numbers = 7;
     const double angle = elevation * acos(-1) / 180;
     const int ends = elevation > 0;
-    const nebel_air_view_desc desc = {
+    const nebel_sky_view_desc desc = {
         .atmosphere = air,
         .sun = {.direction = {.6 * cos(angle), sin(angle), -.8 * cos(angle)}, .irradiance = {1, .9, .8}},
         .position = {0, height, 0},
-        .has_distances = ends};
-    nebel_air_view *view;
-    assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+        .has_ray_ends = ends};
+    nebel_sky_view *view;
+    assert_int_equal(nebel_create_sky_view(&desc, &view), NEBEL_OK);
     upload(view);
     aim(planet, height, ends, &numbers, &a);
     ask(view, &a);
@@ -161,7 +162,7 @@ static void check_place(nb_gl *gl, unsigned program, const nebel_atmosphere *air
     print_message(
         "%s from %g m, sun %g: transmittance %.1e, light %.1e, ground %.1e, normal %.1e, distance %.1e, %d strays\n",
         name, height, elevation, d.clear, d.light, d.ground, d.normal, d.distance, d.strays);
-    nebel_destroy_air_view(view);
+    nebel_destroy_sky_view(view);
     assert_true(d.clear < 1e-3 && d.light < 1e-3 && d.ground < 1e-3 && d.normal < 1e-3 && d.distance < 1e-3);
     assert_true(d.strays <= 2);
 }
@@ -180,7 +181,7 @@ static void check_language(nb_gl_language language)
     nebel_atmosphere *air = NULL;
     const nebel_atmosphere_desc *planet = NULL;
     for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
-        const nebel_atmosphere_desc *const next = nebel_find_atmosphere(places[i].name);
+        const nebel_atmosphere_desc *const next = nebel_lookup_atmosphere(places[i].name);
         if (language == NB_GL_300ES && next->radius > 1e6) continue;
         if (next != planet) {
             nebel_destroy_atmosphere(air);
@@ -210,7 +211,7 @@ static void wrong_questions(void **state)
 {
     (void)state;
     size_t count;
-    assert_int_equal(nebel_pack_air_view(NULL, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_pack_sky_view(NULL, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
 }
 
 int main(void)

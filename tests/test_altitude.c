@@ -414,22 +414,22 @@ static void test_places_and_bounds(void **state)
         nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, &volume, 1);
         const nebel_ray ray = random_ray(&dice_state, &density);
         const sight s = sight_of(&density, &ray);
-        nebel_bound bound;
+        nebel_majorant_segment bound;
         double from = 0;
         for (int piece = 0; piece < 20; piece++) {
-            assert_int_equal(nebel_bound_fog(fog, &ray, 1, from, &bound), NEBEL_OK);
+            assert_int_equal(nebel_next_majorant(fog, &ray, 1, from, &bound), NEBEL_OK);
             assert_true(bound.end > from);
             const double end = fmin(bound.end, from + 1e3 * density.radius);
             for (int n = 0; n <= 8; n++) {
                 const long double t = (long double)from + ((long double)end - (long double)from) * n / 8;
-                nebel_place place = {.distance = -1};
-                nebel_matter matter;
+                nebel_sample_point place = {.distance = -1};
+                nebel_medium_properties matter;
                 for (int c = 0; c < 3; c++)
                     place.position[c] = (double)(s.origin[c] + t * s.direction[c] + (long double)density.center[c]);
                 if (fabs(place.position[0]) > 1e14) continue;
                 const double truth = (double)fminl(.5L * density_at(&s, t), 5e17L);
                 const double digits = 1e-12 + 64 * DBL_EPSILON * (density.radius + (double)t) / density.scale_height;
-                assert_int_equal(nebel_sample_fog(fog, 1, &place, sizeof place, &matter, sizeof matter), NEBEL_OK);
+                assert_int_equal(nebel_sample_medium(fog, 1, &place, sizeof place, &matter, sizeof matter), NEBEL_OK);
                 assert_true(fabs(matter.extinction[0] - truth) <= truth * expm1(fmin(digits, 1)) + DBL_MIN);
                 assert_true(matter.extinction[0] <= bound.extinction[0] * (1 + digits) || truth < 1e-300);
                 found += truth > 1e-3;

@@ -76,7 +76,7 @@ static const bad_volume bad_volumes[] = {
     {{SHAPE(CONVEX, .planes = NULL)}, ARGUMENT, "convex", "at least one plane"},
     {{SHAPE(CONVEX, .planes = NULL, .plane_count = 4)}, ARGUMENT, "convex", "at least one plane"},
     {{SHAPE(CONVEX, .planes = planes_apart)}, ARGUMENT, "convex", "at least one plane"},
-    {{SHAPE(CONVEX, .planes = planes_apart, .plane_count = NEBEL_MAX_PLANES + 1)},
+    {{SHAPE(CONVEX, .planes = planes_apart, .plane_count = NEBEL_MAX_SHAPE_PLANES + 1)},
      LIMIT,
      "1025 planes",
      "at most 1024"},
@@ -116,8 +116,8 @@ static const bad_volume bad_volumes[] = {
     {{DENSITY(GAUSSIAN, .center = {0, 0, 0})}, VALUE, "sigma", "1e-15"},
     {{DENSITY(GAUSSIAN, .sigma = NOT_A_NUMBER)}, VALUE, "sigma", "1e-15"},
     {{DENSITY(GAUSSIAN, .sigma = 1, .center = {ENDLESS, 0, 0})}, VALUE, "gaussian center", "finite"},
-    {{DENSITY(SOFT_EDGE, .distance = 1)}, VALUE, "soft edge", "surface"},
-    {{SHAPE(BOX, .max = {1, 1, 1}), DENSITY(SOFT_EDGE, .distance = 0)}, VALUE, "soft edge distance", "1e-15"},
+    {{DENSITY(SOFT_EDGE, .edge_width = 1)}, VALUE, "soft edge", "surface"},
+    {{SHAPE(BOX, .max = {1, 1, 1}), DENSITY(SOFT_EDGE, .edge_width = 0)}, VALUE, "soft edge distance", "1e-15"},
     /* light */
     {{.extinction = {.1, -.1, .1}}, VALUE, "extinction", "-0.1"},
     {{.extinction = {.1, NOT_A_NUMBER, .1}}, VALUE, "extinction", "nan"},
@@ -142,7 +142,7 @@ static void assert_refused(nebel_fog *fog, nebel_volume_id id, fog_messages *mes
     const size_t before = messages->count;
     nebel_volume_id unchanged = 42;
     const nebel_result result =
-        id == 0 ? nebel_add_volume(fog, &bad->desc, &unchanged) : nebel_change_volume(fog, id, &bad->desc);
+        id == 0 ? nebel_add_volume(fog, &bad->desc, &unchanged) : nebel_update_volume(fog, id, &bad->desc);
     const int said = strstr(messages->text, bad->thing) != NULL && strstr(messages->text, bad->rule) != NULL;
     if (result != bad->result || !said) print_message("volume %zu: %d \"%s\"\n", i, (int)result, messages->text);
     assert_int_equal(result, bad->result);
@@ -156,7 +156,7 @@ static size_t count_of(nebel_fog *fog)
 {
     nebel_snapshot *snapshot = NULL;
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    const size_t count = nebel_snapshot_volume_count(snapshot);
+    const size_t count = nebel_get_volume_count(snapshot);
     nebel_release_snapshot(snapshot);
     return count;
 }
@@ -212,7 +212,7 @@ static void test_exclusions_read_their_shape_only(void **unused)
 
 static nebel_result add_nested(nebel_fog *fog, int depth)
 {
-    enum { MOST = NEBEL_MAX_DEPTH + 4 };
+    enum { MOST = NEBEL_MAX_SHAPE_NESTING + 4 };
     nebel_shape shapes[MOST + 1] = {{.type = NEBEL_SHAPE_SPHERE, .radius = 1}};
     for (int i = 1; i <= depth; i++)
         shapes[i] = (nebel_shape){
@@ -224,7 +224,7 @@ static nebel_result add_nested(nebel_fog *fog, int depth)
 /* Right-leaning, so that evaluating it takes the deepest stack. */
 static nebel_result add_staircase(nebel_fog *fog, int depth)
 {
-    nebel_shape pairs[NEBEL_MAX_DEPTH][2];
+    nebel_shape pairs[NEBEL_MAX_SHAPE_NESTING][2];
     const nebel_shape ball = {.type = NEBEL_SHAPE_SPHERE, .radius = 1};
     for (int i = 0; i < depth; i++) {
         pairs[i][0] = ball;
@@ -238,7 +238,7 @@ static nebel_result add_staircase(nebel_fog *fog, int depth)
 
 static nebel_result add_wide(nebel_fog *fog, size_t leaves)
 {
-    static nebel_shape parts[NEBEL_MAX_LEAVES + 2];
+    static nebel_shape parts[NEBEL_MAX_SHAPE_LEAVES + 2];
     for (size_t i = 0; i < leaves; i++) parts[i] = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .radius = 1};
     const nebel_volume_desc desc = {.shape = {.type = NEBEL_SHAPE_UNION, .parts = parts, .part_count = leaves},
                                     .extinction = {1, 1, 1}};
@@ -247,7 +247,7 @@ static nebel_result add_wide(nebel_fog *fog, size_t leaves)
 
 static nebel_result add_cut(nebel_fog *fog, size_t count)
 {
-    static nebel_plane planes[NEBEL_MAX_PLANES + 1];
+    static nebel_plane planes[NEBEL_MAX_SHAPE_PLANES + 1];
     for (size_t i = 0; i < count; i++) {
         const double a = 2.399963229728653 * (double)i, z = 1 - (2 * (double)i + 1) / (double)count,
                      r = sqrt(1 - z * z);
@@ -264,10 +264,10 @@ static void test_limits_are_legal_and_one_more_is_not(void **unused)
     fog_memory memory = {0};
     fog_messages messages = {0};
     nebel_fog *const fog = make_fog(&memory, &messages);
-    assert_int_equal(add_nested(fog, NEBEL_MAX_DEPTH), NEBEL_OK);
-    assert_int_equal(add_staircase(fog, NEBEL_MAX_DEPTH), NEBEL_OK);
-    assert_int_equal(add_wide(fog, NEBEL_MAX_LEAVES), NEBEL_OK);
-    assert_int_equal(add_cut(fog, NEBEL_MAX_PLANES), NEBEL_OK);
+    assert_int_equal(add_nested(fog, NEBEL_MAX_SHAPE_NESTING), NEBEL_OK);
+    assert_int_equal(add_staircase(fog, NEBEL_MAX_SHAPE_NESTING), NEBEL_OK);
+    assert_int_equal(add_wide(fog, NEBEL_MAX_SHAPE_LEAVES), NEBEL_OK);
+    assert_int_equal(add_cut(fog, NEBEL_MAX_SHAPE_PLANES), NEBEL_OK);
     nebel_snapshot *snapshot = NULL;
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     const nebel_ray ray = {{-3, 0, 0}, {1, 0, 0}, 9};
@@ -279,11 +279,11 @@ static void test_limits_are_legal_and_one_more_is_not(void **unused)
     nebel_release_snapshot(snapshot);
 
     assert_int_equal(messages.count, 0);
-    assert_int_equal(add_nested(fog, NEBEL_MAX_DEPTH + 1), NEBEL_ERROR_LIMIT);
+    assert_int_equal(add_nested(fog, NEBEL_MAX_SHAPE_NESTING + 1), NEBEL_ERROR_LIMIT);
     assert_non_null(strstr(messages.text, "16"));
-    assert_int_equal(add_wide(fog, NEBEL_MAX_LEAVES + 1), NEBEL_ERROR_LIMIT);
+    assert_int_equal(add_wide(fog, NEBEL_MAX_SHAPE_LEAVES + 1), NEBEL_ERROR_LIMIT);
     assert_non_null(strstr(messages.text, "1024"));
-    assert_int_equal(add_cut(fog, NEBEL_MAX_PLANES + 1), NEBEL_ERROR_LIMIT);
+    assert_int_equal(add_cut(fog, NEBEL_MAX_SHAPE_PLANES + 1), NEBEL_ERROR_LIMIT);
     assert_int_equal(messages.count, 3);
     nebel_destroy_fog(fog);
     assert_int_equal(memory.live, 0);
@@ -353,11 +353,11 @@ static void test_null_arguments_are_refused(void **unused)
     nebel_volume_id id = 0;
     assert_int_equal(nebel_add_volume(fog, &desc, &id), NEBEL_OK);
     assert_int_equal(nebel_add_volume(NULL, &desc, NULL), ARGUMENT);
-    assert_int_equal(nebel_change_volume(NULL, id, &desc), ARGUMENT);
+    assert_int_equal(nebel_update_volume(NULL, id, &desc), ARGUMENT);
     assert_int_equal(nebel_remove_volume(NULL, id), ARGUMENT);
     assert_int_equal(messages.count, 0);
     assert_int_equal(nebel_add_volume(fog, NULL, NULL), ARGUMENT);
-    assert_int_equal(nebel_change_volume(fog, id, NULL), ARGUMENT);
+    assert_int_equal(nebel_update_volume(fog, id, NULL), ARGUMENT);
     assert_int_equal(nebel_commit_fog(fog, NULL), ARGUMENT);
     assert_int_equal(messages.count, 3);
 
@@ -375,21 +375,24 @@ static void test_null_arguments_are_refused(void **unused)
     assert_int_equal(nebel_trace(snapshot, &trace, 1, NULL, sizeof ray, &transfer, sizeof transfer), ARGUMENT);
     assert_int_equal(nebel_trace(snapshot, &trace, 1, &ray, sizeof ray, NULL, sizeof transfer), ARGUMENT);
     assert_int_equal(nebel_trace(snapshot, &trace, 0, NULL, 0, NULL, 0), NEBEL_OK);
-    assert_int_equal(nebel_find_transmittance(NULL, .5, 0, 1, &ray, sizeof ray, &distance), ARGUMENT);
-    assert_int_equal(nebel_find_transmittance(snapshot, .5, 0, 1, NULL, sizeof ray, &distance), ARGUMENT);
-    assert_int_equal(nebel_find_transmittance(snapshot, .5, 0, 1, &ray, sizeof ray, NULL), ARGUMENT);
-    assert_int_equal(nebel_find_transmittance(snapshot, .5, 0, 0, NULL, 0, NULL), NEBEL_OK);
+    assert_int_equal(nebel_invert_transmittance(NULL, .5, 0, 1, &ray, sizeof ray, &distance), ARGUMENT);
+    assert_int_equal(nebel_invert_transmittance(snapshot, .5, 0, 1, NULL, sizeof ray, &distance), ARGUMENT);
+    assert_int_equal(nebel_invert_transmittance(snapshot, .5, 0, 1, &ray, sizeof ray, NULL), ARGUMENT);
+    assert_int_equal(nebel_invert_transmittance(snapshot, .5, 0, 0, NULL, 0, NULL), NEBEL_OK);
 
     const float point[3] = {0, 0, 0};
     float out = 0;
     const nebel_segments segments = {.from = point, .to = point}, no_from = {.to = point}, no_to = {.from = point};
-    assert_int_equal(nebel_transmit_segments(NULL, NEBEL_ISA_DEFAULT, 0, 1, &segments, &out, 0), ARGUMENT);
-    assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, 1, NULL, &out, 0), ARGUMENT);
-    assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &no_from, &out, 0), ARGUMENT);
-    assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &no_to, &out, 0), ARGUMENT);
-    assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &segments, NULL, 0), ARGUMENT);
-    assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, 0, &(nebel_segments){0}, NULL, 0),
-                     NEBEL_OK);
+    assert_int_equal(nebel_compute_segment_transmittance(NULL, NEBEL_ISA_DEFAULT, 0, 1, &segments, &out, 0), ARGUMENT);
+    assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 1, NULL, &out, 0), ARGUMENT);
+    assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &no_from, &out, 0),
+                     ARGUMENT);
+    assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &no_to, &out, 0), ARGUMENT);
+    assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &segments, NULL, 0),
+                     ARGUMENT);
+    assert_int_equal(
+        nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 0, &(nebel_segments){0}, NULL, 0),
+        NEBEL_OK);
     assert_int_equal(messages.count, 11);
 
     assert_null(nebel_retain_snapshot(NULL));
@@ -447,7 +450,7 @@ static void test_wrong_rays_are_refused_by_number_and_name(void **unused)
             assert_non_null(strstr(messages.text, number));
             assert_non_null(strstr(messages.text, bad_rays[i].thing));
             messages.text[0] = 0;
-            assert_int_equal(nebel_find_transmittance(snapshot, .5, 0, COUNT, rays, sizeof rays[0], distances),
+            assert_int_equal(nebel_invert_transmittance(snapshot, .5, 0, COUNT, rays, sizeof rays[0], distances),
                              ARGUMENT);
             assert_non_null(strstr(messages.text, number));
         }
@@ -491,7 +494,7 @@ static void test_wrong_queries_are_refused(void **unused)
     const double transmittances[] = {0, 1, -1, 2, NOT_A_NUMBER};
     double distance;
     for (size_t i = 0; i < sizeof transmittances / sizeof transmittances[0]; i++) {
-        assert_int_equal(nebel_find_transmittance(snapshot, transmittances[i], 0, 1, &ray, sizeof ray, &distance),
+        assert_int_equal(nebel_invert_transmittance(snapshot, transmittances[i], 0, 1, &ray, sizeof ray, &distance),
                          ARGUMENT);
         assert_non_null(strstr(messages.text, "transmittance"));
     }
@@ -500,12 +503,14 @@ static void test_wrong_queries_are_refused(void **unused)
     float out;
     for (size_t i = 0; i < sizeof channels / sizeof channels[0]; i++) {
         messages.text[0] = 0;
-        assert_int_equal(nebel_find_transmittance(snapshot, .5, channels[i], 1, &ray, sizeof ray, &distance), ARGUMENT);
+        assert_int_equal(nebel_invert_transmittance(snapshot, .5, channels[i], 1, &ray, sizeof ray, &distance),
+                         ARGUMENT);
         assert_non_null(strstr(messages.text, "channel"));
         messages.text[0] = 0;
         const nebel_segments segments = {.from = point, .to = point};
-        assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, channels[i], 1, &segments, &out, 0),
-                         ARGUMENT);
+        assert_int_equal(
+            nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, channels[i], 1, &segments, &out, 0),
+            ARGUMENT);
         assert_non_null(strstr(messages.text, "channel"));
     }
     nebel_release_snapshot(snapshot);
@@ -527,7 +532,8 @@ static void test_instruction_sets_that_are_not_here_are_unsupported(void **unuse
         const nebel_result expected = nebel_isa_available((nebel_isa)isa) ? NEBEL_OK : NEBEL_ERROR_UNSUPPORTED;
         const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa};
         assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), expected);
-        assert_int_equal(nebel_transmit_segments(snapshot, (nebel_isa)isa, 0, 1, &segments, &out, 0), expected);
+        assert_int_equal(nebel_compute_segment_transmittance(snapshot, (nebel_isa)isa, 0, 1, &segments, &out, 0),
+                         expected);
         refused += expected != NEBEL_OK;
     }
     assert_true(refused >= 4); /* at the least both ends of the list, and NEON or all of x86 */

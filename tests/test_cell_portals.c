@@ -12,7 +12,7 @@ static nebel_cell_fog ask_from(nebel_cell_view view, const nebel_cells *cells, c
     nebel_cell_point point = {.position = {x[0], x[1], x[2]}};
     nebel_cell_fog fog;
     memcpy(view.eye, eye, sizeof view.eye);
-    assert_int_equal(nebel_fog_cells(cells, &view, 1, &point, 0, &fog, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_cell_fog(cells, &view, 1, &point, 0, &fog, 0), NEBEL_OK);
     return fog;
 }
 
@@ -31,7 +31,7 @@ static void test_fog_is_seen_through_portals_alone(void **state)
                                         {{2, 1}, hatch, 3}};
         nebel_cells *cells =
             create(&(nebel_cells_desc){.cells = rooms, .cell_count = 3, .portals = portals, .portal_count = 2});
-        assert_int_equal(nebel_count_cell_portals(cells), 2);
+        assert_int_equal(nebel_get_cell_portal_count(cells), 2);
         static const double eye[3] = {2, 0, 0};
         assert_near(ask(cells, eye, (const double[3]){8, 0, 0}).alpha, .4, 1e-15);
         /* Through the door's rim, and past it, where the wall hides the fog. */
@@ -145,7 +145,7 @@ static void test_random_worlds_of_portals(void **state)
         size_t count = 0;
         world_make(&world, WORLD_CELLS, &d);
         nebel_cells *open = create(&(nebel_cells_desc){.cells = world.cells, .cell_count = world.count});
-        for (size_t i = 0; i < nebel_count_cell_portals(open); i++) {
+        for (size_t i = 0; i < nebel_get_cell_portal_count(open); i++) {
             const nebel_portal whole = nebel_get_cell_portal(open, i);
             const double share = dice(&d, .3, 1);
             if (dice_below(&d, 4) == 0 || count == 100 || whole.vertex_count > 32) continue;
@@ -185,7 +185,7 @@ static void test_a_derived_portal_is_what_two_faces_share(void **state)
         {.shape = {.type = NEBEL_SHAPE_BOX, .min = {20, 0, 0}, .max = {24, 3, 4}}}, /* alone */
     };
     nebel_cells *cells = create(&(nebel_cells_desc){.cells = hall, .cell_count = 4});
-    assert_int_equal(nebel_count_cell_portals(cells), 2);
+    assert_int_equal(nebel_get_cell_portal_count(cells), 2);
     static const double low[2][3] = {{4, 1, 2}, {0, 3, 0}}, high[2][3] = {{4, 3, 4}, {4, 3, 1.5}};
     for (size_t i = 0; i < 2; i++) {
         const nebel_portal portal = nebel_get_cell_portal(cells, i);
@@ -216,7 +216,7 @@ static void test_a_cut_through_corners_leaves_each_once(void **state)
     for (int turned = 0; turned < 2; turned++) {
         const nebel_cell cells_turned[] = {pair[turned], pair[!turned]};
         nebel_cells *cells = create(&(nebel_cells_desc){.cells = cells_turned, .cell_count = 2});
-        assert_int_equal(nebel_count_cell_portals(cells), 1);
+        assert_int_equal(nebel_get_cell_portal_count(cells), 1);
         assert_int_equal(nebel_get_cell_portal(cells, 0).vertex_count, 3);
         nebel_destroy_cells(cells);
     }
@@ -232,7 +232,7 @@ static void test_edges_are_no_portals(void **state)
                                           .min = {i % 2 ? 0 : -3, i / 2 ? 0 : -3, 0},
                                           .max = {i % 2 ? 3 : 0, i / 2 ? 3 : 0, 9}}};
     nebel_cells *cells = create(&(nebel_cells_desc){.cells = boxes, .cell_count = 4});
-    assert_int_equal(nebel_count_cell_portals(cells), 4);
+    assert_int_equal(nebel_get_cell_portal_count(cells), 4);
     nebel_destroy_cells(cells);
     static const double strips[] = {5e-6, 1e-3};
     for (size_t i = 0; i < 2; i++) {
@@ -240,7 +240,7 @@ static void test_edges_are_no_portals(void **state)
             {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-3, 0, 0}, .max = {0, 3, 9}}},
             {.shape = {.type = NEBEL_SHAPE_BOX, .min = {0, 3 - strips[i], 0}, .max = {3, 6, 9}}}};
         cells = create(&(nebel_cells_desc){.cells = pair, .cell_count = 2});
-        assert_int_equal(nebel_count_cell_portals(cells), i);
+        assert_int_equal(nebel_get_cell_portal_count(cells), i);
         nebel_destroy_cells(cells);
     }
 }
@@ -255,7 +255,7 @@ static void test_derived_portals_leave_no_wall(void **state)
         nebel_portal portals[200];
         world_make(&world, WORLD_CELLS, &d);
         nebel_cells *open = create(&(nebel_cells_desc){.cells = world.cells, .cell_count = world.count});
-        const size_t count = nebel_count_cell_portals(open);
+        const size_t count = nebel_get_cell_portal_count(open);
         assert_in_range(count, WORLD_CELLS - 1, 200);
         for (size_t i = 0; i < count; i++) portals[i] = nebel_get_cell_portal(open, i);
         nebel_cells *given = create(&(nebel_cells_desc){
@@ -283,16 +283,16 @@ static void test_a_hair_between_cells_is_nothing(void **state)
         turned[0].shape.transform.rotation[0] = .3;
         turned[1].shape.transform = turned[0].shape.transform;
         nebel_cells *cells = create(&(nebel_cells_desc){.cells = turned, .cell_count = 2});
-        assert_int_equal(nebel_count_cell_portals(cells), 1);
+        assert_int_equal(nebel_get_cell_portal_count(cells), 1);
         nebel_destroy_cells(cells);
         cells = create(&(nebel_cells_desc){.cells = pair, .cell_count = 2});
-        assert_int_equal(nebel_count_cell_portals(cells), 1);
+        assert_int_equal(nebel_get_cell_portal_count(cells), 1);
         assert_near(ask(cells, (const double[3]){1, 0, 0}, (const double[3]){7, 0, 0}).alpha, .6, 1e-6);
         nebel_destroy_cells(cells);
     }
     const nebel_cell parted[] = {BOX(0, 4, .1, 1, 1, 1), BOX(4.001, 9, .1, 1, 1, 1)};
     nebel_cells *cells = create(&(nebel_cells_desc){.cells = parted, .cell_count = 2});
-    assert_int_equal(nebel_count_cell_portals(cells), 0);
+    assert_int_equal(nebel_get_cell_portal_count(cells), 0);
     nebel_destroy_cells(cells);
 }
 

@@ -6,7 +6,7 @@ static nebel_cell_fog ask_at(const nebel_cells *cells, const nebel_cell_view *vi
 {
     const nebel_cell_point point = {.position = {x, y, z}};
     nebel_cell_fog fog;
-    assert_int_equal(nebel_fog_cells(cells, view, 1, &point, 0, &fog, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_cell_fog(cells, view, 1, &point, 0, &fog, 0), NEBEL_OK);
     return fog;
 }
 
@@ -16,11 +16,11 @@ static double alpha_at(const nebel_cells *cells, const nebel_cell_view *view, do
 }
 
 static size_t layers_at(const nebel_cells *cells, const nebel_cell_view *view, double x, double y, double z,
-                        nebel_cell_layer layers[4])
+                        nebel_cell_segment layers[4])
 {
     size_t count = 0;
     const nebel_cell_point point = {.position = {x, y, z}};
-    assert_int_equal(nebel_find_cell_layers(cells, view, &point, 4, layers, &count), NEBEL_OK);
+    assert_int_equal(nebel_compute_cell_segments(cells, view, &point, 4, layers, &count), NEBEL_OK);
     return count;
 }
 
@@ -49,18 +49,18 @@ static void test_the_erratum(void **state)
 {
     (void)state;
     static const double wanted[NEBEL_SPAN_COUNT] = {
-        [NEBEL_SPAN_RAY] = 28.178005607210741 / 3, [NEBEL_SPAN_DEPTH] = 25. / 3, [NEBEL_SPAN_FAITHFUL] = 4};
+        [NEBEL_SPAN_RAY] = 28.178005607210741 / 3, [NEBEL_SPAN_DEPTH] = 25. / 3, [NEBEL_SPAN_PRINTED] = 4};
     for (int span = 0; span < NEBEL_SPAN_COUNT; span++) {
         nebel_cells *cells =
             create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = (nebel_cell_span)span});
-        nebel_cell_layer layer[4];
+        nebel_cell_segment layer[4];
         assert_int_equal(layers_at(cells, &into_leaning, 13, 0, -25, layer), 1);
         assert_near(layer[0].to - layer[0].from, wanted[span], 1e-12);
         assert_near(layer[0].intensity, .04 * wanted[span], 1e-13);
         assert_near(alpha_at(cells, &into_leaning, 13, 0, -25), .04 * wanted[span], 1e-13);
         if (span != NEBEL_SPAN_RAY) assert_near(layer[0].to, 25, 1e-13);
-        assert_int_equal(layer[0].first, 1);
-        assert_int_equal(layer[0].last, 1);
+        assert_int_equal(layer[0].first_cell, 1);
+        assert_int_equal(layer[0].last_cell, 1);
         nebel_destroy_cells(cells);
     }
 }
@@ -69,7 +69,7 @@ static void test_the_erratum(void **state)
 static void test_the_printed_form_is_right_on_the_axis(void **state)
 {
     (void)state;
-    nebel_cells *cells = create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = NEBEL_SPAN_FAITHFUL});
+    nebel_cells *cells = create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = NEBEL_SPAN_PRINTED});
     assert_near(alpha_at(cells, &into_leaning, 0, 0, -25), .04 * 17, 1e-13);
     nebel_destroy_cells(cells);
 }
@@ -78,7 +78,7 @@ static void test_the_printed_form_is_right_on_the_axis(void **state)
 static void test_zmax_comes_from_the_polygon(void **state)
 {
     (void)state;
-    nebel_cells *cells = create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = NEBEL_SPAN_FAITHFUL});
+    nebel_cells *cells = create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = NEBEL_SPAN_PRINTED});
     static const struct {
         nebel_plane surface;
         double span;
@@ -89,7 +89,7 @@ static void test_zmax_comes_from_the_polygon(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const nebel_cell_point point = {{0, 0, -25}, cases[i].surface};
         nebel_cell_fog fog;
-        assert_int_equal(nebel_fog_cells(cells, &into_leaning, 1, &point, 0, &fog, 0), NEBEL_OK);
+        assert_int_equal(nebel_compute_cell_fog(cells, &into_leaning, 1, &point, 0, &fog, 0), NEBEL_OK);
         assert_near(fog.alpha, .04 * cases[i].span, 1e-13);
     }
     nebel_destroy_cells(cells);
@@ -120,9 +120,9 @@ static void test_printed_depths_stay_between_eye_and_surface(void **state)
                                         {{-1, 0, 0}, 40}, {{0, 1, 0}, 3}, {{0, -1, 0}, 3}};
     const nebel_cell leaving = {.shape = {.type = NEBEL_SHAPE_CONVEX, .planes = sides, .plane_count = 6},
                                 .density = .01};
-    nebel_cells *in = create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = NEBEL_SPAN_FAITHFUL});
-    nebel_cells *out = create(&(nebel_cells_desc){.cells = &leaving, .cell_count = 1, .span = NEBEL_SPAN_FAITHFUL});
-    nebel_cell_layer layer[4];
+    nebel_cells *in = create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = NEBEL_SPAN_PRINTED});
+    nebel_cells *out = create(&(nebel_cells_desc){.cells = &leaving, .cell_count = 1, .span = NEBEL_SPAN_PRINTED});
+    nebel_cell_segment layer[4];
     assert_int_equal(layers_at(in, &into_leaning, -13, 0, -25, layer), 1);
     assert_near(layer[0].from, 0, 0);
     assert_near(layer[0].to, 25, 1e-13);
@@ -202,12 +202,12 @@ static void test_the_seam_and_its_cure(void **state)
     nebel_cells *apart = create(&(nebel_cells_desc){.cells = rooms, .cell_count = 2, .ungrouped = 1});
     assert_near(alpha_at(grouped, &along_x, 7, 0, 0), .3 + .3, 1e-15);
     assert_near(alpha_at(apart, &along_x, 7, 0, 0), .3 + .3 - .3 * .3, 1e-15);
-    nebel_cell_layer layers[4];
+    nebel_cell_segment layers[4];
     assert_int_equal(layers_at(grouped, &along_x, 7, 0, 0, layers), 1);
     assert_near(layers[0].from, 0, 0);
     assert_near(layers[0].to, 6, 0);
-    assert_int_equal(layers[0].first, 0);
-    assert_int_equal(layers[0].last, 1);
+    assert_int_equal(layers[0].first_cell, 0);
+    assert_int_equal(layers[0].last_cell, 1);
     assert_int_equal(layers_at(apart, &along_x, 7, 0, 0, layers), 2);
     assert_near(layers[0].to, 3, 0);
     assert_near(layers[1].from, 3, 0);
@@ -324,7 +324,7 @@ static void test_exponential_fog_is_the_exact_one(void **state)
         if (round % 2 != 0) /* turned, shifted, of another size */
             for (size_t i = 0; i < world.count; i++)
                 world.cells[i].shape.transform = (nebel_transform){{1, -2, .5}, {.5, .1, -.3, .8}, {.7, -1.1, .9}};
-        for (size_t i = 0; i < world.count; i++) volumes[i] = nebel_cell_volume(&world.cells[i]);
+        for (size_t i = 0; i < world.count; i++) volumes[i] = nebel_volume_from_cell(&world.cells[i]);
         nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, world.count);
         for (int ungrouped = 0; ungrouped < 2; ungrouped++) {
             nebel_cells *cells = create(&(nebel_cells_desc){.cells = world.cells,
@@ -343,7 +343,7 @@ static void test_a_ray_in_a_face(void **state)
 {
     (void)state;
     const nebel_cell rooms[] = {BOX(0, 4, .1, 1, 1, 1), BOX(4, 9, .2, .5, 0, 1)};
-    const nebel_volume_desc volumes[] = {nebel_cell_volume(&rooms[0]), nebel_cell_volume(&rooms[1])};
+    const nebel_volume_desc volumes[] = {nebel_volume_from_cell(&rooms[0]), nebel_volume_from_cell(&rooms[1])};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, 2);
     nebel_cells *cells = create(&(nebel_cells_desc){.cells = rooms, .cell_count = 2, .model = NEBEL_CELL_EXPONENTIAL});
     static const double xs[] = {0, 4, 9};
@@ -384,7 +384,7 @@ static void test_the_order_of_cells_means_nothing(void **state)
         shuffle(&world, &d);
         nebel_cells *b =
             create(&(nebel_cells_desc){.cells = world.cells, .cell_count = world.count, .model = model, .span = span});
-        assert_int_equal(nebel_count_cell_portals(a), nebel_count_cell_portals(b));
+        assert_int_equal(nebel_get_cell_portal_count(a), nebel_get_cell_portal_count(b));
         for (int i = 0; i < 200; i++) {
             const nebel_cell_view view = random_view(&d, 14);
             const double x = dice(&d, -14, 14), y = dice(&d, -14, 14), z = dice(&d, -14, 14);
@@ -442,7 +442,7 @@ static void test_an_eye_a_hair_before_a_portal(void **state)
 {
     (void)state;
     const nebel_cell_view view = {.eye = {0, 0, -8 + 1e-7}, .forward = {0, 0, -1}};
-    nebel_cells *cells = create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = NEBEL_SPAN_FAITHFUL});
+    nebel_cells *cells = create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = NEBEL_SPAN_PRINTED});
     assert_near(alpha_at(cells, &view, 13, 0, -25), .04 * 17, 1e-7);
     nebel_destroy_cells(cells);
 }
@@ -475,7 +475,7 @@ static void test_what_is_behind_the_eye(void **state)
         assert_near(alpha_at(cells, &view, 15, 0, 0), 0, 0);
         const nebel_cell_point point = {{4, 0, 0}, {{1, 0, 0}, 18}};
         nebel_cell_fog fog;
-        assert_int_equal(nebel_fog_cells(cells, &view, 1, &point, 0, &fog, 0), NEBEL_OK);
+        assert_int_equal(nebel_compute_cell_fog(cells, &view, 1, &point, 0, &fog, 0), NEBEL_OK);
         assert_near(fog.alpha, span == NEBEL_SPAN_RAY ? .5 : 0, 1e-15);
         nebel_destroy_cells(cells);
     }
@@ -493,15 +493,15 @@ static void test_points_that_are_none(void **state)
         const nebel_cell_view view = {.eye = {0, bad[i], 0}, .forward = {1, 0, 0}};
         const nebel_cell_point point = {.position = {7, 0, 0}};
         nebel_cell_fog out;
-        assert_int_equal(nebel_fog_cells(cells, &view, 1, &point, 0, &out, 0), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_compute_cell_fog(cells, &view, 1, &point, 0, &out, 0), NEBEL_ERROR_ARGUMENT);
     }
     nebel_destroy_cells(cells);
     cells = create(&(nebel_cells_desc){.cells = clear_then_fog, .cell_count = 3, .span = NEBEL_SPAN_DEPTH});
     const nebel_cell_view aimless = {.eye = {1, 0, 0}, .forward = {0, 0, 0}};
     const nebel_cell_point point = {.position = {7, 0, 0}};
     nebel_cell_fog out;
-    assert_int_equal(nebel_fog_cells(cells, &aimless, 1, &point, 0, &out, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_cells(NULL, &aimless, 0, NULL, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_cell_fog(cells, &aimless, 1, &point, 0, &out, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_cell_fog(NULL, &aimless, 0, NULL, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
     nebel_destroy_cells(cells);
 }
 
@@ -513,13 +513,14 @@ static void test_streams_that_share_bytes_are_refused(void **state)
     static nebel_cell_fog fog[8];
     nebel_cell_fog *const inside = (void *)((char *)points + 8);
     const size_t whole = sizeof *points, part = sizeof *fog;
-    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole, fog, part), NEBEL_OK);
-    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole - 8, fog, part), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole, fog, part - 8), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole, inside, whole), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole, inside, part), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole, fog, SIZE_MAX / 2), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_cells(cells, &along_x, 0, points, 1, inside, 1), NEBEL_OK);
+    assert_int_equal(nebel_compute_cell_fog(cells, &along_x, 4, points, whole, fog, part), NEBEL_OK);
+    assert_int_equal(nebel_compute_cell_fog(cells, &along_x, 4, points, whole - 8, fog, part), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_cell_fog(cells, &along_x, 4, points, whole, fog, part - 8), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_cell_fog(cells, &along_x, 4, points, whole, inside, whole), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_cell_fog(cells, &along_x, 4, points, whole, inside, part), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_cell_fog(cells, &along_x, 4, points, whole, fog, SIZE_MAX / 2),
+                     NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_cell_fog(cells, &along_x, 0, points, 1, inside, 1), NEBEL_OK);
     nebel_destroy_cells(cells);
 }
 
@@ -534,8 +535,8 @@ static void test_strides(void **state)
     } vertices[3] = {{.point = {{7, 0, 0}, {{0, 0, 0}, 0}}, .mine = 1},
                      {.point = {{9, 0, 0}, {{0, 0, 0}, 0}}, .mine = 2},
                      {.point = {{2, 0, 0}, {{0, 0, 0}, 0}}, .mine = 3}};
-    assert_int_equal(nebel_fog_cells(cells, &along_x, 3, &vertices[0].point, sizeof vertices[0], &vertices[0].fog,
-                                     sizeof vertices[0]),
+    assert_int_equal(nebel_compute_cell_fog(cells, &along_x, 3, &vertices[0].point, sizeof vertices[0],
+                                            &vertices[0].fog, sizeof vertices[0]),
                      NEBEL_OK);
     static const double wanted[] = {.3, .5, 0};
     for (int i = 0; i < 3; i++) {

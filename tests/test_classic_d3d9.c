@@ -22,8 +22,8 @@ static uint32_t bits_of(float x)
 static void set(nebel_d3d9_fog *fog, uint32_t state, uint32_t value)
 {
     uint32_t kept;
-    assert_int_equal(nebel_set_d3d9_fog(fog, state, value), NEBEL_OK);
-    assert_int_equal(nebel_get_d3d9_fog(fog, state, &kept), NEBEL_OK);
+    assert_int_equal(nebel_set_d3d9_state(fog, state, value), NEBEL_OK);
+    assert_int_equal(nebel_get_d3d9_state(fog, state, &kept), NEBEL_OK);
     assert_int_equal(kept, value);
 }
 
@@ -51,7 +51,7 @@ static void test_a_new_device_has_the_documented_states(void **unused)
     nebel_reset_d3d9_fog(&fog);
     for (size_t i = 0; i < sizeof defaults / sizeof *defaults; i++) {
         uint32_t value = 77;
-        assert_int_equal(nebel_get_d3d9_fog(&fog, defaults[i][0], &value), NEBEL_OK);
+        assert_int_equal(nebel_get_d3d9_state(&fog, defaults[i][0], &value), NEBEL_OK);
         assert_int_equal(value, defaults[i][1]);
     }
 }
@@ -63,13 +63,13 @@ static void test_states_that_are_none_change_nothing(void **unused)
     nebel_reset_d3d9_fog(&fog);
     const nebel_d3d9_fog before = fog;
     uint32_t value = 5;
-    assert_int_equal(nebel_set_d3d9_fog(&fog, 29, 1), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_set_d3d9_fog(&fog, NEBEL_D3DRS_FOGTABLEMODE, 4), NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_set_d3d9_fog(&fog, NEBEL_D3DRS_FOGVERTEXMODE, UINT32_MAX), NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_set_d3d9_fog(NULL, 28, 1), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_get_d3d9_fog(&fog, 29, &value), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_get_d3d9_fog(&fog, 28, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_get_d3d9_fog(NULL, 28, &value), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_d3d9_state(&fog, 29, 1), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_d3d9_state(&fog, NEBEL_D3DRS_FOGTABLEMODE, 4), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_set_d3d9_state(&fog, NEBEL_D3DRS_FOGVERTEXMODE, UINT32_MAX), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_set_d3d9_state(NULL, 28, 1), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_get_d3d9_state(&fog, 29, &value), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_get_d3d9_state(&fog, 28, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_get_d3d9_state(NULL, 28, &value), NEBEL_ERROR_ARGUMENT);
     assert_memory_equal(&fog, &before, sizeof fog);
     assert_int_equal(value, 5);
 }
@@ -92,7 +92,7 @@ static void assert_color(const char *what, int found, int wanted, int most)
 
 static double fixed(const nebel_d3d9_fog *fog, double x, double y, double z, double alpha)
 {
-    const nebel_d3d9_vertex vertex = {.place = {x, y, z}, .specular_alpha = alpha};
+    const nebel_d3d9_vertex vertex = {.position = {x, y, z}, .specular_alpha = alpha};
     return nebel_compute_d3d9_vertex_factor(fog, &vertex);
 }
 

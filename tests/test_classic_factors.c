@@ -177,7 +177,7 @@ static void test_curves_are_their_formulas(void **unused)
 {
     (void)unused;
     for (double s = 0; s < 60; s += .7) {
-        assert_near(amount((nebel_curve){.type = NEBEL_CURVE_PHYSICAL, .k = .1}, s), 1 - exp(-.1 * s), 1e-15);
+        assert_near(amount((nebel_curve){.type = NEBEL_CURVE_PHYSICAL, .scale = .1}, s), 1 - exp(-.1 * s), 1e-15);
         assert_near(amount((nebel_curve){.type = NEBEL_CURVE_LINEAR}, s), .05 * s, 1e-15);
         assert_near(amount((nebel_curve){.type = NEBEL_CURVE_EXP}, s), exp(.03 * s) - 1, 1e-14);
         const double x = .04 * s;
@@ -215,7 +215,7 @@ static void test_curves_that_are_none_are_refused(void **unused)
     (void)unused;
     nebel_curve out;
     const nebel_curve unknown[] = {{.type = NEBEL_CURVE_COUNT}, {.type = NEBEL_CURVE_TABLE}};
-    const nebel_curve numbers[] = {{.k = -1}, {.k = not_a_number}, {.k = HUGE_VAL}};
+    const nebel_curve numbers[] = {{.scale = -1}, {.scale = not_a_number}, {.scale = HUGE_VAL}};
     for (size_t i = 0; i < 2; i++) assert_int_equal(nebel_resolve_curve(&unknown[i], &out), NEBEL_ERROR_ARGUMENT);
     for (size_t i = 0; i < 3; i++) assert_int_equal(nebel_resolve_curve(&numbers[i], &out), NEBEL_ERROR_VALUE);
     assert_int_equal(nebel_resolve_curve(NULL, &out), NEBEL_ERROR_ARGUMENT);
@@ -232,7 +232,7 @@ static void test_the_table_is_linear_between_its_entries(void **unused)
     (void)unused;
     float table[NEBEL_CURVE_ENTRIES];
     fill_squares(table);
-    const nebel_curve curve = {.type = NEBEL_CURVE_TABLE, .k = 1, .table = table};
+    const nebel_curve curve = {.type = NEBEL_CURVE_TABLE, .scale = 1, .table = table};
     for (int i = 0; i < NEBEL_CURVE_ENTRIES; i++) assert_near(weight(curve, i / 255.), (double)table[i], 1e-15);
     for (int i = 0; i < 255; i++) {
         const double between = .25 * (double)table[i] + .75 * (double)table[i + 1];
@@ -253,7 +253,7 @@ static void test_an_amount_of_1_is_the_last_entry_of_the_table(void **unused)
     (void)unused;
     float table[NEBEL_CURVE_ENTRIES] = {0};
     table[255] = 1;
-    const nebel_curve curve = {.type = NEBEL_CURVE_TABLE, .k = 1, .table = table};
+    const nebel_curve curve = {.type = NEBEL_CURVE_TABLE, .scale = 1, .table = table};
     assert_true(look_up_as_printed(table, 1) == 0);
     assert_true(weight(curve, 1) == 1 && weight(curve, 7) == 1);
     assert_near(weight(curve, 254.5 / 255), .5, 1e-12);
@@ -277,7 +277,7 @@ static void test_the_eye_of_an_object_is_where_its_matrix_gives_zero(void **unus
     };
     for (size_t i = 0; i < 3; i++) {
         double eye[3], zero[3];
-        assert_int_equal(nebel_find_eye(matrices[i], eye), NEBEL_OK);
+        assert_int_equal(nebel_compute_object_eye(matrices[i], eye), NEBEL_OK);
         apply(matrices[i], eye, zero);
         for (int c = 0; c < 3; c++) assert_near(zero[c], 0, i == 2 ? 1e-8 : 1e-14);
     }
@@ -292,9 +292,9 @@ static void test_matrices_without_an_eye_are_refused(void **unused)
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, (double)NAN, 0, 0, 1},
     };
     double eye[3] = {1, 2, 3};
-    for (size_t i = 0; i < 3; i++) assert_int_equal(nebel_find_eye(matrices[i], eye), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_find_eye(NULL, eye), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_find_eye(matrices[0], NULL), NEBEL_ERROR_ARGUMENT);
+    for (size_t i = 0; i < 3; i++) assert_int_equal(nebel_compute_object_eye(matrices[i], eye), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_object_eye(NULL, eye), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_object_eye(matrices[0], NULL), NEBEL_ERROR_ARGUMENT);
     assert_true(eye[0] == 1 && eye[1] == 2 && eye[2] == 3);
 }
 

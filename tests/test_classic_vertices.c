@@ -50,7 +50,7 @@ static void fog_points(const nebel_snapshot *snapshot, const nebel_vertex_desc *
                        nebel_vertex_format format, void *out)
 {
     const nebel_vertex_output output = {format, out, 0};
-    assert_int_equal(nebel_fog_vertices(snapshot, desc, COUNT, vertices, &output, 1), NEBEL_OK);
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, desc, COUNT, vertices, &output, 1), NEBEL_OK);
 }
 
 static float fog_one(const nebel_snapshot *snapshot, const nebel_vertex_desc *desc, const double eye[3],
@@ -59,7 +59,7 @@ static float fog_one(const nebel_snapshot *snapshot, const nebel_vertex_desc *de
     float out = -7;
     const nebel_vertices vertices = {.positions = point, .eye = {eye[0], eye[1], eye[2]}};
     const nebel_vertex_output output = {NEBEL_VERTEX_FACTOR, &out, 0};
-    assert_int_equal(nebel_fog_vertices(snapshot, desc, 1, &vertices, &output, 1), NEBEL_OK);
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, desc, 1, &vertices, &output, 1), NEBEL_OK);
     return out;
 }
 
@@ -125,7 +125,8 @@ static void test_boxes_have_the_bits_of_segments(void **unused)
         const float from[3] = {-11, 3, 9.5f};
         const nebel_segments segments = {.origin = {1, 2, 3}, .from = from, .to = p.at[0]};
         float a[COUNT], b[COUNT];
-        assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, COUNT, &segments, a, 0), NEBEL_OK);
+        assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, COUNT, &segments, a, 0),
+                         NEBEL_OK);
         fog_points(snapshot, NULL, &vertices, NEBEL_VERTEX_FACTOR, b);
         assert_memory_equal(a, b, sizeof a);
         nebel_release_snapshot(snapshot);
@@ -183,7 +184,7 @@ static void check_formats(const nebel_snapshot *snapshot, const nebel_vertex_des
     const nebel_vertex_output outputs[] = {
         {NEBEL_VERTEX_SPECULAR_ALPHA, specular, 0}, {NEBEL_VERTEX_RGBA8, bytes, 0}, {NEBEL_VERTEX_RGBA_FLOAT, color, 0},
         {NEBEL_VERTEX_COORDINATE, coordinate, 0},   {NEBEL_VERTEX_ALPHA, alpha, 0}, {NEBEL_VERTEX_FACTOR, factor, 0}};
-    assert_int_equal(nebel_fog_vertices(snapshot, desc, COUNT, &vertices, outputs, 6), NEBEL_OK);
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, desc, COUNT, &vertices, outputs, 6), NEBEL_OK);
     int partly = 0;
     for (int i = 0; i < COUNT; i++) {
         const double f = (double)factor[i];
@@ -227,7 +228,7 @@ static void test_halves_are_rounded_upwards(void **unused)
     assert_true(fog_one(snapshot, NULL, eye, point) == .5f);
     const nebel_vertices vertices = {.positions = point};
     const nebel_vertex_output outputs[] = {{NEBEL_VERTEX_RGBA8, bytes, 0}, {NEBEL_VERTEX_SPECULAR_ALPHA, specular, 0}};
-    assert_int_equal(nebel_fog_vertices(snapshot, &(nebel_vertex_desc){.color = color}, 1, &vertices, outputs, 2),
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, &(nebel_vertex_desc){.color = color}, 1, &vertices, outputs, 2),
                      NEBEL_OK);
     for (int c = 0; c < 4; c++) assert_int_equal(bytes[c], 128);
     assert_memory_equal(specular, ((const unsigned char[4]){1, 2, 3, 128}), 4);
@@ -257,7 +258,7 @@ static void fog_structures(const nebel_snapshot *snapshot, nebel_isa isa, vertex
                                            {NEBEL_VERTEX_RGBA8, v[first].color, sizeof *v},
                                            {NEBEL_VERTEX_SPECULAR_ALPHA, v[first].specular, sizeof *v},
                                            {NEBEL_VERTEX_ALPHA, v[first].alpha, sizeof *v}};
-    assert_int_equal(nebel_fog_vertices(snapshot, &(nebel_vertex_desc){.isa = isa}, n, &vertices, outputs, 6),
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, &(nebel_vertex_desc){.isa = isa}, n, &vertices, outputs, 6),
                      NEBEL_OK);
 }
 
@@ -327,8 +328,8 @@ static void test_curves_are_those_of_the_length_inside(void **unused)
         nebel_curve curve;
         assert_int_equal(nebel_resolve_curve(&(nebel_curve){.type = (nebel_curve_type)type, .table = table}, &curve),
                          NEBEL_OK);
-        nebel_snapshot *const kinds[] = {commit_box(-40, -1, -1, 40, 1, 1, curve.k),
-                                         commit_box(-1, -1, -40, 1, 1, 40, curve.k)};
+        nebel_snapshot *const kinds[] = {commit_box(-40, -1, -1, 40, 1, 1, curve.scale),
+                                         commit_box(-1, -1, -40, 1, 1, 40, curve.scale)};
         const nebel_vertex_desc desc = {.curve = curve.type, .table = table};
         for (int kind = 0; kind < 2; kind++) {
             const double eye[3] = {kind ? 0 : -50, 0, kind ? -50 : 0};
@@ -475,8 +476,9 @@ static void test_a_fog_coordinate_is_100_times_the_amount(void **unused)
         const nebel_vertices vertices = {.positions = point};
         const nebel_vertex_output outputs[] = {{NEBEL_VERTEX_COORDINATE, &coordinate, 0},
                                                {NEBEL_VERTEX_RGBA_FLOAT, light, 0}};
-        assert_int_equal(nebel_fog_vertices(snapshot, &(nebel_vertex_desc){.color = color}, 1, &vertices, outputs, 2),
-                         NEBEL_OK);
+        assert_int_equal(
+            nebel_compute_vertex_fog(snapshot, &(nebel_vertex_desc){.color = color}, 1, &vertices, outputs, 2),
+            NEBEL_OK);
         const double f = (double)fog_one(snapshot, NULL, eye, point);
         assert_true(fabs(nebel_compute_fog_factor(&hardware, (double)coordinate) - f) < 1e-6);
         const double printed = nebel_compute_fog_factor(&hardware, (double)light[0]);
@@ -581,7 +583,7 @@ static void test_streams_that_share_bytes_are_refused(void **unused)
         const refusal *const r = &refusals[i];
         const nebel_vertices vertices = {.positions = m, .position_stride = r->position_stride};
         messages.text[0] = '\0';
-        assert_int_equal(nebel_fog_vertices(snapshot, NULL, r->n, &vertices, r->outputs, (size_t)r->output_count),
+        assert_int_equal(nebel_compute_vertex_fog(snapshot, NULL, r->n, &vertices, r->outputs, (size_t)r->output_count),
                          NEBEL_ERROR_ARGUMENT);
         if (strstr(messages.text, r->word) == NULL) fail_msg("refusal %zu: %s", i, messages.text);
         assert_memory_equal(memory, before, sizeof memory);
@@ -606,7 +608,7 @@ static void test_streams_that_lie_in_each_other_are_taken(void **unused)
         const refusal *const r = &taken[i];
         const nebel_vertices vertices = {.positions = m, .position_stride = r->position_stride};
         memset(m, 0, sizeof m);
-        assert_int_equal(nebel_fog_vertices(snapshot, NULL, r->n, &vertices, r->outputs, (size_t)r->output_count),
+        assert_int_equal(nebel_compute_vertex_fog(snapshot, NULL, r->n, &vertices, r->outputs, (size_t)r->output_count),
                          NEBEL_OK);
     }
     nebel_release_snapshot(snapshot);
@@ -638,21 +640,21 @@ static void test_descriptions_that_are_none_are_refused(void **unused)
                  {{.coordinate_end = 1e39}, NEBEL_ERROR_VALUE},
                  {{.coordinate_end = -1}, NEBEL_ERROR_VALUE}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-        assert_int_equal(nebel_fog_vertices(snapshot, &cases[i].desc, 1, &vertices, &output, 1), cases[i].result);
+        assert_int_equal(nebel_compute_vertex_fog(snapshot, &cases[i].desc, 1, &vertices, &output, 1), cases[i].result);
     for (int isa = 0; isa < NEBEL_ISA_COUNT; isa++)
         if (!nebel_isa_available((nebel_isa)isa))
-            assert_int_equal(
-                nebel_fog_vertices(snapshot, &(nebel_vertex_desc){.isa = (nebel_isa)isa}, 1, &vertices, &output, 1),
-                NEBEL_ERROR_UNSUPPORTED);
+            assert_int_equal(nebel_compute_vertex_fog(snapshot, &(nebel_vertex_desc){.isa = (nebel_isa)isa}, 1,
+                                                      &vertices, &output, 1),
+                             NEBEL_ERROR_UNSUPPORTED);
     messages.count = 0;
     vertices.eye[1] = HUGE_VAL;
-    assert_int_equal(nebel_fog_vertices(snapshot, NULL, 1, &vertices, &output, 1), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, NULL, 1, &vertices, &output, 1), NEBEL_ERROR_ARGUMENT);
     vertices.eye[1] = 0;
     vertices.origin[2] = 2e15;
-    assert_int_equal(nebel_fog_vertices(snapshot, NULL, 1, &vertices, &output, 1), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_vertices(snapshot, NULL, 1, NULL, &output, 1), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_vertices(snapshot, NULL, 1, &vertices, NULL, 1), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_vertices(NULL, NULL, 1, &vertices, &output, 1), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, NULL, 1, &vertices, &output, 1), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, NULL, 1, NULL, &output, 1), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, NULL, 1, &vertices, NULL, 1), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_vertex_fog(NULL, NULL, 1, &vertices, &output, 1), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(messages.count, 4);
     nebel_release_snapshot(snapshot);
 }
@@ -680,7 +682,7 @@ static void test_nothing_is_written_beyond_the_last_vertex(void **unused)
             memset(out, 0x77, sizeof out);
             const nebel_vertices vertices = {.positions = p.at};
             const nebel_vertex_output output = {(nebel_vertex_format)format, out, 0};
-            assert_int_equal(nebel_fog_vertices(snapshot, NULL, n, &vertices, &output, 1), NEBEL_OK);
+            assert_int_equal(nebel_compute_vertex_fog(snapshot, NULL, n, &vertices, &output, 1), NEBEL_OK);
             for (size_t i = n * size; i < sizeof out; i++) assert_int_equal(out[i], 0x77);
         }
     nebel_release_snapshot(snapshot);

@@ -20,7 +20,7 @@ static double reflected_by_paths(double depth, double cosine, const double turns
 
 /* The same of the model: its light integrated over the eyes above, in a slab that is seen under a cosine; or below, where what comes
  * through straight or hardly turned is told apart. */
-static double sent_by_model(const nebel_cloud_view *view, double depth, double cosine, int is_above)
+static double sent_by_model(const nebel_cloud_lighting *view, double depth, double cosine, int is_above)
 {
     enum { EYES = 24, TURNS = 96, STEPS = 400 };
     const nb_cloud_light white = {.sun = {1, 1, 1}};
@@ -61,7 +61,7 @@ static void test_light_of_slabs(void **state)
     } slabs[] = {{1, 1}, {4, 1}, {16, 1}, {64, 1}, {2, .342}, {4, .5}, {16, .5}, {64, .5}, {16, .2}};
     nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.seed = 1}});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     const double apart = (double)clouds->layers[0].apart;
     double turns[SLAB_PARTS + 1];
     uint64_t numbers = 5;
@@ -81,7 +81,7 @@ static void test_light_of_slabs(void **state)
         assert_near(up + down, 1, .01);
     }
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -101,7 +101,7 @@ static void test_ways_to_the_sun(void **state)
     enum { PLACES = 400 };
     nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.extinction = .005, .coverage = .6}});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     const double *sun = view->sun.direction;
     const nb_cloud_grain grain = {.width = 6, .first = 16, .wide = 100};
     uint64_t numbers = 17;
@@ -128,7 +128,7 @@ static void test_ways_to_the_sun(void **state)
         assert_true(between > PLACES / 12 && sum[k] < .006 && fabs(bias[k]) < .002);
     }
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -138,12 +138,12 @@ static void test_ways_to_a_sun_below_level(void **state)
     (void)state;
     nebel_clouds *clouds =
         make(1, (const nebel_cloud_layer[]){
-                    {.kind = NEBEL_CLOUD_STRATUS, .base = 400, .top = 1000, .extinction = 4e-5, .coverage = 1}});
-    const nebel_cloud_view_desc desc = {
+                    {.type = NEBEL_CLOUD_STRATUS, .base = 400, .top = 1000, .extinction = 4e-5, .coverage = 1}});
+    const nebel_cloud_lighting_desc desc = {
         .clouds = clouds, .sun = {.direction = {1, -.015, 0}, .irradiance = {5, 4, 3}}, .tolerance = 1e-3};
-    nebel_cloud_view *view;
+    nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
-    assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_OK);
     assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
     const double *sun = view->sun.direction;
     for (int i = 0; i < 8; i++) {
@@ -163,14 +163,14 @@ static void test_ways_to_a_sun_below_level(void **state)
         assert_near(far, truth, .03 * truth);
     }
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
 /* 0 where more than a twentieth is seen through clouds. */
 static double light_of_opaque(nebel_cloud_workspace *workspace, const nebel_ray *ray, double spread)
 {
-    nebel_cloud_knots knots;
+    nebel_cloud_transfer knots;
     assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &spread, 0, &knots, 0), NEBEL_OK);
     return knots.count > 0 && knots.transmittance[knots.count - 1] < .05f
                ? (double)knots.in_scattering[knots.count - 1][1]
@@ -201,9 +201,9 @@ static void test_light_of_flat_heaps(void **state)
         nebel_cloud_layer layer;
         double height;
     } cases[] = {
-        {{.size = 5e4, .coverage = .6, .detail = NEBEL_CLOUD_NONE}, 1e6},
-        {{.size = 5e4, .coverage = .6}, 1e6},
-        {{.size = 1e4, .coverage = .6}, 1e5},
+        {{.cell_size = 5e4, .coverage = .6, .erosion = NEBEL_CLOUD_NONE}, 1e6},
+        {{.cell_size = 5e4, .coverage = .6}, 1e6},
+        {{.cell_size = 1e4, .coverage = .6}, 1e5},
         {{.base = 900, .top = 1200, .extinction = .2, .coverage = .6}, 2e4},
     };
     const double spread = 3e-3;
@@ -211,7 +211,7 @@ static void test_light_of_flat_heaps(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         nebel_clouds *clouds = make(1, &cases[i].layer);
         nebel_cloud_workspace *workspace;
-        nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+        nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
         double sum = 0, squares = 0;
         int count = 0;
         for (int k = 0; k < 500; k++) {
@@ -229,7 +229,7 @@ static void test_light_of_flat_heaps(void **state)
                       1e-3 * cases[i].height, off);
         assert_true(count > 50 && off < .18);
         nebel_destroy_cloud_workspace(workspace);
-        nebel_destroy_cloud_view(view);
+        nebel_destroy_cloud_lighting(view);
         nebel_destroy_clouds(clouds);
     }
 }
@@ -246,9 +246,9 @@ static void test_light_as_pixels_grow(void **state)
 {
     (void)state;
     nebel_clouds *clouds =
-        make(1, (const nebel_cloud_layer[]){{.size = 5e4, .coverage = .9, .detail = NEBEL_CLOUD_NONE}});
+        make(1, (const nebel_cloud_layer[]){{.cell_size = 5e4, .coverage = .9, .erosion = NEBEL_CLOUD_NONE}});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     double jump = 0, off = 0;
     int count = 0;
     for (int i = 0; i < 24; i++) {
@@ -269,7 +269,7 @@ static void test_light_as_pixels_grow(void **state)
         count, off, jump);
     assert_true(count > 12 && off < .2 && jump < .1);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -281,15 +281,15 @@ static void test_light_of_dense_clouds(void **state)
     for (int d = 0; d < 3; d++) {
         nebel_clouds *clouds =
             make(1, (const nebel_cloud_layer[]){
-                        {.kind = NEBEL_CLOUD_STRATUS, .base = 500, .top = 600, .extinction = denser[d]}});
+                        {.type = NEBEL_CLOUD_STRATUS, .base = 500, .top = 600, .extinction = denser[d]}});
         nebel_cloud_workspace *workspace;
-        nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+        nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
         uint64_t numbers = 5;
         int opaque = 0;
         for (int i = 0; i < 2000; i++) {
             const double down = dice(&numbers, .01, .5), turn = dice(&numbers, -PI, PI), level = sqrt(1 - down * down);
             const nebel_ray ray = {{0, 3000, 0}, {level * sin(turn), -down, level * cos(turn)}, HUGE_VAL};
-            nebel_cloud_knots knots;
+            nebel_cloud_transfer knots;
             assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){.01}, 0, &knots, 0), NEBEL_OK);
             for (uint32_t k = 0; k < knots.count; k++)
                 for (int c = 0; c < 3; c++)
@@ -300,7 +300,7 @@ static void test_light_of_dense_clouds(void **state)
         }
         assert_true(opaque > 1000);
         nebel_destroy_cloud_workspace(workspace);
-        nebel_destroy_cloud_view(view);
+        nebel_destroy_cloud_lighting(view);
         nebel_destroy_clouds(clouds);
     }
 }

@@ -167,7 +167,7 @@ static void test_drops_against_spheres(void **state)
                                                      : 180;
             cosines[k] = cos(dice(&numbers, low, high) * PI / 180);
         }
-        nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.diameter = diameter});
+        nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.droplet_diameter = diameter});
         const double mean_truth = drops(color, diameter, SIZES, &numbers, cosines, truth);
         const double mean = mean_cosine(clouds, color);
         for (int k = 0; k < DIRECTIONS; k++) {
@@ -216,7 +216,7 @@ static void test_bows_and_glories(void **state)
 {
     (void)state;
     for (double diameter = 10; diameter <= 50; diameter += 10) {
-        nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.diameter = diameter});
+        nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.droplet_diameter = diameter});
         double bow[3], ring[3];
         for (int c = 0; c < 3; c++) {
             bow[c] = 180 - brightest(clouds, c, 130, 160);
@@ -234,10 +234,10 @@ static void test_ice_has_the_fit(void **state)
 {
     (void)state;
     const nebel_phase fit = {.type = NEBEL_PHASE_DROPLETS, .diameter = 40};
-    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.kind = NEBEL_CLOUD_CIRRUS});
+    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.type = NEBEL_CLOUD_CIRRUS});
     for (double angle = 0; angle <= 180; angle += .25)
         for (int c = 0; c < 3; c++) {
-            const double truth = nebel_phase_value(&fit, cos(angle * PI / 180));
+            const double truth = nebel_evaluate_phase(&fit, cos(angle * PI / 180));
             assert_near(value_at(clouds, c, angle), truth, 3e-3 * truth);
         }
     nebel_destroy_clouds(clouds);

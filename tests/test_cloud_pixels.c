@@ -45,7 +45,7 @@ static void compare_wide_pixels(const nebel_cloud_layer *layer, double aside, si
     nebel_clouds *clouds = make(1, layer);
     const nb_cloud_layer *made = &clouds->layers[0];
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     uint64_t numbers = 23;
     for (size_t s = 0; s < sizeof spreads / sizeof *spreads; s++) {
         double seen = 0, truth = 0;
@@ -54,7 +54,7 @@ static void compare_wide_pixels(const nebel_cloud_layer *layer, double aside, si
             const double x = aside + dice(&numbers, -.6, .6), z = dice(&numbers, -.6, .6);
             const nebel_ray ray = {{0, 4e5, 0}, {x, -1, z}, HUGE_VAL};
             const double length = sqrt(1 + x * x + z * z);
-            nebel_cloud_knots knots;
+            nebel_cloud_transfer knots;
             assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){spreads[s]}, 0, &knots, 0), NEBEL_OK);
             seen += (knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1) / pixels;
             for (int k = 0; k < RAYS; k++) {
@@ -73,7 +73,7 @@ static void compare_wide_pixels(const nebel_cloud_layer *layer, double aside, si
         assert_near(seen, truth, .05);
     }
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -82,7 +82,7 @@ static void test_wide_pixels_let_as_much_through(void **state)
     (void)state;
     for (int i = 0; i < 2; i++) {
         const nebel_cloud_layer layers[] = {
-            {.coverage = .4}, {.kind = NEBEL_CLOUD_STRATUS, .coverage = .6}, {.kind = NEBEL_CLOUD_CIRRUS}};
+            {.coverage = .4}, {.type = NEBEL_CLOUD_STRATUS, .coverage = .6}, {.type = NEBEL_CLOUD_CIRRUS}};
         for (size_t k = 0; k < 3; k++)
             if (nb_test_tries((k + (size_t)i) % 2, 2)) compare_wide_pixels(&layers[k], 1.6 * i, k);
     }
@@ -98,7 +98,7 @@ static void compare_light_of_pixels(const nebel_cloud_layer *layer)
     const double far = 2e5;
     nebel_clouds *clouds = make(1, layer);
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     uint64_t numbers = 5;
     for (int i = 0; i < 9; i++) {
         const double *unit = directions[i / 3], width = widths[i % 3];
@@ -114,7 +114,7 @@ static void compare_light_of_pixels(const nebel_cloud_layer *layer)
                                      HUGE_VAL};
             const nebel_ray thin = {
                 {x - far * unit[0], 1500 - far * unit[1], z - far * unit[2]}, {unit[0], unit[1], unit[2]}, HUGE_VAL};
-            nebel_cloud_knots knots;
+            nebel_cloud_transfer knots;
             assert_int_equal(nebel_trace_clouds(workspace, 1, &thin, 0, &(double){1 / far}, 0, &knots, 0), NEBEL_OK);
             if (knots.count > 0) truth += (double)knots.in_scattering[knots.count - 1][1] / (pixels * RAYS);
             if (!is_first) continue;
@@ -126,7 +126,7 @@ static void compare_light_of_pixels(const nebel_cloud_layer *layer)
         assert_near(seen, truth, .1 * truth);
     }
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -134,7 +134,7 @@ static void test_light_of_pixels(void **state)
 {
     (void)state;
     compare_light_of_pixels(&(nebel_cloud_layer){.coverage = .5});
-    compare_light_of_pixels(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS});
+    compare_light_of_pixels(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS});
 }
 
 typedef struct nb_shown {
@@ -151,7 +151,7 @@ static nb_shown show_pixels(nebel_cloud_workspace *workspace, const double unit[
         const double x = dice(numbers, -1e5, 1e5), z = dice(numbers, -1e5, 1e5);
         const nebel_ray ray = {
             {x - far * unit[0], 1500 - far * unit[1], z - far * unit[2]}, {unit[0], unit[1], unit[2]}, HUGE_VAL};
-        nebel_cloud_knots knots;
+        nebel_cloud_transfer knots;
         assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){width / far}, 0, &knots, 0), NEBEL_OK);
         const double light = knots.count > 0 ? (double)knots.in_scattering[knots.count - 1][1] : 0;
         sum += light / count;
@@ -167,7 +167,7 @@ static void compare_light_of_crowds(const nebel_cloud_layer *layer, double even,
     static const double widths[] = {440, 2000, 20000}, directions[][3] = {{0, -1, 0}, {.7, -.7, .1}, {-.8, -.3, -.5}};
     nebel_clouds *clouds = make(1, layer);
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     uint64_t numbers = 29;
     for (int i = 0; i < 3; i++) {
         if (!nb_test_tries((size_t)(i + turn) % 3, 3)) continue;
@@ -181,7 +181,7 @@ static void compare_light_of_crowds(const nebel_cloud_layer *layer, double even,
         }
     }
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -189,8 +189,8 @@ static void test_light_of_pixels_that_hide_heaps(void **state)
 {
     (void)state;
     compare_light_of_crowds(&(nebel_cloud_layer){.coverage = .5}, .15, 0);
-    compare_light_of_crowds(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS}, .05, 1);
-    compare_light_of_crowds(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, .02, 2);
+    compare_light_of_crowds(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS}, .05, 1);
+    compare_light_of_crowds(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .coverage = 1}, .02, 2);
 }
 
 /* With the sun ten degrees high, along flat rays towards it and away from it: thin rays end on the first cloud, of whose
@@ -201,13 +201,13 @@ static void test_light_under_a_low_sun(void **state)
     static const double directions[][3] = {{.95, -.25, .1}, {-.95, -.25, .1}};
     for (int kind = 0; kind < 2; kind++) {
         nebel_clouds *clouds =
-            make(1, &(nebel_cloud_layer){.kind = kind == 0 ? NEBEL_CLOUD_CUMULUS : NEBEL_CLOUD_STRATUS});
+            make(1, &(nebel_cloud_layer){.type = kind == 0 ? NEBEL_CLOUD_CUMULUS : NEBEL_CLOUD_STRATUS});
         nebel_cloud_workspace *workspace;
-        nebel_cloud_view *view;
+        nebel_cloud_lighting *view;
         uint64_t numbers = 31;
-        const nebel_cloud_view_desc desc = {.clouds = clouds,
-                                            .sun = {.direction = {.985, .174, 0}, .irradiance = {5, 4, 3}}};
-        assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+        const nebel_cloud_lighting_desc desc = {.clouds = clouds,
+                                                .sun = {.direction = {.985, .174, 0}, .irradiance = {5, 4, 3}}};
+        assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_OK);
         assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
         for (int i = 0; i < 2; i++) {
             if (!nb_test_tries((size_t)(i + kind) % 2, 2)) continue;
@@ -217,7 +217,7 @@ static void test_light_under_a_low_sun(void **state)
             assert_near(seen, truth, .15 * truth);
         }
         nebel_destroy_cloud_workspace(workspace);
-        nebel_destroy_cloud_view(view);
+        nebel_destroy_cloud_lighting(view);
         nebel_destroy_clouds(clouds);
     }
 }
@@ -231,7 +231,7 @@ static double show_horizon(nebel_cloud_workspace *workspace, double height, doub
     for (int i = 0; i < RAYS; i++) {
         const double turn = PI / 3 * (i + .5 - RAYS / 2) / RAYS;
         const nebel_ray ray = {{0, height, 0}, {level * sin(turn), rise, -level * cos(turn)}, HUGE_VAL};
-        nebel_cloud_knots knots;
+        nebel_cloud_transfer knots;
         assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &spread, 0, &knots, 0), NEBEL_OK);
         assert_true(knots.count > 0 && knots.transmittance[knots.count - 1] < .02f);
         sum += (double)knots.in_scattering[knots.count - 1][1] / RAYS;
@@ -245,11 +245,11 @@ static void compare_horizons(const nebel_cloud_layer *layer, double height, cons
     static const double suns[][3] = {{.3, .5, -1}, {.1, .15, -1}, {-.3, .5, 1}}, spreads[] = {6e-4, 2e-3, 5e-3, .03};
     nebel_clouds *clouds = make(1, layer);
     for (int i = 0; i < 3; i++) {
-        const nebel_cloud_view_desc desc = {
+        const nebel_cloud_lighting_desc desc = {
             .clouds = clouds, .sun = {.direction = {suns[i][0], suns[i][1], suns[i][2]}, .irradiance = {5, 4, 3}}};
         nebel_cloud_workspace *workspace;
-        nebel_cloud_view *view;
-        assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+        nebel_cloud_lighting *view;
+        assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_OK);
         assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
         for (int k = 0; k < 2; k++) {
             const double thin = show_horizon(workspace, height, degrees[k], 1e-5);
@@ -260,7 +260,7 @@ static void compare_horizons(const nebel_cloud_layer *layer, double height, cons
             }
         }
         nebel_destroy_cloud_workspace(workspace);
-        nebel_destroy_cloud_view(view);
+        nebel_destroy_cloud_lighting(view);
     }
     nebel_destroy_clouds(clouds);
 }
@@ -268,24 +268,24 @@ static void compare_horizons(const nebel_cloud_layer *layer, double height, cons
 static void test_closed_clouds_are_dark_at_the_horizon(void **state)
 {
     (void)state;
-    compare_horizons(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, 100, (double[]){0, .25}, .05);
-    compare_horizons(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, 100, (double[]){1, 3}, .05);
-    compare_horizons(&(nebel_cloud_layer){.coverage = 1, .size = 2e7}, 2, (double[]){.5, 2}, .1);
+    compare_horizons(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .coverage = 1}, 100, (double[]){0, .25}, .05);
+    compare_horizons(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .coverage = 1}, 100, (double[]){1, 3}, .05);
+    compare_horizons(&(nebel_cloud_layer){.coverage = 1, .cell_size = 2e7}, 2, (double[]){.5, 2}, .1);
 }
 
 /* From below no cloud lies downwards, not that of the planet's other side. */
 static void test_no_cloud_is_seen_through_the_planet(void **state)
 {
     (void)state;
-    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1});
+    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .coverage = 1});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     const double from[3] = {0, RADIUS + 250, 0};
     assert_true(nb_cloud_depth_along(workspace, from, (const double[3]){0, 1, 0}, 10, 10, 1) > 5);
     assert_true(nb_cloud_depth_along(workspace, from, (const double[3]){0, -1, 0}, 10, 10, 1) == 0);
     assert_true(nb_cloud_depth_along(workspace, from, (const double[3]){.6, -.8, 0}, 10, 10, 1) == 0);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -297,9 +297,9 @@ static void test_weather_ends_where_it_ends(void **state)
     static float texels[HIGH][WIDE];
     for (int y = 0; y < HIGH; y++)
         for (int x = 0; x < WIDE; x++) texels[y][x] = y > HIGH / 2 - BELT && y < HIGH / 2 + BELT;
-    nebel_clouds *clouds = make(1, &(const nebel_cloud_layer){.weather = {WIDE, HIGH, 1, texels[0]}});
+    nebel_clouds *clouds = make(1, &(const nebel_cloud_layer){.weather_map = {WIDE, HIGH, 1, texels[0]}});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     const double *center = clouds->atmosphere->center, radius = clouds->atmosphere->airs.radius;
     const double step = 2 * tan(25 * PI / 180) / ROWS, edge = PI / HIGH * BELT;
     size_t within = 0, beyond = 0;
@@ -308,7 +308,7 @@ static void test_weather_ends_where_it_ends(void **state)
         const double x = step * (i % ROWS - ROWS / 2), y = step * (i / ROWS - ROWS / 2);
         const nebel_ray ray = {{center[0], center[1], center[2] + 16e6}, {x, y, -1}, HUGE_VAL};
         const double square = 1 + x * x + y * y, under = 16e6 * 16e6 - square * (16e6 * 16e6 - radius * radius);
-        nebel_cloud_knots knots;
+        nebel_cloud_transfer knots;
         if (under < 0) continue;
         const double t = (16e6 - sqrt(under)) / square, latitude = fabs(asin(y * t / radius));
         /* A texel, and what a pixel hides. */
@@ -320,7 +320,7 @@ static void test_weather_ends_where_it_ends(void **state)
     assert_int_equal(beyond, 0);
     assert_true(within > 3 * nb_test_count(ROWS * ROWS) / 10);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -328,20 +328,20 @@ static void test_weather_ends_where_it_ends(void **state)
 
 typedef struct nb_before_sun {
     nebel_clouds *clouds;
-    nebel_cloud_view *view;
+    nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
     double sun[3], across[2][3]; /* across: level, and up */
 } nb_before_sun;
 
-static nb_before_sun begin_before_sun(nebel_cloud_kind kind, double degrees)
+static nb_before_sun begin_before_sun(nebel_cloud_type kind, double degrees)
 {
     const double rise = sin(degrees * PI / 180), level = cos(degrees * PI / 180);
-    nb_before_sun scene = {.clouds = make(1, &(nebel_cloud_layer){.kind = kind}),
+    nb_before_sun scene = {.clouds = make(1, &(nebel_cloud_layer){.type = kind}),
                            .sun = {0, rise, -level},
                            .across = {{1, 0, 0}, {0, level, rise}}};
-    const nebel_cloud_view_desc desc = {.clouds = scene.clouds,
-                                        .sun = {.direction = {0, rise, -level}, .irradiance = {20, 20, 20}}};
-    assert_int_equal(nebel_create_cloud_view(&desc, &scene.view), NEBEL_OK);
+    const nebel_cloud_lighting_desc desc = {.clouds = scene.clouds,
+                                            .sun = {.direction = {0, rise, -level}, .irradiance = {20, 20, 20}}};
+    assert_int_equal(nebel_create_cloud_lighting(&desc, &scene.view), NEBEL_OK);
     assert_int_equal(nebel_create_cloud_workspace(scene.view, &scene.workspace), NEBEL_OK);
     return scene;
 }
@@ -349,7 +349,7 @@ static nb_before_sun begin_before_sun(nebel_cloud_kind kind, double degrees)
 static void end_before_sun(nb_before_sun *scene)
 {
     nebel_destroy_cloud_workspace(scene->workspace);
-    nebel_destroy_cloud_view(scene->view);
+    nebel_destroy_cloud_lighting(scene->view);
     nebel_destroy_clouds(scene->clouds);
 }
 
@@ -368,7 +368,7 @@ static nebel_ray ray_beside_sun(const nb_before_sun *scene, const double from[2]
 
 static nb_look look_along(const nb_before_sun *scene, const nebel_ray *ray, double spread)
 {
-    nebel_cloud_knots knots;
+    nebel_cloud_transfer knots;
     assert_int_equal(nebel_trace_clouds(scene->workspace, 1, ray, 0, &spread, 0, &knots, 0), NEBEL_OK);
     if (knots.count == 0) return (nb_look){0, 1};
     return (nb_look){(double)knots.in_scattering[knots.count - 1][1], (double)knots.transmittance[knots.count - 1]};
@@ -396,7 +396,7 @@ static double once_before_sun(const nb_before_sun *scene, const nebel_ray *ray, 
     return light * exp(-depth) * (double)phase[1];
 }
 
-static void compare_straight_before_sun(nebel_cloud_kind kind, double degrees)
+static void compare_straight_before_sun(nebel_cloud_type kind, double degrees)
 {
     const int rays = pixels_of(400);
     nb_before_sun scene = begin_before_sun(kind, degrees);
@@ -424,10 +424,10 @@ static const double heights_of_sun[] = {2.6, 8, 26}; /* degrees */
 static void test_light_straight_before_the_sun(void **state)
 {
     (void)state;
-    for (int kind = 0; kind < NEBEL_CLOUD_KIND_COUNT; kind++)
+    for (int kind = 0; kind < NEBEL_CLOUD_TYPE_COUNT; kind++)
         for (int i = 0; i < 3; i++)
             if (nb_test_tries((size_t)(kind + i) % 3, 3))
-                compare_straight_before_sun((nebel_cloud_kind)kind, heights_of_sun[i]);
+                compare_straight_before_sun((nebel_cloud_type)kind, heights_of_sun[i]);
 }
 
 /* Mean light of pixels, and of thin rays within them: where hardly any light comes through thin rays, and elsewhere. */
@@ -458,7 +458,7 @@ static void add_pixel(const nb_before_sun *scene, const double from[2], const do
     sum->most = fmax(sum->most, seen.light);
 }
 
-static void compare_beside_sun(nebel_cloud_kind kind, double degrees)
+static void compare_beside_sun(nebel_cloud_type kind, double degrees)
 {
     const double spread = 6e-3;
     const int pixels = pixels_of(500);
@@ -494,7 +494,7 @@ static void test_heaps_fade_with_the_width_of_pixels(void **state)
     static const double unit[3] = {0, -.42261826174069944, -.9063077870366499};
     nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.coverage = .4}});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     double before = 0, least = 1, last = 0;
     for (double width = 250; width < 4000; width *= 1.12) {
         uint64_t numbers = 8;
@@ -508,16 +508,16 @@ static void test_heaps_fade_with_the_width_of_pixels(void **state)
         least, last);
     assert_true(least > .75 && last < .6);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
 static void test_light_of_pixels_beside_the_sun(void **state)
 {
     (void)state;
-    for (int kind = 0; kind < NEBEL_CLOUD_KIND_COUNT; kind++)
+    for (int kind = 0; kind < NEBEL_CLOUD_TYPE_COUNT; kind++)
         for (int i = 0; i < 3; i++)
-            if (nb_test_tries((size_t)(kind + i) % 3, 3)) compare_beside_sun((nebel_cloud_kind)kind, heights_of_sun[i]);
+            if (nb_test_tries((size_t)(kind + i) % 3, 3)) compare_beside_sun((nebel_cloud_type)kind, heights_of_sun[i]);
 }
 
 int main(void)

@@ -22,13 +22,13 @@ static void check_rays(const sky_case *is)
 {
     nebel_clouds *clouds = make(1, &is->layer);
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     uint64_t numbers = 11;
     double worst = 0, sum = 0, beyond = 0;
     int between = 0, untold = 0;
     for (int i = 0; i < is->rays; i++) {
         const nebel_ray ray = draw_ray(&numbers);
-        nebel_cloud_knots knots;
+        nebel_cloud_transfer knots;
         assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
         const double up = ray.direction[1], left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
         const double truth = brute_force(clouds, &ray, .5 * is->low / up, (is->high + 20) / up, 1);
@@ -43,7 +43,7 @@ static void check_rays(const sky_case *is)
                   is->rays, between, worst, sum, untold, beyond);
     assert_true(between > is->least && worst < is->most && sum < is->most_mean && untold <= is->most_untold);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -51,9 +51,9 @@ static void test_transmittance_is_that_of_the_density(void **state)
 {
     (void)state;
     static const sky_case cases[] = {{{.extinction = .005, .coverage = .6}, 900, 2700, 60, 12, 2e-2, 2e-3, 2},
-                                     {{.kind = NEBEL_CLOUD_CUMULUS}, 900, 2700, 500, 20, 8e-2, 2e-3, 20},
-                                     {{.kind = NEBEL_CLOUD_STRATUS}, 300, 800, 500, 30, 3e-2, 2e-3, 10},
-                                     {{.kind = NEBEL_CLOUD_CIRRUS}, 8000, 9500, 500, 120, 3e-2, 2e-3, 10}};
+                                     {{.type = NEBEL_CLOUD_CUMULUS}, 900, 2700, 500, 20, 8e-2, 2e-3, 20},
+                                     {{.type = NEBEL_CLOUD_STRATUS}, 300, 800, 500, 30, 3e-2, 2e-3, 10},
+                                     {{.type = NEBEL_CLOUD_CIRRUS}, 8000, 9500, 500, 120, 3e-2, 2e-3, 10}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) check_rays(&cases[k]);
 }
 

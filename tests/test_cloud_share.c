@@ -14,19 +14,19 @@ static int at(int x, int y)
 
 typedef struct picture {
     nb_cloud_block block;
-    nebel_cloud_knots knots[ALL], truth[ALL];
+    nebel_cloud_transfer knots[ALL], truth[ALL];
     int is_asked[ALL];
 } picture;
 
 /* A wall of cloud from 1 km on, so deep, so bright, and its light red. */
-static nebel_cloud_knots wall(float left, float light)
+static nebel_cloud_transfer wall(float left, float light)
 {
-    return (nebel_cloud_knots){.count = 3,
-                               .t = {1000, 1200, 1400},
-                               .transmittance = {1, .5f * (1 + left), left},
-                               .in_scattering = {{0}, {.5f * light}, {light}},
-                               .error = 1e-3f,
-                               .looks = 20};
+    return (nebel_cloud_transfer){.count = 3,
+                                  .t = {1000, 1200, 1400},
+                                  .transmittance = {1, .5f * (1 + left), left},
+                                  .in_scattering = {{0}, {.5f * light}, {light}},
+                                  .error = 1e-3f,
+                                  .density_queries = 20};
 }
 
 static void begin(picture *p)
@@ -57,7 +57,7 @@ static int trace(picture *p)
     return count;
 }
 
-static void assert_same(const nebel_cloud_knots *a, const nebel_cloud_knots *b)
+static void assert_same(const nebel_cloud_transfer *a, const nebel_cloud_transfer *b)
 {
     assert_int_equal(a->count, b->count);
     for (uint32_t k = 0; k < a->count; k++) {
@@ -122,7 +122,7 @@ static void test_puffs_beside_clear_rays_are_seen(void **state)
     for (int puff = 0; puff < ALL; puff++)
         for (uint32_t looks = 0; looks < 2; looks++) {
             begin(&p);
-            for (int i = 0; i < ALL; i++) p.truth[i] = (nebel_cloud_knots){.looks = looks};
+            for (int i = 0; i < ALL; i++) p.truth[i] = (nebel_cloud_transfer){.density_queries = looks};
             p.truth[puff] = wall(.2f, 1);
             const int count = trace(&p);
             assert_true(looks == 1 ? count == ALL : count < ALL / 2);
@@ -148,9 +148,10 @@ static void test_surfaces_have_rays(void **state)
 static void test_mean_is_between(void **state)
 {
     (void)state;
-    nebel_cloud_knots a = wall(.2f, 1), b = wall(.22f, 1.02f);
+    nebel_cloud_transfer a = wall(.2f, 1), b = wall(.22f, 1.02f);
     for (int k = 0; k < 3; k++) b.t[k] += 100;
-    const nebel_cloud_knots mean = nb_cloud_mean(&a, &b), clear = {.looks = 3}, half = nb_cloud_mean(&clear, &a);
+    const nebel_cloud_transfer mean = nb_cloud_mean(&a, &b), clear = {.density_queries = 3},
+                               half = nb_cloud_mean(&clear, &a);
     assert_int_equal(mean.count, 3);
     assert_true(mean.t[0] == 1000 && mean.t[2] == 1500);
     assert_true(mean.transmittance[0] == 1 && mean.in_scattering[0][0] == 0);

@@ -30,7 +30,7 @@ static void test_noise_is_what_its_constants_say(void **state)
     (void)state;
     enum { COUNT = 200000 };
     nebel_clouds *clouds =
-        make(3, (const nebel_cloud_layer[]){{.seed = 5}, {.kind = NEBEL_CLOUD_STRATUS}, {.kind = NEBEL_CLOUD_CIRRUS}});
+        make(3, (const nebel_cloud_layer[]){{.seed = 5}, {.type = NEBEL_CLOUD_STRATUS}, {.type = NEBEL_CLOUD_CIRRUS}});
     uint64_t numbers = 1;
     double square = 0, steepest = 0;
     for (int i = 0; i < COUNT; i++) {
@@ -70,8 +70,8 @@ static void test_noise_is_what_its_constants_say(void **state)
 static void test_closed_sheets_have_no_gaps(void **state)
 {
     (void)state;
-    nebel_clouds *clouds = make(2, (const nebel_cloud_layer[]){{.kind = NEBEL_CLOUD_STRATUS, .coverage = 1},
-                                                               {.kind = NEBEL_CLOUD_CIRRUS, .coverage = 1}});
+    nebel_clouds *clouds = make(2, (const nebel_cloud_layer[]){{.type = NEBEL_CLOUD_STRATUS, .coverage = 1},
+                                                               {.type = NEBEL_CLOUD_CIRRUS, .coverage = 1}});
     uint64_t numbers = 9;
     for (int k = 0; k < 2; k++) {
         const double height = k == 0 ? 550 : 8750, most = (double)clouds->layers[k].extinction;
@@ -136,7 +136,7 @@ static void test_wisps_lie_along_the_wind(void **state)
 {
     (void)state;
     const nebel_cloud_layer layers[] = {
-        {.kind = NEBEL_CLOUD_CIRRUS}, {.kind = NEBEL_CLOUD_CIRRUS, .wind = {-10, 0}}, {0}};
+        {.type = NEBEL_CLOUD_CIRRUS}, {.type = NEBEL_CLOUD_CIRRUS, .wind = {-10, 0}}, {0}};
     static const double heights[] = {8750, 8750, 1200};
     double ratios[3];
     for (int k = 0; k < 3; k++) {
@@ -202,7 +202,7 @@ static void test_no_lines_in_thin_clouds(void **state)
     enum { WIDE = 160, HIGH = 40 };
     nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.seed = 1, .coverage = .7}});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     double worst = 0, sum = 0, last = 0;
     int between = 0;
     for (int i = 0; i < WIDE * HIGH; i++) {
@@ -210,7 +210,7 @@ static void test_no_lines_in_thin_clouds(void **state)
         const double x = -.25 + .7 * (i % WIDE) / WIDE, y = .2 + .35 * (double)(i / WIDE) / HIGH;
         const double length = sqrt(x * x + y * y + 1);
         const nebel_ray ray = {{0, 1359.375, 0}, {x / length, y / length, -1 / length}, 300};
-        nebel_cloud_knots knots;
+        nebel_cloud_transfer knots;
         assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
         const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
         const double truth = brute_force(clouds, &ray, 0, 300, 1), step = fabs(left - truth - last);
@@ -226,7 +226,7 @@ static void test_no_lines_in_thin_clouds(void **state)
     /* Ten times what all of a ray may be off by: the pieces of one place are a few, each within that. */
     assert_true(between > WIDE * (int)nb_test_count(HIGH) / 2 && worst < 10 * NEBEL_DEFAULT_TOLERANCE);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -251,15 +251,15 @@ static nebel_ray pixel_ray(const window *w, int x, int y)
 static double find_grain(const nebel_cloud_layer *layer, const nebel_sun *sun, const window *w, double *most)
 {
     enum { COUNT = SIDE * SIDE };
-    static nebel_cloud_knots knots[COUNT];
+    static nebel_cloud_transfer knots[COUNT];
     nebel_clouds *clouds = make(1, layer);
-    const nebel_cloud_view_desc desc = {.clouds = clouds, .sun = *sun};
+    const nebel_cloud_lighting_desc desc = {.clouds = clouds, .sun = *sun};
     const double pixel = sqrt(nb_vector_dot(w->right, w->right));
-    nebel_cloud_view *view;
+    nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
     double square = 0;
     *most = 0;
-    assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_OK);
     assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
     for (int i = 0; i < COUNT; i++) {
         const nebel_ray ray = pixel_ray(w, i % SIDE, i / SIDE);
@@ -276,7 +276,7 @@ static double find_grain(const nebel_cloud_layer *layer, const nebel_sun *sun, c
         *most = fmax(*most, fabs(off));
     }
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
     return sqrt(square / COUNT);
 }
@@ -287,7 +287,7 @@ static void test_neighbours_have_light_of_neighbouring_places(void **state)
 {
     (void)state;
     const double pixel = 2 / sqrt(3) / 360;
-    const nebel_cloud_layer sheet = {.kind = NEBEL_CLOUD_STRATUS, .coverage = 0.9};
+    const nebel_cloud_layer sheet = {.type = NEBEL_CLOUD_STRATUS, .coverage = 0.9};
     const nebel_sun sun = {.direction = {.3, .12, -1}, .irradiance = {5, 5, 5}};
     const window w = {{0, 2, 0}, {-180 * pixel, 110 * pixel, -1}, {pixel, 0, 0}, {0, pixel, 0}};
     double most;
@@ -302,7 +302,7 @@ static void test_sunset_under_a_sheet_has_little_grain(void **state)
 {
     (void)state;
     const double pixel = 2 * tan(25 * 3.14159265358979323846 / 180) / 216, up[3] = {0, .92848, .37139};
-    const nebel_cloud_layer sheet = {.kind = NEBEL_CLOUD_STRATUS};
+    const nebel_cloud_layer sheet = {.type = NEBEL_CLOUD_STRATUS};
     const nebel_sun sun = {.direction = {.3, .1, -1}, .irradiance = {20, 20, 20}};
     const window w = {{0, 2, 0},
                       {-30 * pixel, .37139 + 30 * pixel * up[1], -.92848 + 30 * pixel * up[2]},
@@ -339,7 +339,7 @@ static void test_billows_that_are_missed(void **state)
     const int rays = nb_test_count(RAYS) > FEW ? (int)nb_test_count(RAYS) : FEW;
     nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.seed = 1});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     uint64_t numbers = 11;
     double sum = 0, most = 0;
     int untold = 0;
@@ -351,7 +351,7 @@ static void test_billows_that_are_missed(void **state)
                                i % 3 == 2 ? 4120 / -rise : HUGE_VAL};
         const double begin = i % 3 == 0 ? 0 : (i % 3 == 1 ? 800 : 2200) / fabs(rise),
                      end = (i % 3 == 2 ? 4120 : 2720 - height) / fabs(rise);
-        nebel_cloud_knots knots;
+        nebel_cloud_transfer knots;
         assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
         const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
         const double off = fabs(left - brute_force(clouds, &ray, begin, end, 1));
@@ -364,14 +364,14 @@ static void test_billows_that_are_missed(void **state)
                   rays, sum, untold, most);
     assert_true(sum < 2e-3 && untold <= rays / 50 && most < .06);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
 /* What is left of a ray by short steps, less what is traced. */
 static double excess_of(const nebel_clouds *clouds, nebel_cloud_workspace *workspace, const nebel_ray *ray, double end)
 {
-    nebel_cloud_knots knots;
+    nebel_cloud_transfer knots;
     assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
     const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
     return left - brute_force(clouds, ray, 0, end, 2);
@@ -385,7 +385,7 @@ static void test_rays_from_edges_of_blocks(void **state)
     enum { RAYS = 120 };
     nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.seed = 1});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     uint64_t numbers = 7;
     for (int i = 0; i < RAYS; i++) {
         const double turn = dice(&numbers, -.05, .05), up = dice(&numbers, -.2, .2), far = dice(&numbers, -2e4, 2e4);
@@ -395,7 +395,7 @@ static void test_rays_from_edges_of_blocks(void **state)
         assert_true(excess_of(clouds, workspace, i % 2 ? &along_z : &along_x, 4000) < .2);
     }
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -405,9 +405,9 @@ static void test_bases_are_seen(void **state)
     (void)state;
     static const double details[] = {.1, .5};
     for (int k = 0; k < 2; k++) {
-        nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.seed = 2, .detail = details[k]});
+        nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.seed = 2, .erosion = details[k]});
         nebel_cloud_workspace *workspace;
-        nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+        nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
         const nebel_ray known = {{8113.37, 1500, -3450.79}, {-.6338, -.3746, -.6768}, HUGE_VAL};
         uint64_t numbers = 3;
         assert_true(excess_of(clouds, workspace, &known, 4e3) < .02);
@@ -417,7 +417,7 @@ static void test_bases_are_seen(void **state)
             assert_true(excess_of(clouds, workspace, &ray, 1500 / .4) < .1);
         }
         nebel_destroy_cloud_workspace(workspace);
-        nebel_destroy_cloud_view(view);
+        nebel_destroy_cloud_lighting(view);
         nebel_destroy_clouds(clouds);
     }
 }
@@ -429,12 +429,12 @@ static void test_thin_layers(void **state)
     enum { RAYS = 200 };
     nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.base = 900, .top = 910, .extinction = .2, .coverage = .6});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     int missed = 0, met = 0;
     for (int i = 0; i < RAYS; i++) {
         const double length = sqrt(1.04);
         const nebel_ray ray = {{200. * (i - .5 * RAYS), 0, 0}, {0, 1 / length, .2 / length}, HUGE_VAL};
-        nebel_cloud_knots knots;
+        nebel_cloud_transfer knots;
         assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &knots, 0), NEBEL_OK);
         const double truth = brute_force(clouds, &ray, 860 * length, 911 * length, .05);
         const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
@@ -444,7 +444,7 @@ static void test_thin_layers(void **state)
     print_message("a layer of 10 m: of %d rays %d meet it, %d are off\n", RAYS, met, missed);
     assert_true(met > 15 && missed < 3);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -453,14 +453,14 @@ static void test_thin_layers(void **state)
 static void test_thick_cloud_ends_where_it_is_seen(void **state)
 {
     (void)state;
-    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1});
+    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .coverage = 1});
     const double apart = (double)clouds->layers[0].apart;
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     for (int i = 0; i < 40; i++) {
         const double rise = -.03 + .0015 * i;
         const nebel_ray ray = {{0, 600, 0}, {cos(rise), sin(rise), 0}, HUGE_VAL};
-        nebel_cloud_knots knots;
+        nebel_cloud_transfer knots;
         assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &knots, 0), NEBEL_OK);
         const double end = (double)knots.t[knots.count - 1];
         double depth = 0;
@@ -470,7 +470,7 @@ static void test_thick_cloud_ends_where_it_is_seen(void **state)
         assert_true(depth > 3.5 / apart - .2 && depth < 3.5 / apart + 7);
     }
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -481,10 +481,10 @@ static void test_below_the_ground_is_on_it(void **state)
     static const double depths[] = {1, 5e3, 3e6, RADIUS};
     nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.coverage = .6});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     for (int i = 0; i < 20; i++) {
         nebel_ray ray = {{0, 0, 0}, {.3 - .02 * i, .1 + .04 * i, 1}, HUGE_VAL};
-        nebel_cloud_knots on, below;
+        nebel_cloud_transfer on, below;
         assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &on, 0), NEBEL_OK);
         for (size_t k = 0; k < sizeof depths / sizeof *depths; k++) {
             ray.origin[1] = -depths[k];
@@ -497,7 +497,7 @@ static void test_below_the_ground_is_on_it(void **state)
         }
     }
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -512,10 +512,10 @@ static void lay_rays(nebel_ray rays[RAYS])
 
 static void compare_orders(double spread)
 {
-    nebel_clouds *clouds = make(2, (const nebel_cloud_layer[]){{.seed = 2}, {.kind = NEBEL_CLOUD_CIRRUS}});
+    nebel_clouds *clouds = make(2, (const nebel_cloud_layer[]){{.seed = 2}, {.type = NEBEL_CLOUD_CIRRUS}});
     nebel_cloud_workspace *workspace, *other;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
-    nebel_cloud_knots knots[2][RAYS];
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_transfer knots[2][RAYS];
     nebel_ray rays[RAYS];
     memset(knots, 0, sizeof knots);
     assert_int_equal(nebel_create_cloud_workspace(view, &other), NEBEL_OK);
@@ -528,7 +528,7 @@ static void compare_orders(double spread)
     assert_memory_equal(knots[0], knots[1], sizeof knots[0]);
     int some = 0;
     for (int i = 0; i < RAYS; i++) {
-        const nebel_cloud_knots *k = &knots[0][i];
+        const nebel_cloud_transfer *k = &knots[0][i];
         some += k->count > 0;
         for (uint32_t n = 0; n < k->count; n++) {
             assert_true(k->transmittance[n] >= 0 && k->transmittance[n] <= 1 && k->in_scattering[n][1] >= 0);
@@ -538,7 +538,7 @@ static void compare_orders(double spread)
     assert_true(some > RAYS / 3);
     nebel_destroy_cloud_workspace(other);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);
 }
 
@@ -554,31 +554,31 @@ static void test_order_of_rays_makes_no_difference(void **state)
 static void test_instruction_sets_agree(void **state)
 {
     (void)state;
-    static nebel_cloud_knots knots[2][RAYS];
+    static nebel_cloud_transfer knots[2][RAYS];
     nebel_ray rays[RAYS];
     int some = 0;
     lay_rays(rays);
-    for (int kind = 0; kind < NEBEL_CLOUD_KIND_COUNT; kind++) {
-        nebel_clouds *clouds = make(1, &(const nebel_cloud_layer){.kind = (nebel_cloud_kind)kind, .seed = 3});
+    for (int kind = 0; kind < NEBEL_CLOUD_TYPE_COUNT; kind++) {
+        nebel_clouds *clouds = make(1, &(const nebel_cloud_layer){.type = (nebel_cloud_type)kind, .seed = 3});
         memset(knots, 0, sizeof knots);
         for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
-            const nebel_cloud_view_desc desc = {
+            const nebel_cloud_lighting_desc desc = {
                 .clouds = clouds, .sun = {.direction = {.6, .7, .1}, .irradiance = {5, 4, 3}}, .isa = (nebel_isa)isa};
-            nebel_cloud_view *view;
+            nebel_cloud_lighting *view;
             nebel_cloud_workspace *workspace;
             if (!nebel_isa_available((nebel_isa)isa)) {
-                assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_ERROR_UNSUPPORTED);
+                assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_ERROR_UNSUPPORTED);
                 continue;
             }
-            nebel_cloud_knots *seen = knots[isa != NEBEL_ISA_SCALAR];
-            assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+            nebel_cloud_transfer *seen = knots[isa != NEBEL_ISA_SCALAR];
+            assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_OK);
             assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
             assert_int_equal(
                 nebel_trace_clouds(workspace, RAYS, rays, sizeof *rays, &(double){1e-3}, 0, seen, sizeof *seen),
                 NEBEL_OK);
             if (isa != NEBEL_ISA_SCALAR) assert_memory_equal(knots[0], knots[1], sizeof knots[0]);
             nebel_destroy_cloud_workspace(workspace);
-            nebel_destroy_cloud_view(view);
+            nebel_destroy_cloud_lighting(view);
         }
         for (int i = 0; i < RAYS; i++) some += knots[0][i].count > 0;
         nebel_destroy_clouds(clouds);
@@ -613,7 +613,7 @@ static void test_what_is_said_of_bad_layers(void **state)
                        "cloud layer: top: is 100800 m, as none is given; must be within the air, 100000 m");
     assert_layer_fault(&(nebel_cloud_layer){.coverage = 1.5},
                        "cloud layer: coverage: is 1.5; must be within 0 and 1 (0: the number of its kind)");
-    assert_layer_fault(&(nebel_cloud_layer){.detail = -.5},
+    assert_layer_fault(&(nebel_cloud_layer){.erosion = -.5},
                        "cloud layer: detail: is -0.5; must be within 0 and 1, or none (-1)");
     assert_layer_fault(&(nebel_cloud_layer){.wind = {0, 1e13}},
                        "cloud layer: wind: is 1e+13 m; must be within -1e12 and 1e12");
@@ -625,7 +625,7 @@ static void test_clouds_need_air(void **state)
     nebel_atmosphere *moon;
     nebel_clouds *clouds;
     char said[200] = "";
-    assert_int_equal(nebel_create_atmosphere(nebel_find_atmosphere("moon"), &moon), NEBEL_OK);
+    assert_int_equal(nebel_create_atmosphere(nebel_lookup_atmosphere("moon"), &moon), NEBEL_OK);
     nebel_clouds_desc desc = {.atmosphere = moon, .layer_count = 1, .log = {keep_text, said}};
     assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_ERROR_VALUE);
     assert_string_equal(said, "clouds: need air, and the planet has none");
@@ -640,7 +640,7 @@ static void test_bad_layers_are_refused(void **state)
     (void)state;
     const double none = (double)NAN;
     float texel = 2;
-    const nebel_cloud_layer bad[] = {{.kind = (nebel_cloud_kind)7},
+    const nebel_cloud_layer bad[] = {{.type = (nebel_cloud_type)7},
                                      {.base = -5},
                                      {.base = 2000, .top = 1000},
                                      {.base = 1000, .top = 1000},
@@ -652,17 +652,17 @@ static void test_bad_layers_are_refused(void **state)
                                      {.coverage = none},
                                      {.extinction = -1},
                                      {.extinction = HUGE_VAL},
-                                     {.size = none},
-                                     {.size = 1e10},
-                                     {.size = 4.001 * RADIUS},
-                                     {.detail = 1.1},
-                                     {.detail = -.5},
-                                     {.variation = 2},
-                                     {.diameter = 1},
+                                     {.cell_size = none},
+                                     {.cell_size = 1e10},
+                                     {.cell_size = 4.001 * RADIUS},
+                                     {.erosion = 1.1},
+                                     {.erosion = -.5},
+                                     {.patchiness = 2},
+                                     {.droplet_diameter = 1},
                                      {.wind = {none, 0}},
                                      {.wind = {0, HUGE_VAL}},
-                                     {.weather = {1, 1, 1, &texel}},
-                                     {.weather = {1, 1, 3, &texel}}};
+                                     {.weather_map = {1, 1, 1, &texel}},
+                                     {.weather_map = {1, 1, 3, &texel}}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         nebel_clouds *clouds = (nebel_clouds *)&texel;
         nebel_clouds_desc desc = {.atmosphere = air, .layers = {bad[i]}, .layer_count = 1};
@@ -689,29 +689,32 @@ static void test_bad_calls_are_refused(void **state)
     (void)state;
     nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.seed = 1}});
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace), *other;
+    nebel_cloud_lighting *view = view_of(clouds, 0, &workspace), *other;
     const double none = (double)NAN, place[1][3] = {{0, none, 0}};
     nebel_ray ray = {{0, 0, 0}, {0, 1, 0}, HUGE_VAL};
-    nebel_cloud_knots knots;
+    nebel_cloud_transfer knots;
     float number;
     char said[200] = "";
-    const nebel_cloud_view_desc unknown = {.clouds = clouds, .isa = (nebel_isa)77, .log = {keep_text, said}};
-    assert_int_equal(nebel_create_cloud_view(&unknown, &other), NEBEL_ERROR_UNSUPPORTED);
+    const nebel_cloud_lighting_desc unknown = {.clouds = clouds, .isa = (nebel_isa)77, .log = {keep_text, said}};
+    assert_int_equal(nebel_create_cloud_lighting(&unknown, &other), NEBEL_ERROR_UNSUPPORTED);
     assert_string_equal(said, "clouds: instruction set unknown: not available here");
-    const nebel_cloud_view_desc no_sun = {.clouds = clouds, .sun.irradiance = {0, none, 0}, .log = {keep_text, said}};
-    assert_int_equal(nebel_create_cloud_view(&no_sun, &other), NEBEL_ERROR_ARGUMENT);
+    const nebel_cloud_lighting_desc no_sun = {
+        .clouds = clouds, .sun.irradiance = {0, none, 0}, .log = {keep_text, said}};
+    assert_int_equal(nebel_create_cloud_lighting(&no_sun, &other), NEBEL_ERROR_ARGUMENT);
     assert_non_null(strstr(said, "clouds: view: sun"));
-    assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = clouds, .time = none}, &other),
+    assert_int_equal(nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.clouds = clouds, .time = none}, &other),
                      NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = clouds, .tolerance = -1}, &other),
-                     NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.time = 1}, &other), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(
+        nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.clouds = clouds, .tolerance = -1}, &other),
+        NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.time = 1}, &other),
+                     NEBEL_ERROR_ARGUMENT);
     nebel_destroy_cloud_workspace(workspace);
     assert_int_equal(nebel_create_cloud_workspace(NULL, &workspace), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
-    assert_int_equal(nebel_cloud_extinction(clouds, 0, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_cloud_extinction(clouds, none, 0, 0, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_shade_clouds(workspace, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_cloud_extinction(clouds, 0, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_cloud_extinction(clouds, none, 0, 0, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_cloud_sun_transmittance(workspace, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){-1}, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
     ray.t_max = none;
@@ -720,8 +723,8 @@ static void test_bad_calls_are_refused(void **state)
     assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_workspace(NULL);
-    nebel_destroy_cloud_view(view);
-    nebel_destroy_cloud_view(NULL);
+    nebel_destroy_cloud_lighting(view);
+    nebel_destroy_cloud_lighting(NULL);
     nebel_destroy_clouds(clouds);
 }
 
@@ -732,17 +735,18 @@ static void test_without_memory(void **state)
     for (int k = 0; result != NEBEL_OK; k++) {
         int left = k;
         nebel_clouds *clouds = NULL;
-        nebel_cloud_view *view = NULL;
+        nebel_cloud_lighting *view = NULL;
         nebel_cloud_workspace *workspace = NULL;
         const nebel_allocator scarce = {scarce_allocate, scarce_release, &left};
         result = nebel_create_clouds(&(nebel_clouds_desc){.atmosphere = air, .layer_count = 1, .allocator = scarce},
                                      &clouds);
         if (result == NEBEL_OK)
-            result = nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = clouds, .allocator = scarce}, &view);
+            result =
+                nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.clouds = clouds, .allocator = scarce}, &view);
         if (result == NEBEL_OK) result = nebel_create_cloud_workspace(view, &workspace);
         assert_true(result == NEBEL_OK || result == NEBEL_ERROR_MEMORY);
         nebel_destroy_cloud_workspace(workspace);
-        nebel_destroy_cloud_view(view);
+        nebel_destroy_cloud_lighting(view);
         nebel_destroy_clouds(clouds);
         assert_true(k < 24);
     }

@@ -98,7 +98,7 @@ static void make_others(nebel_volume_desc others[OTHERS])
                                     .extinction = {.02, .03, .04},
                                     .source = {.3, .6, .9}};
     others[1] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {-2, 0, 1}, .radius = 4},
-                                    .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = 2},
+                                    .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = 2},
                                     .extinction = {.2, .1, .1},
                                     .source = {2, 1, 0}};
     others[2] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .min = {-3, -9, -9}, .max = {-1, 9, 9}},
@@ -166,8 +166,8 @@ static void test_a_crowd_is_as_one_among_other_fog(void **unused)
         }
     }
     double there[RAYS], wanted[RAYS];
-    assert_int_equal(nebel_find_transmittance(crowd, .8, 1, RAYS, rays, sizeof rays[0], there), NEBEL_OK);
-    assert_int_equal(nebel_find_transmittance(single, .8, 1, RAYS, rays, sizeof rays[0], wanted), NEBEL_OK);
+    assert_int_equal(nebel_invert_transmittance(crowd, .8, 1, RAYS, rays, sizeof rays[0], there), NEBEL_OK);
+    assert_int_equal(nebel_invert_transmittance(single, .8, 1, RAYS, rays, sizeof rays[0], wanted), NEBEL_OK);
     for (int i = 0; i < RAYS; i++) assert_true(there[i] == wanted[i] || fabs(there[i] - wanted[i]) < 1e-9);
     nebel_release_snapshot(crowd);
     nebel_release_snapshot(single);

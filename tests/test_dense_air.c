@@ -9,13 +9,13 @@
 #define PI 3.14159265358979323846
 #define SCALE 8000.0 /* m: of the air's height */
 
-static nebel_atmosphere *make(double radius, double depth, double albedo, nebel_air_quality quality)
+static nebel_atmosphere *make(double radius, double depth, double albedo, nebel_atmosphere_quality quality)
 {
-    nebel_atmosphere_desc desc = {.radius = radius, .thickness = 1e5, .air_count = 1, .quality = quality};
+    nebel_atmosphere_desc desc = {.radius = radius, .thickness = 1e5, .component_count = 1, .quality = quality};
     nebel_atmosphere *made;
-    desc.airs[0].scale_height = SCALE;
+    desc.components[0].scale_height = SCALE;
     for (int c = 0; c < 3; c++) {
-        desc.airs[0].scattering[c] = depth / SCALE;
+        desc.components[0].scattering[c] = depth / SCALE;
         desc.ground_albedo[c] = albedo;
     }
     assert_int_equal(nebel_create_atmosphere(&desc, &made), NEBEL_OK);
@@ -33,22 +33,22 @@ static nebel_transfer trace(const nebel_atmosphere *air, double cosine, double h
     const nebel_ray ray = {
         .origin = {0, height, 0}, .direction = {direction[0], direction[1], direction[2]}, .t_max = HUGE_VAL};
     nebel_transfer transfer;
-    assert_int_equal(nebel_trace_air(air, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_atmosphere(air, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
     return transfer;
 }
 
 /* ---- energy ---------------------------------------------------------------------------------- */
 
 /* Part of sunlight that leaves a flat planet again, whose air and ground take nothing. */
-static double part_returned(double depth, nebel_air_quality quality)
+static double part_returned(double depth, nebel_atmosphere_quality quality)
 {
     enum { SLOPES = 16, TURNS = 8 };
     const double cosine = 0.7, place[1][3] = {{0, 0, 0}};
     nebel_atmosphere *air = make(1e9, depth, 1, quality);
     const nebel_sun sun = sun_of(cosine);
-    nebel_air_light ground;
+    nebel_irradiance ground;
     double flux = 0;
-    assert_int_equal(nebel_light_air(air, &sun, 1, place, 0, &ground, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_atmosphere_irradiance(air, &sun, 1, place, 0, &ground, 0), NEBEL_OK);
     for (int i = 0; i < SLOPES; i++)
         for (int k = 0; k < TURNS; k++) {
             const double down = (i + 0.5) / SLOPES, side = sqrt(1 - down * down), turn = PI * (k + 0.5) / TURNS;
@@ -66,12 +66,12 @@ static void nothing_is_lost(void **state)
 {
     static const struct {
         double depth, off;
-        nebel_air_quality quality;
-    } cases[] = {{0.25, 1e-3, NEBEL_AIR_FAST},
-                 {1, 8e-3, NEBEL_AIR_FAST},
-                 {4, 2e-2, NEBEL_AIR_FAST},
-                 {0.25, 1e-3, NEBEL_AIR_PRECISE},
-                 {1, 3e-3, NEBEL_AIR_PRECISE}};
+        nebel_atmosphere_quality quality;
+    } cases[] = {{0.25, 1e-3, NEBEL_ATMOSPHERE_FAST},
+                 {1, 8e-3, NEBEL_ATMOSPHERE_FAST},
+                 {4, 2e-2, NEBEL_ATMOSPHERE_FAST},
+                 {0.25, 1e-3, NEBEL_ATMOSPHERE_PRECISE},
+                 {1, 3e-3, NEBEL_ATMOSPHERE_PRECISE}};
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         if (i > 0 && !nb_test_tries(i, sizeof cases / sizeof *cases)) continue;
@@ -168,12 +168,12 @@ static void error_covers_what_chance_finds(void **state)
 {
     static const struct {
         double depth;
-        nebel_air_quality quality;
-    } cases[] = {{0.5, NEBEL_AIR_FAST},
-                 {0.5, NEBEL_AIR_PRECISE},
-                 {2, NEBEL_AIR_FAST},
-                 {2, NEBEL_AIR_PRECISE},
-                 {8, NEBEL_AIR_FAST}};
+        nebel_atmosphere_quality quality;
+    } cases[] = {{0.5, NEBEL_ATMOSPHERE_FAST},
+                 {0.5, NEBEL_ATMOSPHERE_PRECISE},
+                 {2, NEBEL_ATMOSPHERE_FAST},
+                 {2, NEBEL_ATMOSPHERE_PRECISE},
+                 {8, NEBEL_ATMOSPHERE_FAST}};
     (void)state;
     chance_state = UINT64_C(88172645463325252);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -186,11 +186,13 @@ static void error_covers_what_chance_finds(void **state)
     }
 }
 
-static nebel_atmosphere *make_of(const nebel_air *of, double depth, double height, nebel_air_quality quality)
+static nebel_atmosphere *make_of(const nebel_atmosphere_component *of, double depth, double height,
+                                 nebel_atmosphere_quality quality)
 {
-    nebel_atmosphere_desc desc = {.radius = 1e9, .thickness = 1e5, .air_count = 1, .airs = {*of}, .quality = quality};
+    nebel_atmosphere_desc desc = {
+        .radius = 1e9, .thickness = 1e5, .component_count = 1, .components = {*of}, .quality = quality};
     nebel_atmosphere *made;
-    for (int c = 0; c < 3; c++) desc.airs[0].scattering[c] = depth / height;
+    for (int c = 0; c < 3; c++) desc.components[0].scattering[c] = depth / height;
     assert_int_equal(nebel_create_atmosphere(&desc, &made), NEBEL_OK);
     return made;
 }
@@ -206,13 +208,14 @@ static void thin_air_has_its_light(void **state)
     (void)state;
     chance_state = UINT64_C(88172645463325252);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        nebel_air of = {.scale_height = cases[i].scale};
+        nebel_atmosphere_component of = {.scale_height = cases[i].scale};
         if (cases[i].width > 0)
-            of = (nebel_air){.profile = NEBEL_AIR_LAYER, .middle = cases[i].middle, .width = cases[i].width};
+            of = (nebel_atmosphere_component){
+                .profile = NEBEL_COMPONENT_TENT, .center_height = cases[i].middle, .half_width = cases[i].width};
         for (size_t q = 0; q < 2; q++) {
             if (q > 0 && !nb_test_tries(i, sizeof cases / sizeof *cases)) continue;
-            nebel_atmosphere *air =
-                make_of(&of, up.depth, cases[i].width + cases[i].scale, q ? NEBEL_AIR_PRECISE : NEBEL_AIR_FAST);
+            nebel_atmosphere *air = make_of(&of, up.depth, cases[i].width + cases[i].scale,
+                                            q ? NEBEL_ATMOSPHERE_PRECISE : NEBEL_ATMOSPHERE_FAST);
             assert_told(&up, air, 0.3, q ? "thin, precise" : "thin, fast");
             nebel_destroy_atmosphere(air);
         }
@@ -224,8 +227,9 @@ static void thin_air_has_its_light(void **state)
 static void haze_has_its_light(void **state)
 {
     enum { SCENES = 24 };
-    static const double most[NEBEL_AIR_QUALITY_COUNT] = {[NEBEL_AIR_FAST] = 0.3, [NEBEL_AIR_PRECISE] = 0.2};
-    double told[NEBEL_AIR_QUALITY_COUNT] = {0}, off[NEBEL_AIR_QUALITY_COUNT] = {0};
+    static const double most[NEBEL_ATMOSPHERE_QUALITY_COUNT] = {
+        [NEBEL_ATMOSPHERE_FAST] = 0.3, [NEBEL_ATMOSPHERE_PRECISE] = 0.2};
+    double told[NEBEL_ATMOSPHERE_QUALITY_COUNT] = {0}, off[NEBEL_ATMOSPHERE_QUALITY_COUNT] = {0};
     size_t count = 0;
     (void)state;
     chance_state = UINT64_C(88172645463325252);
@@ -233,13 +237,14 @@ static void haze_has_its_light(void **state)
         const double turn = PI * chance(), up = copysign(0.08 + 0.92 * chance(), chance() - 0.5);
         const double level = sqrt(1 - up * up), depth = 0.1 * pow(40, chance()), g = 0.3 + 0.55 * chance();
         const scene view = {depth, g, 0.1 + 0.9 * chance(), {level * cos(turn), up, level * sin(turn)}, up < 0};
-        const nebel_air of = {.scale_height = SCALE, .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = g}};
+        const nebel_atmosphere_component of = {.scale_height = SCALE,
+                                               .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = g}};
         double mean[2];
         if (!nb_test_tries(i, SCENES)) continue;
         walk_often(&view, mean);
         count++;
-        for (int q = 0; q < NEBEL_AIR_QUALITY_COUNT; q++) {
-            nebel_atmosphere *air = make_of(&of, depth, SCALE, (nebel_air_quality)q);
+        for (int q = 0; q < NEBEL_ATMOSPHERE_QUALITY_COUNT; q++) {
+            nebel_atmosphere *air = make_of(&of, depth, SCALE, (nebel_atmosphere_quality)q);
             const nebel_transfer transfer = trace(air, view.cosine, view.is_above ? 1e5 : 0, view.direction);
             const double apart = fabs((double)transfer.in_scattering[0] - mean[0]);
             if (apart > (double)transfer.error + 3.5 * mean[1])
@@ -251,7 +256,7 @@ static void haze_has_its_light(void **state)
             nebel_destroy_atmosphere(air);
         }
     }
-    for (int q = 0; q < NEBEL_AIR_QUALITY_COUNT; q++) {
+    for (int q = 0; q < NEBEL_ATMOSPHERE_QUALITY_COUNT; q++) {
         print_message("haze, quality %d: off %.1f %%, told %.1f %% in the mean of %zu\n", q,
                       100 * off[q] / (double)count, 100 * told[q] / (double)count, count);
         assert_true(told[q] <= most[q] * (double)count);
@@ -262,12 +267,13 @@ static void haze_has_its_light(void **state)
 static void error_covers_glow_around_the_sun(void **state)
 {
     const scene glow = {1, 0.8, sin(12 * PI / 180), {cos(15 * PI / 180), sin(15 * PI / 180), 0}, 0};
-    const nebel_air of = {.scale_height = SCALE, .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = glow.g}};
+    const nebel_atmosphere_component of = {.scale_height = SCALE,
+                                           .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = glow.g}};
     (void)state;
     chance_state = UINT64_C(88172645463325252);
     for (size_t q = 0; q < 2; q++) {
         if (!nb_test_tries(1 - q, 2)) continue;
-        nebel_atmosphere *air = make_of(&of, glow.depth, SCALE, q ? NEBEL_AIR_PRECISE : NEBEL_AIR_FAST);
+        nebel_atmosphere *air = make_of(&of, glow.depth, SCALE, q ? NEBEL_ATMOSPHERE_PRECISE : NEBEL_ATMOSPHERE_FAST);
         assert_told(&glow, air, 0.9, q ? "glow, precise" : "glow, fast");
         nebel_destroy_atmosphere(air);
     }

@@ -455,7 +455,7 @@ static void test_same_bits_for_every_isa_and_split(void **unused)
 /* ---- own light ------------------------------------------------------------------------------- */
 
 /* A ball of fog that scatters all light, in the dark, with a lamp or a fire in its middle. */
-static nebel_snapshot *commit_glowing(double g, const nebel_lamp *lamp, const nebel_volume_desc *fire)
+static nebel_snapshot *commit_glowing(double g, const nebel_light *lamp, const nebel_volume_desc *fire)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
@@ -488,7 +488,7 @@ static void find_intensity(const nebel_snapshot *snapshot, double intensity[3])
     }
 }
 
-static const nebel_lamp green = {.intensity = {0, 2, 1}, .radius = .004};
+static const nebel_light green = {.intensity = {0, 2, 1}, .radius = .004};
 static const nebel_volume_desc fire = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = .3}, .emission = {3, 1, 0}};
 
 /* White fog sends out all that begins in it; as it is around its middle, the same to everywhere. */
@@ -551,7 +551,7 @@ static void test_cells_do_not_matter_much(void **unused)
     const nebel_volume_desc volume = ball(&white, 3);
     nebel_transfer transfers[2][RAYS];
     for (int k = 0; k < 2; k++) {
-        nebel_snapshot *snapshot = commit(&white, &volume, &(nebel_diffusion_desc){.cells = k ? 65536 : 8000});
+        nebel_snapshot *snapshot = commit(&white, &volume, &(nebel_diffusion_desc){.max_cells = k ? 65536 : 8000});
         trace(snapshot, &(nebel_trace_desc){0}, transfers[k]);
         nebel_release_snapshot(snapshot);
     }
@@ -589,8 +589,8 @@ static void test_bad_descriptions(void **unused)
     (void)unused;
     const nebel_volume_desc volume = ball(&white, 1);
     nebel_fog *fog = start(&white, &volume, NULL);
-    static const nebel_diffusion_desc bad[] = {{.cells = 1},
-                                               {.cells = NEBEL_MAX_DIFFUSION_CELLS + 1},
+    static const nebel_diffusion_desc bad[] = {{.max_cells = 1},
+                                               {.max_cells = NEBEL_MAX_DIFFUSION_CELLS + 1},
                                                {.has_ground = 1, .ground_height = HUGE_VAL},
                                                {.has_ground = 1, .ground_height = -2e15},
                                                {.has_ground = 1, .ground_albedo = {0, 1.5, 0}},
@@ -661,9 +661,9 @@ static void test_random_fog(void **unused)
         assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
         for (size_t i = 0; i < fog.count; i++)
             assert_int_equal(nebel_add_volume(made, &fog.volumes[i], NULL), NEBEL_OK);
-        const nebel_diffusion_desc few = {.cells = 1000, .has_ground = seed % 3 == 0, .ground_albedo = {.5, .5, 1}};
+        const nebel_diffusion_desc few = {.max_cells = 1000, .has_ground = seed % 3 == 0, .ground_albedo = {.5, .5, 1}};
         assert_int_equal(nebel_set_diffusion(made, &few), NEBEL_OK);
-        const nebel_lamp lamp = {.position = {.1, .2, .3}, .intensity = {3, 2, 1}, .radius = (double)(seed % 3)};
+        const nebel_light lamp = {.position = {.1, .2, .3}, .intensity = {3, 2, 1}, .radius = (double)(seed % 3)};
         if (seed % 2 == 0) assert_int_equal(nebel_set_lamps(made, 1, &lamp), NEBEL_OK);
         const nebel_result result = nebel_commit_fog(made, &snapshot);
         assert_true(result == NEBEL_OK || result == NEBEL_ERROR_UNSUPPORTED);
@@ -692,7 +692,8 @@ static void test_far_away(void **unused)
     far.shape.radius = 1e14;
     const nebel_volume_desc *volumes[] = {&haze, &far};
     for (int k = 0; k < 2; k++) {
-        nebel_snapshot *snapshot = commit(&white, volumes[k], &(nebel_diffusion_desc){.cells = 1000, .has_ground = !k});
+        const nebel_diffusion_desc few = {.max_cells = 1000, .has_ground = !k};
+        nebel_snapshot *snapshot = commit(&white, volumes[k], &few);
         for (int i = 0; i < 60; i++) {
             const double at = NEBEL_MAX_LENGTH * (i % 2 ? 1 : .9999);
             const nebel_ray ray = {{i % 3 ? at : 0, i % 5 ? 2e13 : -at, i % 4 ? -at : 3},
@@ -710,18 +711,15 @@ static void test_far_away(void **unused)
 static void test_lamps_far_away(void **unused)
 {
     (void)unused;
-    static const nebel_lamp far[] = {
+    static const nebel_light far[] = {
         {.position = {NEBEL_MAX_LENGTH, -NEBEL_MAX_LENGTH, 0}, .intensity = {1e9, 1e9, 0}, .radius = 1e6},
         {.position = {0, 1, 0}, .intensity = {1e9, 0, 0}},
-        {.type = NEBEL_LAMP_SPOT,
-         .position = {3, NEBEL_MAX_LENGTH, 3},
-         .intensity = {1, 1, 1},
-         .direction = {0, -1, 0},
-         .outer_angle = 1e-6}};
+        {NEBEL_LIGHT_SPOT, {3, NEBEL_MAX_LENGTH, 3}, {1, 1, 1}, .direction = {0, -1, 0}, .outer_angle = 1e-6}};
     nebel_volume_desc volumes[] = {volume_of(&white, 1e-15), volume_of(&white, .5), ball(&white, 3)};
     volumes[1].density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 2};
     for (size_t i = 0; i < 3 * sizeof volumes / sizeof *volumes; i++) {
-        nebel_fog *fog = start(&white, &volumes[i / 3], &(nebel_diffusion_desc){.cells = 1000, .has_ground = i < 3});
+        const nebel_diffusion_desc few = {.max_cells = 1000, .has_ground = i < 3};
+        nebel_fog *fog = start(&white, &volumes[i / 3], &few);
         nebel_snapshot *snapshot = NULL;
         nebel_transfer transfers[RAYS];
         assert_int_equal(nebel_set_lamps(fog, i % 3 + 1, far), NEBEL_OK);
@@ -747,7 +745,7 @@ static void test_memory_runs_out(void **unused)
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
     assert_int_equal(nebel_set_lamps(fog, 1, &green), NEBEL_OK);
-    assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.cells = 512}), NEBEL_OK);
+    assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.max_cells = 512}), NEBEL_OK);
     const size_t live = memory.live;
     size_t tries = 0;
     while (result == NEBEL_ERROR_MEMORY) {
@@ -772,7 +770,7 @@ int main(int argc, char **argv)
         return 0;
     }
     random_count = argc > 1 ? strtoull(argv[1], NULL, 10) : RANDOM_FOG_KIND_COUNT + nb_test_count(19) - 1;
-    by_default.cells = nb_test_count(2) < 2 ? 8000 : 0; /* 0: as many as there are */
+    by_default.max_cells = nb_test_count(2) < 2 ? 8000 : 0; /* 0: as many as there are */
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_layers_are_near_published_ones),
                                        cmocka_unit_test(test_white_layers_keep_the_suns_light),
                                        cmocka_unit_test(test_height_fog_reflects_as_a_layer),

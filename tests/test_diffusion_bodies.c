@@ -19,7 +19,7 @@ typedef struct trial {
     double coverage;           /* of a grid */
     double darkness;           /* 1 - albedo */
     int sky;                   /* of `skies` */
-    const nebel_lamp *lamps;
+    const nebel_light *lamps;
     size_t lamp_count;
     double emission; /* of a ball amid the fog that scatters nothing */
 } trial;
@@ -231,18 +231,18 @@ static const trial skylit[] = {
 
 enum { SKYLIT = sizeof skylit / sizeof *skylit };
 
-static const nebel_lamp bulb[] = {{.position = {.3, .2, .1}, .intensity = {1, 1, 1}, .radius = .01}};
-static const nebel_lamp outside[] = {{.position = {1.5, 1, .8}, .intensity = {3, 3, 3}, .radius = .01}};
-static const nebel_lamp beam[] = {{.type = NEBEL_LAMP_SPOT,
-                                   .position = {-.9, .8, 0},
-                                   .intensity = {5, 5, 5},
-                                   .radius = .01,
-                                   .direction = {1, -.6, 0},
-                                   .inner_angle = 15,
-                                   .outer_angle = 25}};
-static const nebel_lamp street[] = {{.position = {-.8, -.6, -.5}, .intensity = {1, 1, 1}, .radius = .01},
-                                    {.position = {0, -.6, 0}, .intensity = {1, 1, 1}, .radius = .01},
-                                    {.position = {.8, -.6, .5}, .intensity = {1, 1, 1}, .radius = .01}};
+static const nebel_light bulb[] = {{.position = {.3, .2, .1}, .intensity = {1, 1, 1}, .radius = .01}};
+static const nebel_light outside[] = {{.position = {1.5, 1, .8}, .intensity = {3, 3, 3}, .radius = .01}};
+static const nebel_light beam[] = {{.type = NEBEL_LIGHT_SPOT,
+                                    .position = {-.9, .8, 0},
+                                    .intensity = {5, 5, 5},
+                                    .radius = .01,
+                                    .direction = {1, -.6, 0},
+                                    .inner_angle = 15,
+                                    .outer_angle = 25}};
+static const nebel_light street[] = {{.position = {-.8, -.6, -.5}, .intensity = {1, 1, 1}, .radius = .01},
+                                     {.position = {0, -.6, 0}, .intensity = {1, 1, 1}, .radius = .01},
+                                     {.position = {.8, -.6, .5}, .intensity = {1, 1, 1}, .radius = .01}};
 
 #define HAZE                                                                                                           \
     {                                                                                                                  \
@@ -358,8 +358,8 @@ static nebel_grid *make_cloud(double coverage)
 {
     nebel_grid *grid = NULL;
     const nebel_noise_desc desc = {
-        .size = {48, 48, 48}, .cells = {4, 3, 3}, .octaves = 3, .coverage = coverage, .edge = {.3, .3, .3}};
-    assert_int_equal(nebel_create_noise(&desc, &grid), NEBEL_OK);
+        .size = {48, 48, 48}, .frequency = {4, 3, 3}, .octaves = 3, .coverage = coverage, .falloff = {.3, .3, .3}};
+    assert_int_equal(nebel_create_noise_grid(&desc, &grid), NEBEL_OK);
     return grid;
 }
 
@@ -425,8 +425,8 @@ static void take(const trial *t, nebel_method method, int is_diffuse, shot *out)
                               .environment = skies[t->sky],
                               .meshes = &ground,
                               .mesh_count = is_endless ? 1 : 0,
-                              .lamps = t->lamps,
-                              .lamp_count = t->lamp_count};
+                              .lights = t->lamps,
+                              .light_count = t->lamp_count};
     const double length = sqrt(t->sun[0] * t->sun[0] + t->sun[1] * t->sun[1] + t->sun[2] * t->sun[2]);
     for (int c = 0; c < 3 && has_sun(t); c++) scene.sun_direction[c] = t->sun[c] / length;
     memcpy(scene.ambient, skies[t->sky].radiance, sizeof scene.ambient);
@@ -434,12 +434,11 @@ static void take(const trial *t, nebel_method method, int is_diffuse, shot *out)
     scene.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     scene.camera.view_height = 2.4;
     nebel_snapshot *fog = commit(t, is_diffuse);
-    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){.threads = 2}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){.thread_count = 2}, &renderer),
+                     NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, method, NULL), NEBEL_OK);
-    const nebel_frame_desc frame = {.camera = scene.camera,
-                                    .width = SIDE,
-                                    .height = SIDE,
-                                    .samples = method == NEBEL_METHOD_REFERENCE ? samples : 4};
+    const nebel_frame_desc frame = {
+        .camera = scene.camera, .width = SIDE, .height = SIDE, .samples = method == NEBEL_METHOD_PATH ? samples : 4};
     const nebel_frame planes = {.color = out->color, .standard_error = out->error};
     assert_int_equal(nebel_render_frame(renderer, &frame, &planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
@@ -480,7 +479,7 @@ static void take_all(const trial *t)
 {
     take(t, NEBEL_METHOD_EXACT, 0, &once);
     take(t, NEBEL_METHOD_EXACT, 1, &all);
-    take(t, NEBEL_METHOD_REFERENCE, 0, &reference);
+    take(t, NEBEL_METHOD_PATH, 0, &reference);
 }
 
 static void print_trials(const char *title, const char *exact, const trial *all_trials, int count)

@@ -10,7 +10,7 @@
 
 #include "fog_help.h"
 
-#define SOFT(depth) .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = (depth)}, .extinction = {.2, .2, .2}
+#define SOFT(depth) .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = (depth)}, .extinction = {.2, .2, .2}
 
 static double depth_along(const nebel_volume_desc *volume, const nebel_ray *ray)
 {
@@ -59,7 +59,7 @@ static void test_rays_along_the_axis(void **unused)
     const nebel_ray along = {{0, -20, 0}, {0, 1, 0}, 60};
     nebel_volume_desc body = {.shape = {.type = NEBEL_SHAPE_CYLINDER, .to = {0, 10, 0}, .radius = 1}, SOFT(1.5)};
     assert_near(depth_along(&body, &along), 10 - 1.5);
-    body.density.distance = 8; /* where the ends are nearer than that, 5 / 8 in the middle */
+    body.density.edge_width = 8; /* where the ends are nearer than that, 5 / 8 in the middle */
     assert_near(depth_along(&body, &along), 10 * 5. / 8 / 2);
     body = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_CAPSULE, .to = {0, 10, 0}, .radius = 2}, SOFT(1)};
     assert_near(depth_along(&body, &along), 10 + 2 * 1 + 2 * flank(2, 1));
@@ -85,7 +85,7 @@ static void test_rays_into_planes(void **unused)
     nebel_volume_desc tunnel = {.shape = {.type = NEBEL_SHAPE_CONVEX, .planes = planes, .plane_count = 4}, SOFT(1)};
     assert_near(depth_along(&tunnel, &(nebel_ray){{-9, 0, 0}, {1, 0, 0}, 20}), 6 - 1);
     assert_near(depth_along(&tunnel, &(nebel_ray){{-9, 2.5, 1}, {1, 0, 0}, 20}), .5 * (6 - 1) + .5 * .5);
-    tunnel.density.distance = 6; /* a pyramid of half the height */
+    tunnel.density.edge_width = 6; /* a pyramid of half the height */
     assert_near(depth_along(&tunnel, &(nebel_ray){{-9, 0, 0}, {1, 0, 0}, 20}), 3 * .5);
 }
 
@@ -128,7 +128,7 @@ static void test_the_ray_gathers_what_its_places_have(void **unused)
         random_fog_make(&fog, RANDOM_FOG_SINGLE, 100 + seed);
         nebel_volume_desc *const v = &fog.volumes[0];
         if (v->shape.type == NEBEL_SHAPE_WORLD) continue;
-        v->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = .2 + .02 * (double)seed};
+        v->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = .2 + .02 * (double)seed};
         for (int c = 0; c < 3; c++) v->extinction[c] = .2;
         nebel_ray ray = random_fog_ray(&fog, seed);
         ray.t_max = fmin(ray.t_max, 60);

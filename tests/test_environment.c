@@ -94,7 +94,7 @@ static cosines make_cosines(const nebel_phase *phase, int count)
     assert_non_null(made.values);
     for (int i = 0; i < count; i++) {
         const double part = (i + 0.5) / count;
-        made.values[i] = phase != NULL ? nebel_phase_sample(phase, part) : sqrt(1 - part);
+        made.values[i] = phase != NULL ? nebel_sample_phase(phase, part) : sqrt(1 - part);
     }
     return made;
 }
@@ -112,7 +112,7 @@ static void mean_about(const nebel_environment *environment, const double axis[3
             const double x = 2 * PI * (j + i * 0.618034) / turns;
             double direction[3], radiance[3];
             for (int k = 0; k < 3; k++) direction[k] = c * axis[k] + s * (cos(x) * across[k] + sin(x) * third[k]);
-            nebel_environment_radiance(environment, direction, radiance);
+            nebel_evaluate_environment(environment, direction, radiance);
             for (int k = 0; k < 3; k++) mean[k] += radiance[k] / ((double)at->count * turns);
         }
     }
@@ -152,7 +152,7 @@ static void expect_reflected(const nebel_environment *environment, double tolera
         const double *d = directions[i], length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
         for (int k = 0; k < 3; k++) unit[k] = d[k] / length;
         mean_about(environment, unit, &at, 100, wanted);
-        nebel_environment_reflected(environment, d, reflected);
+        nebel_evaluate_environment_diffuse(environment, d, reflected);
         for (int c = 0; c < 3; c++) assert_true(fabs(reflected[c] - wanted[c]) <= tolerance);
     }
     free(at.values);
@@ -275,7 +275,7 @@ static void a_constant_one_is_the_ambient_radiance(void **state)
         nebel_snapshot *snapshot = commit(&constant, &phases[i]);
         double scattered[3], reflected[3];
         ask(snapshot, directions[i % DIRECTIONS], scattered);
-        nebel_environment_reflected(&constant, directions[i % DIRECTIONS], reflected);
+        nebel_evaluate_environment_diffuse(&constant, directions[i % DIRECTIONS], reflected);
         assert_memory_equal(scattered, constant.radiance, sizeof scattered);
         assert_memory_equal(reflected, constant.radiance, sizeof reflected);
         nebel_release_snapshot(snapshot);
@@ -296,20 +296,20 @@ static void maps_lie_as_panoramas_do(void **state)
     nebel_environment environment = {.type = NEBEL_ENVIRONMENT_MAP, .map = make_map(64, quarters)};
     double radiance[3];
     (void)state;
-    nebel_environment_radiance(&environment, (const double[3]){0.1, 0, -1}, radiance);
+    nebel_evaluate_environment(&environment, (const double[3]){0.1, 0, -1}, radiance);
     assert_true(radiance[0] > 1.99 && radiance[0] < 2.01); /* just right of the middle of columns 0 to 3 */
-    nebel_environment_radiance(&environment, (const double[3]){-0.1, 0, -1}, radiance);
+    nebel_evaluate_environment(&environment, (const double[3]){-0.1, 0, -1}, radiance);
     assert_true(radiance[0] > 0.99 && radiance[0] < 1.01);
-    nebel_environment_radiance(&environment, (const double[3]){0.1, 0, 1}, radiance);
+    nebel_evaluate_environment(&environment, (const double[3]){0.1, 0, 1}, radiance);
     assert_true(radiance[0] > 2.99);
     environment.rotation = 90; /* what was at -z is at -x now */
-    nebel_environment_radiance(&environment, (const double[3]){-1, 0, -0.1}, radiance);
+    nebel_evaluate_environment(&environment, (const double[3]){-1, 0, -0.1}, radiance);
     assert_true(radiance[0] > 1.99 && radiance[0] < 2.01);
-    nebel_environment_radiance(&environment, (const double[3]){-1, 0, 0.1}, radiance);
+    nebel_evaluate_environment(&environment, (const double[3]){-1, 0, 0.1}, radiance);
     assert_true(radiance[0] > 0.99 && radiance[0] < 1.01);
-    nebel_environment_radiance(&environment, (const double[3]){0, 0, 0}, radiance);
+    nebel_evaluate_environment(&environment, (const double[3]){0, 0, 0}, radiance);
     assert_true(radiance[0] == 0);
-    nebel_environment_reflected(&environment, (const double[3]){0, (double)NAN, 1}, radiance);
+    nebel_evaluate_environment_diffuse(&environment, (const double[3]){0, (double)NAN, 1}, radiance);
     assert_true(radiance[0] == 0);
     nebel_release_environment_map(environment.map);
 }
@@ -396,7 +396,7 @@ static void a_box_at_vertices_is_lit_by_direction(void **state)
     float positions[2][3] = {{0, 50, -10}, {0, -50, -10}}, colors[2][4];
     const nebel_vertices vertices = {.positions = positions[0], .position_stride = sizeof *positions};
     const nebel_vertex_output output = {.format = NEBEL_VERTEX_RGBA_FLOAT, .data = colors, .stride = sizeof *colors};
-    assert_int_equal(nebel_fog_vertices(snapshot, NULL, 2, &vertices, &output, 1), NEBEL_OK);
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, NULL, 2, &vertices, &output, 1), NEBEL_OK);
     assert_true(colors[0][2] > 1.2F * colors[1][2]);
     nebel_release_snapshot(snapshot);
 }
@@ -428,7 +428,7 @@ static void what_is_no_environment_is_refused(void **state)
     assert_int_equal(nebel_set_environment(fog, &(nebel_environment){.type = NEBEL_ENVIRONMENT_COUNT}),
                      NEBEL_ERROR_ARGUMENT);
     double radiance[3] = {1, 1, 1}; /* where there is none there is no light */
-    nebel_environment_radiance(&(nebel_environment){.type = NEBEL_ENVIRONMENT_MAP}, (const double[3]){0, 1, 0},
+    nebel_evaluate_environment(&(nebel_environment){.type = NEBEL_ENVIRONMENT_MAP}, (const double[3]){0, 1, 0},
                                radiance);
     for (int c = 0; c < 3; c++) assert_true(radiance[c] == 0);
     nebel_release_environment_map(map);

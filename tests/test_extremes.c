@@ -154,7 +154,7 @@ static void make_density(scene *s, const nebel_shape *shape, nebel_density *d)
     d->power = 1 + dice_below(&s->state, 3);
     place(s, d->center);
     d->sigma = extent(s);
-    d->distance = extent(s);
+    d->edge_width = extent(s);
 }
 
 static void make_volume(scene *s, size_t i)
@@ -316,7 +316,7 @@ static void test_distances_to_a_transmittance_lie_on_the_ray(void **unused)
             const nebel_ray ray = make_ray(&s);
             const double wanted = one_in(&s, 3) ? 1e-300 : one_in(&s, 2) ? nextafter(1, 0) : .5;
             double distance = -1;
-            assert_int_equal(nebel_find_transmittance(snapshot, wanted, r % 3, 1, &ray, sizeof ray, &distance),
+            assert_int_equal(nebel_invert_transmittance(snapshot, wanted, r % 3, 1, &ray, sizeof ray, &distance),
                              NEBEL_OK);
             const int good = distance == HUGE_VAL || (distance >= 0 && distance <= ray.t_max);
             if (!good) print_message("scene %zu ray %d: distance %g of %g\n", (size_t)seed, r, distance, ray.t_max);
@@ -343,7 +343,8 @@ static void test_segments_give_transmittances(void **unused)
                 to[r][k] = (float)coordinate(&s);
             }
         const nebel_segments segments = {{0}, &from[0][0], sizeof from[0], &to[0][0], sizeof to[0], 0};
-        const nebel_result result = nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 1, RAYS, &segments, out, 0);
+        const nebel_result result =
+            nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 1, RAYS, &segments, out, 0);
         assert_true(result == NEBEL_OK);
         for (int r = 0; r < RAYS; r++) assert_true(out[r] >= 0 && out[r] <= 1);
         nebel_release_snapshot(snapshot);

@@ -38,17 +38,17 @@ static nebel_image make_picture(int number)
     return image;
 }
 
-static nebel_result make_film(const char *path, const nebel_film_desc *desc, int count)
+static nebel_result make_film(const char *path, const nebel_movie_desc *desc, int count)
 {
-    nebel_film *film = NULL;
-    nebel_result result = nebel_create_film(path, desc, &film);
+    nebel_movie *film = NULL;
+    nebel_result result = nebel_create_movie(path, desc, &film);
     for (int i = 0; i < count && result == NEBEL_OK; i++) {
         const nebel_image image = make_picture(i);
-        result = nebel_add_film_picture(film, &image);
+        result = nebel_add_movie_frame(film, &image);
         free(image.samples);
     }
-    if (result == NEBEL_OK) result = nebel_finish_film(film);
-    nebel_destroy_film(film);
+    if (result == NEBEL_OK) result = nebel_finish_movie(film);
+    nebel_destroy_movie(film);
     return result;
 }
 
@@ -130,7 +130,7 @@ static void every_picture_is_there_without_loss(void **test)
     double mean;
     const char *path = in_folder("film.webp");
     (void)test;
-    assert_int_equal(make_film(path, &(nebel_film_desc){.frames_per_second = 30, .quality = 100}, COUNT), NEBEL_OK);
+    assert_int_equal(make_film(path, &(nebel_movie_desc){.frames_per_second = 30, .quality = 100}, COUNT), NEBEL_OK);
     compare_film(path, COUNT, 30, &most, &mean);
     assert_int_equal(most, 0);
     assert_int_equal(file_count(), 1);
@@ -144,10 +144,10 @@ static void quality_is_bytes(void **test)
     struct stat small, large;
     const char *path = in_folder("film.WebP");
     (void)test;
-    assert_int_equal(make_film(path, &(nebel_film_desc){.quality = 10}, COUNT), NEBEL_OK);
+    assert_int_equal(make_film(path, &(nebel_movie_desc){.quality = 10}, COUNT), NEBEL_OK);
     assert_int_equal(stat(path, &small), 0);
     compare_film(path, COUNT, 24, &most, &rough);
-    assert_int_equal(make_film(path, &(nebel_film_desc){0}, COUNT), NEBEL_OK);
+    assert_int_equal(make_film(path, &(nebel_movie_desc){0}, COUNT), NEBEL_OK);
     assert_int_equal(stat(path, &large), 0);
     compare_film(path, COUNT, 24, &most, &fine);
     assert_true(small.st_size < large.st_size);
@@ -159,7 +159,7 @@ static void one_picture_is_a_film(void **test)
 {
     const char *path = in_folder("one.webp");
     (void)test;
-    assert_int_equal(make_film(path, &(nebel_film_desc){.quality = 100}, 1), NEBEL_OK);
+    assert_int_equal(make_film(path, &(nebel_movie_desc){.quality = 100}, 1), NEBEL_OK);
     WebPData file = read_file(path);
     int width, height;
     unsigned char wanted[WIDTH * HEIGHT * 3];
@@ -175,20 +175,20 @@ static void one_picture_is_a_film(void **test)
 
 static void nothing_is_left_of_what_was_given_up(void **test)
 {
-    nebel_film *film;
+    nebel_movie *film;
     journal kept = {0};
     const nebel_image image = make_picture(0);
-    const nebel_film_desc desc = {.log = {remember, &kept}};
+    const nebel_movie_desc desc = {.log = {remember, &kept}};
     (void)test;
-    assert_int_equal(nebel_create_film(in_folder("film.webp"), &desc, &film), NEBEL_OK);
-    assert_int_equal(nebel_finish_film(film), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_movie(in_folder("film.webp"), &desc, &film), NEBEL_OK);
+    assert_int_equal(nebel_finish_movie(film), NEBEL_ERROR_ARGUMENT);
     assert_non_null(strstr(kept.last, "has no pictures"));
-    assert_int_equal(nebel_add_film_picture(film, &image), NEBEL_OK);
+    assert_int_equal(nebel_add_movie_frame(film, &image), NEBEL_OK);
     nebel_image other = image;
     other.width = WIDTH - 1;
-    assert_int_equal(nebel_add_film_picture(film, &other), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_add_movie_frame(film, &other), NEBEL_ERROR_ARGUMENT);
     assert_non_null(strstr(kept.last, "a picture of 60 x 37 pixels; those before it have 61 x 37"));
-    nebel_destroy_film(film);
+    nebel_destroy_movie(film);
     assert_int_equal(file_count(), 0);
     free(image.samples);
 }
@@ -199,7 +199,7 @@ static void full_disks_leave_the_old_file(void **test)
     journal kept = {0};
     struct stat before, after;
     const char *path = in_folder("film.webp");
-    const nebel_film_desc desc = {.log = {remember, &kept}, .quality = 100};
+    const nebel_movie_desc desc = {.log = {remember, &kept}, .quality = 100};
     struct rlimit all, little = {.rlim_cur = 500};
     (void)test;
     assert_int_equal(make_film(path, &desc, 2), NEBEL_OK);
@@ -224,25 +224,25 @@ static void streams_that_take_nothing_stop_it_at_once(void **test)
     static const char *const names[] = {"R", "G", "B"};
     static float black[3];
     journal kept = {0};
-    nebel_film *film;
+    nebel_movie *film;
     int ends[2];
     char name[40];
     const nebel_image image = {1, 1, 3, names, black};
-    const nebel_film_desc desc = {.log = {remember, &kept}};
+    const nebel_movie_desc desc = {.log = {remember, &kept}};
     (void)test;
     assert_int_equal(pipe(ends), 0);
     snprintf(name, sizeof name, "/dev/fd/%d", ends[1]);
     assert_int_equal(symlink(name, in_folder("film.webp")), 0);
-    assert_int_equal(nebel_create_film(in_folder("film.webp"), &desc, &film), NEBEL_OK);
-    assert_int_equal(nebel_add_film_picture(film, &image), NEBEL_OK);
+    assert_int_equal(nebel_create_movie(in_folder("film.webp"), &desc, &film), NEBEL_OK);
+    assert_int_equal(nebel_add_movie_frame(film, &image), NEBEL_OK);
     close(ends[0]);
-    assert_int_equal(nebel_add_film_picture(film, &image), NEBEL_ERROR_FILE);
+    assert_int_equal(nebel_add_movie_frame(film, &image), NEBEL_ERROR_FILE);
     assert_non_null(strstr(kept.last, "Broken pipe"));
-    nebel_destroy_film(film);
+    nebel_destroy_movie(film);
     close(ends[1]);
     const int full = open("/dev/full", O_WRONLY);
     assert_int_equal(dup2(full, ends[1]), ends[1]);
-    assert_int_equal(nebel_create_film(in_folder("film.webp"), &desc, &film), NEBEL_ERROR_FILE);
+    assert_int_equal(nebel_create_movie(in_folder("film.webp"), &desc, &film), NEBEL_ERROR_FILE);
     assert_non_null(strstr(kept.last, "No space left"));
     close(ends[1]);
     close(full);
@@ -254,36 +254,36 @@ static void sides_have_a_limit(void **test)
     static const char *const names[] = {"R", "G", "B"};
     journal kept = {0};
     meter m = {.fail_at = 1L << 40};
-    nebel_film *film;
+    nebel_movie *film;
     nebel_image wide = {16384, 1, 3, names, calloc(16384 * 3, sizeof(float))};
-    const nebel_film_desc desc = {.log = {remember, &kept}, .allocator = {metered_allocate, metered_release, &m}};
+    const nebel_movie_desc desc = {.log = {remember, &kept}, .allocator = {metered_allocate, metered_release, &m}};
     (void)test;
-    assert_int_equal(nebel_create_film(in_folder("film.webp"), &desc, &film), NEBEL_OK);
-    assert_int_equal(nebel_add_film_picture(film, &wide), NEBEL_ERROR_LIMIT);
+    assert_int_equal(nebel_create_movie(in_folder("film.webp"), &desc, &film), NEBEL_OK);
+    assert_int_equal(nebel_add_movie_frame(film, &wide), NEBEL_ERROR_LIMIT);
     assert_non_null(strstr(kept.last, "at most 16383 x 16383"));
     wide.width = 100;
     m.fail_at = m.made + 1;
-    assert_int_equal(nebel_add_film_picture(film, &wide), NEBEL_ERROR_MEMORY);
+    assert_int_equal(nebel_add_movie_frame(film, &wide), NEBEL_ERROR_MEMORY);
     m.fail_at = 1L << 40;
-    assert_int_equal(nebel_add_film_picture(film, &wide), NEBEL_OK);
-    nebel_destroy_film(film);
+    assert_int_equal(nebel_add_movie_frame(film, &wide), NEBEL_OK);
+    nebel_destroy_movie(film);
     assert_int_equal(m.live, 0);
     free(wide.samples);
 }
 
 static void a_finished_film_takes_no_more(void **test)
 {
-    nebel_film *film;
+    nebel_movie *film;
     journal kept = {0};
     const nebel_image image = make_picture(0);
     (void)test;
-    assert_int_equal(nebel_create_film(in_folder("film.webp"), &(nebel_film_desc){.log = {remember, &kept}}, &film),
+    assert_int_equal(nebel_create_movie(in_folder("film.webp"), &(nebel_movie_desc){.log = {remember, &kept}}, &film),
                      NEBEL_OK);
-    assert_int_equal(nebel_add_film_picture(film, &image), NEBEL_OK);
-    assert_int_equal(nebel_finish_film(film), NEBEL_OK);
-    assert_int_equal(nebel_add_film_picture(film, &image), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_add_movie_frame(film, &image), NEBEL_OK);
+    assert_int_equal(nebel_finish_movie(film), NEBEL_OK);
+    assert_int_equal(nebel_add_movie_frame(film, &image), NEBEL_ERROR_ARGUMENT);
     assert_non_null(strstr(kept.last, "the film is finished already"));
-    nebel_destroy_film(film);
+    nebel_destroy_movie(film);
     assert_int_equal(remove(in_folder("film.webp")), 0);
     free(image.samples);
 }
@@ -306,11 +306,11 @@ static void refusals_say_why(void **test)
     };
     (void)test;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        nebel_film *film = (nebel_film *)&kept;
+        nebel_movie *film = (nebel_movie *)&kept;
         kept = (journal){0};
-        const nebel_film_desc desc = {
+        const nebel_movie_desc desc = {
             .log = {remember, &kept}, .frames_per_second = cases[i].rate, .quality = cases[i].quality};
-        assert_int_equal(nebel_create_film(in_folder(cases[i].name), &desc, &film), cases[i].result);
+        assert_int_equal(nebel_create_movie(in_folder(cases[i].name), &desc, &film), cases[i].result);
         assert_null(film);
         if (strstr(kept.last, cases[i].words) == NULL) fail_msg("case %zu says: %s", i, kept.last);
     }
@@ -322,12 +322,12 @@ static void refusals_say_why(void **test)
 static void builds_without_webp_say_so(void **test)
 {
     journal kept = {0};
-    nebel_film *film;
+    nebel_movie *film;
     (void)test;
     assert_non_null(strstr(nebel_scene_libraries(), "no WebP"));
-    assert_int_equal(make_film(in_folder("a.webp"), &(nebel_film_desc){0}, COUNT), NEBEL_ERROR_UNSUPPORTED);
-    const nebel_film_desc desc = {.log = {remember, &kept}};
-    assert_int_equal(nebel_create_film(in_folder("a.webp"), &desc, &film), NEBEL_ERROR_UNSUPPORTED);
+    assert_int_equal(make_film(in_folder("a.webp"), &(nebel_movie_desc){0}, COUNT), NEBEL_ERROR_UNSUPPORTED);
+    const nebel_movie_desc desc = {.log = {remember, &kept}};
+    assert_int_equal(nebel_create_movie(in_folder("a.webp"), &desc, &film), NEBEL_ERROR_UNSUPPORTED);
     assert_non_null(strstr(kept.last, "build it with libwebp"));
     assert_int_equal(file_count(), 0);
 }

@@ -8,7 +8,7 @@
 static double find(const nebel_snapshot *snapshot, double transmittance, int channel, const nebel_ray *ray)
 {
     double distance = -1;
-    assert_int_equal(nebel_find_transmittance(snapshot, transmittance, channel, 1, ray, sizeof *ray, &distance),
+    assert_int_equal(nebel_invert_transmittance(snapshot, transmittance, channel, 1, ray, sizeof *ray, &distance),
                      NEBEL_OK);
     return distance;
 }
@@ -130,7 +130,7 @@ static void test_strides_and_many_rays_change_nothing(void **unused)
     const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 4}, .extinction = {.3, .4, .5}};
     nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){0}, &ball, 1);
     for (int i = 0; i < COUNT; i++) rays[i].ray = (nebel_ray){{-6, .1 * i, 0}, {1, 0, .01 * i}, 100};
-    assert_int_equal(nebel_find_transmittance(snapshot, .4, 1, COUNT, &rays[0].ray, sizeof rays[0], distances),
+    assert_int_equal(nebel_invert_transmittance(snapshot, .4, 1, COUNT, &rays[0].ray, sizeof rays[0], distances),
                      NEBEL_OK);
     for (int i = 0; i < COUNT; i++) assert_true(find(snapshot, .4, 1, &rays[i].ray) == distances[i]);
     assert_true(distances[0] < 100 && distances[COUNT - 1] == HUGE_VAL);

@@ -23,7 +23,7 @@ static const nebel_volume_desc kinds[] = {
     {.shape = {.type = NEBEL_SHAPE_WORLD}, LIGHT, .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 8}},
     {.shape = {.type = NEBEL_SHAPE_HALF_SPACE, .normal = {0, 1, 0}}, LIGHT},
     {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-2, -1, -3}, .max = {1, 2, 3}},
-     .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = .5},
+     .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = .5},
      LIGHT},
     {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 3}, .density = {.type = NEBEL_DENSITY_RADIAL, .power = 2}, LIGHT},
     {.shape = {.type = NEBEL_SHAPE_ELLIPSOID, .radii = {1, 2, 3}}, LIGHT, .emission = {.1, .1, .1}},
@@ -59,7 +59,7 @@ static fingerprint look_at(const nebel_snapshot *snapshot)
                                            {{-8, -.5, 0}, {2, .1, 0}, 100}};
     fingerprint print;
     memset(&print, 0, sizeof print);
-    print.count = nebel_snapshot_volume_count(snapshot);
+    print.count = nebel_get_volume_count(snapshot);
     assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, PROBES, rays, sizeof rays[0], print.transfers,
                                  sizeof print.transfers[0]),
                      NEBEL_OK);
@@ -188,7 +188,7 @@ static void test_adding_survives_lost_memory(void **unused)
 
 static nebel_result change(bench *b)
 {
-    return nebel_change_volume(b->fog, b->id, b->desc);
+    return nebel_update_volume(b->fog, b->id, b->desc);
 }
 
 static void test_changing_survives_lost_memory(void **unused)
@@ -280,7 +280,7 @@ static nebel_result find(bench *b)
     nebel_ray rays[RAYS];
     double distances[RAYS];
     make_rays(rays);
-    return nebel_find_transmittance(b->snapshot, .5, 1, b->ray_count, rays, sizeof rays[0], distances);
+    return nebel_invert_transmittance(b->snapshot, .5, 1, b->ray_count, rays, sizeof rays[0], distances);
 }
 
 static nebel_result transmit(bench *b)
@@ -293,7 +293,7 @@ static nebel_result transmit(bench *b)
         to[i][2] = 0;
     }
     const nebel_segments segments = {.from = from, .to = &to[0][0], .to_stride = sizeof to[0]};
-    return nebel_transmit_segments(b->snapshot, NEBEL_ISA_DEFAULT, 0, b->ray_count, &segments, out, 0);
+    return nebel_compute_segment_transmittance(b->snapshot, NEBEL_ISA_DEFAULT, 0, b->ray_count, &segments, out, 0);
 }
 
 static size_t fail_each_in_query(act *query, size_t crowd, size_t ray_count)
@@ -355,13 +355,13 @@ static void test_ids_are_never_used_again_and_stale_ones_are_refused(void **unus
     for (int i = 0; i < ROUNDS; i++) {
         if (i % 3 == 0) continue;
         assert_int_equal(nebel_remove_volume(fog, ids[i]), NEBEL_ERROR_ARGUMENT);
-        assert_int_equal(nebel_change_volume(fog, ids[i], &kinds[1]), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_update_volume(fog, ids[i], &kinds[1]), NEBEL_ERROR_ARGUMENT);
     }
     const nebel_volume_id unknown[] = {0, 1, UINT64_MAX, first + 1000000, first ^ (nebel_volume_id)7 << 32};
     for (size_t i = 0; i < sizeof unknown / sizeof unknown[0]; i++) {
         if (unknown[i] == first) continue;
         assert_int_equal(nebel_remove_volume(fog, unknown[i]), NEBEL_ERROR_ARGUMENT);
-        assert_int_equal(nebel_change_volume(fog, unknown[i], &kinds[1]), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_update_volume(fog, unknown[i], &kinds[1]), NEBEL_ERROR_ARGUMENT);
     }
     const fingerprint after = look_at_fog(fog);
     assert_same(&before, &after);
@@ -375,14 +375,14 @@ static void test_a_changed_volume_keeps_its_id(void **unused)
     nebel_fog *const fog = plain_fog();
     const nebel_volume_id id = must_add(fog, &kinds[3]);
     const fingerprint ball = look_at_fog(fog);
-    assert_int_equal(nebel_change_volume(fog, id, &kinds[9]), NEBEL_OK);
+    assert_int_equal(nebel_update_volume(fog, id, &kinds[9]), NEBEL_OK);
     const fingerprint parts = look_at_fog(fog);
     assert_different(&ball, &parts);
     const nebel_volume_desc wrong = {.extinction = {-1, 0, 0}};
-    assert_int_equal(nebel_change_volume(fog, id, &wrong), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_update_volume(fog, id, &wrong), NEBEL_ERROR_VALUE);
     const fingerprint still = look_at_fog(fog);
     assert_same(&parts, &still);
-    assert_int_equal(nebel_change_volume(fog, id, &kinds[3]), NEBEL_OK);
+    assert_int_equal(nebel_update_volume(fog, id, &kinds[3]), NEBEL_OK);
     const fingerprint again = look_at_fog(fog);
     assert_same(&ball, &again);
     assert_int_equal(nebel_remove_volume(fog, id), NEBEL_OK);
@@ -420,7 +420,7 @@ static void test_a_snapshot_outlives_changes_and_the_fog(void **unused)
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     const fingerprint before = look_at(snapshot);
     for (int i = 0; i < KINDS; i += 2) assert_int_equal(nebel_remove_volume(fog, ids[i]), NEBEL_OK);
-    assert_int_equal(nebel_change_volume(fog, ids[1], &kinds[2]), NEBEL_OK);
+    assert_int_equal(nebel_update_volume(fog, ids[1], &kinds[2]), NEBEL_OK);
     assert_int_equal(nebel_set_ambient(fog, (const double[3]){9, 9, 9}), NEBEL_OK);
     const fingerprint changed = look_at(snapshot);
     nebel_destroy_fog(fog);

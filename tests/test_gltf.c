@@ -131,7 +131,7 @@ static double value_of(const integer *kind, bool is_normalized, long value)
 static void check_quad(const char *name, const integer *kind, bool is_normalized)
 {
     nebel_scene *scene = load_file(name);
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_int_equal(data->mesh_count, 1);
     const nebel_mesh *mesh = data->meshes;
     assert_int_equal(mesh->triangle_count, 2);
@@ -340,7 +340,7 @@ static void pack_ring(packed *out, const ring *made, bool has_floats, bool is_se
 static void check_ring(const ring *made, double tolerance)
 {
     nebel_scene *scene = load_file("ring.gltf");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     assert_int_equal(mesh->vertex_count, RING_VERTICES);
     assert_int_equal(mesh->triangle_count, RING_CORNERS / 3);
     for (int i = 0; i < RING_VERTICES; i++)
@@ -412,7 +412,7 @@ static extent measure(const char *file)
 {
     extent of = {{1e9, 1e9, 1e9}, {-1e9, -1e9, -1e9}, 0};
     nebel_scene *scene = load_file(file);
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     for (size_t m = 0; m < data->mesh_count; m++) {
         of.triangles += data->meshes[m].triangle_count;
         for (size_t i = 0; i < 3 * (size_t)data->meshes[m].vertex_count; i++) {
@@ -562,7 +562,7 @@ static void test_texture_coordinates_are_mapped(void **state)
         snprintf(whole, sizeof whole, "%.*s%s%s", (int)(index - text), text, extension, index);
         write_gltf("quad.gltf", "\"KHR_texture_transform\"", whole);
         nebel_scene *scene = load_file("quad.gltf");
-        const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+        const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
         for (int v = 0; v < VERTICES; v++)
             for (int k = 0; k < 2; k++)
                 if (fabs((double)mesh->uvs[2 * v + k] - cases[i].uvs[v][k]) > 1e-5)

@@ -192,12 +192,12 @@ static void test_what_a_scene_does_not_show_is_no_fog(void **state)
                                                "{\"nebel_extinction\": 1, \"nebel_name\": \"\\u00fc\"}}, "
                                                "{\"name\": \"e\", " EXTRAS("") "}]");
     nebel_scene *scene = parse_good(MODEL(""));
-    assert_int_equal(nebel_scene_contents(scene)->volume_count, 1);
-    assert_string_equal(nebel_scene_contents(scene)->volume_names[0], "\xC3\xBC");
+    assert_int_equal(nebel_get_scene_data(scene)->volume_count, 1);
+    assert_string_equal(nebel_get_scene_data(scene)->volume_names[0], "\xC3\xBC");
     nebel_destroy_scene(scene);
     write_gltf(NODE(EXTRAS("")));
     scene = parse_good(MODEL(""));
-    assert_string_equal(nebel_scene_contents(scene)->volume_names[0], "Mist");
+    assert_string_equal(nebel_get_scene_data(scene)->volume_names[0], "Mist");
     assert_int_equal(nebel_load_scene_models(scene), NEBEL_OK); /* no triangle, but fog */
     nebel_destroy_scene(scene);
 }
@@ -218,13 +218,13 @@ static void test_binary_files(void **state)
     write_file(GLB, file, whole);
     static const char model[] = "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"" GLB "\"}]}";
     nebel_scene *scene = parse_good(model);
-    assert_int_equal(nebel_scene_contents(scene)->volume_count, 1);
+    assert_int_equal(nebel_get_scene_data(scene)->volume_count, 1);
     nebel_destroy_scene(scene);
     const nebel_scene_desc silent = {.log = {NULL, NULL}};
     for (size_t cut = 0; cut < 20; cut++) { /* said when the model is loaded */
         write_file(GLB, file, cut);
         assert_int_equal(nebel_parse_scene(model, strlen(model), "test.json", &silent, &scene), NEBEL_OK);
-        assert_int_equal(nebel_scene_contents(scene)->volume_count, 0);
+        assert_int_equal(nebel_get_scene_data(scene)->volume_count, 0);
         assert_int_equal(nebel_load_scene_models(scene), NEBEL_ERROR_FORMAT);
         nebel_destroy_scene(scene);
     }
@@ -311,7 +311,7 @@ static void test_rings_of_nodes(void **state)
     (void)state;
     write_gltf("\"nodes\": [{\"children\": [1, 77], " EXTRAS("") "}, {\"children\": [0]}]");
     nebel_scene *scene = parse_good(MODEL(""));
-    assert_int_equal(nebel_scene_contents(scene)->volume_count, 0);
+    assert_int_equal(nebel_get_scene_data(scene)->volume_count, 0);
     nebel_destroy_scene(scene);
 }
 

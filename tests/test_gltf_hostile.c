@@ -65,7 +65,7 @@ static void write_sparse(const char *format, int width, unsigned second)
 static void check_corners(const double wanted[VERTICES][3])
 {
     nebel_scene *scene = load_good("\"file\": \"a.gltf\"");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     assert_int_equal(mesh->triangle_count, 2);
     for (int i = 0; i < VERTICES; i++) {
         int found = 0;
@@ -90,7 +90,7 @@ static void test_sparse_integers(void **state)
     /* Without a view all others are 0. */
     write_sparse(SPARSE("", "3", "\"count\": 2, " INDICES VALUES), 2, 2);
     nebel_scene *scene = load_good("\"file\": \"a.gltf\"");
-    assert_int_equal(nebel_scene_contents(scene)->meshes[0].triangle_count, 1);
+    assert_int_equal(nebel_get_scene_data(scene)->meshes[0].triangle_count, 1);
     nebel_destroy_scene(scene);
 }
 
@@ -188,7 +188,7 @@ static void test_long_integers(void **state)
                    "\"byteLength\": 36}], \"accessors\": [{\"bufferView\": 0, \"componentType\": 5125, \"count\": 3, "
                    "\"type\": \"VEC3\"}]");
     nebel_scene *scene = load_good("\"file\": \"a.gltf\"");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     assert_int_equal(mesh->triangle_count, 1);
     for (size_t i = 0; i < 9; i++) assert_true(mesh->positions[3 * mesh->indices[i / 3] + i % 3] == (float)places[i]);
     nebel_destroy_scene(scene);

@@ -18,7 +18,7 @@ enum { MOST_SIDE = 20, MOST_CUTS = 512 };
 /* Voxels as the truth sees them, in a box that is moved but not turned: coordinates in voxels are rate (p - low). */
 typedef struct block {
     int size[3];
-    nebel_filter filter;
+    nebel_grid_filter filter;
     double low[3], high[3];
     float voxels[MOST_SIDE * MOST_SIDE * MOST_SIDE];
     nebel_grid *grid;
@@ -45,7 +45,7 @@ static long double density_of_block(const block *b, const long double p[3])
 {
     int cell[3];
     long double share[3], sum = 0;
-    const int linear = b->filter == NEBEL_FILTER_LINEAR;
+    const int linear = b->filter == NEBEL_GRID_FILTER_LINEAR;
     for (int i = 0; i < 3; i++) {
         const long double at = in_voxels(b, p, i) - (linear ? .5L : 0);
         if (in_voxels(b, p, i) < 0 || in_voxels(b, p, i) > b->size[i]) return 0;
@@ -169,7 +169,7 @@ static void light_of(const block *const *blocks, const double *extinction, const
 
 /* ---- blocks ---------------------------------------------------------------------------------- */
 
-static nebel_grid *make_grid(const int size[3], nebel_voxel_type type, nebel_filter filter, const void *voxels)
+static nebel_grid *make_grid(const int size[3], nebel_voxel_type type, nebel_grid_filter filter, const void *voxels)
 {
     nebel_grid *grid = NULL;
     const nebel_grid_desc desc = {
@@ -179,7 +179,7 @@ static nebel_grid *make_grid(const int size[3], nebel_voxel_type type, nebel_fil
 }
 
 /* A third of the voxels is empty, so that bricks are, too; dice decide how many hang together. */
-static void fill_block(uint64_t *state, block *b, nebel_filter filter)
+static void fill_block(uint64_t *state, block *b, nebel_grid_filter filter)
 {
     b->filter = filter;
     const int hollow = dice_below(state, 3);
@@ -243,7 +243,7 @@ static void depth_is_that_of_T39(void **state)
     nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-.5, -.5, -.5}, .max = {3.5, 3.5, 3.5}},
                            .density = {.type = NEBEL_DENSITY_GRID},
                            .extinction = {.1, .1, .1}};
-    v.density.grid = make_grid(size, NEBEL_VOXEL_FLOAT, NEBEL_FILTER_LINEAR, voxels);
+    v.density.grid = make_grid(size, NEBEL_VOXEL_FLOAT, NEBEL_GRID_FILTER_LINEAR, voxels);
     nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &v, 1);
     nebel_release_grid(v.density.grid);
     const nebel_ray ray = {.origin = {0, .4, 2.7}, .direction = {3, 2.2, -2.4}, .t_max = 4.427188724235731};
@@ -255,7 +255,7 @@ static void depth_is_that_of_T39(void **state)
     nebel_release_snapshot(fog);
 }
 
-static void check_depth(uint64_t seed, nebel_filter filter)
+static void check_depth(uint64_t seed, nebel_grid_filter filter)
 {
     uint64_t state = seed;
     block b;
@@ -283,22 +283,22 @@ static void check_depth(uint64_t seed, nebel_filter filter)
 static void depth_is_the_sum_over_cells(void **state)
 {
     (void)state;
-    for (uint64_t seed = 0; seed < 200; seed++) check_depth(seed, NEBEL_FILTER_LINEAR);
+    for (uint64_t seed = 0; seed < 200; seed++) check_depth(seed, NEBEL_GRID_FILTER_LINEAR);
 }
 
 static void depth_is_the_sum_over_voxels(void **state)
 {
     (void)state;
-    for (uint64_t seed = 0; seed < 200; seed++) check_depth(seed, NEBEL_FILTER_NEAREST);
+    for (uint64_t seed = 0; seed < 200; seed++) check_depth(seed, NEBEL_GRID_FILTER_NEAREST);
 }
 
 /* Two grids of different light over each other. */
-static void check_light(uint64_t seed, nebel_filter filter, double tolerance)
+static void check_light(uint64_t seed, nebel_grid_filter filter, double tolerance)
 {
     uint64_t state = seed;
     static block a, b;
     fill_block(&state, &a, filter);
-    fill_block(&state, &b, NEBEL_FILTER_LINEAR);
+    fill_block(&state, &b, NEBEL_GRID_FILTER_LINEAR);
     const double extinction[2] = {dice(&state, .1, 3), dice(&state, .1, 3)}, source[2] = {.2, 1};
     const nebel_volume_desc v[2] = {volume_of(&a, extinction[0], source[0]), volume_of(&b, extinction[1], source[1])};
     const nebel_volume_desc turned[2] = {v[1], v[0]};
@@ -330,8 +330,8 @@ static void errors_admit_the_truth(void **state)
 {
     (void)state;
     for (uint64_t seed = 0; seed < 60; seed++) {
-        check_light(seed, NEBEL_FILTER_LINEAR, seed % 2 == 0 ? 2e-3 : 1e-7);
-        check_light(seed, NEBEL_FILTER_NEAREST, seed % 2 == 0 ? 2e-3 : 1e-7);
+        check_light(seed, NEBEL_GRID_FILTER_LINEAR, seed % 2 == 0 ? 2e-3 : 1e-7);
+        check_light(seed, NEBEL_GRID_FILTER_NEAREST, seed % 2 == 0 ? 2e-3 : 1e-7);
     }
 }
 
@@ -365,7 +365,7 @@ static long double sunlight_of(const block *b, const long double to_sun[3], cons
 }
 
 /* One block alone, in some seeds with a sun level with its faces. */
-static nebel_snapshot *lone_fog(uint64_t *state, block *b, nebel_filter filter, double sun[3])
+static nebel_snapshot *lone_fog(uint64_t *state, block *b, nebel_grid_filter filter, double sun[3])
 {
     fill_block(state, b, filter);
     const int level = dice_below(state, 5);
@@ -386,7 +386,7 @@ static nebel_snapshot *lone_fog(uint64_t *state, block *b, nebel_filter filter, 
     return fog;
 }
 
-static void check_sunlight(uint64_t seed, nebel_filter filter, double tolerance)
+static void check_sunlight(uint64_t seed, nebel_grid_filter filter, double tolerance)
 {
     static block b;
     uint64_t state = 977 * seed + 5;
@@ -414,8 +414,8 @@ static void errors_of_sunlight_admit_the_truth(void **state)
 {
     (void)state;
     for (uint64_t seed = 0; seed < 24; seed++) {
-        check_sunlight(seed, NEBEL_FILTER_LINEAR, seed % 2 == 0 ? 2e-3 : 1e-4);
-        check_sunlight(seed, NEBEL_FILTER_NEAREST, seed % 2 == 0 ? 2e-3 : 1e-4);
+        check_sunlight(seed, NEBEL_GRID_FILTER_LINEAR, seed % 2 == 0 ? 2e-3 : 1e-4);
+        check_sunlight(seed, NEBEL_GRID_FILTER_NEAREST, seed % 2 == 0 ? 2e-3 : 1e-4);
     }
 }
 
@@ -429,13 +429,13 @@ static void shadows_of_surfaces_part_the_sunlight(void **test)
     for (uint64_t seed = 0; seed < 40; seed++) {
         uint64_t state = seed;
         double sun[3];
-        nebel_snapshot *fog = lone_fog(&state, &b, (nebel_filter)(seed % 2), sun);
+        nebel_snapshot *fog = lone_fog(&state, &b, (nebel_grid_filter)(seed % 2), sun);
         const nebel_ray ray = random_ray(&state);
-        const nebel_lit_pieces pieces[2] = {{lit, toggles}, {dark, toggles}};
+        const nebel_ray_visibility seen[2] = {{lit, toggles}, {dark, toggles}};
         nebel_transfer part[2];
         const nebel_transfer all = trace(fog, NEBEL_PRECISION_FLOAT, 1e-4, &ray);
         for (int i = 0; i < 2; i++) {
-            const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .tolerance = 1e-4, .sunlit = &pieces[i]};
+            const nebel_trace_desc desc = {NEBEL_PRECISION_FLOAT, .tolerance = 1e-4, .sun_visibility = &seen[i]};
             assert_int_equal(nebel_trace(fog, &desc, 1, &ray, sizeof ray, &part[i], sizeof part[i]), NEBEL_OK);
         }
         const double sum = part[0].in_scattering[0] + part[1].in_scattering[0];
@@ -457,7 +457,7 @@ static nebel_snapshot *mixed_fog(uint64_t *state, double albedo)
     nebel_volume_desc v[3] = {
         {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 2}, .extinction = {.1, .2, .3}, .source = {.4, .2, .9}}};
     for (int i = 0; i < 2; i++) {
-        fill_block(state, &b[i], i == 0 ? NEBEL_FILTER_LINEAR : NEBEL_FILTER_NEAREST);
+        fill_block(state, &b[i], i == 0 ? NEBEL_GRID_FILTER_LINEAR : NEBEL_GRID_FILTER_NEAREST);
         v[i + 1] = volume_of(&b[i], .7, .5);
         v[i + 1].shape.transform = (nebel_transform){
             .position = {.1, .2, .3}, .rotation = {.1, .2 * i, .3, 1}, .scale = {1, i == 0 ? -1 : .5, 2}};
@@ -482,7 +482,7 @@ static void bits_do_not_depend_on_company(void **test)
         double sun[3];
         uint64_t state = seed;
         nebel_snapshot *fog = seed < 12 ? mixed_fog(&state, seed % 3 == 2 ? .5 : 0)
-                                        : lone_fog(&state, &lone, (nebel_filter)(seed % 2), sun);
+                                        : lone_fog(&state, &lone, (nebel_grid_filter)(seed % 2), sun);
         nebel_ray rays[RAYS];
         nebel_transfer alone[RAYS], all[RAYS];
         for (int i = 0; i < RAYS; i++) rays[i] = random_ray(&state);
@@ -525,7 +525,7 @@ static void equal_voxels_are_constant_density(void **test)
                            .density = {.type = NEBEL_DENSITY_GRID},
                            .extinction = {1, .5, .25},
                            .albedo = {.9, .8, .7}};
-    v.density.grid = make_grid((int[]){3, 3, 3}, NEBEL_VOXEL_FLOAT, NEBEL_FILTER_LINEAR, voxels);
+    v.density.grid = make_grid((int[]){3, 3, 3}, NEBEL_VOXEL_FLOAT, NEBEL_GRID_FILTER_LINEAR, voxels);
     nebel_volume_desc even = v;
     even.density = (nebel_density){0};
     for (int c = 0; c < 3; c++) even.extinction[c] /= 2;
@@ -589,14 +589,14 @@ static void distances_are_found(void **test)
     (void)test;
     uint64_t state = 11;
     block b;
-    fill_block(&state, &b, NEBEL_FILTER_LINEAR);
+    fill_block(&state, &b, NEBEL_GRID_FILTER_LINEAR);
     const nebel_volume_desc v = volume_of(&b, 1, 0);
     nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &v, 1);
     nebel_release_grid(b.grid);
     for (int i = 0; i < 50; i++) {
         nebel_ray ray = random_ray(&state);
         double distance;
-        assert_int_equal(nebel_find_transmittance(fog, .7, 0, 1, &ray, sizeof ray, &distance), NEBEL_OK);
+        assert_int_equal(nebel_invert_transmittance(fog, .7, 0, 1, &ray, sizeof ray, &distance), NEBEL_OK);
         if (isfinite(distance)) {
             assert_true(distance <= ray.t_max);
             ray.t_max = distance;
@@ -615,23 +615,23 @@ static void places_are_sampled_and_bounded(void **test)
     for (uint64_t seed = 0; seed < 40; seed++) {
         uint64_t state = seed;
         block b;
-        fill_block(&state, &b, seed % 2 == 0 ? NEBEL_FILTER_LINEAR : NEBEL_FILTER_NEAREST);
+        fill_block(&state, &b, seed % 2 == 0 ? NEBEL_GRID_FILTER_LINEAR : NEBEL_GRID_FILTER_NEAREST);
         const nebel_volume_desc v = volume_of(&b, .5, 1);
         nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &v, 1);
         nebel_release_grid(b.grid);
         for (int i = 0; i < 30; i++) {
             long double at[3];
-            nebel_place place = {.distance = -1};
+            nebel_sample_point place = {.distance = -1};
             nebel_ray ray = random_ray(&state);
-            nebel_matter matter;
-            nebel_bound bound;
+            nebel_medium_properties matter;
+            nebel_majorant_segment bound;
             for (int c = 0; c < 3; c++) {
                 ray.origin[c] = place.position[c] = dice(&state, b.low[c], b.high[c]);
                 at[c] = (long double)place.position[c];
             }
-            assert_int_equal(nebel_sample_fog(fog, 1, &place, sizeof place, &matter, sizeof matter), NEBEL_OK);
+            assert_int_equal(nebel_sample_medium(fog, 1, &place, sizeof place, &matter, sizeof matter), NEBEL_OK);
             assert_near(matter.extinction[1], .5 * (double)density_of_block(&b, at), 1e-12);
-            assert_int_equal(nebel_bound_fog(fog, &ray, 0, 0, &bound), NEBEL_OK);
+            assert_int_equal(nebel_next_majorant(fog, &ray, 0, 0, &bound), NEBEL_OK);
             assert_true(matter.extinction[1] <= bound.extinction[1]);
         }
         nebel_release_snapshot(fog);
@@ -656,7 +656,7 @@ static void bad_grids_are_refused(void **test)
         {{.size = {4097, 1, 1}, .voxels = good}, NEBEL_ERROR_LIMIT, "must be 1 to 4096"},
         {{.size = {4096, 4096, 4096}, .voxels = good}, NEBEL_ERROR_LIMIT, "at most 1073741824 in all"},
         {{.size = {2, 2, 2}, .voxels = good, .type = (nebel_voxel_type)9}, NEBEL_ERROR_ARGUMENT, "type 9 is unknown"},
-        {{.size = {2, 2, 2}, .voxels = good, .filter = (nebel_filter)9}, NEBEL_ERROR_ARGUMENT, "filter 9 is unknown"},
+        {{.size = {2, 2, 2}, .voxels = good, .filter = 9}, NEBEL_ERROR_ARGUMENT, "filter 9 is unknown"},
         {{.size = {2, 2, 2}, .voxels = good, .scale = HUGE_VAL}, NEBEL_ERROR_VALUE, "scale and offset"},
         {{.size = {2, 2, 2}, .voxels = good, .offset = (double)NAN}, NEBEL_ERROR_VALUE, "scale and offset"},
         {{.size = {2, 2, 2}, .voxels = not_a_number}, NEBEL_ERROR_VALUE, "voxel 1, 1, 0 has the density nan"},
@@ -688,7 +688,7 @@ static void volumes_need_a_box_and_a_grid(void **test)
     fog_messages messages = {0};
     nebel_fog *fog = NULL;
     const float voxel = 1;
-    nebel_grid *grid = make_grid((int[]){1, 1, 1}, NEBEL_VOXEL_FLOAT, NEBEL_FILTER_LINEAR, &voxel);
+    nebel_grid *grid = make_grid((int[]){1, 1, 1}, NEBEL_VOXEL_FLOAT, NEBEL_GRID_FILTER_LINEAR, &voxel);
     assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, &fog), NEBEL_OK);
     nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX, .max = {1, 1, 1}},
                            .density = {.type = NEBEL_DENSITY_GRID},
@@ -710,7 +710,7 @@ static void volumes_need_a_box_and_a_grid(void **test)
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     assert_int_equal(nebel_pack_fog(snapshot, (double[3]){0, 0, 0}, NULL, 0, &words), NEBEL_OK);
     nebel_release_snapshot(snapshot);
-    assert_int_equal(nebel_set_lamps(fog, 1, &(nebel_lamp){.intensity = {1, 1, 1}}), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(fog, 1, &(nebel_light){.intensity = {1, 1, 1}}), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     assert_int_equal(nebel_pack_fog(snapshot, (double[3]){0, 0, 0}, NULL, 0, &words), NEBEL_OK);
     nebel_destroy_fog(fog);
@@ -737,7 +737,7 @@ static nebel_result live_and_die(const nebel_allocator *allocator, double albedo
     const nebel_fog_desc sky = {.allocator = *allocator, .sun = {{.2, 1, .3}, {1, 1, 1}}};
     result = nebel_create_fog(&sky, &fog);
     if (result == NEBEL_OK) result = nebel_add_volume(fog, &v, &id);
-    if (result == NEBEL_OK) result = nebel_change_volume(fog, id, &v);
+    if (result == NEBEL_OK) result = nebel_update_volume(fog, id, &v);
     for (int i = 0; i < 2 && result == NEBEL_OK; i++) {
         nebel_release_snapshot(snapshot);
         result = nebel_commit_fog(fog, &snapshot);

@@ -75,7 +75,7 @@ static nebel_grid *load(const nebel_grid_file *file)
 static void check_wedge(const char *path, double tolerance)
 {
     static const double wanted[3] = {0.7529, 0.7642, 0.7610};
-    nebel_grid *grid = load(&(nebel_grid_file){.file = path, .grid = "density"});
+    nebel_grid *grid = load(&(nebel_grid_file){.path = path, .grid_name = "density"});
     for (int axis = 0; axis < 3; axis++) {
         assert_near(through(grid, axis, .2, .2), wanted[axis], tolerance);
         assert_near(through(grid, axis, .9, .9), 1, 1e-12);
@@ -119,8 +119,8 @@ static void plain_files_are_those_that_were_zipped(void **state)
     for (char magic = '0'; magic <= '2'; magic++) {
         plain.data[7] = (unsigned char)magic;
         write_bytes("plain.nvdb", plain.data, plain.size);
-        nebel_grid *zipped = load(&(nebel_grid_file){.file = CORPUS "zip.nvdb"});
-        nebel_grid *other = load(&(nebel_grid_file){.file = in_folder("plain.nvdb")});
+        nebel_grid *zipped = load(&(nebel_grid_file){.path = CORPUS "zip.nvdb"});
+        nebel_grid *other = load(&(nebel_grid_file){.path = in_folder("plain.nvdb")});
         for (int axis = 0; axis < 3; axis++) assert_true(through(zipped, axis, .1, .3) == through(other, axis, .1, .3));
         nebel_release_grid(zipped);
         nebel_release_grid(other);
@@ -226,8 +226,8 @@ static void numbers_are_x_first(void **state)
     const size_t sizes[] = {sizeof floats, sizeof bytes, sizeof words};
     for (int type = 0; type < 3; type++) {
         write_bytes("numbers.raw", data[type], sizes[type]);
-        nebel_grid *grid = load(&(nebel_grid_file){.file = in_folder("numbers.raw"),
-                                                   .filter = NEBEL_FILTER_NEAREST,
+        nebel_grid *grid = load(&(nebel_grid_file){.path = in_folder("numbers.raw"),
+                                                   .filter = NEBEL_GRID_FILTER_NEAREST,
                                                    .size = {3, 2, 1},
                                                    .type = (nebel_voxel_type)type});
         assert_near(through(grid, 1, .5, .9), exp(-.75), 2e-3); /* along y, at x = .9 */
@@ -256,7 +256,7 @@ static void pictures_are_slices(void **state)
     write_slice("s_00.png", 2, 3, black);
     write_slice("s_01.png", 2, 3, corner);
     nebel_grid *grid =
-        load(&(nebel_grid_file){.file = in_folder("s_##.png"), .filter = NEBEL_FILTER_NEAREST, .slices = 2});
+        load(&(nebel_grid_file){.path = in_folder("s_##.png"), .filter = NEBEL_GRID_FILTER_NEAREST, .slice_count = 2});
     assert_near(through(grid, 2, .25, .9), exp(-.5), 1e-12);
     assert_near(through(grid, 2, .25, .1), 1, 0);
     assert_near(through(grid, 2, .75, .9), 1, 0);
@@ -367,22 +367,22 @@ static void noise_moves_from_frame_to_frame(void **state)
     (void)state;
     nebel_scene *scene = parse_good(NOISE);
     nebel_noise_desc desc = {.size = {12, 12, 12},
-                             .cells = {2, 3, 2},
+                             .frequency = {2, 3, 2},
                              .octaves = 2,
                              .gain = .6,
                              .coverage = .8,
-                             .edge = {.1, 0, 0},
+                             .falloff = {.1, 0, 0},
                              .seed = 4};
-    assert_int_equal(nebel_scene_contents(scene)->moving_volume_count, 1);
-    assert_true(nebel_scene_contents(scene)->moves_on);
+    assert_int_equal(nebel_get_scene_data(scene)->animated_volume_count, 1);
+    assert_true(nebel_get_scene_data(scene)->has_endless_motion);
     for (int frame = 0; frame < 8; frame += 3) {
         nebel_grid *grid = NULL;
         desc.offset[0] = .5 * frame;
         desc.time = .25 * frame;
-        assert_int_equal(nebel_create_noise(&desc, &grid), NEBEL_OK);
+        assert_int_equal(nebel_create_noise_grid(&desc, &grid), NEBEL_OK);
         assert_true(light_at_frame(scene, frame) == through(grid, 0, .4, .6));
         nebel_grid *at = NULL;
-        assert_int_equal(nebel_scene_grid(scene, nebel_scene_contents(scene)->volumes[0].density.grid, frame, &at),
+        assert_int_equal(nebel_get_scene_grid(scene, nebel_get_scene_data(scene)->volumes[0].density.grid, frame, &at),
                          NEBEL_OK);
         assert_true(through(at, 0, .4, .6) == through(grid, 0, .4, .6));
         nebel_release_grid(at);
@@ -390,7 +390,7 @@ static void noise_moves_from_frame_to_frame(void **state)
     }
     assert_true(fabs(light_at_frame(scene, 0) - light_at_frame(scene, 3)) > 1e-4);
     nebel_grid *none = NULL;
-    assert_int_equal(nebel_scene_grid(scene, NULL, 3, &none), NEBEL_OK);
+    assert_int_equal(nebel_get_scene_grid(scene, NULL, 3, &none), NEBEL_OK);
     assert_null(none);
     nebel_destroy_scene(scene);
     parse_without_memory(NOISE);
@@ -398,7 +398,7 @@ static void noise_moves_from_frame_to_frame(void **state)
 
 static nebel_grid *grid_of(const nebel_scene *scene)
 {
-    return nebel_scene_contents(scene)->volumes[0].density.grid;
+    return nebel_get_scene_data(scene)->volumes[0].density.grid;
 }
 
 /* Noise with other numbers is that of a file that has them, and its words stay. */
@@ -408,22 +408,22 @@ static void noise_is_given_other_numbers(void **state)
     nebel_scene *scene = parse_good(NOISE);
     nebel_scene_noise noise, again;
     nebel_grid *changed = NULL, *here = NULL, *there = NULL;
-    assert_true(nebel_find_scene_noise(scene, grid_of(scene), &noise));
+    assert_true(nebel_get_scene_noise(scene, grid_of(scene), &noise));
     assert_int_equal(noise.desc.size[2], 12);
-    assert_true(noise.desc.gain == .6 && noise.drift[0] == .5 && noise.change == .25 && noise.desc.seed == 4);
-    noise.desc.cells[1] = 4;
-    noise.drift[2] = -1;
+    assert_true(noise.desc.gain == .6 && noise.velocity[0] == .5 && noise.evolution == .25 && noise.desc.seed == 4);
+    noise.desc.frequency[1] = 4;
+    noise.velocity[2] = -1;
     noise.desc.octaves = 3;
-    assert_int_equal(nebel_change_scene_noise(scene, grid_of(scene), &noise, &changed), NEBEL_OK);
-    assert_true(nebel_find_scene_noise(scene, changed, &again));
-    assert_memory_equal(noise.desc.cells, again.desc.cells, sizeof noise.desc.cells);
-    assert_true(again.drift[2] == -1 && again.desc.octaves == 3 && again.desc.coverage == .8);
-    assert_non_null(strstr(nebel_grid_name(changed), "\"cells\": [2, 4, 2], \"octaves\": 3, \"gain\": 0.6"));
+    assert_int_equal(nebel_update_scene_noise(scene, grid_of(scene), &noise, &changed), NEBEL_OK);
+    assert_true(nebel_get_scene_noise(scene, changed, &again));
+    assert_memory_equal(noise.desc.frequency, again.desc.frequency, sizeof noise.desc.frequency);
+    assert_true(again.velocity[2] == -1 && again.desc.octaves == 3 && again.desc.coverage == .8);
+    assert_non_null(strstr(nebel_get_grid_name(changed), "\"cells\": [2, 4, 2], \"octaves\": 3, \"gain\": 0.6"));
     noise.desc.offset[0] = 1;
     noise.desc.offset[2] = -2;
     noise.desc.time = .5;
-    assert_int_equal(nebel_create_noise(&noise.desc, &there), NEBEL_OK);
-    assert_int_equal(nebel_scene_grid(scene, changed, 2, &here), NEBEL_OK);
+    assert_int_equal(nebel_create_noise_grid(&noise.desc, &there), NEBEL_OK);
+    assert_int_equal(nebel_get_scene_grid(scene, changed, 2, &here), NEBEL_OK);
     assert_true(through(here, 0, .4, .6) == through(there, 0, .4, .6));
     assert_false(through(here, 0, .4, .6) == through(changed, 0, .4, .6));
     nebel_release_grid(there);
@@ -438,15 +438,15 @@ static void what_is_no_noise_stays(void **state)
     nebel_scene *scene = parse_good(NOISE), *of_file = parse_good(WEDGE);
     nebel_scene_noise noise;
     nebel_grid *changed = NULL;
-    assert_false(nebel_find_scene_noise(of_file, grid_of(of_file), &noise));
-    assert_false(nebel_find_scene_noise(scene, NULL, &noise));
-    assert_true(nebel_find_scene_noise(scene, grid_of(scene), &noise));
-    assert_int_equal(nebel_change_scene_noise(of_file, grid_of(of_file), &noise, &changed), NEBEL_ERROR_ARGUMENT);
+    assert_false(nebel_get_scene_noise(of_file, grid_of(of_file), &noise));
+    assert_false(nebel_get_scene_noise(scene, NULL, &noise));
+    assert_true(nebel_get_scene_noise(scene, grid_of(scene), &noise));
+    assert_int_equal(nebel_update_scene_noise(of_file, grid_of(of_file), &noise, &changed), NEBEL_ERROR_ARGUMENT);
     noise.desc.gain = 2;
-    assert_int_equal(nebel_change_scene_noise(scene, grid_of(scene), &noise, &changed), NEBEL_ERROR_FORMAT);
+    assert_int_equal(nebel_update_scene_noise(scene, grid_of(scene), &noise, &changed), NEBEL_ERROR_FORMAT);
     noise.desc.gain = .5;
-    noise.desc.cells[0] = 7;
-    assert_int_equal(nebel_change_scene_noise(scene, grid_of(scene), &noise, &changed), NEBEL_ERROR_VALUE);
+    noise.desc.frequency[0] = 7;
+    assert_int_equal(nebel_update_scene_noise(scene, grid_of(scene), &noise, &changed), NEBEL_ERROR_VALUE);
     assert_null(changed);
     nebel_destroy_scene(of_file);
     nebel_destroy_scene(scene);
@@ -462,16 +462,16 @@ static void memory_runs_out_while_noise_is_changed(void **state)
     nebel_scene *scene = NULL;
     nebel_scene_noise noise;
     assert_int_equal(nebel_parse_scene(NOISE, strlen(NOISE), "s.json", &desc, &scene), NEBEL_OK);
-    assert_true(nebel_find_scene_noise(scene, grid_of(scene), &noise));
-    noise.change = 2;
+    assert_true(nebel_get_scene_noise(scene, grid_of(scene), &noise));
+    noise.evolution = 2;
     nebel_result changing = NEBEL_ERROR_MEMORY, moving = NEBEL_ERROR_MEMORY;
     const long live = m.live;
     for (long k = 0; changing != NEBEL_OK || moving != NEBEL_OK; k++) {
         nebel_grid *changed = NULL, *at = NULL;
         m.fail_at = m.made + k;
-        changing = nebel_change_scene_noise(scene, grid_of(scene), &noise, &changed);
+        changing = nebel_update_scene_noise(scene, grid_of(scene), &noise, &changed);
         m.fail_at = m.made + k;
-        moving = nebel_scene_grid(scene, grid_of(scene), 3, &at);
+        moving = nebel_get_scene_grid(scene, grid_of(scene), 3, &at);
         if (changing != NEBEL_OK) assert_int_equal(changing, NEBEL_ERROR_MEMORY);
         if (moving != NEBEL_OK) assert_int_equal(moving, NEBEL_ERROR_MEMORY);
         nebel_release_grid(changed);
@@ -493,21 +493,21 @@ static void copies_are_saved(void **state)
     const nebel_scene_desc desc = {.log = {remember, &kept}};
     write_bytes("copies.json", WEDGE, strlen(WEDGE));
     assert_int_equal(nebel_load_scene(path, &desc, &scene), NEBEL_OK);
-    const nebel_scene_data *before = nebel_scene_contents(scene);
+    const nebel_scene_data *before = nebel_get_scene_data(scene);
     nebel_scene_data changed = *before;
     nebel_volume_desc volumes[2] = {before->volumes[0], before->volumes[0]};
-    const nebel_volume_entry entries[2] = {before->volume_entries[0], before->volume_entries[0]};
+    const nebel_volume_track entries[2] = {before->volume_tracks[0], before->volume_tracks[0]};
     const char *const names[2] = {"", "copy"};
     const size_t sources[2] = {0, NEBEL_NEW_VOLUME};
     volumes[0].extinction[0] = volumes[0].extinction[1] = volumes[0].extinction[2] = 2;
     volumes[1].shape.transform.position[0] = 5;
     changed.volumes = volumes;
-    changed.volume_entries = entries;
+    changed.volume_tracks = entries;
     changed.volume_names = names;
     changed.volume_count = 2;
     if (nebel_save_scene(path, &desc, before, &changed, sources) != NEBEL_OK) fail_msg("%s", kept.last);
     if (nebel_load_scene(path, &desc, &again) != NEBEL_OK) fail_msg("%s", kept.last);
-    const nebel_scene_data *after = nebel_scene_contents(again);
+    const nebel_scene_data *after = nebel_get_scene_data(again);
     assert_int_equal(after->volume_count, 2);
     for (int i = 0; i < 2; i++) {
         assert_int_equal(after->volumes[i].density.type, NEBEL_DENSITY_GRID);

@@ -186,8 +186,8 @@ static void check_transmittance(uint64_t seed)
     nebel_snapshot *fog = fog_of(&c);
     nebel_ray_planes rays = {.offset_stride = sizeof(float), .direction_stride = sizeof(float)};
     nebel_transfer_planes dark = {.transmittance_stride = sizeof(float)}, lit = dark;
-    const nebel_lit_pieces pieces = {first, toggles};
-    const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .sunlit = &pieces};
+    const nebel_ray_visibility pieces = {first, toggles};
+    const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .sun_visibility = &pieces};
     lit.in_scattering_stride = sizeof(float);
     for (int n = 0; n < COUNT; n++) {
         const nebel_ray ray = random_ray(&state, &c);

@@ -57,7 +57,7 @@ static void holes_are_where_alpha_is_low(void **state)
         test_card_make(&card, fabsf(times[i]));
         if (times[i] < 0)
             for (int k = 0; k < 8; k++) card.uvs[k] += -64; /* texture coordinates below 0 repeat as well */
-        test_render(&card.scene, NULL, &(nebel_renderer_desc){0}, &camera, 1, &picture);
+        test_render(&card.scene, NULL, &(nebel_cpu_renderer_desc){0}, &camera, 1, &picture);
         if (times[i] < 0) test_card_make(&card, fabsf(times[i]));
         for (uint32_t y = 0; y < SIZE; y++)
             for (uint32_t x = 0; x < SIZE; x++) check_pixel(&card, &picture, x, y, &seen);
@@ -76,9 +76,9 @@ static void the_reference_has_the_same_holes(void **state)
     test_card_make(&card, 3);
     const nebel_frame_desc frame = {
         .camera = camera_above(), .width = SIZE, .height = SIZE, .samples = 1, .bounces = 1};
-    assert_int_equal(nebel_create_renderer(&card.scene, NULL, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&card.scene, NULL, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
-    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_REFERENCE, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_PATH, NULL), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &reference.planes), NEBEL_OK);
     for (int i = 0; i < SIZE * SIZE; i++) {
         assert_true(picture.planes.depth[i] == reference.planes.depth[i]);
@@ -94,16 +94,16 @@ static void the_reference_has_the_same_holes(void **state)
 static void lamps_shine_through_holes(void **state)
 {
     static test_card card;
-    const nebel_lamp lamp = {.position = {.5, 4, .25}, .intensity = {10, 10, 10}};
+    const nebel_light lamp = {.position = {.5, 4, .25}, .intensity = {10, 10, 10}};
     const nebel_camera camera = camera_above();
     test_picture picture = test_picture_make(SIZE, SIZE);
     size_t dark = 0, lit = 0;
     (void)state;
     test_card_make(&card, 1);
     card.scene.has_sun = 0;
-    card.scene.lamp_count = 1;
-    card.scene.lamps = &lamp;
-    test_render(&card.scene, NULL, &(nebel_renderer_desc){0}, &camera, 1, &picture);
+    card.scene.light_count = 1;
+    card.scene.lights = &lamp;
+    test_render(&card.scene, NULL, &(nebel_cpu_renderer_desc){0}, &camera, 1, &picture);
     for (uint32_t y = 0; y < SIZE; y++)
         for (uint32_t x = 0; x < SIZE; x++) {
             const double middle[2] = {.5 * (at(x) + lamp.position[0]), .5 * (at(y) + lamp.position[2])};
@@ -222,7 +222,7 @@ static void a_line_is_cut_where_alpha_passes_the_cutoff(void **state)
 static nebel_result create(const test_card *card)
 {
     nebel_renderer *renderer = NULL;
-    const nebel_result result = nebel_create_renderer(&card->scene, NULL, &(nebel_renderer_desc){0}, &renderer);
+    const nebel_result result = nebel_create_cpu_renderer(&card->scene, NULL, &(nebel_cpu_renderer_desc){0}, &renderer);
     nebel_destroy_renderer(renderer);
     return result;
 }
@@ -264,7 +264,7 @@ static void odd_coordinates_are_survived(void **state)
             const nebel_camera camera = test_camera(0, 1, 8, 0, 2, 0);
             test_card_make(&card, 1);
             card.uvs[k] = odd[i];
-            test_render(&card.scene, fog, &(nebel_renderer_desc){0}, &camera, 1, &picture);
+            test_render(&card.scene, fog, &(nebel_cpu_renderer_desc){0}, &camera, 1, &picture);
             for (int p = 0; p < 3 * 8 * 8; p++) assert_true(isfinite(picture.planes.in_scattering[p]));
         }
     test_picture_free(&picture);

@@ -635,7 +635,7 @@ static void test_streams_take_png_from_where_they_stand(void **state)
     const int file = open(in_folder("log"), O_RDWR | O_CREAT | O_APPEND, 0600);
     assert_int_equal(write(file, "old", 3), 3);
     snprintf(name, sizeof name, "/dev/fd/%d", file);
-    assert_int_equal(nebel_find_image_format(name), NEBEL_IMAGE_PNG);
+    assert_int_equal(nebel_get_image_format(name), NEBEL_IMAGE_PNG);
     assert_int_equal(check_path(name, &kept), NEBEL_OK);
     assert_int_equal(write_image(name, &image, &kept), NEBEL_OK);
     assert_int_equal(pread(file, bytes, 11, 0), 11);
@@ -646,11 +646,11 @@ static void test_streams_take_png_from_where_they_stand(void **state)
     assert_int_equal(check_path(name, &kept), NEBEL_ERROR_FILE);
     assert_non_null(strstr(kept.last, "not open to writing"));
     close(closed);
-    assert_int_equal(nebel_find_image_format("/dev/null"), NEBEL_IMAGE_PNG);
+    assert_int_equal(nebel_get_image_format("/dev/null"), NEBEL_IMAGE_PNG);
     assert_int_equal(write_image("/dev/full", &image, &kept), NEBEL_ERROR_FILE);
-    assert_int_equal(nebel_find_image_format(in_folder("log")), NEBEL_IMAGE_NONE);
-    assert_int_equal(nebel_find_image_format(in_folder("none")), NEBEL_IMAGE_NONE);
-    assert_int_equal(nebel_find_image_format(in_folder("")), NEBEL_IMAGE_NONE);
+    assert_int_equal(nebel_get_image_format(in_folder("log")), NEBEL_IMAGE_NONE);
+    assert_int_equal(nebel_get_image_format(in_folder("none")), NEBEL_IMAGE_NONE);
+    assert_int_equal(nebel_get_image_format(in_folder("")), NEBEL_IMAGE_NONE);
     unlink(in_folder("log"));
     free(image.samples);
 }

@@ -26,8 +26,8 @@ static nebel_transfer light_along(const nebel_scene *scene, const nebel_ray *ray
 static const nebel_volume_desc *import(const char *text, size_t count, nebel_scene **scene)
 {
     *scene = parse_good(text);
-    assert_int_equal(nebel_scene_contents(*scene)->volume_count, count);
-    return nebel_scene_contents(*scene)->volumes;
+    assert_int_equal(nebel_get_scene_data(*scene)->volume_count, count);
+    return nebel_get_scene_data(*scene)->volumes;
 }
 
 /* ---- Unreal ---------------------------------------------------------------------------------- */
@@ -54,8 +54,8 @@ static void test_unreal_height_fog(void **state)
     assert_grey(fog[1].extinction, ln2 * ln2 * 0.001);
     assert_int_equal(fog[1].density.type, NEBEL_DENSITY_CONSTANT);
     assert_vector(fog[1].source, .1, .2, .3);
-    assert_string_equal(nebel_scene_contents(scene)->volume_names[0], "haze");
-    assert_string_equal(nebel_scene_contents(scene)->volume_names[1], "haze");
+    assert_string_equal(nebel_get_scene_data(scene)->volume_names[0], "haze");
+    assert_string_equal(nebel_get_scene_data(scene)->volume_names[1], "haze");
     nebel_destroy_scene(scene);
     fog = import(IMPORT("\"type\": \"unreal_height_fog\""), 1, &scene);
     assert_grey(fog->extinction, ln2 * ln2 * 0.002);
@@ -85,7 +85,7 @@ static void test_unreal_start_and_largest_opacity(void **state)
                       "\"FogInscatteringLuminance\": [1, 2, 3]"),
                1, &scene);
     assert_number(fog->start, 7);
-    assert_number(nebel_scene_contents(scene)->max_opacity, .8);
+    assert_number(nebel_get_scene_data(scene)->max_opacity, .8);
     const double places[][2] = {{2000, 170}, {2000, 900}, {9000, -300}, {60000, 4000}};
     for (int i = 0; i < 4; i++) {
         const double x = places[i][0] / 100, y = (places[i][1] - 150) / 100;
@@ -100,7 +100,7 @@ static void test_unreal_start_and_largest_opacity(void **state)
     (void)import("{\"nebel\": 1, \"fog\": [{\"import\": {\"type\": \"unreal_height_fog\", \"FogMaxOpacity\": 0.5}}], "
                  "\"max_opacity\": 0.25}",
                  1, &scene);
-    assert_number(nebel_scene_contents(scene)->max_opacity, .25);
+    assert_number(nebel_get_scene_data(scene)->max_opacity, .25);
     nebel_destroy_scene(scene);
 }
 
@@ -222,7 +222,7 @@ static void test_godot_edge_fade(void **state)
     const nebel_volume_desc *fog =
         import(IMPORT("\"type\": \"godot_fog_volume\", \"shape\": 0, \"size\": [4, 2, 6]"), 1, &scene);
     assert_int_equal(fog->density.type, NEBEL_DENSITY_SOFT_EDGE);
-    assert_number(fog->density.distance, .2 / 1.1); /* the engine's 0.1 */
+    assert_number(fog->density.edge_width, .2 / 1.1); /* the engine's 0.1 */
     nebel_destroy_scene(scene);
     fog = import(IMPORT("\"type\": \"godot_fog_volume\", \"shape\": 4"), 1, &scene);
     assert_int_equal(fog->density.type, NEBEL_DENSITY_CONSTANT);
@@ -264,7 +264,7 @@ static void test_hdrp_local_volumetric_fog(void **state)
     assert_grey(fog->extinction, .25);
     assert_grey(fog->albedo, 1);
     assert_int_equal(fog->density.type, NEBEL_DENSITY_SOFT_EDGE);
-    assert_number(fog->density.distance, 1);
+    assert_number(fog->density.edge_width, 1);
     nebel_destroy_scene(scene);
     fog = import(IMPORT(LOCAL "\"size\": [10, 20, 5], \"positiveFade\": [0, 0, 0], \"negativeFade\": [0, 0, 0]"), 1,
                  &scene);

@@ -88,7 +88,7 @@ static nebel_density random_density(const nebel_shape *shape)
     point(d.center, 8);
     if (d.type == NEBEL_DENSITY_ALTITUDE) d.center[1] -= d.radius;
     d.sigma = dice(1, 6);
-    d.distance = dice(.3, 4);
+    d.edge_width = dice(.3, 4);
     return d;
 }
 
@@ -251,13 +251,14 @@ static void test_segment_kernels_are_bit_equal_for_every_stride(void **state)
         fill_points(to, 5 * POINTS / 3);
         const nebel_segments segments = {
             .from = from, .from_stride = round % 2 ? 12 : 0, .to = to, .to_stride = round % 3 ? 12 : 20};
-        assert_int_equal(nebel_transmit_segments(fog, NEBEL_ISA_SCALAR, round % 3, POINTS, &segments, reference, 4),
-                         NEBEL_OK);
+        assert_int_equal(
+            nebel_compute_segment_transmittance(fog, NEBEL_ISA_SCALAR, round % 3, POINTS, &segments, reference, 4),
+            NEBEL_OK);
         for (int i = 0; i < POINTS; i++) assert_true(reference[i] >= 0 && reference[i] <= 1);
         for (nebel_isa isa = NEBEL_ISA_SSE2; isa < NEBEL_ISA_COUNT; isa++)
             for (size_t stride = 4; stride <= 8 && nebel_isa_available(isa); stride += 4) {
-                assert_int_equal(nebel_transmit_segments(fog, isa, round % 3, POINTS, &segments, out, stride),
-                                 NEBEL_OK);
+                assert_int_equal(
+                    nebel_compute_segment_transmittance(fog, isa, round % 3, POINTS, &segments, out, stride), NEBEL_OK);
                 for (size_t i = 0; i < POINTS; i++)
                     assert_memory_equal(&out[i * stride / 4], &reference[i], sizeof(float));
             }
@@ -279,11 +280,12 @@ static void test_a_segment_gives_the_same_bits_in_any_layout(void **state)
     for (int boxes = 1; boxes <= 6; boxes++) {
         nebel_snapshot *fog = boxes_of_fog(boxes);
         const nebel_segments slow = {.from = eye, .to = spread, .to_stride = 20}, fast = {.from = eye, .to = packed};
-        assert_int_equal(nebel_transmit_segments(fog, NEBEL_ISA_SCALAR, 1, MANY, &slow, expected_light, 8), NEBEL_OK);
+        assert_int_equal(nebel_compute_segment_transmittance(fog, NEBEL_ISA_SCALAR, 1, MANY, &slow, expected_light, 8),
+                         NEBEL_OK);
         for (nebel_isa isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++)
             for (size_t k = 0; k < sizeof counts / sizeof *counts && nebel_isa_available(isa); k++) {
                 for (size_t i = 0; i < MANY; i++) out[i] = -7;
-                assert_int_equal(nebel_transmit_segments(fog, isa, 1, counts[k], &fast, out, 0), NEBEL_OK);
+                assert_int_equal(nebel_compute_segment_transmittance(fog, isa, 1, counts[k], &fast, out, 0), NEBEL_OK);
                 for (size_t i = 0; i < MANY; i++)
                     assert_true(out[i] == (i < counts[k] ? expected_light[2 * i] : -7)); /* never a NaN */
             }
@@ -300,7 +302,8 @@ static void test_segment_kernel_agrees_with_the_reference(void **state)
     nebel_snapshot *fog = boxes_of_fog(5);
     for (int i = 0; i < 3 * POINTS; i++) to[i] = (float)dice(-15, 15);
     const nebel_segments segments = {.from = eye, .to = to};
-    assert_int_equal(nebel_transmit_segments(fog, NEBEL_ISA_DEFAULT, 1, POINTS, &segments, out, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_segment_transmittance(fog, NEBEL_ISA_DEFAULT, 1, POINTS, &segments, out, 0),
+                     NEBEL_OK);
     for (int i = 0; i < POINTS; i++) {
         nebel_ray ray = {.origin = {1.5, -2.25, 20}};
         double square = 0;

@@ -8,7 +8,7 @@
 #include <math.h>
 
 static nebel_snapshot *commit(const nebel_fog_desc *desc, const nebel_volume_desc *volumes, size_t n,
-                              const nebel_lamp *lamps, size_t lamp_count)
+                              const nebel_light *lamps, size_t lamp_count)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
@@ -29,7 +29,7 @@ static nebel_transfer ask(const nebel_snapshot *snapshot, const nebel_trace_desc
 
 /* ---- even fog -------------------------------------------------------------------------------- */
 
-static nebel_snapshot *make_airlight(double extinction, const nebel_lamp *lamp)
+static nebel_snapshot *make_airlight(double extinction, const nebel_light *lamp)
 {
     const nebel_volume_desc volume = {.extinction = {extinction, extinction, extinction}, .albedo = {1, 1, 1}};
     return commit(&(nebel_fog_desc){0}, &volume, 1, lamp, 1);
@@ -60,8 +60,8 @@ static void airlight_is_that_of_T17(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const double angle = cases[i].angle * 3.14159265358979323846 / 180;
-        const nebel_lamp lamp = {.position = {cases[i].distance * cos(angle), 0, cases[i].distance * sin(angle)},
-                                 .intensity = {100, 100, 100}};
+        const nebel_light lamp = {.position = {cases[i].distance * cos(angle), 0, cases[i].distance * sin(angle)},
+                                  .intensity = {100, 100, 100}};
         nebel_snapshot *snapshot = make_airlight(cases[i].extinction, &lamp);
         expect_light(snapshot, (nebel_ray){{0, 0, 0}, {1, 0, 0}, cases[i].length}, cases[i].light);
         nebel_release_snapshot(snapshot);
@@ -70,12 +70,12 @@ static void airlight_is_that_of_T17(void **state)
 
 static void spots_are_those_of_T19(void **state)
 {
-    nebel_lamp lamp = {.type = NEBEL_LAMP_SPOT,
-                       .position = {10, 5, 0},
-                       .intensity = {100, 100, 100},
-                       .direction = {0, -2, 0},
-                       .inner_angle = 30,
-                       .outer_angle = 30};
+    nebel_light lamp = {.type = NEBEL_LIGHT_SPOT,
+                        .position = {10, 5, 0},
+                        .intensity = {100, 100, 100},
+                        .direction = {0, -2, 0},
+                        .inner_angle = 30,
+                        .outer_angle = 30};
     const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, HUGE_VAL};
     (void)state;
     nebel_snapshot *snapshot = make_airlight(0.02, &lamp);
@@ -87,7 +87,7 @@ static void spots_are_those_of_T19(void **state)
     const nebel_trace_desc fine = {.tolerance = 1e-9};
     const nebel_transfer spot = ask(snapshot, &fine, ray);
     nebel_release_snapshot(snapshot);
-    lamp.type = NEBEL_LAMP_POINT;
+    lamp.type = NEBEL_LIGHT_POINT;
     snapshot = make_airlight(0.02, &lamp);
     const nebel_transfer point = ask(snapshot, &fine, ray);
     assert_true(fog_difference(&spot, &point) < 2e-9);
@@ -102,9 +102,9 @@ static double square_to(const double a[3], const double b[3])
 }
 
 /* Smooth from the inner angle to the outer one, by cosines. */
-static double cone_of(const nebel_lamp *lamp, const double towards[3])
+static double cone_of(const nebel_light *lamp, const double towards[3])
 {
-    if (lamp->type != NEBEL_LAMP_SPOT) return 1;
+    if (lamp->type != NEBEL_LIGHT_SPOT) return 1;
     const double degree = 3.14159265358979323846 / 180;
     const double inner = cos(lamp->inner_angle * degree), outer = cos(lamp->outer_angle * degree);
     double dot = 0, square = 0;
@@ -117,7 +117,7 @@ static double cone_of(const nebel_lamp *lamp, const double towards[3])
 }
 
 /* What balls of fog give there per metre towards -view, in red. */
-static double glow_at(const nebel_volume_desc *balls, size_t count, const nebel_lamp *lamp, const double view[3],
+static double glow_at(const nebel_volume_desc *balls, size_t count, const nebel_light *lamp, const double view[3],
                       const double place[3], double *reach, double towards[3])
 {
     const double square = square_to(place, lamp->position), distance = sqrt(square), r2 = lamp->radius * lamp->radius;
@@ -131,14 +131,14 @@ static double glow_at(const nebel_volume_desc *balls, size_t count, const nebel_
     const double irradiance = lamp->intensity[0] / (3.14159265358979323846 * r2) * seen * cone_of(lamp, towards);
     for (size_t k = 0; k < count; k++)
         if (square_to(place, balls[k].shape.center) < balls[k].shape.radius * balls[k].shape.radius)
-            glow += balls[k].extinction[0] * balls[k].albedo[0] * nebel_phase_value(&balls[k].phase, cosine);
+            glow += balls[k].extinction[0] * balls[k].albedo[0] * nebel_evaluate_phase(&balls[k].phase, cosine);
     return glow * irradiance;
 }
 
 enum { STEPS = 40000 };
 
 static double brute_force(const nebel_snapshot *snapshot, const nebel_volume_desc *balls, size_t count,
-                          const nebel_lamp *lamp, const nebel_ray *ray)
+                          const nebel_light *lamp, const nebel_ray *ray)
 {
     static nebel_ray rays[2 * STEPS];
     static nebel_transfer transfers[2 * STEPS];
@@ -173,16 +173,16 @@ static void light_is_that_of_brute_force(void **state)
                                         .extinction = {1, 1, 1},
                                         .albedo = {0.4, 0.4, 0.4},
                                         .phase = {.type = NEBEL_PHASE_RAYLEIGH}}};
-    const nebel_lamp lamps[] = {{.position = {0, 3, 1}, .intensity = {10, 10, 10}, .radius = 0.1},
-                                {.position = {1.2, 0.2, 0.1}, .intensity = {1, 1, 1}, .radius = 0.25},
-                                {.position = {-0.5, 0.1, 0.5}, .intensity = {3, 3, 3}, .radius = 0.01},
-                                {.type = NEBEL_LAMP_SPOT,
-                                 .position = {0, 2.5, 0},
-                                 .intensity = {9, 9, 9},
-                                 .radius = 0.05,
-                                 .direction = {0.1, -1, 0.05},
-                                 .inner_angle = 5,
-                                 .outer_angle = 20}};
+    const nebel_light lamps[] = {{.position = {0, 3, 1}, .intensity = {10, 10, 10}, .radius = 0.1},
+                                 {.position = {1.2, 0.2, 0.1}, .intensity = {1, 1, 1}, .radius = 0.25},
+                                 {.position = {-0.5, 0.1, 0.5}, .intensity = {3, 3, 3}, .radius = 0.01},
+                                 {.type = NEBEL_LIGHT_SPOT,
+                                  .position = {0, 2.5, 0},
+                                  .intensity = {9, 9, 9},
+                                  .radius = 0.05,
+                                  .direction = {0.1, -1, 0.05},
+                                  .inner_angle = 5,
+                                  .outer_angle = 20}};
     enum { RAY_KINDS = 3 };
     const nebel_ray rays[RAY_KINDS] = {
         {{-4, 0.1, 0.2}, {1, 0, 0}, 9}, {{-4, 0.2, 0.1}, {1, 0, 0}, 9}, {{0, 0, 0}, {0, 0.6, 0.8}, 1}};
@@ -216,7 +216,7 @@ enum { RAYS = 16, LAMPS = 3 };
 
 static random_fog fog;
 static nebel_fog_desc sky;
-static nebel_lamp lamps[LAMPS];
+static nebel_light lamps[LAMPS];
 
 /* Random fog under a sun and lamps within and beside it. */
 static void make_lit(random_fog_kind kind, uint64_t seed)
@@ -225,12 +225,12 @@ static void make_lit(random_fog_kind kind, uint64_t seed)
     random_fog_make(&fog, kind, seed);
     random_fog_light(&fog, &numbers);
     for (int i = 0; i < LAMPS; i++) {
-        nebel_lamp *lamp = &lamps[i];
-        *lamp = (nebel_lamp){.type = i == 1 ? NEBEL_LAMP_SPOT : NEBEL_LAMP_POINT,
-                             .direction = {dice(&numbers, -1, 1), -1, dice(&numbers, -1, 1)},
-                             .inner_angle = 10,
-                             .outer_angle = dice(&numbers, 15, 100),
-                             .radius = i == 2 ? dice(&numbers, 0.01, 0.5) : 0};
+        nebel_light *lamp = &lamps[i];
+        *lamp = (nebel_light){.type = i == 1 ? NEBEL_LIGHT_SPOT : NEBEL_LIGHT_POINT,
+                              .direction = {dice(&numbers, -1, 1), -1, dice(&numbers, -1, 1)},
+                              .inner_angle = 10,
+                              .outer_angle = dice(&numbers, 15, 100),
+                              .radius = i == 2 ? dice(&numbers, 0.01, 0.5) : 0};
         for (int c = 0; c < 3; c++) {
             lamp->position[c] = dice(&numbers, -4, 4);
             lamp->intensity[c] = dice(&numbers, 0, 20);
@@ -312,22 +312,22 @@ static void light_is_the_same_in_any_set_and_split(void **state)
             for (uint32_t k = 0; k < count; k++) toggles[first[i] + k] = (float)(t += dice(&numbers, 0, 4));
             first[i + 1] = first[i] + count;
         }
-        const nebel_lit_pieces none = {(const uint32_t[RAYS + 1]){0}, NULL}, some = {first, toggles};
-        const nebel_lit_pieces pieces[LAMPS] = {some, none, some};
+        const nebel_ray_visibility none = {(const uint32_t[RAYS + 1]){0}, NULL}, some = {first, toggles};
+        const nebel_ray_visibility pieces[LAMPS] = {some, none, some};
         nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
         trace(snapshot, &desc, rays, all);
-        desc.lamplit = pieces;
+        desc.light_visibility = pieces;
         trace(snapshot, &desc, rays, expected);
         for (int i = 0; i < RAYS; i++)
             assert_memory_equal(all[i].transmittance, expected[i].transmittance, sizeof all[i].transmittance);
         for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
             if (!nebel_isa_available(desc.isa)) continue;
-            desc.lamplit = pieces;
+            desc.light_visibility = pieces;
             trace(snapshot, &desc, rays, other);
             assert_memory_equal(expected, other, sizeof expected);
             for (size_t i = 0; i < nb_test_count(RAYS); i++) {
-                const nebel_lit_pieces one[LAMPS] = {{first + i, toggles}, none, {first + i, toggles}};
-                desc.lamplit = one;
+                const nebel_ray_visibility one[LAMPS] = {{first + i, toggles}, none, {first + i, toggles}};
+                desc.light_visibility = one;
                 assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
             }
             assert_memory_equal(expected, other, sizeof expected);
@@ -341,14 +341,15 @@ static void pieces_add_up(void **state)
 {
     static const float odd[] = {2, 5, 9.5f, 10.25f, 31}, even[] = {0, 2, 5, 9.5f, 10.25f, 31};
     static const uint32_t odd_first[] = {0, 5}, even_first[] = {0, 6};
-    const nebel_lit_pieces pieces[] = {{odd_first, odd}, {even_first, even}};
-    const nebel_lamp lamp = {.position = {10, 1, 2}, .intensity = {100, 50, 20}};
+    const nebel_ray_visibility pieces[] = {{odd_first, odd}, {even_first, even}};
+    const nebel_light lamp = {.position = {10, 1, 2}, .intensity = {100, 50, 20}};
     const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 60};
     nebel_snapshot *snapshot = make_airlight(0.03, &lamp);
     (void)state;
     nebel_transfer transfer[3];
     for (int i = 0; i < 3; i++)
-        transfer[i] = ask(snapshot, &(nebel_trace_desc){.tolerance = 1e-8, .lamplit = i < 2 ? &pieces[i] : NULL}, ray);
+        transfer[i] =
+            ask(snapshot, &(nebel_trace_desc){.tolerance = 1e-8, .light_visibility = i < 2 ? &pieces[i] : NULL}, ray);
     for (int c = 0; c < 3; c++) {
         const double both = transfer[0].in_scattering[c] + transfer[1].in_scattering[c];
         assert_true(transfer[1].in_scattering[c] > 0.05 * transfer[2].in_scattering[c]);
@@ -363,7 +364,7 @@ static void pieces_add_up(void **state)
 static void hard_rays_are_answered(void **state)
 {
     const double far = 1e7;
-    const nebel_lamp lamp = {.position = {far, 5, 0}, .intensity = {100, 100, 100}};
+    const nebel_light lamp = {.position = {far, 5, 0}, .intensity = {100, 100, 100}};
     const nebel_ray rays[] = {{{far - 10, 5, 0}, {1, 0, 0}, HUGE_VAL},
                               {{far, 5, 0}, {1, 0, 0}, HUGE_VAL},
                               {{far, 5, 0}, {1, 0, 0}, 0},
@@ -381,7 +382,7 @@ static void hard_rays_are_answered(void **state)
             assert_true(transfer.error >= 0 && transfer.error < 0.01);
         }
     const nebel_transfer away = ask(snapshot, NULL, rays[6]);
-    near = make_airlight(0.02, &(nebel_lamp){.position = {0, 5, 0}, .intensity = {100, 100, 100}});
+    near = make_airlight(0.02, &(nebel_light){.position = {0, 5, 0}, .intensity = {100, 100, 100}});
     const nebel_transfer here = ask(near, NULL, (nebel_ray){{-20, 5, 0}, {0, 1, 0}, HUGE_VAL});
     assert_true(fog_difference(&away, &here) < 1e-9);
     nebel_release_snapshot(snapshot);
@@ -391,10 +392,10 @@ static void hard_rays_are_answered(void **state)
 static void lamps_are_checked(void **state)
 {
     const double nan = (double)NAN;
-    const nebel_lamp right = {.type = NEBEL_LAMP_SPOT, .direction = {0, -1, 0}, .outer_angle = 40};
-    nebel_lamp wrong[12];
+    const nebel_light right = {.type = NEBEL_LIGHT_SPOT, .direction = {0, -1, 0}, .outer_angle = 40};
+    nebel_light wrong[12];
     for (int i = 0; i < 12; i++) wrong[i] = right;
-    wrong[0].type = (nebel_lamp_type)7;
+    wrong[0].type = (nebel_light_type)7;
     wrong[1].position[1] = nan;
     wrong[2].position[2] = 1e16;
     wrong[3].intensity[0] = -1;
@@ -412,7 +413,7 @@ static void lamps_are_checked(void **state)
     const nebel_fog_desc desc = {.log = fog_messages_log(&messages)};
     assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
     for (int i = 0; i < 12; i++) {
-        const nebel_lamp both[] = {right, wrong[i]};
+        const nebel_light both[] = {right, wrong[i]};
         assert_int_equal(nebel_set_lamps(made, 2, both), NEBEL_ERROR_VALUE);
         assert_non_null(strstr(messages.text, "lamp 1: "));
     }
@@ -426,9 +427,9 @@ static void lamps_are_checked(void **state)
 static void lost_memory_is_survived(void **state)
 {
     const nebel_volume_desc volume = {.extinction = {0.1, 0.1, 0.1}, .albedo = {1, 1, 1}};
-    const nebel_lamp lamp = {.position = {1, 2, 3}, .intensity = {1, 1, 1}};
+    const nebel_light lamp = {.position = {1, 2, 3}, .intensity = {1, 1, 1}};
     static const uint32_t first[] = {0, 0};
-    const nebel_lit_pieces pieces = {first, NULL};
+    const nebel_ray_visibility pieces = {first, NULL};
     const nebel_ray ray = {{0, 0.2, -1}, {0, 0, 1}, HUGE_VAL};
     fog_memory memory = {0};
     const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory)};
@@ -449,7 +450,7 @@ static void lost_memory_is_survived(void **state)
     assert_int_equal(result, NEBEL_OK);
     memory.fail_first = memory.fail_count = 1;
     nebel_transfer transfer;
-    const nebel_trace_desc asked = {.lamplit = &pieces};
+    const nebel_trace_desc asked = {.light_visibility = &pieces};
     assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &transfer, 0), NEBEL_ERROR_MEMORY);
     assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &transfer, 0), NEBEL_OK);
     nebel_destroy_fog(made);
@@ -464,8 +465,8 @@ static void a_snapshot_tells_of_its_lamps(void **state)
                                           .extinction = {1, 1, 1},
                                           .albedo = {0, 1, 0}},
                                          {.extinction = {1, 1, 1}, .source = {1, 1, 1}}};
-    const nebel_lamp given[] = {{.position = {7, 8, 9}, .intensity = {1, 1, 1}, .radius = 0.5},
-                                {.position = {-1, 0, 1}, .intensity = {1, 1, 1}}};
+    const nebel_light given[] = {{.position = {7, 8, 9}, .intensity = {1, 1, 1}, .radius = 0.5},
+                                 {.position = {-1, 0, 1}, .intensity = {1, 1, 1}}};
     double min[3], max[3], position[3], radius;
     (void)state;
     nebel_snapshot *snapshot = commit(&(nebel_fog_desc){0}, volumes, 2, given, 2);

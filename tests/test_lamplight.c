@@ -18,10 +18,10 @@ static nebel_mesh make_square(const float *positions)
 }
 
 /* Straight down on the floor, 1 m to 8 pixels. */
-static void render(const nebel_lamp *lamp, int has_lid, double extinction, test_picture *picture)
+static void render(const nebel_light *lamp, int has_lid, double extinction, test_picture *picture)
 {
     const nebel_mesh meshes[] = {make_square(floor_positions), make_square(lid_positions)};
-    const nebel_scene_data scene = {.mesh_count = has_lid ? 2 : 1, .meshes = meshes, .lamp_count = 1, .lamps = lamp};
+    const nebel_scene_data scene = {.mesh_count = has_lid ? 2 : 1, .meshes = meshes, .light_count = 1, .lights = lamp};
     nebel_camera camera = test_camera(0, 1, 0, 0, 0, 0);
     camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     camera.up[1] = 0;
@@ -29,7 +29,7 @@ static void render(const nebel_lamp *lamp, int has_lid, double extinction, test_
     camera.view_height = SIZE / 8.0;
     nebel_snapshot *fog = test_world_fog(extinction, 0);
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     const nebel_frame_desc desc = {.camera = camera, .width = SIZE, .height = SIZE, .samples = 1};
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture->planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
@@ -45,7 +45,7 @@ static double at(uint32_t pixel)
 /* Light is that at the start of shadow rays, 1.4e-4 m above so large a floor. */
 static void a_floor_is_lit(void **state)
 {
-    const nebel_lamp lamp = {.position = {0.5, 3, 0.25}, .intensity = {10, 20, 5}};
+    const nebel_light lamp = {.position = {0.5, 3, 0.25}, .intensity = {10, 20, 5}};
     test_picture picture = test_picture_make(SIZE, SIZE);
     (void)state;
     for (int foggy = 0; foggy < 2; foggy++) {
@@ -68,12 +68,12 @@ static void a_floor_is_lit(void **state)
 /* The lid, 2 m wide at 2 m, shades 6 m of the floor about the middle; no lamp shines beyond its cone. */
 static void shadows_and_cones_have_edges(void **state)
 {
-    nebel_lamp lamp = {.position = {0, 3, 0}, .intensity = {10, 10, 10}};
+    nebel_light lamp = {.position = {0, 3, 0}, .intensity = {10, 10, 10}};
     test_picture picture = test_picture_make(SIZE, SIZE);
     (void)state;
     render(&lamp, 1, 0, &picture);
     for (uint32_t x = 0; x < SIZE; x++) assert_true(test_color(&picture, x, SIZE / 2)[0] == 0);
-    lamp.type = NEBEL_LAMP_SPOT;
+    lamp.type = NEBEL_LIGHT_SPOT;
     lamp.direction[1] = -3;
     lamp.inner_angle = lamp.outer_angle = 22.5; /* of 3 m: 1.2426 m */
     render(&lamp, 0, 0, &picture);
@@ -87,9 +87,9 @@ static void shadows_and_cones_have_edges(void **state)
 /* A lamp on the floor, below it, in a surface's own place, and one that is none. */
 static void odd_lamps_are_answered(void **state)
 {
-    const nebel_lamp lamps[] = {{.position = {0, 0, 0}, .intensity = {10, 10, 10}},
-                                {.position = {0, -1, 0}, .intensity = {10, 10, 10}},
-                                {.position = {0, 0.5, 0}, .intensity = {10, 10, 10}, .radius = 1}};
+    const nebel_light lamps[] = {{.position = {0, 0, 0}, .intensity = {10, 10, 10}},
+                                 {.position = {0, -1, 0}, .intensity = {10, 10, 10}},
+                                 {.position = {0, 0.5, 0}, .intensity = {10, 10, 10}, .radius = 1}};
     test_picture picture = test_picture_make(SIZE, SIZE);
     (void)state;
     for (size_t i = 0; i < sizeof lamps / sizeof lamps[0]; i++) {
@@ -100,10 +100,10 @@ static void odd_lamps_are_answered(void **state)
             if (i == 1) assert_true(light == 0);
         }
     }
-    const nebel_lamp wrong = {.position = {(double)NAN, 0, 0}, .intensity = {1, 1, 1}};
-    const nebel_scene_data scene = {.lamp_count = 1, .lamps = &wrong};
+    const nebel_light wrong = {.position = {(double)NAN, 0, 0}, .intensity = {1, 1, 1}};
+    const nebel_scene_data scene = {.light_count = 1, .lights = &wrong};
     nebel_renderer *renderer = NULL;
-    nebel_result result = nebel_create_renderer(&scene, NULL, &(nebel_renderer_desc){0}, &renderer);
+    nebel_result result = nebel_create_cpu_renderer(&scene, NULL, &(nebel_cpu_renderer_desc){0}, &renderer);
     const nebel_frame_desc desc = {.camera = test_camera(0, 1, 0, 0, 0, 0), .width = SIZE, .height = SIZE};
     if (result == NEBEL_OK) result = nebel_render_frame(renderer, &desc, &picture.planes);
     assert_int_equal(result, NEBEL_ERROR_VALUE);
@@ -113,7 +113,7 @@ static void odd_lamps_are_answered(void **state)
 
 static const float wall_positions[] = {-50, -50, -3, 50, -50, -3, 50, 50, -3, -50, 50, -3};
 
-static nebel_snapshot *lit_fog(const nebel_volume_desc *volume, const nebel_lamp *lamp)
+static nebel_snapshot *lit_fog(const nebel_volume_desc *volume, const nebel_light *lamp)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
@@ -126,18 +126,19 @@ static nebel_snapshot *lit_fog(const nebel_volume_desc *volume, const nebel_lamp
 }
 
 /* Level at a wall 3 m behind the lamp, through fog about it; the floor is seen from its edge. */
-static void render_wall(const nebel_lamp *lamp, int has_floor, nebel_method method, test_picture *picture)
+static void render_wall(const nebel_light *lamp, int has_floor, nebel_method method, test_picture *picture)
 {
     static const uint32_t upright[] = {0, 1, 2, 0, 2, 3};
     nebel_mesh meshes[] = {make_square(wall_positions), make_square(floor_positions)};
     meshes[0].indices = upright;
-    const nebel_scene_data scene = {.mesh_count = has_floor ? 2 : 1, .meshes = meshes, .lamp_count = 1, .lamps = lamp};
+    const nebel_scene_data scene = {
+        .mesh_count = has_floor ? 2 : 1, .meshes = meshes, .light_count = 1, .lights = lamp};
     const nebel_volume_desc box = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-4, -4, -2.9}, .max = {4, 4, 3}},
                                    .extinction = {.1, .1, .1},
                                    .albedo = {1, 1, 1}};
     nebel_snapshot *fog = lit_fog(&box, lamp);
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, method, NULL), NEBEL_OK);
     nebel_frame_desc desc = {.camera = test_camera(0, 2, 10, 0, 2, 0), .width = SIZE, .height = SIZE};
     desc.samples = desc.bounces = 1;
@@ -152,14 +153,14 @@ static void render_wall(const nebel_lamp *lamp, int has_floor, nebel_method meth
  * the last one's light that leaves the floor farther from it than that: below 5.8 degrees. */
 static void floors_do_not_hide_lamps_in_them(void **state)
 {
-    const nebel_lamp lamps[] = {{.position = {0, 0, 0}, .intensity = {10, 10, 10}},
-                                {.position = {0.3, 0, 0.2}, .intensity = {10, 10, 10}},
-                                {.position = {0.3, -1e-4, 0.2}, .intensity = {10, 10, 10}}};
-    const nebel_method methods[] = {NEBEL_METHOD_EXACT, NEBEL_METHOD_REFERENCE};
+    const nebel_light lamps[] = {{.position = {0, 0, 0}, .intensity = {10, 10, 10}},
+                                 {.position = {0.3, 0, 0.2}, .intensity = {10, 10, 10}},
+                                 {.position = {0.3, -1e-4, 0.2}, .intensity = {10, 10, 10}}};
+    const nebel_method methods[] = {NEBEL_METHOD_EXACT, NEBEL_METHOD_PATH};
     test_picture with = test_picture_make(SIZE, SIZE), without = test_picture_make(SIZE, SIZE);
     (void)state;
     for (size_t i = 0; i < 2 * sizeof lamps / sizeof lamps[0]; i++) {
-        const nebel_lamp *lamp = &lamps[i / 2];
+        const nebel_light *lamp = &lamps[i / 2];
         const uint32_t rows = lamp->position[1] < 0 ? SIZE * 3 / 4 : SIZE; /* from 1.02 m or 0.11 m up */
         uint32_t lit = 0;
         render_wall(lamp, 1, methods[i % 2], &with);

@@ -18,17 +18,18 @@ enum { ROWS = 16, COLUMNS = 32 };
 
 static float clouds[ROWS][COLUMNS], detail[ROWS][COLUMNS], ground[ROWS][COLUMNS][3];
 
-static nebel_layers *create(const nebel_layers_desc *desc)
+static nebel_textured_planet *create(const nebel_textured_planet_desc *desc)
 {
-    nebel_layers *layers = NULL;
-    assert_int_equal(nebel_create_layers(desc, &layers), NEBEL_OK);
+    nebel_textured_planet *layers = NULL;
+    assert_int_equal(nebel_create_textured_planet(desc, &layers), NEBEL_OK);
     return layers;
 }
 
-static nebel_layer_hits look(const nebel_layers *layers, const nebel_layer_view *view, const nebel_ray *ray)
+static nebel_shell_hits look(const nebel_textured_planet *layers, const nebel_textured_planet_query *view,
+                             const nebel_ray *ray)
 {
-    nebel_layer_hits hits;
-    assert_int_equal(nebel_trace_layers(layers, view, 1, ray, 0, &hits, 0), NEBEL_OK);
+    nebel_shell_hits hits;
+    assert_int_equal(nebel_trace_textured_planet(layers, view, 1, ray, 0, &hits, 0), NEBEL_OK);
     return hits;
 }
 
@@ -72,17 +73,18 @@ static double filter(const float *texels, int stride, double u, double v, int re
 static const double wraps[3] = {2, 3, -5}, gain = .4, brightness = .7;
 static const double ramp[4][3] = {{.1, 0, .3}, {.2, .9, .4}, {.5, .6, 1}, {0, .1, .2}};
 
-static nebel_layers *create_known(void)
+static nebel_textured_planet *create_known(void)
 {
-    nebel_layers_desc desc = {.radius = 2, .cloud_count = 1, .ground = {COLUMNS, ROWS, 3, ground[0][0]}};
-    desc.clouds[0] = (nebel_cloud_shell){.height = .5,
-                                         .gain = gain,
-                                         .color = {.9, .8, .7},
-                                         .map = {COLUMNS, ROWS, 1, clouds[0]},
-                                         .detail = {COLUMNS, ROWS, 1, detail[0]}};
-    memcpy(desc.clouds[0].wrap, wraps, sizeof wraps);
-    desc.air = (nebel_air_shell){.height = 1, .brightness = brightness, .ramp_count = 4};
-    memcpy(desc.air.ramp, ramp, sizeof ramp);
+    nebel_textured_planet_desc desc = {
+        .radius = 2, .cloud_shell_count = 1, .color_map = {COLUMNS, ROWS, 3, ground[0][0]}};
+    desc.cloud_shells[0] = (nebel_cloud_shell){.height = .5,
+                                               .gain = gain,
+                                               .color = {.9, .8, .7},
+                                               .coverage_map = {COLUMNS, ROWS, 1, clouds[0]},
+                                               .detail_map = {COLUMNS, ROWS, 1, detail[0]}};
+    memcpy(desc.cloud_shells[0].uv_tiling, wraps, sizeof wraps);
+    desc.atmosphere = (nebel_atmosphere_shell){.height = 1, .brightness = brightness, .ramp_count = 4};
+    memcpy(desc.atmosphere.ramp, ramp, sizeof ramp);
     return create(&desc);
 }
 
@@ -118,14 +120,14 @@ static int find_place(const nebel_ray *ray, const double sun[3], double radius, 
     return 1;
 }
 
-static void expect_hit(const nebel_layer_hit *hit, double t, const double radiance[3], double cover)
+static void expect_hit(const nebel_shell_hit *hit, double t, const double radiance[3], double cover)
 {
     assert_true(fabs(hit->t - t) < 1e-9);
-    assert_true(fabs(hit->cover - cover) < 1e-6);
+    assert_true(fabs(hit->opacity - cover) < 1e-6);
     for (int c = 0; c < 3; c++) assert_true(fabs(hit->radiance[c] - radiance[c]) < 1e-6);
 }
 
-static void expect_clouds(const nebel_layer_view *view, const place *p, const nebel_layer_hit *hit)
+static void expect_clouds(const nebel_textured_planet_query *view, const place *p, const nebel_shell_hit *hit)
 {
     static const double color[3] = {.9, .8, .7};
     double sum = 0, radiance[3];
@@ -137,7 +139,7 @@ static void expect_clouds(const nebel_layer_view *view, const place *p, const ne
     expect_hit(hit, p->t, radiance, cover);
 }
 
-static void expect_ground(const nebel_layer_view *view, const place *p, const nebel_layer_hit *hit)
+static void expect_ground(const nebel_textured_planet_query *view, const place *p, const nebel_shell_hit *hit)
 {
     double radiance[3];
     for (int c = 0; c < 3; c++)
@@ -146,7 +148,7 @@ static void expect_ground(const nebel_layer_view *view, const place *p, const ne
     expect_hit(hit, p->t, radiance, 1);
 }
 
-static void expect_air(const place *p, const nebel_layer_hit *hit)
+static void expect_air(const place *p, const nebel_shell_hit *hit)
 {
     const double s = 3 * p->sun + 3, v = fmin(.9, fabs(p->view)), u = 1 - .5 * v;
     double radiance[3];
@@ -193,15 +195,15 @@ static void layers_are_those_of_the_formulas(void **state)
     (void)state;
     uint64_t numbers = 5;
     int grounds = 0;
-    nebel_layer_view view = {.sun = {{.48, .6, .64}, {3, 2, 1}}, .ambient = {.1, .2, .3}};
+    nebel_textured_planet_query view = {.sun = {{.48, .6, .64}, {3, 2, 1}}, .ambient = {.1, .2, .3}};
     roll_maps(&numbers);
-    nebel_layers *layers = create_known();
+    nebel_textured_planet *layers = create_known();
     for (int i = 0; i < 3000; i++) {
         double target[3];
         place p;
         choose_target(i, &numbers, target);
         const nebel_ray ray = ray_to(target, &numbers);
-        const nebel_layer_hits hits = look(layers, &view, &ray);
+        const nebel_shell_hits hits = look(layers, &view, &ray);
         uint32_t count = 0;
         if (find_place(&ray, view.sun.direction, 3, &p)) expect_air(&p, &hits.hits[count++]);
         if (find_place(&ray, view.sun.direction, 2.5, &p)) expect_clouds(&view, &p, &hits.hits[count++]);
@@ -212,17 +214,17 @@ static void layers_are_those_of_the_formulas(void **state)
         assert_int_equal(hits.count, count);
     }
     assert_true(grounds > 500);
-    nebel_destroy_layers(layers);
+    nebel_destroy_textured_planet(layers);
 }
 
 /* From within the clouds their inner side is seen, and behind the end of the ray nothing. */
 static void rays_end_and_begin_within(void **state)
 {
     (void)state;
-    nebel_layers *layers = create_known();
-    const nebel_layer_view view = {.sun = {{0, 1, 0}, {1, 1, 1}}};
+    nebel_textured_planet *layers = create_known();
+    const nebel_textured_planet_query view = {.sun = {{0, 1, 0}, {1, 1, 1}}};
     nebel_ray ray = {{0, 2.25, 0}, {0, 1, 0}, HUGE_VAL};
-    nebel_layer_hits hits = look(layers, &view, &ray);
+    nebel_shell_hits hits = look(layers, &view, &ray);
     assert_int_equal(hits.count, 2);
     assert_true(fabs(hits.hits[0].t - .25) < 1e-12 && fabs(hits.hits[1].t - .75) < 1e-12);
     ray.t_max = .5;
@@ -230,10 +232,10 @@ static void rays_end_and_begin_within(void **state)
     ray = (nebel_ray){{0, 2.25, 0}, {0, -1, 0}, HUGE_VAL};
     hits = look(layers, &view, &ray);
     assert_int_equal(hits.count, 1);
-    assert_true(hits.hits[0].cover == 1);
+    assert_true(hits.hits[0].opacity == 1);
     ray = (nebel_ray){{0, 9, 0}, {0, 1, 0}, HUGE_VAL};
     assert_int_equal(look(layers, &view, &ray).count, 0);
-    nebel_destroy_layers(layers);
+    nebel_destroy_textured_planet(layers);
 }
 
 /* From on the ground, to rounding, there is the ground below and no ground above. */
@@ -241,8 +243,8 @@ static void the_ground_is_below_who_stands_on_it(void **state)
 {
     (void)state;
     uint64_t numbers = 11;
-    nebel_layers *layers = create_known();
-    const nebel_layer_view view = {.sun = {{0, 1, 0}, {1, 1, 1}}};
+    nebel_textured_planet *layers = create_known();
+    const nebel_textured_planet_query view = {.sun = {{0, 1, 0}, {1, 1, 1}}};
     for (int i = 0; i < 1000; i++) {
         double up[3] = {dice(&numbers, -1, 1), dice(&numbers, -1, 1), dice(&numbers, -1, 1)};
         nebel_ray ray = {.t_max = HUGE_VAL};
@@ -253,46 +255,48 @@ static void the_ground_is_below_who_stands_on_it(void **state)
         }
         const double rise = nb_vector_dot(up, ray.direction);
         if (fabs(rise) < 1e-6) continue;
-        const nebel_layer_hits hits = look(layers, &view, &ray);
+        const nebel_shell_hits hits = look(layers, &view, &ray);
         assert_int_equal(hits.count, rise > 0 ? 2 : 1);
         assert_int_equal(hits.hits[0].is_ground, rise < 0);
         assert_true(rise > 0 || hits.hits[0].t < 1e-12);
     }
-    nebel_destroy_layers(layers);
+    nebel_destroy_textured_planet(layers);
 }
 
 /* After a quarter of a day what was to the west is here: an eastward turn. The clouds turn with the ground and on. */
 static void balls_turn_to_the_east(void **state)
 {
     (void)state;
-    nebel_layers_desc desc = {.radius = 2, .day = 400, .cloud_count = 1, .ground = {COLUMNS, ROWS, 3, ground[0][0]}};
-    desc.clouds[0] = (nebel_cloud_shell){.height = .5, .day = -400, .map = {COLUMNS, ROWS, 1, clouds[0]}};
-    desc.air.is_absent = 1;
-    nebel_layers *layers = create(&desc);
-    nebel_layer_view view = {.ambient = {1, 1, 1}};
+    nebel_textured_planet_desc desc = {
+        .radius = 2, .rotation_period = 400, .cloud_shell_count = 1, .color_map = {COLUMNS, ROWS, 3, ground[0][0]}};
+    desc.cloud_shells[0] =
+        (nebel_cloud_shell){.height = .5, .rotation_period = -400, .coverage_map = {COLUMNS, ROWS, 1, clouds[0]}};
+    desc.atmosphere.is_disabled = 1;
+    nebel_textured_planet *layers = create(&desc);
+    nebel_textured_planet_query view = {.ambient = {1, 1, 1}};
     const nebel_ray here = {{9, 1, 0}, {-9, -.5, 0}, HUGE_VAL}, west = {{0, 1, 9}, {0, -.5, -9}, HUGE_VAL};
-    const nebel_layer_hits before = look(layers, &view, &west), same = look(layers, &view, &here);
+    const nebel_shell_hits before = look(layers, &view, &west), same = look(layers, &view, &here);
     view.time = 100;
-    const nebel_layer_hits after = look(layers, &view, &here);
+    const nebel_shell_hits after = look(layers, &view, &here);
     for (int c = 0; c < 3; c++) {
         assert_true(fabs(after.hits[1].radiance[c] - before.hits[1].radiance[c]) < 1e-6);
         assert_true(fabs(after.hits[1].radiance[c] - same.hits[1].radiance[c]) > 1e-3);
         assert_true(fabs(after.hits[0].radiance[c] - same.hits[0].radiance[c]) < 1e-6);
     }
-    nebel_destroy_layers(layers);
+    nebel_destroy_textured_planet(layers);
 }
 
 /* From very far away a map is its mean. */
 static void maps_are_averaged(void **state)
 {
     (void)state;
-    nebel_layers *layers = create_known();
+    nebel_textured_planet *layers = create_known();
     double mean = 0;
     for (int i = 0; i < ROWS * COLUMNS; i++) mean += (double)ground[i / COLUMNS][i % COLUMNS][1] / (ROWS * COLUMNS);
-    const nebel_layer_view view = {.ambient = {1, 1, 1}, .spread = 10};
-    const nebel_layer_hits hits = look(layers, &view, &(nebel_ray){{9, 1, 0}, {-1, 0, 0}, HUGE_VAL});
+    const nebel_textured_planet_query view = {.ambient = {1, 1, 1}, .pixel_spread = 10};
+    const nebel_shell_hits hits = look(layers, &view, &(nebel_ray){{9, 1, 0}, {-1, 0, 0}, HUGE_VAL});
     assert_true(fabs(hits.hits[hits.count - 1].radiance[1] - mean) < 1e-5);
-    nebel_destroy_layers(layers);
+    nebel_destroy_textured_planet(layers);
 }
 
 /* ---- maps that are made ---------------------------------------------------------------------- */
@@ -330,12 +334,13 @@ static void maps_have_no_seam_and_no_star(void **state)
 {
     (void)state;
     static float texels[TALL * WIDE * 3];
-    for (int kind = 0; kind < NEBEL_MAP_KIND_COUNT; kind++) {
+    for (int kind = 0; kind < NEBEL_PLANET_MAP_TYPE_COUNT; kind++) {
         for (uint32_t seed = 1; seed < 4; seed++) {
-            const nebel_map_desc desc = {.kind = (nebel_map_kind)kind, .width = WIDE, .height = TALL, .seed = seed};
-            const int channels = kind == NEBEL_MAP_GROUND ? 3 : 1;
-            assert_int_equal(nebel_make_map(&desc, texels), NEBEL_OK);
-            expect_smooth(texels, channels, kind != NEBEL_MAP_DETAIL);
+            const nebel_planet_map_desc desc = {
+                .type = (nebel_planet_map_type)kind, .width = WIDE, .height = TALL, .seed = seed};
+            const int channels = kind == NEBEL_PLANET_MAP_GROUND ? 3 : 1;
+            assert_int_equal(nebel_generate_planet_map(&desc, texels), NEBEL_OK);
+            expect_smooth(texels, channels, kind != NEBEL_PLANET_MAP_DETAIL);
         }
     }
 }
@@ -346,9 +351,9 @@ static void coverage_is_about_what_is_asked(void **state)
     static float texels[TALL * WIDE];
     double last = 0;
     for (int i = 1; i < 10; i += 2) {
-        const nebel_map_desc desc = {.width = WIDE, .height = TALL, .coverage = .1 * i};
+        const nebel_planet_map_desc desc = {.width = WIDE, .height = TALL, .coverage = .1 * i};
         double covered = 0;
-        assert_int_equal(nebel_make_map(&desc, texels), NEBEL_OK);
+        assert_int_equal(nebel_generate_planet_map(&desc, texels), NEBEL_OK);
         for (size_t k = 0; k < TALL * WIDE; k++) covered += (texels[k] > 0) * 1. / (TALL * WIDE);
         assert_true(fabs(covered - .1 * i) < .15 && covered > last);
         last = covered;
@@ -367,12 +372,14 @@ static void faults_say_the_number(void **state)
 {
     (void)state;
     char said[200] = "";
-    nebel_layers *layers;
+    nebel_textured_planet *layers;
     const nebel_log log = {keep_text, said};
-    assert_int_equal(nebel_create_layers(&(nebel_layers_desc){.radius = .5, .log = log}, &layers), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_create_textured_planet(&(nebel_textured_planet_desc){.radius = .5, .log = log}, &layers),
+                     NEBEL_ERROR_VALUE);
     assert_string_equal(said, "planet: radius: is 0.5; must be within 1 and 1e+12");
-    nebel_layers_desc desc = {.cloud_count = 2, .clouds = {{.gain = 1}, {.height = -1}}, .log = log};
-    assert_int_equal(nebel_create_layers(&desc, &layers), NEBEL_ERROR_VALUE);
+    nebel_textured_planet_desc desc = {
+        .cloud_shell_count = 2, .cloud_shells = {{.gain = 1}, {.height = -1}}, .log = log};
+    assert_int_equal(nebel_create_textured_planet(&desc, &layers), NEBEL_ERROR_VALUE);
     assert_string_equal(said, "planet: clouds[1]: height: is -1; must be more than 0, at most 1e12");
     assert_null(layers);
 }
@@ -380,74 +387,77 @@ static void faults_say_the_number(void **state)
 static void bad_descriptions_are_refused(void **state)
 {
     (void)state;
-    nebel_layers *layers = NULL;
-    const nebel_layers_desc bad[] = {{.radius = -1},
-                                     {.radius = (double)NAN},
-                                     {.radius = .5},
-                                     {.center = {HUGE_VAL, 0, 0}},
-                                     {.rotation = {0, (double)NAN, 0, 1}},
-                                     {.day = (double)NAN},
-                                     {.coverage = 2},
-                                     {.cloud_count = 9},
-                                     {.air = {.height = -1}},
-                                     {.air = {.brightness = (double)NAN}},
-                                     {.air = {.ramp_count = 17}},
-                                     {.cloud_count = 1, .clouds = {{.height = -1}}},
-                                     {.cloud_count = 1, .clouds = {{.gain = (double)NAN}}},
-                                     {.cloud_count = 1, .clouds = {{.wrap = {1e9, 0, 0}}}},
-                                     {.cloud_count = 1, .clouds = {{.map = {COLUMNS, ROWS, 3, ground[0][0]}}}},
-                                     {.cloud_count = 1, .clouds = {{.map = {0, ROWS, 1, clouds[0]}}}},
-                                     {.cloud_count = 1, .clouds = {{.map = {COLUMNS, ROWS, 1, NULL}}}},
-                                     {.ground = {SIZE_MAX, SIZE_MAX, 3, ground[0][0]}}};
+    nebel_textured_planet *layers = NULL;
+    const nebel_textured_planet_desc bad[] = {
+        {.radius = -1},
+        {.radius = (double)NAN},
+        {.radius = .5},
+        {.center = {HUGE_VAL, 0, 0}},
+        {.rotation = {0, (double)NAN, 0, 1}},
+        {.rotation_period = (double)NAN},
+        {.land_coverage = 2},
+        {.cloud_shell_count = 9},
+        {.atmosphere = {.height = -1}},
+        {.atmosphere = {.brightness = (double)NAN}},
+        {.atmosphere = {.ramp_count = 17}},
+        {.cloud_shell_count = 1, .cloud_shells = {{.height = -1}}},
+        {.cloud_shell_count = 1, .cloud_shells = {{.gain = (double)NAN}}},
+        {.cloud_shell_count = 1, .cloud_shells = {{.uv_tiling = {1e9, 0, 0}}}},
+        {.cloud_shell_count = 1, .cloud_shells = {{.coverage_map = {COLUMNS, ROWS, 3, ground[0][0]}}}},
+        {.cloud_shell_count = 1, .cloud_shells = {{.coverage_map = {0, ROWS, 1, clouds[0]}}}},
+        {.cloud_shell_count = 1, .cloud_shells = {{.coverage_map = {COLUMNS, ROWS, 1, NULL}}}},
+        {.color_map = {SIZE_MAX, SIZE_MAX, 3, ground[0][0]}}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-        assert_int_equal(nebel_create_layers(&bad[i], &layers), NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_create_layers(NULL, &layers), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_create_layers(&(nebel_layers_desc){.radius = 1}, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_make_map(&(nebel_map_desc){.coverage = (double)NAN}, clouds[0]), NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_make_map(&(nebel_map_desc){.width = 20000}, clouds[0]), NEBEL_ERROR_VALUE);
+        assert_int_equal(nebel_create_textured_planet(&bad[i], &layers), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_create_textured_planet(NULL, &layers), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_textured_planet(&(nebel_textured_planet_desc){.radius = 1}, NULL),
+                     NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_generate_planet_map(&(nebel_planet_map_desc){.coverage = (double)NAN}, clouds[0]),
+                     NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_generate_planet_map(&(nebel_planet_map_desc){.width = 20000}, clouds[0]), NEBEL_ERROR_VALUE);
 }
 
 static void bad_rays_are_refused(void **state)
 {
     (void)state;
-    nebel_layers *layers = create_known();
-    nebel_layer_hits hits;
-    const nebel_layer_view good = {.time = 0};
+    nebel_textured_planet *layers = create_known();
+    nebel_shell_hits hits;
+    const nebel_textured_planet_query good = {.time = 0};
     const nebel_ray ray = {{9, 0, 0}, {-1, 0, 0}, HUGE_VAL};
     const nebel_ray rays[] = {
         {{(double)NAN, 0, 0}, {-1, 0, 0}, 1}, {{0, 1.1e15, 0}, {-1, 0, 0}, 1}, {{9, 0, 0}, {0, 0, 0}, 1},
         {{9, 0, 0}, {(double)NAN, 0, 0}, 1},  {{9, 0, 0}, {-1, 0, 0}, -1},     {{HUGE_VAL, 0, 0}, {-1, 0, 0}, 1}};
-    const nebel_layer_view views[] = {{.time = (double)NAN},
-                                      {.time = HUGE_VAL},
-                                      {.spread = -1},
-                                      {.ambient = {(double)NAN, 0, 0}},
-                                      {.sun = {{(double)NAN, 0, 0}, {1, 1, 1}}},
-                                      {.sun = {{1, 0, 0}, {-1, 1, 1}}}};
+    const nebel_textured_planet_query views[] = {{.time = (double)NAN},
+                                                 {.time = HUGE_VAL},
+                                                 {.pixel_spread = -1},
+                                                 {.ambient = {(double)NAN, 0, 0}},
+                                                 {.sun = {{(double)NAN, 0, 0}, {1, 1, 1}}},
+                                                 {.sun = {{1, 0, 0}, {-1, 1, 1}}}};
     for (size_t i = 0; i < sizeof rays / sizeof *rays; i++)
-        assert_int_equal(nebel_trace_layers(layers, &good, 1, &rays[i], 0, &hits, 0), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_trace_textured_planet(layers, &good, 1, &rays[i], 0, &hits, 0), NEBEL_ERROR_ARGUMENT);
     for (size_t i = 0; i < sizeof views / sizeof *views; i++)
-        assert_int_equal(nebel_trace_layers(layers, &views[i], 1, &ray, 0, &hits, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_layers(NULL, &good, 1, &ray, 0, &hits, 0), NEBEL_ERROR_ARGUMENT);
-    nebel_destroy_layers(layers);
+        assert_int_equal(nebel_trace_textured_planet(layers, &views[i], 1, &ray, 0, &hits, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_textured_planet(NULL, &good, 1, &ray, 0, &hits, 0), NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_textured_planet(layers);
 }
 
 static void memory_that_runs_out_is_told(void **state)
 {
     (void)state;
-    nebel_layers *layers = NULL;
+    nebel_textured_planet *layers = NULL;
     for (int most = 0;; most++) {
         int left = most;
-        nebel_layers_desc desc = {.allocator = {scarce_allocate, scarce_release, &left},
-                                  .ground = {COLUMNS, ROWS, 3, ground[0][0]},
-                                  .cloud_count = 1};
-        desc.clouds[0].map = (nebel_map){COLUMNS, ROWS, 1, clouds[0]};
-        const nebel_result result = nebel_create_layers(&desc, &layers);
+        nebel_textured_planet_desc desc = {.allocator = {scarce_allocate, scarce_release, &left},
+                                           .color_map = {COLUMNS, ROWS, 3, ground[0][0]},
+                                           .cloud_shell_count = 1};
+        desc.cloud_shells[0].coverage_map = (nebel_planet_map){COLUMNS, ROWS, 1, clouds[0]};
+        const nebel_result result = nebel_create_textured_planet(&desc, &layers);
         if (result == NEBEL_OK) break;
         assert_int_equal(result, NEBEL_ERROR_MEMORY);
         assert_null(layers);
     }
-    nebel_destroy_layers(layers);
-    nebel_destroy_layers(NULL);
+    nebel_destroy_textured_planet(layers);
+    nebel_destroy_textured_planet(NULL);
 }
 
 int main(void)

@@ -132,7 +132,7 @@ static void an_error_is_the_same_beside_voxels(void **state)
 {
     (void)state;
     static const float voxels[] = {0.826f, 0.834f, 0.357f, 0.324f, 0.657f, 0.172f, 0.119f, 0.228f};
-    const nebel_grid_desc of_grid = {.size = {4, 2, 1}, .voxels = voxels, .filter = NEBEL_FILTER_LINEAR};
+    const nebel_grid_desc of_grid = {.size = {4, 2, 1}, .voxels = voxels, .filter = NEBEL_GRID_FILTER_LINEAR};
     nebel_grid *grid = NULL;
     assert_int_equal(nebel_create_grid(&of_grid, &grid), NEBEL_OK);
     const nebel_volume_desc fog[] = {
@@ -141,7 +141,7 @@ static void an_error_is_the_same_beside_voxels(void **state)
          .extinction = {0.001, 0.00114, 0.0015},
          .albedo = {0.28, 0.91, 0.9}},
         {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0.0231, -0.5634, -1.068}, .radius = 0.7712},
-         .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = 0.378},
+         .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = 0.378},
          .extinction = {1.75, 1.32, 1.97},
          .albedo = {0.88, 0.88, 0.88}}};
     const nebel_fog_desc desc = {.sun = {{0.5718, 0.799, 0.186}, {1.466, 1.466, 1.466}}};

@@ -1,5 +1,5 @@
 /* Sunlight and lamplight in many bodies over each other, of all profiles, against brute force: the midpoint rule over
- * nebel_sample_fog, with transmittances of nebel_trace, which know nothing of light. */
+ * nebel_sample_medium, with transmittances of nebel_trace, which know nothing of light. */
 #include "unit.h"
 
 #include "fog_help.h"
@@ -23,7 +23,7 @@ typedef struct crowd {
     nebel_volume_desc bodies[BODIES];
     size_t count;
     nebel_fog_desc desc;
-    nebel_lamp lamp;
+    nebel_light lamp;
     int has_lamp;
 } crowd;
 
@@ -54,7 +54,7 @@ static void choose_density(nebel_volume_desc *v, int kind, uint64_t *numbers)
         *d = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = 1 + (int)(size * 10) % 3};
         break;
     case 2:
-        *d = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = 0.4};
+        *d = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = 0.4};
         break;
     case 3:
         *d = (nebel_density){.type = NEBEL_DENSITY_GAUSSIAN, .sigma = size};
@@ -93,15 +93,15 @@ static void make_crowd(crowd *made, size_t count, int mixed, int light, uint64_t
         made->bodies[6].start = 9;
         made->bodies[7].cutoff = 11;
     }
-    made->lamp = (nebel_lamp){.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
+    made->lamp = (nebel_light){.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
     if (light == 2) {
-        const nebel_lamp spot = {.type = NEBEL_LAMP_SPOT,
-                                 .position = {2, 6, 1},
-                                 .intensity = {90, 60, 30},
-                                 .radius = 0.2,
-                                 .direction = {-0.2, -1, 0},
-                                 .inner_angle = 10,
-                                 .outer_angle = 35};
+        const nebel_light spot = {.type = NEBEL_LIGHT_SPOT,
+                                  .position = {2, 6, 1},
+                                  .intensity = {90, 60, 30},
+                                  .radius = 0.2,
+                                  .direction = {-0.2, -1, 0},
+                                  .inner_angle = 10,
+                                  .outer_angle = 35};
         made->lamp = spot;
     }
     if (light == 0) {
@@ -111,7 +111,7 @@ static void make_crowd(crowd *made, size_t count, int mixed, int light, uint64_t
 }
 
 static nebel_snapshot *commit(const nebel_fog_desc *desc, size_t count, const nebel_volume_desc *bodies, int has_lamp,
-                              const nebel_lamp *lamp)
+                              const nebel_light *lamp)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
@@ -148,7 +148,7 @@ typedef struct arrival {
 
 static arrival light_arrives(const crowd *of, const double p[3])
 {
-    const nebel_lamp *lamp = &of->lamp;
+    const nebel_light *lamp = &of->lamp;
     arrival a = {.distance = HUGE_VAL, .fluence = 1};
     memcpy(a.towards, sun_direction, sizeof sun_direction);
     if (!of->has_lamp) return a;
@@ -157,7 +157,7 @@ static arrival light_arrives(const crowd *of, const double p[3])
     for (int k = 0; k < 3; k++) a.towards[k] /= apart;
     a.distance = fmax(apart - lamp->radius, 0);
     a.fluence = 2 * (1 - sqrt(1 - sine * sine)) / (lamp->radius * lamp->radius);
-    if (lamp->type != NEBEL_LAMP_SPOT) return a;
+    if (lamp->type != NEBEL_LIGHT_SPOT) return a;
     const double degree = acos(-1) / 180, edge = cos(lamp->outer_angle * degree);
     const double cosine = -dot(a.towards, lamp->direction) / sqrt(dot(lamp->direction, lamp->direction));
     const double s = fmin(fmax((cosine - edge) / (cos(lamp->inner_angle * degree) - edge), 0), 1);
@@ -174,10 +174,10 @@ static double phase_value(double g, double cosine)
 /* What the lit bodies of a snapshot scatter at a place. */
 static void scattering_at(const nebel_snapshot *snapshot, const nebel_ray *ray, double t, double out[3])
 {
-    nebel_place place = {.distance = t};
-    nebel_matter matter;
+    nebel_sample_point place = {.distance = t};
+    nebel_medium_properties matter;
     for (int k = 0; k < 3; k++) place.position[k] = ray->origin[k] + t * ray->direction[k];
-    assert_int_equal(nebel_sample_fog(snapshot, 1, &place, 0, &matter, 0), NEBEL_OK);
+    assert_int_equal(nebel_sample_medium(snapshot, 1, &place, 0, &matter, 0), NEBEL_OK);
     memcpy(out, matter.scattering, sizeof matter.scattering);
 }
 
@@ -256,7 +256,7 @@ static void expect_the_same_bits(const nebel_snapshot *snapshot, const nebel_tra
         trace(snapshot, &desc, rays, other);
         assert_memory_equal(expected, other, sizeof other);
     }
-    if (asked->sunlit != NULL || asked->lamplit != NULL) return;
+    if (asked->sun_visibility != NULL || asked->light_visibility != NULL) return;
     for (int i = 0; i < RAYS; i++) {
         assert_int_equal(nebel_trace(snapshot, asked, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
         assert_memory_equal(&expected[i], &other[i], sizeof other[i]);
@@ -274,7 +274,7 @@ static void expect_brute_force(size_t count, int mixed, int light, int in_shadow
     const int forced_rays = (int)nb_test_count(FORCED);
     for (uint32_t i = 0; i <= RAYS; i++) first[i] = 2 * i;
     for (int i = 0; i < 2 * RAYS; i++) toggles[i] = i % 2 == 0 ? 7 : 9.5f;
-    const nebel_lit_pieces pieces = {first, toggles};
+    const nebel_ray_visibility pieces = {first, toggles};
     make_crowd(&of, count, mixed, light, 17 * count + (uint64_t)light);
     make_rays(rays, 5 * count + 3);
     nebel_snapshot *snapshot = commit_crowd(&of), *turned = commit_turned(&of);
@@ -283,8 +283,8 @@ static void expect_brute_force(size_t count, int mixed, int light, int in_shadow
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         for (int fine = 0; fine < 2; fine++) {
             nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = fine ? 2e-5 : 0};
-            if (in_shadow && light == 0) asked.sunlit = &pieces;
-            if (in_shadow && light > 0) asked.lamplit = &pieces;
+            if (in_shadow && light == 0) asked.sun_visibility = &pieces;
+            if (in_shadow && light > 0) asked.light_visibility = &pieces;
             trace(snapshot, &asked, rays, transfers);
             if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_bits(snapshot, &asked, rays, transfers);
             for (int i = 0; i < forced_rays; i++) {
@@ -363,7 +363,7 @@ static void light_falls_through_slits(void **state)
 static void bodies_far_away_change_nothing(void **state)
 {
     (void)state;
-    static const nebel_lamp lamp = {.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
+    static const nebel_light lamp = {.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
     enum { MANY = 70 };
     nebel_volume_desc bodies[MANY];
     nebel_snapshot *fog[2];

@@ -25,7 +25,7 @@ enum { VECTOR = 16, MAX_TURNS = 24000 };
 
 static const char counted_body[] =
     "nb_progress progress = nb_open_progress();\n"
-    "nb_media media = nb_media_of(0, int(NEBEL_WORD(0).x), false);\n"
+    "nb_media media = nb_media_of(0, int(NEBEL_FOG_TEXEL(0).x), false);\n"
     "nebel_transfer l = nb_trace_further(progress, nb_ray_up_to(in0.xyz, in1.xyz, in0.w, true), media, true, true);\n"
     "out0 = vec4(l.transmittance, float(progress.turns)); out1 = vec4(l.in_scattering, 0.0);\n";
 
@@ -143,10 +143,10 @@ static void try_kinds(lit_kind first, lit_kind last, lit_source source)
 {
     char defines[128];
     tracer t;
-    snprintf(
-        defines, sizeof defines,
-        "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_VOXELS\n#define NEBEL_FEATURES %u\n#define NEBEL_MOST_LIGHT 1e9\n",
-        (unsigned)features_of(first, last, source));
+    snprintf(defines, sizeof defines,
+             "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_VOXELS\n#define NEBEL_FEATURES %u\n#define "
+             "NEBEL_MAX_RADIANCE 1e9\n",
+             (unsigned)features_of(first, last, source));
     open_tracer(&t, NB_GL_330, TEXTURE, defines, counted_body);
     for (int kind = (int)first; kind <= (int)last; kind++)
         for (uint64_t seed = 0; seed < seed_count; seed++) try_scene(&t, (lit_kind)kind, source, first_seed + seed);

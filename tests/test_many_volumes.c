@@ -120,7 +120,7 @@ static void test_a_million_volumes_are_found_by_every_ray(void **unused)
         volume_count, added - start, committed - added, fog_bytes >> 20, (memory.bytes - fog_bytes) >> 20,
         memory.most_bytes >> 20);
     nebel_destroy_fog(fog);
-    assert_int_equal(nebel_snapshot_volume_count(snapshot), volume_count);
+    assert_int_equal(nebel_get_volume_count(snapshot), volume_count);
     assert_true(memory.bytes / volume_count < 3000);
     size_t met = 0;
     for (int i = 0; i < RAYS; i++) {
@@ -180,7 +180,7 @@ static void test_thousands_of_volumes_on_one_ray_are_exact_in_any_order(void **u
             assert_true(depth > .5);
         }
     }
-    assert_int_equal(nebel_find_transmittance(snapshot, .9, 0, 5, rays, sizeof rays[0], distances), NEBEL_OK);
+    assert_int_equal(nebel_invert_transmittance(snapshot, .9, 0, 5, rays, sizeof rays[0], distances), NEBEL_OK);
     for (int i = 0; i < 5; i++) {
         nebel_ray ray = rays[i];
         double depth = 0;

@@ -20,7 +20,7 @@ static void assert_near(const float *got, double x, double y, double z)
 /* Every mesh is what the header promises; the number of triangles in all. */
 static size_t check_meshes(const nebel_scene *scene)
 {
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     size_t count = 0;
     for (size_t m = 0; m < data->mesh_count; m++) {
         const nebel_mesh *mesh = &data->meshes[m];
@@ -62,7 +62,7 @@ static void test_scale_comes_first_then_rotation_then_position(void **state)
     write_text("t.mtl", "newmtl red\nKd 0.5 0.25 0.125\n");
     nebel_scene *scene =
         load_good("\"file\": \"t.obj\", \"position\": [10, 20, 30], \"rotation\": [0, 0, 1, 1], \"scale\": [2, 3, 4]");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     assert_int_equal(check_meshes(scene), 1);
     assert_true(mesh->origin[0] == 10 && mesh->origin[1] == 20 && mesh->origin[2] == 30);
     assert_near(mesh->positions + 3 * (size_t)mesh->indices[1], 0, 2, 0);
@@ -83,7 +83,7 @@ static void test_a_mirrored_model_is_not_inside_out(void **state)
         snprintf(members, sizeof members, "\"file\": \"t.obj\", \"scale\": %s, \"rotation\": [0.1, 0.2, 0.3, 1]",
                  scales[i]);
         nebel_scene *scene = load_good(members);
-        const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+        const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
         face_normal(mesh, 0, normal);
         const float *n = mesh->normals + 3 * (size_t)mesh->indices[0];
         assert_true(normal[0] * (double)n[0] + normal[1] * (double)n[1] + normal[2] * (double)n[2] > 0);
@@ -96,7 +96,7 @@ static void test_a_model_far_away_stays_precise(void **state)
     (void)state;
     write_text("t.obj", triangle_obj);
     nebel_scene *scene = load_good("\"file\": \"t.obj\", \"position\": [1e7, 0, -1e9], \"scale\": 0.001");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     assert_true(mesh->origin[2] == -1e9);
     assert_near(mesh->positions + 3 * (size_t)mesh->indices[1], .001, 0, 0);
     nebel_destroy_scene(scene);
@@ -107,10 +107,10 @@ static void test_loading_twice_changes_nothing(void **state)
     (void)state;
     write_text("t.obj", triangle_obj);
     nebel_scene *scene = load_good("\"file\": \"t.obj\", \"color\": [1, 0.5, 0]");
-    const nebel_mesh *meshes = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *meshes = nebel_get_scene_data(scene)->meshes;
     assert_near(meshes->base_color, 1, .5, 0);
     assert_int_equal(nebel_load_scene_models(scene), NEBEL_OK);
-    assert_ptr_equal(nebel_scene_contents(scene)->meshes, meshes);
+    assert_ptr_equal(nebel_get_scene_data(scene)->meshes, meshes);
     nebel_destroy_scene(scene);
 }
 
@@ -241,7 +241,7 @@ static size_t count_textures(const char *before, const char *picture, journal *k
     write_text("sub/t.mtl", text);
     nebel_scene *scene = load("\"file\": \"sub/t.obj\"", &result, kept);
     if (result != NEBEL_OK) fail_msg("%s", kept->last);
-    const size_t count = nebel_scene_contents(scene)->texture_count;
+    const size_t count = nebel_get_scene_data(scene)->texture_count;
     nebel_destroy_scene(scene);
     return count;
 }
@@ -280,7 +280,7 @@ static void test_a_cube_with_shared_corners_keeps_its_edges(void **state)
     (void)state;
     write_text("cube.ply", cube_ply);
     nebel_scene *scene = load_good("\"file\": \"cube.ply\"");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     assert_int_equal(check_meshes(scene), 12);
     assert_int_equal(mesh->vertex_count, 24);
     for (size_t i = 0; i < 36; i++) {
@@ -298,7 +298,7 @@ static void test_normals_that_are_no_directions_are_mended(void **state)
     write_text("t.obj", "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 5 0 0\nv 6 0 0\nv 5 0 3\nv 7 0 0\nv 8 0 0\nv 9 0 0\n"
                         "vn 0 0 0\nvn nan 0 0\nf 1//1 2//1 3//1\nf 4//2 5//2 6//2\nf 7//1 8//1 9//1\n");
     nebel_scene *scene = load_good("\"file\": \"t.obj\"");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     assert_int_equal(check_meshes(scene), 3);
     for (size_t i = 0; i < 9; i++) {
         const double x = (double)mesh->positions[3 * (size_t)mesh->indices[i]];
@@ -325,7 +325,7 @@ static void test_a_fold_is_sharp_from_sixty_degrees_on(void **state)
     (void)state;
     write_folded_ply(59);
     nebel_scene *scene = load_good("\"file\": \"fold.ply\"");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     const double half = 29.5 * acos(-1) / 180, whole = 61 * acos(-1) / 180;
     assert_int_equal(mesh->vertex_count, 4);
     for (size_t i = 0; i < 2; i++) assert_near(mesh->normals + 3 * i, sin(half), cos(half), 0);
@@ -333,7 +333,7 @@ static void test_a_fold_is_sharp_from_sixty_degrees_on(void **state)
     nebel_destroy_scene(scene);
     write_folded_ply(61);
     scene = load_good("\"file\": \"fold.ply\"");
-    mesh = nebel_scene_contents(scene)->meshes;
+    mesh = nebel_get_scene_data(scene)->meshes;
     assert_int_equal(mesh->vertex_count, 6);
     for (size_t i = 0; i < 3; i++) {
         assert_near(mesh->normals + 3 * (size_t)mesh->indices[i], 0, 1, 0);
@@ -348,11 +348,11 @@ static void test_what_lies_at_one_place_is_smoothed_together(void **state)
     (void)state;
     write_text("t.obj", "v 0 0 0\nv 0 0 1\nv -1 0 0\nv 1 0 0\nv -0 -0 1\nf 1 3 2\nf 1 5 4\n");
     nebel_scene *scene = load_good("\"file\": \"t.obj\"");
-    assert_int_equal(nebel_scene_contents(scene)->meshes->vertex_count, 4);
+    assert_int_equal(nebel_get_scene_data(scene)->meshes->vertex_count, 4);
     nebel_destroy_scene(scene);
     write_text("t.obj", "v 0 0 0\nv 0 0 1\nv -1 0 0\nv 1 -1 0\nv 0 0.001 1\nf 1 3 2\nf 1 5 4\n");
     scene = load_good("\"file\": \"t.obj\"");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     assert_int_equal(mesh->vertex_count, 5);
     assert_near(mesh->normals + 3 * (size_t)mesh->indices[2], 0, 1, 0);
     nebel_destroy_scene(scene);
@@ -369,7 +369,7 @@ static void test_a_seam_of_the_texture_stays_smooth(void **state)
     write_text("t.obj", "mtllib t.mtl\nusemtl red\nv 0 0 0\nv 0 0 1\nv -1 0 0\nv 1 -1 0\nvt 0 0.25\nvt 1 1\n"
                         "f 1/1 3/1 2/1\nf 1/2 2/2 4/2\n");
     nebel_scene *scene = load_good("\"file\": \"t.obj\"");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     const double half = acos(-1) / 8;
     assert_int_equal(check_meshes(scene), 2);
     assert_int_equal(mesh->vertex_count, 6);
@@ -401,7 +401,7 @@ static void test_the_tip_of_a_cone_is_seen_from_all_sides(void **state)
     for (int s = 0; s < 5; s++) {
         write_cone(sides[s]);
         nebel_scene *scene = load_good("\"file\": \"cone.ply\"");
-        const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+        const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
         assert_int_equal(check_meshes(scene), sides[s]);
         for (size_t i = 0; i < sides[s]; i++) {
             double face[3];
@@ -432,7 +432,7 @@ static void test_a_smooth_surface_has_its_normals(void **state)
         if (k % ROW < CELLS) fprintf(file, "3 %d %d %d\n3 %d %d %d\n", k, k + ROW, k + 1, k + 1, k + ROW, k + ROW + 1);
     fclose(file);
     nebel_scene *scene = load_good("\"file\": \"bowl.ply\"");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     assert_int_equal(mesh->vertex_count, ROW * ROW);
     assert_int_equal(check_meshes(scene), 2 * CELLS * CELLS);
     for (size_t i = 0; i < ROW * ROW; i++) {
@@ -450,7 +450,7 @@ static void test_triangles_with_two_corners_at_one_place_are_left_out(void **sta
     write_text("t.obj", "v 0 0 0\nv 0 0 1\nv 1 0 0\nv 0 0 1\nf 1 2 3\nf 1 1 2\nf 1 2 2\nf 1 2 1\nf 2 3 4\n");
     nebel_scene *scene = load_good("\"file\": \"t.obj\"");
     assert_int_equal(check_meshes(scene), 1);
-    assert_int_equal(nebel_scene_contents(scene)->meshes->vertex_count, 3);
+    assert_int_equal(nebel_get_scene_data(scene)->meshes->vertex_count, 3);
     nebel_destroy_scene(scene);
 }
 
@@ -488,8 +488,8 @@ static void test_a_height_map_becomes_terrain(void **state)
     const uint16_t values[12] = {0, 0, 0, 0, 65535, 0, 0, 13107, 0, 0, 0, 1};
     write_heights("h.png", 4, 3, values);
     nebel_scene *scene = load_good(HEIGHTS("h.png") ", \"position\": [5, 6, 7], \"color\": [0.25, 0.5, 1]");
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
-    assert_int_equal(nebel_scene_contents(scene)->mesh_count, 1);
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
+    assert_int_equal(nebel_get_scene_data(scene)->mesh_count, 1);
     assert_int_equal(mesh->vertex_count, 12);
     assert_int_equal(mesh->triangle_count, 12);
     assert_int_equal(check_meshes(scene), 12);
@@ -515,7 +515,7 @@ static void test_a_slope_has_the_normal_of_its_plane(void **state)
         for (uint32_t x = 0; x < 5; x++) values[y * 5 + x] = (uint16_t)(x * 6000 + y * 3000);
     write_heights("h.png", 5, 4, values);
     nebel_scene *scene = load_good(HEIGHTS("h.png"));
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
     const double dx = 10 * 6000 / 65535.0 / 1.5, dz = 10 * 3000 / 65535.0 / (2.0 / 3),
                  length = sqrt(dx * dx + 1 + dz * dz);
     for (size_t i = 0; i < 20; i++) assert_near(mesh->normals + 3 * i, -dx / length, 1 / length, -dz / length);
@@ -544,26 +544,26 @@ static void test_models_are_placed_anew(void **state)
     (void)state;
     write_text("t.obj", triangle_obj);
     nebel_scene *scene = load_good("\"file\": \"t.obj\", \"position\": [5, 0, 0]}, {\"file\": \"t.obj\"");
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_int_equal(data->model_count, 2);
-    nebel_model moved = data->models[0], wrong = moved;
+    nebel_scene_model moved = data->models[0], wrong = moved;
     moved.position[1] = 3;
     moved.has_color = 1;
     moved.color[2] = .5;
-    assert_int_equal(nebel_load_models_anew(scene, &moved, 1), NEBEL_OK);
+    assert_int_equal(nebel_reload_scene_models(scene, &moved, 1), NEBEL_OK);
     assert_int_equal(data->mesh_count, 1);
     assert_near((const float[]){(float)data->meshes[0].origin[0] + data->meshes[0].positions[0],
                                 (float)data->meshes[0].origin[1] + data->meshes[0].positions[1],
                                 (float)data->meshes[0].origin[2] + data->meshes[0].positions[2]},
                 5, 3, 0);
     assert_near(data->meshes[0].base_color, 0, 0, .5);
-    wrong.source = 2;
-    assert_int_equal(nebel_load_models_anew(scene, &wrong, 1), NEBEL_ERROR_ARGUMENT);
+    wrong.model_index = 2;
+    assert_int_equal(nebel_reload_scene_models(scene, &wrong, 1), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(data->mesh_count, 1);
     remove(in_folder("t.obj"));
-    assert_int_equal(nebel_load_models_anew(scene, data->models, 2), NEBEL_ERROR_FILE);
+    assert_int_equal(nebel_reload_scene_models(scene, data->models, 2), NEBEL_ERROR_FILE);
     assert_int_equal(data->mesh_count, 1);
-    assert_int_equal(nebel_load_models_anew(scene, NULL, 0), NEBEL_OK);
+    assert_int_equal(nebel_reload_scene_models(scene, NULL, 0), NEBEL_OK);
     assert_int_equal(data->mesh_count, 0);
     nebel_destroy_scene(scene);
 }
@@ -583,7 +583,7 @@ static void survive_every_failing_allocation(const char *text, int in_process)
         m.fail_at = m.made + k;
         result = nebel_load_scene_models(scene);
         if (result != NEBEL_OK) assert_int_equal(result, NEBEL_ERROR_MEMORY);
-        if (result != NEBEL_OK) assert_int_equal(nebel_scene_contents(scene)->mesh_count, 0);
+        if (result != NEBEL_OK) assert_int_equal(nebel_get_scene_data(scene)->mesh_count, 0);
         nebel_destroy_scene(scene);
         assert_int_equal(m.live, 0);
         assert_true(k < 500);
@@ -644,11 +644,11 @@ static void test_models_of_many_formats(void **state)
         char members[300];
         snprintf(members, sizeof members, "\"file\": \"" MODELS "%s\"", models[i].file);
         nebel_scene *scene = load_good(members);
-        const size_t triangles = check_meshes(scene), textures = nebel_scene_contents(scene)->texture_count;
+        const size_t triangles = check_meshes(scene), textures = nebel_get_scene_data(scene)->texture_count;
         if ((models[i].triangles != 0 && triangles != models[i].triangles) || textures != models[i].textures)
             fail_msg("%s: %zu triangles, %zu textures", models[i].file, triangles, textures);
         for (size_t t = 0; t < textures; t++) {
-            const nebel_texture *texture = &nebel_scene_contents(scene)->textures[t];
+            const nebel_texture *texture = &nebel_get_scene_data(scene)->textures[t];
             assert_true(texture->width > 0 && texture->height > 0);
             assert_int_equal(texture->rgba[3], 255);
         }

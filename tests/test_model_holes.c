@@ -74,7 +74,7 @@ static void write_leaf_glb(const char *material, const char *base, const char *a
 static float load_cutoff(const char *members, int has_texture)
 {
     nebel_scene *scene = load_good(members);
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_int_equal(data->mesh_count, 1);
     const nebel_mesh *mesh = &data->meshes[0];
     const float cutoff = mesh->alpha_cutoff;
@@ -133,7 +133,7 @@ static void assert_noted(const char *members, const char *message)
     nebel_scene *scene = load(members, &result, &kept);
     assert_int_equal(result, NEBEL_OK);
     assert_non_null(strstr(kept.last, message));
-    assert_true(nebel_scene_contents(scene)->meshes[0].alpha_cutoff == 0);
+    assert_true(nebel_get_scene_data(scene)->meshes[0].alpha_cutoff == 0);
     nebel_destroy_scene(scene);
 }
 

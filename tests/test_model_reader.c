@@ -100,8 +100,8 @@ static void test_a_process_reads_what_this_one_reads(void **state)
         if (files[i][0] == '/' && access(files[i], R_OK) != 0) continue;
         if (load_by(NULL, 0, files[i], &kept, &apart) != NEBEL_OK) fail_msg("%s", kept.last);
         if (load_by("/nowhere", 1, files[i], &kept, &here) != NEBEL_OK) fail_msg("%s", kept.last);
-        assert_true(nebel_scene_contents(apart)->mesh_count > 0);
-        assert_same_meshes(nebel_scene_contents(apart), nebel_scene_contents(here));
+        assert_true(nebel_get_scene_data(apart)->mesh_count > 0);
+        assert_same_meshes(nebel_get_scene_data(apart), nebel_get_scene_data(here));
         nebel_destroy_scene(apart);
         nebel_destroy_scene(here);
     }
@@ -424,7 +424,7 @@ static void test_references_stay_in_the_folder(void **state)
     assert_int_equal(result, NEBEL_OK);
     assert_non_null(strstr(kept.last, "without \"../paint.mtl\""));
     assert_non_null(strstr(kept.last, "outside the folder"));
-    assert_true(nebel_scene_contents(scene)->meshes[0].base_color[1] > 0);
+    assert_true(nebel_get_scene_data(scene)->meshes[0].base_color[1] > 0);
     nebel_destroy_scene(scene);
     for (int i = 0; i < 2; i++) {
         scene = load(i == 0 ? "\"file\": \"sub/quad.obj\", \"folder\": \".\""
@@ -432,8 +432,8 @@ static void test_references_stay_in_the_folder(void **state)
                      &result, &kept);
         assert_int_equal(result, NEBEL_OK);
         assert_int_equal(kept.count, 0);
-        assert_true(nebel_scene_contents(scene)->meshes[0].base_color[0] == 1);
-        assert_true(nebel_scene_contents(scene)->meshes[0].base_color[1] == 0);
+        assert_true(nebel_get_scene_data(scene)->meshes[0].base_color[0] == 1);
+        assert_true(nebel_get_scene_data(scene)->meshes[0].base_color[1] == 0);
         nebel_destroy_scene(scene);
     }
     mkdir(in_folder("other"), 0700);
@@ -493,7 +493,7 @@ static int read_on_an_old_kernel(void *user)
             snprintf(file, sizeof file, "old/case%d.obj", i);
             out->results[here][i] = load_by(NULL, here, file, &out->kept[here][i], &scene);
             if (out->results[here][i] == NEBEL_OK)
-                out->green[here][i] = nebel_scene_contents(scene)->meshes[0].base_color[1];
+                out->green[here][i] = nebel_get_scene_data(scene)->meshes[0].base_color[1];
             nebel_destroy_scene(scene);
         }
     return 0;

@@ -17,7 +17,7 @@ static nebel_nebula_desc a_nebula(void)
     return (nebel_nebula_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {1e3, 5, -7}, .radius = 10},
                                .count = COUNT,
                                .seed = 11,
-                               .size = {.1, .8},
+                               .radius_range = {.1, .8},
                                .absorption = {.1, .2, .3},
                                .emission = {1, 1, 1},
                                .colors = violet,
@@ -33,7 +33,7 @@ static void test_fills_its_shape_evenly(void **unused)
 {
     (void)unused;
     const nebel_nebula_desc desc = a_nebula();
-    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, particles), NEBEL_OK);
     int within_half = 0, in_lower_octave[3] = {0};
     for (int i = 0; i < COUNT; i++) {
         const double r = distance(&particles[i], desc.shape.center);
@@ -55,29 +55,29 @@ static void test_starts_at_points(void **unused)
 {
     (void)unused;
     nebel_nebula_desc desc = a_nebula();
-    desc.turbulence_size = 5;
-    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    desc.turbulence_scale = 5;
+    assert_int_equal(nebel_generate_nebula(&desc, particles), NEBEL_OK);
     static double points[COUNT][3];
     for (int i = 0; i < COUNT; i++) memcpy(points[i], particles[i].center, sizeof points[i]);
     desc.points = (const double(*)[3])points;
     desc.shape.radius = -1;
-    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, again), NEBEL_OK);
     for (int i = 0; i < COUNT; i++) {
         assert_memory_equal(again[i].center, particles[i].center, sizeof again->center);
         assert_memory_equal(again[i].emission, particles[i].emission, sizeof again->emission);
         assert_true(again[i].radius == particles[i].radius);
     }
     desc.turbulence = 1;
-    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, again), NEBEL_OK);
     int moved = 0;
     for (int i = 0; i < COUNT; i++) moved += distance(&again[i], points[i]) > .01;
     assert_true(moved > COUNT / 2);
-    desc.turbulence_size = 0;
+    desc.turbulence_scale = 0;
     for (int i = 0; i < COUNT; i++) memset(points[i], 0, sizeof points[i]);
-    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, again), NEBEL_OK);
     assert_true(isfinite(again[COUNT - 1].center[0]));
     points[7][1] = HUGE_VAL;
-    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_generate_nebula(&desc, again), NEBEL_ERROR_VALUE);
 }
 
 static void test_is_strewn_as_its_density_says(void **unused)
@@ -85,7 +85,7 @@ static void test_is_strewn_as_its_density_says(void **unused)
     (void)unused;
     nebel_nebula_desc desc = a_nebula();
     desc.density = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = 1};
-    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, particles), NEBEL_OK);
     int within_half = 0;
     for (int i = 0; i < COUNT; i++) within_half += distance(&particles[i], desc.shape.center) < 5;
     const double share = (1 / 24.0 - 1 / 160.0) / (1 / 3.0 - 1 / 5.0); /* of the integral of (1 - r^2) r^2 */
@@ -98,18 +98,18 @@ static void test_fades_as_its_density_says(void **unused)
     (void)unused;
     nebel_nebula_desc desc = a_nebula();
     desc.density = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = 1};
-    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, particles), NEBEL_OK);
     desc.density.power = 2;
-    desc.fade = .5;
-    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    desc.dimming = .5;
+    assert_int_equal(nebel_generate_nebula(&desc, again), NEBEL_OK);
     for (int i = 0; i < COUNT; i++) {
         const double r = distance(&again[i], desc.shape.center) / 10, share = 1 - r * r;
         assert_true(distance(&again[i], particles[i].center) < 1e-9);
         assert_true(fabs(again[i].extinction[1] - share * desc.absorption[1]) < 1e-9);
         for (int c = 0; c < 3; c++) assert_true(fabs(again[i].emission[c] - share * particles[i].emission[c]) < 1e-9);
     }
-    desc.fade = 1.5;
-    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_ERROR_VALUE);
+    desc.dimming = 1.5;
+    assert_int_equal(nebel_generate_nebula(&desc, again), NEBEL_ERROR_VALUE);
 }
 
 static void test_every_shape_holds_its_particles(void **unused)
@@ -131,7 +131,7 @@ static void test_every_shape_holds_its_particles(void **unused)
     };
     for (size_t s = 0; s < sizeof shapes / sizeof *shapes; s++) {
         nebel_nebula_desc desc = {.shape = shapes[s], .count = 500, .seed = s};
-        assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+        assert_int_equal(nebel_generate_nebula(&desc, particles), NEBEL_OK);
         const nebel_volume_desc body = {.shape = shapes[s], .extinction = {1e4, 1e4, 1e4}};
         nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &body, 1);
         for (size_t i = 0; i < desc.count; i++) { /* the march must find fog where a particle is */
@@ -152,14 +152,14 @@ static void test_the_same_seed_gives_the_same_particles(void **unused)
     (void)unused;
     nebel_nebula_desc desc = a_nebula();
     desc.turbulence = 2;
-    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
-    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, particles), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, again), NEBEL_OK);
     assert_memory_equal(particles, again, sizeof particles);
     desc.count = 10; /* a particle does not depend on how many there are */
-    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, again), NEBEL_OK);
     assert_memory_equal(particles, again, 10 * sizeof *particles);
     desc.seed++;
-    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, again), NEBEL_OK);
     for (int i = 0; i < 10; i++) assert_true(particles[i].center[0] != again[i].center[0]);
 }
 
@@ -167,9 +167,9 @@ static void test_eddies_carry_no_farther_than_told(void **unused)
 {
     (void)unused;
     nebel_nebula_desc desc = a_nebula();
-    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, particles), NEBEL_OK);
     desc.turbulence = 3;
-    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, again), NEBEL_OK);
     double farthest = 0;
     for (int i = 0; i < COUNT; i++)
         for (int c = 0; c < 3; c++) farthest = fmax(farthest, fabs(again[i].center[c] - particles[i].center[c]));
@@ -181,10 +181,10 @@ static void test_eddies_carry_no_farther_than_told(void **unused)
 static void test_a_particle_is_exact_fog(void **unused)
 {
     (void)unused;
-    const double chords[NEBEL_PARTICLE_COUNT] = {16 / 15.0, sqrt(2 * acos(-1)) / 3 * erf(3 / sqrt(2)), 2};
-    for (int p = 0; p < NEBEL_PARTICLE_COUNT; p++) {
+    const double chords[NEBEL_PARTICLE_PROFILE_COUNT] = {16 / 15.0, sqrt(2 * acos(-1)) / 3 * erf(3 / sqrt(2)), 2};
+    for (int p = 0; p < NEBEL_PARTICLE_PROFILE_COUNT; p++) {
         const nebel_particle particle = {{1, 2, 3}, .5, {.7, .8, .9}, {2, 3, 4}, (nebel_particle_profile)p};
-        const nebel_volume_desc volume = nebel_particle_volume(&particle);
+        const nebel_volume_desc volume = nebel_volume_from_particle(&particle);
         nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &volume, 1);
         const nebel_ray ray = {{1, 2, -3}, {0, 0, 1}, HUGE_VAL};
         nebel_transfer transfer;
@@ -207,12 +207,12 @@ static nebel_snapshot *crowd(nebel_particle_profile profile)
     nebel_nebula_desc desc = a_nebula();
     desc.count = CROWD;
     desc.profile = profile;
-    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&desc, particles), NEBEL_OK);
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
     assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
     for (int i = 0; i < CROWD; i++) {
-        const nebel_volume_desc volume = nebel_particle_volume(&particles[i]);
+        const nebel_volume_desc volume = nebel_volume_from_particle(&particles[i]);
         assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
     }
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
@@ -244,7 +244,7 @@ static void test_a_crowd_is_integrated_as_one_particle_is(void **unused)
     static nebel_ray rays[CROWD_RAYS];
     static nebel_transfer truth[CROWD_RAYS], transfer[CROWD_RAYS], alone;
     aim(rays);
-    for (int p = 0; p < NEBEL_PARTICLE_COUNT; p++) {
+    for (int p = 0; p < NEBEL_PARTICLE_PROFILE_COUNT; p++) {
         nebel_snapshot *fog = crowd((nebel_particle_profile)p);
         trace(fog, &(nebel_trace_desc){.tolerance = 1e-9}, CROWD_RAYS, rays, truth);
         trace(fog, &(nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT}, CROWD_RAYS, rays, transfer);
@@ -298,7 +298,7 @@ static void expect(nebel_result result, nebel_nebula_desc desc)
 {
     fog_messages messages = {0};
     desc.log = fog_messages_log(&messages);
-    assert_int_equal(nebel_scatter_nebula(&desc, particles), result);
+    assert_int_equal(nebel_generate_nebula(&desc, particles), result);
     assert_int_equal(messages.count, 1);
 }
 
@@ -306,19 +306,19 @@ static void test_refuses_what_is_not_a_nebula(void **unused)
 {
     (void)unused;
     nebel_nebula_desc desc = a_nebula();
-    assert_int_equal(nebel_scatter_nebula(NULL, particles), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_scatter_nebula(&desc, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_generate_nebula(NULL, particles), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_generate_nebula(&desc, NULL), NEBEL_ERROR_ARGUMENT);
     desc.shape.type = NEBEL_SHAPE_WORLD;
     expect(NEBEL_ERROR_VALUE, desc);
     desc = a_nebula(), desc.shape.radius = -1;
     expect(NEBEL_ERROR_VALUE, desc);
-    desc = a_nebula(), desc.size[0] = 2, desc.size[1] = 1;
+    desc = a_nebula(), desc.radius_range[0] = 2, desc.radius_range[1] = 1;
     expect(NEBEL_ERROR_VALUE, desc);
-    desc = a_nebula(), desc.size[1] = (double)NAN;
+    desc = a_nebula(), desc.radius_range[1] = (double)NAN;
     expect(NEBEL_ERROR_VALUE, desc);
     desc = a_nebula(), desc.turbulence = (double)INFINITY;
     expect(NEBEL_ERROR_VALUE, desc);
-    desc = a_nebula(), desc.turbulence_size = NEBEL_MIN_LENGTH / 2;
+    desc = a_nebula(), desc.turbulence_scale = NEBEL_MIN_LENGTH / 2;
     expect(NEBEL_ERROR_VALUE, desc);
     desc = a_nebula(), desc.allocator.release = fog_memory_release;
     expect(NEBEL_ERROR_ARGUMENT, desc);
@@ -326,7 +326,7 @@ static void test_refuses_what_is_not_a_nebula(void **unused)
     expect(NEBEL_ERROR_VALUE, desc);
     desc = a_nebula(), desc.emission[2] = (double)NAN;
     expect(NEBEL_ERROR_VALUE, desc);
-    desc = a_nebula(), desc.profile = NEBEL_PARTICLE_COUNT;
+    desc = a_nebula(), desc.profile = NEBEL_PARTICLE_PROFILE_COUNT;
     expect(NEBEL_ERROR_VALUE, desc);
     desc = a_nebula(); /* a Gaussian elsewhere: no particle will ever be taken */
     desc.density = (nebel_density){.type = NEBEL_DENSITY_GAUSSIAN, .center = {0, 0, 0}, .sigma = 1};
@@ -341,7 +341,7 @@ static void test_memory_may_fail(void **unused)
         nebel_nebula_desc desc = a_nebula();
         desc.count = 3;
         desc.allocator = fog_memory_allocator(&memory);
-        const nebel_result result = nebel_scatter_nebula(&desc, particles);
+        const nebel_result result = nebel_generate_nebula(&desc, particles);
         assert_int_equal(memory.live, 0);
         if (memory.fail_first > 0) {
             assert_int_equal(result, NEBEL_OK);

@@ -11,7 +11,7 @@ static nebel_snapshot *noise_fog(const nebel_noise_desc *desc)
     nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX, .max = {NOISE_SIDE, NOISE_SIDE, NOISE_SIDE}},
                            .density = {.type = NEBEL_DENSITY_GRID},
                            .extinction = {1, 1, 1}};
-    assert_int_equal(nebel_create_noise(desc, &v.density.grid), NEBEL_OK);
+    assert_int_equal(nebel_create_noise_grid(desc, &v.density.grid), NEBEL_OK);
     nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &v, 1);
     nebel_release_grid(v.density.grid);
     return fog;
@@ -20,9 +20,9 @@ static nebel_snapshot *noise_fog(const nebel_noise_desc *desc)
 /* Of the voxel with these indices. */
 static double noise_at(const nebel_snapshot *fog, int x, int y, int z)
 {
-    nebel_matter matter;
-    const nebel_place place = {{x + .5, y + .5, z + .5}, -1};
-    assert_int_equal(nebel_sample_fog(fog, 1, &place, sizeof place, &matter, sizeof matter), NEBEL_OK);
+    nebel_medium_properties matter;
+    const nebel_sample_point place = {{x + .5, y + .5, z + .5}, -1};
+    assert_int_equal(nebel_sample_medium(fog, 1, &place, sizeof place, &matter, sizeof matter), NEBEL_OK);
     return matter.extinction[0];
 }
 
@@ -43,7 +43,7 @@ static void compare_noise(const nebel_noise_desc *a, const nebel_noise_desc *b, 
 }
 
 static const nebel_noise_desc plain_noise = {
-    .size = {NOISE_SIDE, NOISE_SIDE, NOISE_SIDE}, .cells = {3, 2, 4}, .octaves = 2, .seed = 5};
+    .size = {NOISE_SIDE, NOISE_SIDE, NOISE_SIDE}, .frequency = {3, 2, 4}, .octaves = 2, .seed = 5};
 
 static void it_drifts_and_changes(void **test)
 {
@@ -95,7 +95,7 @@ static void no_axis_shows(void **test)
         const double cells = octaves == 1 ? 4 : 2;
         for (uint32_t seed = 0; seed < 20; seed++) {
             const nebel_noise_desc desc = {.size = {NOISE_SIDE, NOISE_SIDE, NOISE_SIDE},
-                                           .cells = {cells, cells, cells},
+                                           .frequency = {cells, cells, cells},
                                            .octaves = octaves,
                                            .gain = 1,
                                            .seed = seed};
@@ -126,7 +126,7 @@ static void it_is_a_density(void **test)
     nebel_noise_desc desc = plain_noise;
     nebel_snapshot *fog = noise_fog(&desc);
     desc.coverage = .5;
-    desc.edge[1] = .25;
+    desc.falloff[1] = .25;
     nebel_snapshot *wisps = noise_fog(&desc);
     for (int x = 0; x < NOISE_SIDE; x++)
         for (int y = 0; y < NOISE_SIDE; y++)
@@ -157,29 +157,30 @@ static void bad_numbers_are_refused(void **test)
         nebel_result result;
         const char *word;
     } cases[] = {
-        {{.size = {0, 8, 8}, .cells = {1, 1, 1}}, NEBEL_ERROR_LIMIT, "0 x 8 x 8 voxels"},
-        {{.size = {4096, 4096, 4}, .cells = {1, 1, 1}}, NEBEL_ERROR_LIMIT, "at most 8388608 in all"},
-        {{.size = {8, 8, 8}, .cells = {1, 0, 1}}, NEBEL_ERROR_VALUE, "cells is 0"},
-        {{.size = {8, 8, 8}, .cells = {1, 1, 4.5}}, NEBEL_ERROR_VALUE, "of two voxels each at least"},
-        {{.size = {8, 8, 8}, .cells = {1, 1, 1}, .octaves = 17}, NEBEL_ERROR_VALUE, "octaves is 17"},
-        {{.size = {8, 8, 8}, .cells = {1, 1, 1}, .gain = 1.5}, NEBEL_ERROR_VALUE, "gain is 1.5"},
-        {{.size = {8, 8, 8}, .cells = {1, 1, 1}, .coverage = -1}, NEBEL_ERROR_VALUE, "coverage is -1"},
-        {{.size = {8, 8, 8}, .cells = {1, 1, 1}, .edge = {0, 0, .6}}, NEBEL_ERROR_VALUE, "edge is 0.6"},
-        {{.size = {8, 8, 8}, .cells = {1, 1, 1}, .offset = {2e9}}, NEBEL_ERROR_VALUE, "offset is 2e+09"},
-        {{.size = {8, 8, 8}, .cells = {1, 1, 1}, .time = (double)NAN}, NEBEL_ERROR_VALUE, "time is nan"},
+        {{.size = {0, 8, 8}, .frequency = {1, 1, 1}}, NEBEL_ERROR_LIMIT, "0 x 8 x 8 voxels"},
+        {{.size = {4096, 4096, 4}, .frequency = {1, 1, 1}}, NEBEL_ERROR_LIMIT, "at most 8388608 in all"},
+        {{.size = {8, 8, 8}, .frequency = {1, 0, 1}}, NEBEL_ERROR_VALUE, "cells is 0"},
+        {{.size = {8, 8, 8}, .frequency = {1, 1, 4.5}}, NEBEL_ERROR_VALUE, "of two voxels each at least"},
+        {{.size = {8, 8, 8}, .frequency = {1, 1, 1}, .octaves = 17}, NEBEL_ERROR_VALUE, "octaves is 17"},
+        {{.size = {8, 8, 8}, .frequency = {1, 1, 1}, .gain = 1.5}, NEBEL_ERROR_VALUE, "gain is 1.5"},
+        {{.size = {8, 8, 8}, .frequency = {1, 1, 1}, .coverage = -1}, NEBEL_ERROR_VALUE, "coverage is -1"},
+        {{.size = {8, 8, 8}, .frequency = {1, 1, 1}, .falloff = {0, 0, .6}}, NEBEL_ERROR_VALUE, "edge is 0.6"},
+        {{.size = {8, 8, 8}, .frequency = {1, 1, 1}, .offset = {2e9}}, NEBEL_ERROR_VALUE, "offset is 2e+09"},
+        {{.size = {8, 8, 8}, .frequency = {1, 1, 1}, .time = (double)NAN}, NEBEL_ERROR_VALUE, "time is nan"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         fog_messages messages = {0};
         nebel_grid *grid = (nebel_grid *)&messages;
         cases[i].desc.log = fog_messages_log(&messages);
-        assert_int_equal(nebel_create_noise(&cases[i].desc, &grid), cases[i].result);
+        assert_int_equal(nebel_create_noise_grid(&cases[i].desc, &grid), cases[i].result);
         assert_null(grid);
         if (strstr(messages.text, cases[i].word) == NULL) fail_msg("case %zu says: %s", i, messages.text);
     }
     nebel_grid *grid = NULL;
-    const nebel_noise_desc half = {.size = {8, 8, 8}, .cells = {1, 1, 1}, .allocator = {.release = fog_memory_release}};
-    assert_int_equal(nebel_create_noise(&half, &grid), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_create_noise(NULL, NULL), NEBEL_ERROR_ARGUMENT);
+    const nebel_noise_desc half = {
+        .size = {8, 8, 8}, .frequency = {1, 1, 1}, .allocator = {.release = fog_memory_release}};
+    assert_int_equal(nebel_create_noise_grid(&half, &grid), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_noise_grid(NULL, NULL), NEBEL_ERROR_ARGUMENT);
 }
 
 int main(void)

@@ -24,7 +24,7 @@ static const nebel_view good_view = {.eye_from_world = {1, 0, 0, 0, 0, 1, 0, 0, 
                                      .height = 16};
 
 static struct {
-    nebel_gl_fog gl_fog;
+    nebel_gl_fog_resources gl_fog_resources;
     nebel_gl_textures gl_textures;
     nebel_view view;
     float floats[4];

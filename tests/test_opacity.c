@@ -79,12 +79,12 @@ static void test_planes_give_the_same_bits(void **unused)
                                        .direction_float = {&direction[0], &direction[1], &direction[2]},
                                        .t_max = &(float){60}};
         float T[3], S[3];
-        const nebel_transfer_planes lights = {.transmittance = {&T[0], &T[1], &T[2]},
-                                              .in_scattering = {&S[0], &S[1], &S[2]}};
+        const nebel_transfer_planes transfers = {.transmittance = {&T[0], &T[1], &T[2]},
+                                                 .in_scattering = {&S[0], &S[1], &S[2]}};
         nebel_transfer transfer;
         const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT};
         assert_int_equal(nebel_trace(limited, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
-        assert_int_equal(nebel_trace_planes(limited, NULL, 1, &rays, &lights), NEBEL_OK);
+        assert_int_equal(nebel_trace_planes(limited, NULL, 1, &rays, &transfers), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
             assert_true((double)T[c] == transfer.transmittance[c]);
             assert_true((double)S[c] == transfer.in_scattering[c]);
@@ -104,14 +104,15 @@ static void test_streams_of_segments_and_pixels_are_limited(void **unused)
     const float from[3] = {0, 0, 0}, to[2][3] = {{8, 0, 0}, {1.5f, 0, 0}}, depth[2] = {8, 1.5f};
     float through[2];
     const nebel_segments segments = {.from = from, .to = to[0]};
-    assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, 2, &segments, through, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 2, &segments, through, 0),
+                     NEBEL_OK);
     assert_true(fabs((double)through[0] - .25) < 1e-6);
     assert_true(fabs((double)through[1] - exp(-.5)) < 1e-6);
     const uint8_t black[8] = {0, 0, 0, 255, 0, 0, 0, 255};
     uint8_t out[8];
     const nebel_pixels pixels = {
-        .corner = {1, 0, 0}, .width = 2, .height = 1, .depth = depth, .color = black, .out = out};
-    assert_int_equal(nebel_fog_pixels(snapshot, NEBEL_ISA_DEFAULT, &pixels), NEBEL_OK);
+        .corner = {1, 0, 0}, .width = 2, .height = 1, .depth = depth, .color = black, .output = out};
+    assert_int_equal(nebel_apply_fog_to_pixels(snapshot, NEBEL_ISA_DEFAULT, &pixels), NEBEL_OK);
     assert_true(abs(out[0] - 191) <= 1);
     assert_true(abs(out[4] - 100) <= 1);
     nebel_release_snapshot(snapshot);
@@ -121,7 +122,7 @@ static double find(const nebel_snapshot *snapshot, double transmittance)
 {
     const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, HUGE_VAL};
     double distance = -1;
-    assert_int_equal(nebel_find_transmittance(snapshot, transmittance, 2, 1, &ray, sizeof ray, &distance), NEBEL_OK);
+    assert_int_equal(nebel_invert_transmittance(snapshot, transmittance, 2, 1, &ray, sizeof ray, &distance), NEBEL_OK);
     return distance;
 }
 

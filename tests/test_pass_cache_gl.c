@@ -118,8 +118,8 @@ static void check(nebel_gl *gl, nebel_snapshot *fog, const nebel_view *view, int
 static int moves(const nebel_view *from, const nebel_view *to)
 {
     nebel_rays a, b;
-    assert_int_equal(nebel_view_rays(from, NULL, &a), NEBEL_OK);
-    assert_int_equal(nebel_view_rays(to, NULL, &b), NEBEL_OK);
+    assert_int_equal(nebel_compute_view_rays(from, NULL, &a), NEBEL_OK);
+    assert_int_equal(nebel_compute_view_rays(to, NULL, &b), NEBEL_OK);
     return memcmp(a.eye, b.eye, sizeof a.eye) != 0;
 }
 

@@ -74,10 +74,10 @@ static void draw_in_black_fog(int rich)
     const float black[3] = {0, 0, 0};
     const nebel_vertex_output stream = classic_stream(&mesh, NEBEL_VERTEX_COORDINATE);
     nebel_gl_classic *const classic = classic_create(NEBEL_GL_CLASSIC_FOG_COORD);
-    assert_int_equal(nebel_gl_begin_classic(classic, black), NEBEL_OK);
-    assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_OK);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, black), NEBEL_OK);
+    assert_int_equal(nebel_gl_bind_classic_stream(classic, &stream, 0), NEBEL_OK);
     draw_surface(rich);
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
     nebel_destroy_gl_classic(classic);
 }
 
@@ -86,10 +86,10 @@ static void add_fog(nebel_vertex_format format)
 {
     const nebel_vertex_output stream = classic_stream(&mesh, format);
     nebel_gl_classic *const classic = classic_create(NEBEL_GL_CLASSIC_ADDITIVE);
-    assert_int_equal(nebel_gl_begin_classic(classic, NULL), NEBEL_OK);
-    assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_OK);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, NULL), NEBEL_OK);
+    assert_int_equal(nebel_gl_bind_classic_stream(classic, &stream, 0), NEBEL_OK);
     classic_draw_positions(&mesh);
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
     nebel_destroy_gl_classic(classic);
 }
 
@@ -130,14 +130,14 @@ static void test_black_object_in_fog_adds_the_same_bits(void **state)
     classic_read(&one);
     draw_in_black_fog(0);
     nebel_gl_classic *const classic = classic_create(NEBEL_GL_CLASSIC_FOG_COORD);
-    assert_int_equal(nebel_gl_begin_classic(classic, classic_color_float), NEBEL_OK);
-    assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_OK);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, classic_color_float), NEBEL_OK);
+    assert_int_equal(nebel_gl_bind_classic_stream(classic, &stream, 0), NEBEL_OK);
     glEnable(GL_BLEND);
     glBlendFunc(GL_ONE, GL_ONE);
     glDepthFunc(GL_EQUAL);
     glColor4f(0, 0, 0, 0);
     classic_draw_positions(&mesh);
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
     nebel_destroy_gl_classic(classic);
     classic_read(&two);
     assert_true(classic_compare(&one, &two) == 0);
@@ -287,10 +287,10 @@ static void test_amounts_are_interpolated_with_perspective(void **state)
         classic_set_mesh(&mesh);
         glColor4f(0, 0, 0, 1);
         if (ways[i].kind != NEBEL_GL_CLASSIC_FOG_COORD) classic_draw_positions(&mesh);
-        assert_int_equal(nebel_gl_begin_classic(classic, white), NEBEL_OK);
-        assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_OK);
+        assert_int_equal(nebel_gl_begin_classic_fog(classic, white), NEBEL_OK);
+        assert_int_equal(nebel_gl_bind_classic_stream(classic, &stream, 0), NEBEL_OK);
         classic_draw_positions(&mesh);
-        assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+        assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
         nebel_destroy_gl_classic(classic);
         classic_read(&image);
         assert_true(compare_with_slope(&image) <= float_tolerance);
@@ -333,8 +333,8 @@ static unsigned use_program(int es, const char *output)
     float matrix_float[16];
     const matrix m = multiply(mesh.clip_from_eye, mesh.eye_from_object);
     snprintf(head, sizeof head, "#define OUTPUT %s\n", output);
-    const char *const vertex[] = {version, nebel_gl_classic_text(), vertex_text};
-    const char *const fragment[] = {version, head, nebel_gl_classic_text(), fragment_text};
+    const char *const vertex[] = {version, nebel_gl_classic_shader_source(), vertex_text};
+    const char *const fragment[] = {version, head, nebel_gl_classic_shader_source(), fragment_text};
     pass_attach(program, GL_VERTEX_SHADER, 3, vertex);
     pass_attach(program, GL_FRAGMENT_SHADER, 4, fragment);
     glBindAttribLocation(program, 0, "place");
@@ -385,7 +385,7 @@ static void draw_with_shaders(nebel_gl_classic_kind kind, int es)
         [NEBEL_GL_CLASSIC_ALPHA] = "nebel_classic_alpha(pass_stream.rgb, pass_stream.a)"};
     unsigned buffers[2], array, first = 0;
     nebel_gl_classic *const classic = classic_create(kind);
-    assert_int_equal(nebel_gl_classic_method(classic), kind);
+    assert_int_equal(nebel_gl_get_classic_method(classic), kind);
     bind_mesh(buffers, &array, kind == NEBEL_GL_CLASSIC_ALPHA ? NEBEL_VERTEX_ALPHA : NEBEL_VERTEX_RGBA_FLOAT);
     classic_clear();
     if (kind != NEBEL_GL_CLASSIC_FOG_COORD) {
@@ -393,9 +393,9 @@ static void draw_with_shaders(nebel_gl_classic_kind kind, int es)
         draw_buffers();
     }
     const unsigned second = use_program(es, outputs[kind]);
-    assert_int_equal(nebel_gl_begin_classic(classic, classic_color_float), NEBEL_OK);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, classic_color_float), NEBEL_OK);
     draw_buffers();
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
     glUseProgram(0);
     if (first != 0) glDeleteProgram(first);
     glDeleteProgram(second);

@@ -203,11 +203,11 @@ static void use(nebel_gl_classic_kind kind, fixed_snapshot *during)
     const float color[3] = {.1f, .2f, .3f};
     const nebel_vertex_output stream = classic_stream(&mesh, format_of(kind));
     nebel_gl_classic *const classic = classic_create(kind);
-    assert_int_equal(nebel_gl_begin_classic(classic, color), NEBEL_OK);
-    assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_OK);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, color), NEBEL_OK);
+    assert_int_equal(nebel_gl_bind_classic_stream(classic, &stream, 0), NEBEL_OK);
     take_fixed(during);
     classic_draw_positions(&mesh);
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
     nebel_destroy_gl_classic(classic);
 }
 
@@ -268,13 +268,13 @@ static void check_odd_state(nb_gl_language language)
             odd_set(&o, desktop, on);
             odd_take(&before, desktop);
             nebel_gl_classic *const classic = classic_create((nebel_gl_classic_kind)kind);
-            assert_int_equal(nebel_gl_begin_classic(classic, classic_color_float), NEBEL_OK);
+            assert_int_equal(nebel_gl_begin_classic_fog(classic, classic_color_float), NEBEL_OK);
             if (kind != NEBEL_GL_CLASSIC_FOG_COORD) {
                 GLint function;
                 glGetIntegerv(GL_DEPTH_FUNC, &function);
                 assert_true(function == GL_EQUAL && glIsEnabled(GL_BLEND));
             }
-            assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+            assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
             nebel_destroy_gl_classic(classic);
             odd_take(&after, desktop);
             odd_expect_same(&before, &after);
@@ -345,7 +345,7 @@ static void draw_fed(nebel_gl_classic *classic, nebel_vertex_format format, feed
         buffer = make_buffer(packed, CLASSIC_VERTICES * size);
         stream.data = NULL;
     }
-    if (how != IMMEDIATE) assert_int_equal(nebel_gl_feed_classic(classic, &stream, buffer), NEBEL_OK);
+    if (how != IMMEDIATE) assert_int_equal(nebel_gl_bind_classic_stream(classic, &stream, buffer), NEBEL_OK);
     if (how == IMMEDIATE)
         draw_immediate(format);
     else if (format == NEBEL_VERTEX_COORDINATE)
@@ -361,9 +361,9 @@ static void draw_feeding(nebel_vertex_format format, nebel_gl_classic_kind kind,
     classic_clear();
     classic_set_mesh(&mesh);
     if (kind != NEBEL_GL_CLASSIC_FOG_COORD) classic_draw_plain(&mesh);
-    assert_int_equal(nebel_gl_begin_classic(classic, classic_color_float), NEBEL_OK);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, classic_color_float), NEBEL_OK);
     draw_fed(classic, format, how);
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
     nebel_destroy_gl_classic(classic);
     classic_read(image);
 }
@@ -402,13 +402,13 @@ static void test_a_feed_replaces_the_last(void **state)
     const nebel_vertex_output bytes = classic_stream(&mesh, NEBEL_VERTEX_RGBA8);
     classic_clear();
     classic_draw_plain(&mesh);
-    assert_int_equal(nebel_gl_begin_classic(classic, NULL), NEBEL_OK);
-    assert_int_equal(nebel_gl_feed_classic(classic, &nothing, 0), NEBEL_OK);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, NULL), NEBEL_OK);
+    assert_int_equal(nebel_gl_bind_classic_stream(classic, &nothing, 0), NEBEL_OK);
     classic_draw_positions(&mesh);
-    assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_OK);
-    assert_int_equal(nebel_gl_feed_classic(classic, &bytes, 0), NEBEL_OK);
+    assert_int_equal(nebel_gl_bind_classic_stream(classic, &stream, 0), NEBEL_OK);
+    assert_int_equal(nebel_gl_bind_classic_stream(classic, &bytes, 0), NEBEL_OK);
     classic_draw_positions(&mesh);
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
     classic_read(&refed);
     assert_memory_equal(&right, &refed, sizeof right);
     nebel_destroy_gl_classic(classic);
@@ -428,10 +428,10 @@ static int draw_in_old_context(nebel_gl_classic *classic)
     classic_set_mesh(&mesh);
     classic_draw_plain(&mesh);
     classic_read(&surface);
-    if (nebel_gl_begin_classic(classic, NULL) != NEBEL_OK) return 10;
-    if (nebel_gl_feed_classic(classic, &stream, 0) != NEBEL_OK) return 11;
+    if (nebel_gl_begin_classic_fog(classic, NULL) != NEBEL_OK) return 10;
+    if (nebel_gl_bind_classic_stream(classic, &stream, 0) != NEBEL_OK) return 11;
     classic_draw_positions(&mesh);
-    if (nebel_gl_end_classic(classic) != NEBEL_OK || glGetError() != GL_NO_ERROR) return 12;
+    if (nebel_gl_end_classic_fog(classic) != NEBEL_OK || glGetError() != GL_NO_ERROR) return 12;
     classic_read(&fogged);
     glGetBooleanv(GL_COLOR_WRITEMASK, mask);
     glGetIntegerv(GL_BLEND_DST, &factor);
@@ -451,7 +451,7 @@ static int draw_without_fog_coordinates(void)
     if (epoxy_gl_version() != 13 || epoxy_has_gl_extension("GL_EXT_fog_coord")) return 3;
     const nebel_gl_classic_desc desc = {.log = fog_messages_log(&messages)};
     if (nebel_create_gl_classic(&desc, &classic) != NEBEL_OK) return 4;
-    if (nebel_gl_classic_method(classic) != NEBEL_GL_CLASSIC_TWO_PASS) return 5;
+    if (nebel_gl_get_classic_method(classic) != NEBEL_GL_CLASSIC_TWO_PASS) return 5;
     if (messages.count != 1 || strstr(messages.text, "two passes") == NULL) return 6;
     const classic_target target = classic_make_target(GL_RGBA8);
     classic_make_mesh(&mesh);
@@ -535,25 +535,25 @@ static void test_streams_that_do_not_fit_are_refused(void **state)
         nebel_gl_classic *const classic = classic_create((nebel_gl_classic_kind)kind);
         const nebel_vertex_output good = classic_stream(&mesh, format_of((nebel_gl_classic_kind)kind));
         nebel_vertex_output bad = good;
-        assert_int_equal(nebel_gl_feed_classic(classic, &good, 0), NEBEL_ERROR_ARGUMENT);
-        assert_int_equal(nebel_gl_begin_classic(classic, classic_color_float), NEBEL_OK);
-        assert_int_equal(nebel_gl_feed_classic(classic, NULL, 0), NEBEL_ERROR_ARGUMENT);
-        assert_int_equal(nebel_gl_feed_classic(classic, &good, 9999), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_gl_bind_classic_stream(classic, &good, 0), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_gl_begin_classic_fog(classic, classic_color_float), NEBEL_OK);
+        assert_int_equal(nebel_gl_bind_classic_stream(classic, NULL, 0), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_gl_bind_classic_stream(classic, &good, 9999), NEBEL_ERROR_ARGUMENT);
         bad.data = NULL;
-        assert_int_equal(nebel_gl_feed_classic(classic, &bad, 0), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_gl_bind_classic_stream(classic, &bad, 0), NEBEL_ERROR_ARGUMENT);
         bad = (nebel_vertex_output){NEBEL_VERTEX_SPECULAR_ALPHA, mesh.vertices, 0};
-        assert_int_equal(nebel_gl_feed_classic(classic, &bad, 0), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_gl_bind_classic_stream(classic, &bad, 0), NEBEL_ERROR_ARGUMENT);
         bad = (nebel_vertex_output){good.format, good.data, size_of(good.format) - 1};
-        assert_int_equal(nebel_gl_feed_classic(classic, &bad, 0), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_gl_bind_classic_stream(classic, &bad, 0), NEBEL_ERROR_ARGUMENT);
         bad.stride = (size_t)INT32_MAX + 1;
-        assert_int_equal(nebel_gl_feed_classic(classic, &bad, 0), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_gl_bind_classic_stream(classic, &bad, 0), NEBEL_ERROR_ARGUMENT);
         glGenVertexArrays(1, &array);
         glBindVertexArray(array);
-        assert_int_equal(nebel_gl_feed_classic(classic, &good, 0), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_gl_bind_classic_stream(classic, &good, 0), NEBEL_ERROR_ARGUMENT);
         glBindVertexArray(0);
         glDeleteVertexArrays(1, &array);
-        assert_int_equal(nebel_gl_feed_classic(classic, &good, 0), NEBEL_OK);
-        assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+        assert_int_equal(nebel_gl_bind_classic_stream(classic, &good, 0), NEBEL_OK);
+        assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
         nebel_destroy_gl_classic(classic);
     }
     pass_close(&context);
@@ -568,22 +568,22 @@ static void test_begin_and_end_come_in_pairs(void **state)
     classic_open(&context, NB_GL_COMPATIBILITY);
     nebel_gl_classic *const classic = classic_create(NEBEL_GL_CLASSIC_FOG_COORD);
     take_fixed(&before);
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_gl_begin_classic(classic, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, NULL), NEBEL_ERROR_ARGUMENT);
     glGetIntegerv(GL_MAX_ATTRIB_STACK_DEPTH, &depth);
     for (int i = 0; i < depth; i++) glPushAttrib(GL_FOG_BIT);
-    assert_int_equal(nebel_gl_begin_classic(classic, classic_color_float), NEBEL_ERROR_LIMIT);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, classic_color_float), NEBEL_ERROR_LIMIT);
     glPopAttrib();
-    assert_int_equal(nebel_gl_begin_classic(classic, classic_color_float), NEBEL_OK);
-    assert_int_equal(nebel_gl_begin_classic(classic, classic_color_float), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, classic_color_float), NEBEL_OK);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, classic_color_float), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_ERROR_ARGUMENT);
     for (int i = 1; i < depth; i++) glPopAttrib();
     take_fixed(&after);
     assert_memory_equal(&before, &after, sizeof before);
-    assert_int_equal(nebel_gl_begin_classic(NULL, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_gl_feed_classic(NULL, NULL, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_gl_end_classic(NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_gl_begin_classic_fog(NULL, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_gl_bind_classic_stream(NULL, NULL, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_gl_end_classic_fog(NULL), NEBEL_ERROR_ARGUMENT);
     nebel_destroy_gl_classic(classic);
     pass_close(&context);
 }
@@ -596,9 +596,9 @@ static void test_without_a_fixed_pipeline_nothing_is_fed(void **state)
     const nebel_vertex_output stream = classic_stream(&mesh, NEBEL_VERTEX_RGBA8);
     classic_open(&context, NB_GL_330);
     nebel_gl_classic *const classic = classic_create(NEBEL_GL_CLASSIC_TWO_PASS);
-    assert_int_equal(nebel_gl_begin_classic(classic, NULL), NEBEL_OK);
-    assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_ERROR_UNSUPPORTED);
-    assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
+    assert_int_equal(nebel_gl_begin_classic_fog(classic, NULL), NEBEL_OK);
+    assert_int_equal(nebel_gl_bind_classic_stream(classic, &stream, 0), NEBEL_ERROR_UNSUPPORTED);
+    assert_int_equal(nebel_gl_end_classic_fog(classic), NEBEL_OK);
     nebel_destroy_gl_classic(classic);
     pass_close(&context);
 }

@@ -115,9 +115,10 @@ static void test_air_of_a_planet(void **state)
 {
     (void)state;
     nebel_atmosphere *air = NULL;
-    nebel_planet planet = {.air = *nebel_find_atmosphere("toy"), .sun_diameter = .5, .sun_left = {1, 1, 1}};
-    for (int i = 0; i < 3; i++) planet.air.ground[i] = pass_eye[i] - (i == 1 ? 20 : 0);
-    assert_int_equal(nebel_create_atmosphere(&planet.air, &air), NEBEL_OK);
+    nebel_planet planet = {
+        .atmosphere_desc = *nebel_lookup_atmosphere("toy"), .sun_angular_diameter = .5, .sun_left = {1, 1, 1}};
+    for (int i = 0; i < 3; i++) planet.atmosphere_desc.ground_point[i] = pass_eye[i] - (i == 1 ? 20 : 0);
+    assert_int_equal(nebel_create_atmosphere(&planet.atmosphere_desc, &air), NEBEL_OK);
     planet.atmosphere = air;
     const nebel_scene_data scene = {
         .has_sun = 1, .sun_direction = {.6, .8, 0}, .sun_irradiance = {3, 3, 3}, .planet_count = 1, .planets = &planet};

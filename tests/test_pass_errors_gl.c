@@ -174,7 +174,7 @@ static void test_shaders_that_the_driver_refuses(void **state)
     static stage s;
     open_stage(&s, NB_GL_330);
     nebel_gl_pass pass = pass_of(&s);
-    pass.output = NEBEL_GL_OUTPUT_BLEND_GREY; /* another program, so that all functions are loaded that are replaced */
+    pass.output = NEBEL_GL_OUTPUT_BLEND_GRAY; /* another program, so that all functions are loaded that are replaced */
     assert_int_equal(nebel_gl_draw_fog(s.gl, &pass), NEBEL_OK);
     const int objects = pass_count_objects();
     true_shader_source = epoxy_glShaderSource;
@@ -343,7 +343,7 @@ static void test_views_that_are_none(void **state)
 {
     (void)state;
     static stage s;
-    nebel_gl_fog fog;
+    nebel_gl_fog_resources fog;
     open_stage(&s, NB_GL_300ES);
     nebel_view view = s.picture.view;
     view.height = 0;
@@ -355,7 +355,7 @@ static void test_views_that_are_none(void **state)
     view.eye_from_world[3] = 1;
     expect_message(nebel_gl_set_fog(s.gl, s.fog, &view), NEBEL_ERROR_ARGUMENT, "eye_from_world must be a rotation");
     expect_message(nebel_gl_set_fog(s.gl, s.fog, NULL), NEBEL_ERROR_ARGUMENT, "view is missing");
-    expect_message(nebel_gl_get_fog(s.gl, &fog), NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog first");
+    expect_message(nebel_gl_get_fog_resources(s.gl, &fog), NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog first");
     assert_int_equal(nebel_gl_set_fog(NULL, s.fog, &view), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_gl_draw_fog(NULL, NULL), NEBEL_ERROR_ARGUMENT);
     close_stage(&s);
@@ -384,11 +384,11 @@ static void refuse_depths(stage *s)
     } cases[] = {
         {{.range = {.5, .5}}, "depth.range must"},
         {{.range = {0, (double)INFINITY}}, "depth.range must"},
-        {{.sky = (nebel_sky)3}, "depth.sky must"},
-        {{.start = (nebel_start)2}, "depth.start must"},
-        {{.kind = NEBEL_DEPTH_KIND_COUNT}, "depth.kind must"},
-        {{.kind = NEBEL_DEPTH_KIND_LOGARITHM}, "depth.log_far must"},
-        {{.kind = NEBEL_DEPTH_KIND_LOGARITHM, .log_scale = -1, .log_far = 9}, "depth.log_scale must"},
+        {{.background = (nebel_background_depth)3}, "depth.sky must"},
+        {{.ray_start = (nebel_ray_start)2}, "depth.start must"},
+        {{.encoding = NEBEL_DEPTH_ENCODING_COUNT}, "depth.kind must"},
+        {{.encoding = NEBEL_DEPTH_ENCODING_LOGARITHMIC}, "depth.log_far must"},
+        {{.encoding = NEBEL_DEPTH_ENCODING_LOGARITHMIC, .log_scale = -1, .log_far = 9}, "depth.log_scale must"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         nebel_gl_pass pass = pass_of(s);
@@ -512,8 +512,8 @@ static void test_what_embedded_contexts_lack(void **state)
     assert_int_equal(nebel_gl_set_fog(s.gl, s.fog, &s.picture.view), NEBEL_OK);
     pass = pass_of(&s);
     pass.output = NEBEL_GL_OUTPUT_BLEND;
-    refuse(&s, pass, NEBEL_ERROR_UNSUPPORTED, "NEBEL_GL_OUTPUT_BLEND_GREY");
-    pass.output = NEBEL_GL_OUTPUT_BLEND_GREY;
+    refuse(&s, pass, NEBEL_ERROR_UNSUPPORTED, "NEBEL_GL_OUTPUT_BLEND_GRAY");
+    pass.output = NEBEL_GL_OUTPUT_BLEND_GRAY;
     assert_int_equal(nebel_gl_draw_fog(s.gl, &pass), NEBEL_OK);
     close_stage(&s);
 }

@@ -17,7 +17,7 @@ typedef struct split {
 static void draw_split(nebel_gl *gl, nebel_snapshot *fog, const pass_picture *picture, split *out)
 {
     const int width = (int)picture->view.width, height = (int)picture->view.height;
-    const int window = picture->depth.kind == NEBEL_DEPTH_KIND_WINDOW;
+    const int window = picture->depth.encoding == NEBEL_DEPTH_ENCODING_WINDOW;
     const unsigned depth = window ? pass_depth_texture(width, height, picture->stored)
                                   : pass_color_texture(width, height, 1, picture->stored);
     const unsigned first = pass_color_texture(width, height, 4, NULL),
@@ -125,9 +125,9 @@ static void test_every_kind_of_depth_agrees_with_trace(void **state)
     (void)state;
     const nebel_depth_desc kinds[] = {
         {.range = {.25, .75}, .zero_to_one = 1},
-        {.kind = NEBEL_DEPTH_KIND_AXIS},
-        {.kind = NEBEL_DEPTH_KIND_DISTANCE},
-        {.kind = NEBEL_DEPTH_KIND_LOGARITHM, .log_scale = 2, .log_far = 1e6},
+        {.encoding = NEBEL_DEPTH_ENCODING_AXIAL},
+        {.encoding = NEBEL_DEPTH_ENCODING_RADIAL},
+        {.encoding = NEBEL_DEPTH_ENCODING_LOGARITHMIC, .log_scale = 2, .log_far = 1e6},
     };
     for (int i = 0; i < 2; i++) {
         stage s = open_stage(languages[i]);
@@ -257,7 +257,7 @@ static pass_picture aim(double yaw, double pitch, const double point[3])
 {
     const matrix eye = look(pass_eye, yaw, pitch);
     double in_eye[3], square = 0;
-    pass_picture picture = {.clip = usual, .depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE}};
+    pass_picture picture = {.clip = usual, .depth = {.encoding = NEBEL_DEPTH_ENCODING_RADIAL}};
     for (int i = 0; i < 3; i++) {
         in_eye[i] = eye.m[12 + i];
         for (int k = 0; k < 3; k++) in_eye[i] += eye.m[4 * k + i] * point[k];
@@ -310,13 +310,13 @@ static void test_many_volumes_agree_with_trace(void **state)
             nebel_snapshot *const fog = pass_fog(counts[k]);
             pass_picture picture = {
                 .view = pass_view(PERSPECTIVE, reversed, .1, 0), .clip = reversed, .depth = {.zero_to_one = 1}};
-            nebel_gl_fog stored_fog;
+            nebel_gl_fog_resources stored_fog;
             char name[64];
             snprintf(name, sizeof name, "%d volumes", counts[k] < 0 ? 2 : counts[k] + 4);
             check_picture(s.gl, fog, &picture, name);
-            assert_int_equal(nebel_gl_get_fog(s.gl, &stored_fog), NEBEL_OK);
-            assert_true((stored_fog.block != 0) == (stored_fog.word_count <= NEBEL_BLOCK_WORDS));
-            assert_true((stored_fog.texture != 0) == (stored_fog.word_count > NEBEL_BLOCK_WORDS));
+            assert_int_equal(nebel_gl_get_fog_resources(s.gl, &stored_fog), NEBEL_OK);
+            assert_true((stored_fog.block != 0) == (stored_fog.texel_count <= NEBEL_BLOCK_TEXELS));
+            assert_true((stored_fog.texture != 0) == (stored_fog.texel_count > NEBEL_BLOCK_TEXELS));
             assert_true((stored_fog.tiles != 0) == (counts[k] >= 0));
             nebel_release_snapshot(fog);
         }
@@ -330,14 +330,14 @@ static void test_block_and_texture_give_the_same(void **state)
     static split block, texture;
     stage s = open_stage(NB_GL_330);
     nebel_gl *other = NULL;
-    nebel_gl_fog stored_fog;
+    nebel_gl_fog_resources stored_fog;
     nebel_snapshot *const fog = pass_fog(0);
     pass_picture picture = {.view = pass_view(PERSPECTIVE, usual, 2, 0), .clip = usual};
     pass_fill(&picture);
     assert_int_equal(nebel_create_gl(&(nebel_gl_desc){.storage = NEBEL_GL_STORAGE_TEXTURE}, &other), NEBEL_OK);
     draw_split(s.gl, fog, &picture, &block);
     draw_split(other, fog, &picture, &texture);
-    assert_int_equal(nebel_gl_get_fog(other, &stored_fog), NEBEL_OK);
+    assert_int_equal(nebel_gl_get_fog_resources(other, &stored_fog), NEBEL_OK);
     assert_true(stored_fog.block == 0 && stored_fog.texture != 0);
     assert_memory_equal(&block, &texture, sizeof block);
     nebel_destroy_gl(other);
@@ -415,7 +415,7 @@ static void check_sheet(const split *fog, nebel_gl_output output)
         const float *const t = fog->transmittance + 4 * i;
         const double grey = ((double)t[0] + (double)t[1] + (double)t[2]) / 3;
         for (int c = 0; c < 3; c++) {
-            const double through = output == NEBEL_GL_OUTPUT_BLEND_GREY ? grey : (double)t[c];
+            const double through = output == NEBEL_GL_OUTPUT_BLEND_GRAY ? grey : (double)t[c];
             const double wanted = through * (double)sheet_color[at + c] + (double)fog->in_scattering[4 * i + c];
             assert_true(fabs((double)sheet_out[at + c] - wanted) < 5e-7);
         }
@@ -436,7 +436,7 @@ static void test_every_output_puts_the_same_fog_over_its_pixels(void **state)
 {
     (void)state;
     static split fog_of_pixels;
-    const nebel_gl_output outputs[] = {NEBEL_GL_OUTPUT_COMPOSE, NEBEL_GL_OUTPUT_BLEND, NEBEL_GL_OUTPUT_BLEND_GREY};
+    const nebel_gl_output outputs[] = {NEBEL_GL_OUTPUT_COMPOSE, NEBEL_GL_OUTPUT_BLEND, NEBEL_GL_OUTPUT_BLEND_GRAY};
     for (int i = 0; i < 2; i++) {
         stage s = open_stage(languages[i]);
         nebel_snapshot *const fog = pass_fog(0);

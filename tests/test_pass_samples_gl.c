@@ -295,7 +295,7 @@ static void test_each_sample_is_blended_by_itself(void **state)
     stage s = open_stage();
     for (int grey = 0; grey < 2; grey++) {
         pass_difference everywhere = {0, 0, 0};
-        blend(&s, grey ? NEBEL_GL_OUTPUT_BLEND_GREY : NEBEL_GL_OUTPUT_BLEND, got);
+        blend(&s, grey ? NEBEL_GL_OUTPUT_BLEND_GRAY : NEBEL_GL_OUTPUT_BLEND, got);
         for (int i = 0; i < PASS_PIXELS; i++) {
             double wanted[3], alpha = 0;
             expect_blended(s.fog, i, grey, wanted);
@@ -334,7 +334,7 @@ static void test_each_odd_thing_alone(void **state)
     (void)state;
     static float plain[4 * PASS_PIXELS], strange[4 * PASS_PIXELS];
     for (int grey = 0; grey < 2; grey++) {
-        const nebel_gl_output output = grey ? NEBEL_GL_OUTPUT_BLEND_GREY : NEBEL_GL_OUTPUT_BLEND;
+        const nebel_gl_output output = grey ? NEBEL_GL_OUTPUT_BLEND_GRAY : NEBEL_GL_OUTPUT_BLEND;
         const char *name = "nothing";
         stage s = open_stage();
         draw_into_samples(&s, output, -1, &name, plain);

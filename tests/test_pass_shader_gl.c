@@ -1,4 +1,4 @@
-/* A host's own shader with nebel's text, reading what nebel_gl_get_fog hands out, gives the pixels of the pass; and the
+/* A host's own shader with nebel's text, reading what nebel_gl_get_fog_resources hands out, gives the pixels of the pass; and the
  * C words lie as the driver wants them. */
 #include <math.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@ static const range usual = {-1, 0};
 
 /* ---- the host's program ---------------------------------------------------------------------- */
 
-static unsigned make_program(const nebel_gl_fog *fog, int es)
+static unsigned make_program(const nebel_gl_fog_resources *fog, int es)
 {
     const char *const version = es ? "#version 300 es\n" : "#version 330 core\n";
     const char *const vertex[] = {version, "void main() { gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, "
@@ -25,10 +25,11 @@ static unsigned make_program(const nebel_gl_fog *fog, int es)
         "layout(location = 1) out highp vec4 second;\n"
         "void main()\n"
         "{\n"
-        "    nebel_sight s = nebel_see(gl_FragCoord.xy, texelFetch(depth, ivec2(gl_FragCoord.xy), 0).x);\n"
+        "    nebel_view_ray s = nebel_make_view_ray(gl_FragCoord.xy, texelFetch(depth, ivec2(gl_FragCoord.xy), 0).x);\n"
         "#ifdef NEBEL_TILES\n"
         "    int tile = int(gl_FragCoord.x) / size + int(gl_FragCoord.y) / size * columns;\n"
-        "    nebel_transfer l = nebel_trace_list(s.origin, s.direction, s.t_max, NEBEL_INDEX(2 * tile), NEBEL_INDEX(2 "
+        "    nebel_transfer l = nebel_trace_list(s.origin, s.direction, s.t_max, NEBEL_TILE_ENTRY(2 * tile), "
+        "NEBEL_TILE_ENTRY(2 "
         "* "
         "tile + 1));\n"
         "#else\n"
@@ -39,9 +40,9 @@ static unsigned make_program(const nebel_gl_fog *fog, int es)
         "}\n";
     char defines[256];
     snprintf(defines, sizeof defines, "#define NEBEL_VIEW\n#define NEBEL_FEATURES %u\n%s%s", fog->features,
-             fog->texture ? "#define NEBEL_TEXTURE\n" : "", fog->tiles ? "#define NEBEL_TILES\n" : "");
+             fog->texture ? "#define NEBEL_FOG_TEXTURE\n" : "", fog->tiles ? "#define NEBEL_TILES\n" : "");
     const char *const fragment[] = {
-        version, defines, nebel_shader_text(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330), main_text};
+        version, defines, nebel_get_shader_source(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330), main_text};
     const unsigned program = glCreateProgram();
     pass_attach(program, GL_VERTEX_SHADER, 2, vertex);
     pass_attach(program, GL_FRAGMENT_SHADER, 4, fragment);
@@ -53,7 +54,7 @@ static unsigned make_program(const nebel_gl_fog *fog, int es)
 
 static void check_block(unsigned program)
 {
-    const char *const name = "nebel_words[0]";
+    const char *const name = "nebel_texels[0]";
     const unsigned block = glGetUniformBlockIndex(program, "nebel_fog_block");
     GLuint index = GL_INVALID_INDEX;
     GLint size = 0, offset = -1, stride = 0, length = 0;
@@ -64,10 +65,10 @@ static void check_block(unsigned program)
     glGetActiveUniformsiv(program, 1, &index, GL_UNIFORM_OFFSET, &offset);
     glGetActiveUniformsiv(program, 1, &index, GL_UNIFORM_ARRAY_STRIDE, &stride);
     glGetActiveUniformsiv(program, 1, &index, GL_UNIFORM_SIZE, &length);
-    assert_int_equal(size, NEBEL_BLOCK_WORDS * sizeof(nebel_word));
+    assert_int_equal(size, NEBEL_BLOCK_TEXELS * sizeof(nebel_texel_f32));
     assert_int_equal(offset, 0);
-    assert_int_equal(stride, sizeof(nebel_word));
-    assert_int_equal(length, NEBEL_BLOCK_WORDS);
+    assert_int_equal(stride, sizeof(nebel_texel_f32));
+    assert_int_equal(length, NEBEL_BLOCK_TEXELS);
     glUniformBlockBinding(program, block, 3);
 }
 
@@ -84,16 +85,16 @@ static void bind(unsigned program, const char *name, int unit, unsigned texture)
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
 }
 
-static void draw_own(const nebel_gl_fog *fog, const nebel_view *view, unsigned depth, int es)
+static void draw_own(const nebel_gl_fog_resources *fog, const nebel_view *view, unsigned depth, int es)
 {
     nebel_rays rays;
     unsigned array;
     const unsigned program = make_program(fog, es);
-    assert_int_equal(nebel_view_rays(view, NULL, &rays), NEBEL_OK);
+    assert_int_equal(nebel_compute_view_rays(view, NULL, &rays), NEBEL_OK);
     glGenVertexArrays(1, &array);
     glBindVertexArray(array);
     glUseProgram(program);
-    glUniform4fv(glGetUniformLocation(program, "nebel_rays"), NEBEL_RAY_WORDS, rays.words[0].v);
+    glUniform4fv(glGetUniformLocation(program, "nebel_rays"), NEBEL_RAY_TEXELS, rays.texels[0].v);
     glUniform1i(glGetUniformLocation(program, "columns"), (GLint)fog->tile_columns);
     glUniform1i(glGetUniformLocation(program, "size"), (GLint)fog->tile_size);
     bind(program, "depth", 5, depth);
@@ -114,7 +115,7 @@ static void check(int es, int volumes)
 {
     nb_gl context;
     nebel_gl *gl = NULL;
-    nebel_gl_fog stored_fog;
+    nebel_gl_fog_resources stored_fog;
     pass_open(&context, es ? NB_GL_300ES : NB_GL_330);
     nebel_snapshot *const fog = pass_fog(volumes);
     pass_picture picture = {.view = pass_view(PERSPECTIVE, usual, .3, -.1), .clip = usual};
@@ -128,7 +129,7 @@ static void check(int es, int volumes)
     assert_int_equal(nebel_gl_draw_fog(gl, &(nebel_gl_pass){.output = NEBEL_GL_OUTPUT_SPLIT, .depth_texture = depth}),
                      NEBEL_OK);
     for (int i = 0; i < 2; i++) pass_read(targets[i], PASS_WIDTH, PASS_HEIGHT, theirs[i]);
-    assert_int_equal(nebel_gl_get_fog(gl, &stored_fog), NEBEL_OK);
+    assert_int_equal(nebel_gl_get_fog_resources(gl, &stored_fog), NEBEL_OK);
     draw_own(&stored_fog, &picture.view, depth, es);
     for (int i = 0; i < 2; i++) pass_read(targets[i], PASS_WIDTH, PASS_HEIGHT, own[i]);
     for (int i = 0; i < 2; i++) {

@@ -105,14 +105,14 @@ static const char fragment_text[] =
     "}\n"
     "void main()\n"
     "{\n"
-    "    nebel_sight s = nebel_see(gl_FragCoord.xy, texelFetch(depth, ivec2(gl_FragCoord.xy), 0).x);\n"
+    "    nebel_view_ray s = nebel_make_view_ray(gl_FragCoord.xy, texelFetch(depth, ivec2(gl_FragCoord.xy), 0).x);\n"
     "    if (surface_light.a >= s.t_max) discard;\n"
     "    nebel_blend blend = blend_of(nebel_trace(s.origin, s.direction, surface_light.a));\n"
     "#if PATH == 0\n"
     "    source = vec4(blend.source, 0.0);\n"
     "    factor = vec4(blend.factor, 1.0);\n"
     "#elif PATH == 1\n"
-    "    source = nebel_blend_grey(blend);\n"
+    "    source = nebel_blend_gray(blend);\n"
     "#else\n"
     "    source = vec4(stage == 0 ? blend.factor : blend.source, 1.0);\n"
     "#endif\n"
@@ -124,14 +124,15 @@ static unsigned make_program(const nebel_gl *gl, nb_gl_language language, path h
     const char *const version = es ? "#version 300 es\n" : "#version 330 core\n";
     const char *const vertex[] = {version, "void main() { gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, "
                                            "float(gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }\n"};
-    nebel_gl_fog fog;
+    nebel_gl_fog_resources fog;
     char defines[128];
-    assert_int_equal(nebel_gl_get_fog(gl, &fog), NEBEL_OK);
+    assert_int_equal(nebel_gl_get_fog_resources(gl, &fog), NEBEL_OK);
     snprintf(defines, sizeof defines,
              "#define NEBEL_VIEW\n#define NEBEL_TRANSPARENT\n#define NEBEL_FEATURES %u\n#define PATH %d\n",
              fog.features, (int)how);
-    const char *const fragment[] = {
-        version, defines, nebel_shader_text(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330), fragment_text};
+    const char *const fragment[] = {version, defines,
+                                    nebel_get_shader_source(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330),
+                                    fragment_text};
     const unsigned program = glCreateProgram();
     pass_attach(program, GL_VERTEX_SHADER, 2, vertex);
     pass_attach(program, GL_FRAGMENT_SHADER, 4, fragment);
@@ -142,14 +143,14 @@ static unsigned make_program(const nebel_gl *gl, nb_gl_language language, path h
 static void use_program(unsigned program, const nebel_gl *gl, const pass_picture *picture, unsigned depth)
 {
     nebel_rays rays;
-    nebel_gl_fog fog;
-    assert_int_equal(nebel_gl_get_fog(gl, &fog), NEBEL_OK);
-    assert_int_equal(nebel_view_rays(&picture->view, &picture->depth, &rays), NEBEL_OK);
+    nebel_gl_fog_resources fog;
+    assert_int_equal(nebel_gl_get_fog_resources(gl, &fog), NEBEL_OK);
+    assert_int_equal(nebel_compute_view_rays(&picture->view, &picture->depth, &rays), NEBEL_OK);
     assert_true(fog.block != 0);
     glUseProgram(program);
     glUniformBlockBinding(program, glGetUniformBlockIndex(program, "nebel_fog_block"), 3);
     glBindBufferBase(GL_UNIFORM_BUFFER, 3, fog.block);
-    glUniform4fv(glGetUniformLocation(program, "nebel_rays"), NEBEL_RAY_WORDS, rays.words[0].v);
+    glUniform4fv(glGetUniformLocation(program, "nebel_rays"), NEBEL_RAY_TEXELS, rays.texels[0].v);
     glUniform1i(glGetUniformLocation(program, "depth"), 5);
     glActiveTexture(GL_TEXTURE5);
     glBindTexture(GL_TEXTURE_2D, depth);
@@ -238,7 +239,7 @@ static void try_path(nb_gl_language language, path how)
     pass_open(&context, language);
     nebel_snapshot *const fog = pass_fog(0);
     picture = (pass_picture){.view = pass_view(PERSPECTIVE, usual, .3, -.1), .clip = usual};
-    picture.depth.kind = NEBEL_DEPTH_KIND_DISTANCE;
+    picture.depth.encoding = NEBEL_DEPTH_ENCODING_RADIAL;
     pass_fill(&picture);
     for (int i = 0; i < 4 * PASS_PIXELS; i++) background[i] = i % 4 == 3 ? .25f : (float)dice(&state, 0, 2);
     assert_int_equal(nebel_create_gl(&(nebel_gl_desc){0}, &gl), NEBEL_OK);

@@ -1,4 +1,4 @@
-/* Crowds in a host's own shader: more volumes of different light in one place than NEBEL_MOST_TURNS has turns of loops
+/* Crowds in a host's own shader: more volumes of different light in one place than NEBEL_MAX_ITERATIONS has turns of loops
  * for. What comes out then is what docs/shaders.md promises. */
 #include <math.h>
 #include <stdio.h>
@@ -48,7 +48,7 @@ typedef struct split {
 } split;
 
 /* A host's shader that says how many turns there are, as many as nebel/gl.h finds on llvmpipe. */
-static unsigned make_program(const nebel_gl_fog *fog)
+static unsigned make_program(const nebel_gl_fog_resources *fog)
 {
     const char *const vertex = "#version 330 core\n"
                                "void main() { gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, "
@@ -59,17 +59,17 @@ static unsigned make_program(const nebel_gl_fog *fog)
         "layout(location = 1) out vec4 second;\n"
         "void main()\n"
         "{\n"
-        "    nebel_sight s = nebel_see(gl_FragCoord.xy, texelFetch(depth, ivec2(gl_FragCoord.xy), 0).x);\n"
+        "    nebel_view_ray s = nebel_make_view_ray(gl_FragCoord.xy, texelFetch(depth, ivec2(gl_FragCoord.xy), 0).x);\n"
         "    nebel_transfer l = nebel_trace(s.origin, s.direction, s.t_max);\n"
         "    first = vec4(l.in_scattering, 1.0);\n"
         "    second = vec4(l.transmittance, 1.0);\n"
         "}\n";
     char head[256];
     snprintf(head, sizeof head,
-             "#version 330 core\n#define NEBEL_VIEW\n#define NEBEL_MOST_TURNS 24000\n#define NEBEL_TEXTURE\n"
+             "#version 330 core\n#define NEBEL_VIEW\n#define NEBEL_MAX_ITERATIONS 24000\n#define NEBEL_FOG_TEXTURE\n"
              "#define NEBEL_FEATURES %u\n",
              fog->features);
-    const char *const fragment[] = {head, nebel_shader_text(NEBEL_DIALECT_GLSL_330), main_text};
+    const char *const fragment[] = {head, nebel_get_shader_source(NEBEL_DIALECT_GLSL_330), main_text};
     const unsigned program = glCreateProgram();
     pass_attach(program, GL_VERTEX_SHADER, 1, &vertex);
     pass_attach(program, GL_FRAGMENT_SHADER, 3, fragment);
@@ -90,7 +90,7 @@ static void draw(nebel_snapshot *snapshot, const pass_picture *picture, split *o
 {
     nb_gl context;
     nebel_gl *gl = NULL;
-    nebel_gl_fog fog;
+    nebel_gl_fog_resources fog;
     nebel_rays rays;
     unsigned array;
     pass_open(&context, NB_GL_330);
@@ -100,13 +100,13 @@ static void draw(nebel_snapshot *snapshot, const pass_picture *picture, split *o
                                 pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL)};
     const unsigned framebuffer = pass_framebuffer(targets[0], targets[1]);
     assert_int_equal(nebel_gl_set_fog(gl, snapshot, &picture->view), NEBEL_OK);
-    assert_int_equal(nebel_gl_get_fog(gl, &fog), NEBEL_OK);
-    assert_int_equal(nebel_view_rays(&picture->view, NULL, &rays), NEBEL_OK);
+    assert_int_equal(nebel_gl_get_fog_resources(gl, &fog), NEBEL_OK);
+    assert_int_equal(nebel_compute_view_rays(&picture->view, NULL, &rays), NEBEL_OK);
     const unsigned program = make_program(&fog);
     glGenVertexArrays(1, &array);
     glBindVertexArray(array);
     glUseProgram(program);
-    glUniform4fv(glGetUniformLocation(program, "nebel_rays"), NEBEL_RAY_WORDS, rays.words[0].v);
+    glUniform4fv(glGetUniformLocation(program, "nebel_rays"), NEBEL_RAY_TEXELS, rays.texels[0].v);
     bind(program, "depth", 0, depth);
     bind(program, "nebel_fog_texture", 1, fog.texture);
     glViewport(0, 0, PASS_WIDTH, PASS_HEIGHT);

@@ -178,8 +178,8 @@ static void check_triangle(nb_gl_language language)
     memcpy(points.origin, middle, sizeof points.origin);
     memcpy(points.eye, camera.position, sizeof points.eye);
     const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, corners, 0};
-    assert_int_equal(nebel_fog_vertices(fog, NULL, 3, &points, &output, 1), NEBEL_OK);
-    assert_int_equal(nebel_gl_camera_view(&camera, WIDTH, HEIGHT, NULL, &view), NEBEL_OK);
+    assert_int_equal(nebel_compute_vertex_fog(fog, NULL, 3, &points, &output, 1), NEBEL_OK);
+    assert_int_equal(nebel_view_from_camera(&camera, WIDTH, HEIGHT, NULL, &view), NEBEL_OK);
     pass_open(&context, language);
     draw_alone(&f, fog, &camera, NEBEL_GL_METHOD_VERTEX, &p);
     for (int i = 0; i < PIXELS; i++) {
@@ -330,7 +330,7 @@ static void check_pixels(nebel_gl_renderer *renderer, nebel_gl_frame_desc desc, 
     nebel_view view;
     int fogged = 0;
     desc.method = NEBEL_GL_METHOD_CELLS_PIXEL;
-    assert_int_equal(nebel_gl_camera_view(&desc.camera, WIDTH, HEIGHT, NULL, &view), NEBEL_OK);
+    assert_int_equal(nebel_view_from_camera(&desc.camera, WIDTH, HEIGHT, NULL, &view), NEBEL_OK);
     assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);
     assert_int_equal(nebel_gl_read_planes(renderer, &wanted), NEBEL_OK);
     for (int i = 0; i < PIXELS; i++) {
@@ -342,7 +342,8 @@ static void check_pixels(nebel_gl_renderer *renderer, nebel_gl_frame_desc desc, 
             from.eye[k] = desc.camera.position[k];
             point.position[k] = from.eye[k] + (double)p.depth[i] * (double)ray.direction[k];
         }
-        if (isfinite(p.depth[i])) assert_int_equal(nebel_fog_cells(cells, &from, 1, &point, 0, &fog, 0), NEBEL_OK);
+        if (isfinite(p.depth[i]))
+            assert_int_equal(nebel_compute_cell_fog(cells, &from, 1, &point, 0, &fog, 0), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
             assert_true(fabs((double)p.transmittance[i][c] - (1 - fog.alpha)) < 1e-5);
             assert_true(fabs((double)p.in_scattering[i][c] - fog.color[c]) < 1e-5);
@@ -358,7 +359,7 @@ static void test_cells_are_drawn_like_volumes(void **state)
     (void)state;
     static floor_mesh f;
     static planes by_volumes, by_cells;
-    const nebel_volume_desc volumes[] = {nebel_cell_volume(&rooms[0]), nebel_cell_volume(&rooms[1])};
+    const nebel_volume_desc volumes[] = {nebel_volume_from_cell(&rooms[0]), nebel_volume_from_cell(&rooms[1])};
     nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, volumes, 2);
     nebel_cells *const cells = create_rooms();
     nb_gl context;
@@ -443,7 +444,7 @@ static void check_factor(nebel_gl_renderer *renderer, const floor_mesh *f, const
     nebel_view view;
     float corners[3][4] = {{0}};
     double lowest = 1, highest = 0;
-    assert_int_equal(nebel_gl_camera_view(camera, WIDTH, HEIGHT, NULL, &view), NEBEL_OK);
+    assert_int_equal(nebel_view_from_camera(camera, WIDTH, HEIGHT, NULL, &view), NEBEL_OK);
     for (int i = 0; i < 3; i++) {
         double from_eye[3];
         for (int k = 0; k < 3; k++) from_eye[k] = middle[k] + (double)f->positions[i][k] - camera->position[k];

@@ -77,10 +77,10 @@ static void values_are_those_of_T22(void **state)
                  0.6851851851851852}};
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        expect_near("ahead", nebel_phase_value(&rows[i].phase, 1), rows[i].at_0, tolerance);
-        expect_near("30 degrees", nebel_phase_value(&rows[i].phase, cos(PI / 6)), rows[i].at_30, tolerance);
-        expect_near("90 degrees", nebel_phase_value(&rows[i].phase, 0), rows[i].at_90, tolerance);
-        expect_near("back", nebel_phase_value(&rows[i].phase, -1), rows[i].at_180, tolerance);
+        expect_near("ahead", nebel_evaluate_phase(&rows[i].phase, 1), rows[i].at_0, tolerance);
+        expect_near("30 degrees", nebel_evaluate_phase(&rows[i].phase, cos(PI / 6)), rows[i].at_30, tolerance);
+        expect_near("90 degrees", nebel_evaluate_phase(&rows[i].phase, 0), rows[i].at_90, tolerance);
+        expect_near("back", nebel_evaluate_phase(&rows[i].phase, -1), rows[i].at_180, tolerance);
         expect_near("mean", nebel_phase_mean_cosine(&rows[i].phase), rows[i].mean, tolerance);
     }
 }
@@ -100,10 +100,10 @@ static void droplets_are_those_of_T23(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         const nebel_phase phase = {.type = NEBEL_PHASE_DROPLETS, .diameter = rows[i][0]};
-        expect_near("ahead", nebel_phase_value(&phase, 1), rows[i][1], 1e-11);
-        expect_near("90 degrees", nebel_phase_value(&phase, 0), rows[i][2], 1e-11);
-        expect_near("140 degrees", nebel_phase_value(&phase, cos(140 * PI / 180)), rows[i][3], 1e-11);
-        expect_near("back", nebel_phase_value(&phase, -1), rows[i][4], 1e-11);
+        expect_near("ahead", nebel_evaluate_phase(&phase, 1), rows[i][1], 1e-11);
+        expect_near("90 degrees", nebel_evaluate_phase(&phase, 0), rows[i][2], 1e-11);
+        expect_near("140 degrees", nebel_evaluate_phase(&phase, cos(140 * PI / 180)), rows[i][3], 1e-11);
+        expect_near("back", nebel_evaluate_phase(&phase, -1), rows[i][4], 1e-11);
         expect_near("mean", nebel_phase_mean_cosine(&phase), rows[i][5], 1e-11);
     }
 }
@@ -123,10 +123,10 @@ static void samples_are_those_of_T24(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         const nebel_phase phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = rows[i][0]};
-        expect_near("henyey_greenstein", nebel_phase_sample(&phase, rows[i][1]), rows[i][2], tolerance);
+        expect_near("henyey_greenstein", nebel_sample_phase(&phase, rows[i][1]), rows[i][2], tolerance);
     }
     for (size_t i = 0; i < 3; i++)
-        expect_near("rayleigh", nebel_phase_sample(&(nebel_phase){.type = NEBEL_PHASE_RAYLEIGH}, rayleigh[i][0]),
+        expect_near("rayleigh", nebel_sample_phase(&(nebel_phase){.type = NEBEL_PHASE_RAYLEIGH}, rayleigh[i][0]),
                     rayleigh[i][1], tolerance);
 }
 
@@ -146,7 +146,7 @@ static void integrate(const nebel_phase *phase, double end, double *light, doubl
         const double from = fmin(low, end), to = fmin(high, end), half = (to - from) / (2 * PARTS);
         for (int i = 0; i < 3 * PARTS && half > 0; i++) {
             const double c = from + half * (2 * (i / 3) + 1 + nodes[i % 3]);
-            const double value = 2 * PI * half * weights[i % 3] * nebel_phase_value(phase, c);
+            const double value = 2 * PI * half * weights[i % 3] * nebel_evaluate_phase(phase, c);
             *light += value;
             *moment += value * c;
         }
@@ -169,10 +169,10 @@ static void samples_invert_the_integral(void **state)
     static const double parts[] = {1e-3, 0.2, 0.5, 0.77, 0.999};
     (void)state;
     for (int i = 0; i < COUNT; i++) {
-        assert_true(nebel_phase_sample(&all[i], 0) < -1 + 1e-9 && nebel_phase_sample(&all[i], 1) > 1 - 1e-9);
+        assert_true(nebel_sample_phase(&all[i], 0) < -1 + 1e-9 && nebel_sample_phase(&all[i], 1) > 1 - 1e-9);
         for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++) {
             double light, moment;
-            integrate(&all[i], nebel_phase_sample(&all[i], parts[k]), &light, &moment);
+            integrate(&all[i], nebel_sample_phase(&all[i], parts[k]), &light, &moment);
             expect_near("part", light, parts[k], 1e-7);
         }
     }
@@ -190,13 +190,13 @@ static void what_is_out_of_range_is_not_a_number(void **state)
                                         {.type = NEBEL_PHASE_DROPLETS, .diameter = 51}};
     (void)state;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        assert_true(isnan(nebel_phase_value(&wrong[i], 0.5)));
+        assert_true(isnan(nebel_evaluate_phase(&wrong[i], 0.5)));
         assert_true(isnan(nebel_phase_mean_cosine(&wrong[i])));
-        assert_true(isnan(nebel_phase_sample(&wrong[i], 0.5)));
+        assert_true(isnan(nebel_sample_phase(&wrong[i], 0.5)));
     }
     const nebel_phase even = {.type = NEBEL_PHASE_ISOTROPIC};
-    assert_true(isnan(nebel_phase_value(&even, 1.1)) && isnan(nebel_phase_value(&even, (double)NAN)));
-    assert_true(isnan(nebel_phase_sample(&even, -0.1)) && isnan(nebel_phase_sample(&even, (double)NAN)));
+    assert_true(isnan(nebel_evaluate_phase(&even, 1.1)) && isnan(nebel_evaluate_phase(&even, (double)NAN)));
+    assert_true(isnan(nebel_sample_phase(&even, -0.1)) && isnan(nebel_sample_phase(&even, (double)NAN)));
 }
 
 int main(void)

@@ -29,7 +29,9 @@ typedef struct world {
 static void make_world_under(const nebel_cloud_layer *layer, double lift, world *w)
 {
     static const double sun[3] = {.6, .64, .48};
-    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"), .sun_diameter = .53, .cloud_layer_count = 1},
+    *w = (world){.planet = {.atmosphere_desc = *nebel_lookup_atmosphere("earth"),
+                            .sun_angular_diameter = .53,
+                            .cloud_layer_count = 1},
                  .mesh = {.origin = {200, -100, -2500},
                           .positions = wall[0],
                           .indices = wall_indices,
@@ -37,8 +39,8 @@ static void make_world_under(const nebel_cloud_layer *layer, double lift, world 
                           .triangle_count = 2,
                           .base_color = {.8f, .8f, .8f},
                           .texture = -1}};
-    w->planet.air.ground[1] = -lift;
-    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    w->planet.atmosphere_desc.ground_point[1] = -lift;
+    assert_int_equal(nebel_create_atmosphere(&w->planet.atmosphere_desc, &w->atmosphere), NEBEL_OK);
     const nebel_clouds_desc desc = {.atmosphere = w->atmosphere, .layers = {*layer}, .layer_count = 1};
     assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
     w->planet.atmosphere = w->atmosphere;
@@ -195,7 +197,7 @@ static nebel_camera make_horizon(double below, world *w)
 {
     const double pixel = 2 * tan(30 * acos(-1) / 180) / (54 * scale), dip = below * pixel;
     make_world(.4, 0, w);
-    return planet_camera(.5 * dip * dip * w->planet.air.radius, pixel);
+    return planet_camera(.5 * dip * dip * w->planet.atmosphere_desc.radius, pixel);
 }
 
 /* Of two samples one sees the ground, the other clouds beyond the horizon; the middle of the pixel sees either. */
@@ -222,9 +224,9 @@ static void sheets_lie_over_mist(void **state)
     (void)state;
     nb_gl context;
     world w;
-    make_world_under(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .base = 1500, .coverage = .5}, 0, &w);
+    make_world_under(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .base = 1500, .coverage = .5}, 0, &w);
     memcpy(w.scene.sun_direction, (const double[3]){.78, .046, -.624}, sizeof w.scene.sun_direction);
-    nebel_snapshot *const mist = planet_mist(w.planet.air.radius, w.scene.sun_direction);
+    nebel_snapshot *const mist = planet_mist(w.planet.atmosphere_desc.radius, w.scene.sun_direction);
     memset(w.scene.ambient, 0, sizeof w.scene.ambient);
     for (int c = 0; c < 3; c++) w.scene.sun_irradiance[c] = 20;
     nebel_camera camera = planet_camera(3e5, -.41);
@@ -268,7 +270,7 @@ static void threads_and_frames_change_nothing(void **state)
     assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &(nebel_gl_renderer_desc){0}, &renderer), NEBEL_OK);
     draw(renderer, 0, once);
     nebel_destroy_gl_renderer(renderer);
-    const nebel_gl_renderer_desc threaded = {.run = nebel_run_parts};
+    const nebel_gl_renderer_desc threaded = {.run = nebel_parallel_for_openmp};
     assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &threaded, &renderer), NEBEL_OK);
     draw(renderer, 7, later);
     draw(renderer, 0, again);

@@ -62,13 +62,13 @@ static void mist_seas_are_the_same(void **state)
         assert_true(nb_vector_make_unit(sun.direction));
         assert_int_equal(
             nebel_load_scene(NEBEL_SOURCE "/examples/scenes/mist-sea.json", &(nebel_scene_desc){0}, &scene), NEBEL_OK);
-        assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
-        assert_int_equal(nebel_light_scene_by(scene, &sun), NEBEL_OK);
+        assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
+        assert_int_equal(nebel_set_scene_sun(scene, &sun), NEBEL_OK);
         assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-        nebel_scene_data data = *nebel_scene_contents(scene);
+        nebel_scene_data data = *nebel_get_scene_data(scene);
         memcpy(data.sun_direction, sun.direction, sizeof sun.direction);
         data.mesh_count = 0;
-        const nebel_camera camera = nebel_scene_camera(scene, k % 3);
+        const nebel_camera camera = nebel_get_scene_camera(scene, k % 3);
         snprintf(name, sizeof name, "frame %d of a sea of mist, sun %d", k % 3, k / 3);
         picture_pair pair = check(name, &data, fog, &camera);
         assert_true(picture_largest_light(&pair) > .01);
@@ -93,8 +93,8 @@ static void turn(double radius, double angle, double place[3])
 static nebel_camera turned_camera(const worlds *s, double angle)
 {
     nebel_camera camera = planet_camera(25, .75);
-    turn(s->planets[0].air.radius, angle, camera.position);
-    turn(s->planets[0].air.radius, angle, camera.look_at);
+    turn(s->planets[0].atmosphere_desc.radius, angle, camera.position);
+    turn(s->planets[0].atmosphere_desc.radius, angle, camera.look_at);
     turn(0, angle, camera.up);
     return camera;
 }
@@ -108,23 +108,24 @@ static nebel_snapshot *make_ball(const worlds *s, double angle, const nebel_envi
     nebel_fog *fog;
     nebel_snapshot *snapshot;
     static const double origin[1][3] = {{0, 0, 0}};
-    nebel_air_light light;
+    nebel_irradiance light;
     nebel_fog_desc desc = {.sun = s->sun};
     nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 80, -70}, .radius = 20},
                               .extinction = {.02, .03, .04},
                               .albedo = {.9, .8, .7},
                               .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .3}};
-    nebel_lamp lamp = {.position = {0, 80, -70}, .intensity = {300, 200, 100}, .radius = 1};
-    turn(s->planets[0].air.radius, angle, ball.shape.center);
+    nebel_light lamp = {.position = {0, 80, -70}, .intensity = {300, 200, 100}, .radius = 1};
+    turn(s->planets[0].atmosphere_desc.radius, angle, ball.shape.center);
     memcpy(lamp.position, ball.shape.center, sizeof lamp.position);
     for (int c = 0; c < 3 && (own & GLOW) != 0; c++) ball.emission[c] = .002 * (c + 1);
-    assert_int_equal(nebel_light_air(s->atmospheres[0], &s->sun, 1, origin, 0, &light, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_atmosphere_irradiance(s->atmospheres[0], &s->sun, 1, origin, 0, &light, 0),
+                     NEBEL_OK);
     memcpy(desc.sun.irradiance, light.sun, sizeof light.sun);
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     assert_int_equal(nebel_set_environment(fog, sky), NEBEL_OK);
     if ((own & LAMP) != 0) assert_int_equal(nebel_set_lamps(fog, 1, &lamp), NEBEL_OK);
     if ((own & DIFFUSE) != 0)
-        assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.cells = 4096}), NEBEL_OK);
+        assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.max_cells = 4096}), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &ball, NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     nebel_destroy_fog(fog);

@@ -60,14 +60,14 @@ static const trial trials[] = {
     {.name = "ball",
      .count = 1,
      .volumes = {{.shape = BALL, .extinction = {5, 5, 5}, .albedo = {1, 1, 1}}},
-     .diffusion = {.cells = 2048}},
+     .diffusion = {.max_cells = 2048}},
     {.name = "droplets, far out",
      .count = 1,
      .volumes = {{.shape = BALL,
                   .extinction = {4, 4, 4},
                   .albedo = {1, 1, 1},
                   .phase = {.type = NEBEL_PHASE_DROPLETS, .diameter = 16}}},
-     .diffusion = {.cells = 2048},
+     .diffusion = {.max_cells = 2048},
      .far = 1e7},
     {.name = "colours beside soot",
      .count = 2,
@@ -77,7 +77,7 @@ static const trial trials[] = {
                   .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .7}},
                  {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-3, -.4, -3}, .max = {3, .4, 3}},
                   .extinction = {.6, .5, .3}}},
-     .diffusion = {.cells = 2048},
+     .diffusion = {.max_cells = 2048},
      .projection = NEBEL_PROJECTION_PANORAMA},
     {.name = "height fog over a bright ground",
      .count = 1,
@@ -92,7 +92,7 @@ static const trial trials[] = {
                  {.extinction = {.3, .4, .5},
                   .albedo = {1, 1, 1},
                   .density = {.type = NEBEL_DENSITY_HEIGHT, .base = -2, .scale_height = 1}}},
-     .diffusion = {.cells = 2048, .has_ground = 1, .ground_height = -2}},
+     .diffusion = {.max_cells = 2048, .has_ground = 1, .ground_height = -2}},
     {.name = "what is left of a box",
      .count = 2,
      .volumes = {{.shape = {.type = NEBEL_SHAPE_BOX, .min = {-2, -1, -2}, .max = {2, 1, 1}},
@@ -101,7 +101,7 @@ static const trial trials[] = {
                  {.operation = NEBEL_OPERATION_EXCLUDE,
                   .priority = 1,
                   .shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1.2}}},
-     .diffusion = {.cells = 2048}},
+     .diffusion = {.max_cells = 2048}},
     {.name = "smoke in height fog, overcast",
      .count = 2,
      .volumes = {{.shape = BALL,
@@ -111,7 +111,7 @@ static const trial trials[] = {
                  {.extinction = {.3, .4, .5},
                   .albedo = {1, .98, .9},
                   .density = {.type = NEBEL_DENSITY_HEIGHT, .base = -2, .scale_height = 1}}},
-     .diffusion = {.cells = 2048, .has_ground = 1, .ground_height = -2, .ground_albedo = {.1, .3, .1}},
+     .diffusion = {.max_cells = 2048, .has_ground = 1, .ground_height = -2, .ground_albedo = {.1, .3, .1}},
      .is_overcast = 1},
     {.name = "lamps in coloured droplets",
      .count = 1,
@@ -119,7 +119,7 @@ static const trial trials[] = {
                   .extinction = {1, 1.2, 1.5},
                   .albedo = {1, 1, .9},
                   .phase = {.type = NEBEL_PHASE_DROPLETS, .diameter = 16}}},
-     .diffusion = {.cells = 2048},
+     .diffusion = {.max_cells = 2048},
      .is_night = 1},
     {.name = "lamps and fire in height fog",
      .count = 2,
@@ -127,18 +127,18 @@ static const trial trials[] = {
                  {.extinction = {.8, .8, .8},
                   .albedo = {1, 1, 1},
                   .density = {.type = NEBEL_DENSITY_HEIGHT, .base = -2, .scale_height = 1}}},
-     .diffusion = {.cells = 2048, .has_ground = 1, .ground_height = -2, .ground_albedo = {.5, .5, .5}},
+     .diffusion = {.max_cells = 2048, .has_ground = 1, .ground_height = -2, .ground_albedo = {.5, .5, .5}},
      .is_night = 1},
 };
 
-static const nebel_lamp lamps[] = {{.position = {.5, .3, .4}, .intensity = {4, 3, 1}, .radius = .1},
-                                   {.type = NEBEL_LAMP_SPOT,
-                                    .position = {-1.5, 1.6, .5},
-                                    .intensity = {2, 3, 4},
-                                    .radius = .1,
-                                    .direction = {1, -1, 0},
-                                    .inner_angle = 20,
-                                    .outer_angle = 40}};
+static const nebel_light lamps[] = {{.position = {.5, .3, .4}, .intensity = {4, 3, 1}, .radius = .1},
+                                    {.type = NEBEL_LIGHT_SPOT,
+                                     .position = {-1.5, 1.6, .5},
+                                     .intensity = {2, 3, 4},
+                                     .radius = .1,
+                                     .direction = {1, -1, 0},
+                                     .inner_angle = 20,
+                                     .outer_angle = 40}};
 
 static const nebel_environment overcast = {
     .type = NEBEL_ENVIRONMENT_GRADIENT, .zenith = {.9, 1, 1.2}, .horizon = {.5, .4, .3}, .ground = {.1, .1, 0}};
@@ -191,7 +191,7 @@ static nebel_snapshot *commit_random(const random_fog *random)
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     for (size_t i = 0; i < random->count; i++)
         assert_int_equal(nebel_add_volume(fog, &random->volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.cells = 512}), NEBEL_OK);
+    assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.max_cells = 512}), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     nebel_destroy_fog(fog);
     return snapshot;

@@ -174,7 +174,7 @@ static void changes_are_seen(void **state)
         if (i == 4) sky->rotation += 50;
         assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
         assert_int_equal(nebel_gl_read_planes(renderer, &(nebel_gl_planes){.color = other}), NEBEL_OK);
-        test_render(&s.ball.scene, NULL, &(nebel_renderer_desc){0}, &s.camera, 1, &cpu);
+        test_render(&s.ball.scene, NULL, &(nebel_cpu_renderer_desc){0}, &s.camera, 1, &cpu);
         assert_true(share_apart(cpu.planes.color, other) < .01);
         const int same = memcmp(first, other, sizeof first) == 0;
         assert_true(i == 1 ? same : !same);

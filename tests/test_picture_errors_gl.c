@@ -262,18 +262,18 @@ static void test_shadows_of_particles_are_missed(void **state)
 {
     (void)state;
     static stage s;
-    const nebel_lamp lamp = {.position = {0, 3, 0}, .intensity = {1, 1, 1}};
+    const nebel_light lamp = {.position = {0, 3, 0}, .intensity = {1, 1, 1}};
     start_with_renderer(&s, NB_GL_330);
     expect_said(&s, 0, -2, "light of the sun from fog");
     expect_said(&s, 9, -2, NULL);
     expect_said(&s, 0, 2, NULL);
-    s.ball.scene.lamps = &lamp;
-    s.ball.scene.lamp_count = 1;
+    s.ball.scene.lights = &lamp;
+    s.ball.scene.light_count = 1;
     expect_said(&s, 9, -2, "light of lamps");
     for (int i = 0; i < PARTICLES; i++) memset(s.particles[i].extinction, 0, sizeof s.particles[i].extinction);
     assert_int_equal(nebel_set_gl_renderer_particles(s.renderer, s.particles, PARTICLES), NEBEL_OK);
     expect_said(&s, 0, -2, NULL);
-    s.ball.scene.lamp_count = 0;
+    s.ball.scene.light_count = 0;
     end(&s);
 }
 

@@ -84,7 +84,7 @@ static int is_right(int shape, double size, double depth, const nebel_camera *ca
     const nebel_result result = nebel_gl_render_frame(opengl, &frame);
     if (result == NEBEL_OK) {
         assert_int_equal(nebel_gl_read_planes(opengl, &planes), NEBEL_OK);
-        assert_int_equal(nebel_create_renderer(&empty, fog, &(nebel_renderer_desc){0}, &cpu), NEBEL_OK);
+        assert_int_equal(nebel_create_cpu_renderer(&empty, fog, &(nebel_cpu_renderer_desc){0}, &cpu), NEBEL_OK);
         assert_int_equal(nebel_render_frame(cpu, &as_it_is, &pair->cpu), NEBEL_OK);
         nebel_destroy_renderer(cpu);
         worst = worst_pixel(pair);

@@ -29,7 +29,7 @@ typedef struct world {
 
 static void make_air(double coverage, world *w)
 {
-    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    assert_int_equal(nebel_create_atmosphere(&w->planet.atmosphere_desc, &w->atmosphere), NEBEL_OK);
     const nebel_clouds_desc desc = {.atmosphere = w->atmosphere, .layers = {{.coverage = coverage}}, .layer_count = 1};
     assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
     w->planet.atmosphere = w->atmosphere;
@@ -39,7 +39,9 @@ static void make_air(double coverage, world *w)
 /* With a sky of its own, which is the same all around. */
 static void make_world(double coverage, const double sun[3], world *w)
 {
-    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"), .sun_diameter = .53, .cloud_layer_count = 1},
+    *w = (world){.planet = {.atmosphere_desc = *nebel_lookup_atmosphere("earth"),
+                            .sun_angular_diameter = .53,
+                            .cloud_layer_count = 1},
                  .mesh = {.origin = {0, 0, -150},
                           .positions = wall[0],
                           .indices = wall_indices,
@@ -68,22 +70,22 @@ static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume)
     static const double origin[1][3] = {{0, 0, 0}};
     nebel_fog *fog;
     nebel_snapshot *snapshot;
-    nebel_cloud_view *view;
+    nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
-    nebel_cloud_view_desc above = {.clouds = w->clouds, .sun = {.irradiance = {5, 4, 3}}};
+    nebel_cloud_lighting_desc above = {.clouds = w->clouds, .sun = {.irradiance = {5, 4, 3}}};
     nebel_fog_desc desc = {.sun = {.direction = {0, 1, 0}}};
     nebel_environment environment = w->scene.environment;
-    nebel_air_light light;
+    nebel_irradiance light;
     float sun, sky;
     memcpy(above.sun.direction, w->scene.sun_direction, sizeof above.sun.direction);
-    assert_int_equal(nebel_create_cloud_view(&above, &view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_lighting(&above, &view), NEBEL_OK);
     assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
-    assert_int_equal(nebel_shade_clouds(workspace, 200, 1, origin, 0, &sun), NEBEL_OK);
-    assert_int_equal(nebel_shade_sky(workspace, 200, 1, origin, 0, &sky), NEBEL_OK);
+    assert_int_equal(nebel_compute_cloud_sun_transmittance(workspace, 200, 1, origin, 0, &sun), NEBEL_OK);
+    assert_int_equal(nebel_compute_cloud_sky_transmittance(workspace, 200, 1, origin, 0, &sky), NEBEL_OK);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     desc.sun = above.sun;
-    assert_int_equal(nebel_light_air(w->atmosphere, &above.sun, 1, origin, 0, &light, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_atmosphere_irradiance(w->atmosphere, &above.sun, 1, origin, 0, &light, 0), NEBEL_OK);
     for (int c = 0; c < 3; c++) desc.sun.irradiance[c] = (double)sun * light.sun[c];
     environment.intensity = (double)sky;
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
@@ -109,7 +111,7 @@ static double by_clouds(world *w, nebel_snapshot *fog, const nebel_camera *camer
     double most = 0;
     const nebel_frame_desc frame = {.camera = *camera, .width = pair->width, .height = pair->height, .samples = 1};
     w->planet.clouds = NULL;
-    assert_int_equal(nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&w->scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &clear.cpu), NEBEL_OK);
     nebel_destroy_renderer(renderer);
     w->planet.clouds = w->clouds;
@@ -201,7 +203,8 @@ static void far_fog_has_both(void **state)
     nb_gl context;
     world w;
     make_world(.6, low, &w);
-    const double radius = w.planet.air.radius, angle = .05, x = radius * sin(angle), y = radius * (cos(angle) - 1);
+    const double radius = w.planet.atmosphere_desc.radius, angle = .05, x = radius * sin(angle),
+                 y = radius * (cos(angle) - 1);
     nebel_volume_desc mist = make_mist(1e-3, 6000, 0);
     for (int c = 0; c < 3; c++) {
         const double place[3] = {x, y, 0};
@@ -225,8 +228,8 @@ static void shadows_stand_with_the_origin_by_night(void **state)
     nb_gl context;
     world w;
     make_world(.6, high, &w);
-    const double radius = w.planet.air.radius;
-    double *const top = w.planet.air.ground;
+    const double radius = w.planet.atmosphere_desc.radius;
+    double *const top = w.planet.atmosphere_desc.ground_point;
     nebel_destroy_clouds(w.clouds);
     nebel_destroy_atmosphere(w.atmosphere);
     for (int c = 0; c < 3; c++) top[c] = radius * (w.scene.sun_direction[c] + (c == 1));

@@ -67,12 +67,12 @@ static void expect_sameness(const picture_difference *d)
 
 static void render_demo(const nebel_scene *scene, const nebel_camera *camera, picture_pair *pair)
 {
-    const nebel_scene_data *const data = nebel_scene_contents(scene);
+    const nebel_scene_data *const data = nebel_get_scene_data(scene);
     nebel_snapshot *fog = NULL;
     nebel_particle *made = NULL;
     nb_gl context;
     picture_particles particles = {.count = data->particle_count};
-    assert_int_equal(nebel_make_scene_particles(scene, &made), NEBEL_OK);
+    assert_int_equal(nebel_generate_scene_particles(scene, &made), NEBEL_OK);
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
     assert_int_equal(nebel_commit_scene_volumes_at(scene, 0, &particles.others), NEBEL_OK);
     particles.list = made;
@@ -91,7 +91,7 @@ static void check_demo(const nebel_scene *scene, const char *name)
     /* Each pixel of this cloud walks through dense noise, over and over: a quarter of them shows the same. */
     const uint32_t coarse = strcmp(name, "cloud.json") == 0 ? 2 : 1, width = DEMO_WIDTH / coarse;
     picture_pair pair = picture_make(width, DEMO_HEIGHT / coarse);
-    const nebel_scene_data *const data = nebel_scene_contents(scene);
+    const nebel_scene_data *const data = nebel_get_scene_data(scene);
     render_demo(scene, &data->camera, &pair);
     const picture_difference d = check(name, &pair);
     expect_sameness(&d);
@@ -108,7 +108,7 @@ static void check_panorama(const nebel_scene *scene, const char *name)
 {
     char title[128];
     picture_pair pair = picture_make(ROUND_WIDTH, ROUND_HEIGHT);
-    nebel_camera camera = nebel_scene_contents(scene)->camera;
+    nebel_camera camera = nebel_get_scene_data(scene)->camera;
     camera.projection = NEBEL_PROJECTION_PANORAMA;
     render_demo(scene, &camera, &pair);
     snprintf(title, sizeof title, "%s-around", name);
@@ -132,7 +132,7 @@ static int try_demo(const char *path, int number)
     }
     assert_int_equal(loaded, NEBEL_OK);
     const nebel_result models = nebel_load_scene_models(scene);
-    if (models == NEBEL_OK && nebel_scene_contents(scene)->planet_count > 0) {
+    if (models == NEBEL_OK && nebel_get_scene_data(scene)->planet_count > 0) {
         print_message("%s: left out: test_picture_planet_gl compares planets\n", name);
         nebel_destroy_scene(scene);
         return 0;
@@ -191,7 +191,7 @@ static nebel_scene_data scene_around(const double middle[3], nebel_mesh meshes[4
 }
 
 /* With lamps it scatters light; sun NULL: there is none. */
-static nebel_snapshot *commit(random_fog *random, const nebel_sun *sun, size_t lamp_count, const nebel_lamp *lamps)
+static nebel_snapshot *commit(random_fog *random, const nebel_sun *sun, size_t lamp_count, const nebel_light *lamps)
 {
     uint64_t numbers = random->seed;
     nebel_fog *fog = NULL;
@@ -211,14 +211,14 @@ static nebel_snapshot *commit(random_fog *random, const nebel_sun *sun, size_t l
 
 /* Every fourth scene has lamps: a ball beside the boxes and a spot between them. Mesa's software ends the
  * loops of very many volumes in their light, and of those that cover others in that of both. */
-static size_t place_lamps(const random_fog *fog, int number, nebel_lamp lamps[2])
+static size_t place_lamps(const random_fog *fog, int number, nebel_light lamps[2])
 {
     static const double places[2][3] = {{6, 5, 3}, {-1, 2, -2}};
     for (int i = 0; i < 2; i++) {
-        lamps[i] = (nebel_lamp){.intensity = {20, 15, 10}, .radius = .1 * i, .direction = {1, -2, -1}};
+        lamps[i] = (nebel_light){.intensity = {20, 15, 10}, .radius = .1 * i, .direction = {1, -2, -1}};
         for (int k = 0; k < 3; k++) lamps[i].position[k] = fog->shift[k] + places[i][k];
     }
-    lamps[1].type = NEBEL_LAMP_SPOT;
+    lamps[1].type = NEBEL_LIGHT_SPOT;
     lamps[1].inner_angle = 20;
     lamps[1].outer_angle = 50;
     if (number % 4 != 1 || fog->kind == RANDOM_FOG_MANY) return 0;
@@ -247,12 +247,12 @@ static picture_difference check_random(random_fog *random, const nebel_sun *sun,
     nebel_mesh meshes[4];
     char name[64];
     nb_gl context;
-    nebel_lamp lamps[2];
+    nebel_light lamps[2];
     const size_t lamp_count = sun != NULL ? 0 : place_lamps(random, number, lamps);
     nebel_snapshot *const fog = commit(random, sun, lamp_count, lamps);
     nebel_scene_data scene = scene_around(random->shift, meshes, positions);
-    scene.lamp_count = lamp_count;
-    scene.lamps = lamps;
+    scene.light_count = lamp_count;
+    scene.lights = lamps;
     scene.has_sun = sun != NULL;
     for (int k = 0; k < 3 && sun != NULL; k++) {
         scene.sun_direction[k] = sun->direction[k];

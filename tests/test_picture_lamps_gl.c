@@ -13,14 +13,14 @@ enum { WIDTH = 128, HEIGHT = 96, MANY = 100, BEYOND_ROOM = 700, FOG_LAMPS = 3, F
 static const double pi = 3.14159265358979323846;
 
 /* What a spot, a ball and a point above the stage shine on. */
-static void set_lamps(const test_stage *s, nebel_lamp lamps[3])
+static void set_lamps(const test_stage *s, nebel_light lamps[3])
 {
     static const double places[3][3] = {{2.5, 2, .5}, {-1.5, 1.8, 1}, {.3, .4, 2.6}};
     for (int i = 0; i < 3; i++) {
-        lamps[i] = (nebel_lamp){.intensity = {6 - 2 * i, 4, 2 + 2 * i}, .radius = i == 1 ? .2 : 0};
+        lamps[i] = (nebel_light){.intensity = {6 - 2 * i, 4, 2 + 2 * i}, .radius = i == 1 ? .2 : 0};
         for (int k = 0; k < 3; k++) lamps[i].position[k] = s->camera.look_at[k] + places[i][k];
     }
-    lamps[0].type = NEBEL_LAMP_SPOT;
+    lamps[0].type = NEBEL_LIGHT_SPOT;
     memcpy(lamps[0].direction, (const double[3]){-2, -2.2, -.4}, sizeof lamps[0].direction);
     lamps[0].inner_angle = 15;
     lamps[0].outer_angle = 40;
@@ -71,12 +71,12 @@ static void test_surfaces_are_lit_as_on_the_cpu(void **state)
     static test_stage s;
     static const double centers[2][3] = {{0, 0, 0}, {1e6, -3e5, 5e5}};
     for (int i = 0; i < 4; i++) {
-        nebel_lamp lamps[3];
+        nebel_light lamps[3];
         test_stage_set(&s, centers[i % 2], (const double[3]){3, 2, 5});
         set_lamps(&s, lamps);
         s.ball.scene.has_sun = i != 1;
-        s.ball.scene.lamp_count = 3;
-        s.ball.scene.lamps = lamps;
+        s.ball.scene.light_count = 3;
+        s.ball.scene.lights = lamps;
         if (i == 3) s.camera.projection = NEBEL_PROJECTION_PANORAMA;
         expect_same_light(&s.ball.scene, i == 2 ? NULL : s.fog, &s.camera, i % 2 == 0 ? NB_GL_330 : NB_GL_300ES, .005);
         nebel_release_snapshot(s.fog);
@@ -90,21 +90,21 @@ static void test_lamps_may_lie_in_surfaces(void **state)
     static test_stage s;
     for (int i = 0; i < 2; i++) {
         test_stage_set(&s, (const double[3]){0, 0, 0}, (const double[3]){3, 2, 5});
-        const nebel_lamp lamp = {.position = {1.8, i == 0 ? -1 : -1 - 1e-4, 1.6}, .intensity = {6, 5, 4}};
+        const nebel_light lamp = {.position = {1.8, i == 0 ? -1 : -1 - 1e-4, 1.6}, .intensity = {6, 5, 4}};
         s.ball.scene.has_sun = 0;
-        s.ball.scene.lamp_count = 1;
-        s.ball.scene.lamps = &lamp;
+        s.ball.scene.light_count = 1;
+        s.ball.scene.lights = &lamp;
         expect_same_light(&s.ball.scene, NULL, &s.camera, NB_GL_330, .005);
         nebel_release_snapshot(s.fog);
     }
 }
 
 /* Each shines past the ball on the floor. */
-static void set_ring(const test_stage *s, nebel_lamp *lamps, int count)
+static void set_ring(const test_stage *s, nebel_light *lamps, int count)
 {
     for (int i = 0; i < count; i++) {
         const double angle = 2 * pi * i / count, from[3] = {4 * cos(angle), .5 + .01 * (i % 7), 4 * sin(angle)};
-        lamps[i] = (nebel_lamp){.intensity = {40. / count, 30. / count, 20. / count}, .radius = .05};
+        lamps[i] = (nebel_light){.intensity = {40. / count, 30. / count, 20. / count}, .radius = .05};
         for (int k = 0; k < 3; k++) lamps[i].position[k] = s->camera.look_at[k] + from[k];
     }
 }
@@ -113,12 +113,12 @@ static void test_many_lamps_cast_shadows(void **state)
 {
     (void)state;
     static test_stage s;
-    static nebel_lamp lamps[MANY];
+    static nebel_light lamps[MANY];
     test_stage_set(&s, (const double[3]){0, 0, 0}, (const double[3]){3, 2, 5});
     set_ring(&s, lamps, MANY);
     s.ball.scene.has_sun = 0;
-    s.ball.scene.lamp_count = MANY;
-    s.ball.scene.lamps = lamps;
+    s.ball.scene.light_count = MANY;
+    s.ball.scene.lights = lamps;
     expect_same_light(&s.ball.scene, NULL, &s.camera, NB_GL_330, .002);
     nebel_release_snapshot(s.fog);
 }
@@ -137,13 +137,13 @@ static void test_lamps_may_change_from_frame_to_frame(void **state)
     static test_stage s;
     static float own[WIDTH * HEIGHT * 3], changed[WIDTH * HEIGHT * 3], first[WIDTH * HEIGHT * 3];
     nb_gl context;
-    nebel_lamp lamps[3], usual[3];
+    nebel_light lamps[3], usual[3];
     nebel_gl_renderer *renderer = NULL;
     test_stage_set(&s, (const double[3]){0, 0, 0}, (const double[3]){3, 2, 5});
     set_lamps(&s, usual);
     memcpy(lamps, usual, sizeof lamps);
-    s.ball.scene.lamp_count = 3;
-    s.ball.scene.lamps = lamps;
+    s.ball.scene.light_count = 3;
+    s.ball.scene.lights = lamps;
     pass_open(&context, NB_GL_330);
     assert_int_equal(nebel_create_gl_renderer(&s.ball.scene, s.fog, &(nebel_gl_renderer_desc){0}, &renderer), NEBEL_OK);
     render(renderer, &s, first);
@@ -172,23 +172,23 @@ static void test_lamps_have_a_limit(void **state)
 {
     (void)state;
     static test_stage s;
-    static nebel_lamp lamps[4097];
+    static nebel_light lamps[4097];
     static float color[WIDTH * HEIGHT * 3];
     nb_gl context;
     nebel_gl_renderer *renderer = NULL;
     test_stage_set(&s, (const double[3]){0, 0, 0}, (const double[3]){3, 2, 5});
     set_ring(&s, lamps, 4097);
     s.ball.scene.has_sun = 0;
-    s.ball.scene.lamp_count = BEYOND_ROOM;
-    s.ball.scene.lamps = lamps;
+    s.ball.scene.light_count = BEYOND_ROOM;
+    s.ball.scene.lights = lamps;
     pass_open(&context, NB_GL_330);
-    const nebel_gl_renderer_desc desc = {.shadow_size = 256};
+    const nebel_gl_renderer_desc desc = {.shadow_map_size = 256};
     assert_int_equal(nebel_create_gl_renderer(&s.ball.scene, NULL, &desc, &renderer), NEBEL_OK);
     render(renderer, &s, color);
-    s.ball.scene.lamp_count = 4097;
+    s.ball.scene.light_count = 4097;
     const nebel_gl_frame_desc frame = {.camera = s.camera, .width = WIDTH, .height = HEIGHT, .samples = 1};
     assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_ERROR_LIMIT);
-    s.ball.scene.lamp_count = 0;
+    s.ball.scene.light_count = 0;
     render(renderer, &s, color);
     nebel_destroy_gl_renderer(renderer);
     pass_close(&context);
@@ -198,22 +198,22 @@ static void test_lamps_have_a_limit(void **state)
 /* ---- fog ------------------------------------------------------------------------------------- */
 
 /* Lamps among the volumes, and one of them beside. */
-static void strew_lamps(const random_fog *fog, uint64_t *numbers, nebel_lamp lamps[FOG_LAMPS])
+static void strew_lamps(const random_fog *fog, uint64_t *numbers, nebel_light lamps[FOG_LAMPS])
 {
     for (int i = 0; i < FOG_LAMPS; i++) {
-        lamps[i] = (nebel_lamp){.radius = i == 1 ? dice(numbers, .05, 1) : 0};
+        lamps[i] = (nebel_light){.radius = i == 1 ? dice(numbers, .05, 1) : 0};
         for (int k = 0; k < 3; k++) {
             lamps[i].position[k] = fog->shift[k] + dice(numbers, -6, 6) * (i == 2 ? 3 : 1);
             lamps[i].intensity[k] = dice(numbers, 2, 30);
             lamps[i].direction[k] = dice(numbers, -1, 1);
         }
     }
-    lamps[0].type = NEBEL_LAMP_SPOT;
+    lamps[0].type = NEBEL_LIGHT_SPOT;
     lamps[0].outer_angle = dice(numbers, 20, 120);
     lamps[0].inner_angle = dice(numbers, 0, 1) * lamps[0].outer_angle;
 }
 
-static nebel_snapshot *commit_lit(const nebel_fog_desc *desc, const random_fog *random, const nebel_lamp *lamps)
+static nebel_snapshot *commit_lit(const nebel_fog_desc *desc, const random_fog *random, const nebel_light *lamps)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
@@ -230,7 +230,7 @@ static nebel_snapshot *commit_lit(const nebel_fog_desc *desc, const random_fog *
 static picture_difference check_random(random_fog_kind kind, uint64_t seed)
 {
     static random_fog random;
-    nebel_lamp lamps[FOG_LAMPS];
+    nebel_light lamps[FOG_LAMPS];
     nb_gl context;
     uint64_t numbers = seed + 7;
     random_fog_make(&random, kind, seed);
@@ -245,7 +245,7 @@ static picture_difference check_random(random_fog_kind kind, uint64_t seed)
     }
     if ((seed + kind) % 3 == 1) camera.projection = NEBEL_PROJECTION_PANORAMA;
     if ((seed + kind) % 3 == 2) camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
-    const nebel_scene_data scene = {.background = {.1, .1, .1}, .lamp_count = FOG_LAMPS, .lamps = lamps};
+    const nebel_scene_data scene = {.background = {.1, .1, .1}, .light_count = FOG_LAMPS, .lights = lamps};
     picture_pair pair = picture_make(FOG_WIDTH, FOG_HEIGHT);
     pass_open(&context, seed % 2 == 0 ? NB_GL_330 : NB_GL_300ES);
     picture_render(&scene, fog, &camera, 1, &pair);

@@ -47,12 +47,12 @@ static void check_scene(const char *name, double time)
     nebel_particle *list = NULL;
     snprintf(path, sizeof path, NEBEL_SOURCE "/examples/scenes/%s", name);
     assert_int_equal(nebel_load_scene(path, &(nebel_scene_desc){0}, &scene), NEBEL_OK);
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
-    const nebel_scene_data *const data = nebel_scene_contents(scene);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
+    const nebel_scene_data *const data = nebel_get_scene_data(scene);
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
     assert_int_equal(nebel_commit_scene_volumes_at(scene, 0, &particles.others), NEBEL_OK);
     particles.count = data->particle_count;
-    assert_int_equal(nebel_make_scene_particles(scene, &list), NEBEL_OK);
+    assert_int_equal(nebel_generate_scene_particles(scene, &list), NEBEL_OK);
     particles.list = list;
     picture_pair pair = picture_make(96 * scale, 54 * scale);
     pair.time = time;
@@ -78,20 +78,20 @@ static void scenes_are_the_same(void **state)
 /* ---- worlds ---------------------------------------------------------------------------------- */
 
 typedef struct world {
-    nebel_layers *layers;
+    nebel_textured_planet *layers;
     nebel_planet planet;
     nebel_mesh mesh;
     nebel_scene_data scene;
 } world;
 
 /* Sizes that are no powers of two: their levels are means of parts of texels. */
-static nebel_map make_map(nebel_map_kind kind)
+static nebel_planet_map make_map(nebel_planet_map_type kind)
 {
-    static float texels[NEBEL_MAP_KIND_COUNT][90 * 45 * 3];
-    const nebel_map_desc desc = {.kind = kind, .width = 90, .height = 45, .coverage = .4, .seed = 3};
-    nebel_map map = {.texels = texels[kind]};
-    assert_int_equal(nebel_size_map(&desc, &map), NEBEL_OK);
-    assert_int_equal(nebel_make_map(&desc, texels[kind]), NEBEL_OK);
+    static float texels[NEBEL_PLANET_MAP_TYPE_COUNT][90 * 45 * 3];
+    const nebel_planet_map_desc desc = {.type = kind, .width = 90, .height = 45, .coverage = .4, .seed = 3};
+    nebel_planet_map map = {.texels = texels[kind]};
+    assert_int_equal(nebel_get_planet_map_size(&desc, &map), NEBEL_OK);
+    assert_int_equal(nebel_generate_planet_map(&desc, texels[kind]), NEBEL_OK);
     return map;
 }
 
@@ -101,7 +101,7 @@ static const uint32_t wall_indices[6] = {0, 1, 2, 0, 2, 3};
 /* A ball of `radius`, shells a fifth and two fifths of that above it, and air between them. */
 static void make_world(double radius, world *w)
 {
-    const nebel_map clouds = make_map(NEBEL_MAP_CLOUDS), detail = make_map(NEBEL_MAP_DETAIL);
+    const nebel_planet_map clouds = make_map(NEBEL_PLANET_MAP_CLOUDS), detail = make_map(NEBEL_PLANET_MAP_DETAIL);
     *w = (world){.mesh = {.origin = {0, 0, 1.3 * radius},
                           .positions = wall[0],
                           .indices = wall_indices,
@@ -109,18 +109,23 @@ static void make_world(double radius, world *w)
                           .triangle_count = 2,
                           .base_color = {.8f, .4f, .2f},
                           .texture = -1}};
-    w->planet.shells = (nebel_layers_desc){
+    w->planet.textured_desc = (nebel_textured_planet_desc){
         .radius = radius,
         .rotation = {.2, .3, -.1, 1},
-        .day = 100,
-        .ground = make_map(NEBEL_MAP_GROUND),
-        .clouds = {{.height = .2 * radius, .day = 50, .map = clouds, .detail = detail, .wrap = {2, -3, 4.5}},
-                   {.height = .4 * radius, .day = -70, .gain = .5, .map = clouds, .color = {1, .8, .6}}},
-        .cloud_count = 2,
-        .air = {.height = .3 * radius, .brightness = .4}};
-    assert_int_equal(nebel_create_layers(&w->planet.shells, &w->layers), NEBEL_OK);
-    w->planet.model = NEBEL_PLANET_LAYERS;
-    w->planet.layers = w->layers;
+        .rotation_period = 100,
+        .color_map = make_map(NEBEL_PLANET_MAP_GROUND),
+        .cloud_shells =
+            {{.height = .2 * radius,
+              .rotation_period = 50,
+              .coverage_map = clouds,
+              .detail_map = detail,
+              .uv_tiling = {2, -3, 4.5}},
+             {.height = .4 * radius, .rotation_period = -70, .gain = .5, .coverage_map = clouds, .color = {1, .8, .6}}},
+        .cloud_shell_count = 2,
+        .atmosphere = {.height = .3 * radius, .brightness = .4}};
+    assert_int_equal(nebel_create_textured_planet(&w->planet.textured_desc, &w->layers), NEBEL_OK);
+    w->planet.model = NEBEL_PLANET_TEXTURED;
+    w->planet.textured = w->layers;
     w->scene = (nebel_scene_data){.has_sun = 1,
                                   .sun_direction = {.6, .48, .64},
                                   .sun_irradiance = {3, 2.5, 2},
@@ -193,7 +198,7 @@ static void eyes_everywhere_see_the_same(void **state)
         pass_close(&context);
     }
     nebel_release_snapshot(fog);
-    nebel_destroy_layers(w.layers);
+    nebel_destroy_textured_planet(w.layers);
 }
 
 /* Where squares of distances cancel: two metres above the ground of a planet as large as the Earth, and a hundred radii away. */
@@ -215,7 +220,7 @@ static void large_distances_keep_their_digits(void **state)
         picture_free(&pair);
     }
     pass_close(&context);
-    nebel_destroy_layers(w.layers);
+    nebel_destroy_textured_planet(w.layers);
 }
 
 /* ---- particles ------------------------------------------------------------------------------- */
@@ -235,7 +240,7 @@ static void particles_lie_between_shells(void **state)
     for (int i = 0; i < 3; i++) {
         list[i] = (nebel_particle){.radius = .5, .extinction = {1, 2, 3}, .emission = {.9, .6, .3}};
         memcpy(list[i].center, centers[i], sizeof centers[i]);
-        const nebel_volume_desc volume = nebel_particle_volume(&list[i]);
+        const nebel_volume_desc volume = nebel_volume_from_particle(&list[i]);
         assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
     }
     assert_int_equal(nebel_commit_fog(fog, &all), NEBEL_OK);
@@ -248,7 +253,7 @@ static void particles_lie_between_shells(void **state)
     picture_free(&pair);
     pass_close(&context);
     nebel_release_snapshot(all);
-    nebel_destroy_layers(w.layers);
+    nebel_destroy_textured_planet(w.layers);
 }
 
 /* ---- time, state, refusals ------------------------------------------------------------------- */
@@ -283,7 +288,7 @@ static void close_stage(stage *s)
 {
     nebel_destroy_gl_renderer(s->renderer);
     pass_close(&s->context);
-    nebel_destroy_layers(s->w.layers);
+    nebel_destroy_textured_planet(s->w.layers);
 }
 
 static void shells_turn_and_return(void **state)
@@ -345,16 +350,16 @@ static void what_cannot_be_drawn_is_refused(void **state)
     s.frame.method = NEBEL_GL_METHOD_VERTEX;
     expect(&s, NEBEL_ERROR_UNSUPPORTED, "method");
     s.frame.method = NEBEL_GL_METHOD_EXACT;
-    nebel_layers_desc desc = s.w.planet.shells;
-    desc.clouds[0].map = (nebel_map){.width = 1, .height = 16384, .channels = 1, .texels = tall};
-    nebel_layers *large;
-    assert_int_equal(nebel_create_layers(&desc, &large), NEBEL_OK);
-    s.w.planet.layers = large;
+    nebel_textured_planet_desc desc = s.w.planet.textured_desc;
+    desc.cloud_shells[0].coverage_map = (nebel_planet_map){.width = 1, .height = 16384, .channels = 1, .texels = tall};
+    nebel_textured_planet *large;
+    assert_int_equal(nebel_create_textured_planet(&desc, &large), NEBEL_OK);
+    s.w.planet.textured = large;
     expect(&s, NEBEL_ERROR_LIMIT, "GL_MAX_TEXTURE_SIZE");
     expect(&s, NEBEL_ERROR_LIMIT, "GL_MAX_TEXTURE_SIZE");
-    s.w.planet.layers = s.w.layers;
+    s.w.planet.textured = s.w.layers;
     assert_int_equal(nebel_gl_render_frame(s.renderer, &s.frame), NEBEL_OK);
-    nebel_destroy_layers(large);
+    nebel_destroy_textured_planet(large);
     close_stage(&s);
 }
 

@@ -41,7 +41,7 @@ static nebel_scene *load(const char *name)
     nebel_scene *scene = NULL;
     snprintf(path, sizeof path, NEBEL_SOURCE "/examples/scenes/%s", name);
     assert_int_equal(nebel_load_scene(path, &(nebel_scene_desc){0}, &scene), NEBEL_OK);
-    if (nebel_load_scene_models(scene) == NEBEL_OK && nebel_load_scene_planet(scene) == NEBEL_OK) return scene;
+    if (nebel_load_scene_models(scene) == NEBEL_OK && nebel_load_scene_planets(scene) == NEBEL_OK) return scene;
     print_message("%s: left out: its models are made, not kept\n", name);
     nebel_destroy_scene(scene);
     return NULL;
@@ -52,7 +52,7 @@ static void check_scene(const char *name, int around)
     nebel_scene *const scene = load(name);
     nebel_snapshot *fog = NULL;
     if (scene == NULL) return;
-    const nebel_scene_data *const data = nebel_scene_contents(scene);
+    const nebel_scene_data *const data = nebel_get_scene_data(scene);
     nebel_camera camera = data->camera;
     if (around) camera.projection = NEBEL_PROJECTION_PANORAMA;
     picture_pair pair = around ? make_pair(96, 48) : make_pair(96, 54);
@@ -90,8 +90,8 @@ typedef struct world {
 static void make_world(const char *name, double elevation, world *w)
 {
     const double angle = elevation * acos(-1) / 180, sun[3] = {.3 * cos(angle), sin(angle), -.95 * cos(angle)};
-    *w = (world){.planet = {.air = *nebel_find_atmosphere(name), .sun_diameter = .53}};
-    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    *w = (world){.planet = {.atmosphere_desc = *nebel_lookup_atmosphere(name), .sun_angular_diameter = .53}};
+    assert_int_equal(nebel_create_atmosphere(&w->planet.atmosphere_desc, &w->atmosphere), NEBEL_OK);
     w->planet.atmosphere = w->atmosphere;
     w->scene =
         (nebel_scene_data){.has_sun = 1, .sun_irradiance = {20, 19, 18}, .planet_count = 1, .planets = &w->planet};
@@ -108,7 +108,8 @@ static void a_flight_is_the_same(void **state)
     pass_open(&context, NB_GL_300ES);
     for (int i = 0; i < (all ? 8 : 3); i++) {
         char name[64];
-        const double dip = heights[i] > 0 ? acos(w.planet.air.radius / (w.planet.air.radius + heights[i])) : 0;
+        const double dip =
+            heights[i] > 0 ? acos(w.planet.atmosphere_desc.radius / (w.planet.atmosphere_desc.radius + heights[i])) : 0;
         nebel_camera camera = planet_camera(heights[i], -dip);
         if (i == 1) camera.projection = NEBEL_PROJECTION_PANORAMA;
         picture_pair pair = make_pair(96, 48);
@@ -168,9 +169,9 @@ static void mist_bends_with_the_ground(void **state)
     pass_open(&context, NB_GL_330);
     assert_int_equal(nebel_load_scene(NEBEL_SOURCE "/examples/scenes/mist-sea.json", &(nebel_scene_desc){0}, &scene),
                      NEBEL_OK);
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    nebel_scene_data data = *nebel_scene_contents(scene);
+    nebel_scene_data data = *nebel_get_scene_data(scene);
     data.mesh_count = 0;
     picture_pair pair = make_pair(64, 36);
     render(&data, fog, &data.camera, &pair);

@@ -120,7 +120,7 @@ static void test_particles_among_many_volumes(void **state)
         *p = (nebel_particle){.radius = .3 + .01 * (i - MANY),
                               .extinction = {1, grey ? 1 : 2, grey ? 1 : .3},
                               .emission = {.1, .2, .3},
-                              .profile = (nebel_particle_profile)(i % NEBEL_PARTICLE_COUNT)};
+                              .profile = (nebel_particle_profile)(i % NEBEL_PARTICLE_PROFILE_COUNT)};
         /* Apart from each other; the first holds the eye. */
         const int at = i - MANY;
         for (int k = 0; k < 3; k++)
@@ -130,7 +130,7 @@ static void test_particles_among_many_volumes(void **state)
                                                : at / 15) *
                                              2.2 -
                                          4.4;
-        volumes[i] = nebel_particle_volume(p);
+        volumes[i] = nebel_volume_from_particle(p);
     }
     for (int i = 0; i < 2; i++) {
         nb_gl context;
@@ -197,7 +197,8 @@ static void render_cpu(const test_stage *s, const nebel_cells *cells, const nebe
 {
     nebel_renderer *renderer = NULL;
     const nebel_frame_desc frame = {.camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = 1};
-    assert_int_equal(nebel_create_renderer(&s->ball.scene, s->fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&s->ball.scene, s->fog, &(nebel_cpu_renderer_desc){0}, &renderer),
+                     NEBEL_OK);
     if (method == NEBEL_METHOD_CELLS) {
         assert_int_equal(nebel_set_renderer_cells(renderer, cells, NEBEL_CELLS_PER_VERTEX), NEBEL_OK);
     } else {

@@ -132,11 +132,11 @@ static void make_particles(nebel_particle particles[9], nebel_volume_desc volume
                                         .radius = .4 + .03 * i,
                                         .extinction = {1, grey ? 1 : 2.5, grey ? 1 : .2},
                                         .emission = {.4, .1 * i, .3},
-                                        .profile = (nebel_particle_profile)(i % NEBEL_PARTICLE_COUNT)};
+                                        .profile = (nebel_particle_profile)(i % NEBEL_PARTICLE_PROFILE_COUNT)};
     }
     const double eye[3] = {3.1, 2, 5};
     memcpy(particles[4].center, eye, sizeof eye);
-    for (int i = 0; i < 9; i++) volumes[2 + i] = nebel_particle_volume(&particles[i]);
+    for (int i = 0; i < 9; i++) volumes[2 + i] = nebel_volume_from_particle(&particles[i]);
 }
 
 static void check_particles(const test_stage *s, nb_gl_language language, int grey, nebel_projection projection)
@@ -290,13 +290,13 @@ static void draw_in_odd_state(nb_gl_language language, nebel_gl_method method, i
 {
     static test_stage s;
     static odd_snapshot before, after;
-    static const nebel_lamp lamp = {.position = {1, 2, 1}, .intensity = {3, 2, 1}};
+    static const nebel_light lamp = {.position = {1, 2, 1}, .intensity = {3, 2, 1}};
     const int desktop = language == NB_GL_330;
     nb_gl context;
     odd o;
     set_stage(&s, (double[3]){0, 0, 0});
-    s.ball.scene.lamp_count = 1;
-    s.ball.scene.lamps = &lamp;
+    s.ball.scene.light_count = 1;
+    s.ball.scene.lights = &lamp;
     pass_open(&context, language);
     if (odd_state >= 0) odd_set(&o, desktop, odd_state);
     if (odd_state >= 0 && desktop) glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
@@ -412,7 +412,7 @@ static void test_what_is_refused(void **state)
     static test_stage s;
     nb_gl context;
     nebel_gl_renderer *renderer = NULL;
-    const nebel_gl_renderer_desc usual = {0}, tiny = {.shadow_size = 1};
+    const nebel_gl_renderer_desc usual = {0}, tiny = {.shadow_map_size = 1};
     set_stage(&s, (double[3]){0, 0, 0});
     assert_int_equal(nebel_create_gl_renderer(&s.ball.scene, s.fog, &usual, &renderer), NEBEL_ERROR_UNSUPPORTED);
     pass_open(&context, NB_GL_330);

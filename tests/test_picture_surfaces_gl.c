@@ -157,7 +157,7 @@ static void try_size(double size)
          .extinction = {e, e, e},
          .albedo = {.9, .9, .9}},
         {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-size, -size, -size}, .max = {0, size, size}},
-         .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = .3 * size},
+         .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = .3 * size},
          .extinction = {e, e, e},
          .source = {.2, .4, .6}},
     };
@@ -248,7 +248,7 @@ static void render_alone(const nebel_scene_data *scene, const nebel_camera *came
     nebel_gl_renderer *refusing = NULL;
     const nebel_frame_desc desc = {.camera = *camera, .width = 32, .height = 24, .samples = 1};
     const nebel_gl_frame_desc refused = {.camera = *camera, .width = 32, .height = 24, .samples = 1};
-    assert_int_equal(nebel_create_renderer(scene, NULL, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(scene, NULL, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &desc, cpu), NEBEL_OK);
     nebel_destroy_renderer(renderer);
     assert_int_equal(nebel_create_gl_renderer(scene, NULL, &(nebel_gl_renderer_desc){0}, &refusing), NEBEL_OK);
@@ -437,7 +437,7 @@ typedef struct stage {
     float balls[BALLS][BALL_VERTICES][3];
     uint32_t ball_indices[3 * BALL_TRIANGLES];
     nebel_mesh meshes[MESHES];
-    nebel_lamp lamps[2];
+    nebel_light lamps[2];
     nebel_scene_data scene;
 } stage;
 
@@ -512,12 +512,12 @@ static void set_stage(stage *s, int number)
     memcpy(s->floor, floor, sizeof floor);
     s->meshes[CARDS + BALLS] = card_of(s->floor, NULL);
     for (int i = 0; i < 2; i++) {
-        s->lamps[i] = (nebel_lamp){.type = i == 0 ? NEBEL_LAMP_POINT : NEBEL_LAMP_SPOT,
-                                   .position = {dice(&numbers, -3, 3), 4, dice(&numbers, -3, 3)},
-                                   .intensity = {12, 10, 8},
-                                   .direction = {0, -1, .1},
-                                   .inner_angle = 30,
-                                   .outer_angle = 60};
+        s->lamps[i] = (nebel_light){.type = i == 0 ? NEBEL_LIGHT_POINT : NEBEL_LIGHT_SPOT,
+                                    .position = {dice(&numbers, -3, 3), 4, dice(&numbers, -3, 3)},
+                                    .intensity = {12, 10, 8},
+                                    .direction = {0, -1, .1},
+                                    .inner_angle = 30,
+                                    .outer_angle = 60};
     }
     s->scene =
         (nebel_scene_data){.ambient = {.1, .12, .15},
@@ -526,8 +526,8 @@ static void set_stage(stage *s, int number)
                            .has_sun = number % 4 != 2,
                            .sun_direction = {dice(&numbers, -1, 1), dice(&numbers, .2, 1), dice(&numbers, -1, 1)},
                            .sun_irradiance = {4, 3, 2},
-                           .lamp_count = number % 2 == 0 ? 2 : 0,
-                           .lamps = s->lamps};
+                           .light_count = number % 2 == 0 ? 2 : 0,
+                           .lights = s->lamps};
 }
 
 static void add(picture_light *all, const picture_light *d)

@@ -28,7 +28,7 @@ static void make_particles(nebel_particle particles[PARTICLES], int grey)
     for (int i = 0; i < PARTICLES; i++) {
         nebel_particle *const p = &particles[i];
         *p = (nebel_particle){.radius = dice(&state, .1, .5),
-                              .profile = (nebel_particle_profile)(i % NEBEL_PARTICLE_COUNT)};
+                              .profile = (nebel_particle_profile)(i % NEBEL_PARTICLE_PROFILE_COUNT)};
         for (int k = 0; k < 3; k++) {
             p->center[k] = dice(&state, k == 1 ? -1.1 : -1.8, k == 1 ? 1 : 1.8);
             p->extinction[k] = grey ? 1.5 : dice(&state, .2, 3);
@@ -47,7 +47,7 @@ static nebel_camera camera_of(nebel_projection projection)
 }
 
 static void draw(nb_gl_language language, const nebel_camera *camera, const nebel_particle *particles,
-                 const nebel_gl_taps *taps, planes *out)
+                 const nebel_depth_taps *taps, planes *out)
 {
     static test_ball ball;
     nb_gl context;
@@ -122,7 +122,7 @@ static double opaque_at(const nebel_camera *camera, const float *depth, double u
 }
 
 static int is_drawn(const nebel_camera *camera, const float *depth, int x, int y, double along,
-                    const nebel_gl_taps *taps)
+                    const nebel_depth_taps *taps)
 {
     static const double steps[5][2] = {{0, 0}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}};
     double low = HUGE_VAL, high = -HUGE_VAL;
@@ -130,11 +130,11 @@ static int is_drawn(const nebel_camera *camera, const float *depth, int x, int y
         const double u = (x + .5) / WIDTH + steps[k][0] * taps->offset,
                      v = (y + .5) / HEIGHT + steps[k][1] * taps->offset;
         double there = opaque_at(camera, depth, u, v);
-        if (there < 0) there = taps->nothing;
+        if (there < 0) there = taps->background_depth;
         low = fmin(low, there);
         high = fmax(high, there);
     }
-    return high - low > taps->edge || !(low < along - taps->margin);
+    return high - low > taps->edge_threshold || !(low < along - taps->depth_margin);
 }
 
 typedef struct place {
@@ -156,7 +156,7 @@ static void place_particles(const nebel_camera *camera, const nebel_particle *pa
     nebel_ray axis;
     make_ray(camera, WIDTH / 2., HEIGHT / 2., &axis);
     for (int i = 0; i < PARTICLES; i++) {
-        const nebel_volume_desc volume = nebel_particle_volume(&particles[i]);
+        const nebel_volume_desc volume = nebel_volume_from_particle(&particles[i]);
         double square = 0;
         places[i].alone = fog_commit(&(nebel_fog_desc){0}, &volume, 1);
         places[i].along = 0;
@@ -172,7 +172,7 @@ static void place_particles(const nebel_camera *camera, const nebel_particle *pa
 }
 
 /* Returns how many particles are hidden that the ray meets. */
-static int render_pixel(const nebel_camera *camera, const float *depth, int x, int y, const nebel_gl_taps *taps,
+static int render_pixel(const nebel_camera *camera, const float *depth, int x, int y, const nebel_depth_taps *taps,
                         nebel_transfer *transfer)
 {
     nebel_ray ray;
@@ -199,12 +199,12 @@ static int render_pixel(const nebel_camera *camera, const float *depth, int x, i
 
 /* ---- tests ----------------------------------------------------------------------------------- */
 
-static void check(nb_gl_language language, nebel_projection projection, int grey, const nebel_gl_taps *taps)
+static void check(nb_gl_language language, nebel_projection projection, int grey, const nebel_depth_taps *taps)
 {
     static planes got;
     static nebel_particle particles[PARTICLES];
     const nebel_camera camera = camera_of(projection);
-    const nebel_gl_taps used = taps != NULL ? *taps : (nebel_gl_taps){.0005, 100000, .5, .125, 1};
+    const nebel_depth_taps used = taps != NULL ? *taps : (nebel_depth_taps){.0005, 100000, .5, .125, 1};
     double worst = 0;
     size_t fogged = 0, beyond = 0, hidden = 0;
     make_particles(particles, grey);
@@ -232,9 +232,9 @@ static void check(nb_gl_language language, nebel_projection projection, int grey
 static void test_defaults_are_those_of_the_technique(void **state)
 {
     (void)state;
-    const nebel_gl_taps taps = nebel_gl_default_taps();
-    assert_true(taps.offset == .0005 && taps.nothing == 100000 && taps.edge == .5 && taps.margin == .125 &&
-                taps.brightness == 1);
+    const nebel_depth_taps taps = nebel_gl_default_taps();
+    assert_true(taps.offset == .0005 && taps.background_depth == 100000 && taps.edge_threshold == .5 &&
+                taps.depth_margin == .125 && taps.brightness == 1);
     check(NB_GL_330, NEBEL_PROJECTION_PERSPECTIVE, 1, NULL);
     check(NB_GL_300ES, NEBEL_PROJECTION_ORTHOGRAPHIC, 0, NULL);
 }
@@ -243,7 +243,8 @@ static void test_defaults_are_those_of_the_technique(void **state)
 static void test_constants_count(void **state)
 {
     (void)state;
-    const nebel_gl_taps wide = {.offset = .023, .nothing = 3, .edge = .3, .margin = .4, .brightness = .6};
+    const nebel_depth_taps wide = {
+        .offset = .023, .background_depth = 3, .edge_threshold = .3, .depth_margin = .4, .brightness = .6};
     check(NB_GL_330, NEBEL_PROJECTION_PERSPECTIVE, 0, &wide);
     check(NB_GL_300ES, NEBEL_PROJECTION_PERSPECTIVE, 1, &wide);
     check(NB_GL_330, NEBEL_PROJECTION_PANORAMA, 0, &wide);
@@ -256,7 +257,7 @@ static void test_what_is_refused(void **state)
     static test_ball ball;
     nb_gl context;
     nebel_gl_renderer *renderer = NULL;
-    nebel_gl_taps taps = nebel_gl_default_taps();
+    nebel_depth_taps taps = nebel_gl_default_taps();
     nebel_gl_frame_desc desc = {
         .camera = camera_of(NEBEL_PROJECTION_PERSPECTIVE), .width = 8, .height = 8, .samples = 1, .taps = &taps};
     test_ball_make(&ball, (double[3]){0, 0, 0});

@@ -142,7 +142,7 @@ static void half_shadows_lie_on_clouds(void **state)
     worlds s;
     worlds_make(2, bodies, up, 5, &s);
     const nebel_clouds_desc desc = {
-        .atmosphere = s.atmospheres[0], .layers = {{.kind = NEBEL_CLOUD_STRATUS}}, .layer_count = 1};
+        .atmosphere = s.atmospheres[0], .layers = {{.type = NEBEL_CLOUD_STRATUS}}, .layer_count = 1};
     assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_OK);
     s.planets[0].clouds = clouds;
     pass_open(&context, NB_GL_330);

@@ -100,7 +100,7 @@ static void fill(nebel_pixel_type type)
     }
 }
 
-static nebel_pixels make_picture(nebel_pixel_type type, nebel_depth depth_type, int srgb)
+static nebel_pixels make_picture(nebel_pixel_type type, nebel_pixel_depth depth_type, int srgb)
 {
     for (int i = 0; i < PIXELS; i++) depth[i] = i % 19 == 0 ? HUGE_VALF : (float)dice(0, 90);
     fill(type);
@@ -112,7 +112,7 @@ static nebel_pixels make_picture(nebel_pixel_type type, nebel_depth depth_type, 
                           .height = HEIGHT,
                           .depth = depth,
                           .color = color,
-                          .out = out,
+                          .output = out,
                           .type = type,
                           .srgb = srgb,
                           .transmittance = kept};
@@ -133,7 +133,7 @@ static double encode(double x)
 static double length_of(const nebel_pixels *p, int i)
 {
     double square = 0;
-    if (p->depth_type == NEBEL_DEPTH_RAY) return (double)depth[i];
+    if (p->depth_type == NEBEL_PIXEL_DEPTH_RADIAL) return (double)depth[i];
     for (int c = 0; c < 3; c++) {
         const double way = (double)p->corner[c] + i % WIDTH * (double)p->step_x[c] + i / WIDTH * (double)p->step_y[c];
         square += way * way;
@@ -197,8 +197,9 @@ static void test_every_kind_follows_the_formula(void **state)
         nebel_snapshot *const now = make_fog(fog);
         for (nebel_pixel_type type = NEBEL_PIXEL_RGBA8; type < NEBEL_PIXEL_COUNT; type++)
             for (int srgb = 0; srgb <= has_srgb(type); srgb++) {
-                const nebel_pixels p = make_picture(type, round ? NEBEL_DEPTH_RAY : NEBEL_DEPTH_AXIS, srgb);
-                assert_int_equal(nebel_fog_pixels(now, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
+                const nebel_pixels p =
+                    make_picture(type, round ? NEBEL_PIXEL_DEPTH_RADIAL : NEBEL_PIXEL_DEPTH_AXIAL, srgb);
+                assert_int_equal(nebel_apply_fog_to_pixels(now, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
                 assert_fogged(&p, fog);
             }
         nebel_release_snapshot(now);
@@ -210,17 +211,17 @@ static void test_instruction_sets_and_rows_give_the_same_bytes(void **state)
     (void)state;
     nebel_snapshot *const now = make_fog(&haze);
     for (nebel_pixel_type type = NEBEL_PIXEL_RGBA8; type < NEBEL_PIXEL_COUNT; type++) {
-        nebel_pixels p = make_picture(type, NEBEL_DEPTH_AXIS, has_srgb(type));
+        nebel_pixels p = make_picture(type, NEBEL_PIXEL_DEPTH_AXIAL, has_srgb(type));
         const size_t bytes = PIXELS * nebel_pixel_size(type);
         assert_int_equal(bytes, PIXELS * kinds[type].channels * kinds[type].size);
-        assert_int_equal(nebel_fog_pixels(now, NEBEL_ISA_SCALAR, &p), NEBEL_OK);
+        assert_int_equal(nebel_apply_fog_to_pixels(now, NEBEL_ISA_SCALAR, &p), NEBEL_OK);
         for (nebel_isa isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
             if (!nebel_isa_available(isa)) continue;
             memcpy(other, color, bytes);
-            p.color = p.out = other;
+            p.color = p.output = other;
             for (p.first_row = 0; p.first_row < HEIGHT; p.first_row += p.row_count) {
                 p.row_count = p.first_row + 2 <= HEIGHT ? 2 : HEIGHT - p.first_row;
-                assert_int_equal(nebel_fog_pixels(now, isa, &p), NEBEL_OK);
+                assert_int_equal(nebel_apply_fog_to_pixels(now, isa, &p), NEBEL_OK);
             }
             assert_memory_equal(other, out, bytes);
         }
@@ -237,14 +238,14 @@ static void test_depths_that_are_none_keep_every_number(void **state)
         for (nebel_pixel_type type = NEBEL_PIXEL_RGBA8; type < NEBEL_PIXEL_COUNT; type++)
             for (int srgb = 0; srgb <= has_srgb(type); srgb++) {
                 static uint16_t number;
-                nebel_pixels p = make_picture(type, NEBEL_DEPTH_AXIS, srgb);
+                nebel_pixels p = make_picture(type, NEBEL_PIXEL_DEPTH_AXIAL, srgb);
                 const size_t bytes = PIXELS * nebel_pixel_size(type);
                 for (size_t i = 0; kinds[type].size == 2 && i < bytes / 2; i++, number++) {
                     if (kinds[type].sample == HALF && (number & 0x7fff) > 0x7c00) number = 0x8001;
                     memcpy(color + 2 * i, &number, 2);
                 }
                 for (int i = 0; i < PIXELS; i++) depth[i] = i % 3 == 0 ? nanf("") : i % 3 == 1 ? -5.f : 0.f;
-                assert_int_equal(nebel_fog_pixels(now, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
+                assert_int_equal(nebel_apply_fog_to_pixels(now, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
                 assert_memory_equal(out, color, bytes);
             }
         nebel_release_snapshot(now);
@@ -257,7 +258,7 @@ static void test_lit_boxes_show_their_light(void **state)
     (void)state;
     nebel_fog *fog = NULL;
     nebel_snapshot *now = NULL;
-    nebel_pixels p = make_picture(NEBEL_PIXEL_RGBA8, NEBEL_DEPTH_RAY, 0);
+    nebel_pixels p = make_picture(NEBEL_PIXEL_RGBA8, NEBEL_PIXEL_DEPTH_RADIAL, 0);
     p.transmittance = NULL;
     const nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-50, -50, -80}, .max = {50, 50, -2}},
                                       .extinction = {.05, .05, .05},
@@ -267,7 +268,7 @@ static void test_lit_boxes_show_their_light(void **state)
     assert_int_equal(nebel_set_sun(fog, &sun), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &now), NEBEL_OK);
-    assert_int_equal(nebel_fog_pixels(now, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
+    assert_int_equal(nebel_apply_fog_to_pixels(now, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
     for (int i = 0; i < PIXELS; i++) {
         nebel_ray ray = {.t_max = (double)depth[i]};
         nebel_transfer transfer;
@@ -288,16 +289,16 @@ static void test_wrong_kinds_are_refused(void **state)
 {
     (void)state;
     nebel_snapshot *const now = make_fog(&haze);
-    const nebel_pixels good = make_picture(NEBEL_PIXEL_RGB16, NEBEL_DEPTH_AXIS, 0);
+    const nebel_pixels good = make_picture(NEBEL_PIXEL_RGB16, NEBEL_PIXEL_DEPTH_AXIAL, 0);
     nebel_pixels bad[] = {good, good, good, good, good};
     bad[0].type = NEBEL_PIXEL_COUNT;
     bad[1].type = NEBEL_PIXEL_RGB_HALF;
     bad[1].srgb = 1;
     bad[2].color_pitch = 6 * WIDTH - 2;
-    bad[3].out_pitch = 6 * WIDTH + 1;
+    bad[3].output_pitch = 6 * WIDTH + 1;
     bad[4].transmittance_pitch = 12 * WIDTH - 4;
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-        assert_int_equal(nebel_fog_pixels(now, NEBEL_ISA_DEFAULT, &bad[i]), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_apply_fog_to_pixels(now, NEBEL_ISA_DEFAULT, &bad[i]), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_pixel_size(NEBEL_PIXEL_COUNT), 0);
     nebel_release_snapshot(now);
 }

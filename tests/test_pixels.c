@@ -19,7 +19,7 @@ static double dice(double low, double high)
 static float depth[PIXELS];
 static uint8_t color[4 * PIXELS], out[4 * PIXELS], other[4 * PIXELS];
 
-static nebel_pixels make_picture(nebel_depth depth_type)
+static nebel_pixels make_picture(nebel_pixel_depth depth_type)
 {
     for (int i = 0; i < PIXELS; i++) depth[i] = i % 19 == 0 ? HUGE_VALF : (float)dice(0, 60);
     for (int i = 0; i < 4 * PIXELS; i++) color[i] = (uint8_t)dice(0, 256);
@@ -32,7 +32,7 @@ static nebel_pixels make_picture(nebel_depth depth_type)
                           .height = HEIGHT,
                           .depth = depth,
                           .color = color,
-                          .out = out};
+                          .output = out};
 }
 
 /* `tinted`: what the kernel does not take. */
@@ -76,7 +76,7 @@ static void assert_fogged(const nebel_snapshot *fog, const nebel_pixels *p)
                 (double)p->corner[c] + i % WIDTH * (double)p->step_x[c] + i / WIDTH * (double)p->step_y[c];
             square += ray.direction[c] * ray.direction[c];
         }
-        ray.t_max = (double)depth[i] * (p->depth_type == NEBEL_DEPTH_RAY ? 1 : sqrt(square));
+        ray.t_max = (double)depth[i] * (p->depth_type == NEBEL_PIXEL_DEPTH_RADIAL ? 1 : sqrt(square));
         nebel_transfer transfer;
         assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
                          NEBEL_OK);
@@ -89,9 +89,9 @@ static void test_every_pixel_is_the_nearest_byte(void **state)
 {
     (void)state;
     for (int round = 0; round < 24; round++) {
-        const nebel_pixels p = make_picture(round % 2 ? NEBEL_DEPTH_RAY : NEBEL_DEPTH_AXIS);
+        const nebel_pixels p = make_picture(round % 2 ? NEBEL_PIXEL_DEPTH_RADIAL : NEBEL_PIXEL_DEPTH_AXIAL);
         nebel_snapshot *fog = make_fog(round % 5, round % 3 == 2);
-        assert_int_equal(nebel_fog_pixels(fog, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
+        assert_int_equal(nebel_apply_fog_to_pixels(fog, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
         assert_fogged(fog, &p);
         nebel_release_snapshot(fog);
     }
@@ -106,7 +106,7 @@ static void test_the_sky_is_right_where_ways_are_level(void **state)
         {.shape = {.type = NEBEL_SHAPE_BOX, .min = {990, 10, -60}, .max = {1005, 30, -30}},
          .extinction = {.1, .1, .1}}};
     for (int boxes = 1; boxes <= 2; boxes++) {
-        nebel_pixels p = make_picture(boxes == 1 ? NEBEL_DEPTH_AXIS : NEBEL_DEPTH_RAY);
+        nebel_pixels p = make_picture(boxes == 1 ? NEBEL_PIXEL_DEPTH_AXIAL : NEBEL_PIXEL_DEPTH_RADIAL);
         memcpy(p.corner, (const float[3]){-1, .5f, -1}, sizeof p.corner);
         memcpy(p.step_x, (const float[3]){.03125f, 0, 0}, sizeof p.step_x);
         memcpy(p.step_y, (const float[3]){0, -.03125f, 0}, sizeof p.step_y);
@@ -118,7 +118,7 @@ static void test_the_sky_is_right_where_ways_are_level(void **state)
         assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
         for (nebel_isa isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
             if (!nebel_isa_available(isa)) continue;
-            assert_int_equal(nebel_fog_pixels(snapshot, isa, &p), NEBEL_OK);
+            assert_int_equal(nebel_apply_fog_to_pixels(snapshot, isa, &p), NEBEL_OK);
             assert_fogged(snapshot, &p);
         }
         nebel_release_snapshot(snapshot);
@@ -130,16 +130,16 @@ static void test_instruction_sets_and_splits_give_the_same_bytes(void **state)
 {
     (void)state;
     for (int round = 0; round < 12; round++) {
-        nebel_pixels p = make_picture(round % 2 ? NEBEL_DEPTH_RAY : NEBEL_DEPTH_AXIS);
+        nebel_pixels p = make_picture(round % 2 ? NEBEL_PIXEL_DEPTH_RADIAL : NEBEL_PIXEL_DEPTH_AXIAL);
         nebel_snapshot *fog = make_fog(1 + round % 4, 0);
-        assert_int_equal(nebel_fog_pixels(fog, NEBEL_ISA_SCALAR, &p), NEBEL_OK);
-        p.out = other;
+        assert_int_equal(nebel_apply_fog_to_pixels(fog, NEBEL_ISA_SCALAR, &p), NEBEL_OK);
+        p.output = other;
         for (nebel_isa isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
             if (!nebel_isa_available(isa)) continue;
             memset(other, 0, sizeof other);
             for (p.first_row = 0; p.first_row < HEIGHT; p.first_row += p.row_count) {
                 p.row_count = p.first_row + 7 <= HEIGHT ? 7 : HEIGHT - p.first_row;
-                assert_int_equal(nebel_fog_pixels(fog, isa, &p), NEBEL_OK);
+                assert_int_equal(nebel_apply_fog_to_pixels(fog, isa, &p), NEBEL_OK);
             }
             assert_memory_equal(other, out, sizeof out);
         }
@@ -152,14 +152,14 @@ static void test_a_picture_may_be_fogged_in_place_between_other_rows(void **stat
     (void)state;
     enum { PITCH = 4 * (WIDTH + 5) };
     static uint8_t wide[PITCH * HEIGHT];
-    nebel_pixels p = make_picture(NEBEL_DEPTH_AXIS);
+    nebel_pixels p = make_picture(NEBEL_PIXEL_DEPTH_AXIAL);
     nebel_snapshot *fog = make_fog(3, 0);
-    assert_int_equal(nebel_fog_pixels(fog, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
+    assert_int_equal(nebel_apply_fog_to_pixels(fog, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
     memset(wide, 0x5a, sizeof wide);
     for (size_t y = 0; y < HEIGHT; y++) memcpy(wide + y * PITCH, color + y * 4 * WIDTH, 4 * WIDTH);
-    p.color = p.out = wide;
-    p.color_pitch = p.out_pitch = PITCH;
-    assert_int_equal(nebel_fog_pixels(fog, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
+    p.color = p.output = wide;
+    p.color_pitch = p.output_pitch = PITCH;
+    assert_int_equal(nebel_apply_fog_to_pixels(fog, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
     for (size_t y = 0; y < HEIGHT; y++) {
         assert_memory_equal(wide + y * PITCH, out + y * 4 * WIDTH, 4 * WIDTH);
         for (size_t i = 4 * WIDTH; i < PITCH; i++) assert_int_equal(wide[y * PITCH + i], 0x5a);
@@ -171,10 +171,10 @@ static void test_depths_that_are_none_leave_the_picture_alone(void **state)
 {
     (void)state;
     for (int tinted = 0; tinted < 2; tinted++) {
-        const nebel_pixels p = make_picture(NEBEL_DEPTH_AXIS);
+        const nebel_pixels p = make_picture(NEBEL_PIXEL_DEPTH_AXIAL);
         nebel_snapshot *fog = make_fog(4, tinted);
         for (int i = 0; i < PIXELS; i++) depth[i] = i % 3 == 0 ? nanf("") : i % 3 == 1 ? -5.f : 0.f;
-        assert_int_equal(nebel_fog_pixels(fog, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
+        assert_int_equal(nebel_apply_fog_to_pixels(fog, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
         assert_memory_equal(out, color, sizeof out);
         nebel_release_snapshot(fog);
     }
@@ -185,7 +185,7 @@ static void test_opaque_fog_shows_its_own_colour(void **state)
     (void)state;
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    const nebel_pixels p = make_picture(NEBEL_DEPTH_RAY);
+    const nebel_pixels p = make_picture(NEBEL_PIXEL_DEPTH_RADIAL);
     for (int i = 0; i < PIXELS; i++) depth[i] = 50;
     const nebel_volume_desc volume = {
         .shape = {.type = NEBEL_SHAPE_BOX, .min = {900, -80, -99}, .max = {1100, 120, 99}},
@@ -194,7 +194,7 @@ static void test_opaque_fog_shows_its_own_colour(void **state)
     assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    assert_int_equal(nebel_fog_pixels(snapshot, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
+    assert_int_equal(nebel_apply_fog_to_pixels(snapshot, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
     for (int i = 0; i < PIXELS; i++) {
         const uint8_t wanted[4] = {0, 255, 255, color[4 * i + 3]};
         assert_memory_equal(out + 4 * i, wanted, 4);
@@ -207,10 +207,10 @@ static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     nebel_snapshot *fog = make_fog(1, 0);
-    const nebel_pixels good = make_picture(NEBEL_DEPTH_AXIS);
+    const nebel_pixels good = make_picture(NEBEL_PIXEL_DEPTH_AXIAL);
     nebel_pixels bad[] = {good, good, good, good, good, good, good, good};
     bad[0].depth = NULL;
-    bad[1].out = NULL;
+    bad[1].output = NULL;
     bad[2].width = 0;
     bad[3].height = 70000;
     bad[4].color_pitch = 4 * WIDTH - 1;
@@ -218,10 +218,10 @@ static void test_wrong_arguments_are_refused(void **state)
     bad[6].eye[1] = HUGE_VAL;
     bad[7].step_y[2] = HUGE_VALF;
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-        assert_int_equal(nebel_fog_pixels(fog, NEBEL_ISA_DEFAULT, &bad[i]), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_pixels(NULL, NEBEL_ISA_DEFAULT, &good), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_pixels(fog, NEBEL_ISA_DEFAULT, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_fog_pixels(fog, NEBEL_ISA_COUNT, &good), NEBEL_ERROR_UNSUPPORTED);
+        assert_int_equal(nebel_apply_fog_to_pixels(fog, NEBEL_ISA_DEFAULT, &bad[i]), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_apply_fog_to_pixels(NULL, NEBEL_ISA_DEFAULT, &good), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_apply_fog_to_pixels(fog, NEBEL_ISA_DEFAULT, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_apply_fog_to_pixels(fog, NEBEL_ISA_COUNT, &good), NEBEL_ERROR_UNSUPPORTED);
     nebel_release_snapshot(fog);
 }
 

@@ -31,19 +31,19 @@ static void unit_direction(const nebel_ray *ray, double d[3])
     for (int i = 0; i < 3; i++) d[i] /= sqrt(square);
 }
 
-static nebel_place place_on(const nebel_ray *ray, double t)
+static nebel_sample_point place_on(const nebel_ray *ray, double t)
 {
     double d[3];
     unit_direction(ray, d);
-    nebel_place place = {.distance = t};
+    nebel_sample_point place = {.distance = t};
     for (int i = 0; i < 3; i++) place.position[i] = ray->origin[i] + t * d[i];
     return place;
 }
 
-static nebel_matter matter_at(const nebel_snapshot *snapshot, nebel_place place)
+static nebel_medium_properties matter_at(const nebel_snapshot *snapshot, nebel_sample_point place)
 {
-    nebel_matter matter;
-    assert_int_equal(nebel_sample_fog(snapshot, 1, &place, sizeof place, &matter, sizeof matter), NEBEL_OK);
+    nebel_medium_properties matter;
+    assert_int_equal(nebel_sample_medium(snapshot, 1, &place, sizeof place, &matter, sizeof matter), NEBEL_OK);
     return matter;
 }
 
@@ -59,7 +59,7 @@ static int is_near(double a, double b)
     return fabs(a - b) <= 2e-3 * fmax(fabs(a), fabs(b));
 }
 
-static int are_alike(const nebel_matter *a, const nebel_matter *b)
+static int are_alike(const nebel_medium_properties *a, const nebel_medium_properties *b)
 {
     int alike = 1;
     for (int c = 0; c < 3; c++)
@@ -69,18 +69,18 @@ static int are_alike(const nebel_matter *a, const nebel_matter *b)
 }
 
 /* 1 where a short ray could tell: the fog is the same all along it. */
-static int compare_with_ray(const nebel_snapshot *snapshot, nebel_place place, const double d[3])
+static int compare_with_ray(const nebel_snapshot *snapshot, nebel_sample_point place, const double d[3])
 {
     place.distance = -1;
-    const nebel_matter here = matter_at(snapshot, place);
+    const nebel_medium_properties here = matter_at(snapshot, place);
     const double densest = most_of(here.extinction), far = fabs(place.position[0]) + fabs(place.position[2]);
     if (!(densest < 1e9)) return 0;
     const double h = fmin(1e-4 / fmax(densest, 1e-30), 1e-4 + 1e-9 * far);
     if (h < 1e-10 * far) return 0;
     for (int k = 1; k <= 16; k++) {
-        nebel_place along = place;
+        nebel_sample_point along = place;
         for (int i = 0; i < 3; i++) along.position[i] += h * k / 16 * d[i];
-        const nebel_matter there = matter_at(snapshot, along);
+        const nebel_medium_properties there = matter_at(snapshot, along);
         if (!are_alike(&here, &there)) return 0;
     }
     const nebel_ray ray = {{place.position[0], place.position[1], place.position[2]}, {d[0], d[1], d[2]}, h};
@@ -125,16 +125,16 @@ static void distances_count_from_the_start_of_a_ray(void **state)
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, &volume, 1);
     const double distances[] = {-1, 0, 1.9, 2, 4.9, 5}, there[] = {1, 0, 0, 1, 1, 0};
     for (int i = 0; i < 6; i++)
-        assert_true(matter_at(snapshot, (nebel_place){.distance = distances[i]}).extinction[1] == there[i]);
+        assert_true(matter_at(snapshot, (nebel_sample_point){.distance = distances[i]}).extinction[1] == there[i]);
     const nebel_ray ray = {.direction = {0, 0, 3}};
     const double ends[] = {2, 5, HUGE_VAL}, within[] = {0, 1, 0};
-    nebel_bound bound = {.end = 0};
+    nebel_majorant_segment bound = {.end = 0};
     for (int i = 0; i < 3; i++) {
-        assert_int_equal(nebel_bound_fog(snapshot, &ray, 0, bound.end, &bound), NEBEL_OK);
+        assert_int_equal(nebel_next_majorant(snapshot, &ray, 0, bound.end, &bound), NEBEL_OK);
         assert_true(bound.end == ends[i]);
         assert_true(fabs(bound.extinction[0] - within[i]) < 1e-8);
     }
-    assert_int_equal(nebel_bound_fog(snapshot, &ray, 1, 0, &bound), NEBEL_OK);
+    assert_int_equal(nebel_next_majorant(snapshot, &ray, 1, 0, &bound), NEBEL_OK);
     assert_true(isinf(bound.end) && bound.extinction[0] >= 1);
     nebel_release_snapshot(snapshot);
 }
@@ -147,12 +147,12 @@ static double trusted_reach(const nebel_ray *ray)
     return 1e3 * (1 + fabs(ray->origin[0]) + fabs(ray->origin[1]) + fabs(ray->origin[2]));
 }
 
-static void assert_bounds(const nebel_snapshot *snapshot, const nebel_ray *ray, double from, const nebel_bound *bound,
-                          uint64_t *numbers)
+static void assert_bounds(const nebel_snapshot *snapshot, const nebel_ray *ray, double from,
+                          const nebel_majorant_segment *bound, uint64_t *numbers)
 {
     const double to = fmin(bound->end, fmin(10 * from + 100, trusted_reach(ray)));
     for (int k = 0; k < PLACES && from < to; k++) {
-        const nebel_matter matter = matter_at(snapshot, place_on(ray, dice(numbers, from, to)));
+        const nebel_medium_properties matter = matter_at(snapshot, place_on(ray, dice(numbers, from, to)));
         for (int c = 0; c < 3; c++) {
             assert_true(matter.extinction[c] <= bound->extinction[c]);
             assert_true(matter.emission[c] <= bound->emission[c]);
@@ -169,11 +169,11 @@ static void pieces_bound_the_fog_and_come_to_an_end(void **state)
             nebel_snapshot *snapshot = make_fog((random_fog_kind)kind, seed);
             for (uint64_t i = 0; i < RAYS; i++) {
                 const nebel_ray ray = random_fog_ray(&fog, i);
-                nebel_bound bound = {.end = 0};
+                nebel_majorant_segment bound = {.end = 0};
                 for (int pieces = 0; bound.end < 1e14; pieces++) {
                     assert_true(pieces < MOST_PIECES);
                     const double from = bound.end;
-                    assert_int_equal(nebel_bound_fog(snapshot, &ray, 0, from, &bound), NEBEL_OK);
+                    assert_int_equal(nebel_next_majorant(snapshot, &ray, 0, from, &bound), NEBEL_OK);
                     assert_true(bound.end > from);
                     assert_bounds(snapshot, &ray, from, &bound, &numbers);
                 }
@@ -197,10 +197,10 @@ static void the_last_piece_knows_what_covers_it(void **state)
     const double slopes[] = {-1, 1}, last[] = {.25, 0};
     for (int i = 0; i < 2; i++) {
         const nebel_ray ray = {.direction = {.3, slopes[i], .1}};
-        nebel_bound bound = {.end = 0};
+        nebel_majorant_segment bound = {.end = 0};
         for (int pieces = 0; bound.end < HUGE_VAL; pieces++) {
             assert_true(pieces < 10);
-            assert_int_equal(nebel_bound_fog(snapshot, &ray, 0, bound.end, &bound), NEBEL_OK);
+            assert_int_equal(nebel_next_majorant(snapshot, &ray, 0, bound.end, &bound), NEBEL_OK);
             if (pieces == 0) assert_true(fabs(bound.extinction[0] - 1) < 1e-8);
         }
         assert_true(fabs(bound.extinction[0] - last[i]) < 1e-8);
@@ -218,9 +218,9 @@ static void bounds_are_near(void **state)
     nebel_snapshot *box = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, volumes, 1);
     const nebel_ray along = {.direction = {0, 0, 1}};
     double depth = 0, most = 0;
-    for (nebel_bound bound = {.end = 0}; bound.end < HUGE_VAL;) {
+    for (nebel_majorant_segment bound = {.end = 0}; bound.end < HUGE_VAL;) {
         const double from = bound.end;
-        assert_int_equal(nebel_bound_fog(box, &along, 0, from, &bound), NEBEL_OK);
+        assert_int_equal(nebel_next_majorant(box, &along, 0, from, &bound), NEBEL_OK);
         if (bound.extinction[0] > 0) depth += (bound.end - from) * bound.extinction[0];
         most = fmax(most, bound.extinction[0]);
     }
@@ -231,9 +231,9 @@ static void bounds_are_near(void **state)
     const nebel_ray *rays[] = {&up, &down};
     for (int i = 0; i < 2; i++) {
         depth = 0;
-        for (nebel_bound bound = {.end = 0}; bound.end < 1e14 && depth < 50;) {
+        for (nebel_majorant_segment bound = {.end = 0}; bound.end < 1e14 && depth < 50;) {
             const double from = bound.end;
-            assert_int_equal(nebel_bound_fog(mist, rays[i], 0, from, &bound), NEBEL_OK);
+            assert_int_equal(nebel_next_majorant(mist, rays[i], 0, from, &bound), NEBEL_OK);
             const nebel_ray piece = {.direction = {rays[i]->direction[0], rays[i]->direction[1], rays[i]->direction[2]},
                                      .origin = {0, place_on(rays[i], from).position[1], 0},
                                      .t_max = bound.end - from};
@@ -262,13 +262,13 @@ static void scatterers_are_chosen_by_what_they_scatter(void **state)
         {.extinction = {7, 7, 7}, .source = {1, 1, 1}},
         {.extinction = {4, 4, 4}, .albedo = {1, 1, 1}, .shape = {.type = NEBEL_SHAPE_SPHERE, .radius = .5}}};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, volumes, 4);
-    const nebel_place place = {{0, 1, 0}, -1};
-    const nebel_matter matter = matter_at(snapshot, place);
+    const nebel_sample_point place = {{0, 1, 0}, -1};
+    const nebel_medium_properties matter = matter_at(snapshot, place);
     enum { CHANCES = 20000 };
     double sums[3] = {0}, often[2] = {0};
     for (int i = 0; i < CHANCES; i++) {
         nebel_scatterer one;
-        assert_int_equal(nebel_choose_scatterer(snapshot, &place, -1, (i + .5) / CHANCES, &one), NEBEL_OK);
+        assert_int_equal(nebel_sample_scatterer(snapshot, &place, -1, (i + .5) / CHANCES, &one), NEBEL_OK);
         const int is_second = one.phase.type == NEBEL_PHASE_HENYEY_GREENSTEIN;
         assert_true(is_second ? one.phase.g == .5 : one.phase.type == NEBEL_PHASE_RAYLEIGH);
         assert_true(fabs(one.scattering[1] - (is_second ? 1.2 * exp(-1) : 1)) < 1e-12);
@@ -276,7 +276,7 @@ static void scatterers_are_chosen_by_what_they_scatter(void **state)
         for (int c = 0; c < 3; c++) sums[c] += one.scattering[c] / one.probability / CHANCES;
     }
     nebel_scatterer blue;
-    assert_int_equal(nebel_choose_scatterer(snapshot, &place, 2, 0, &blue), NEBEL_OK);
+    assert_int_equal(nebel_sample_scatterer(snapshot, &place, 2, 0, &blue), NEBEL_OK);
     assert_true(is_near(blue.scattering[2] / blue.probability, matter.scattering[2]));
     const double second = 3.6 * exp(-1);
     assert_true(fabs(often[1] - second / (second + 3)) < 1e-3);
@@ -291,7 +291,7 @@ static void where_nothing_scatters_nothing_is_chosen(void **state)
     const nebel_volume_desc volume = {.extinction = {1, 1, 1}, .source = {1, 1, 1}};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, &volume, 1);
     nebel_scatterer none;
-    assert_int_equal(nebel_choose_scatterer(snapshot, &(nebel_place){{0, 0, 0}, 0}, -1, 0.5, &none), NEBEL_OK);
+    assert_int_equal(nebel_sample_scatterer(snapshot, &(nebel_sample_point){{0, 0, 0}, 0}, -1, 0.5, &none), NEBEL_OK);
     assert_true(none.probability == 0);
     nebel_release_snapshot(snapshot);
 }
@@ -302,7 +302,7 @@ static void grey_is_what_dims_all_channels_alike(void **state)
     const nebel_volume_desc volumes[] = {{.extinction = {1, 1, 1}, .albedo = {.1, .2, .3}}, {.extinction = {1, 1, 2}}};
     for (size_t n = 0; n <= 2; n++) {
         nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, volumes, n);
-        assert_int_equal(nebel_is_fog_grey(snapshot), n < 2);
+        assert_int_equal(nebel_is_extinction_gray(snapshot), n < 2);
         nebel_release_snapshot(snapshot);
     }
 }
@@ -314,35 +314,36 @@ static void bad_calls_are_refused(void **state)
     (void)state;
     fog_messages messages = {0};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, NULL, 0);
-    const nebel_place good = {{0, 0, 0}, 0},
-                      bad[] = {{{(double)NAN, 0, 0}, 0}, {{0, 1e16, 0}, 0}, {{0, 0, 0}, (double)NAN}};
+    const nebel_sample_point good = {{0, 0, 0}, 0},
+                             bad[] = {{{(double)NAN, 0, 0}, 0}, {{0, 1e16, 0}, 0}, {{0, 0, 0}, (double)NAN}};
     const nebel_ray ray = {.direction = {0, 0, 1}}, still = {.direction = {0, 0, 0}},
                     away = {{0, 0, 1.1 * NEBEL_MAX_LENGTH}, {0, 0, 1}, 0};
-    nebel_matter matter;
+    nebel_medium_properties matter;
     nebel_scatterer one;
-    nebel_bound bound;
+    nebel_majorant_segment bound;
     size_t refused = 0;
     for (int i = 0; i < 3; i++) {
-        refused += nebel_sample_fog(snapshot, 1, &bad[i], sizeof *bad, &matter, sizeof matter) == NEBEL_ERROR_ARGUMENT;
-        refused += nebel_choose_scatterer(snapshot, &bad[i], -1, 0, &one) == NEBEL_ERROR_ARGUMENT;
+        refused +=
+            nebel_sample_medium(snapshot, 1, &bad[i], sizeof *bad, &matter, sizeof matter) == NEBEL_ERROR_ARGUMENT;
+        refused += nebel_sample_scatterer(snapshot, &bad[i], -1, 0, &one) == NEBEL_ERROR_ARGUMENT;
     }
-    refused += nebel_sample_fog(snapshot, 1, NULL, 0, &matter, 0) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_sample_fog(snapshot, 1, &good, 0, NULL, 0) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_choose_scatterer(snapshot, &good, -1, 1, &one) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_choose_scatterer(snapshot, &good, -1, (double)NAN, &one) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_choose_scatterer(snapshot, &good, -1, 0, NULL) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_choose_scatterer(snapshot, &good, 3, 0, &one) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_choose_scatterer(snapshot, &good, -2, 0, &one) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_bound_fog(snapshot, &ray, 0, -1, &bound) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_bound_fog(snapshot, &ray, 0, HUGE_VAL, &bound) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_bound_fog(snapshot, &still, 0, 0, &bound) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_bound_fog(snapshot, &away, 0, 0, &bound) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_bound_fog(snapshot, &ray, 0, 0, NULL) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_sample_medium(snapshot, 1, NULL, 0, &matter, 0) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_sample_medium(snapshot, 1, &good, 0, NULL, 0) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_sample_scatterer(snapshot, &good, -1, 1, &one) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_sample_scatterer(snapshot, &good, -1, (double)NAN, &one) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_sample_scatterer(snapshot, &good, -1, 0, NULL) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_sample_scatterer(snapshot, &good, 3, 0, &one) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_sample_scatterer(snapshot, &good, -2, 0, &one) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_next_majorant(snapshot, &ray, 0, -1, &bound) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_next_majorant(snapshot, &ray, 0, HUGE_VAL, &bound) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_next_majorant(snapshot, &still, 0, 0, &bound) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_next_majorant(snapshot, &away, 0, 0, &bound) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_next_majorant(snapshot, &ray, 0, 0, NULL) == NEBEL_ERROR_ARGUMENT;
     assert_int_equal(refused, 18);
     assert_int_equal(messages.count, refused);
-    assert_int_equal(nebel_sample_fog(NULL, 0, NULL, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_sample_fog(snapshot, 0, NULL, 0, NULL, 0), NEBEL_OK);
-    assert_int_equal(nebel_bound_fog(snapshot, &ray, 0, 0, &bound), NEBEL_OK);
+    assert_int_equal(nebel_sample_medium(NULL, 0, NULL, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_sample_medium(snapshot, 0, NULL, 0, NULL, 0), NEBEL_OK);
+    assert_int_equal(nebel_next_majorant(snapshot, &ray, 0, 0, &bound), NEBEL_OK);
     assert_true(isinf(bound.end) && bound.extinction[0] == 0);
     nebel_release_snapshot(snapshot);
 }

@@ -197,7 +197,7 @@ static void test_odd_strides_and_unknown_precisions_are_refused(void **state)
     double distances[2];
     assert_int_equal(nebel_trace(fog, NULL, 2, rays, odd, transfers, sizeof *transfers), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace(fog, NULL, 2, rays, sizeof *rays, transfers, 3), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_find_transmittance(fog, 0.5, 0, 2, rays, odd, distances), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_invert_transmittance(fog, 0.5, 0, 2, rays, odd, distances), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace(fog, &unknown, 2, rays, sizeof *rays, transfers, sizeof *transfers),
                      NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace(fog, NULL, 2, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);

@@ -132,7 +132,7 @@ static nebel_atmosphere *make(const nebel_atmosphere_desc *desc)
 static nebel_transfer trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, nebel_ray ray)
 {
     nebel_transfer transfer;
-    assert_int_equal(nebel_trace_air(atmosphere, sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_atmosphere(atmosphere, sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
     return transfer;
 }
 
@@ -150,7 +150,7 @@ static void transmittance_is_that_of_T30(void **state)
                 {10, 90, {0.5337529126605932, 0.21129856810545702, 0.06686940936695239}},
                 {10, 92, {0.2419706064641268, 0.03397747215487229, 0.0006590211656675128}},
                 {2, 45, {0.9359246538814264, 0.8517230142965991, 0.7449021300051336}}};
-    nebel_atmosphere *earth = make(nebel_find_atmosphere("earth"));
+    nebel_atmosphere *earth = make(nebel_lookup_atmosphere("earth"));
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         const double angle = rows[i].zenith * DEGREES;
         const nebel_ray ray = {{0, 1e3 * rows[i].height, 0}, {sin(angle), cos(angle), 0}, (double)INFINITY};
@@ -171,7 +171,7 @@ static void gain_is_that_of_T31(void **state)
                                      {1000, 0.09391954466598366, 0.16878565493378345, 0.296771255787103},
                                      {10000, 0.09454518608437013, 0.17501879121877703, 0.32030411574217416},
                                      {50000, 0.06237947042135505, 0.10835963614682466, 0.21987139072115106}};
-    nebel_atmosphere *earth = make(nebel_find_atmosphere("earth"));
+    nebel_atmosphere *earth = make(nebel_lookup_atmosphere("earth"));
     const nb_airs *airs = &earth->airs;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         const double radius = airs->radius + rows[i][0], horizon = -sqrt(1 - pow(airs->radius / radius, 2));
@@ -220,9 +220,9 @@ static void light_is_that_of_T40(void **state)
     nebel_atmosphere_desc desc = {
         .radius = 1e6,
         .thickness = 5e5,
-        .airs = {{.scattering = {1e-6, 1e-6, 1e-6}, .scale_height = 6e4},
-                 {.scattering = {0, 1.5e-6, 0}, .absorption = {0, 0.5e-6, 2e-6}, .scale_height = 3e4}},
-        .air_count = 2};
+        .components = {{.scattering = {1e-6, 1e-6, 1e-6}, .scale_height = 6e4},
+                       {.scattering = {0, 1.5e-6, 0}, .absorption = {0, 0.5e-6, 2e-6}, .scale_height = 3e4}},
+        .component_count = 2};
     nebel_atmosphere *small = make(&desc);
     const nb_track level = {1.4e6, 0}, up = {1.4e6, 1.4e6};
     double depth[3];
@@ -234,8 +234,9 @@ static void light_is_that_of_T40(void **state)
     expect_near("Rayleigh", 4 * PI * gather(small, 0, 0, 0, 2), 0.05320320237142445, 1e-6);
     expect_near("from above", 4 * PI * gather(small, 5e5, 180, 0, 0), 0.05652699014088097, 1e-6);
     nebel_destroy_atmosphere(small);
-    desc.airs[0] = (nebel_air){.absorption = {1.2e-6}, .profile = NEBEL_AIR_LAYER, .middle = 2.5e5, .width = 2.5e5};
-    desc.airs[1] = (nebel_air){.scattering = {0, 1e-6, 0}, .scale_height = 1e15};
+    desc.components[0] = (nebel_atmosphere_component){
+        .absorption = {1.2e-6}, .profile = NEBEL_COMPONENT_TENT, .center_height = 2.5e5, .half_width = 2.5e5};
+    desc.components[1] = (nebel_atmosphere_component){.scattering = {0, 1e-6, 0}, .scale_height = 1e15};
     nebel_atmosphere *odd = make(&desc);
     nb_track_depth(&odd->airs, (nb_track){1e6, 1e6}, 5e5, depth);
     expect_near("layer", exp(-depth[0]), 0.7408182206817179, 1e-9);
@@ -246,18 +247,18 @@ static void light_is_that_of_T40(void **state)
 
 static const nebel_atmosphere_desc measured = {.radius = 6.36e6,
                                                .thickness = 6e4,
-                                               .airs = {{.scattering = {5.80234e-6, 13.55776e-6, 33.10001e-6},
-                                                         .phase = {.type = NEBEL_PHASE_RAYLEIGH},
-                                                         .scale_height = 8000},
-                                                        {.scattering = {3.996e-6, 3.996e-6, 3.996e-6},
-                                                         .absorption = {0.444e-6, 0.444e-6, 0.444e-6},
-                                                         .phase = {.type = NEBEL_PHASE_CORNETTE_SHANKS, .g = 0.8},
-                                                         .scale_height = 1200},
-                                                        {.absorption = {0.6497166e-6, 1.8809e-6, 0.08501668e-6},
-                                                         .profile = NEBEL_AIR_LAYER,
-                                                         .middle = 25000,
-                                                         .width = 15000}},
-                                               .air_count = 3,
+                                               .components = {{.scattering = {5.80234e-6, 13.55776e-6, 33.10001e-6},
+                                                               .phase = {.type = NEBEL_PHASE_RAYLEIGH},
+                                                               .scale_height = 8000},
+                                                              {.scattering = {3.996e-6, 3.996e-6, 3.996e-6},
+                                                               .absorption = {0.444e-6, 0.444e-6, 0.444e-6},
+                                                               .phase = {.type = NEBEL_PHASE_CORNETTE_SHANKS, .g = 0.8},
+                                                               .scale_height = 1200},
+                                                              {.absorption = {0.6497166e-6, 1.8809e-6, 0.08501668e-6},
+                                                               .profile = NEBEL_COMPONENT_TENT,
+                                                               .center_height = 25000,
+                                                               .half_width = 15000}},
+                                               .component_count = 3,
                                                .ground_albedo = {0.1, 0.1, 0.1}};
 
 /* View's zenith, azimuth from the sun, the sun's zenith, height [km]; once and all orders for red, green and blue. */
@@ -286,8 +287,9 @@ static void add_ground(const nebel_atmosphere *atmosphere, const nebel_sun *sun,
         up[c] = (place[c] + (c == 1 ? radius : 0)) / radius;
         cosine += up[c] * sun->direction[c];
     }
-    nebel_air_light arrives;
-    assert_int_equal(nebel_light_air(atmosphere, sun, 1, (const double(*)[3])place, 0, &arrives, 0), NEBEL_OK);
+    nebel_irradiance arrives;
+    assert_int_equal(nebel_compute_atmosphere_irradiance(atmosphere, sun, 1, (const double(*)[3])place, 0, &arrives, 0),
+                     NEBEL_OK);
     for (int c = 0; c < 3; c++) {
         once[c] += transfer->transmittance[c] * 0.1 / PI * cosine * arrives.sun[c];
         all[c] += transfer->transmittance[c] * 0.1 / PI * (cosine * arrives.sun[c] + arrives.sky[c]);
@@ -297,10 +299,10 @@ static void add_ground(const nebel_atmosphere *atmosphere, const nebel_sun *sun,
 static void skies_are_those_of_T41(void **state)
 {
     (void)state;
-    for (int quality = 0; quality < NEBEL_AIR_QUALITY_COUNT; quality++) {
+    for (int quality = 0; quality < NEBEL_ATMOSPHERE_QUALITY_COUNT; quality++) {
         nebel_atmosphere_desc desc = measured;
         double worst_once = 0, worst = 0, worst_told = 0;
-        desc.quality = (nebel_air_quality)quality;
+        desc.quality = (nebel_atmosphere_quality)quality;
         nebel_atmosphere *earth = make(&desc);
         for (size_t i = 0; i < sizeof skies / sizeof *skies; i++) {
             const double *row = skies[i];
@@ -330,7 +332,8 @@ static void skies_are_those_of_T41(void **state)
         }
         print_message("quality %d: once %.2e off, all orders %.2e, %.2f of the error told\n", quality, worst_once,
                       worst, worst_told);
-        assert_true(worst_once <= 2e-3 && worst <= (quality == NEBEL_AIR_PRECISE ? 0.01 : 0.03) && worst_told <= 1);
+        assert_true(worst_once <= 2e-3 && worst <= (quality == NEBEL_ATMOSPHERE_PRECISE ? 0.01 : 0.03) &&
+                    worst_told <= 1);
         nebel_destroy_atmosphere(earth);
     }
 }
@@ -341,9 +344,9 @@ static void twilights_agree(void **state)
     (void)state;
     static const double depths[] = {3, 5, 7, 10}, most[] = {0.025, 0.05, 0.1, 0.3};
     static const double views[][2] = {{0, 0}, {60, 0}, {60, 180}, {80, 0}, {85, 0}, {80, 180}, {85, 90}, {88, 0}};
-    nebel_atmosphere_desc desc = *nebel_find_atmosphere("earth");
+    nebel_atmosphere_desc desc = *nebel_lookup_atmosphere("earth");
     nebel_atmosphere *const fast = make(&desc);
-    desc.quality = NEBEL_AIR_PRECISE;
+    desc.quality = NEBEL_ATMOSPHERE_PRECISE;
     nebel_atmosphere *const precise = make(&desc);
     for (int s = 0; s < 4; s++) {
         double worst = 0;
@@ -374,9 +377,9 @@ static void qualities_agree(void **state)
     (void)state;
     static const char *const names[] = {"mars", "toy"};
     for (int n = 0; n < 2; n++) {
-        nebel_atmosphere_desc desc = *nebel_find_atmosphere(names[n]);
+        nebel_atmosphere_desc desc = *nebel_lookup_atmosphere(names[n]);
         nebel_atmosphere *fast = make(&desc);
-        desc.quality = NEBEL_AIR_PRECISE;
+        desc.quality = NEBEL_ATMOSPHERE_PRECISE;
         nebel_atmosphere *precise = make(&desc);
         double worst = 0, most = 0;
         for (int i = 0; i < 400; i++) {
@@ -402,18 +405,18 @@ static void qualities_agree(void **state)
 }
 
 /* Air and ground that take nothing, in light from everywhere: everything looks alike. */
-static void check_furnace(nebel_air_quality quality)
+static void check_furnace(nebel_atmosphere_quality quality)
 {
     enum { RINGS = 16, TURNS = 24 };
     const nebel_atmosphere_desc desc = {.radius = 6.36e6,
                                         .thickness = 1e5,
-                                        .airs = {{.scattering = {5.802e-6, 13.558e-6, 33.1e-6},
-                                                  .phase = {.type = NEBEL_PHASE_RAYLEIGH},
-                                                  .scale_height = 8000},
-                                                 {.scattering = {4e-6, 4e-6, 4e-6},
-                                                  .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.5},
-                                                  .scale_height = 1200}},
-                                        .air_count = 2,
+                                        .components = {{.scattering = {5.802e-6, 13.558e-6, 33.1e-6},
+                                                        .phase = {.type = NEBEL_PHASE_RAYLEIGH},
+                                                        .scale_height = 8000},
+                                                       {.scattering = {4e-6, 4e-6, 4e-6},
+                                                        .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.5},
+                                                        .scale_height = 1200}},
+                                        .component_count = 2,
                                         .ground_albedo = {1, 1, 1},
                                         .quality = quality};
     /* From near the ground, from within the air, and from space: past the planet, to its edge, straight down. */
@@ -435,11 +438,13 @@ static void check_furnace(nebel_air_quality quality)
             clear = trace(white, &sun, ray);
             for (int c = 0; c < 3; c++) light[c] += clear.in_scattering[c];
             if (!(way < HUGE_VAL)) continue;
-            nebel_air_light arrives;
+            nebel_irradiance arrives;
             const double place[3] = {way * ray.direction[0], height + way * ray.direction[1], 0};
             const double up[2] = {place[0] / 6.36e6, 1 + place[1] / 6.36e6};
             const double cosine = fmax(0, up[0] * sun.direction[0] + up[1] * sun.direction[1]);
-            assert_int_equal(nebel_light_air(white, &sun, 1, (const double(*)[3])place, 0, &arrives, 0), NEBEL_OK);
+            assert_int_equal(
+                nebel_compute_atmosphere_irradiance(white, &sun, 1, (const double(*)[3])place, 0, &arrives, 0),
+                NEBEL_OK);
             for (int c = 0; c < 3; c++) ground[c] += (cosine * arrives.sun[c] + arrives.sky[c]) / PI;
         }
         for (int c = 0; c < 3; c++) {
@@ -453,8 +458,8 @@ static void check_furnace(nebel_air_quality quality)
 static void a_furnace_stays_white(void **state)
 {
     (void)state;
-    check_furnace(NEBEL_AIR_FAST);
-    check_furnace(NEBEL_AIR_PRECISE);
+    check_furnace(NEBEL_ATMOSPHERE_FAST);
+    check_furnace(NEBEL_ATMOSPHERE_PRECISE);
 }
 
 /* ---- odd places and bad input ---------------------------------------------------------------- */
@@ -465,7 +470,7 @@ static void odd_rays_have_answers(void **state)
     const nebel_sun sun = {.direction = {0.6, 0.8, 0}, .irradiance = {1, 1, 1}};
     static const char *const names[] = {"earth", "mars", "toy"};
     for (int i = 0; i < 3; i++) {
-        const nebel_atmosphere_desc *desc = nebel_find_atmosphere(names[i]);
+        const nebel_atmosphere_desc *desc = nebel_lookup_atmosphere(names[i]);
         nebel_atmosphere *air = make(desc);
         const double radius = desc->radius, top = desc->thickness;
         const double places[][3] = {{0, 0, 0},       {0, -radius, 0}, {0, -radius / 2, 0}, {0, top, 0},
@@ -504,10 +509,11 @@ static void below_the_ground_is_on_it(void **state)
         const nebel_ray below = {{0, -depths[k], 0}, {.2, 1, -.4}, HUGE_VAL};
         const double places[2][3] = {{0, 0, 0}, {0, -depths[k], 0}};
         nebel_transfer wanted, got;
-        nebel_air_light light[2];
-        assert_int_equal(nebel_trace_air(air, &sun, 1, &on, 0, &wanted, 0), NEBEL_OK);
-        assert_int_equal(nebel_trace_air(air, &sun, 1, &below, 0, &got, 0), NEBEL_OK);
-        assert_int_equal(nebel_light_air(air, &sun, 2, places, sizeof *places, light, sizeof *light), NEBEL_OK);
+        nebel_irradiance light[2];
+        assert_int_equal(nebel_trace_atmosphere(air, &sun, 1, &on, 0, &wanted, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_atmosphere(air, &sun, 1, &below, 0, &got, 0), NEBEL_OK);
+        assert_int_equal(
+            nebel_compute_atmosphere_irradiance(air, &sun, 2, places, sizeof *places, light, sizeof *light), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
             expect_near("transmittance", got.transmittance[c], wanted.transmittance[c], 1e-9);
             expect_near("light", got.in_scattering[c], wanted.in_scattering[c], 1e-9);
@@ -518,12 +524,14 @@ static void below_the_ground_is_on_it(void **state)
     nebel_destroy_atmosphere(air);
 }
 
-static nebel_air_light light_above(const nebel_atmosphere *air, const nebel_sun *sun, const double up[3], double height)
+static nebel_irradiance light_above(const nebel_atmosphere *air, const nebel_sun *sun, const double up[3],
+                                    double height)
 {
-    nebel_air_light light;
+    nebel_irradiance light;
     double place[1][3], radius = air->airs.radius + height;
     for (int c = 0; c < 3; c++) place[0][c] = air->center[c] + radius * up[c];
-    assert_int_equal(nebel_light_air(air, sun, 1, (const double(*)[3])place, 0, &light, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_atmosphere_irradiance(air, sun, 1, (const double(*)[3])place, 0, &light, 0),
+                     NEBEL_OK);
     return light;
 }
 
@@ -534,16 +542,16 @@ static void light_goes_on_above_the_air(void **state)
     static const char *const names[] = {"earth", "mars", "toy"};
     static const double up[3] = {.48, .6, -.64}, across[3] = {.8, 0, .6}, parts[] = {.999, 1, 1.001, 2, 1e3, 1e7};
     for (int n = 0; n < 3; n++) {
-        nebel_atmosphere *air = make(nebel_find_atmosphere(names[n]));
+        nebel_atmosphere *air = make(nebel_lookup_atmosphere(names[n]));
         const double thickness = air->airs.top - air->airs.radius;
         double before = 0;
         for (int degrees = -20; degrees <= 90; degrees += 10) {
             const double x = cos(degrees * DEGREES), y = sin(degrees * DEGREES);
             const nebel_sun sun = {.direction = {x * across[0] + y * up[0], y * up[1], x * across[2] + y * up[2]},
                                    .irradiance = {1, 1, 1}};
-            const nebel_air_light ground = light_above(air, &sun, up, 0);
-            const nebel_air_light below = light_above(air, &sun, up, thickness * (1 - 1e-6));
-            const nebel_air_light above = light_above(air, &sun, up, thickness * (1 + 1e-6));
+            const nebel_irradiance ground = light_above(air, &sun, up, 0);
+            const nebel_irradiance below = light_above(air, &sun, up, thickness * (1 - 1e-6));
+            const nebel_irradiance above = light_above(air, &sun, up, thickness * (1 + 1e-6));
             for (int c = 0; c < 3; c++) {
                 for (size_t k = 0; k < sizeof parts / sizeof *parts; k++)
                     expect_near("sky", light_above(air, &sun, up, parts[k] * thickness).sky[c], ground.sky[c], 1e-6);
@@ -560,7 +568,7 @@ static void light_goes_on_above_the_air(void **state)
 static void distance_changes_nothing(void **state)
 {
     (void)state;
-    nebel_atmosphere *earth = make(nebel_find_atmosphere("earth"));
+    nebel_atmosphere *earth = make(nebel_lookup_atmosphere("earth"));
     const nebel_sun sun = {.direction = {1, 0.2, 0}, .irradiance = {1, 1, 1}};
     for (int i = 0; i < 20; i++) {
         const double x = 6.4e6 * i / 19 + 1e4;
@@ -582,7 +590,7 @@ static void rays_end_within_hazy_air(void **state)
     static const char *const names[] = {"earth", "mars"};
     static const double most_of[] = {5e-3, 0.2};
     for (int n = 0; n < 2; n++) {
-        const nebel_atmosphere_desc *known = nebel_find_atmosphere(names[n]);
+        const nebel_atmosphere_desc *known = nebel_lookup_atmosphere(names[n]);
         nebel_atmosphere *air = make(known);
         double worst = 0, told = 0, step = 0;
         for (int i = 0; i < 400; i++) {
@@ -633,36 +641,39 @@ static void bad_numbers_are_refused(void **state)
         expect_fault(&(nebel_atmosphere_desc){.radius = x});
         expect_fault(&(nebel_atmosphere_desc){.thickness = x});
         expect_fault(&(nebel_atmosphere_desc){.ground_albedo = {0, x, 0}});
-        if (i > 0) expect_fault(&(nebel_atmosphere_desc){.ground = {0, x, 0}});
-        expect_fault(&(nebel_atmosphere_desc){.airs = {{.scattering = {x}, .scale_height = 1e4}}, .air_count = 1});
-        expect_fault(&(nebel_atmosphere_desc){.airs = {{.absorption = {x}, .scale_height = 1e4}}, .air_count = 1});
-        expect_fault(&(nebel_atmosphere_desc){.airs = {{.scale_height = x}}, .air_count = 1});
+        if (i > 0) expect_fault(&(nebel_atmosphere_desc){.ground_point = {0, x, 0}});
+        expect_fault(
+            &(nebel_atmosphere_desc){.components = {{.scattering = {x}, .scale_height = 1e4}}, .component_count = 1});
+        expect_fault(
+            &(nebel_atmosphere_desc){.components = {{.absorption = {x}, .scale_height = 1e4}}, .component_count = 1});
+        expect_fault(&(nebel_atmosphere_desc){.components = {{.scale_height = x}}, .component_count = 1});
     }
-    expect_fault(&(nebel_atmosphere_desc){.airs = {{.scale_height = 0}}, .air_count = 1});
-    expect_fault(
-        &(nebel_atmosphere_desc){.airs = {{.profile = (nebel_air_profile)2, .scale_height = 1e4}}, .air_count = 1});
+    expect_fault(&(nebel_atmosphere_desc){.components = {{.scale_height = 0}}, .component_count = 1});
+    expect_fault(&(nebel_atmosphere_desc){.components = {{.profile = (nebel_component_profile)2, .scale_height = 1e4}},
+                                          .component_count = 1});
     expect_fault(&(nebel_atmosphere_desc){.thickness = 1, .radius = 1e7});
-    expect_fault(&(nebel_atmosphere_desc){.air_count = NEBEL_MAX_AIRS + 1});
-    expect_fault(&(nebel_atmosphere_desc){.quality = NEBEL_AIR_QUALITY_COUNT});
+    expect_fault(&(nebel_atmosphere_desc){.component_count = NEBEL_MAX_COMPONENTS + 1});
+    expect_fault(&(nebel_atmosphere_desc){.quality = NEBEL_ATMOSPHERE_QUALITY_COUNT});
     nebel_atmosphere *earth = make(&(nebel_atmosphere_desc){.radius = 0});
     nebel_transfer transfer;
     const nebel_ray good = {{0, 0, 0}, {0, 1, 0}, 1}, still = {{0, 0, 0}, {0, 0, 0}, 1},
                     back = {{0, 0, 0}, {0, 1, 0}, -1};
     const nebel_sun none = {.irradiance = {1}}, dark = {.direction = {0}}, negative = {{0, 1, 0}, {-1}};
-    assert_int_equal(nebel_trace_air(earth, &none, 1, &good, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_air(earth, &negative, 1, &good, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_air(earth, &dark, 1, &still, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_air(earth, &dark, 1, &back, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_air(NULL, &dark, 1, &good, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_atmosphere(earth, &none, 1, &good, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_atmosphere(earth, &negative, 1, &good, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_atmosphere(earth, &dark, 1, &still, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_atmosphere(earth, &dark, 1, &back, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_atmosphere(NULL, &dark, 1, &good, 0, &transfer, 0), NEBEL_ERROR_ARGUMENT);
     const nebel_ray last_is_bad[2] = {good, back};
     transfer.error = -7;
-    assert_int_equal(nebel_trace_air(earth, &dark, 2, last_is_bad, sizeof good, &transfer, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_atmosphere(earth, &dark, 2, last_is_bad, sizeof good, &transfer, 0),
+                     NEBEL_ERROR_ARGUMENT);
     assert_true(transfer.error == -7);
-    assert_int_equal(nebel_trace_air(earth, NULL, 0, NULL, 0, NULL, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_atmosphere(earth, NULL, 0, NULL, 0, NULL, 0), NEBEL_OK);
     nebel_destroy_atmosphere(earth);
     nebel_destroy_atmosphere(NULL);
-    assert_null(nebel_find_atmosphere("venus"));
-    assert_null(nebel_find_atmosphere(NULL));
+    assert_null(nebel_lookup_atmosphere("venus"));
+    assert_null(nebel_lookup_atmosphere(NULL));
 }
 
 /* Backwards, and how often is counted. */
@@ -676,7 +687,7 @@ static void parts_may_come_in_any_order(void **state)
 {
     (void)state;
     int calls = 0;
-    nebel_atmosphere_desc desc = *nebel_find_atmosphere("mars");
+    nebel_atmosphere_desc desc = *nebel_lookup_atmosphere("mars");
     nebel_atmosphere *forwards = make(&desc);
     desc.run = run_backwards;
     desc.run_user = &calls;
@@ -726,9 +737,9 @@ static void try_kernel(const nebel_atmosphere *atmosphere, nb_gather_fn *kernel)
 static void all_instruction_sets_agree(void **state)
 {
     (void)state;
-    for (int quality = 0; quality < NEBEL_AIR_QUALITY_COUNT; quality++) {
-        nebel_atmosphere_desc desc = *nebel_find_atmosphere("earth");
-        desc.quality = (nebel_air_quality)quality;
+    for (int quality = 0; quality < NEBEL_ATMOSPHERE_QUALITY_COUNT; quality++) {
+        nebel_atmosphere_desc desc = *nebel_lookup_atmosphere("earth");
+        desc.quality = (nebel_atmosphere_quality)quality;
         nebel_atmosphere *earth = make(&desc);
         for (int isa = 0; isa < NEBEL_ISA_COUNT; isa++) {
             nb_gather_fn *const kernel = nb_gather_choose((nebel_isa)isa);

@@ -1,4 +1,4 @@
-/* Tables of air from one place: how far they are from nebel_trace_air, and whether they say so. */
+/* Tables of air from one place: how far they are from nebel_trace_atmosphere, and whether they say so. */
 #include <nebel/planet.h>
 
 #include "planet/view.h"
@@ -30,7 +30,7 @@ static double draw(uint32_t *state)
 static nebel_atmosphere *make(const char *name)
 {
     nebel_atmosphere *atmosphere = NULL;
-    assert_int_equal(nebel_create_atmosphere(nebel_find_atmosphere(name), &atmosphere), NEBEL_OK);
+    assert_int_equal(nebel_create_atmosphere(nebel_lookup_atmosphere(name), &atmosphere), NEBEL_OK);
     return atmosphere;
 }
 
@@ -69,20 +69,21 @@ static void aim(bundle *rays, const nebel_atmosphere_desc *desc, double height, 
     }
 }
 
-static void trace_both(bundle *rays, const nebel_air_view_desc *desc, const nebel_air_view *view)
+static void trace_both(bundle *rays, const nebel_sky_view_desc *desc, const nebel_sky_view *view)
 {
     const double *const direction[3] = {rays->direction[0], rays->direction[1], rays->direction[2]};
-    const nebel_transfer_planes lights = {
+    const nebel_transfer_planes transfers = {
         .transmittance = {rays->transmittance[0], rays->transmittance[1], rays->transmittance[2]},
         .in_scattering = {rays->in_scattering[0], rays->in_scattering[1], rays->in_scattering[2]},
         .error = rays->error};
-    assert_int_equal(nebel_trace_air_view(view, RAYS, direction, desc->has_distances ? rays->t_max : NULL, &lights),
+    assert_int_equal(nebel_trace_sky_view(view, RAYS, direction, desc->has_ray_ends ? rays->t_max : NULL, &transfers),
                      NEBEL_OK);
     for (int i = 0; i < RAYS; i++) {
-        nebel_ray ray = {.t_max = desc->has_distances ? (double)rays->t_max[i] : HUGE_VAL};
+        nebel_ray ray = {.t_max = desc->has_ray_ends ? (double)rays->t_max[i] : HUGE_VAL};
         memcpy(ray.origin, desc->position, sizeof ray.origin);
         for (int c = 0; c < 3; c++) ray.direction[c] = rays->direction[c][i];
-        assert_int_equal(nebel_trace_air(desc->atmosphere, &desc->sun, 1, &ray, 0, &rays->exact[i], 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_atmosphere(desc->atmosphere, &desc->sun, 1, &ray, 0, &rays->exact[i], 0),
+                         NEBEL_OK);
     }
 }
 
@@ -140,22 +141,22 @@ static void tables_are_as_far_off_as_they_say(void **state)
     uint32_t seed = 1;
     for (int n = 0; n < 3; n++) {
         nebel_atmosphere *air = make(names[n]);
-        const nebel_atmosphere_desc *known = nebel_find_atmosphere(names[n]);
+        const nebel_atmosphere_desc *known = nebel_lookup_atmosphere(names[n]);
         for (int p = 0; p < (n == 0 ? 6 : 4); p++) {
             tally all = {.count = 0};
             for (int s = 0; s < 3; s++) {
                 if (!nb_test_tries((size_t)(n + p + s) % 3, 3)) continue;
                 const double angle = elevations[s] * acos(-1) / 180, height = places[p].height * known->thickness;
-                const nebel_air_view_desc desc = {.atmosphere = air,
+                const nebel_sky_view_desc desc = {.atmosphere = air,
                                                   .sun = {{cos(angle), sin(angle), 0.1}, {2, 1.9, 1.7}},
                                                   .position = {0, height, 0}};
-                nebel_air_view *view;
+                nebel_sky_view *view;
                 bundle rays;
-                assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+                assert_int_equal(nebel_create_sky_view(&desc, &view), NEBEL_OK);
                 aim(&rays, known, height, &seed);
                 trace_both(&rays, &desc, view);
                 count(&rays, &all);
-                nebel_destroy_air_view(view);
+                nebel_destroy_sky_view(view);
             }
             char what[40];
             (void)snprintf(what, sizeof what, "%s from %s", names[n], places[p].where);
@@ -176,24 +177,24 @@ static void deep_air_has_no_stairs(void **state)
     const nebel_atmosphere_desc deep = {
         .radius = 1e3,
         .thickness = 1e3,
-        .airs = {{.scattering = {1e-4, 2e-4, 4e-4}, .phase.type = NEBEL_PHASE_RAYLEIGH, .scale_height = 300}},
-        .air_count = 1};
+        .components = {{.scattering = {1e-4, 2e-4, 4e-4}, .phase.type = NEBEL_PHASE_RAYLEIGH, .scale_height = 300}},
+        .component_count = 1};
     nebel_atmosphere *air;
     uint32_t seed = 5;
     assert_int_equal(nebel_create_atmosphere(&deep, &air), NEBEL_OK);
     for (size_t i = 0; i < sizeof eyes / sizeof *eyes; i++) {
-        const nebel_air_view_desc desc = {
+        const nebel_sky_view_desc desc = {
             .atmosphere = air, .sun = {{1, eyes[i].sun, .2}, {1, 1, 1}}, .position = {0, eyes[i].height, 0}};
-        nebel_air_view *view;
+        nebel_sky_view *view;
         tally all = {.count = 0};
-        assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+        assert_int_equal(nebel_create_sky_view(&desc, &view), NEBEL_OK);
         for (int part = 0; part < 6; part++) {
             bundle rays;
             aim(&rays, &deep, eyes[i].height, &seed);
             trace_both(&rays, &desc, view);
             count(&rays, &all);
         }
-        nebel_destroy_air_view(view);
+        nebel_destroy_sky_view(view);
         check(eyes[i].what, &all, eyes[i].most_of_99, eyes[i].most);
     }
     nebel_destroy_atmosphere(air);
@@ -207,17 +208,17 @@ static void look_along_ends(const nebel_atmosphere_desc *desc, const double heig
     for (int h = 0; h < height_count; h++)
         for (int s = 0; s < 3; s++) {
             if (!nb_test_tries((size_t)(h + s) % 3, 3)) continue;
-            const nebel_air_view_desc from = {.atmosphere = air,
+            const nebel_sky_view_desc from = {.atmosphere = air,
                                               .sun = {{0.3, 0.02 + 0.2 * s, 1}, {1, 1, 1}},
                                               .position = {0, heights[h], 0},
-                                              .has_distances = 1};
-            nebel_air_view *view;
+                                              .has_ray_ends = 1};
+            nebel_sky_view *view;
             bundle rays;
-            assert_int_equal(nebel_create_air_view(&from, &view), NEBEL_OK);
+            assert_int_equal(nebel_create_sky_view(&from, &view), NEBEL_OK);
             aim(&rays, desc, heights[h], &seed);
             trace_both(&rays, &from, view);
             count(&rays, all);
-            nebel_destroy_air_view(view);
+            nebel_destroy_sky_view(view);
         }
     nebel_destroy_atmosphere(air);
 }
@@ -226,7 +227,7 @@ static void rays_may_end_within_the_air(void **state)
 {
     (void)state;
     static const double low[] = {2, 1e4}, high[] = {3e4, 9e4}, above[] = {4e5, 2e7};
-    const nebel_atmosphere_desc *earth = nebel_find_atmosphere("earth");
+    const nebel_atmosphere_desc *earth = nebel_lookup_atmosphere("earth");
     tally from_low = {.count = 0}, from_high = {.count = 0}, from_above = {.count = 0};
     look_along_ends(earth, low, 2, &from_low);
     look_along_ends(earth, high, 2, &from_high);
@@ -244,16 +245,16 @@ static void thin_air_from_space_is_told(void **state)
     static const double height[] = {1e6};
     const nebel_atmosphere_desc layer = {.radius = 6.36e6,
                                          .thickness = 1e5,
-                                         .airs = {{.scattering = {2e-5, 4e-5, 8e-5},
-                                                   .phase.type = NEBEL_PHASE_RAYLEIGH,
-                                                   .profile = NEBEL_AIR_LAYER,
-                                                   .middle = 2.5e4,
-                                                   .width = 3e3}},
-                                         .air_count = 1},
+                                         .components = {{.scattering = {2e-5, 4e-5, 8e-5},
+                                                         .phase.type = NEBEL_PHASE_RAYLEIGH,
+                                                         .profile = NEBEL_COMPONENT_TENT,
+                                                         .center_height = 2.5e4,
+                                                         .half_width = 3e3}},
+                                         .component_count = 1},
                                 thin = {.radius = 6.36e6,
                                         .thickness = 100,
-                                        .airs = {{.scattering = {1e-3, 2e-3, 4e-3}, .scale_height = 10}},
-                                        .air_count = 1};
+                                        .components = {{.scattering = {1e-3, 2e-3, 4e-3}, .scale_height = 10}},
+                                        .component_count = 1};
     tally of_layer = {.count = 0}, of_thin = {.count = 0};
     look_along_ends(&layer, height, 1, &of_layer);
     look_along_ends(&thin, height, 1, &of_thin);
@@ -268,51 +269,51 @@ static void thin_air_is_passed_up_to_the_ground(void **state)
     (void)state;
     enum { COUNT = 100 };
     const nebel_atmosphere_desc desc = {
-        .thickness = 6.4, .airs = {{.scattering = {.2, .3, .5}, .scale_height = .8}}, .air_count = 1};
-    const nebel_air_view_desc from = {
-        .position = {0, 2e7, 0}, .sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}}, .has_distances = 1};
-    nebel_air_view_desc whole = from;
+        .thickness = 6.4, .components = {{.scattering = {.2, .3, .5}, .scale_height = .8}}, .component_count = 1};
+    const nebel_sky_view_desc from = {
+        .position = {0, 2e7, 0}, .sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}}, .has_ray_ends = 1};
+    nebel_sky_view_desc whole = from;
     nebel_atmosphere *atmosphere;
-    nebel_air_view *view;
+    nebel_sky_view *view;
     double direction[3][COUNT];
     float distance[COUNT], left[2][3][COUNT], light[2][3][COUNT];
     const double *const along[3] = {direction[0], direction[1], direction[2]};
     assert_int_equal(nebel_create_atmosphere(&desc, &atmosphere), NEBEL_OK);
     whole.atmosphere = atmosphere;
-    assert_int_equal(nebel_create_air_view(&whole, &view), NEBEL_OK);
+    assert_int_equal(nebel_create_sky_view(&whole, &view), NEBEL_OK);
     for (int i = 0; i < COUNT; i++) {
         direction[0][i] = .0023 * i;
         direction[1][i] = -1;
         direction[2][i] = .0001 * i;
     }
-    assert_int_equal(nebel_find_ground(view, COUNT, along, &(nebel_ground_planes){.distance = distance}), NEBEL_OK);
+    assert_int_equal(nebel_trace_ground(view, COUNT, along, &(nebel_ground_planes){.distance = distance}), NEBEL_OK);
     for (int k = 0; k < 2; k++) {
-        const nebel_transfer_planes lights = {.transmittance = {left[k][0], left[k][1], left[k][2]},
-                                              .in_scattering = {light[k][0], light[k][1], light[k][2]}};
-        assert_int_equal(nebel_trace_air_view(view, COUNT, along, k == 0 ? distance : NULL, &lights), NEBEL_OK);
+        const nebel_transfer_planes transfers = {.transmittance = {left[k][0], left[k][1], left[k][2]},
+                                                 .in_scattering = {light[k][0], light[k][1], light[k][2]}};
+        assert_int_equal(nebel_trace_sky_view(view, COUNT, along, k == 0 ? distance : NULL, &transfers), NEBEL_OK);
     }
     assert_true(left[1][2][0] < .9f && left[1][2][0] > .1f);
     assert_memory_equal(left[0], left[1], sizeof left[0]);
     assert_memory_equal(light[0], light[1], sizeof light[0]);
-    nebel_destroy_air_view(view);
+    nebel_destroy_sky_view(view);
     nebel_destroy_atmosphere(atmosphere);
 }
 
-/* The ground is a ball, lit by what nebel_light_air says. */
+/* The ground is a ball, lit by what nebel_compute_atmosphere_irradiance says. */
 static void ground_is_lit_as_places_are(void **state)
 {
     (void)state;
     const double radius = 6.36e6;
     nebel_atmosphere *air = make("earth");
     for (int h = 0; h < 3; h++) {
-        const nebel_air_view_desc desc = {.atmosphere = air,
+        const nebel_sky_view_desc desc = {.atmosphere = air,
                                           .sun = {{0.9, h == 2 ? 0.05 : 0.4, 0.2}, {3, 2, 1}},
                                           .position = {0,
                                                        h == 0   ? 2
                                                        : h == 1 ? 1e4
                                                                 : 4e7,
                                                        0}};
-        nebel_air_view *view;
+        nebel_sky_view *view;
         bundle rays;
         float distance[RAYS], normal[3][RAYS], sun[3][RAYS], sky[3][RAYS];
         const nebel_ground_planes planes = {.distance = distance,
@@ -321,10 +322,10 @@ static void ground_is_lit_as_places_are(void **state)
                                             .sky = {sky[0], sky[1], sky[2]}};
         uint32_t seed = 3;
         int met = 0;
-        assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
-        aim(&rays, nebel_find_atmosphere("earth"), desc.position[1], &seed);
+        assert_int_equal(nebel_create_sky_view(&desc, &view), NEBEL_OK);
+        aim(&rays, nebel_lookup_atmosphere("earth"), desc.position[1], &seed);
         const double *const direction[3] = {rays.direction[0], rays.direction[1], rays.direction[2]};
-        assert_int_equal(nebel_find_ground(view, RAYS, direction, &planes), NEBEL_OK);
+        assert_int_equal(nebel_trace_ground(view, RAYS, direction, &planes), NEBEL_OK);
         for (int i = 0; i < RAYS; i++) {
             const double length = sqrt(pow(direction[0][i], 2) + pow(direction[1][i], 2) + pow(direction[2][i], 2));
             double place[3], square = 0, closest = 0;
@@ -343,15 +344,17 @@ static void ground_is_lit_as_places_are(void **state)
                 assert_true(fabs((double)normal[c][i] - from / radius) <= 1e-6);
             }
             assert_true(fabs(sqrt(square) - radius) <= 1e-6 * (double)distance[i]);
-            nebel_air_light light;
-            assert_int_equal(nebel_light_air(air, &desc.sun, 1, (const double(*)[3])place, 0, &light, 0), NEBEL_OK);
+            nebel_irradiance light;
+            assert_int_equal(
+                nebel_compute_atmosphere_irradiance(air, &desc.sun, 1, (const double(*)[3])place, 0, &light, 0),
+                NEBEL_OK);
             for (int c = 0; c < 3; c++) {
                 assert_true(fabs((double)sun[c][i] - light.sun[c]) <= 2e-3);
                 assert_true(fabs((double)sky[c][i] - light.sky[c]) <= 1e-3 * light.sky[c] + 1e-6);
             }
         }
         assert_true(met > RAYS / 4 && met < RAYS);
-        nebel_destroy_air_view(view);
+        nebel_destroy_sky_view(view);
     }
     nebel_destroy_atmosphere(air);
 }
@@ -368,25 +371,25 @@ static void order_of_work_changes_nothing(void **state)
     (void)state;
     nebel_atmosphere *air = make("toy");
     int runs = 0;
-    nebel_air_view_desc desc = {
-        .atmosphere = air, .sun = {{1, 1, 0}, {1, 1, 1}}, .position = {0, 3, 0}, .has_distances = 1};
-    nebel_air_view *one, *other;
+    nebel_sky_view_desc desc = {
+        .atmosphere = air, .sun = {{1, 1, 0}, {1, 1, 1}}, .position = {0, 3, 0}, .has_ray_ends = 1};
+    nebel_sky_view *one, *other;
     static bundle a, b;
     uint32_t seed = 4;
-    assert_int_equal(nebel_create_air_view(&desc, &one), NEBEL_OK);
+    assert_int_equal(nebel_create_sky_view(&desc, &one), NEBEL_OK);
     desc.run = run_backwards;
     desc.run_user = &runs;
-    assert_int_equal(nebel_create_air_view(&desc, &other), NEBEL_OK);
+    assert_int_equal(nebel_create_sky_view(&desc, &other), NEBEL_OK);
     assert_true(runs > 0);
-    aim(&a, nebel_find_atmosphere("toy"), 3, &seed);
+    aim(&a, nebel_lookup_atmosphere("toy"), 3, &seed);
     b = a;
     trace_both(&a, &desc, one);
     trace_both(&b, &desc, other);
     assert_memory_equal(a.transmittance, b.transmittance, sizeof a.transmittance);
     assert_memory_equal(a.in_scattering, b.in_scattering, sizeof a.in_scattering);
     assert_memory_equal(a.error, b.error, sizeof a.error);
-    nebel_destroy_air_view(one);
-    nebel_destroy_air_view(other);
+    nebel_destroy_sky_view(one);
+    nebel_destroy_sky_view(other);
     nebel_destroy_atmosphere(air);
 }
 
@@ -402,33 +405,33 @@ static void odd_places_have_answers(void **state)
         for (int s = 0; s < 3; s++)
             for (int levels = 0; levels < 2; levels++) {
                 if (!nb_test_tries((size_t)(h + s + levels) % 3, 3)) continue;
-                nebel_air_view_desc desc = {.atmosphere = air,
+                nebel_sky_view_desc desc = {.atmosphere = air,
                                             .sun = {.irradiance = {1, 1, 1}},
                                             .position = {0, heights[h], 0},
-                                            .has_distances = levels};
+                                            .has_ray_ends = levels};
                 memcpy(desc.sun.direction, suns[s], sizeof suns[s]);
-                nebel_air_view *view;
-                assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+                nebel_sky_view *view;
+                assert_int_equal(nebel_create_sky_view(&desc, &view), NEBEL_OK);
                 for (int w = 0; w < 6; w++) {
                     const double *const direction[3] = {&ways[w][0], &ways[w][1], &ways[w][2]};
                     const float reach = 10;
                     float left[3], light[3], error, distance, sun[3], sky[3];
-                    const nebel_transfer_planes lights = {.transmittance = {&left[0], &left[1], &left[2]},
-                                                          .in_scattering = {&light[0], &light[1], &light[2]},
-                                                          .error = &error};
+                    const nebel_transfer_planes transfers = {.transmittance = {&left[0], &left[1], &left[2]},
+                                                             .in_scattering = {&light[0], &light[1], &light[2]},
+                                                             .error = &error};
                     const nebel_ground_planes ground = {
                         .distance = &distance, .sun = {&sun[0], &sun[1], &sun[2]}, .sky = {&sky[0], &sky[1], &sky[2]}};
-                    assert_int_equal(nebel_trace_air_view(view, 1, direction, levels ? &reach : NULL, &lights),
+                    assert_int_equal(nebel_trace_sky_view(view, 1, direction, levels ? &reach : NULL, &transfers),
                                      NEBEL_OK);
                     for (int c = 0; c < 3; c++)
                         assert_true(left[c] >= 0 && left[c] <= 1 && light[c] >= 0 && light[c] < 1);
                     assert_true(error >= 0 && error < 1);
-                    assert_int_equal(nebel_find_ground(view, 1, direction, &ground), NEBEL_OK);
+                    assert_int_equal(nebel_trace_ground(view, 1, direction, &ground), NEBEL_OK);
                     assert_true(distance >= 0);
                     for (int c = 0; c < 3 && distance < HUGE_VALF; c++)
                         assert_true(sun[c] >= 0 && sun[c] <= 1 && sky[c] >= 0 && sky[c] <= 1);
                 }
-                nebel_destroy_air_view(view);
+                nebel_destroy_sky_view(view);
             }
     nebel_destroy_atmosphere(air);
 }
@@ -437,38 +440,38 @@ static void bad_calls_are_refused(void **state)
 {
     (void)state;
     nebel_atmosphere *air = make("toy");
-    nebel_air_view *view = NULL;
-    const nebel_air_view_desc bad[] = {{.atmosphere = NULL},
+    nebel_sky_view *view = NULL;
+    const nebel_sky_view_desc bad[] = {{.atmosphere = NULL},
                                        {.atmosphere = air, .sun = {{0, 0, 0}, {1, 1, 1}}},
                                        {.atmosphere = air, .sun = {{0, 1, 0}, {(double)NAN, 1, 1}}},
                                        {.atmosphere = air, .position = {0, (double)NAN, 0}},
                                        {.atmosphere = air, .position = {0, 1e16, 0}}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-        assert_int_equal(nebel_create_air_view(&bad[i], &view), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(nebel_create_sky_view(&bad[i], &view), NEBEL_ERROR_ARGUMENT);
         assert_null(view);
     }
-    assert_int_equal(nebel_create_air_view(NULL, &view), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_sky_view(NULL, &view), NEBEL_ERROR_ARGUMENT);
     for (int calls = 0; calls < 3; calls++) {
         int left = calls;
-        const nebel_air_view_desc desc = {.atmosphere = air, .allocator = {scarce_allocate, scarce_release, &left}};
-        assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_ERROR_MEMORY);
+        const nebel_sky_view_desc desc = {.atmosphere = air, .allocator = {scarce_allocate, scarce_release, &left}};
+        assert_int_equal(nebel_create_sky_view(&desc, &view), NEBEL_ERROR_MEMORY);
         assert_null(view);
     }
-    nebel_destroy_air_view(NULL);
+    nebel_destroy_sky_view(NULL);
     const double x[1] = {1}, *const directions[3] = {x, NULL, x};
     float distance;
-    assert_int_equal(nebel_create_air_view(&(nebel_air_view_desc){.atmosphere = air}, &view), NEBEL_OK);
-    assert_int_equal(nebel_trace_air_view(view, 1, directions, NULL, &(nebel_transfer_planes){.error = NULL}),
+    assert_int_equal(nebel_create_sky_view(&(nebel_sky_view_desc){.atmosphere = air}, &view), NEBEL_OK);
+    assert_int_equal(nebel_trace_sky_view(view, 1, directions, NULL, &(nebel_transfer_planes){.error = NULL}),
                      NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_find_ground(view, 1, directions, &(nebel_ground_planes){.distance = &distance}),
+    assert_int_equal(nebel_trace_ground(view, 1, directions, &(nebel_ground_planes){.distance = &distance}),
                      NEBEL_ERROR_ARGUMENT);
-    nebel_destroy_air_view(view);
+    nebel_destroy_sky_view(view);
     nebel_destroy_atmosphere(air);
     nebel_atmosphere_desc whole = {.radius = 5};
     assert_int_equal(nebel_resolve_atmosphere(&(nebel_atmosphere_desc){.radius = -1}, &whole), NEBEL_ERROR_VALUE);
     assert_true(whole.radius == 5);
     assert_int_equal(nebel_resolve_atmosphere(&(nebel_atmosphere_desc){.radius = 0}, &whole), NEBEL_OK);
-    assert_true(whole.radius == 6.36e6 && whole.air_count == 3);
+    assert_true(whole.radius == 6.36e6 && whole.component_count == 3);
     assert_int_equal(nebel_resolve_atmosphere(NULL, &whole), NEBEL_ERROR_ARGUMENT);
 }
 
@@ -482,16 +485,16 @@ static void ends_that_are_none_count_as_zero(void **state)
     const nebel_transfer_planes told = {.in_scattering = {bad[0], bad[1], bad[2]}, .error = error},
                                 wanted = {.in_scattering = {zero[0], zero[1], zero[2]}};
     nebel_atmosphere *earth = make("earth");
-    nebel_air_view *view;
-    const nebel_air_view_desc desc = {
-        .atmosphere = earth, .sun = {{0, 1, 0}, {1, 1, 1}}, .position = {0, 1e4, 0}, .has_distances = 1};
-    assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+    nebel_sky_view *view;
+    const nebel_sky_view_desc desc = {
+        .atmosphere = earth, .sun = {{0, 1, 0}, {1, 1, 1}}, .position = {0, 1e4, 0}, .has_ray_ends = 1};
+    assert_int_equal(nebel_create_sky_view(&desc, &view), NEBEL_OK);
     rays.direction[1][0] = rays.direction[0][1] = 1;
-    assert_int_equal(nebel_trace_air_view(view, 2, direction, (const float[]){NAN, -1}, &told), NEBEL_OK);
-    assert_int_equal(nebel_trace_air_view(view, 2, direction, (const float[]){0, 0}, &wanted), NEBEL_OK);
+    assert_int_equal(nebel_trace_sky_view(view, 2, direction, (const float[]){NAN, -1}, &told), NEBEL_OK);
+    assert_int_equal(nebel_trace_sky_view(view, 2, direction, (const float[]){0, 0}, &wanted), NEBEL_OK);
     assert_memory_equal(bad, zero, sizeof bad);
     assert_true(error[0] >= 0 && error[1] >= 0);
-    nebel_destroy_air_view(view);
+    nebel_destroy_sky_view(view);
     nebel_destroy_atmosphere(earth);
 }
 
@@ -501,22 +504,22 @@ typedef struct answers {
     float distance[RAYS], normal[3][RAYS], sun[3][RAYS], sky[3][RAYS];
 } answers;
 
-static void ask(nebel_air_view *view, nebel_isa isa, const bundle *rays, int ends, answers *a)
+static void ask(nebel_sky_view *view, nebel_isa isa, const bundle *rays, int ends, answers *a)
 {
     const double *const direction[3] = {rays->direction[0], rays->direction[1], rays->direction[2]};
-    nebel_transfer_planes lights = {.error = a->error};
+    nebel_transfer_planes transfers = {.error = a->error};
     nebel_ground_planes ground = {.distance = a->distance};
     memset(a, 0, sizeof *a);
     for (int c = 0; c < 3; c++) {
-        lights.transmittance[c] = a->transmittance[c];
-        lights.in_scattering[c] = a->in_scattering[c];
+        transfers.transmittance[c] = a->transmittance[c];
+        transfers.in_scattering[c] = a->in_scattering[c];
         ground.normal[c] = a->normal[c];
         ground.sun[c] = a->sun[c];
         ground.sky[c] = a->sky[c];
     }
     view->look = nb_look_choose(isa);
-    assert_int_equal(nebel_trace_air_view(view, RAYS, direction, ends ? rays->t_max : NULL, &lights), NEBEL_OK);
-    assert_int_equal(nebel_find_ground(view, RAYS, direction, &ground), NEBEL_OK);
+    assert_int_equal(nebel_trace_sky_view(view, RAYS, direction, ends ? rays->t_max : NULL, &transfers), NEBEL_OK);
+    assert_int_equal(nebel_trace_ground(view, RAYS, direction, &ground), NEBEL_OK);
 }
 
 /* Also of directions that are none, and of rays that do not fill the last lanes. */
@@ -529,13 +532,13 @@ static void all_instruction_sets_agree(void **state)
     nebel_atmosphere *earth = make("earth");
     uint32_t chance = 5;
     for (int i = 0; i < 8; i++) {
-        const nebel_air_view_desc desc = {.atmosphere = earth,
+        const nebel_sky_view_desc desc = {.atmosphere = earth,
                                           .sun = {.direction = {0.5, 0.8 - 0.15 * i, -0.4}, .irradiance = {1, 2, 3}},
                                           .position = {0, heights[i % 4], 0},
-                                          .has_distances = i / 4};
-        nebel_air_view *view;
-        assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
-        aim(&rays, nebel_find_atmosphere("earth"), heights[i % 4], &chance);
+                                          .has_ray_ends = i / 4};
+        nebel_sky_view *view;
+        assert_int_equal(nebel_create_sky_view(&desc, &view), NEBEL_OK);
+        aim(&rays, nebel_lookup_atmosphere("earth"), heights[i % 4], &chance);
         for (int c = 0; c < 3; c++) {
             rays.direction[c][3] = c == 1;
             rays.direction[c][4] = 0;
@@ -543,13 +546,13 @@ static void all_instruction_sets_agree(void **state)
             rays.direction[c][6] = HUGE_VAL;
             rays.direction[c][7] = (double)NAN;
         }
-        ask(view, NEBEL_ISA_SCALAR, &rays, desc.has_distances, &scalar);
+        ask(view, NEBEL_ISA_SCALAR, &rays, desc.has_ray_ends, &scalar);
         for (int isa = 0; isa < NEBEL_ISA_COUNT; isa++) {
             if (nb_look_choose((nebel_isa)isa) == NULL) continue;
-            ask(view, (nebel_isa)isa, &rays, desc.has_distances, &other);
+            ask(view, (nebel_isa)isa, &rays, desc.has_ray_ends, &other);
             assert_memory_equal(&scalar, &other, sizeof scalar);
         }
-        nebel_destroy_air_view(view);
+        nebel_destroy_sky_view(view);
     }
     nebel_destroy_atmosphere(earth);
 }

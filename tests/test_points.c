@@ -22,7 +22,7 @@ static nebel_particle *make(const char *text, nebel_scene **scene)
 {
     nebel_particle *particles = NULL;
     *scene = parse_good(text);
-    assert_int_equal(nebel_make_scene_particles(*scene, &particles), NEBEL_OK);
+    assert_int_equal(nebel_generate_scene_particles(*scene, &particles), NEBEL_OK);
     return particles;
 }
 
@@ -41,7 +41,7 @@ static void test_each_vertex_is_a_particle(void **state)
     write_points("3\n", "end_header\n1 2 3\n4 5 6\n-1 0 2.5\n");
     nebel_particle *particles =
         make(SCENE(", \"position\": [10, 0, 0], \"rotation\": [0, 0, 1, 1], \"scale\": [1, 2, 1]"), &scene);
-    assert_int_equal(nebel_scene_contents(scene)->particle_count, 3);
+    assert_int_equal(nebel_get_scene_data(scene)->particle_count, 3);
     assert_at(&particles[0], 10 - 4, 1, 3);
     assert_at(&particles[1], 10 - 10, 4, 6);
     assert_at(&particles[2], 10, -1, 2.5);
@@ -61,7 +61,7 @@ static void test_vertices_at_one_place_count_once(void **state)
     write_points("5\n", "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
                         "0 0 0\n1 0 0\n0 1 0\n1 0 0\n7 7 7\n3 0 1 2\n");
     nebel_particle *particles = make(SCENE(""), &scene);
-    assert_int_equal(nebel_scene_contents(scene)->particle_count, 4);
+    assert_int_equal(nebel_get_scene_data(scene)->particle_count, 4);
     assert_at(&particles[3], 7, 7, 7);
     nebel_free_scene_particles(scene, particles);
     nebel_destroy_scene(scene);

@@ -16,7 +16,7 @@ enum { RAYS = 200, WORDS = 20000, PARTICLES = 100 };
 typedef struct answers {
     nebel_transfer transfers[2][RAYS]; /* in double, in float */
     double distances[RAYS];
-    nebel_word words[WORDS];
+    nebel_texel_f32 words[WORDS];
     nebel_particle particles[PARTICLES];
 } answers;
 
@@ -29,7 +29,7 @@ static void ask(const random_fog *fog, const nebel_ray rays[RAYS], answers *got)
         const nebel_trace_desc how = {.precision = k == 0 ? NEBEL_PRECISION_DOUBLE : NEBEL_PRECISION_FLOAT};
         nebel_trace(snapshot, &how, RAYS, rays, sizeof *rays, got->transfers[k], sizeof *got->transfers[k]);
     }
-    nebel_find_transmittance(snapshot, 0.5, 0, RAYS, rays, sizeof *rays, got->distances);
+    nebel_invert_transmittance(snapshot, 0.5, 0, RAYS, rays, sizeof *rays, got->distances);
     const double eye[] = {1 / 3.0, 2 / 7.0, 3 / 11.0};
     size_t count = 0;
     assert_int_equal(nebel_pack_fog(snapshot, eye, got->words, WORDS, &count), NEBEL_OK);
@@ -38,7 +38,7 @@ static void ask(const random_fog *fog, const nebel_ray rays[RAYS], answers *got)
                                       .density = {.type = NEBEL_DENSITY_RADIAL, .power = 2},
                                       .count = PARTICLES,
                                       .seed = fog->seed};
-    assert_int_equal(nebel_scatter_nebula(&nebula, got->particles), NEBEL_OK);
+    assert_int_equal(nebel_generate_nebula(&nebula, got->particles), NEBEL_OK);
 }
 
 #if (defined(__x86_64__) || defined(__i386__)) && LDBL_MANT_DIG == 64

@@ -92,9 +92,10 @@ static void droplets_are_those_of_T27(void **state)
 {
     (void)state;
     for (int i = 0; i < MODELS; i++) {
-        nebel_droplet_sums sums;
-        assert_int_equal(nebel_sum_droplets(&nebel_find_preset(models[i].name)->sizes, &sums), NEBEL_OK);
-        expect_near("number", sums.number, models[i].number, 1e-10);
+        nebel_droplet_properties sums;
+        assert_int_equal(nebel_compute_droplet_properties(&nebel_lookup_fog_preset(models[i].name)->droplets, &sums),
+                         NEBEL_OK);
+        expect_near("number", sums.number_density, models[i].number, 1e-10);
         expect_near("radius", sums.effective_radius, models[i].radius, 1e-10);
         expect_near("water", sums.water, models[i].water, 1e-10);
         expect_near("extinction", 1e3 * sums.extinction, models[i].twice_the_area, 1e-10);
@@ -119,14 +120,14 @@ static void droplets_of_one_size_are_counted(void **state)
 static void sums_that_are_none_are_refused(void **state)
 {
     (void)state;
-    static const nebel_droplet_sizes bad[] = {{0, 3, 1, 1}, {1, -1, 1, 1},          {1, 3, 0, 1},
-                                              {1, 3, 1, 0}, {1, (double)NAN, 1, 1}, {1, 1e9, 1, 1}};
-    nebel_droplet_sums sums = {.number = 7};
+    static const nebel_droplet_distribution bad[] = {{0, 3, 1, 1}, {1, -1, 1, 1},          {1, 3, 0, 1},
+                                                     {1, 3, 1, 0}, {1, (double)NAN, 1, 1}, {1, 1e9, 1, 1}};
+    nebel_droplet_properties sums = {.number_density = 7};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-        assert_int_equal(nebel_sum_droplets(&bad[i], &sums), NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_sum_droplets(NULL, &sums), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_sum_droplets(&bad[0], NULL), NEBEL_ERROR_ARGUMENT);
-    assert_true(sums.number == 7);
+        assert_int_equal(nebel_compute_droplet_properties(&bad[i], &sums), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_compute_droplet_properties(NULL, &sums), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_droplet_properties(&bad[0], NULL), NEBEL_ERROR_ARGUMENT);
+    assert_true(sums.number_density == 7);
 }
 
 /* ---- Mie ------------------------------------------------------------------------------------- */
@@ -160,7 +161,7 @@ static void compute_mie(double m, double x, double *extinction, double *forward)
 }
 
 /* Of all droplets: 1/m, and the mean cosine. */
-static void sum_mie(const nebel_droplet_sizes *sizes, double *extinction, double *mean)
+static void sum_mie(const nebel_droplet_distribution *sizes, double *extinction, double *mean)
 {
     enum { STEPS = 3000 };
     const double step = 33 / sizes->rate / STEPS;
@@ -180,9 +181,9 @@ static void fogs_are_as_Mie_has_them(void **state)
 {
     (void)state;
     for (int i = 0; i < MODELS; i++) {
-        const nebel_preset *preset = nebel_find_preset(models[i].name);
+        const nebel_fog_preset *preset = nebel_lookup_fog_preset(models[i].name);
         double extinction, mean;
-        sum_mie(&preset->sizes, &extinction, &mean);
+        sum_mie(&preset->droplets, &extinction, &mean);
         expect_near("T27's extinction", extinction, models[i].mie / 1e3, 1e-3);
         expect_near("T27's mean cosine", mean, models[i].g, 1e-3);
         for (int c = 0; c < 3; c++) {
@@ -198,7 +199,7 @@ static void fogs_are_as_Mie_has_them(void **state)
 
 /* ---- presets --------------------------------------------------------------------------------- */
 
-static double exponent_of(const nebel_preset *preset, int channel)
+static double exponent_of(const nebel_fog_preset *preset, int channel)
 {
     static const double lengths[] = {.65, .55, .45};
     return -log(preset->extinction[channel] / preset->extinction[1]) / log(lengths[channel] / .55);
@@ -212,12 +213,12 @@ static void others_are_as_their_sources_say(void **state)
         double visibility, exponent;
     } rows[] = {{"mist", 2000, 0}, {"haze", 5000, 1.3}, {"smoke", 1000, 1.8}, {"black_smoke", 10, 1}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        const nebel_preset *preset = nebel_find_preset(rows[i].name);
+        const nebel_fog_preset *preset = nebel_lookup_fog_preset(rows[i].name);
         expect_near("visibility", nebel_visibility_from_extinction(preset->extinction[1], 0), rows[i].visibility,
                     1e-12);
         assert_true(fabs(exponent_of(preset, 0) - rows[i].exponent) < 1e-4);
         assert_true(fabs(exponent_of(preset, 2) - rows[i].exponent) < 1e-4);
-        assert_true(preset->sizes.scale == 0);
+        assert_true(preset->droplets.scale == 0);
     }
 }
 
@@ -226,9 +227,9 @@ static void each_makes_a_volume(void **state)
     (void)state;
     nebel_fog *fog;
     size_t count;
-    const nebel_preset *presets = nebel_list_presets(&count);
+    const nebel_fog_preset *presets = nebel_list_fog_presets(&count);
     assert_int_equal(count, 8);
-    assert_ptr_equal(nebel_list_presets(NULL), presets);
+    assert_ptr_equal(nebel_list_fog_presets(NULL), presets);
     assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
     for (size_t i = 0; i < count; i++) {
         nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_WORLD}, .phase = presets[i].phase};
@@ -237,12 +238,12 @@ static void each_makes_a_volume(void **state)
             volume.albedo[c] = presets[i].albedo[c];
         }
         assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
-        assert_ptr_equal(nebel_find_preset(presets[i].name), &presets[i]);
-        assert_true(strlen(presets[i].source) > 20);
+        assert_ptr_equal(nebel_lookup_fog_preset(presets[i].name), &presets[i]);
+        assert_true(strlen(presets[i].citation) > 20);
     }
     nebel_destroy_fog(fog);
-    assert_null(nebel_find_preset("fog"));
-    assert_null(nebel_find_preset(NULL));
+    assert_null(nebel_lookup_fog_preset("fog"));
+    assert_null(nebel_lookup_fog_preset(NULL));
 }
 
 int main(void)

@@ -294,15 +294,15 @@ static void test_pictures_with_changed_bytes_have_no_record(void **state)
 
 static nebel_result make_film(const char *path, uint32_t count, const char *with)
 {
-    nebel_film *film = NULL;
-    nebel_result result = nebel_create_film(path, &(nebel_film_desc){.quality = 100}, &film);
+    nebel_movie *film = NULL;
+    nebel_result result = nebel_create_movie(path, &(nebel_movie_desc){.quality = 100}, &film);
     if (result == NEBEL_OK && with != NULL) result = nebel_set_film_record(film, with);
     for (uint32_t i = 0; i < count && result == NEBEL_OK; i++) {
         const nebel_image image = {31, 17, 4, names, samples + 1000 * i};
-        result = nebel_add_film_picture(film, &image);
+        result = nebel_add_movie_frame(film, &image);
     }
-    if (result == NEBEL_OK) result = nebel_finish_film(film);
-    nebel_destroy_film(film);
+    if (result == NEBEL_OK) result = nebel_finish_movie(film);
+    nebel_destroy_movie(film);
     return result;
 }
 

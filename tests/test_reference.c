@@ -35,9 +35,9 @@ static const shot *take(const run *r)
 {
     nebel_renderer *renderer = NULL;
     nebel_snapshot *fog = fog_commit(&r->sky, r->volumes, r->volume_count);
-    const nebel_renderer_desc desc = {.threads = r->threads};
-    assert_int_equal(nebel_create_renderer(&r->scene, fog, &desc, &renderer), NEBEL_OK);
-    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_REFERENCE, NULL), NEBEL_OK);
+    const nebel_cpu_renderer_desc desc = {.thread_count = r->threads};
+    assert_int_equal(nebel_create_cpu_renderer(&r->scene, fog, &desc, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_PATH, NULL), NEBEL_OK);
     const nebel_frame_desc frame = {.camera = r->camera,
                                     .width = r->side,
                                     .height = r->side,

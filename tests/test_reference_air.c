@@ -29,7 +29,7 @@ static void set_rgb(double rgb[3], double value)
 static void start(globe *g, const nebel_atmosphere_desc *air, const nebel_cloud_layer *layer)
 {
     memset(g, 0, sizeof *g);
-    assert_int_equal(nebel_resolve_atmosphere(air, &g->planet.air), NEBEL_OK);
+    assert_int_equal(nebel_resolve_atmosphere(air, &g->planet.atmosphere_desc), NEBEL_OK);
     assert_int_equal(nebel_create_atmosphere(air, &g->atmosphere), NEBEL_OK);
     g->planet.atmosphere = g->atmosphere;
     if (layer != NULL) {
@@ -85,8 +85,9 @@ static nebel_camera camera_of(const nebel_ray *ray)
 static nebel_result render(const globe *g, nebel_snapshot *fog, const nebel_frame_desc *desc, const nebel_frame *planes)
 {
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&g->scene, fog, &(nebel_renderer_desc){.threads = 2}, &renderer), NEBEL_OK);
-    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_REFERENCE, NULL), NEBEL_OK);
+    assert_int_equal(
+        nebel_create_cpu_renderer(&g->scene, fog, &(nebel_cpu_renderer_desc){.thread_count = 2}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_PATH, NULL), NEBEL_OK);
     const nebel_result result = nebel_render_frame(renderer, desc, planes);
     nebel_destroy_renderer(renderer);
     return result;
@@ -121,16 +122,17 @@ static void expect(const char *what, const estimate *e, int channel, double expe
 
 /* ---- furnaces -------------------------------------------------------------------------------- */
 
-static const nebel_atmosphere_desc white_air = {.airs = {{.scattering = {5e-5, 1e-5, 1e-4},
-                                                          .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .8},
-                                                          .scale_height = 8000},
-                                                         {.scattering = {1e-5, 1e-5, 4e-5},
-                                                          .phase = {.type = NEBEL_PHASE_RAYLEIGH},
-                                                          .profile = NEBEL_AIR_LAYER,
-                                                          .middle = 25000,
-                                                          .width = 15000}},
-                                                .air_count = 2,
-                                                .ground_albedo = {1, 1, 1}};
+static const nebel_atmosphere_desc white_air = {
+    .components = {{.scattering = {5e-5, 1e-5, 1e-4},
+                    .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .8},
+                    .scale_height = 8000},
+                   {.scattering = {1e-5, 1e-5, 4e-5},
+                    .phase = {.type = NEBEL_PHASE_RAYLEIGH},
+                    .profile = NEBEL_COMPONENT_TENT,
+                    .center_height = 25000,
+                    .half_width = 15000}},
+    .component_count = 2,
+    .ground_albedo = {1, 1, 1}};
 
 /* Light that nothing absorbs is the same everywhere: along the ground, down on it, past it and from within clouds and fog. */
 static void furnace(const nebel_cloud_layer *layer, nebel_snapshot *fog, uint32_t samples)
@@ -157,7 +159,7 @@ static void white_air_over_white_ground_is_white(void **state)
 static void white_clouds_and_fog_are_white(void **state)
 {
     (void)state;
-    const nebel_cloud_layer stratus = {.kind = NEBEL_CLOUD_STRATUS, .coverage = .6, .extinction = .01};
+    const nebel_cloud_layer stratus = {.type = NEBEL_CLOUD_STRATUS, .coverage = .6, .extinction = .01};
     const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 400, 0}, .radius = 300},
                                     .extinction = {.001, .004, .002},
                                     .albedo = {1, 1, 1}};
@@ -171,12 +173,12 @@ static void white_clouds_and_fog_are_white(void **state)
 /* So large a planet that its air is a flat layer. */
 static nebel_atmosphere_desc flat_air(const nebel_phase *phase, double albedo, double depth)
 {
-    nebel_atmosphere_desc desc = {.radius = 1e10, .thickness = 1e5, .air_count = 1};
+    nebel_atmosphere_desc desc = {.radius = 1e10, .thickness = 1e5, .component_count = 1};
     const double extinction = depth / (1e4 * -expm1(-10));
-    desc.airs[0].phase = *phase;
-    desc.airs[0].scale_height = 1e4;
-    set_rgb(desc.airs[0].scattering, albedo * extinction);
-    set_rgb(desc.airs[0].absorption, (1 - albedo) * extinction);
+    desc.components[0].phase = *phase;
+    desc.components[0].scale_height = 1e4;
+    set_rgb(desc.components[0].scattering, albedo * extinction);
+    set_rgb(desc.components[0].absorption, (1 - albedo) * extinction);
     return desc;
 }
 
@@ -251,7 +253,7 @@ static void flat_air_sends_up_and_down_what_layers_do(void **state)
 /* Of this part of its scattering air absorbs the rest, so that what was scattered twice is as much less again. */
 #define DIM 1e-4
 
-/* nebel_trace_air, whose light scattered once is right to 1e-4, and a sun that makes up for the dimming. */
+/* nebel_trace_atmosphere, whose light scattered once is right to 1e-4, and a sun that makes up for the dimming. */
 static void once_is_what_quadrature_says(void **state)
 {
     (void)state;
@@ -262,11 +264,11 @@ static void once_is_what_quadrature_says(void **state)
                  {"earth", 2, 20, 10, -4, .1},  {"earth", 4e5, -15.5, 0, 30, .02}, {"mars", 2, 10, 5, 8, .02},
                  {"toy", 1, 25, 90, 40, .02},   {"toy", 300, -60, 90, 20, .02}};
     for (size_t i = 0; i < sizeof views / sizeof *views; i++) {
-        nebel_atmosphere_desc air = *nebel_find_atmosphere(views[i].name);
-        for (uint32_t k = 0; k < air.air_count; k++)
+        nebel_atmosphere_desc air = *nebel_lookup_atmosphere(views[i].name);
+        for (uint32_t k = 0; k < air.component_count; k++)
             for (int c = 0; c < 3; c++) {
-                air.airs[k].absorption[c] += (1 - DIM) * air.airs[k].scattering[c];
-                air.airs[k].scattering[c] *= DIM;
+                air.components[k].absorption[c] += (1 - DIM) * air.components[k].scattering[c];
+                air.components[k].scattering[c] *= DIM;
             }
         memset(air.ground_albedo, 0, sizeof air.ground_albedo);
         globe g;
@@ -276,7 +278,7 @@ static void once_is_what_quadrature_says(void **state)
         nebel_sun sun = {.irradiance = {1 / DIM, 1 / DIM, 1 / DIM}};
         nebel_transfer transfer;
         memcpy(sun.direction, g.scene.sun_direction, sizeof sun.direction);
-        assert_int_equal(nebel_trace_air(g.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_atmosphere(g.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
         const estimate e = look(&g, NULL, &ray, 40, 1);
         for (int c = 0; c < 3; c++) {
             const double expected = (double)transfer.in_scattering[c];
@@ -290,8 +292,8 @@ static void once_is_what_quadrature_says(void **state)
 /* ---- clouds ---------------------------------------------------------------------------------- */
 
 /* Air that does nothing, for clouds alone. */
-static const nebel_atmosphere_desc bare = {.airs = {{.absorption = {1e-20, 1e-20, 1e-20}, .scale_height = 1e5}},
-                                           .air_count = 1};
+static const nebel_atmosphere_desc bare = {.components = {{.absorption = {1e-20, 1e-20, 1e-20}, .scale_height = 1e5}},
+                                           .component_count = 1};
 
 enum { STEPS = 4000 };
 
@@ -304,7 +306,7 @@ static double sum_clouds(const globe *g, const double from[3], const double to[3
     for (int i = 0; i < STEPS; i++)
         for (int c = 0; c < 3; c++) places[i][c] = from[c] + (i + .5) / STEPS * length * to[c];
     assert_int_equal(
-        nebel_cloud_extinction(g->clouds, 0, 0, STEPS, (const double(*)[3])places, sizeof *places, extinction),
+        nebel_compute_cloud_extinction(g->clouds, 0, 0, STEPS, (const double(*)[3])places, sizeof *places, extinction),
         NEBEL_OK);
     for (int i = 0; i < STEPS; i++) depth += (double)extinction[i] * length / STEPS;
     return depth;
@@ -328,7 +330,7 @@ static void clouds_are_what_sums_of_their_density_say(void **state)
 {
     (void)state;
     static float extinction[STEPS], on_the_way[STEPS];
-    const nebel_cloud_layer cumulus = {.kind = NEBEL_CLOUD_CUMULUS, .coverage = .7, .extinction = .003};
+    const nebel_cloud_layer cumulus = {.type = NEBEL_CLOUD_CUMULUS, .coverage = .7, .extinction = .003};
     const double length = 4000;
     globe g;
     start(&g, &bare, &cumulus);
@@ -357,11 +359,11 @@ static void clouds_are_what_sums_of_their_density_say(void **state)
 static void even_clouds_lose_nothing(void **state)
 {
     (void)state;
-    const nebel_cloud_layer stratus = {.kind = NEBEL_CLOUD_STRATUS,
+    const nebel_cloud_layer stratus = {.type = NEBEL_CLOUD_STRATUS,
                                        .coverage = 1,
                                        .extinction = .008,
-                                       .detail = NEBEL_CLOUD_NONE,
-                                       .variation = NEBEL_CLOUD_NONE};
+                                       .erosion = NEBEL_CLOUD_NONE,
+                                       .patchiness = NEBEL_CLOUD_NONE};
     nebel_atmosphere_desc air = bare;
     set_rgb(air.ground_albedo, 1);
     globe g;
@@ -382,7 +384,7 @@ static void the_ground_has_a_distance_and_a_normal(void **state)
     (void)state;
     float color[3], depth, normal[3];
     globe g;
-    start(&g, nebel_find_atmosphere("moon"), NULL);
+    start(&g, nebel_lookup_atmosphere("moon"), NULL);
     shine(&g, 45, 3);
     const nebel_ray ray = ray_of(1000, -90, 0);
     const nebel_frame planes = {.color = color, .depth = &depth, .normal = normal};
@@ -399,18 +401,19 @@ static void the_same_for_any_number_of_threads(void **state)
     (void)state;
     enum { WIDE = 66, HIGH = 2 };
     static float color[2][3 * WIDE * HIGH];
-    const nebel_cloud_layer cumulus = {.kind = NEBEL_CLOUD_CUMULUS, .extinction = .005};
+    const nebel_cloud_layer cumulus = {.type = NEBEL_CLOUD_CUMULUS, .extinction = .005};
     globe g;
-    start(&g, nebel_find_atmosphere("earth"), &cumulus);
+    start(&g, nebel_lookup_atmosphere("earth"), &cumulus);
     shine(&g, 30, 3);
     for (int i = 0; i < 2; i++) {
         nebel_renderer *renderer = NULL;
         const nebel_frame planes = {.color = color[i]};
         const nebel_frame_desc desc = {
             .camera = test_camera(0, 100, 0, 1, 100.3, 0), .width = WIDE, .height = HIGH, .samples = 2};
-        assert_int_equal(nebel_create_renderer(&g.scene, NULL, &(nebel_renderer_desc){.threads = 1 + 2 * i}, &renderer),
-                         NEBEL_OK);
-        assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_REFERENCE, NULL), NEBEL_OK);
+        assert_int_equal(
+            nebel_create_cpu_renderer(&g.scene, NULL, &(nebel_cpu_renderer_desc){.thread_count = 1 + 2 * i}, &renderer),
+            NEBEL_OK);
+        assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_PATH, NULL), NEBEL_OK);
         assert_int_equal(nebel_render_frame(renderer, &desc, &planes), NEBEL_OK);
         nebel_destroy_renderer(renderer);
     }
@@ -425,7 +428,7 @@ static void odd_cameras(void **state)
     static const double heights[] = {0, -1, -1000, -1999, 1e9};
     float color[3 * PIXELS];
     globe g;
-    start(&g, nebel_find_atmosphere("toy"), NULL);
+    start(&g, nebel_lookup_atmosphere("toy"), NULL);
     shine(&g, 30, 3);
     const nebel_frame planes = {.color = color};
     nebel_frame_desc desc = {.width = SIDE, .height = SIDE, .samples = 1};

@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-static const nebel_lamp point = {.position = {10, 5, 0}, .intensity = {100, 100, 100}};
+static const nebel_light point = {.position = {10, 5, 0}, .intensity = {100, 100, 100}};
 static const nb_meeting nothing = {.t = HUGE_VAL};
 
 /* ---- paths ----------------------------------------------------------------------------------- */
@@ -24,9 +24,9 @@ typedef struct trial {
     nb_path_world world;
 } trial;
 
-static void start(trial *t, const nebel_lamp *lamps, size_t count, const nebel_volume_desc *volume)
+static void start(trial *t, const nebel_light *lamps, size_t count, const nebel_volume_desc *volume)
 {
-    *t = (trial){.scene = {.lamp_count = count, .lamps = lamps}};
+    *t = (trial){.scene = {.light_count = count, .lights = lamps}};
     t->world = (nb_path_world){.media.fog = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, volume, 1),
                                .scene = &t->scene,
                                .geometry = &t->geometry,
@@ -66,7 +66,7 @@ static void expect(const tally *all, double expected, double part)
 
 /* ---- airlight (T17, T19) --------------------------------------------------------------------- */
 
-static tally see_airlight(double extinction, const nebel_lamp *lamp, double length)
+static tally see_airlight(double extinction, const nebel_light *lamp, double length)
 {
     enum { PATHS = 40000 };
     const nebel_volume_desc fog = white_fog(extinction);
@@ -92,7 +92,7 @@ static void airlight_is_that_of_T17(void **state)
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const double angle = cases[i].angle * test_pi / 180;
-        nebel_lamp lamp = point;
+        nebel_light lamp = point;
         lamp.position[0] = cases[i].distance * cos(angle);
         lamp.position[1] = cases[i].distance * sin(angle);
         const tally all = see_airlight(cases[i].extinction, &lamp, cases[i].length);
@@ -103,8 +103,8 @@ static void airlight_is_that_of_T17(void **state)
 static void spots_are_those_of_T19(void **state)
 {
     (void)state;
-    nebel_lamp spot = point;
-    spot.type = NEBEL_LAMP_SPOT;
+    nebel_light spot = point;
+    spot.type = NEBEL_LIGHT_SPOT;
     spot.direction[1] = -2;
     spot.inner_angle = spot.outer_angle = 30;
     const tally all = see_airlight(.02, &spot, HUGE_VAL), none = see_airlight(.02, &spot, 7.1132);
@@ -119,7 +119,7 @@ static void places_are_those_of_T20(void **state)
     (void)state;
     static const double chances[] = {.1, .5, .9}, places[] = {10.62638608785674, 19.66907215105618, 31.49775892242482};
     const double angle = 15 * test_pi / 180;
-    const nebel_lamp lamp = {.position = {20 * cos(angle), 20 * sin(angle), 0}, .intensity = {1, 1, 1}};
+    const nebel_light lamp = {.position = {20 * cos(angle), 20 * sin(angle), 0}, .intensity = {1, 1, 1}};
     const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 60};
     const nb_passing passing = nb_passing_of(&lamp, &ray);
     for (int i = 0; i < 3; i++) {
@@ -137,7 +137,7 @@ static void places_are_as_dense_as_they_say(void **state)
     (void)state;
     static const double lamps[][2] = {{5, 1}, {-5, 1}, {1e7, 1}, {-1e7, 1}, {5, 0}, {20, 1e-2}, {5, 1e6}};
     for (size_t i = 0; i < sizeof lamps / sizeof *lamps; i++) {
-        const nebel_lamp lamp = {.position = {lamps[i][0], lamps[i][1], 0}, .radius = .25, .intensity = {1, 1, 1}};
+        const nebel_light lamp = {.position = {lamps[i][0], lamps[i][1], 0}, .radius = .25, .intensity = {1, 1, 1}};
         const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 10};
         const nb_passing passing = nb_passing_of(&lamp, &ray);
         const double middle = nb_passing_draw(&passing, .3);
@@ -182,7 +182,7 @@ static void all_light_gets_out_of_white_fog(void **state)
 {
     (void)state;
     enum { PATHS = 40000 };
-    const nebel_lamp lamps[] = {{.intensity = {2, 2, 2}, .radius = .25}, {.intensity = {1, 1, 1}, .radius = .125}};
+    const nebel_light lamps[] = {{.intensity = {2, 2, 2}, .radius = .25}, {.intensity = {1, 1, 1}, .radius = .125}};
     nebel_volume_desc ball = white_fog(2);
     ball.shape = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .radius = 1};
     ball.phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .5};
@@ -210,14 +210,14 @@ static float look_below(float half)
     static const uint32_t indices[] = {0, 1, 2, 0, 2, 3};
     const nebel_mesh lid = {
         .positions = positions, .indices = indices, .vertex_count = 4, .triangle_count = 2, .texture = -1};
-    const nebel_lamp lamp = {.position = {0, 3, 0}, .intensity = {10, 10, 10}, .radius = .1};
-    const nebel_scene_data scene = {.mesh_count = 1, .meshes = &lid, .lamp_count = 1, .lamps = &lamp};
+    const nebel_light lamp = {.position = {0, 3, 0}, .intensity = {10, 10, 10}, .radius = .1};
+    const nebel_scene_data scene = {.mesh_count = 1, .meshes = &lid, .light_count = 1, .lights = &lamp};
     nebel_volume_desc box = white_fog(.5);
     box.shape = (nebel_shape){.type = NEBEL_SHAPE_BOX, .min = {-1, -1, -1}, .max = {1, 0, 1}};
     nebel_snapshot *fog = test_fog(1, &box);
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
-    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_REFERENCE, NULL), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_PATH, NULL), NEBEL_OK);
     float color[3] = {-1, -1, -1}, layer[3], through[3];
     nebel_frame_desc desc = {
         .camera = test_camera(0, -.5, 8, 0, -.5, 0), .width = 1, .height = 1, .samples = 256, .bounces = 1};

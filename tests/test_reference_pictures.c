@@ -21,7 +21,7 @@ typedef struct picture {
 /* As it is shown, 0 to 1. */
 static void take(nebel_renderer *renderer, const nebel_scene *scene, nebel_method method, uint32_t seed, picture *shown)
 {
-    const nebel_frame_desc frame = {.camera = nebel_scene_camera(scene, 0),
+    const nebel_frame_desc frame = {.camera = nebel_get_scene_camera(scene, 0),
                                     .width = WIDTH,
                                     .height = HEIGHT,
                                     .samples = samples,
@@ -49,11 +49,11 @@ static void compare(const char *name, const char *path)
     assert_int_equal(nebel_load_scene(path, &(nebel_scene_desc){.log = {0}}, &scene), NEBEL_OK);
     assert_int_equal(nebel_load_scene_models(scene), NEBEL_OK);
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(
-        nebel_create_renderer(nebel_scene_contents(scene), fog, &(nebel_renderer_desc){.threads = 0}, &renderer),
-        NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(nebel_get_scene_data(scene), fog,
+                                               &(nebel_cpu_renderer_desc){.thread_count = 0}, &renderer),
+                     NEBEL_OK);
     take(renderer, scene, NEBEL_METHOD_EXACT, 0, &exact);
-    for (uint32_t i = 0; i < 2; i++) take(renderer, scene, NEBEL_METHOD_REFERENCE, i + 1, &paths[i]);
+    for (uint32_t i = 0; i < 2; i++) take(renderer, scene, NEBEL_METHOD_PATH, i + 1, &paths[i]);
     const double noise = mean_product(&paths[0], &paths[1], &paths[1]) / 2;
     const double square = mean_product(&exact, &paths[0], &paths[1]);
     const double deviation = noise / sqrt(PIXELS); /* its channels are made by the same paths */

@@ -21,7 +21,7 @@ typedef struct trial {
     size_t volume_count;
     nebel_volume_desc volumes[MOST_VOLUMES];
     nebel_mesh meshes[MOST_MESHES];
-    nebel_lamp lamps[MOST_LAMPS];
+    nebel_light lamps[MOST_LAMPS];
 } trial;
 
 static void set_rgb(double rgb[3], double r, double g, double b)
@@ -132,7 +132,7 @@ static trial hollow_and_replaced(void)
     core->shape = (nebel_shape){.type = NEBEL_SHAPE_BOX, .min = {1, 0, -1}, .max = {3, 2, 2}};
     core->operation = NEBEL_OPERATION_REPLACE;
     core->priority = 1;
-    core->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = .4};
+    core->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = .4};
     return t;
 }
 
@@ -193,14 +193,14 @@ static trial cloud_of_voxels(void)
 
 static void add_lamps(trial *t)
 {
-    t->scene.lamp_count = 2;
-    t->lamps[0] = (nebel_lamp){.position = {-1, 1.5, 1}, .intensity = {4, 3, 2}, .radius = .05};
-    t->lamps[1] = (nebel_lamp){.type = NEBEL_LAMP_SPOT,
-                               .position = {2, 4, 0},
-                               .intensity = {5, 10, 15},
-                               .direction = {-1, -3, .5},
-                               .inner_angle = 15,
-                               .outer_angle = 40};
+    t->scene.light_count = 2;
+    t->lamps[0] = (nebel_light){.position = {-1, 1.5, 1}, .intensity = {4, 3, 2}, .radius = .05};
+    t->lamps[1] = (nebel_light){.type = NEBEL_LIGHT_SPOT,
+                                .position = {2, 4, 0},
+                                .intensity = {5, 10, 15},
+                                .direction = {-1, -3, .5},
+                                .inner_angle = 15,
+                                .outer_angle = 40};
 }
 
 /* Two fogs through each other, one of them with a lamp within. */
@@ -289,7 +289,7 @@ static nebel_snapshot *commit(const nebel_fog_desc *sky, const trial *t)
         assert_int_equal(nebel_add_volume(fog, &t->volumes[i], NULL), NEBEL_OK);
     if (t->scene.environment.type != NEBEL_ENVIRONMENT_CONSTANT)
         assert_int_equal(nebel_set_environment(fog, &t->scene.environment), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, t->scene.lamp_count, t->lamps), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(fog, t->scene.light_count, t->lamps), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     nebel_destroy_fog(fog);
     return snapshot;
@@ -304,9 +304,10 @@ static void take(const trial *t, nebel_method method, uint32_t seed, float *colo
     nebel_snapshot *fog = commit(&sky, t);
     nebel_scene_data scene = t->scene;
     scene.meshes = t->meshes;
-    scene.lamps = t->lamps;
+    scene.lights = t->lamps;
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){.threads = 0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){.thread_count = 0}, &renderer),
+                     NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, method, NULL), NEBEL_OK);
     const nebel_frame_desc frame = {
         .camera = t->camera, .width = WIDTH, .height = HEIGHT, .samples = samples, .seed = seed, .bounces = 1};
@@ -323,7 +324,7 @@ static void take_paths(const trial *t, float *color, float *error)
     const float part = 1 / (float)pictures;
     for (size_t i = 0; i < 3 * PIXELS; i++) color[i] = error[i] = 0;
     for (uint32_t seed = 0; seed < pictures; seed++) {
-        take(t, NEBEL_METHOD_REFERENCE, seed, one, its);
+        take(t, NEBEL_METHOD_PATH, seed, one, its);
         for (size_t i = 0; i < 3 * PIXELS; i++) {
             color[i] += part * one[i];
             error[i] = hypotf(error[i], part * its[i]);

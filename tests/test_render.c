@@ -3,7 +3,7 @@
 
 #include "cpu/renderer.h"
 
-static const nebel_renderer_desc plain = {.threads = 1};
+static const nebel_cpu_renderer_desc plain = {.thread_count = 1};
 
 /* Everything that is drawn must come from this formula. */
 static void assert_pixel(const float *color, const double surface[3], const double transmittance[3],
@@ -326,9 +326,9 @@ static void test_thread_count_changes_no_byte(void **state)
     for (int p = 0; p < 3; p++) {
         nebel_camera moved = camera;
         moved.projection = (nebel_projection)p;
-        test_render(&ball.scene, fog, &(nebel_renderer_desc){.threads = 1}, &moved, 5, &one);
+        test_render(&ball.scene, fog, &(nebel_cpu_renderer_desc){.thread_count = 1}, &moved, 5, &one);
         for (int threads = 2; threads < 6; threads += 3) {
-            test_render(&ball.scene, fog, &(nebel_renderer_desc){.threads = threads}, &moved, 5, &more);
+            test_render(&ball.scene, fog, &(nebel_cpu_renderer_desc){.thread_count = threads}, &moved, 5, &more);
             assert_same_bytes(&one, &more);
         }
     }
@@ -345,7 +345,7 @@ static void test_fog_in_any_instruction_set_changes_no_byte(void **state)
     nebel_snapshot *fog = test_world_fog(.1, .5);
     const nebel_frame_desc frame = {.camera = test_camera(2, 2, 5, 0, 0, 0), .width = 64, .height = 48, .samples = 2};
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&ball.scene, fog, &plain, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&ball.scene, fog, &plain, &renderer), NEBEL_OK);
     test_picture scalar = test_picture_make(64, 48), other = test_picture_make(64, 48);
     renderer->fog_isa = NEBEL_ISA_SCALAR;
     assert_int_equal(nebel_render_frame(renderer, &frame, &scalar.planes), NEBEL_OK);
@@ -369,7 +369,7 @@ static void test_earlier_frames_change_no_byte(void **state)
     ball.meshes[1].origin[0] = 5000; /* so that the scene is larger than a cell */
     const double places[3] = {5001, 0, 2500};
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&ball.scene, NULL, &plain, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&ball.scene, NULL, &plain, &renderer), NEBEL_OK);
     test_picture fresh = test_picture_make(40, 30), later = test_picture_make(40, 30);
     for (int i = 0; i < 3; i++) {
         const nebel_camera camera = test_camera(places[i], 2, 5, places[i], 0, 0);
@@ -392,7 +392,7 @@ static void test_fog_of_a_frame_takes_the_place_of_that_before(void **state)
     const nebel_camera camera = test_camera(2, 2, 5, 0, 0, 0);
     const nebel_frame_desc frame = {.camera = camera, .width = 40, .height = 30, .samples = 1};
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&ball.scene, fogs[2], &plain, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&ball.scene, fogs[2], &plain, &renderer), NEBEL_OK);
     test_picture fresh = test_picture_make(40, 30), later = test_picture_make(40, 30);
     for (int i = 0; i < 3; i++) {
         assert_int_equal(nebel_set_renderer_fog(renderer, fogs[i]), NEBEL_OK);

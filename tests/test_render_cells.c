@@ -24,10 +24,10 @@ static void render_cells(const nebel_scene_data *scene, const nebel_cells *cells
                          const nebel_camera *camera, test_picture *picture)
 {
     nebel_renderer *renderer = NULL;
-    const nebel_renderer_desc desc = {.threads = threads};
+    const nebel_cpu_renderer_desc desc = {.thread_count = threads};
     const nebel_frame_desc frame = {
         .camera = *camera, .width = picture->width, .height = picture->height, .samples = 1};
-    assert_int_equal(nebel_create_renderer(scene, NULL, &desc, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(scene, NULL, &desc, &renderer), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_cells(renderer, cells, stage), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &picture->planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
@@ -53,7 +53,7 @@ static nebel_cell_fog ask(const nebel_cells *cells, const nebel_camera *camera, 
         view.eye[i] = camera->position[i];
         view.forward[i] = camera->look_at[i] - camera->position[i];
     }
-    assert_int_equal(nebel_fog_cells(cells, &view, 1, &point, 0, &fog, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_cell_fog(cells, &view, 1, &point, 0, &fog, 0), NEBEL_OK);
     return fog;
 }
 
@@ -94,7 +94,7 @@ static void test_exponential_pixels_are_exact(void **state)
     const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
     const nebel_camera camera = test_camera(-3, 5, 6, 1, 0, -1);
-    const nebel_volume_desc volumes[] = {nebel_cell_volume(&rooms[0]), nebel_cell_volume(&rooms[1])};
+    const nebel_volume_desc volumes[] = {nebel_volume_from_cell(&rooms[0]), nebel_volume_from_cell(&rooms[1])};
     const nebel_cells_desc desc = {.cells = rooms, .cell_count = 3, .model = NEBEL_CELL_EXPONENTIAL, .ungrouped = 1};
     nebel_cells *cells = NULL;
     nebel_snapshot *fog = test_fog(2, volumes);
@@ -102,7 +102,7 @@ static void test_exponential_pixels_are_exact(void **state)
     int fogged = 0;
     assert_int_equal(nebel_create_cells(&desc, &cells), NEBEL_OK);
     render_cells(&scene, cells, NEBEL_CELLS_PER_PIXEL, 2, &camera, &classic);
-    test_render(&scene, fog, &(nebel_renderer_desc){0}, &camera, 1, &exact);
+    test_render(&scene, fog, &(nebel_cpu_renderer_desc){0}, &camera, 1, &exact);
     for (size_t i = 0; i < 40 * 30; i++) {
         if (!isfinite(classic.planes.depth[i])) continue; /* classic fog is on surfaces alone */
         for (size_t c = 3 * i; c < 3 * i + 3; c++)
@@ -226,7 +226,7 @@ static void test_threads_change_nothing(void **state)
     static test_ball ball;
     test_ball_make(&ball, (const double[3]){0, 1, 0});
     const nebel_camera camera = test_camera(0, 3, 5, 0, 0, 0);
-    nebel_cells *cells = create_rooms(NEBEL_SPAN_FAITHFUL);
+    nebel_cells *cells = create_rooms(NEBEL_SPAN_PRINTED);
     test_picture one = test_picture_make(70, 50), many = test_picture_make(70, 50);
     for (int stage = 0; stage < NEBEL_CELL_STAGE_COUNT; stage++) {
         render_cells(&ball.scene, cells, (nebel_cell_stage)stage, 1, &camera, &one);
@@ -249,7 +249,7 @@ static void test_cells_come_and_go(void **state)
     test_picture before = test_picture_make(16, 16), after = test_picture_make(16, 16);
     nebel_renderer *renderer = NULL;
     const nebel_frame_desc frame = {.camera = camera, .width = 16, .height = 16, .samples = 1};
-    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &before.planes), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_cells(renderer, cells, NEBEL_CELLS_PER_VERTEX), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &after.planes), NEBEL_OK);

@@ -14,10 +14,10 @@ static nebel_result render_by(const nebel_scene_data *scene, nebel_snapshot *fog
                               test_picture *picture)
 {
     nebel_renderer *renderer = NULL;
-    const nebel_renderer_desc desc = {.threads = threads};
+    const nebel_cpu_renderer_desc desc = {.thread_count = threads};
     const nebel_frame_desc frame = {
         .camera = *camera, .width = picture->width, .height = picture->height, .samples = 1};
-    assert_int_equal(nebel_create_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, method, numbers), NEBEL_OK);
     const nebel_result result = nebel_render_frame(renderer, &frame, &picture->planes);
     nebel_destroy_renderer(renderer);
@@ -464,7 +464,7 @@ static void test_methods_come_and_go(void **state)
     nebel_snapshot *fog = test_fog(1, &bank);
     test_picture before = test_picture_make(16, 16), after = test_picture_make(16, 16);
     const nebel_frame_desc frame = {.camera = camera, .width = 16, .height = 16, .samples = 1};
-    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &before.planes), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_VERTEX, NULL), NEBEL_OK);
     const nebel_factor_desc bad = {.density = -1};
@@ -500,10 +500,10 @@ static void test_methods_come_and_go(void **state)
 static void test_words(void **state)
 {
     (void)state;
-    assert_string_equal(nebel_method_word(NEBEL_METHOD_EXACT), "exact");
-    assert_string_equal(nebel_method_word(NEBEL_METHOD_ADDITIVE), "additive");
-    assert_null(nebel_method_word(NEBEL_METHOD_COUNT));
-    assert_null(nebel_method_word((nebel_method)-1));
+    assert_string_equal(nebel_method_name(NEBEL_METHOD_EXACT), "exact");
+    assert_string_equal(nebel_method_name(NEBEL_METHOD_ADDITIVE), "additive");
+    assert_null(nebel_method_name(NEBEL_METHOD_COUNT));
+    assert_null(nebel_method_name((nebel_method)-1));
 }
 
 int main(void)

@@ -6,27 +6,28 @@ static nebel_transfer air_to(const world *w, const nebel_sun *sun, nebel_ray ray
 {
     nebel_transfer transfer;
     ray.t_max = t;
-    assert_int_equal(nebel_trace_air(w->atmosphere, sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_atmosphere(w->atmosphere, sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
     return transfer;
 }
 
 /* Air up to t in the shade of clouds. */
 static nebel_transfer shaded_to(const world *w, const nebel_sun *sun, const nebel_ray *ray,
-                                const nebel_air_shade *shade, double t)
+                                const nebel_air_shadow *shade, double t)
 {
     nebel_transfer transfer = air_to(w, sun, *ray, t);
     for (uint32_t k = 0; k < shade->count && (double)shade->t[k] < t; k++) {
         const nebel_transfer a = air_to(w, sun, *ray, (double)shade->t[k]),
                              b = air_to(w, sun, *ray, fmin(t, (double)shade->t[k + 1]));
         for (int c = 0; c < 3; c++)
-            transfer.in_scattering[c] -= (1 - (double)shade->part[k][c]) * (b.in_scattering[c] - a.in_scattering[c]);
+            transfer.in_scattering[c] -=
+                (1 - (double)shade->transmittance[k][c]) * (b.in_scattering[c] - a.in_scattering[c]);
     }
     return transfer;
 }
 
 /* The table of air in pictures is off by up to 2.7e-2 for rays that end in it. Clouds and air in short pieces: sum of T_air dS_cloud + T_cloud dS_air, with clouds as a straight line between knots. */
-static void compose(const world *w, const nebel_sun *sun, const nebel_ray *ray, const nebel_cloud_knots *knots,
-                    const nebel_air_shade *shade, double light[3])
+static void compose(const world *w, const nebel_sun *sun, const nebel_ray *ray, const nebel_cloud_transfer *knots,
+                    const nebel_air_shadow *shade, double light[3])
 {
     enum { STEPS = 24 };
     const nebel_transfer all = shaded_to(w, sun, ray, shade, HUGE_VAL);
@@ -58,12 +59,12 @@ static void clouds_and_air_are_one(void **state)
         double height, pitch;
     } views[] = {{2, .4}, {1500, .1}, {9000, -.5}};
     world w;
-    nebel_cloud_view *view;
+    nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
     make_world(&(nebel_cloud_layer){.coverage = .5, .extinction = .01}, &w);
     nebel_sun sun = {.irradiance = {5, 4, 3}};
     memcpy(sun.direction, w.scene.sun_direction, sizeof sun.direction);
-    assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = w.clouds, .sun = sun}, &view),
+    assert_int_equal(nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.clouds = w.clouds, .sun = sun}, &view),
                      NEBEL_OK);
     assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
     for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
@@ -76,10 +77,10 @@ static void clouds_and_air_are_one(void **state)
             if (!nb_test_tries(i, WIDTH * HEIGHT)) continue;
             const nebel_ray ray = planet_ray(&camera, views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
             const double length = sqrt(pow(ray.direction[0], 2) + pow(ray.direction[1], 2) + pow(ray.direction[2], 2));
-            nebel_cloud_knots knots;
-            nebel_air_shade shade;
+            nebel_cloud_transfer knots;
+            nebel_air_shadow shade;
             double light[3];
-            assert_int_equal(nebel_shade_air(workspace, 1, &ray, 0, &shade, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_cloud_shadow_on_air(workspace, 1, &ray, 0, &shade, 0), NEBEL_OK);
             assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){spread / length}, 0, &knots, 0),
                              NEBEL_OK);
             compose(&w, &sun, &ray, &knots, &shade, light);
@@ -92,7 +93,7 @@ static void clouds_and_air_are_one(void **state)
         test_picture_free(&picture);
     }
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     free_world(&w);
 }
 
@@ -123,7 +124,7 @@ static void clouds_end_at_surfaces(void **state)
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
     const double height = 1500, way = 2000;
     world w;
-    nebel_cloud_view *view;
+    nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
     make_world(&(nebel_cloud_layer){.coverage = .9, .extinction = .002}, &w);
     const nebel_mesh wall = {.origin = {0, height, -way},
@@ -137,7 +138,7 @@ static void clouds_end_at_surfaces(void **state)
     w.scene.meshes = &wall;
     nebel_sun sun = {.irradiance = {5, 4, 3}};
     memcpy(sun.direction, w.scene.sun_direction, sizeof sun.direction);
-    assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = w.clouds, .sun = sun}, &view),
+    assert_int_equal(nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.clouds = w.clouds, .sun = sun}, &view),
                      NEBEL_OK);
     assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
     const nebel_camera camera = planet_camera(height, 0);
@@ -147,7 +148,7 @@ static void clouds_end_at_surfaces(void **state)
     for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
         nebel_ray ray = planet_ray(&camera, 0, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
         const double length = sqrt(pow(ray.direction[0], 2) + pow(ray.direction[1], 2) + pow(ray.direction[2], 2));
-        nebel_cloud_knots knots;
+        nebel_cloud_transfer knots;
         if (i % WIDTH >= WIDTH / 2) continue;
         ray.t_max = way * length / fabs(ray.direction[2]);
         assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0,
@@ -162,7 +163,7 @@ static void clouds_end_at_surfaces(void **state)
     assert_true(cloudy > 60 && worst < 1e-2);
     test_picture_free(&picture);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     free_world(&w);
 }
 
@@ -210,10 +211,10 @@ static int ascend(const void *a, const void *b)
 
 /* Clouds, straight between knots, and the ball: T_ball dS_cloud + T_cloud dS_ball in short pieces between all places where either
  * begins to change. */
-static void compose_ball(const ball *b, const nebel_ray *ray, const nebel_cloud_knots *knots, double light[3])
+static void compose_ball(const ball *b, const nebel_ray *ray, const nebel_cloud_transfer *knots, double light[3])
 {
     enum { STEPS = 200 };
-    double ends[2], places[NEBEL_MAX_CLOUD_KNOTS + 3] = {0};
+    double ends[2], places[NEBEL_MAX_CLOUD_NODES + 3] = {0};
     uint32_t count = 1, next = 0;
     meet_ball(b, ray, ends);
     for (uint32_t k = 0; k < knots->count; k++) places[count++] = (double)knots->t[k];
@@ -249,13 +250,13 @@ typedef struct off {
 /* Steps through clouds may lie elsewhere as the last digit of a ray does. Whether they do not: those of a few rays that differ in it
  * are alike, and the picture without fog shows them. */
 static int have_same_knots(nebel_cloud_workspace *workspace, const nebel_ray *ray, double spread, const float shown[3],
-                           double tolerance, nebel_cloud_knots *knots)
+                           double tolerance, nebel_cloud_transfer *knots)
 {
     enum { OTHERS = 6 };
     assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &(double){spread}, 0, knots, 0), NEBEL_OK);
     for (int i = 0; i < OTHERS; i++) {
         nebel_ray other = *ray;
-        nebel_cloud_knots its;
+        nebel_cloud_transfer its;
         other.direction[i % 3] *= 1 + (i < 3 ? 1e-13 : -1e-13);
         assert_int_equal(nebel_trace_clouds(workspace, 1, &other, 0, &(double){spread}, 0, &its, 0), NEBEL_OK);
         if (its.count != knots->count) return 0;
@@ -281,7 +282,7 @@ static void compare_ball(const world *w, const ball *b, nebel_cloud_workspace *w
         nebel_ray ray = planet_ray(camera, .4, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
         const double length = sqrt(pow(ray.direction[0], 2) + pow(ray.direction[1], 2) + pow(ray.direction[2], 2));
         const double spread = 2 * tan(30 * test_pi / 180) / HEIGHT / length;
-        nebel_cloud_knots knots;
+        nebel_cloud_transfer knots;
         double light[3], ends[2];
         nebel_ray unit = ray;
         for (int c = 0; c < 3; c++) unit.direction[c] /= length;
@@ -318,16 +319,16 @@ static void fog_lies_among_clouds(void **state)
     const size_t count = sizeof cases / sizeof *cases;
     const nebel_camera camera = planet_camera(2, .4);
     world w;
-    nebel_cloud_view *view;
+    nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
     test_picture clear;
     for (size_t v = 0; v < count; v++) {
         off is = {0};
         if (v == 0 || cases[v].cloud != cases[v - 1].cloud) {
             make_world_in(1e-4, &(nebel_cloud_layer){.coverage = .8, .extinction = cases[v].cloud}, &w);
-            nebel_cloud_view_desc desc = {.clouds = w.clouds, .sun = {.irradiance = {5, 4, 3}}};
+            nebel_cloud_lighting_desc desc = {.clouds = w.clouds, .sun = {.irradiance = {5, 4, 3}}};
             memcpy(desc.sun.direction, w.scene.sun_direction, sizeof desc.sun.direction);
-            assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+            assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_OK);
             assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
             clear = render(&w, &camera, 2, 1, 0);
         }
@@ -343,7 +344,7 @@ static void fog_lies_among_clouds(void **state)
         if (v + 1 < count && cases[v].cloud == cases[v + 1].cloud) continue;
         test_picture_free(&clear);
         nebel_destroy_cloud_workspace(workspace);
-        nebel_destroy_cloud_view(view);
+        nebel_destroy_cloud_lighting(view);
         free_world(&w);
     }
 }
@@ -372,7 +373,7 @@ static void samples_leave_fog_before_clouds_where_it_is(void **state)
     (void)state;
     double one[2], several[2];
     world w;
-    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, &w);
+    make_world(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .coverage = 1}, &w);
     nebel_snapshot *const fog = make_ball(&(ball){{0, 200, -600}, 150, 6e-3});
     find_center(&w, fog, 1, one);
     find_center(&w, fog, 4, several);
@@ -397,7 +398,7 @@ static void dusk_does_not_shine_through_at_the_horizon(void **state)
     (void)state;
     double most = 0;
     world w;
-    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, &w);
+    make_world(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .coverage = 1}, &w);
     memcpy(w.scene.sun_direction, (const double[3]){.2, -.07, -.98}, sizeof w.scene.sun_direction);
     for (int i = 0; i < 8; i++) {
         if (!nb_test_tries((size_t)i, 8)) continue;
@@ -436,9 +437,9 @@ static void sheets_over_mist_have_no_dots(void **state)
 {
     (void)state;
     world w;
-    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .base = 1500, .coverage = .5}, &w);
+    make_world(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .base = 1500, .coverage = .5}, &w);
     memcpy(w.scene.sun_direction, (const double[3]){.927, .046, -.371}, sizeof w.scene.sun_direction);
-    nebel_snapshot *const mist = planet_mist(w.planet.air.radius, w.scene.sun_direction);
+    nebel_snapshot *const mist = planet_mist(w.planet.atmosphere_desc.radius, w.scene.sun_direction);
     nebel_camera camera = planet_camera(3e5, -.55);
     camera.vertical_fov = 10;
     test_picture picture = render_in(&w, mist, &camera, 2, 1, 0);
@@ -456,8 +457,8 @@ static void clouds_hide_the_ground_from_orbit(void **state)
 {
     (void)state;
     world w;
-    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, &w);
-    const double height = 4e5, dip = acos(w.planet.air.radius / (w.planet.air.radius + height));
+    make_world(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .coverage = 1}, &w);
+    const double height = 4e5, dip = acos(w.planet.atmosphere_desc.radius / (w.planet.atmosphere_desc.radius + height));
     nebel_camera camera = planet_camera(height, -dip - .05);
     camera.vertical_fov = 9;
     test_picture picture = render(&w, &camera, 2, 4, 0);
@@ -482,7 +483,7 @@ static void the_ground_has_shadows(void **state)
     (void)state;
     world w;
     make_world(&(nebel_cloud_layer){.coverage = .5}, &w);
-    w.planet.air.ground_albedo[1] = .5;
+    w.planet.atmosphere_desc.ground_albedo[1] = .5;
     const nebel_camera camera = planet_camera(800, -.6);
     test_picture picture = render(&w, &camera, 2, 1, 0);
     double darkest = HUGE_VAL, brightest = 0;
@@ -520,7 +521,7 @@ static double let_through(const nebel_clouds *clouds, double x, double z)
     for (int i = 0; i < STEPS; i++) {
         const double place[1][3] = {{x, low + (high - low) * (i + .5) / STEPS, z}};
         float extinction;
-        assert_int_equal(nebel_cloud_extinction(clouds, 0, 0, 1, place, 0, &extinction), NEBEL_OK);
+        assert_int_equal(nebel_compute_cloud_extinction(clouds, 0, 0, 1, place, 0, &extinction), NEBEL_OK);
         depth += (double)extinction * (high - low) / STEPS;
     }
     const double apart = (1 - g * g) * depth;
@@ -534,7 +535,7 @@ static void air_under_clouds_is_dim(void **state)
     enum { PLACES = 24 };
     const double way = 4000;
     world w;
-    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .base = 1500, .top = 2500, .coverage = 1}, &w);
+    make_world(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .base = 1500, .top = 2500, .coverage = 1}, &w);
     memcpy(w.scene.sun_direction, (const double[3]){0, 1, 0}, sizeof w.scene.sun_direction);
     const nebel_camera camera = planet_camera(100, 0);
     test_picture under = render_wall(&w, way, &camera);
@@ -601,9 +602,9 @@ static void surfaces_under_clouds_have_less_sky(void **state)
                              .base_color = {.8f, .8f, .8f},
                              .texture = -1};
     world w;
-    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .base = 1500, .top = 2500, .coverage = 1}, &w);
+    make_world(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .base = 1500, .top = 2500, .coverage = 1}, &w);
     memcpy(w.scene.sun_direction, (const double[3]){0, .17, -.985}, sizeof w.scene.sun_direction);
-    for (int c = 0; c < 3; c++) w.planet.air.ground_albedo[c] = .5;
+    for (int c = 0; c < 3; c++) w.planet.atmosphere_desc.ground_albedo[c] = .5;
     nebel_environment_map *const map = planet_even_sky(&w.scene);
     w.scene.mesh_count = 1;
     w.scene.meshes = &wall;
@@ -647,7 +648,7 @@ static void no_clouds_change_nothing(void **state)
     (void)state;
     static const float none = 0;
     world w;
-    make_world(&(nebel_cloud_layer){.weather = {1, 1, 1, &none}}, &w);
+    make_world(&(nebel_cloud_layer){.weather_map = {1, 1, 1, &none}}, &w);
     const nebel_camera camera = planet_camera(2, .4);
     test_picture with = render_wall(&w, 4000, &camera); /* with it both have tables for rays that end in the air */
     w.planet.clouds = NULL;
@@ -666,7 +667,8 @@ static void bad_times_are_refused(void **state)
     nebel_renderer *renderer;
     make_world(&(nebel_cloud_layer){.seed = 1}, &w);
     test_picture picture = test_picture_make(WIDTH, HEIGHT);
-    assert_int_equal(nebel_create_renderer(&w.scene, NULL, &(nebel_renderer_desc){.threads = 1}, &renderer), NEBEL_OK);
+    assert_int_equal(
+        nebel_create_cpu_renderer(&w.scene, NULL, &(nebel_cpu_renderer_desc){.thread_count = 1}, &renderer), NEBEL_OK);
     nebel_frame_desc desc = {
         .camera = planet_camera(2, 0), .width = WIDTH, .height = HEIGHT, .samples = 1, .time = (double)NAN};
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_ERROR_VALUE);
@@ -694,7 +696,7 @@ static void a_flight_through_clouds_has_no_jump(void **state)
     const int frames = nb_test_count(FRAMES) > FEWEST ? (int)nb_test_count(FRAMES) : FEWEST;
     static const double begins[] = {290, 790, 2e5}, steps[] = {2, 2, 500};
     world w;
-    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS}, &w);
+    make_world(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS}, &w);
     nebel_renderer *const renderer = create_renderer(&w, NULL, 2);
     for (int k = 0; k < 3; k++) {
         double changes[FRAMES];

@@ -21,7 +21,7 @@ static nebel_atmosphere *earth;
 static int make_air(void **state)
 {
     (void)state;
-    return nebel_create_atmosphere(nebel_find_atmosphere("earth"), &earth) == NEBEL_OK ? 0 : -1;
+    return nebel_create_atmosphere(nebel_lookup_atmosphere("earth"), &earth) == NEBEL_OK ? 0 : -1;
 }
 
 static int free_air(void **state)
@@ -33,7 +33,7 @@ static int free_air(void **state)
 
 static void make_world(const double to_sun[3], world *w)
 {
-    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth")}, .sun = {.irradiance = {5, 4, 3}}};
+    *w = (world){.planet = {.atmosphere_desc = *nebel_lookup_atmosphere("earth")}, .sun = {.irradiance = {5, 4, 3}}};
     memcpy(w->sun.direction, to_sun, sizeof w->sun.direction);
     assert_true(nb_vector_make_unit(w->sun.direction));
     w->atmosphere = earth;
@@ -42,10 +42,11 @@ static void make_world(const double to_sun[3], world *w)
     memcpy(w->scene.sun_direction, w->sun.direction, sizeof w->scene.sun_direction);
 }
 
-static nebel_air_light light_at(const world *w, const double place[3])
+static nebel_irradiance light_at(const world *w, const double place[3])
 {
-    nebel_air_light light;
-    assert_int_equal(nebel_light_air(w->atmosphere, &w->sun, 1, (const double(*)[3])(const void *)place, 0, &light, 0),
+    nebel_irradiance light;
+    assert_int_equal(nebel_compute_atmosphere_irradiance(w->atmosphere, &w->sun, 1,
+                                                         (const double(*)[3])(const void *)place, 0, &light, 0),
                      NEBEL_OK);
     return light;
 }
@@ -71,9 +72,9 @@ static test_picture render(const world *w, nebel_snapshot *fog, const nebel_came
     nebel_renderer *renderer;
     const test_picture picture = test_picture_make(WIDTH, HEIGHT);
     const nebel_frame_desc desc = {.camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = 1};
-    assert_int_equal(
-        nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){.isa = isa, .threads = threads}, &renderer),
-        NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(
+                         &w->scene, fog, &(nebel_cpu_renderer_desc){.isa = isa, .thread_count = threads}, &renderer),
+                     NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
     return picture;
@@ -103,10 +104,10 @@ static test_picture see_ball(world *w, double angle, const double light[3])
                               .extinction = {.02, .03, .04},
                               .albedo = {.9, .8, .7},
                               .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .3}};
-    turn(w->planet.air.radius, angle, camera.position);
-    turn(w->planet.air.radius, angle, camera.look_at);
+    turn(w->planet.atmosphere_desc.radius, angle, camera.position);
+    turn(w->planet.atmosphere_desc.radius, angle, camera.look_at);
     turn_direction(angle, camera.up);
-    turn(w->planet.air.radius, angle, ball.shape.center);
+    turn(w->planet.atmosphere_desc.radius, angle, ball.shape.center);
     memcpy(w->scene.ambient, sky.radiance, sizeof w->scene.ambient);
     nebel_snapshot *fog = make_fog(w, &ball, light, &sky);
     const test_picture picture = render(w, fog, &camera, NEBEL_ISA_DEFAULT, 2);
@@ -128,7 +129,7 @@ static void a_ball_has_the_light_of_its_place(void **state)
         make_world(suns[k / 4], &there);
         turn_direction(-angle, turned);
         make_world(turned, &here);
-        const nebel_air_light at_origin = light_at(&there, origin), at_ball = light_at(&here, middle);
+        const nebel_irradiance at_origin = light_at(&there, origin), at_ball = light_at(&here, middle);
         test_picture away = see_ball(&there, angle, at_origin.sun), home = see_ball(&here, 0, at_ball.sun);
         double worst = 0;
         int fogged = 0;
@@ -151,7 +152,7 @@ static void light_ball(world *w, double height, double brightest[3])
 {
     static const double origin[3] = {0, 0, 0};
     const nebel_environment none = {.type = NEBEL_ENVIRONMENT_CONSTANT};
-    const nebel_air_light light = light_at(w, origin);
+    const nebel_irradiance light = light_at(w, origin);
     const nebel_camera camera = planet_camera(height, 0);
     test_picture pictures[2];
     for (int k = 0; k < 2; k++) {
@@ -179,7 +180,7 @@ static void a_ball_high_up_has_its_own_sun(void **state)
     make_world(to_sun, &w);
     light_ball(&w, 30, by_ground);
     light_ball(&w, high[1], above);
-    const nebel_air_light here = light_at(&w, origin), there = light_at(&w, high);
+    const nebel_irradiance here = light_at(&w, origin), there = light_at(&w, high);
     for (int c = 0; c < 3; c++) {
         print_message("sun at 9 km: %.3g times that on the ground, fog %.3g times as bright\n",
                       there.sun[c] / here.sun[c], above[c] / by_ground[c]);
@@ -195,15 +196,15 @@ static void a_ball_in_eclipse_is_black(void **state)
     static const double to_sun[3] = {0, 1, 0}, white[3] = {1, 1, 1}, angle = .5;
     world w;
     make_world(to_sun, &w);
-    nebel_planet planets[2] = {w.planet, {.air = *nebel_find_atmosphere("moon")}};
+    nebel_planet planets[2] = {w.planet, {.atmosphere_desc = *nebel_lookup_atmosphere("moon")}};
     double place[3] = {0, 20, -70};
-    turn(w.planet.air.radius, angle, place);
-    planets[0].sun_diameter = .53;
-    memcpy(planets[1].air.ground, place, sizeof place);
-    planets[1].air.ground[1] += 4e8;
-    planets[1].air.radius = 3e6;
+    turn(w.planet.atmosphere_desc.radius, angle, place);
+    planets[0].sun_angular_diameter = .53;
+    memcpy(planets[1].atmosphere_desc.ground_point, place, sizeof place);
+    planets[1].atmosphere_desc.ground_point[1] += 4e8;
+    planets[1].atmosphere_desc.radius = 3e6;
     nebel_atmosphere *moon;
-    assert_int_equal(nebel_create_atmosphere(&planets[1].air, &moon), NEBEL_OK);
+    assert_int_equal(nebel_create_atmosphere(&planets[1].atmosphere_desc, &moon), NEBEL_OK);
     planets[1].atmosphere = moon;
     w.scene.planets = planets;
     test_picture pictures[3];
@@ -213,8 +214,8 @@ static void a_ball_in_eclipse_is_black(void **state)
         nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 20}, .extinction = {.02, .03, .04}};
         for (int c = 0; c < 3 && k != 2; c++) ball.albedo[c] = 1;
         memcpy(ball.shape.center, place, sizeof place);
-        turn(w.planet.air.radius, angle, camera.position);
-        turn(w.planet.air.radius, angle, camera.look_at);
+        turn(w.planet.atmosphere_desc.radius, angle, camera.position);
+        turn(w.planet.atmosphere_desc.radius, angle, camera.look_at);
         turn_direction(angle, camera.up);
         w.scene.planet_count = k == 0 ? 1 : 2;
         nebel_snapshot *fog = make_fog(&w, &ball, white, &none);
@@ -237,7 +238,7 @@ static void a_ball_in_eclipse_is_black(void **state)
 /* Where a ray is within the air and above the ground. */
 static int cross_air(const world *w, const nebel_ray *ray, const double unit[3], double at[2])
 {
-    const double radius = w->planet.air.radius, top = radius + w->planet.air.thickness;
+    const double radius = w->planet.atmosphere_desc.radius, top = radius + w->planet.atmosphere_desc.thickness;
     const double from[3] = {ray->origin[0], ray->origin[1] + radius, ray->origin[2]};
     const double along = nb_vector_dot(from, unit), square = nb_vector_dot(from, from);
     const double outer = along * along - square + top * top, inner = along * along - square + radius * radius;
@@ -258,7 +259,7 @@ static steps step_along(const world *w, const nb_daylight *daylight, const nebel
 {
     enum { STEPS = 4000 };
     static const double origin[3] = {0, 0, 0};
-    const nebel_air_light home = light_at(w, origin);
+    const nebel_irradiance home = light_at(w, origin);
     const double length = nb_vector_length(ray.direction);
     double unit[3], left[3] = {1, 1, 1}, ends[2];
     const nebel_ray whole = ray;
@@ -275,10 +276,10 @@ static steps step_along(const world *w, const nb_daylight *daylight, const nebel
             middle[c] = whole.origin[c] + .5 * (from + to) * unit[c];
         }
         ray.t_max = to - from;
-        const nebel_air_light there = light_at(w, middle);
+        const nebel_irradiance there = light_at(w, middle);
         double sun_left[3], brighter[3];
         nb_daylight_at(daylight, NB_DAYLIGHT_OF_FOG, middle, sun_left, brighter);
-        assert_int_equal(nebel_trace_air(w->atmosphere, &w->sun, 1, &ray, 0, &air, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_atmosphere(w->atmosphere, &w->sun, 1, &ray, 0, &air, 0), NEBEL_OK);
         assert_int_equal(nebel_trace(by_sun, NULL, 1, &ray, 0, &sun, 0), NEBEL_OK);
         assert_int_equal(nebel_trace(by_sky, NULL, 1, &ray, 0, &sky, 0), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
@@ -299,8 +300,8 @@ static nebel_volume_desc mist_of(const world *w)
     return (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_WORLD},
                                .density = {.type = NEBEL_DENSITY_ALTITUDE,
                                            .scale_height = 2000,
-                                           .center = {0, -w->planet.air.radius, 0},
-                                           .radius = w->planet.air.radius},
+                                           .center = {0, -w->planet.atmosphere_desc.radius, 0},
+                                           .radius = w->planet.atmosphere_desc.radius},
                                .extinction = {4e-5, 4e-5, 4e-5},
                                .albedo = {.95, .9, .85}};
 }
@@ -319,7 +320,7 @@ static void mist_is_lit_by_place(void **state)
         nebel_environment_map *map = planet_even_sky(&w.scene);
         const double none[3] = {0, 0, 0}, origin[3] = {0, 0, 0};
         const nebel_environment dark = {.type = NEBEL_ENVIRONMENT_CONSTANT};
-        const nebel_air_light home = light_at(&w, origin);
+        const nebel_irradiance home = light_at(&w, origin);
         const nebel_volume_desc mist = mist_of(&w);
         nebel_snapshot *fog = make_fog(&w, &mist, home.sun, &w.scene.environment);
         nebel_snapshot *by_sun = make_fog(&w, &mist, w.sun.irradiance, &dark);

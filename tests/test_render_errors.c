@@ -19,13 +19,14 @@ static void write_log(nebel_result result, const char *message, void *user)
 
 /* ---- descriptions ---------------------------------------------------------------------------- */
 
-static void assert_not_created(const nebel_scene_data *scene, const nebel_renderer_desc *desc, nebel_result expected)
+static void assert_not_created(const nebel_scene_data *scene, const nebel_cpu_renderer_desc *desc,
+                               nebel_result expected)
 {
     test_log log = {0};
-    nebel_renderer_desc logged = *desc;
+    nebel_cpu_renderer_desc logged = *desc;
     logged.log = (nebel_log){write_log, &log};
     nebel_renderer *renderer = (nebel_renderer *)&log;
-    assert_int_equal(nebel_create_renderer(scene, NULL, &logged, &renderer), expected);
+    assert_int_equal(nebel_create_cpu_renderer(scene, NULL, &logged, &renderer), expected);
     assert_null(renderer);
     assert_int_equal(log.messages, 1);
     assert_int_equal(log.result, expected);
@@ -43,20 +44,21 @@ static void test_bad_renderer_descriptions(void **state)
     (void)state;
     const nebel_scene_data scene = {0};
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&scene, NULL, NULL, &renderer), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_create_renderer(&scene, NULL, &(nebel_renderer_desc){0}, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_not_created(NULL, &(nebel_renderer_desc){0}, NEBEL_ERROR_ARGUMENT);
-    assert_not_created(&scene, &(nebel_renderer_desc){.threads = -1}, NEBEL_ERROR_ARGUMENT);
-    assert_not_created(&scene, &(nebel_renderer_desc){.threads = 1000000}, NEBEL_ERROR_ARGUMENT);
-    assert_not_created(&scene, &(nebel_renderer_desc){.isa = (nebel_isa)99}, NEBEL_ERROR_UNSUPPORTED);
-    assert_not_created(&scene, &(nebel_renderer_desc){.allocator = {.allocate = no_memory}}, NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, NULL, NULL, &renderer), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, NULL, &(nebel_cpu_renderer_desc){0}, NULL),
+                     NEBEL_ERROR_ARGUMENT);
+    assert_not_created(NULL, &(nebel_cpu_renderer_desc){0}, NEBEL_ERROR_ARGUMENT);
+    assert_not_created(&scene, &(nebel_cpu_renderer_desc){.thread_count = -1}, NEBEL_ERROR_ARGUMENT);
+    assert_not_created(&scene, &(nebel_cpu_renderer_desc){.thread_count = 1000000}, NEBEL_ERROR_ARGUMENT);
+    assert_not_created(&scene, &(nebel_cpu_renderer_desc){.isa = (nebel_isa)99}, NEBEL_ERROR_UNSUPPORTED);
+    assert_not_created(&scene, &(nebel_cpu_renderer_desc){.allocator = {.allocate = no_memory}}, NEBEL_ERROR_ARGUMENT);
     nebel_destroy_renderer(NULL);
 }
 
 static void assert_bad_mesh(const nebel_mesh *mesh, nebel_result expected)
 {
     const nebel_scene_data scene = {.mesh_count = 1, .meshes = mesh};
-    assert_not_created(&scene, &(nebel_renderer_desc){.threads = 1}, expected);
+    assert_not_created(&scene, &(nebel_cpu_renderer_desc){.thread_count = 1}, expected);
 }
 
 static void test_bad_meshes(void **state)
@@ -82,7 +84,7 @@ static void test_bad_meshes(void **state)
     assert_bad_mesh(&mesh, NEBEL_ERROR_VALUE);
     const nebel_texture texture = {.width = 1, .height = 0};
     const nebel_scene_data scene = {.texture_count = 1, .textures = &texture};
-    assert_not_created(&scene, &(nebel_renderer_desc){.threads = 1}, NEBEL_ERROR_ARGUMENT);
+    assert_not_created(&scene, &(nebel_cpu_renderer_desc){.thread_count = 1}, NEBEL_ERROR_ARGUMENT);
 }
 
 static nebel_frame_desc good_frame(void)
@@ -94,8 +96,8 @@ static void assert_bad_frame(const nebel_scene_data *scene, const nebel_frame_de
 {
     test_log log = {0};
     nebel_renderer *renderer = NULL;
-    const nebel_renderer_desc desc = {.threads = 1, .log = {write_log, &log}};
-    assert_int_equal(nebel_create_renderer(scene, NULL, &desc, &renderer), NEBEL_OK);
+    const nebel_cpu_renderer_desc desc = {.thread_count = 1, .log = {write_log, &log}};
+    assert_int_equal(nebel_create_cpu_renderer(scene, NULL, &desc, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, frame, &(nebel_frame){0}), NEBEL_ERROR_VALUE);
     assert_int_equal(log.messages, 1);
     nebel_destroy_renderer(renderer);
@@ -141,25 +143,25 @@ static void test_times_of_planets_are_numbers(void **state)
 {
     (void)state;
     static const double bad[] = {(double)NAN, HUGE_VAL, -HUGE_VAL, 2e12};
-    nebel_planet cloudy = {.air = *nebel_find_atmosphere("earth")};
-    nebel_planet layered = {.model = NEBEL_PLANET_LAYERS, .shells = {.cloud_count = 1}};
+    nebel_planet cloudy = {.atmosphere_desc = *nebel_lookup_atmosphere("earth")};
+    nebel_planet layered = {.model = NEBEL_PLANET_TEXTURED, .textured_desc = {.cloud_shell_count = 1}};
     nebel_atmosphere *air;
     nebel_clouds *clouds;
-    nebel_layers *layers;
-    assert_int_equal(nebel_create_atmosphere(&cloudy.air, &air), NEBEL_OK);
+    nebel_textured_planet *layers;
+    assert_int_equal(nebel_create_atmosphere(&cloudy.atmosphere_desc, &air), NEBEL_OK);
     const nebel_clouds_desc desc = {.atmosphere = air, .layer_count = 1};
     assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_OK);
-    assert_int_equal(nebel_create_layers(&layered.shells, &layers), NEBEL_OK);
+    assert_int_equal(nebel_create_textured_planet(&layered.textured_desc, &layers), NEBEL_OK);
     cloudy.atmosphere = air;
     cloudy.clouds = clouds;
-    layered.layers = layers;
+    layered.textured = layers;
     for (int i = 0; i < 4; i++) {
         nebel_frame_desc frame = good_frame();
         frame.time = bad[i];
         assert_bad_frame(&(nebel_scene_data){.planet_count = 1, .planets = &cloudy}, &frame);
         assert_bad_frame(&(nebel_scene_data){.planet_count = 1, .planets = &layered}, &frame);
     }
-    nebel_destroy_layers(layers);
+    nebel_destroy_textured_planet(layers);
     nebel_destroy_clouds(clouds);
     nebel_destroy_atmosphere(air);
 }
@@ -170,7 +172,7 @@ static void test_missing_arguments_of_a_frame(void **state)
     const nebel_scene_data scene = {0};
     const nebel_frame_desc frame = good_frame();
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&scene, NULL, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, NULL, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(NULL, &frame, &(nebel_frame){0}), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_render_frame(renderer, NULL, &(nebel_frame){0}), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_render_frame(renderer, &frame, NULL), NEBEL_ERROR_ARGUMENT);
@@ -191,7 +193,7 @@ static void test_extreme_coordinates_give_numbers(void **state)
         nebel_camera camera = test_camera(d, .5 * d, .3 * d, 0, 0, 0);
         camera.projection = (nebel_projection)(i / 4);
         camera.view_height = d;
-        test_render(&ball.scene, NULL, &(nebel_renderer_desc){.threads = 1}, &camera, 2, &picture);
+        test_render(&ball.scene, NULL, &(nebel_cpu_renderer_desc){.thread_count = 1}, &camera, 2, &picture);
         for (int k = 0; k < 16 * 16 * 3; k++) assert_true(isfinite(picture.planes.color[k]));
     }
     test_picture_free(&picture);
@@ -204,8 +206,8 @@ static void test_light_without_end_is_an_error(void **state)
     nebel_snapshot *fog = test_fog(1, &(nebel_volume_desc){.emission = {1, 1, 1}});
     test_log log = {0};
     nebel_renderer *renderer = NULL;
-    const nebel_renderer_desc desc = {.threads = 2, .log = {write_log, &log}};
-    assert_int_equal(nebel_create_renderer(&scene, fog, &desc, &renderer), NEBEL_OK);
+    const nebel_cpu_renderer_desc desc = {.thread_count = 2, .log = {write_log, &log}};
+    assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &desc, &renderer), NEBEL_OK);
     const nebel_frame_desc frame = good_frame();
     assert_int_equal(nebel_render_frame(renderer, &frame, &(nebel_frame){0}), NEBEL_ERROR_UNBOUNDED);
     assert_int_equal(log.messages, 1);
@@ -234,7 +236,8 @@ static void test_progress_rises_and_ends(void **state)
     (void)state;
     const nebel_scene_data scene = {0};
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&scene, NULL, &(nebel_renderer_desc){.threads = 3}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, NULL, &(nebel_cpu_renderer_desc){.thread_count = 3}, &renderer),
+                     NEBEL_OK);
     test_progress progress = {0};
     nebel_frame_desc frame = good_frame();
     frame.width = frame.height = 1500;
@@ -279,9 +282,10 @@ static void test_every_allocation_may_fail(void **state)
     int k = 0;
     for (; result != NEBEL_OK && k < 100; k++) {
         test_memory memory = {.countdown = k};
-        const nebel_renderer_desc desc = {.threads = 1, .allocator = {counted_allocate, counted_release, &memory}};
+        const nebel_cpu_renderer_desc desc = {.thread_count = 1,
+                                              .allocator = {counted_allocate, counted_release, &memory}};
         nebel_renderer *renderer = NULL;
-        result = nebel_create_renderer(&ball.scene, NULL, &desc, &renderer);
+        result = nebel_create_cpu_renderer(&ball.scene, NULL, &desc, &renderer);
         if (result == NEBEL_OK) result = nebel_render_frame(renderer, &frame, &(nebel_frame){0});
         if (result != NEBEL_OK) assert_int_equal(result, NEBEL_ERROR_MEMORY);
         nebel_destroy_renderer(renderer);
@@ -293,7 +297,7 @@ static void test_every_allocation_may_fail(void **state)
 static void test_libraries_are_named(void **state)
 {
     (void)state;
-    assert_non_null(strstr(nebel_renderer_libraries(), "Embree 3."));
+    assert_non_null(strstr(nebel_cpu_libraries(), "Embree 3."));
 }
 
 int main(void)

@@ -1,4 +1,4 @@
-/* A flight from 2 m to 20,000 km: pictures of neighbouring heights, and neighbouring pixels, are off what nebel_trace_air says by the
+/* A flight from 2 m to 20,000 km: pictures of neighbouring heights, and neighbouring pixels, are off what nebel_trace_atmosphere says by the
  * same, so that nothing flickers and no seam shows; and fog of a metre's size stands still wherever on a planet it is. */
 #include "near.h"
 #include "planet_help.h"
@@ -17,11 +17,11 @@ typedef struct world {
 
 static void make_world(const double ground[3], const double to_sun[3], world *w)
 {
-    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth")}, .sun = {.irradiance = {9, 9, 9}}};
-    memcpy(w->planet.air.ground, ground, sizeof w->planet.air.ground);
+    *w = (world){.planet = {.atmosphere_desc = *nebel_lookup_atmosphere("earth")}, .sun = {.irradiance = {9, 9, 9}}};
+    memcpy(w->planet.atmosphere_desc.ground_point, ground, sizeof w->planet.atmosphere_desc.ground_point);
     memcpy(w->sun.direction, to_sun, sizeof w->sun.direction);
     assert_true(nb_vector_make_unit(w->sun.direction));
-    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    assert_int_equal(nebel_create_atmosphere(&w->planet.atmosphere_desc, &w->atmosphere), NEBEL_OK);
     w->planet.atmosphere = w->atmosphere;
     w->scene = (nebel_scene_data){.has_sun = 1, .sun_irradiance = {9, 9, 9}, .planet_count = 1, .planets = &w->planet};
     memcpy(w->scene.sun_direction, to_sun, sizeof w->scene.sun_direction);
@@ -30,7 +30,8 @@ static void make_world(const double ground[3], const double to_sun[3], world *w)
 static nebel_renderer *create_renderer(const world *w, nebel_snapshot *fog)
 {
     nebel_renderer *renderer;
-    assert_int_equal(nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){.threads = 2}, &renderer), NEBEL_OK);
+    assert_int_equal(
+        nebel_create_cpu_renderer(&w->scene, fog, &(nebel_cpu_renderer_desc){.thread_count = 2}, &renderer), NEBEL_OK);
     return renderer;
 }
 
@@ -43,11 +44,11 @@ static void render(nebel_renderer *renderer, const nebel_camera *camera, const t
 /* Air, and Lambert's ground behind it. Returns whether there is any. */
 static int look(const world *w, const nebel_ray *ray, double depth, double light[3])
 {
-    const double radius = w->planet.air.radius;
+    const double radius = w->planet.atmosphere_desc.radius;
     double place[1][3], cosine = 0;
     nebel_transfer air;
-    nebel_air_light arrives;
-    assert_int_equal(nebel_trace_air(w->atmosphere, &w->sun, 1, ray, 0, &air, 0), NEBEL_OK);
+    nebel_irradiance arrives;
+    assert_int_equal(nebel_trace_atmosphere(w->atmosphere, &w->sun, 1, ray, 0, &air, 0), NEBEL_OK);
     memcpy(light, air.in_scattering, 3 * sizeof *light);
     if (!(depth < HUGE_VAL)) return 0;
     double square = 0;
@@ -56,9 +57,11 @@ static int look(const world *w, const nebel_ray *ray, double depth, double light
         place[0][c] = ray->origin[c] + depth * ray->direction[c] / sqrt(square);
         cosine += (place[0][c] + (c == 1 ? radius : 0)) / radius * w->sun.direction[c];
     }
-    assert_int_equal(nebel_light_air(w->atmosphere, &w->sun, 1, (const double(*)[3])place, 0, &arrives, 0), NEBEL_OK);
+    assert_int_equal(
+        nebel_compute_atmosphere_irradiance(w->atmosphere, &w->sun, 1, (const double(*)[3])place, 0, &arrives, 0),
+        NEBEL_OK);
     for (int c = 0; c < 3; c++)
-        light[c] += air.transmittance[c] * w->planet.air.ground_albedo[c] / test_pi *
+        light[c] += air.transmittance[c] * w->planet.atmosphere_desc.ground_albedo[c] / test_pi *
                     (fmax(0, cosine) * arrives.sun[c] + arrives.sky[c]);
     return 1;
 }
@@ -77,7 +80,7 @@ typedef struct column {
 
 static void fly_past(const world *w, nebel_renderer *renderer, double height, const test_picture *picture, column *seen)
 {
-    const double radius = w->planet.air.radius, dip = acos(radius / (radius + height));
+    const double radius = w->planet.atmosphere_desc.radius, dip = acos(radius / (radius + height));
     const double pitch = -dip - .12 * (test_pi / 2 - dip);
     const nebel_camera camera = planet_camera(height, pitch);
     double light[HEIGHT][3], brightest = 0;
@@ -156,9 +159,9 @@ static nebel_snapshot *make_mist(const world *w, const double place[3])
         .extinction = {1, 1, 1},
         .albedo = {.9, .8, .7}};
     nebel_fog_desc desc = {.sun = w->sun};
-    nebel_air_light light;
+    nebel_irradiance light;
     const double middle[1][3] = {{place[0], place[1] + 1, place[2] - 6}};
-    assert_int_equal(nebel_light_air(w->atmosphere, &w->sun, 1, middle, 0, &light, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_atmosphere_irradiance(w->atmosphere, &w->sun, 1, middle, 0, &light, 0), NEBEL_OK);
     memcpy(desc.sun.irradiance, light.sun, sizeof light.sun);
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &mist, NULL), NEBEL_OK);

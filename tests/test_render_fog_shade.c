@@ -17,7 +17,7 @@ typedef struct world {
     nebel_environment_map *map;
     nebel_planet planet;
     nebel_scene_data scene;
-    nebel_cloud_view *view;
+    nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
 } world;
 
@@ -26,8 +26,8 @@ static nebel_atmosphere *usual;
 
 static nebel_atmosphere *make_atmosphere(const nebel_atmosphere_desc *air)
 {
-    const nebel_atmosphere_desc *const earth = nebel_find_atmosphere("earth");
-    const int is_there = memcmp(air->ground, earth->ground, sizeof air->ground) == 0;
+    const nebel_atmosphere_desc *const earth = nebel_lookup_atmosphere("earth");
+    const int is_there = memcmp(air->ground_point, earth->ground_point, sizeof air->ground_point) == 0;
     nebel_atmosphere *made = is_there ? usual : NULL;
     if (made == NULL) assert_int_equal(nebel_create_atmosphere(air, &made), NEBEL_OK);
     if (is_there) usual = made;
@@ -49,29 +49,29 @@ static int free_usual(void **state)
 /* What comes of the planet and of the scene's sun. */
 static void make_air(world *w)
 {
-    w->atmosphere = make_atmosphere(&w->planet.air);
+    w->atmosphere = make_atmosphere(&w->planet.atmosphere_desc);
     const nebel_clouds_desc desc = {
         .atmosphere = w->atmosphere, .layers = {w->planet.cloud_layers[0]}, .layer_count = 1};
     assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
     w->planet.atmosphere = w->atmosphere;
     w->planet.clouds = w->clouds;
-    nebel_cloud_view_desc view = {.clouds = w->clouds, .sun = {.irradiance = {5, 4, 3}}};
+    nebel_cloud_lighting_desc view = {.clouds = w->clouds, .sun = {.irradiance = {5, 4, 3}}};
     memcpy(view.sun.direction, w->scene.sun_direction, sizeof view.sun.direction);
-    assert_int_equal(nebel_create_cloud_view(&view, &w->view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_lighting(&view, &w->view), NEBEL_OK);
     assert_int_equal(nebel_create_cloud_workspace(w->view, &w->workspace), NEBEL_OK);
 }
 
 /* Air so thin that it hardly counts, and a sky of its own. */
 static void make_world(const nebel_cloud_layer *layer, const double sun[3], world *w)
 {
-    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"),
+    *w = (world){.planet = {.atmosphere_desc = *nebel_lookup_atmosphere("earth"),
                             .sun_left = {1, 1, 1},
                             .cloud_layer_count = 1,
                             .cloud_layers = {*layer}}};
-    for (uint32_t k = 0; k < w->planet.air.air_count; k++)
+    for (uint32_t k = 0; k < w->planet.atmosphere_desc.component_count; k++)
         for (int c = 0; c < 3; c++) {
-            w->planet.air.airs[k].scattering[c] *= 1e-4;
-            w->planet.air.airs[k].absorption[c] *= 1e-4;
+            w->planet.atmosphere_desc.components[k].scattering[c] *= 1e-4;
+            w->planet.atmosphere_desc.components[k].absorption[c] *= 1e-4;
         }
     w->scene = (nebel_scene_data){.has_sun = 1,
                                   .sun_irradiance = {irradiance[0], irradiance[1], irradiance[2]},
@@ -86,7 +86,7 @@ static void make_world(const nebel_cloud_layer *layer, const double sun[3], worl
 static void free_world(world *w)
 {
     nebel_destroy_cloud_workspace(w->workspace);
-    nebel_destroy_cloud_view(w->view);
+    nebel_destroy_cloud_lighting(w->view);
     nebel_destroy_clouds(w->clouds);
     nebel_release_environment_map(w->map);
     free_atmosphere(w->atmosphere);
@@ -95,15 +95,18 @@ static void free_world(world *w)
 static double sun_at(const world *w, const double place[3])
 {
     float part;
-    assert_int_equal(nebel_shade_clouds(w->workspace, 0, 1, (const double(*)[3])(const void *)place, 0, &part),
-                     NEBEL_OK);
+    assert_int_equal(
+        nebel_compute_cloud_sun_transmittance(w->workspace, 0, 1, (const double(*)[3])(const void *)place, 0, &part),
+        NEBEL_OK);
     return (double)part;
 }
 
 static double sky_at(const world *w, const double place[3])
 {
     float part;
-    assert_int_equal(nebel_shade_sky(w->workspace, 0, 1, (const double(*)[3])(const void *)place, 0, &part), NEBEL_OK);
+    assert_int_equal(
+        nebel_compute_cloud_sky_transmittance(w->workspace, 0, 1, (const double(*)[3])(const void *)place, 0, &part),
+        NEBEL_OK);
     return (double)part;
 }
 
@@ -135,8 +138,9 @@ static test_picture render(const world *w, nebel_snapshot *fog, const nebel_came
     nebel_renderer *renderer;
     const test_picture picture = test_picture_make(WIDTH, HEIGHT);
     const nebel_frame_desc desc = {.camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = 1};
-    assert_int_equal(nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){.threads = threads}, &renderer),
-                     NEBEL_OK);
+    assert_int_equal(
+        nebel_create_cpu_renderer(&w->scene, fog, &(nebel_cpu_renderer_desc){.thread_count = threads}, &renderer),
+        NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
     return picture;
@@ -154,7 +158,7 @@ static test_picture render_evenly(const world *w, nebel_snapshot *fog, const neb
 /* Of a ray of unit length from above it. */
 static double to_ground(const world *w, const nebel_ray *ray)
 {
-    const double radius = w->planet.air.radius, height = ray->origin[1];
+    const double radius = w->planet.atmosphere_desc.radius, height = ray->origin[1];
     const double along = (radius + height) * ray->direction[1];
     return -along - sqrt(along * along - height * (2 * radius + height));
 }
@@ -366,7 +370,7 @@ static void clear_places_stay_as_they_are(void **state)
     static const double sun[3] = {.3, .8, -.2};
     static const float none = 0;
     world w;
-    make_world(&(nebel_cloud_layer){.weather = {1, 1, 1, &none}}, sun, &w);
+    make_world(&(nebel_cloud_layer){.weather_map = {1, 1, 1, &none}}, sun, &w);
     const nebel_volume_desc bank = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-600, 0, -2100}, .max = {600, 60, -900}},
                                     .extinction = {2e-3, 2e-3, 2e-3},
                                     .albedo = {.97, .97, .97}};
@@ -387,9 +391,9 @@ static void clear_places_stay_as_they_are(void **state)
 /* The planet's top in the scene: its middle, and all that is told of it, moves with it. */
 static void move_planet(const double top[3], world *w)
 {
-    memcpy(w->planet.air.ground, top, sizeof w->planet.air.ground);
+    memcpy(w->planet.atmosphere_desc.ground_point, top, sizeof w->planet.atmosphere_desc.ground_point);
     nebel_destroy_cloud_workspace(w->workspace);
-    nebel_destroy_cloud_view(w->view);
+    nebel_destroy_cloud_lighting(w->view);
     nebel_destroy_clouds(w->clouds);
     free_atmosphere(w->atmosphere);
     make_air(w);
@@ -398,7 +402,7 @@ static void move_planet(const double top[3], world *w)
 /* Mist or a ball of it on the top, with the sun that the origin has; ambient light is no sky, so that it is the same anywhere. */
 static test_picture see_top(world *w, const double top[3], int is_ball, double sun)
 {
-    const double radius = w->planet.air.radius;
+    const double radius = w->planet.atmosphere_desc.radius;
     nebel_camera camera = planet_camera(300, -.6);
     nebel_volume_desc fog = {
         .shape = {.type = NEBEL_SHAPE_WORLD}, .extinction = {1e-3, 1e-3, 1e-3}, .albedo = {.97, .97, .97}};
@@ -432,7 +436,7 @@ static void shade_does_not_hang_on_the_origin(void **state)
         world w;
         make_world(&(nebel_cloud_layer){.coverage = .6}, sun, &w);
         /* The origin lies on the ground on the side away from the sun. */
-        const double radius = w.planet.air.radius,
+        const double radius = w.planet.atmosphere_desc.radius,
                      away[3] = {radius * w.scene.sun_direction[0], radius * (w.scene.sun_direction[1] + 1),
                                 radius * w.scene.sun_direction[2]};
         test_picture day = see_top(&w, here, is_ball, sun_at(&w, here)), night = see_top(&w, away, is_ball, 0);

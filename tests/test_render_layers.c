@@ -1,38 +1,41 @@
-/* Planets of layers in pictures of the CPU: what nebel_trace_layers says, laid over each other through the fog between. */
+/* Planets of layers in pictures of the CPU: what nebel_trace_textured_planet says, laid over each other through the fog between. */
 #include "test_render_scene.h"
 
 enum { WIDTH = 48, HEIGHT = 32, PIXELS = WIDTH * HEIGHT };
 
 typedef struct world {
-    nebel_layers *layers;
+    nebel_textured_planet *layers;
     nebel_planet planet;
     nebel_scene_data scene;
     nebel_camera camera;
 } world;
 
 /* Small maps: those that planets make for themselves take half a second. */
-static nebel_map make_map(nebel_map_kind kind)
+static nebel_planet_map make_map(nebel_planet_map_type kind)
 {
-    static float texels[NEBEL_MAP_KIND_COUNT][64 * 32 * 3];
-    const nebel_map_desc desc = {.kind = kind, .width = 64, .height = 32, .coverage = .4, .seed = 3};
-    nebel_map map = {.texels = texels[kind]};
-    assert_int_equal(nebel_size_map(&desc, &map), NEBEL_OK);
-    assert_int_equal(nebel_make_map(&desc, texels[kind]), NEBEL_OK);
+    static float texels[NEBEL_PLANET_MAP_TYPE_COUNT][64 * 32 * 3];
+    const nebel_planet_map_desc desc = {.type = kind, .width = 64, .height = 32, .coverage = .4, .seed = 3};
+    nebel_planet_map map = {.texels = texels[kind]};
+    assert_int_equal(nebel_get_planet_map_size(&desc, &map), NEBEL_OK);
+    assert_int_equal(nebel_generate_planet_map(&desc, texels[kind]), NEBEL_OK);
     return map;
 }
 
 static void make_world(world *w)
 {
-    const nebel_map clouds = make_map(NEBEL_MAP_CLOUDS), detail = make_map(NEBEL_MAP_DETAIL);
+    const nebel_planet_map clouds = make_map(NEBEL_PLANET_MAP_CLOUDS), detail = make_map(NEBEL_PLANET_MAP_DETAIL);
     *w = (world){.camera = test_camera(1, 3, 9, 0, 0, 0)};
-    nebel_layers_desc *desc = &w->planet.shells;
-    *desc = (nebel_layers_desc){.radius = 2, .day = 100, .ground = make_map(NEBEL_MAP_GROUND), .cloud_count = 2};
-    desc->clouds[0] = (nebel_cloud_shell){.height = .1, .day = 50, .map = clouds, .detail = detail};
-    desc->clouds[1] = (nebel_cloud_shell){.height = .4, .day = -70, .gain = .5, .map = clouds};
-    desc->air = (nebel_air_shell){.height = .7, .brightness = .4};
-    assert_int_equal(nebel_create_layers(desc, &w->layers), NEBEL_OK);
-    w->planet.model = NEBEL_PLANET_LAYERS;
-    w->planet.layers = w->layers;
+    nebel_textured_planet_desc *desc = &w->planet.textured_desc;
+    *desc = (nebel_textured_planet_desc){
+        .radius = 2, .rotation_period = 100, .color_map = make_map(NEBEL_PLANET_MAP_GROUND), .cloud_shell_count = 2};
+    desc->cloud_shells[0] =
+        (nebel_cloud_shell){.height = .1, .rotation_period = 50, .coverage_map = clouds, .detail_map = detail};
+    desc->cloud_shells[1] =
+        (nebel_cloud_shell){.height = .4, .rotation_period = -70, .gain = .5, .coverage_map = clouds};
+    desc->atmosphere = (nebel_atmosphere_shell){.height = .7, .brightness = .4};
+    assert_int_equal(nebel_create_textured_planet(desc, &w->layers), NEBEL_OK);
+    w->planet.model = NEBEL_PLANET_TEXTURED;
+    w->planet.textured = w->layers;
     for (int c = 0; c < 3; c++) w->planet.sun_left[c] = 1;
     w->scene = (nebel_scene_data){.has_sun = 1,
                                   .sun_direction = {.6, .48, .64},
@@ -57,8 +60,9 @@ static void render(const world *w, nebel_snapshot *fog, int threads, double time
                    float *depth)
 {
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){.threads = threads}, &renderer),
-                     NEBEL_OK);
+    assert_int_equal(
+        nebel_create_cpu_renderer(&w->scene, fog, &(nebel_cpu_renderer_desc){.thread_count = threads}, &renderer),
+        NEBEL_OK);
     const nebel_frame_desc frame = {
         .camera = w->camera, .width = WIDTH, .height = HEIGHT, .samples = samples, .time = time};
     assert_int_equal(nebel_render_frame(renderer, &frame, &(nebel_frame){.color = color, .depth = depth}), NEBEL_OK);
@@ -97,7 +101,7 @@ static nebel_transfer fog_up_to(const nebel_snapshot *fog, const nebel_ray *ray,
 }
 
 /* From behind to the front: each piece of fog takes away from what is behind it and adds its own. */
-static void compose(const world *w, const nebel_snapshot *fog, const nebel_ray *ray, const nebel_layer_hits *hits,
+static void compose(const world *w, const nebel_snapshot *fog, const nebel_ray *ray, const nebel_shell_hits *hits,
                     double color[3])
 {
     double far = HUGE_VAL;
@@ -112,7 +116,7 @@ static void compose(const world *w, const nebel_snapshot *fog, const nebel_ray *
             const double light =
                 is_ground_piece ? 0 : (all.in_scattering[c] - before.in_scattering[c]) / before.transmittance[c];
             color[c] = left * color[c] + light;
-            if (k > 0) color[c] = (1 - hits->hits[k - 1].cover) * color[c] + hits->hits[k - 1].radiance[c];
+            if (k > 0) color[c] = (1 - hits->hits[k - 1].opacity) * color[c] + hits->hits[k - 1].radiance[c];
         }
         far = near;
     }
@@ -125,14 +129,14 @@ static void check_picture(const world *w, nebel_snapshot *fog, double time)
     double worst = 0;
     render(w, fog, 1, time, 1, color, depth);
     for (uint32_t i = 0; i < PIXELS; i++) {
-        nebel_layer_view view = {.time = time};
-        nebel_layer_hits hits;
+        nebel_textured_planet_query view = {.time = time};
+        nebel_shell_hits hits;
         double wanted[3];
-        const nebel_ray ray = ray_of(&w->camera, i % WIDTH, i / WIDTH, &view.spread);
+        const nebel_ray ray = ray_of(&w->camera, i % WIDTH, i / WIDTH, &view.pixel_spread);
         memcpy(view.sun.direction, w->scene.sun_direction, sizeof view.sun.direction);
         memcpy(view.sun.irradiance, w->scene.sun_irradiance, sizeof view.sun.irradiance);
         memcpy(view.ambient, w->scene.ambient, sizeof view.ambient);
-        assert_int_equal(nebel_trace_layers(w->layers, &view, 1, &ray, 0, &hits, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_textured_planet(w->layers, &view, 1, &ray, 0, &hits, 0), NEBEL_OK);
         compose(w, fog, &ray, &hits, wanted);
         for (int c = 0; c < 3; c++) worst = fmax(worst, fabs((double)color[3 * i + (uint32_t)c] - wanted[c]));
         const int has_ground = hits.count > 0 && hits.hits[hits.count - 1].is_ground;
@@ -156,7 +160,7 @@ static void pictures_are_what_rays_say(void **state)
     nebel_snapshot *fog = make_fog();
     check_picture(&w, fog, 33);
     nebel_release_snapshot(fog);
-    nebel_destroy_layers(w.layers);
+    nebel_destroy_textured_planet(w.layers);
 }
 
 /* A square before the planet hides it, one behind it is hidden, one within the shells is seen through them. */
@@ -183,7 +187,7 @@ static void models_stand_before_and_behind(void **state)
     square.origin[1] = -1;
     render(&w, NULL, 1, 0, 1, with, depth);
     assert_memory_equal(with, without, sizeof with);
-    nebel_destroy_layers(w.layers);
+    nebel_destroy_textured_planet(w.layers);
 }
 
 static void bytes_do_not_hang_on_threads(void **state)
@@ -197,7 +201,7 @@ static void bytes_do_not_hang_on_threads(void **state)
     render(&w, fog, 3, 7, 4, three, NULL);
     assert_memory_equal(one, three, sizeof one);
     nebel_release_snapshot(fog);
-    nebel_destroy_layers(w.layers);
+    nebel_destroy_textured_planet(w.layers);
 }
 
 static void what_cannot_be_drawn_is_refused(void **state)
@@ -207,13 +211,14 @@ static void what_cannot_be_drawn_is_refused(void **state)
     make_world(&w);
     nebel_renderer *renderer = NULL;
     nebel_frame_desc frame = {.camera = w.camera, .width = WIDTH, .height = HEIGHT, .time = HUGE_VAL};
-    assert_int_equal(nebel_create_renderer(&w.scene, NULL, &(nebel_renderer_desc){.threads = 1}, &renderer), NEBEL_OK);
+    assert_int_equal(
+        nebel_create_cpu_renderer(&w.scene, NULL, &(nebel_cpu_renderer_desc){.thread_count = 1}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &(nebel_frame){.color = NULL}), NEBEL_ERROR_VALUE);
     frame.time = 0;
-    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_REFERENCE, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_PATH, NULL), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &(nebel_frame){.color = NULL}), NEBEL_ERROR_UNSUPPORTED);
     nebel_destroy_renderer(renderer);
-    nebel_destroy_layers(w.layers);
+    nebel_destroy_textured_planet(w.layers);
 }
 
 int main(void)

@@ -93,19 +93,19 @@ static void test_windows_have_the_pixels_of_the_whole(void **state)
 {
     static const nebel_projection projections[] = {NEBEL_PROJECTION_PERSPECTIVE, NEBEL_PROJECTION_ORTHOGRAPHIC,
                                                    NEBEL_PROJECTION_PANORAMA};
-    static const nebel_method methods[] = {NEBEL_METHOD_EXACT, NEBEL_METHOD_VERTEX, NEBEL_METHOD_REFERENCE};
+    static const nebel_method methods[] = {NEBEL_METHOD_EXACT, NEBEL_METHOD_VERTEX, NEBEL_METHOD_PATH};
     (void)state;
     test_barrel barrel;
     test_barrel_make(&barrel);
     nebel_snapshot *fog = make_fog();
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&barrel.scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&barrel.scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     for (size_t m = 0; m < sizeof methods / sizeof *methods; m++) {
         assert_int_equal(nebel_set_renderer_method(renderer, methods[m], NULL), NEBEL_OK);
         for (size_t i = 0; i < sizeof projections / sizeof *projections; i++) {
             nebel_camera camera = test_camera(.5, 1, 6, 0, 0, 0);
             camera.projection = projections[i];
-            if (methods[m] != NEBEL_METHOD_REFERENCE || i == 0) compare_windows(renderer, &camera, 2);
+            if (methods[m] != NEBEL_METHOD_PATH || i == 0) compare_windows(renderer, &camera, 2);
         }
     }
     nebel_destroy_renderer(renderer);
@@ -130,7 +130,7 @@ static void test_windows_that_cut_regions_are_refused(void **state)
     const nebel_scene_data scene = {0};
     nebel_snapshot *fog = make_fog();
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     const nebel_camera camera = test_camera(0, 0, 6, 0, 0, 0);
     test_planes whole = make_planes(WIDTH, HEIGHT);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
@@ -179,7 +179,7 @@ static void test_samples_are_the_same_alone(void **state)
     test_barrel_make(&barrel);
     nebel_snapshot *fog = make_fog();
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(&barrel.scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&barrel.scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     const nebel_camera camera = test_camera(.5, 1, 6, 0, 0, 0);
     compare_samples(renderer, &camera);
     test_planes whole = make_planes(WIDTH, HEIGHT);

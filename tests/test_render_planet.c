@@ -1,4 +1,4 @@
-/* Planets in pictures of the CPU: the sky, the ground and models through air are what nebel_trace_air says, and air and fog along one ray are
+/* Planets in pictures of the CPU: the sky, the ground and models through air are what nebel_trace_atmosphere says, and air and fog along one ray are
  * what many short pieces give. */
 #include "planet_help.h"
 #include "test_render_scene.h"
@@ -25,7 +25,7 @@ static nebel_atmosphere *keep_air(const char *name)
     int k = 0;
     while (strcmp(kept[k].name, name) != 0) k++;
     if (kept[k].atmosphere == NULL)
-        assert_int_equal(nebel_create_atmosphere(nebel_find_atmosphere(name), &kept[k].atmosphere), NEBEL_OK);
+        assert_int_equal(nebel_create_atmosphere(nebel_lookup_atmosphere(name), &kept[k].atmosphere), NEBEL_OK);
     return kept[k].atmosphere;
 }
 
@@ -40,10 +40,10 @@ static void make_world(const char *name, const double sun[3], world *w)
 {
     static const double origin[1][3] = {{0, 0, 0}};
     const nebel_sun white = {.direction = {sun[0], sun[1], sun[2]}, .irradiance = {1, 1, 1}};
-    nebel_air_light light;
-    *w = (world){.planet = {.air = *nebel_find_atmosphere(name)}};
+    nebel_irradiance light;
+    *w = (world){.planet = {.atmosphere_desc = *nebel_lookup_atmosphere(name)}};
     w->atmosphere = keep_air(name);
-    assert_int_equal(nebel_light_air(w->atmosphere, &white, 1, origin, 0, &light, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_atmosphere_irradiance(w->atmosphere, &white, 1, origin, 0, &light, 0), NEBEL_OK);
     w->planet.atmosphere = w->atmosphere;
     memcpy(w->planet.sun_left, light.sun, sizeof light.sun);
     w->scene = (nebel_scene_data){.has_sun = 1, .sun_irradiance = {5, 4, 3}, .planet_count = 1, .planets = &w->planet};
@@ -63,9 +63,9 @@ static test_picture render(const world *w, nebel_snapshot *fog, const nebel_came
 {
     nebel_renderer *renderer;
     const test_picture picture = test_picture_make(WIDTH, HEIGHT);
-    assert_int_equal(
-        nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){.isa = isa, .threads = threads}, &renderer),
-        NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(
+                         &w->scene, fog, &(nebel_cpu_renderer_desc){.isa = isa, .thread_count = threads}, &renderer),
+                     NEBEL_OK);
     const nebel_frame_desc desc = {.camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = samples};
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
@@ -75,7 +75,7 @@ static test_picture render(const world *w, nebel_snapshot *fog, const nebel_came
 /* Lambert's ground where the ray ends, before the air. */
 static void light_ground(const world *w, const nebel_ray *ray, const nebel_sun *sun, double light[3], double *way)
 {
-    const double radius = w->planet.air.radius;
+    const double radius = w->planet.atmosphere_desc.radius;
     double unit[3], from[3], b = 0, c0 = -radius * radius;
     const double length = sqrt(pow(ray->direction[0], 2) + pow(ray->direction[1], 2) + pow(ray->direction[2], 2));
     for (int c = 0; c < 3; c++) {
@@ -88,14 +88,17 @@ static void light_ground(const world *w, const nebel_ray *ray, const nebel_sun *
     memset(light, 0, 3 * sizeof *light);
     if (!(*way < HUGE_VAL)) return;
     double place[1][3], cosine = 0;
-    nebel_air_light arrives;
+    nebel_irradiance arrives;
     for (int c = 0; c < 3; c++) {
         place[0][c] = ray->origin[c] + *way * unit[c];
         cosine += (from[c] + *way * unit[c]) / radius * sun->direction[c];
     }
-    assert_int_equal(nebel_light_air(w->atmosphere, sun, 1, (const double(*)[3])place, 0, &arrives, 0), NEBEL_OK);
+    assert_int_equal(
+        nebel_compute_atmosphere_irradiance(w->atmosphere, sun, 1, (const double(*)[3])place, 0, &arrives, 0),
+        NEBEL_OK);
     for (int c = 0; c < 3; c++)
-        light[c] = w->planet.air.ground_albedo[c] / test_pi * (fmax(0, cosine) * arrives.sun[c] + arrives.sky[c]);
+        light[c] =
+            w->planet.atmosphere_desc.ground_albedo[c] / test_pi * (fmax(0, cosine) * arrives.sun[c] + arrives.sky[c]);
 }
 
 static void sky_and_ground_are_those_of_the_air(void **state)
@@ -120,7 +123,7 @@ static void sky_and_ground_are_those_of_the_air(void **state)
             const nebel_ray ray = planet_ray(&camera, views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
             nebel_transfer transfer;
             double behind[3], way;
-            assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_atmosphere(w.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
             light_ground(&w, &ray, &sun, behind, &way);
             const double depth = (double)picture.planes.depth[i];
             if (fabs(way) < HUGE_VAL) assert_true(fabs(depth - way) <= 1e-5 * way + 1e-3);
@@ -174,7 +177,7 @@ static void models_are_seen_through_air(void **state)
     const uint32_t middle = HEIGHT / 2 * WIDTH + WIDTH / 2;
     const nebel_ray ray = {{0, 20, 0}, {0, 0, -1}, 2000};
     nebel_transfer transfer;
-    assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_atmosphere(w.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
     assert_true(fabs((double)picture.planes.depth[middle] - 2000) < 1);
     for (int c = 0; c < 3; c++) {
         const double lit = w.planet.sun_left[c] * sun.irradiance[c] * .8 / test_pi;
@@ -211,9 +214,9 @@ static void models_take_the_light_of_their_place(void **state)
         const nebel_ray ray = {{0, height, 20 - distance}, {0, 0, -1}, 20};
         const double place[1][3] = {{0, height, -distance}};
         nebel_transfer transfer;
-        nebel_air_light there;
-        assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
-        assert_int_equal(nebel_light_air(w.atmosphere, &sun, 1, place, 0, &there, 0), NEBEL_OK);
+        nebel_irradiance there;
+        assert_int_equal(nebel_trace_atmosphere(w.atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+        assert_int_equal(nebel_compute_atmosphere_irradiance(w.atmosphere, &sun, 1, place, 0, &there, 0), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
             const double exact =
                 transfer.transmittance[c] * there.sun[c] * to_sun[2] / test_pi + transfer.in_scattering[c];
@@ -238,19 +241,21 @@ static void daylight_is_that_of_the_air(void **state)
     for (int n = 0; n < 3; n++) {
         world w;
         make_world(names[n], to_sun, &w);
-        const double radius = w.planet.air.radius, top = w.planet.air.thickness;
+        const double radius = w.planet.atmosphere_desc.radius, top = w.planet.atmosphere_desc.thickness;
         const nebel_sun white = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
-        nebel_air_light at_origin, there;
+        nebel_irradiance at_origin, there;
         double worst_sun = 0, worst_sky = 0;
         nb_daylight_set(&daylight, &w.planet, &w.planet, to_sun);
-        assert_int_equal(nebel_light_air(w.atmosphere, &white, 1, origin, 0, &at_origin, 0), NEBEL_OK);
+        assert_int_equal(nebel_compute_atmosphere_irradiance(w.atmosphere, &white, 1, origin, 0, &at_origin, 0),
+                         NEBEL_OK);
         for (int i = 0; i < 2000; i++) {
             const double y = 1 - 2 * (i + .5) / 2000, turn = 2.4 * i, height = 1.2 * top * pow(i % 37 / 36., 2);
             const double level = sqrt(1 - y * y);
             const double place[1][3] = {{(radius + height) * level * cos(turn), (radius + height) * y - radius,
                                          (radius + height) * level * sin(turn)}};
             double sun[3], sky[3];
-            assert_int_equal(nebel_light_air(w.atmosphere, &white, 1, place, 0, &there, 0), NEBEL_OK);
+            assert_int_equal(nebel_compute_atmosphere_irradiance(w.atmosphere, &white, 1, place, 0, &there, 0),
+                             NEBEL_OK);
             nb_daylight_at(&daylight, NB_DAYLIGHT_OF_SURFACES, place[0], sun, sky);
             for (int c = 0; c < 3; c++) {
                 worst_sun = fmax(worst_sun, fabs(sun[c] - there.sun[c]));
@@ -269,7 +274,7 @@ static void look_around(const world *w, const double to_sun[3], double height_of
     static nebel_ray rays[SLOPES * TURNS];
     static nebel_transfer found[SLOPES * TURNS];
     const nebel_sun white = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
-    const double level = sqrt(1 - height_of_sun * height_of_sun), radius = w->planet.air.radius;
+    const double level = sqrt(1 - height_of_sun * height_of_sun), radius = w->planet.atmosphere_desc.radius;
     double other[3] = {to_sun[1], -to_sun[0], 0}, up[3], ahead[3], across[3];
     assert_true(nb_vector_make_unit(other));
     for (int c = 0; c < 3; c++) {
@@ -286,12 +291,16 @@ static void look_around(const world *w, const double to_sun[3], double height_of
         for (int c = 0; c < 3; c++)
             rays[i].direction[c] = slope * up[c] + flat * (cos(turn) * ahead[c] + sin(turn) * across[c]);
     }
-    nebel_air_light there;
-    assert_int_equal(nebel_light_air(w->atmosphere, &white, 1, (const double(*)[3])place, 0, &there, 0), NEBEL_OK);
-    assert_int_equal(nebel_trace_air(w->atmosphere, &white, SLOPES * TURNS, rays, sizeof *rays, found, sizeof *found),
-                     NEBEL_OK);
+    nebel_irradiance there;
+    assert_int_equal(
+        nebel_compute_atmosphere_irradiance(w->atmosphere, &white, 1, (const double(*)[3])place, 0, &there, 0),
+        NEBEL_OK);
+    assert_int_equal(
+        nebel_trace_atmosphere(w->atmosphere, &white, SLOPES * TURNS, rays, sizeof *rays, found, sizeof *found),
+        NEBEL_OK);
     for (int c = 0; c < 3; c++) {
-        light[c] = 2 * w->planet.air.ground_albedo[c] * (there.sky[c] + fmax(0, height_of_sun) * there.sun[c]);
+        light[c] =
+            2 * w->planet.atmosphere_desc.ground_albedo[c] * (there.sky[c] + fmax(0, height_of_sun) * there.sun[c]);
         for (int i = 0; i < SLOPES * TURNS; i++)
             light[c] += 2 * test_pi / (SLOPES * TURNS) * (double)found[i].in_scattering[c];
     }
@@ -310,17 +319,19 @@ static void fog_has_the_sky_from_all_sides(void **state)
         make_world(names[n], to_sun, &w);
         double place[3], there[3], at_origin[3], worst = 0, by_level = 0;
         const nebel_sun white = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
-        nebel_air_light level, level_at_origin;
+        nebel_irradiance level, level_at_origin;
         nb_daylight_set(&daylight, &w.planet, &w.planet, to_sun);
         look_around(&w, to_sun, to_sun[1], place, at_origin);
-        assert_int_equal(nebel_light_air(w.atmosphere, &white, 1, (const double(*)[3])place, 0, &level_at_origin, 0),
+        assert_int_equal(nebel_compute_atmosphere_irradiance(w.atmosphere, &white, 1, (const double(*)[3])place, 0,
+                                                             &level_at_origin, 0),
                          NEBEL_OK);
         for (size_t i = 0; i < sizeof heights / sizeof *heights; i++) {
             double sun[3], sky[3];
             look_around(&w, to_sun, heights[i], place, there);
             nb_daylight_at(&daylight, NB_DAYLIGHT_OF_FOG, place, sun, sky);
-            assert_int_equal(nebel_light_air(w.atmosphere, &white, 1, (const double(*)[3])place, 0, &level, 0),
-                             NEBEL_OK);
+            assert_int_equal(
+                nebel_compute_atmosphere_irradiance(w.atmosphere, &white, 1, (const double(*)[3])place, 0, &level, 0),
+                NEBEL_OK);
             for (int c = 0; c < 3; c++) {
                 const double off = fabs(log(sky[c] * at_origin[c] / there[c]));
                 assert_true(heights[i] > -.15 ||
@@ -351,7 +362,7 @@ static void step_along(const world *w, const nebel_snapshot *fog, nebel_ray ray,
         nebel_transfer air, of_fog;
         ray.t_max = next - at;
         for (int c = 0; c < 3; c++) ray.origin[c] = whole.origin[c] + at * unit[c];
-        assert_int_equal(nebel_trace_air(w->atmosphere, &sun, 1, &ray, 0, &air, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_atmosphere(w->atmosphere, &sun, 1, &ray, 0, &air, 0), NEBEL_OK);
         assert_int_equal(nebel_trace(fog, NULL, 1, &ray, 0, &of_fog, 0), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
             light[c] += left[c] * (0.5 * (1 + of_fog.transmittance[c]) * air.in_scattering[c] +
@@ -381,7 +392,7 @@ static void air_and_fog_share_a_ray(void **state)
         nebel_ray ending = ray;
         ending.t_max = fmin(way, 1.5e6);
         step_along(&w, snapshot, ray, ending.t_max, light);
-        assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &air, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_atmosphere(w.atmosphere, &sun, 1, &ray, 0, &air, 0), NEBEL_OK);
         assert_int_equal(nebel_trace(snapshot, NULL, 1, &ending, 0, &alone, 0), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
             const double got = (double)picture.planes.in_scattering[3 * i + (uint32_t)c];
@@ -428,8 +439,9 @@ static void fog_in_the_dark_is_as_exact(void **state)
     world w;
     make_world("earth", night, &w);
     test_picture usual = render(&w, snapshot, &camera, NEBEL_ISA_DEFAULT, 2, 1);
-    assert_int_equal(nebel_create_renderer(&w.scene, snapshot, &(nebel_renderer_desc){.threads = 2}, &renderer),
-                     NEBEL_OK);
+    assert_int_equal(
+        nebel_create_cpu_renderer(&w.scene, snapshot, &(nebel_cpu_renderer_desc){.thread_count = 2}, &renderer),
+        NEBEL_OK);
     const nebel_frame_desc fine = {.camera = camera, .width = WIDTH, .height = HEIGHT, .samples = 1, .tolerance = 1e-6};
     assert_int_equal(nebel_render_frame(renderer, &fine, &exact.planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
@@ -467,19 +479,19 @@ static nebel_snapshot *black_ball(const double shift[3])
 static test_picture render_shadow(const double shift[3], const nebel_mesh *mesh)
 {
     const double to_sun[3] = {.48, .6, -.64};
-    nebel_lamp lamp = {.position = {shift[0] + 6, shift[1] + 7, shift[2] - 8}, .intensity = {300, 300, 300}};
+    nebel_light lamp = {.position = {shift[0] + 6, shift[1] + 7, shift[2] - 8}, .intensity = {300, 300, 300}};
     nebel_camera camera = planet_camera(14, -1);
     world w;
     make_world("moon", to_sun, &w);
     for (int c = 0; c < 3; c++) {
-        w.planet.air.ground[c] += shift[c];
+        w.planet.atmosphere_desc.ground_point[c] += shift[c];
         camera.position[c] += shift[c];
         camera.look_at[c] += shift[c];
     }
-    assert_int_equal(nebel_create_atmosphere(&w.planet.air, &w.atmosphere), NEBEL_OK);
+    assert_int_equal(nebel_create_atmosphere(&w.planet.atmosphere_desc, &w.atmosphere), NEBEL_OK);
     w.planet.atmosphere = w.atmosphere;
-    w.scene.lamp_count = 1;
-    w.scene.lamps = &lamp;
+    w.scene.light_count = 1;
+    w.scene.lights = &lamp;
     w.scene.mesh_count = mesh != NULL;
     w.scene.meshes = mesh;
     nebel_snapshot *fog = black_ball(shift);
@@ -523,7 +535,8 @@ static test_picture render_large(const world *w, const nebel_camera *camera)
 {
     const test_picture large = test_picture_make(TIMES * WIDTH, TIMES * HEIGHT);
     nebel_renderer *renderer;
-    assert_int_equal(nebel_create_renderer(&w->scene, NULL, &(nebel_renderer_desc){.threads = 2}, &renderer), NEBEL_OK);
+    assert_int_equal(
+        nebel_create_cpu_renderer(&w->scene, NULL, &(nebel_cpu_renderer_desc){.thread_count = 2}, &renderer), NEBEL_OK);
     assert_int_equal(
         nebel_render_frame(
             renderer,
@@ -569,7 +582,7 @@ static void many_samples_are_the_mean_of_single_ones(void **state)
         world w;
         if (v > 0 && v < 4 && !nb_test_tries(v - 1, 3)) continue;
         make_world(views[v].name, views[v].sun, &w);
-        w.planet.sun_diameter = 2;
+        w.planet.sun_angular_diameter = 2;
         nebel_camera camera = planet_camera(views[v].height, views[v].pitch);
         camera.vertical_fov = 6;
         test_picture small = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 2, TIMES * TIMES);
@@ -641,7 +654,7 @@ static void the_sun_is_a_disc(void **state)
         camera.look_at[0] += .001;
         double sum[3] = {0, 0, 0};
         for (int seen = 0; seen < 2; seen++) {
-            w.planet.sun_diameter = seen ? .35 : 0;
+            w.planet.sun_angular_diameter = seen ? .35 : 0;
             test_picture picture = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 1, 16);
             const double pixel = 2 * tan(fields[f] * test_pi / 360) / HEIGHT;
             for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
@@ -666,7 +679,7 @@ static void every_thread_and_processor_gives_the_same(void **state)
     make_world("toy", to_sun, &w);
     w.scene.mesh_count = 1;
     w.scene.meshes = &wall;
-    w.planet.sun_diameter = 3;
+    w.planet.sun_angular_diameter = 3;
     nebel_fog *fog;
     nebel_snapshot *snapshot;
     const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 20, -90}, .radius = 40},
@@ -706,7 +719,8 @@ static void odd_cameras(void **state)
         test_picture_free(&picture);
     }
     nebel_renderer *renderer;
-    assert_int_equal(nebel_create_renderer(&w.scene, NULL, &(nebel_renderer_desc){.threads = 1}, &renderer), NEBEL_OK);
+    assert_int_equal(
+        nebel_create_cpu_renderer(&w.scene, NULL, &(nebel_cpu_renderer_desc){.thread_count = 1}, &renderer), NEBEL_OK);
     nebel_frame_desc desc = {.camera = planet_camera(10, 0), .width = 8, .height = 8};
     desc.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     desc.camera.view_height = 10;

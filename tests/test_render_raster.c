@@ -104,7 +104,8 @@ static double random_within(uint32_t *seed, double low, double high)
 static nebel_renderer *make_renderer(const nebel_scene_data *scene)
 {
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(scene, NULL, &(nebel_renderer_desc){.threads = 1}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(scene, NULL, &(nebel_cpu_renderer_desc){.thread_count = 1}, &renderer),
+                     NEBEL_OK);
     return renderer;
 }
 

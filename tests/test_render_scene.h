@@ -80,11 +80,11 @@ static inline nebel_snapshot *test_world_fog(double extinction, double source)
 }
 
 /* Renders with a renderer of its own. */
-static inline void test_render(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_renderer_desc *desc,
+static inline void test_render(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_cpu_renderer_desc *desc,
                                const nebel_camera *camera, uint32_t samples, test_picture *picture)
 {
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_create_renderer(scene, fog, desc, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(scene, fog, desc, &renderer), NEBEL_OK);
     const nebel_frame_desc frame = {
         .camera = *camera, .width = picture->width, .height = picture->height, .samples = samples};
     assert_int_equal(nebel_render_frame(renderer, &frame, &picture->planes), NEBEL_OK);

@@ -1,5 +1,5 @@
 /* Several planets in one picture of the CPU: each ray through the air of all in the order of their distances, to the
- * nearest ground, against nebel_trace_air planet by planet; eclipses against rays to all of the sun's disc. */
+ * nearest ground, against nebel_trace_atmosphere planet by planet; eclipses against rays to all of the sun's disc. */
 #include "near.h"
 #include "planet_help.h"
 #include "test_render_scene.h"
@@ -15,8 +15,9 @@ static test_picture render(const worlds *s, const nebel_camera *camera, int thre
 {
     nebel_renderer *renderer;
     const test_picture picture = test_picture_make(WIDTH, HEIGHT);
-    assert_int_equal(nebel_create_renderer(&s->scene, NULL, &(nebel_renderer_desc){.threads = threads}, &renderer),
-                     NEBEL_OK);
+    assert_int_equal(
+        nebel_create_cpu_renderer(&s->scene, NULL, &(nebel_cpu_renderer_desc){.thread_count = threads}, &renderer),
+        NEBEL_OK);
     const nebel_frame_desc desc = {.camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = samples};
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
@@ -25,8 +26,8 @@ static test_picture render(const worlds *s, const nebel_camera *camera, int thre
 
 static void center_of(const nebel_planet *planet, double center[3])
 {
-    memcpy(center, planet->air.ground, 3 * sizeof *center);
-    center[1] -= planet->air.radius;
+    memcpy(center, planet->atmosphere_desc.ground_point, 3 * sizeof *center);
+    center[1] -= planet->atmosphere_desc.radius;
 }
 
 /* From where to where a ray is within a ball; HUGE_VAL where never. Its direction has the length 1. */
@@ -48,7 +49,7 @@ static void cross_ball(const double origin[3], const double unit[3], const doubl
 static double count_suns(const worlds *s, size_t but, const double place[3])
 {
     enum { ACROSS = 60 };
-    const double radius = .5 * s->planets[0].sun_diameter * test_pi / 180;
+    const double radius = .5 * s->planets[0].sun_angular_diameter * test_pi / 180;
     const double axis[3] = {fabs(s->sun.direction[0]) < .5, 0, !(fabs(s->sun.direction[0]) < .5)};
     double side[3], up[3];
     int all = 0, seen = 0;
@@ -66,7 +67,7 @@ static double count_suns(const worlds *s, size_t but, const double place[3])
         for (size_t k = 0; k < s->count; k++) {
             double center[3], at[2];
             center_of(&s->planets[k], center);
-            cross_ball(place, to, center, s->planets[k].air.radius, at);
+            cross_ball(place, to, center, s->planets[k].atmosphere_desc.radius, at);
             hidden |= k != but && at[1] < HUGE_VAL;
         }
         all++;
@@ -86,8 +87,9 @@ static double look(const worlds *s, const nebel_ray *camera_ray, double light[3]
         double center[3], air[2], ball[2];
         size_t place = k;
         center_of(&s->planets[k], center);
-        cross_ball(camera_ray->origin, unit, center, s->planets[k].air.radius + s->planets[k].air.thickness, air);
-        cross_ball(camera_ray->origin, unit, center, s->planets[k].air.radius, ball);
+        cross_ball(camera_ray->origin, unit, center,
+                   s->planets[k].atmosphere_desc.radius + s->planets[k].atmosphere_desc.thickness, air);
+        cross_ball(camera_ray->origin, unit, center, s->planets[k].atmosphere_desc.radius, ball);
         entry[k] = air[0];
         if (ball[0] > 0 && ball[0] < end) {
             end = ball[0];
@@ -101,7 +103,7 @@ static double look(const worlds *s, const nebel_ray *camera_ray, double light[3]
         nebel_ray ray = *camera_ray;
         nebel_transfer part;
         ray.t_max = end;
-        assert_int_equal(nebel_trace_air(s->atmospheres[order[k]], &s->sun, 1, &ray, 0, &part, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_atmosphere(s->atmospheres[order[k]], &s->sun, 1, &ray, 0, &part, 0), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
             light[c] += left[c] * part.in_scattering[c];
             left[c] *= part.transmittance[c];
@@ -109,17 +111,18 @@ static double look(const worlds *s, const nebel_ray *camera_ray, double light[3]
     }
     if (!(end < HUGE_VAL)) return end;
     double place[1][3], center[3], cosine = 0;
-    nebel_air_light arrives;
+    nebel_irradiance arrives;
     center_of(&s->planets[ground], center);
     for (int c = 0; c < 3; c++) {
         place[0][c] = camera_ray->origin[c] + end * unit[c];
-        cosine += (place[0][c] - center[c]) / s->planets[ground].air.radius * s->sun.direction[c];
+        cosine += (place[0][c] - center[c]) / s->planets[ground].atmosphere_desc.radius * s->sun.direction[c];
     }
-    assert_int_equal(nebel_light_air(s->atmospheres[ground], &s->sun, 1, (const double(*)[3])place, 0, &arrives, 0),
+    assert_int_equal(nebel_compute_atmosphere_irradiance(s->atmospheres[ground], &s->sun, 1, (const double(*)[3])place,
+                                                         0, &arrives, 0),
                      NEBEL_OK);
     const double seen = count_suns(s, ground, place[0]);
     for (int c = 0; c < 3; c++)
-        light[c] += left[c] * s->planets[ground].air.ground_albedo[c] / test_pi *
+        light[c] += left[c] * s->planets[ground].atmosphere_desc.ground_albedo[c] / test_pi *
                     (fmax(0, cosine) * seen * arrives.sun[c] + arrives.sky[c]);
     return end;
 }
@@ -274,13 +277,14 @@ static void clouds_are_in_the_shadow_of_moons(void **state)
         worlds s;
         worlds_make(i < 0 ? 1 : 2, bodies, up, 5, &s);
         const nebel_clouds_desc desc = {
-            .atmosphere = s.atmospheres[0], .layers = {{.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}}, .layer_count = 1};
+            .atmosphere = s.atmospheres[0], .layers = {{.type = NEBEL_CLOUD_STRATUS, .coverage = 1}}, .layer_count = 1};
         nebel_clouds *clouds;
         assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_OK);
         s.planets[0].clouds = clouds;
         test_picture picture = render(&s, &camera, 1, 1);
-        nebel_air_light light;
-        assert_int_equal(nebel_light_air(s.atmospheres[0], &s.sun, 1, &place, 0, &light, 0), NEBEL_OK);
+        nebel_irradiance light;
+        assert_int_equal(nebel_compute_atmosphere_irradiance(s.atmospheres[0], &s.sun, 1, &place, 0, &light, 0),
+                         NEBEL_OK);
         const double left = i < 0 ? 1 : count_suns(&s, 0, place);
         for (int c = 0; c < 3; c++) {
             const double got = (double)test_color(&picture, WIDTH / 2, HEIGHT / 2)[c];

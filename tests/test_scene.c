@@ -22,7 +22,7 @@ static void test_the_example_of_the_contract(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good(contract);
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_vector(data->camera.position, 0, 2, 8);
     assert_vector(data->camera.look_at, 0, 1, 0);
     assert_number(data->camera.vertical_fov, 40);
@@ -53,7 +53,7 @@ static void test_what_is_absent_has_its_default(void **state)
     (void)state;
     nebel_scene *scene =
         parse_good("{\"fog\": [{\"shape\": {\"type\": \"world\"}, \"extinction\": 0}], \"nebel\": 1.0e0}");
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_vector(data->camera.position, 0, 1.7, 0);
     assert_vector(data->camera.look_at, 0, 1.7, -1);
     assert_vector(data->camera.up, 0, 1, 0);
@@ -82,7 +82,7 @@ static void test_a_camera_without_look_at_looks_along_minus_z(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good("{\"nebel\": 1, \"fog\": [], \"camera\": {\"position\": [3, 4, 5]}}");
-    assert_vector(nebel_scene_contents(scene)->camera.look_at, 3, 4, 4);
+    assert_vector(nebel_get_scene_data(scene)->camera.look_at, 3, 4, 4);
     nebel_destroy_scene(scene);
 }
 
@@ -93,7 +93,7 @@ static void test_colors_with_a_hash_are_srgb(void **state)
     nebel_scene *scene = parse_good("{\"nebel\": 1, \"background\": \"#0A0b80\", \"ambient\": \"#fc8\", \"fog\": [{"
                                     "\"shape\": {\"type\": \"world\"}, \"extinction\": 1, \"albedo\": \"#ffffff\","
                                     "\"emission\": \"#00F\"}]}");
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_vector(data->background, 0.0030352698354883750, 0.0033465357638991605, 0.21586050011389923);
     assert_vector(data->ambient, 1, 0.60382733885533748, 0.24620132670783545);
     assert_vector(data->volumes[0].albedo, 1, 1, 1);
@@ -107,7 +107,7 @@ static void test_colors_with_a_hash_are_srgb(void **state)
 static const nebel_volume_desc *one(const char *text, nebel_scene **scene)
 {
     *scene = parse_good(text);
-    return nebel_scene_contents(*scene)->volumes;
+    return nebel_get_scene_data(*scene)->volumes;
 }
 
 static void test_all_simple_shapes(void **state)
@@ -205,7 +205,7 @@ static void test_all_densities(void **state)
                                      &s[3])
                                      ->density;
     assert_int_equal(soft->type, NEBEL_DENSITY_SOFT_EDGE);
-    assert_number(soft->distance, .25);
+    assert_number(soft->edge_width, .25);
     for (int i = 0; i < 4; i++) nebel_destroy_scene(s[i]);
 }
 
@@ -235,8 +235,8 @@ static void test_altitudes(void **state)
         {.scale_height = 40, .center = {0, -2000, 0}, .radius = 2000, .base = 3, .below = NEBEL_BELOW_CONSTANT},
         {.scale_height = 40, .center = {1, 3, -2}, .radius = 6.36e6},
         {.scale_height = 40,
-         .center = {0, -nebel_find_atmosphere("mars")->radius, 0},
-         .radius = nebel_find_atmosphere("mars")->radius},
+         .center = {0, -nebel_lookup_atmosphere("mars")->radius, 0},
+         .radius = nebel_lookup_atmosphere("mars")->radius},
         {.scale_height = 40, .center = {1e3, -4.9e5, -2e3}, .radius = 5e5},
         {.scale_height = 40, .center = {0, -3000, 0}, .radius = 3000}};
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
@@ -298,7 +298,7 @@ static void test_operations_priorities_and_distances_are_read(void **state)
         "{\"operation\": \"replace\", \"start\": 4, \"cutoff\": 18, \"priority\": 3, \"extinction\": 0.2, \"shape\": "
         "{\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 2}}, "
         "{\"operation\": \"exclude\", \"priority\": -4, \"shape\": {\"type\": \"world\"}}]}");
-    const nebel_volume_desc *const volumes = nebel_scene_contents(scene)->volumes;
+    const nebel_volume_desc *const volumes = nebel_get_scene_data(scene)->volumes;
     assert_int_equal(volumes[0].operation, NEBEL_OPERATION_ADD);
     assert_int_equal(volumes[0].priority, 0);
     assert_int_equal(volumes[1].operation, NEBEL_OPERATION_REPLACE);
@@ -322,7 +322,7 @@ static void test_the_fog_of_the_scene_answers_rays(void **state)
     nebel_snapshot *fog = NULL;
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
     nebel_destroy_scene(scene);
-    assert_int_equal(nebel_snapshot_volume_count(fog), 2);
+    assert_int_equal(nebel_get_volume_count(fog), 2);
     const nebel_ray ray = {.direction = {0, 0, -1}, .t_max = 10};
     nebel_transfer transfer;
     assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
@@ -338,7 +338,7 @@ static void test_the_fog_of_the_scene_hides_no_more_than_it_may(void **state)
     nebel_scene *scene = parse_good("{\"nebel\": 1, \"max_opacity\": 0.4, \"fog\": [{\"shape\": {\"type\": \"world\"}, "
                                     "\"extinction\": 0.1, \"source\": 0.5}]}");
     nebel_snapshot *fog = NULL;
-    assert_number(nebel_scene_contents(scene)->max_opacity, .4);
+    assert_number(nebel_get_scene_data(scene)->max_opacity, .4);
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
     nebel_destroy_scene(scene);
     const nebel_ray ray = {.direction = {0, 0, -1}, .t_max = 10};
@@ -354,7 +354,7 @@ static void test_the_order_of_sections_does_not_matter(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good("{\"fog\": [], \"ambient\": 1, \"models\": [], \"lights\": [], \"nebel\": 1}");
-    assert_vector(nebel_scene_contents(scene)->ambient, 1, 1, 1);
+    assert_vector(nebel_get_scene_data(scene)->ambient, 1, 1, 1);
     nebel_destroy_scene(scene);
 }
 
@@ -366,10 +366,10 @@ static void test_the_files_of_a_scene_are_named(void **state)
                                "{\"file\": \"/c.png\", \"size\": [1, 1], \"height\": 1}}]}";
     assert_int_equal(nebel_parse_scene(text, strlen(text), "here/scene.json", &(nebel_scene_desc){0}, &scene),
                      NEBEL_OK);
-    const nebel_scene_data *data = nebel_scene_contents(scene);
-    assert_int_equal(data->file_count, 2);
-    assert_string_equal(data->files[0], "here/a/b.obj");
-    assert_string_equal(data->files[1], "/c.png");
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
+    assert_int_equal(data->path_count, 2);
+    assert_string_equal(data->paths[0], "here/a/b.obj");
+    assert_string_equal(data->paths[1], "/c.png");
     nebel_destroy_scene(scene);
 }
 
@@ -384,7 +384,7 @@ static void check_number(const char *decimal)
                                      "\"transform\": {\"rotation\": [%s, 0, 0, 0]}}}]}";
     snprintf(text, sizeof text, form, decimal);
     nebel_scene *scene = parse_good(text);
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     const double got = wanted == 0 ? data->camera.up[0] : data->volumes[0].shape.transform.rotation[0];
     if (memcmp(&got, &wanted, sizeof got) != 0) fail_msg("%s was read as %.17g", decimal, got);
     nebel_destroy_scene(scene);
@@ -450,17 +450,17 @@ static void test_a_nebula_is_fog(void **state)
         "\"colors\": [[1, 0, 0], [0, 0, 1]], \"profile\": \"ball\"}, "
         "{\"shape\": {\"type\": \"box\", \"min\": [5, 5, 5], \"max\": [6, 6, 6]}, \"seed\": 3, \"count\": 30}]}";
     assert_int_equal(nebel_parse_scene(text, sizeof text - 1, "nebula", &(nebel_scene_desc){0}, &scene), NEBEL_OK);
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_int_equal(data->nebula_count, 2);
     assert_int_equal(data->particle_count, 100);
     assert_string_equal(data->nebula_names[0], "a");
-    assert_int_equal(nebel_make_scene_particles(scene, &particles), NEBEL_OK);
-    assert_int_equal(particles[69].profile, NEBEL_PARTICLE_BALL);
+    assert_int_equal(nebel_generate_scene_particles(scene, &particles), NEBEL_OK);
+    assert_int_equal(particles[69].profile, NEBEL_PARTICLE_UNIFORM);
     assert_int_equal(particles[70].profile, NEBEL_PARTICLE_SOFT);
     assert_true(particles[70].center[0] > 5);
     nebel_free_scene_particles(scene, particles);
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(nebel_snapshot_volume_count(fog), 101);
+    assert_int_equal(nebel_get_volume_count(fog), 101);
     nebel_release_snapshot(fog);
     nebel_destroy_scene(scene);
 }

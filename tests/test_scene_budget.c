@@ -43,7 +43,7 @@ static void assert_too_much(nebel_scene *scene, const journal *kept, const char 
     assert_int_equal(nebel_load_scene_models(scene), NEBEL_ERROR_LIMIT);
     if (kept->count != 1 || strstr(kept->last, model) == NULL || strstr(kept->last, what) == NULL)
         fail_msg("%d: %s", kept->count, kept->last);
-    assert_int_equal(nebel_scene_contents(scene)->mesh_count, 0);
+    assert_int_equal(nebel_get_scene_data(scene)->mesh_count, 0);
     nebel_destroy_scene(scene);
 }
 
@@ -54,7 +54,7 @@ static void test_models_share_the_memory(void **state)
     for (int in_process = 0; in_process < 2; in_process++) {
         nebel_scene *scene = open_terrains(6, "skin.obj", 256 * MEGABYTE, in_process, &kept);
         if (nebel_load_scene_models(scene) != NEBEL_OK) fail_msg("%s", kept.last);
-        assert_int_equal(nebel_scene_contents(scene)->texture_count, 1);
+        assert_int_equal(nebel_get_scene_data(scene)->texture_count, 1);
         nebel_destroy_scene(scene);
         scene = open_terrains(8, "skin.obj", 256 * MEGABYTE, in_process, &kept);
         assert_too_much(scene, &kept, "models[7].heightfield",
@@ -97,13 +97,14 @@ static void test_hosts_count_what_they_ask_for(void **state)
 {
     (void)state;
     journal kept;
-    const nebel_diffusion_desc coarse = {.cells = 7000}, fine = {.cells = 80000}, absurd = {.cells = UINT32_MAX};
+    const nebel_diffusion_desc coarse = {.max_cells = 7000}, fine = {.max_cells = 80000},
+                               absurd = {.max_cells = UINT32_MAX};
     nebel_scene *scene = open_terrains(1, "quad.obj", 100 * MEGABYTE, 0, &kept);
     assert_int_equal(nebel_load_scene_models(scene), NEBEL_OK);
     assert_int_equal(nebel_set_scene_diffusion(scene, &coarse), NEBEL_OK);
     assert_int_equal(nebel_set_scene_diffusion(scene, &fine), NEBEL_ERROR_LIMIT);
     assert_non_null(strstr(kept.last, "multiple scattering brings the scene to 102 MB of memory; 100 MB is the most"));
-    assert_int_equal(nebel_scene_contents(scene)->diffusion->cells, 7000);
+    assert_int_equal(nebel_get_scene_data(scene)->diffusion->max_cells, 7000);
     assert_int_equal(nebel_set_scene_diffusion(scene, &absurd), NEBEL_ERROR_LIMIT);
     /* What is given back is free for others. */
     assert_int_equal(nebel_charge_scene(scene, "--size: a picture", 66 * MEGABYTE), NEBEL_ERROR_LIMIT);

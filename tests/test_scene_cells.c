@@ -26,7 +26,7 @@ static void test_everything_it_may_say(void **state)
     nebel_scene *scene = parse_good(SCENE("\"cells\": [" HALL ", " CRYPT "], \"model\": \"exponential\", \"span\": "
                                           "\"faithful\", \"grouping\": false, \"portals\": [{\"cells\": [\"crypt\", "
                                           "\"hall\"], \"polygon\": " DOOR "}]"));
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     const nebel_cells_desc *cells = data->cells;
     assert_int_equal(cells->cell_count, 2);
     assert_string_equal(data->cell_names[1], "crypt");
@@ -35,7 +35,7 @@ static void test_everything_it_may_say(void **state)
     assert_number(cells->cells[1].density, .1);
     assert_number(cells->cells[1].color[2], 1);
     assert_int_equal(cells->model, NEBEL_CELL_EXPONENTIAL);
-    assert_int_equal(cells->span, NEBEL_SPAN_FAITHFUL);
+    assert_int_equal(cells->span, NEBEL_SPAN_PRINTED);
     assert_int_equal(cells->ungrouped, 1);
     assert_int_equal(cells->portal_count, 1);
     assert_int_equal(cells->portals[0].cells[0], 1);
@@ -50,22 +50,22 @@ static void test_what_it_leaves_out(void **state)
     (void)state;
     nebel_scene *scene =
         parse_good(SCENE("\"cells\": [{\"shape\": {\"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1]}}]"));
-    const nebel_cells_desc *cells = nebel_scene_contents(scene)->cells;
+    const nebel_cells_desc *cells = nebel_get_scene_data(scene)->cells;
     assert_int_equal(cells->model, NEBEL_CELL_LINEAR);
     assert_int_equal(cells->span, NEBEL_SPAN_RAY);
     assert_int_equal(cells->ungrouped, 0);
     assert_null(cells->portals);
     assert_number(cells->cells[0].density, 0);
-    assert_string_equal(nebel_scene_contents(scene)->cell_names[0], "");
+    assert_string_equal(nebel_get_scene_data(scene)->cell_names[0], "");
     nebel_destroy_scene(scene);
     scene = parse_good(PORTALS("\"derived\""));
-    assert_null(nebel_scene_contents(scene)->cells->portals);
+    assert_null(nebel_get_scene_data(scene)->cells->portals);
     nebel_destroy_scene(scene);
     scene = parse_good(PORTALS("[]"));
-    assert_non_null(nebel_scene_contents(scene)->cells->portals);
+    assert_non_null(nebel_get_scene_data(scene)->cells->portals);
     nebel_destroy_scene(scene);
     scene = parse_good("{\"nebel\": 1, \"fog\": []}");
-    assert_null(nebel_scene_contents(scene)->cells);
+    assert_null(nebel_get_scene_data(scene)->cells);
     nebel_destroy_scene(scene);
 }
 
@@ -81,7 +81,7 @@ static void test_other_units_and_axes(void **state)
         "[1, 0, "
         "0, 400], [-1, 0, 0, 0], [0, 1, 0, 300], [0, -1, 0, -100]]}}], \"portals\": [{\"cells\": [\"a\", \"b\"], "
         "\"polygon\": [[0, 100, 500], [400, 100, 500], [400, 300, 500]]}]}}");
-    const nebel_cells_desc *cells = nebel_scene_contents(scene)->cells;
+    const nebel_cells_desc *cells = nebel_get_scene_data(scene)->cells;
     const double *min = cells->cells[0].shape.min, *vertex = cells->portals[0].vertices[1];
     assert_number(cells->cells[0].density, .2);
     assert_number(min[0], 0);
@@ -102,7 +102,7 @@ static void test_cells_are_exact_fog_too(void **state)
     nebel_scene *scene = parse_good(SCENE("\"cells\": [" HALL ", " CRYPT "]"));
     nebel_snapshot *fog = NULL;
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(nebel_snapshot_volume_count(fog), 2);
+    assert_int_equal(nebel_get_volume_count(fog), 2);
     const nebel_ray ray = {.origin = {1, 1, 1}, .direction = {1, 0, 0}, .t_max = 6};
     nebel_transfer transfer;
     assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
@@ -258,7 +258,7 @@ static void test_only_what_changes_is_written(void **state)
     nebel_scene *scene = NULL;
     const nebel_scene_desc desc = {.log = {NULL, NULL}};
     assert_int_equal(nebel_load_scene(path, &desc, &scene), NEBEL_OK);
-    const nebel_scene_data *was = nebel_scene_contents(scene);
+    const nebel_scene_data *was = nebel_get_scene_data(scene);
     nebel_scene_data now = *was;
     nebel_cells_desc cells = *was->cells;
     nebel_cell two[2] = {was->cells->cells[0], was->cells->cells[1]};
@@ -300,7 +300,7 @@ static void test_names_and_portals_are_written(void **state)
     nebel_scene *scene = NULL;
     const nebel_scene_desc desc = {.log = {NULL, NULL}};
     assert_int_equal(nebel_load_scene(path, &desc, &scene), NEBEL_OK);
-    const nebel_scene_data *was = nebel_scene_contents(scene);
+    const nebel_scene_data *was = nebel_get_scene_data(scene);
     nebel_scene_data now = *was;
     nebel_cells_desc cells = *was->cells;
     nebel_portal two[2] = {was->cells->portals[0], was->cells->portals[0]};
@@ -325,7 +325,7 @@ static void test_names_and_portals_are_written(void **state)
     check_text(derived);
     nebel_destroy_scene(scene);
     assert_int_equal(nebel_load_scene(path, &desc, &scene), NEBEL_OK);
-    was = nebel_scene_contents(scene);
+    was = nebel_get_scene_data(scene);
     now = *was;
     cells = *was->cells;
     now.cells = &cells;

@@ -12,7 +12,7 @@ static void test_everything_it_may_say(void **state)
     nebel_scene *scene =
         parse_good(SCENE("\"unit\": 0.5, ", "{\"start\": -2, \"end\": 40, \"density\": 0.25, \"color\": [1, 2, 0.5], "
                                             "\"coordinate\": \"radial\", \"stage\": \"pixel\"}"));
-    const nebel_factor_desc *factor = nebel_scene_contents(scene)->classic;
+    const nebel_factor_desc *factor = nebel_get_scene_data(scene)->classic;
     assert_number(factor->start, -1);
     assert_number(factor->end, 20);
     assert_number(factor->density, .5);
@@ -26,7 +26,7 @@ static void test_defaults(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good(SCENE("\"unit\": 0.01, ", "{}"));
-    const nebel_factor_desc *factor = nebel_scene_contents(scene)->classic;
+    const nebel_factor_desc *factor = nebel_get_scene_data(scene)->classic;
     assert_number(factor->start, 0);
     assert_number(factor->end, 1);
     assert_number(factor->density, 1);
@@ -35,7 +35,7 @@ static void test_defaults(void **state)
     assert_int_equal(factor->stage, NEBEL_STAGE_VERTEX);
     nebel_destroy_scene(scene);
     scene = parse_good("{\"nebel\": 1, \"fog\": []}");
-    assert_null(nebel_scene_contents(scene)->classic);
+    assert_null(nebel_get_scene_data(scene)->classic);
     nebel_destroy_scene(scene);
 }
 
@@ -53,12 +53,12 @@ static void test_curves(void **state)
     for (size_t i = 0; i < 4; i++) {
         snprintf(text, sizeof text, SCENE("", "{\"curve\": \"%s\"}"), curves[i].name);
         nebel_scene *scene = parse_good(text);
-        assert_int_equal(nebel_scene_contents(scene)->classic_curve, curves[i].curve);
+        assert_int_equal(nebel_get_scene_data(scene)->classic_curve, curves[i].curve);
         nebel_destroy_scene(scene);
     }
     nebel_scene *scene = parse_good(SCENE("", "{\"table\": [1, 0, 0.5, 1]}"));
-    const float *table = nebel_scene_contents(scene)->classic_table;
-    assert_int_equal(nebel_scene_contents(scene)->classic_curve, NEBEL_CURVE_TABLE);
+    const float *table = nebel_get_scene_data(scene)->classic_table;
+    assert_int_equal(nebel_get_scene_data(scene)->classic_curve, NEBEL_CURVE_TABLE);
     for (int i = 0; i < NEBEL_CURVE_ENTRIES; i++) {
         const double at = i / 85., wanted = at < 1 ? 1 - at : (at - 1) / 2;
         assert_near((double)table[i], wanted, 1e-7);
@@ -70,7 +70,7 @@ static void test_device(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good(SCENE("\"unit\": 0.5, ", "{\"d3d9\": {}}"));
-    const nebel_d3d9_fog *d3d9 = nebel_scene_contents(scene)->classic_d3d9;
+    const nebel_d3d9_fog *d3d9 = nebel_get_scene_data(scene)->classic_d3d9;
     nebel_d3d9_fog wanted;
     nebel_reset_d3d9_fog(&wanted);
     wanted.fog_enable = 1;
@@ -81,28 +81,28 @@ static void test_device(void **state)
                          "{\"d3d9\": {\"fog_vertex_mode\": \"exp2\", \"fog_table_mode\": \"linear\", \"fog_start\": 4, "
                          "\"fog_end\": 10, \"fog_density\": 0.25, \"fog_color\": [1, 0.5, 0.2], \"range_fog_enable\": "
                          "true}, \"coordinate\": \"user\", \"end\": 100}"));
-    d3d9 = nebel_scene_contents(scene)->classic_d3d9;
+    d3d9 = nebel_get_scene_data(scene)->classic_d3d9;
     wanted = (nebel_d3d9_fog){1, 0xff8033, NEBEL_D3DFOG_LINEAR, NEBEL_D3DFOG_EXP2, 2, 5, .5f, 1};
     assert_memory_equal(d3d9, &wanted, sizeof wanted);
-    assert_number(nebel_scene_contents(scene)->classic_z_near, 0);
-    assert_number(nebel_scene_contents(scene)->classic_z_far, 1000);
+    assert_number(nebel_get_scene_data(scene)->classic_z_near, 0);
+    assert_number(nebel_get_scene_data(scene)->classic_z_far, 1000);
     /* Coordinates of one's own have no unit. */
-    assert_number(nebel_scene_contents(scene)->classic->end, 100);
+    assert_number(nebel_get_scene_data(scene)->classic->end, 100);
     nebel_destroy_scene(scene);
     scene =
         parse_good(SCENE("\"unit\": 0.5, ", "{\"d3d9\": {\"fog_color\": \"#12b4c0\", \"z_near\": 4, \"z_far\": 20}}"));
-    assert_int_equal(nebel_scene_contents(scene)->classic_d3d9->fog_color, 0x12b4c0); /* bytes are stored as they are */
-    assert_number(nebel_scene_contents(scene)->classic_z_near, 2);
-    assert_number(nebel_scene_contents(scene)->classic_z_far, 10);
+    assert_int_equal(nebel_get_scene_data(scene)->classic_d3d9->fog_color, 0x12b4c0); /* bytes are stored as they are */
+    assert_number(nebel_get_scene_data(scene)->classic_z_near, 2);
+    assert_number(nebel_get_scene_data(scene)->classic_z_far, 10);
     nebel_destroy_scene(scene);
     /* Device depth has no unit. */
     scene = parse_good(SCENE("\"unit\": 0.5, \"camera\": {\"projection\": \"orthographic\"}, ",
                              "{\"d3d9\": {\"fog_table_mode\": \"exp\", \"fog_end\": 0.75, \"fog_density\": 3}}"));
-    assert_number((double)nebel_scene_contents(scene)->classic_d3d9->fog_end, .75);
-    assert_number((double)nebel_scene_contents(scene)->classic_d3d9->fog_density, 3);
+    assert_number((double)nebel_get_scene_data(scene)->classic_d3d9->fog_end, .75);
+    assert_number((double)nebel_get_scene_data(scene)->classic_d3d9->fog_density, 3);
     nebel_destroy_scene(scene);
     scene = parse_good(SCENE("", "{}"));
-    assert_null(nebel_scene_contents(scene)->classic_d3d9);
+    assert_null(nebel_get_scene_data(scene)->classic_d3d9);
     nebel_destroy_scene(scene);
 }
 

@@ -14,12 +14,12 @@ static void test_an_empty_layer_is_a_good_one(void **state)
     (void)state;
     nebel_cloud_layer layer;
     nebel_scene *scene = parse_good(PLANET("", "[{}, {\"kind\": \"cirrus\"}]"));
-    const nebel_planet *planet = nebel_scene_contents(scene)->planets;
+    const nebel_planet *planet = nebel_get_scene_data(scene)->planets;
     assert_int_equal(planet->cloud_layer_count, 2);
-    assert_int_equal(planet->cloud_layers[1].kind, NEBEL_CLOUD_CIRRUS);
+    assert_int_equal(planet->cloud_layers[1].type, NEBEL_CLOUD_CIRRUS);
     assert_int_equal(planet->cloud_layers[1].seed, 2);
-    assert_int_equal(nebel_resolve_cloud_layer(planet->air.thickness, &planet->cloud_layers[0], NULL, &layer),
-                     NEBEL_OK);
+    assert_int_equal(
+        nebel_resolve_cloud_layer(planet->atmosphere_desc.thickness, &planet->cloud_layers[0], NULL, &layer), NEBEL_OK);
     assert_number(layer.base, 900);
     assert_number(layer.top, 2700);
     assert_number(layer.coverage, .4);
@@ -27,17 +27,17 @@ static void test_an_empty_layer_is_a_good_one(void **state)
     assert_int_equal(nebel_resolve_cloud_layer(1e4, &planet->cloud_layers[0], NULL, &layer), NEBEL_OK);
     assert_number(layer.top, 270);
     assert_number(layer.extinction, .5);
-    assert_number(layer.size, 220);
+    assert_number(layer.cell_size, 220);
     /* But not below the height of a layer that is given. */
     const nebel_cloud_layer high = {.base = 100, .top = 1000};
     assert_int_equal(nebel_resolve_cloud_layer(1e4, &high, NULL, &layer), NEBEL_OK);
     assert_number(layer.extinction, .1);
-    assert_number(layer.size, 1100);
+    assert_number(layer.cell_size, 1100);
     assert_null(planet->clouds);
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     assert_non_null(planet->clouds);
     const nebel_clouds *clouds = planet->clouds;
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     assert_ptr_equal(planet->clouds, clouds);
     nebel_destroy_scene(scene);
 }
@@ -49,18 +49,18 @@ static void test_everything_they_may_say(void **state)
         "\"up\": \"z\", \"unit\": 1000, ",
         "[{\"kind\": \"stratus\", \"base\": 1, \"top\": 2, \"coverage\": 0.25, \"extinction\": 5, \"size\": 3, "
         "\"detail\": 0, \"variation\": 1, \"diameter\": 12, \"seed\": 7, \"wind\": [2, 3]}, {\"coverage\": 0}]"));
-    const nebel_planet *planet = nebel_scene_contents(scene)->planets;
+    const nebel_planet *planet = nebel_get_scene_data(scene)->planets;
     const nebel_cloud_layer *layer = planet->cloud_layers;
     assert_int_equal(planet->cloud_layer_count, 1);
-    assert_int_equal(layer->kind, NEBEL_CLOUD_STRATUS);
+    assert_int_equal(layer->type, NEBEL_CLOUD_STRATUS);
     assert_number(layer->base, 1000);
     assert_number(layer->top, 2000);
     assert_number(layer->coverage, .25);
     assert_number(layer->extinction, 5e-3);
-    assert_number(layer->size, 3000);
-    assert_number(layer->detail, NEBEL_CLOUD_NONE);
-    assert_number(layer->variation, 1);
-    assert_number(layer->diameter, 12);
+    assert_number(layer->cell_size, 3000);
+    assert_number(layer->erosion, NEBEL_CLOUD_NONE);
+    assert_number(layer->patchiness, 1);
+    assert_number(layer->droplet_diameter, 12);
     assert_int_equal(layer->seed, 7);
     assert_number(layer->wind[0], 2000);
     assert_number(layer->wind[1], -3000);
@@ -139,7 +139,7 @@ static void test_fog_has_their_shadow(void **state)
         "[0, 10, 0], \"radius\": 5}, \"extinction\": 0.01, \"albedo\": 1}]}");
     const nebel_ray ray = {{0, 10, 9}, {0, 0, -1}, 20};
     double darkest = HUGE_VAL, brightest = 0, per_sunlight = 0;
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     for (int frame = 0; frame < 24; frame++) {
         nebel_snapshot *fog;
         nebel_transfer transfer;
@@ -152,7 +152,7 @@ static void test_fog_has_their_shadow(void **state)
         assert_int_equal(nebel_find_scene_sunlight(scene, frame, &sunlight), NEBEL_OK);
         if (frame == 0) per_sunlight = transfer.in_scattering[1] / sunlight.irradiance[1];
         assert_near(transfer.in_scattering[1], per_sunlight * sunlight.irradiance[1], 1e-6);
-        assert_true(sunlight.irradiance[1] < 3 * nebel_scene_contents(scene)->planets->sun_left[1] * (1 + 1e-12));
+        assert_true(sunlight.irradiance[1] < 3 * nebel_get_scene_data(scene)->planets->sun_left[1] * (1 + 1e-12));
         nebel_release_snapshot(fog);
     }
     assert_true(darkest > 0 && brightest > 2.5 * darkest);
@@ -178,17 +178,17 @@ static void test_fog_has_less_sky(void **state)
             "{\"model\": \"physical\", \"clouds\": [{\"kind\": \"stratus\", \"coverage\": 1}]}, \"fog\": []}",
             ambients[k]);
         nebel_scene *scene = parse_good(text);
-        assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
-        const nebel_scene_data *const data = nebel_scene_contents(scene);
-        nebel_cloud_view *view;
+        assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
+        const nebel_scene_data *const data = nebel_get_scene_data(scene);
+        nebel_cloud_lighting *view;
         nebel_cloud_workspace *workspace;
         nebel_sun sun, same;
         nebel_environment ambient;
         float part;
-        const nebel_cloud_view_desc desc = {.clouds = data->planets->clouds, .sun = nebel_scene_sun(scene, 0)};
-        assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+        const nebel_cloud_lighting_desc desc = {.clouds = data->planets->clouds, .sun = nebel_get_scene_sun(scene, 0)};
+        assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_OK);
         assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
-        assert_int_equal(nebel_shade_sky(workspace, 200, 1, origin, 0, &part), NEBEL_OK);
+        assert_int_equal(nebel_compute_cloud_sky_transmittance(workspace, 200, 1, origin, 0, &part), NEBEL_OK);
         assert_int_equal(nebel_find_scene_light(scene, 0, &sun, &ambient), NEBEL_OK);
         assert_int_equal(nebel_find_scene_sunlight(scene, 0, &same), NEBEL_OK);
         assert_memory_equal(&sun, &same, sizeof sun);
@@ -198,7 +198,7 @@ static void test_fog_has_less_sky(void **state)
         assert_int_equal(nebel_find_scene_light(scene, 1e13, &sun, &ambient), NEBEL_ERROR_VALUE);
         assert_int_equal(nebel_find_scene_light(scene, 0, &sun, NULL), NEBEL_ERROR_ARGUMENT);
         nebel_destroy_cloud_workspace(workspace);
-        nebel_destroy_cloud_view(view);
+        nebel_destroy_cloud_lighting(view);
         nebel_destroy_scene(scene);
     }
 }

@@ -12,8 +12,8 @@ static void test_everything_it_may_say(void **state)
     nebel_scene *scene =
         parse_good(SCENE("\"unit\": 0.5, ", "{\"model\": \"diffusion\", \"cells\": 1000, \"ground\": {\"height\": -3, "
                                             "\"albedo\": [0.1, 0.2, 0.3]}}"));
-    const nebel_diffusion_desc *desc = nebel_scene_contents(scene)->diffusion;
-    assert_int_equal(desc->cells, 1000);
+    const nebel_diffusion_desc *desc = nebel_get_scene_data(scene)->diffusion;
+    assert_int_equal(desc->max_cells, 1000);
     assert_int_equal(desc->has_ground, 1);
     assert_number(desc->ground_height, -1.5);
     assert_number(desc->ground_albedo[2], .3);
@@ -24,15 +24,15 @@ static void test_defaults(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good(SCENE("", "{\"model\": \"diffusion\"}"));
-    assert_int_equal(nebel_scene_contents(scene)->diffusion->cells, 0);
-    assert_int_equal(nebel_scene_contents(scene)->diffusion->has_ground, 0);
+    assert_int_equal(nebel_get_scene_data(scene)->diffusion->max_cells, 0);
+    assert_int_equal(nebel_get_scene_data(scene)->diffusion->has_ground, 0);
     nebel_destroy_scene(scene);
     scene = parse_good(SCENE("", "{\"model\": \"diffusion\", \"ground\": {}}"));
-    assert_int_equal(nebel_scene_contents(scene)->diffusion->has_ground, 1);
-    assert_number(nebel_scene_contents(scene)->diffusion->ground_albedo[0], 0);
+    assert_int_equal(nebel_get_scene_data(scene)->diffusion->has_ground, 1);
+    assert_number(nebel_get_scene_data(scene)->diffusion->ground_albedo[0], 0);
     nebel_destroy_scene(scene);
     scene = parse_good("{\"nebel\": 1, \"fog\": []}");
-    assert_null(nebel_scene_contents(scene)->diffusion);
+    assert_null(nebel_get_scene_data(scene)->diffusion);
     nebel_destroy_scene(scene);
 }
 
@@ -55,12 +55,12 @@ static void test_a_program_may_say_otherwise(void **state)
         "{\"nebel\": 1, \"sun\": {\"direction\": [1, 1, 1], \"irradiance\": 3}, \"fog\": [{\"shape\": {\"type\": "
         "\"sphere\", \"center\": [0, 0, 0], \"radius\": 2}, \"extinction\": 2, \"albedo\": 1}], "
         "\"multiple_scattering\": {\"model\": \"diffusion\"}}");
-    nebel_diffusion_desc desc = {.cells = 8000};
+    nebel_diffusion_desc desc = {.max_cells = 8000};
     const double file = light_of(scene);
     assert_int_equal(nebel_set_scene_diffusion(scene, NULL), NEBEL_OK);
     const double off = light_of(scene);
     assert_int_equal(nebel_set_scene_diffusion(scene, &desc), NEBEL_OK);
-    desc.cells = 1; /* it has a copy */
+    desc.max_cells = 1; /* it has a copy */
     const double coarse = light_of(scene);
     assert_true(off * 2 < file);
     assert_true(fabs(coarse - file) < .05 * file);

@@ -78,11 +78,11 @@ static void a_gradient_is_read(void **state)
     nebel_scene *scene =
         load_good("{\"nebel\": 1, \"fog\": [], \"background\": \"ambient\", \"ambient\": {\"ground\": 0, "
                   "\"type\": \"gradient\", \"zenith\": [1, 2, 3], \"horizon\": 0.5}}");
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_int_equal(data->environment.type, NEBEL_ENVIRONMENT_GRADIENT);
     assert_true(data->environment.zenith[1] == 2 && data->environment.horizon[2] == 0.5);
     assert_int_equal(data->shows_ambient, 1);
-    assert_null(data->environment_file);
+    assert_null(data->environment_path);
     nebel_destroy_scene(scene);
 }
 
@@ -91,12 +91,12 @@ static void a_map_is_read(void **state)
     (void)state;
     write_picture("four.exr", WIDTH, HEIGHT, 4, colors, 0.5F);
     nebel_scene *scene = load_good(MAP("four.exr", ", \"rotation\": 90, \"intensity\": 2"));
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     double radiance[3];
     assert_int_equal(data->environment.type, NEBEL_ENVIRONMENT_MAP);
-    assert_string_equal(data->environment_file, path_of("four.exr"));
-    assert_int_equal(data->file_count, 1);
-    nebel_environment_radiance(&data->environment, (const double[3]){0, 1, 0}, radiance);
+    assert_string_equal(data->environment_path, path_of("four.exr"));
+    assert_int_equal(data->path_count, 1);
+    nebel_evaluate_environment(&data->environment, (const double[3]){0, 1, 0}, radiance);
     for (int c = 0; c < 3; c++) assert_true(fabs(radiance[c] - (c + 1) / 4.0) < 1e-6);
     nebel_destroy_scene(scene);
 }
@@ -187,18 +187,18 @@ static void maps_are_saved(void **state)
     static const char before[] = MAP("good.exr", "");
     (void)state;
     nebel_scene *scene = load_good(before);
-    nebel_scene_data now = *nebel_scene_contents(scene);
-    expect_saved(before, nebel_scene_contents(scene), &now, before);
+    nebel_scene_data now = *nebel_get_scene_data(scene);
+    expect_saved(before, nebel_get_scene_data(scene), &now, before);
     now.environment.rotation = -45;
     now.environment.intensity = 3;
     now.shows_ambient = 1;
-    expect_saved(before, nebel_scene_contents(scene), &now,
+    expect_saved(before, nebel_get_scene_data(scene), &now,
                  "{\"nebel\": 1, \"ambient\": {\"type\": \"environment\", \"file\": \"good.exr\", \"rotation\": -45, "
                  "\"intensity\": 3}, \"fog\": [], \"background\": \"ambient\"}");
-    now = *nebel_scene_contents(scene);
+    now = *nebel_get_scene_data(scene);
     now.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_CONSTANT};
     now.ambient[1] = 1;
-    expect_saved(before, nebel_scene_contents(scene), &now, "{\"nebel\": 1, \"ambient\": [0, 1, 0], \"fog\": []}");
+    expect_saved(before, nebel_get_scene_data(scene), &now, "{\"nebel\": 1, \"ambient\": [0, 1, 0], \"fog\": []}");
     nebel_destroy_scene(scene);
 }
 
@@ -207,18 +207,18 @@ static void gradients_come_and_go(void **state)
     static const char before[] = "{\"nebel\": 1, \"background\": \"ambient\", \"fog\": []}";
     (void)state;
     nebel_scene *scene = load_good(before);
-    nebel_scene_data now = *nebel_scene_contents(scene);
+    nebel_scene_data now = *nebel_get_scene_data(scene);
     now.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_GRADIENT, .zenith = {1, 2, 3}, .ground = {1, 1, 1}};
     now.shows_ambient = 0;
     static const char after[] = "{\"nebel\": 1, \"background\": 0, \"fog\": [], \"ambient\": { \"type\": \"gradient\", "
                                 "\"zenith\": [1, 2, 3], \"horizon\": 0, \"ground\": 1 }}";
-    expect_saved(before, nebel_scene_contents(scene), &now, after);
+    expect_saved(before, nebel_get_scene_data(scene), &now, after);
     nebel_destroy_scene(scene);
     scene = load_good(after);
-    now = *nebel_scene_contents(scene);
+    now = *nebel_get_scene_data(scene);
     assert_true(now.environment.zenith[2] == 3);
     now.environment.type = NEBEL_ENVIRONMENT_CONSTANT;
-    expect_saved(after, nebel_scene_contents(scene), &now,
+    expect_saved(after, nebel_get_scene_data(scene), &now,
                  "{\"nebel\": 1, \"background\": 0, \"fog\": [], \"ambient\": 0}");
     nebel_destroy_scene(scene);
 }
@@ -230,10 +230,10 @@ static void new_maps_are_not_saved(void **state)
     journal kept = {0};
     (void)state;
     nebel_scene *scene = load_good(before);
-    nebel_scene_data now = *nebel_scene_contents(scene);
+    nebel_scene_data now = *nebel_get_scene_data(scene);
     now.environment.type = NEBEL_ENVIRONMENT_MAP;
     assert_int_equal(nebel_save_scene(path_of("scene.json"), &(nebel_scene_desc){.log = {remember, &kept}},
-                                      nebel_scene_contents(scene), &now, NULL),
+                                      nebel_get_scene_data(scene), &now, NULL),
                      NEBEL_ERROR_ARGUMENT);
     nebel_destroy_scene(scene);
 }
@@ -246,11 +246,11 @@ static void render(const char *text, float *color)
     nebel_snapshot *fog = NULL;
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(
-        nebel_create_renderer(nebel_scene_contents(scene), fog, &(nebel_renderer_desc){.threads = 1}, &renderer),
-        NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(nebel_get_scene_data(scene), fog,
+                                               &(nebel_cpu_renderer_desc){.thread_count = 1}, &renderer),
+                     NEBEL_OK);
     const nebel_frame_desc desc = {
-        .camera = nebel_scene_camera(scene, 0), .width = WIDTH, .height = HEIGHT, .samples = 1};
+        .camera = nebel_get_scene_camera(scene, 0), .width = WIDTH, .height = HEIGHT, .samples = 1};
     assert_int_equal(nebel_render_frame(renderer, &desc, &(nebel_frame){.color = color}), NEBEL_OK);
     nebel_destroy_renderer(renderer);
     nebel_release_snapshot(fog);

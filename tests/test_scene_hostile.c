@@ -130,8 +130,8 @@ static double time_parse(size_t count)
     const double start = seconds();
     nebel_scene *scene = parse_good(text);
     const double spent = seconds() - start;
-    assert_int_equal(nebel_scene_contents(scene)->volume_count, count);
-    assert_true(nebel_scene_contents(scene)->volumes[count - 1].shape.center[0] == (double)count - .5);
+    assert_int_equal(nebel_get_scene_data(scene)->volume_count, count);
+    assert_true(nebel_get_scene_data(scene)->volumes[count - 1].shape.center[0] == (double)count - .5);
     nebel_destroy_scene(scene);
     free(text);
     return spent;
@@ -257,7 +257,7 @@ static void test_relative_paths_start_at_the_scene(void **state)
              "%s:2:21: models[0].file: cannot read the model \"%s/there/is.none\": No such file or directory", path,
              (char *)*state);
     assert_string_equal(kept.last, expected);
-    assert_int_equal(nebel_scene_contents(scene)->mesh_count, 0);
+    assert_int_equal(nebel_get_scene_data(scene)->mesh_count, 0);
     nebel_destroy_scene(scene);
 }
 

@@ -17,9 +17,9 @@ static void test_what_a_key_leaves_out_it_takes_from_the_volume(void **state)
              "\"keys\": [{\"frame\": 10, \"shape\": {\"radius\": 4}}, {\"frame\": 20, \"source\": \"#fff\", "
              "\"visibility\": 15, "
              "\"density\": {\"base\": 7}, \"shape\": {\"transform\": {\"scale\": 3}}}]"));
-    assert_int_equal(nebel_scene_contents(scene)->moving_volume_count, 1);
-    assert_int_equal(nebel_scene_volume_origin(scene, 0), NEBEL_VOLUME_MOVING);
-    const nebel_volume_desc first = nebel_scene_volume(scene, 0, 10), last = nebel_scene_volume(scene, 0, 20);
+    assert_int_equal(nebel_get_scene_data(scene)->animated_volume_count, 1);
+    assert_int_equal(nebel_get_volume_origin(scene, 0), NEBEL_VOLUME_ANIMATED);
+    const nebel_volume_desc first = nebel_get_scene_volume(scene, 0, 10), last = nebel_get_scene_volume(scene, 0, 20);
     assert_number(first.shape.radius, 4);
     assert_vector(first.source, 1, 2, 3);
     assert_number(first.extinction[1], -log(.05) / 30);
@@ -29,12 +29,13 @@ static void test_what_a_key_leaves_out_it_takes_from_the_volume(void **state)
     assert_number(last.density.base, 7);
     assert_number(last.density.scale_height, 4);
     assert_vector(last.shape.transform.scale, 3, 3, 3);
-    const nebel_volume_desc before = nebel_scene_volume(scene, 0, -1e9), after = nebel_scene_volume(scene, 0, HUGE_VAL);
+    const nebel_volume_desc before = nebel_get_scene_volume(scene, 0, -1e9),
+                            after = nebel_get_scene_volume(scene, 0, HUGE_VAL);
     assert_number(before.shape.radius, 4);
     assert_number(after.shape.radius, 2);
-    assert_number(nebel_scene_volume(scene, 0, (double)NAN).shape.radius, 4);
-    assert_number(nebel_scene_contents(scene)->volumes[0].shape.radius, 4);
-    const nebel_volume_desc middle = nebel_scene_volume(scene, 0, 15);
+    assert_number(nebel_get_scene_volume(scene, 0, (double)NAN).shape.radius, 4);
+    assert_number(nebel_get_scene_data(scene)->volumes[0].shape.radius, 4);
+    const nebel_volume_desc middle = nebel_get_scene_volume(scene, 0, 15);
     assert_number(middle.shape.radius, 3);
     assert_vector(middle.source, 1, 1.5, 2);
     nebel_destroy_scene(scene);
@@ -47,9 +48,9 @@ static void test_places_follow_a_cubic(void **state)
     nebel_scene *scene = parse_good(
         FOG(BALL ", \"extinction\": 1, \"keys\": [{\"frame\": 0}, {\"frame\": 10, \"shape\": {\"center\": [1, 0, 0]}}, "
                  "{\"frame\": 20, \"shape\": {\"center\": [4, 0, 0]}}]"));
-    assert_vector(nebel_scene_volume(scene, 0, 5).shape.center, .25, 0, 0);
-    assert_vector(nebel_scene_volume(scene, 0, 10).shape.center, 1, 0, 0);
-    assert_vector(nebel_scene_volume(scene, 0, 15).shape.center, 2.75, 0, 0);
+    assert_vector(nebel_get_scene_volume(scene, 0, 5).shape.center, .25, 0, 0);
+    assert_vector(nebel_get_scene_volume(scene, 0, 10).shape.center, 1, 0, 0);
+    assert_vector(nebel_get_scene_volume(scene, 0, 15).shape.center, 2.75, 0, 0);
     nebel_destroy_scene(scene);
 }
 
@@ -65,7 +66,7 @@ static void test_amounts_stay_within_their_keys(void **state)
     for (int k = 0; k < 3; k++)
         for (int i = 0; i <= 1000; i++) {
             const double frame = keys[k][0] + (keys[k + 1][0] - keys[k][0]) * i / 1000;
-            const nebel_volume_desc volume = nebel_scene_volume(scene, 0, frame);
+            const nebel_volume_desc volume = nebel_get_scene_volume(scene, 0, frame);
             assert_true(volume.extinction[0] >= fmin(keys[k][1], keys[k + 1][1]));
             assert_true(volume.extinction[0] <= fmax(keys[k][1], keys[k + 1][1]));
             assert_true(volume.shape.radius >= 1e-3 && volume.shape.radius <= 2);
@@ -83,10 +84,10 @@ static void test_a_box_never_turns_inside_out(void **state)
             "{\"frame\": 1, \"shape\": {\"min\": [100, 0, 0], \"max\": [100.000001, 1e-3, 1]}},"
             "{\"frame\": 3, \"shape\": {\"min\": [-100, 50, 0], \"max\": [-99, 50.001, 1]}}, {\"frame\": 4}]"));
     for (int i = 0; i <= 4000; i++) {
-        const nebel_volume_desc volume = nebel_scene_volume(scene, 0, i / 1000.0);
+        const nebel_volume_desc volume = nebel_get_scene_volume(scene, 0, i / 1000.0);
         for (int k = 0; k < 3; k++) assert_true(volume.shape.min[k] < volume.shape.max[k]);
     }
-    assert_vector(nebel_scene_volume(scene, 0, 1).shape.max, 100.000001, 1e-3, 1);
+    assert_vector(nebel_get_scene_volume(scene, 0, 1).shape.max, 100.000001, 1e-3, 1);
     nebel_destroy_scene(scene);
 }
 
@@ -103,7 +104,7 @@ static void test_rotations_go_the_shorter_way(void **state)
         BALL ", \"extinction\": 1, \"keys\": [{\"frame\": 0, \"shape\": {\"transform\": {\"rotation\": [0, 0, 0, 1]}}},"
              "{\"frame\": 2, \"shape\": {\"transform\": {\"rotation\": [0, -0.5, 0, -0.8660254037844386]}}},"
              "{\"frame\": 3, \"shape\": {\"transform\": {\"rotation\": [0, 0.5, 0, 0.8660254037844386]}}}]"));
-    const nebel_volume_desc middle = nebel_scene_volume(scene, 0, 1), still = nebel_scene_volume(scene, 0, 2.5);
+    const nebel_volume_desc middle = nebel_get_scene_volume(scene, 0, 1), still = nebel_get_scene_volume(scene, 0, 2.5);
     const double angle = half_angle(&middle);
     assert_true(angle > .2 && angle < .35);
     const double *q = still.shape.transform.rotation;
@@ -125,8 +126,8 @@ static void test_what_would_vanish_keeps_the_nearer_key(void **state)
         "{\"extinction\": 1, \"shape\": {\"type\": \"world\"}, \"density\": {\"type\": \"linear\", \"from\": [-1, 0, "
         "0], \"to\": [1, 0, 0]}, "
         "\"keys\": [{\"frame\": 0}, {\"frame\": 2, \"density\": {\"from\": [1, 0, 0], \"to\": [-1, 0, 0]}}]}]}");
-    assert_vector(nebel_scene_volume(scene, 0, 1).shape.normal, 0, -.1, 0);
-    const nebel_volume_desc tube = nebel_scene_volume(scene, 1, 1), ramp = nebel_scene_volume(scene, 2, 1);
+    assert_vector(nebel_get_scene_volume(scene, 0, 1).shape.normal, 0, -.1, 0);
+    const nebel_volume_desc tube = nebel_get_scene_volume(scene, 1, 1), ramp = nebel_get_scene_volume(scene, 2, 1);
     assert_vector(tube.shape.from, 0, 0, 0);
     assert_vector(tube.shape.to, -2, 0, 0);
     assert_vector(ramp.density.to, -2, 0, 0);
@@ -188,7 +189,7 @@ static void test_keys_are_in_the_units_of_the_file(void **state)
         "8}]}, \"keys\": ["
         "{\"frame\": 0, \"shape\": {\"transform\": {\"position\": [1, 2, 3]}}}, {\"frame\": 1, \"extinction\": 3}]}]}");
     for (int frame = 0; frame < 2; frame++) {
-        const nebel_volume_desc volume = nebel_scene_volume(scene, 0, frame);
+        const nebel_volume_desc volume = nebel_get_scene_volume(scene, 0, frame);
         assert_vector(volume.shape.parts[0].planes[0].normal, 0, 2, 0);
         assert_number(volume.shape.parts[0].planes[0].distance, 3);
         assert_vector(volume.shape.parts[1].center, .5, 1.5, -1);
@@ -207,7 +208,7 @@ static void test_keys_may_all_but_coincide(void **state)
                  "{\"center\": [1e15, 0, 0]}}, {\"frame\": 2e-307, \"extinction\": 0}, {\"frame\": 3e-307, \"shape\": "
                  "{\"center\": [-1e15, 0, 0]}}, {\"frame\": 1, \"extinction\": 2}]"));
     for (int i = -1; i <= 40; i++) {
-        const nebel_volume_desc volume = nebel_scene_volume(scene, 0, i * 1e-308);
+        const nebel_volume_desc volume = nebel_get_scene_volume(scene, 0, i * 1e-308);
         assert_true(volume.extinction[0] >= 0 && volume.extinction[0] <= 1e9);
         assert_true(isfinite(volume.shape.center[0]));
     }
@@ -221,23 +222,23 @@ static void test_frames_that_are_none(void **state)
     const double odd[] = {(double)NAN, (double)INFINITY, -(double)INFINITY, -1e300, 1e300, 0, 0, -3, 7};
     enum { COUNT = sizeof odd / sizeof *odd };
     nebel_scene *scene = parse_good(FOG(BALL ", \"extinction\": 1"));
-    const nebel_volume_desc volume = nebel_scene_volume(scene, 0, 0);
+    const nebel_volume_desc volume = nebel_get_scene_volume(scene, 0, 0);
     for (int shift = 0; shift < COUNT; shift++) {
         nebel_camera_key cameras[COUNT];
         nebel_sun_key suns[COUNT];
         nebel_volume_key volumes[COUNT];
         for (int i = 0; i < COUNT; i++) {
             const double frame = odd[(i * 4 + shift) % COUNT];
-            cameras[i] = (nebel_camera_key){.frame = frame, .camera = nebel_scene_contents(scene)->camera};
+            cameras[i] = (nebel_camera_key){.frame = frame, .camera = nebel_get_scene_data(scene)->camera};
             cameras[i].camera.position[0] = i;
             suns[i] = (nebel_sun_key){.frame = frame, .sun = {.direction = {1, i, 0}, .irradiance = {i, 1, 1}}};
             volumes[i] = (nebel_volume_key){.frame = frame, .volume = volume};
             volumes[i].volume.extinction[0] = i;
         }
         for (int i = 0; i < COUNT; i++) {
-            const nebel_camera camera = nebel_camera_between_keys(cameras, COUNT, odd[i]);
-            const nebel_sun sun = nebel_sun_between_keys(suns, COUNT, odd[i]);
-            const double extinction = nebel_volume_between_keys(volumes, COUNT, odd[i]).extinction[0];
+            const nebel_camera camera = nebel_interpolate_camera(cameras, COUNT, odd[i]);
+            const nebel_sun sun = nebel_interpolate_sun(suns, COUNT, odd[i]);
+            const double extinction = nebel_interpolate_volume(volumes, COUNT, odd[i]).extinction[0];
             assert_true(isfinite(camera.position[0]) && isfinite(sun.direction[0]) && isfinite(sun.irradiance[0]));
             assert_true(extinction >= 0 && extinction <= COUNT);
         }

@@ -16,20 +16,20 @@ static void test_defaults(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good(SCENE("", "{\"model\": \"layers\"}"));
-    const nebel_planet *planet = nebel_scene_contents(scene)->planets;
-    assert_int_equal(planet->model, NEBEL_PLANET_LAYERS);
-    assert_number(planet->shells.radius, 6.36e6);
-    assert_number(planet->shells.center[1], -6.36e6);
-    assert_int_equal(planet->shells.cloud_count, 0);
-    assert_false(nebel_scene_contents(scene)->moves_on);
+    const nebel_planet *planet = nebel_get_scene_data(scene)->planets;
+    assert_int_equal(planet->model, NEBEL_PLANET_TEXTURED);
+    assert_number(planet->textured_desc.radius, 6.36e6);
+    assert_number(planet->textured_desc.center[1], -6.36e6);
+    assert_int_equal(planet->textured_desc.cloud_shell_count, 0);
+    assert_false(nebel_get_scene_data(scene)->has_endless_motion);
     assert_number(planet->sun_left[1], 1);
-    assert_null(planet->layers);
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
-    assert_non_null(planet->layers);
+    assert_null(planet->textured);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
+    assert_non_null(planet->textured);
     assert_null(planet->atmosphere);
-    const nebel_layers *layers = planet->layers;
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
-    assert_ptr_equal(planet->layers, layers);
+    const nebel_textured_planet *layers = planet->textured;
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
+    assert_ptr_equal(planet->textured, layers);
     nebel_destroy_scene(scene);
 }
 
@@ -42,32 +42,32 @@ static void test_everything_it_may_say(void **state)
               "\"coverage\": 0.25, \"seed\": 9, \"clouds\": [{\"height\": 2, \"day\": -7, \"color\": [0.1, 0.2, 0.3], "
               "\"wrap\": [1, -2, 3], \"gain\": 4, \"coverage\": 0.75, \"seed\": 11}, {}], \"air\": {\"height\": 3, "
               "\"brightness\": 2, \"ramp\": [[0, 0, 0], [0.5, 0.25, 1]]}}"));
-    const nebel_layers_desc *desc = &nebel_scene_contents(scene)->planets[0].shells;
+    const nebel_textured_planet_desc *desc = &nebel_get_scene_data(scene)->planets[0].textured_desc;
     assert_number(desc->center[0], 1000);
     assert_number(desc->center[1], 3000);
     assert_number(desc->center[2], -2000);
     assert_number(desc->radius, 20000);
     assert_number(desc->rotation[1], 1);
-    assert_number(desc->day, 5);
-    assert_number(desc->coverage, .25);
+    assert_number(desc->rotation_period, 5);
+    assert_number(desc->land_coverage, .25);
     assert_int_equal(desc->seed, 9);
-    assert_int_equal(desc->cloud_count, 2);
-    assert_number(desc->clouds[0].height, 2000);
-    assert_number(desc->clouds[0].day, -7);
-    assert_true(nebel_scene_contents(scene)->moves_on);
-    assert_number(desc->clouds[0].color[2], .3);
-    assert_number(desc->clouds[0].wrap[1], -2);
-    assert_number(desc->clouds[0].gain, 4);
-    assert_number(desc->clouds[0].coverage, .75);
-    assert_int_equal(desc->clouds[0].seed, 11);
-    assert_number(desc->air.height, 3000);
-    assert_number(desc->air.brightness, 2);
-    assert_int_equal(desc->air.ramp_count, 2);
-    assert_number(desc->air.ramp[1][1], .25);
-    assert_int_equal(desc->air.is_absent, 0);
+    assert_int_equal(desc->cloud_shell_count, 2);
+    assert_number(desc->cloud_shells[0].height, 2000);
+    assert_number(desc->cloud_shells[0].rotation_period, -7);
+    assert_true(nebel_get_scene_data(scene)->has_endless_motion);
+    assert_number(desc->cloud_shells[0].color[2], .3);
+    assert_number(desc->cloud_shells[0].uv_tiling[1], -2);
+    assert_number(desc->cloud_shells[0].gain, 4);
+    assert_number(desc->cloud_shells[0].coverage, .75);
+    assert_int_equal(desc->cloud_shells[0].seed, 11);
+    assert_number(desc->atmosphere.height, 3000);
+    assert_number(desc->atmosphere.brightness, 2);
+    assert_int_equal(desc->atmosphere.ramp_count, 2);
+    assert_number(desc->atmosphere.ramp[1][1], .25);
+    assert_int_equal(desc->atmosphere.is_disabled, 0);
     nebel_destroy_scene(scene);
     scene = parse_good(LAYERS("\"air\": {\"brightness\": 0}"));
-    assert_int_equal(nebel_scene_contents(scene)->planets[0].shells.air.is_absent, 1);
+    assert_int_equal(nebel_get_scene_data(scene)->planets[0].textured_desc.atmosphere.is_disabled, 1);
     nebel_destroy_scene(scene);
 }
 
@@ -112,20 +112,20 @@ static void test_maps_come_from_pictures(void **state)
     assert_int_equal(
         load("\"map\": \"colors.png\", \"clouds\": [{\"map\": \"grey.exr\", \"detail\": \"colors.exr\"}]", &scene),
         NEBEL_OK);
-    const nebel_layers_desc *desc = &nebel_scene_contents(scene)->planets[0].shells;
-    assert_int_equal(desc->ground.width, 2);
-    assert_int_equal(desc->ground.channels, 3);
-    assert_true(fabs((double)desc->ground.texels[5] - .2159) < 2e-3); /* sRGB */
-    assert_int_equal(desc->clouds[0].map.channels, 1);
-    assert_true(fabs((double)desc->clouds[0].map.texels[1] - .5) < 3e-3);
-    assert_true(fabs((double)desc->clouds[0].detail.texels[1] - .5) < 1e-3);
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
-    assert_int_equal(nebel_scene_contents(scene)->file_count, 3);
+    const nebel_textured_planet_desc *desc = &nebel_get_scene_data(scene)->planets[0].textured_desc;
+    assert_int_equal(desc->color_map.width, 2);
+    assert_int_equal(desc->color_map.channels, 3);
+    assert_true(fabs((double)desc->color_map.texels[5] - .2159) < 2e-3); /* sRGB */
+    assert_int_equal(desc->cloud_shells[0].coverage_map.channels, 1);
+    assert_true(fabs((double)desc->cloud_shells[0].coverage_map.texels[1] - .5) < 3e-3);
+    assert_true(fabs((double)desc->cloud_shells[0].detail_map.texels[1] - .5) < 1e-3);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
+    assert_int_equal(nebel_get_scene_data(scene)->path_count, 3);
     nebel_destroy_scene(scene);
     assert_int_equal(load("\"map\": \"grey.exr\"", &scene), NEBEL_OK);
-    desc = &nebel_scene_contents(scene)->planets[0].shells;
-    assert_int_equal(desc->ground.channels, 3);
-    for (int i = 0; i < 6; i++) assert_true(fabs((double)desc->ground.texels[i] - .5) < 1e-3);
+    desc = &nebel_get_scene_data(scene)->planets[0].textured_desc;
+    assert_int_equal(desc->color_map.channels, 3);
+    for (int i = 0; i < 6; i++) assert_true(fabs((double)desc->color_map.texels[i] - .5) < 1e-3);
     nebel_destroy_scene(scene);
     assert_int_equal(mkfifo(in_folder("pipe.png"), 0600), 0);
     assert_int_equal(load("\"map\": \"pipe.png\"", &scene), NEBEL_ERROR_FILE);
@@ -174,8 +174,8 @@ static void test_without_memory(void **state)
         const nebel_scene_desc desc = metered_desc(&m, &kept);
         assert_int_equal(nebel_parse_scene(text, strlen(text), "-", &desc, &scene), NEBEL_OK);
         m.fail_at = m.made + calls;
-        const nebel_result result = nebel_load_scene_planet(scene);
-        assert_true(result == NEBEL_OK || nebel_scene_contents(scene)->planets[0].layers == NULL);
+        const nebel_result result = nebel_load_scene_planets(scene);
+        assert_true(result == NEBEL_OK || nebel_get_scene_data(scene)->planets[0].textured == NULL);
         nebel_destroy_scene(scene);
         assert_int_equal(m.live, 0);
         if (result == NEBEL_OK) break;

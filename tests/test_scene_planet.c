@@ -13,22 +13,22 @@ static void test_defaults(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good("{\"nebel\": 1, \"fog\": []}");
-    assert_int_equal(nebel_scene_contents(scene)->planet_count, 0);
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_int_equal(nebel_get_scene_data(scene)->planet_count, 0);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     nebel_destroy_scene(scene);
     scene = parse_good(SCENE("", "{\"model\": \"physical\"}"));
-    assert_int_equal(nebel_scene_contents(scene)->planet_count, 1);
-    const nebel_planet *planet = nebel_scene_contents(scene)->planets;
+    assert_int_equal(nebel_get_scene_data(scene)->planet_count, 1);
+    const nebel_planet *planet = nebel_get_scene_data(scene)->planets;
     assert_int_equal(planet->model, NEBEL_PLANET_PHYSICAL);
-    assert_number(planet->air.radius, 6.36e6);
-    assert_number(planet->air.ground[1], 0);
-    assert_int_equal(planet->air.air_count, 3);
-    assert_int_equal(planet->air.quality, NEBEL_AIR_FAST);
-    assert_near(planet->sun_diameter, .533, 1e-3);
+    assert_number(planet->atmosphere_desc.radius, 6.36e6);
+    assert_number(planet->atmosphere_desc.ground_point[1], 0);
+    assert_int_equal(planet->atmosphere_desc.component_count, 3);
+    assert_int_equal(planet->atmosphere_desc.quality, NEBEL_ATMOSPHERE_FAST);
+    assert_near(planet->sun_angular_diameter, .533, 1e-3);
     assert_null(planet->atmosphere);
     nebel_destroy_scene(scene);
     scene = parse_good(SCENE("", "{\"model\": \"physical\", \"preset\": \"mars\"}"));
-    assert_number(nebel_scene_contents(scene)->planets[0].air.radius, 3.3895e6);
+    assert_number(nebel_get_scene_data(scene)->planets[0].atmosphere_desc.radius, 3.3895e6);
     nebel_destroy_scene(scene);
 }
 
@@ -41,26 +41,26 @@ static void test_everything_it_may_say(void **state)
         "\"ground_albedo\": [0.1, 0.2, 0.3], \"quality\": \"precise\", \"sun_diameter\": 2, \"airs\": [{\"type\": "
         "\"exponential\", \"scattering\": [1, 2, 3], \"phase\": {\"type\": \"henyey_greenstein\", \"g\": 0.5}, "
         "\"scale_height\": 0.5}, {\"type\": \"layer\", \"absorption\": 4, \"middle\": 3, \"width\": 1}]}"));
-    const nebel_planet *planet = nebel_scene_contents(scene)->planets;
-    const nebel_air *air = planet->air.airs;
-    assert_number(planet->air.ground[0], 1000);
-    assert_number(planet->air.ground[1], -30000 + 20000);
-    assert_number(planet->air.ground[2], -2000);
-    assert_number(planet->air.radius, 20000);
-    assert_number(planet->air.thickness, 5000);
-    assert_number(planet->air.ground_albedo[2], .3);
-    assert_int_equal(planet->air.quality, NEBEL_AIR_PRECISE);
-    assert_number(planet->sun_diameter, 2);
-    assert_int_equal(planet->air.air_count, 2);
-    assert_int_equal(air[0].profile, NEBEL_AIR_EXPONENTIAL);
+    const nebel_planet *planet = nebel_get_scene_data(scene)->planets;
+    const nebel_atmosphere_component *air = planet->atmosphere_desc.components;
+    assert_number(planet->atmosphere_desc.ground_point[0], 1000);
+    assert_number(planet->atmosphere_desc.ground_point[1], -30000 + 20000);
+    assert_number(planet->atmosphere_desc.ground_point[2], -2000);
+    assert_number(planet->atmosphere_desc.radius, 20000);
+    assert_number(planet->atmosphere_desc.thickness, 5000);
+    assert_number(planet->atmosphere_desc.ground_albedo[2], .3);
+    assert_int_equal(planet->atmosphere_desc.quality, NEBEL_ATMOSPHERE_PRECISE);
+    assert_number(planet->sun_angular_diameter, 2);
+    assert_int_equal(planet->atmosphere_desc.component_count, 2);
+    assert_int_equal(air[0].profile, NEBEL_COMPONENT_EXPONENTIAL);
     assert_number(air[0].scattering[2], 3e-3);
     assert_number(air[0].absorption[2], 0);
     assert_number(air[0].phase.g, .5);
     assert_number(air[0].scale_height, 500);
-    assert_int_equal(air[1].profile, NEBEL_AIR_LAYER);
+    assert_int_equal(air[1].profile, NEBEL_COMPONENT_TENT);
     assert_number(air[1].absorption[0], 4e-3);
-    assert_number(air[1].middle, 3000);
-    assert_number(air[1].width, 1000);
+    assert_number(air[1].center_height, 3000);
+    assert_number(air[1].half_width, 1000);
     nebel_destroy_scene(scene);
 }
 
@@ -68,23 +68,23 @@ static void test_everything_it_may_say(void **state)
 static void test_gravity_stretches_presets(void **state)
 {
     (void)state;
-    const nebel_atmosphere_desc *earth = nebel_find_atmosphere("earth");
+    const nebel_atmosphere_desc *earth = nebel_lookup_atmosphere("earth");
     nebel_scene *scene = parse_good(SCENE("", "{\"model\": \"physical\", \"gravity\": 4.91}"));
-    const nebel_atmosphere_desc *air = &nebel_scene_contents(scene)->planets[0].air;
+    const nebel_atmosphere_desc *air = &nebel_get_scene_data(scene)->planets[0].atmosphere_desc;
     assert_number(air->thickness, 2 * earth->thickness);
-    assert_number(air->airs[0].scale_height, 2 * earth->airs[0].scale_height);
-    assert_number(air->airs[1].scale_height, 2 * earth->airs[1].scale_height);
-    assert_number(air->airs[2].middle, 2 * earth->airs[2].middle);
-    assert_number(air->airs[2].width, 2 * earth->airs[2].width);
-    assert_number(air->airs[0].scattering[2], earth->airs[0].scattering[2]);
+    assert_number(air->components[0].scale_height, 2 * earth->components[0].scale_height);
+    assert_number(air->components[1].scale_height, 2 * earth->components[1].scale_height);
+    assert_number(air->components[2].center_height, 2 * earth->components[2].center_height);
+    assert_number(air->components[2].half_width, 2 * earth->components[2].half_width);
+    assert_number(air->components[0].scattering[2], earth->components[0].scattering[2]);
     assert_number(air->radius, earth->radius);
     nebel_destroy_scene(scene);
     scene =
         parse_good(SCENE("", "{\"model\": \"physical\", \"preset\": \"mars\", \"gravity\": 1.865, \"thickness\": 2e5, "
                              "\"airs\": [{\"type\": \"exponential\", \"scale_height\": 8000}]}"));
-    air = &nebel_scene_contents(scene)->planets[0].air;
+    air = &nebel_get_scene_data(scene)->planets[0].atmosphere_desc;
     assert_number(air->thickness, 2e5);
-    assert_number(air->airs[0].scale_height, 8000);
+    assert_number(air->components[0].scale_height, 8000);
     nebel_destroy_scene(scene);
 }
 
@@ -114,10 +114,10 @@ static void test_air_lights_fog(void **state)
     for (int with_sky = 0; with_sky < 2; with_sky++) {
         (void)snprintf(text, sizeof text, lit_fog, with_sky ? "" : "\"ambient\": 0,");
         nebel_scene *scene = parse_good(text);
-        const nebel_scene_data *data = nebel_scene_contents(scene);
+        const nebel_scene_data *data = nebel_get_scene_data(scene);
         const nebel_transfer clear = light_of(scene);
-        assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
-        assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+        assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
+        assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
         const nebel_transfer transfer = light_of(scene);
         assert_non_null(data->planets[0].atmosphere);
         assert_number(data->sun_irradiance[0], 4);
@@ -131,18 +131,18 @@ static void test_air_lights_fog(void **state)
         dimmed = transfer;
         nebel_destroy_scene(scene);
     }
-    assert_int_equal(nebel_load_scene_planet(NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_load_scene_planets(NULL), NEBEL_ERROR_ARGUMENT);
 }
 
-/* The map holds what nebel_trace_air sees, and the ground below. */
+/* The map holds what nebel_trace_atmosphere sees, and the ground below. */
 static void test_sky_is_that_of_the_air(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good(
         SCENE(SUN, "{\"model\": \"physical\", \"ground_albedo\": 0.5, \"airs\": [{\"type\": \"exponential\", "
                    "\"scattering\": 2e-5, \"phase\": {\"type\": \"rayleigh\"}, \"scale_height\": 8000}]}"));
-    const nebel_scene_data *data = nebel_scene_contents(scene);
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     nebel_sun sun = {.irradiance = {4, 3, 2}};
     memcpy(sun.direction, data->sun_direction, sizeof sun.direction);
     static const double ways[][3] = {{0, 1, 0}, {1, 1, 0}, {-1, .5, .3}, {0, .3, -1}, {.2, .6, 1}};
@@ -150,15 +150,16 @@ static void test_sky_is_that_of_the_air(void **state)
         const nebel_ray ray = {{0, 0, 0}, {ways[i][0], ways[i][1], ways[i][2]}, (double)INFINITY};
         nebel_transfer transfer;
         double seen[3];
-        assert_int_equal(nebel_trace_air(data->planets[0].atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
-        nebel_environment_radiance(&data->environment, ways[i], seen);
+        assert_int_equal(nebel_trace_atmosphere(data->planets[0].atmosphere, &sun, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+        nebel_evaluate_environment(&data->environment, ways[i], seen);
         for (int c = 0; c < 3; c++) assert_near(seen[c] / transfer.in_scattering[c], 1, .03);
     }
     static const double origin[1][3] = {{0, 0, 0}}, down[3] = {0, -1, 0};
-    nebel_air_light arrives;
+    nebel_irradiance arrives;
     double ground[3];
-    assert_int_equal(nebel_light_air(data->planets[0].atmosphere, &sun, 1, origin, 0, &arrives, 0), NEBEL_OK);
-    nebel_environment_radiance(&data->environment, down, ground);
+    assert_int_equal(nebel_compute_atmosphere_irradiance(data->planets[0].atmosphere, &sun, 1, origin, 0, &arrives, 0),
+                     NEBEL_OK);
+    nebel_evaluate_environment(&data->environment, down, ground);
     for (int c = 0; c < 3; c++)
         assert_near(ground[c], .5 / acos(-1) * (sqrt(.5) * arrives.sun[c] + arrives.sky[c]), 2e-3);
     nebel_destroy_scene(scene);
@@ -242,12 +243,12 @@ static void test_several(void **state)
         parse_good(SCENE("\"sun\": {\"direction\": [0, 1, 0], \"irradiance\": 4}, ",
                          "[" EARTH "," MOON_AT("8.3e6") ", {\"model\": \"physical\", \"preset\": \"toy\", \"center\": "
                                                         "[0, -2e7, 0], \"airs\": []}]"));
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_int_equal(data->planet_count, 3);
-    assert_number(data->planets[1].air.ground[1], 8.3e6 + 1.7374e6);
-    assert_number(data->planets[1].air.ground_albedo[0], .11);
-    assert_int_equal(data->planets[2].air.air_count, 1);
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_number(data->planets[1].atmosphere_desc.ground_point[1], 8.3e6 + 1.7374e6);
+    assert_number(data->planets[1].atmosphere_desc.ground_albedo[0], .11);
+    assert_int_equal(data->planets[2].atmosphere_desc.component_count, 1);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     for (int i = 0; i < 3; i++) assert_non_null(data->planets[i].atmosphere);
     /* The moon in the zenith hides the sun. */
     assert_true(data->planets[0].sun_left[0] == 0);
@@ -257,12 +258,13 @@ static void test_several(void **state)
                                {{0, 8.3e6 + 1.7374e6 + 50, 0}, {1, -.00001, 0}, (double)INFINITY}};
     const double places[2][3] = {{1.8e6, 8.3e6, 0}, {-1.8e6, 8.3e6, 0}};
     nebel_transfer transfer[2];
-    nebel_air_light there[2];
+    nebel_irradiance there[2];
     assert_int_equal(
-        nebel_trace_air(data->planets[1].atmosphere, &sun, 2, rays, sizeof *rays, transfer, sizeof *transfer),
+        nebel_trace_atmosphere(data->planets[1].atmosphere, &sun, 2, rays, sizeof *rays, transfer, sizeof *transfer),
         NEBEL_OK);
-    assert_int_equal(
-        nebel_light_air(data->planets[1].atmosphere, &sun, 2, places, sizeof *places, there, sizeof *there), NEBEL_OK);
+    assert_int_equal(nebel_compute_atmosphere_irradiance(data->planets[1].atmosphere, &sun, 2, places, sizeof *places,
+                                                         there, sizeof *there),
+                     NEBEL_OK);
     for (int c = 0; c < 3; c++) {
         for (int i = 0; i < 2; i++) {
             assert_true(transfer[i].transmittance[c] == 1 && transfer[i].in_scattering[c] == 0);
@@ -288,11 +290,11 @@ static void test_without_memory(void **state)
         const nebel_scene_desc desc = metered_desc(&m, &kept);
         assert_int_equal(nebel_parse_scene(text, strlen(text), "-", &desc, &scene), NEBEL_OK);
         m.fail_at = m.made + calls;
-        const nebel_result result = nebel_load_scene_planet(scene);
+        const nebel_result result = nebel_load_scene_planets(scene);
         if (result != NEBEL_OK) {
             assert_int_equal(result, NEBEL_ERROR_MEMORY);
-            assert_null(nebel_scene_contents(scene)->planets[0].atmosphere);
-            assert_int_equal(nebel_scene_contents(scene)->environment.type, NEBEL_ENVIRONMENT_CONSTANT);
+            assert_null(nebel_get_scene_data(scene)->planets[0].atmosphere);
+            assert_int_equal(nebel_get_scene_data(scene)->environment.type, NEBEL_ENVIRONMENT_CONSTANT);
         }
         nebel_destroy_scene(scene);
         assert_int_equal(m.live, 0);

@@ -11,7 +11,7 @@
 static void test_other_keys_replace_it(void **state)
 {
     (void)state;
-    const nebel_preset *const haze = nebel_find_preset("haze");
+    const nebel_fog_preset *const haze = nebel_lookup_fog_preset("haze");
     draft d = open_draft(SCENE("\"unit\": 2, \"fog\": [{" HAZE "}, {" HAZE ", \"visibility\": 50}, {" HAZE
                                ", \"albedo\": 0.5}, {" HAZE ", \"phase\": {\"type\": \"rayleigh\"}}, {" HAZE
                                ", \"source\": 3}, {" HAZE ", \"mean_free_path\": 5}]"));
@@ -37,8 +37,9 @@ static void test_it_moves(void **state)
     (void)state;
     draft d = open_draft(SCENE("\"fog\": [{" BOX ", \"preset\": \"smoke\", \"keys\": [{\"frame\": 0}, {\"frame\": 10, "
                                "\"extinction\": 1, \"albedo\": 0.25}]}]"));
-    const nebel_preset *const smoke = nebel_find_preset("smoke");
-    const nebel_volume_desc first = nebel_scene_volume(d.scene, 0, 0), last = nebel_scene_volume(d.scene, 0, 10);
+    const nebel_fog_preset *const smoke = nebel_lookup_fog_preset("smoke");
+    const nebel_volume_desc first = nebel_get_scene_volume(d.scene, 0, 0),
+                            last = nebel_get_scene_volume(d.scene, 0, 10);
     for (int c = 0; c < 3; c++) {
         assert_true(first.extinction[c] == smoke->extinction[c] && first.albedo[c] == smoke->albedo[c]);
         assert_true(last.extinction[c] == 1 && last.albedo[c] == .25);
@@ -54,17 +55,17 @@ static void test_it_is_saved(void **state)
     static const char text[] = SCENE("\"unit\": 2, \"fog\": [{" BOX ", \"preset\": \"mist\"}, {" BOX
                                      ", \"preset\": \"haze\", \"source\": 1}, {" BOX ", \"preset\": \"smoke\"}]");
     draft d = open_draft(text);
-    nebel_volume_entry entries[3];
+    nebel_volume_track entries[3];
     for (int c = 0; c < 3; c++)
-        assert_true(fabs(d.volumes[0].extinction[c] - nebel_find_preset("mist")->extinction[c]) < 1e-18);
+        assert_true(fabs(d.volumes[0].extinction[c] - nebel_lookup_fog_preset("mist")->extinction[c]) < 1e-18);
     assert_int_equal(d.volumes[0].phase.type, NEBEL_PHASE_DROPLETS);
     assert_true(d.volumes[1].albedo[0] == 0 && d.volumes[1].phase.type == NEBEL_PHASE_ISOTROPIC);
-    assert_true(d.volumes[2].albedo[1] == nebel_find_preset("smoke")->albedo[1]);
+    assert_true(d.volumes[2].albedo[1] == nebel_lookup_fog_preset("smoke")->albedo[1]);
     d.volumes[0].priority = 3;
     check_saved(&d, SCENE("\"unit\": 2, \"fog\": [{" BOX ", \"preset\": \"mist\", \"priority\": 3}, {" BOX
                           ", \"preset\": \"haze\", \"source\": 1}, {" BOX ", \"preset\": \"smoke\"}]"));
     d = open_draft(text);
-    for (int i = 0; i < 3; i++) entries[i] = d.data.volume_entries[i];
+    for (int i = 0; i < 3; i++) entries[i] = d.data.volume_tracks[i];
     entries[2].contrast = .02;
     d.entries = entries;
     for (int c = 0; c < 3; c++) {

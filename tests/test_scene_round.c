@@ -17,7 +17,7 @@ typedef struct change {
     nebel_scene_data data;
     nebel_volume_desc volumes[MOST];
     const char *volume_names[MOST];
-    nebel_volume_entry entries[MOST];
+    nebel_volume_track entries[MOST];
     nebel_volume_desc own[MOST];
     nebel_volume_key *keys[MOST];
     nebel_nebula_desc nebulae[MOST];
@@ -31,8 +31,8 @@ typedef struct change {
     nebel_factor_desc classic;
     nebel_d3d9_fog device;
     float table[NEBEL_CURVE_ENTRIES];
-    nebel_model models[MOST];
-    nebel_lamp lamps[MOST];
+    nebel_scene_model models[MOST];
+    nebel_light lamps[MOST];
     nebel_planet planets[NEBEL_MAX_PLANETS];
     nebel_camera_key camera_keys[MOST];
     char names[3 * MOST][32];
@@ -85,9 +85,9 @@ static void change_volume(nebel_volume_desc *volume)
 
 static void change_entry(change *c, size_t i)
 {
-    nebel_volume_entry *entry = &c->entries[i];
+    nebel_volume_track *entry = &c->entries[i];
     if (entry->key_count == 0) return;
-    c->own[i] = *entry->own;
+    c->own[i] = *entry->base;
     change_volume(&c->own[i]);
     c->keys[i] = malloc(entry->key_count * sizeof *c->keys[i]);
     for (size_t k = 0; k < entry->key_count; k++) {
@@ -104,14 +104,14 @@ static void change_entry(change *c, size_t i)
         key->volume.density.power = c->own[i].density.power;
         key->volume.density.below = c->own[i].density.below;
     }
-    entry->own = &c->own[i];
+    entry->base = &c->own[i];
     entry->keys = c->keys[i];
 }
 
 static bool is_written(const change *c, size_t i)
 {
-    const nebel_volume_origin origin = nebel_scene_volume_origin(c->scene, i);
-    return origin == NEBEL_VOLUME_WRITTEN || origin == NEBEL_VOLUME_MOVING;
+    const nebel_volume_origin origin = nebel_get_volume_origin(c->scene, i);
+    return origin == NEBEL_VOLUME_STATIC || origin == NEBEL_VOLUME_ANIMATED;
 }
 
 static void change_volumes(change *c)
@@ -119,7 +119,7 @@ static void change_volumes(change *c)
     for (size_t i = 0; i < c->data.volume_count; i++) {
         c->volumes[i] = c->data.volumes[i];
         c->volume_names[i] = c->data.volume_names[i];
-        c->entries[i] = c->data.volume_entries[i];
+        c->entries[i] = c->data.volume_tracks[i];
         if (!is_written(c, i)) continue;
         change_volume(&c->volumes[i]);
         c->volume_names[i] = name_anew(c, "fog");
@@ -129,7 +129,7 @@ static void change_volumes(change *c)
     }
     c->data.volumes = c->volumes;
     c->data.volume_names = c->volume_names;
-    c->data.volume_entries = c->entries;
+    c->data.volume_tracks = c->entries;
 }
 
 static void change_nebulae(change *c)
@@ -140,15 +140,15 @@ static void change_nebulae(change *c)
         nebula->shape = copy_shape(&nebula->shape);
         nb_space_convert_nebula(&half, nebula);
         nebula->seed++;
-        if (nebula->points == NULL) nebula->fade = nebula->fade > .5 ? .25 : .75;
+        if (nebula->points == NULL) nebula->dimming = nebula->dimming > .5 ? .25 : .75;
         nebula->count++;
-        nebula->profile = (nebel_particle_profile)((nebula->profile + 1) % NEBEL_PARTICLE_COUNT);
+        nebula->profile = (nebel_particle_profile)((nebula->profile + 1) % NEBEL_PARTICLE_PROFILE_COUNT);
         c->nebula_names[i] = name_anew(c, "nebula");
-        c->nebula_places[i] = c->data.nebula_places[i];
+        c->nebula_places[i] = c->data.nebula_transforms[i];
     }
     c->data.nebulae = c->nebulae;
     c->data.nebula_names = c->nebula_names;
-    c->data.nebula_places = c->nebula_places;
+    c->data.nebula_transforms = c->nebula_places;
 }
 
 static void change_portals(change *c)
@@ -241,7 +241,7 @@ static void change_camera(change *c)
 static void change_models(change *c)
 {
     for (size_t i = 0; i < c->data.model_count; i++) {
-        nebel_model *model = &c->models[i];
+        nebel_scene_model *model = &c->models[i];
         *model = c->data.models[i];
         nb_space_convert_placement(&half, model->position, model->rotation, model->scale);
         model->size[0] /= 2;
@@ -255,62 +255,62 @@ static void change_models(change *c)
 
 static void change_lamps(change *c)
 {
-    for (size_t i = 0; i < c->data.lamp_count; i++) {
-        nebel_lamp *lamp = &c->lamps[i];
-        *lamp = c->data.lamps[i];
+    for (size_t i = 0; i < c->data.light_count; i++) {
+        nebel_light *lamp = &c->lamps[i];
+        *lamp = c->data.lights[i];
         nb_space_convert_place(&half, lamp->position);
         dim(lamp->intensity);
         lamp->radius = lamp->radius > 0 ? 2 * lamp->radius : .25;
-        if (lamp->type != NEBEL_LAMP_SPOT) continue;
+        if (lamp->type != NEBEL_LIGHT_SPOT) continue;
         const double direction[3] = {lamp->direction[1], lamp->direction[2], lamp->direction[0]};
         memcpy(lamp->direction, direction, sizeof direction);
         lamp->outer_angle = (lamp->outer_angle + 180) / 2;
         lamp->inner_angle = (lamp->inner_angle + 1) / 2;
     }
-    c->data.lamps = c->lamps;
+    c->data.lights = c->lamps;
 }
 
-static void change_air(nebel_air *air)
+static void change_air(nebel_atmosphere_component *air)
 {
     for (int k = 0; k < 3; k++) {
         air->scattering[k] = air->scattering[k] / 2 + 1e-6;
         air->absorption[k] = air->absorption[k] / 2 + 1e-7 * k;
     }
     air->phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = air->phase.g / 2 + .25};
-    if (air->profile == NEBEL_AIR_EXPONENTIAL) air->scale_height *= 1.5;
-    if (air->profile == NEBEL_AIR_LAYER) air->middle *= .75, air->width *= .75;
+    if (air->profile == NEBEL_COMPONENT_EXPONENTIAL) air->scale_height *= 1.5;
+    if (air->profile == NEBEL_COMPONENT_TENT) air->center_height *= .75, air->half_width *= .75;
 }
 
 /* Of layers that are one above the other, all of them, so that they stay apart. */
 static void change_cloud(const nebel_planet *planet, nebel_cloud_layer *layer)
 {
-    assert_int_equal(nebel_resolve_cloud_layer(planet->air.thickness, layer, NULL, layer), NEBEL_OK);
+    assert_int_equal(nebel_resolve_cloud_layer(planet->atmosphere_desc.thickness, layer, NULL, layer), NEBEL_OK);
     layer->base *= .75;
     layer->top *= .75;
     layer->coverage /= 2;
     layer->extinction /= 2;
-    layer->size *= 2;
-    layer->detail = layer->detail == NEBEL_CLOUD_NONE ? .5 : NEBEL_CLOUD_NONE;
-    layer->variation = layer->variation == NEBEL_CLOUD_NONE ? .25 : NEBEL_CLOUD_NONE;
-    layer->diameter = 30;
+    layer->cell_size *= 2;
+    layer->erosion = layer->erosion == NEBEL_CLOUD_NONE ? .5 : NEBEL_CLOUD_NONE;
+    layer->patchiness = layer->patchiness == NEBEL_CLOUD_NONE ? .25 : NEBEL_CLOUD_NONE;
+    layer->droplet_diameter = 30;
     layer->wind[0] += 5;
     layer->wind[1] -= 7;
 }
 
-static void change_layers(nebel_layers_desc *desc)
+static void change_layers(nebel_textured_planet_desc *desc)
 {
-    desc->day += 12;
-    desc->coverage = .375;
-    desc->air.height = desc->radius / 16;
-    desc->air.is_absent = !desc->air.is_absent;
-    desc->air.brightness = desc->air.is_absent ? 0 : .75;
-    for (uint32_t i = 0; i < desc->cloud_count; i++) {
-        nebel_cloud_shell *shell = &desc->clouds[i];
+    desc->rotation_period += 12;
+    desc->land_coverage = .375;
+    desc->atmosphere.height = desc->radius / 16;
+    desc->atmosphere.is_disabled = !desc->atmosphere.is_disabled;
+    desc->atmosphere.brightness = desc->atmosphere.is_disabled ? 0 : .75;
+    for (uint32_t i = 0; i < desc->cloud_shell_count; i++) {
+        nebel_cloud_shell *shell = &desc->cloud_shells[i];
         shell->height = desc->radius / 64 * (i + 1);
-        shell->day -= 3;
+        shell->rotation_period -= 3;
         shell->gain = .25;
         shell->coverage = .625;
-        for (int k = 0; k < 3; k++) shell->color[k] = .125 * (k + 1), shell->wrap[k] = k + 2;
+        for (int k = 0; k < 3; k++) shell->color[k] = .125 * (k + 1), shell->uv_tiling[k] = k + 2;
     }
 }
 
@@ -319,11 +319,12 @@ static void change_planets(change *c)
     for (size_t i = 0; i < c->data.planet_count; i++) {
         nebel_planet *planet = &c->planets[i];
         *planet = c->data.planets[i];
-        dim(planet->air.ground_albedo);
-        planet->sun_diameter += .25;
-        for (uint32_t k = 0; k < planet->air.air_count; k++) change_air(&planet->air.airs[k]);
+        dim(planet->atmosphere_desc.ground_albedo);
+        planet->sun_angular_diameter += .25;
+        for (uint32_t k = 0; k < planet->atmosphere_desc.component_count; k++)
+            change_air(&planet->atmosphere_desc.components[k]);
         for (uint32_t k = 0; k < planet->cloud_layer_count; k++) change_cloud(planet, &planet->cloud_layers[k]);
-        change_layers(&planet->shells);
+        change_layers(&planet->textured_desc);
     }
     c->data.planets = c->planets;
 }
@@ -421,7 +422,7 @@ static void same_density(const nebel_density *a, const nebel_density *b)
     SAME(&a->to, &b->to);
     SAME(&a->center, &b->center);
     SAME(&a->sigma, &b->sigma);
-    SAME(&a->distance, &b->distance);
+    SAME(&a->edge_width, &b->edge_width);
 }
 
 static void same_volume(const nebel_volume_desc *a, const nebel_volume_desc *b)
@@ -446,11 +447,11 @@ static void same_volumes(const nebel_scene_data *a, const nebel_scene_data *b)
 {
     WHOLE(a->volume_count, b->volume_count);
     for (size_t i = 0; i < a->volume_count; i++) {
-        const nebel_volume_entry *x = &a->volume_entries[i], *y = &b->volume_entries[i];
+        const nebel_volume_track *x = &a->volume_tracks[i], *y = &b->volume_tracks[i];
         WORD(a->volume_names[i], b->volume_names[i]);
         WHOLE(x->key_count, y->key_count);
         if (x->key_count == 0) same_volume(&a->volumes[i], &b->volumes[i]);
-        if (x->key_count > 0) same_volume(x->own, y->own);
+        if (x->key_count > 0) same_volume(x->base, y->base);
         for (size_t k = 0; k < x->key_count; k++) {
             SAME(&x->keys[k].frame, &y->keys[k].frame);
             same_volume(&x->keys[k].volume, &y->keys[k].volume);
@@ -469,12 +470,12 @@ static void same_nebulae(const nebel_scene_data *a, const nebel_scene_data *b)
         WHOLE(x->count, y->count);
         WHOLE(x->seed, y->seed);
         WHOLE(x->profile, y->profile);
-        SAME(&x->size, &y->size);
+        SAME(&x->radius_range, &y->radius_range);
         SAME(&x->absorption, &y->absorption);
         SAME(&x->emission, &y->emission);
-        SAME(&x->fade, &y->fade);
+        SAME(&x->dimming, &y->dimming);
         SAME(&x->turbulence, &y->turbulence);
-        SAME(&x->turbulence_size, &y->turbulence_size);
+        SAME(&x->turbulence_scale, &y->turbulence_scale);
         WHOLE(x->color_count, y->color_count);
         for (size_t k = 0; k < x->color_count; k++) SAME(&x->colors[k], &y->colors[k]);
     }
@@ -531,7 +532,7 @@ static void same_models(const nebel_scene_data *a, const nebel_scene_data *b)
 {
     WHOLE(a->model_count, b->model_count);
     for (size_t i = 0; i < a->model_count; i++) {
-        const nebel_model *x = &a->models[i], *y = &b->models[i];
+        const nebel_scene_model *x = &a->models[i], *y = &b->models[i];
         SAME(&x->position, &y->position);
         if (!x->is_heightfield) SAME(&x->rotation, &y->rotation);
         if (!x->is_heightfield) SAME(&x->scale, &y->scale);
@@ -545,9 +546,9 @@ static void same_models(const nebel_scene_data *a, const nebel_scene_data *b)
 /* Directions are made unit ones, which rounds all their numbers alike. */
 static void same_lamps(const nebel_scene_data *a, const nebel_scene_data *b)
 {
-    WHOLE(a->lamp_count, b->lamp_count);
-    for (size_t i = 0; i < a->lamp_count; i++) {
-        const nebel_lamp *x = &a->lamps[i], *y = &b->lamps[i];
+    WHOLE(a->light_count, b->light_count);
+    for (size_t i = 0; i < a->light_count; i++) {
+        const nebel_light *x = &a->lights[i], *y = &b->lights[i];
         SAME(&x->position, &y->position);
         SAME(&x->intensity, &y->intensity);
         SAME(&x->radius, &y->radius);
@@ -557,7 +558,7 @@ static void same_lamps(const nebel_scene_data *a, const nebel_scene_data *b)
     }
 }
 
-static void same_air(const nebel_air *a, const nebel_air *b)
+static void same_air(const nebel_atmosphere_component *a, const nebel_atmosphere_component *b)
 {
     WHOLE(a->profile, b->profile);
     SAME(&a->scattering, &b->scattering);
@@ -565,39 +566,39 @@ static void same_air(const nebel_air *a, const nebel_air *b)
     WHOLE(a->phase.type, b->phase.type);
     SAME(&a->phase.g, &b->phase.g);
     SAME(&a->scale_height, &b->scale_height);
-    SAME(&a->middle, &b->middle);
-    SAME(&a->width, &b->width);
+    SAME(&a->center_height, &b->center_height);
+    SAME(&a->half_width, &b->half_width);
 }
 
 static void same_clouds(const nebel_cloud_layer *a, const nebel_cloud_layer *b)
 {
-    WHOLE(a->kind, b->kind);
+    WHOLE(a->type, b->type);
     WHOLE(a->seed, b->seed);
     SAME(&a->base, &b->base);
     SAME(&a->top, &b->top);
     SAME(&a->coverage, &b->coverage);
     SAME(&a->extinction, &b->extinction);
-    SAME(&a->size, &b->size);
-    SAME(&a->detail, &b->detail);
-    SAME(&a->variation, &b->variation);
-    SAME(&a->diameter, &b->diameter);
+    SAME(&a->cell_size, &b->cell_size);
+    SAME(&a->erosion, &b->erosion);
+    SAME(&a->patchiness, &b->patchiness);
+    SAME(&a->droplet_diameter, &b->droplet_diameter);
     SAME(&a->wind, &b->wind);
 }
 
-static void same_shells(const nebel_layers_desc *a, const nebel_layers_desc *b)
+static void same_shells(const nebel_textured_planet_desc *a, const nebel_textured_planet_desc *b)
 {
-    SAME(&a->day, &b->day);
-    SAME(&a->coverage, &b->coverage);
-    SAME(&a->air.height, &b->air.height);
-    SAME(&a->air.brightness, &b->air.brightness);
-    WHOLE(a->air.is_absent, b->air.is_absent);
-    WHOLE(a->cloud_count, b->cloud_count);
-    for (uint32_t i = 0; i < a->cloud_count; i++) {
-        const nebel_cloud_shell *x = &a->clouds[i], *y = &b->clouds[i];
+    SAME(&a->rotation_period, &b->rotation_period);
+    SAME(&a->land_coverage, &b->land_coverage);
+    SAME(&a->atmosphere.height, &b->atmosphere.height);
+    SAME(&a->atmosphere.brightness, &b->atmosphere.brightness);
+    WHOLE(a->atmosphere.is_disabled, b->atmosphere.is_disabled);
+    WHOLE(a->cloud_shell_count, b->cloud_shell_count);
+    for (uint32_t i = 0; i < a->cloud_shell_count; i++) {
+        const nebel_cloud_shell *x = &a->cloud_shells[i], *y = &b->cloud_shells[i];
         SAME(&x->height, &y->height);
-        SAME(&x->day, &y->day);
+        SAME(&x->rotation_period, &y->rotation_period);
         SAME(&x->color, &y->color);
-        SAME(&x->wrap, &y->wrap);
+        SAME(&x->uv_tiling, &y->uv_tiling);
         SAME(&x->gain, &y->gain);
         SAME(&x->coverage, &y->coverage);
     }
@@ -609,14 +610,15 @@ static void same_planets(const nebel_scene_data *a, const nebel_scene_data *b)
     for (size_t i = 0; i < a->planet_count; i++) {
         const nebel_planet *x = &a->planets[i], *y = &b->planets[i];
         WHOLE(x->model, y->model);
-        if (x->model == NEBEL_PLANET_LAYERS) {
-            same_shells(&x->shells, &y->shells);
+        if (x->model == NEBEL_PLANET_TEXTURED) {
+            same_shells(&x->textured_desc, &y->textured_desc);
             continue;
         }
-        SAME(&x->air.ground_albedo, &y->air.ground_albedo);
-        SAME(&x->sun_diameter, &y->sun_diameter);
-        WHOLE(x->air.air_count, y->air.air_count);
-        for (uint32_t k = 0; k < x->air.air_count; k++) same_air(&x->air.airs[k], &y->air.airs[k]);
+        SAME(&x->atmosphere_desc.ground_albedo, &y->atmosphere_desc.ground_albedo);
+        SAME(&x->sun_angular_diameter, &y->sun_angular_diameter);
+        WHOLE(x->atmosphere_desc.component_count, y->atmosphere_desc.component_count);
+        for (uint32_t k = 0; k < x->atmosphere_desc.component_count; k++)
+            same_air(&x->atmosphere_desc.components[k], &y->atmosphere_desc.components[k]);
         WHOLE(x->cloud_layer_count, y->cloud_layer_count);
         for (uint32_t k = 0; k < x->cloud_layer_count; k++) same_clouds(&x->cloud_layers[k], &y->cloud_layers[k]);
     }
@@ -687,12 +689,12 @@ static void check_file(const char *name)
     copy_file(name, copy);
     c = (change){.name_count = 0};
     if (nebel_load_scene(copy, &desc, &c.scene) != NEBEL_OK) fail_msg("%s: %s", name, kept.last);
-    c.data = *nebel_scene_contents(c.scene);
+    c.data = *nebel_get_scene_data(c.scene);
     change_all(&c);
-    if (nebel_save_scene(copy, &desc, nebel_scene_contents(c.scene), &c.data, NULL) != NEBEL_OK ||
+    if (nebel_save_scene(copy, &desc, nebel_get_scene_data(c.scene), &c.data, NULL) != NEBEL_OK ||
         nebel_load_scene(copy, &desc, &again) != NEBEL_OK)
         fail_msg("%s: %s", name, kept.last);
-    same_data(nebel_scene_contents(again), &c.data);
+    same_data(nebel_get_scene_data(again), &c.data);
     nebel_destroy_scene(again);
     free_change(&c);
     unlink(copy);

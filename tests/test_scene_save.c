@@ -258,7 +258,7 @@ static void test_a_table_comes(void **state)
     d.data.classic_table = table;
     assert_int_equal(save(&d, &kept), NEBEL_OK);
     assert_int_equal(nebel_load_scene(file_path(), &(nebel_scene_desc){.log = {remember, &kept}}, &scene), NEBEL_OK);
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_int_equal(data->classic_curve, NEBEL_CURVE_TABLE);
     assert_memory_equal(data->classic_table, table, sizeof table);
     assert_true(data->classic->end == 1 && data->classic->density == 1);
@@ -272,9 +272,9 @@ static void test_models(void **state)
         open_draft(SCENE("\"unit\": 2, \"models\": [ {\"file\": \"a.obj\"}, {\"file\": \"b.obj\", \"color\": 1, "
                          "\"scale\": [1, 2, 3]}, {\"position\": [1, 2, 3], \"heightfield\": {\"file\": \"c.png\", "
                          "\"size\": [4, 5], \"height\": 6}} ], \"fog\": []"));
-    nebel_model models[2] = {d.data.models[1], d.data.models[2]};
+    nebel_scene_model models[2] = {d.data.models[1], d.data.models[2]};
     assert_int_equal(d.data.model_count, 3);
-    assert_string_equal(strrchr(models[0].file, '/'), "/b.obj");
+    assert_string_equal(strrchr(models[0].path, '/'), "/b.obj");
     models[0].has_color = 0;
     models[0].position[1] = 3;
     models[0].scale[2] = 4;
@@ -300,8 +300,8 @@ static void test_contrast_and_phase(void **state)
         SCENE("\"fog\": [{" BOX ", \"visibility\": 5}, {" BOX ", \"extinction\": 1, \"albedo\": 0.5}, {" BOX
               ", \"extinction\": 1, \"albedo\": 0.5, \"phase\": {\"type\": \"rayleigh\"}}, {" BOX
               ", \"extinction\": 1, \"albedo\": 0.5, \"phase\": {\"type\": \"draine\", \"g\": 0.1, \"alpha\": 2}}]"));
-    nebel_volume_entry entries[4];
-    for (int i = 0; i < 4; i++) entries[i] = d.data.volume_entries[i];
+    nebel_volume_track entries[4];
+    for (int i = 0; i < 4; i++) entries[i] = d.data.volume_tracks[i];
     assert_int_equal(d.volumes[2].phase.type, NEBEL_PHASE_RAYLEIGH);
     assert_int_equal(d.volumes[3].phase.type, NEBEL_PHASE_DRAINE);
     assert_true(d.volumes[3].phase.g == .1 && d.volumes[3].phase.alpha == 2);
@@ -333,7 +333,7 @@ static void test_keys_come_change_and_go(void **state)
               "\"frame\": 24, \"shape\": { \"max\": [1, 2.5, 8], \"transform\": { \"position\": [2, 0, 0] } }, "
               "\"extinction\": 4, \"source\": 0.5 }]}]");
     nebel_volume_key keys[3];
-    nebel_volume_entry entry = {.contrast = .05, .keys = keys, .key_count = 2};
+    nebel_volume_track entry = {.contrast = .05, .keys = keys, .key_count = 2};
     draft d = open_draft(still);
     nebel_volume_desc own = d.volumes[0];
     keys[0] = (nebel_volume_key){0, own};
@@ -341,11 +341,11 @@ static void test_keys_come_change_and_go(void **state)
     keys[1].volume.shape.max[1] = 4;
     keys[1].volume.shape.transform.position[0] = 1;
     for (int c = 0; c < 3; c++) keys[1].volume.extinction[c] = 8, keys[1].volume.source[c] = .5;
-    entry.own = &own;
+    entry.base = &own;
     d.entries = &entry;
     check_saved(&d, moving);
     d = open_draft(moving);
-    entry = d.data.volume_entries[0];
+    entry = d.data.volume_tracks[0];
     assert_int_equal(entry.key_count, 2);
     keys[0] = entry.keys[0];
     keys[1] = entry.keys[1];
@@ -361,8 +361,8 @@ static void test_keys_come_change_and_go(void **state)
                       "\"transform\": { \"position\": [2, 0, 0] } }, \"extinction\": 4, \"source\": 0.5 }, { "
                       "\"frame\": 30.5, \"emission\": [1, 0, 0] }]}]"));
     d = open_draft(moving);
-    entry = (nebel_volume_entry){.contrast = .05};
-    d.volumes[0] = *d.data.volume_entries[0].own;
+    entry = (nebel_volume_track){.contrast = .05};
+    d.volumes[0] = *d.data.volume_tracks[0].base;
     d.entries = &entry;
     check_saved(&d, still);
 }
@@ -374,7 +374,7 @@ static void test_keys_keep_their_words_and_lines(void **state)
                                ", \"visibility\": 30, \"keys\": [ {\"frame\": 1, \"visibility\": 20 /* thick */},\n"
                                "    {\"frame\": 2}, {\"frame\": 3, \"source\": \"#fff\"}]}]"));
     nebel_volume_key keys[3];
-    nebel_volume_entry entry = d.data.volume_entries[0];
+    nebel_volume_track entry = d.data.volume_tracks[0];
     keys[0] = entry.keys[0];
     keys[1] = entry.keys[1];
     keys[2] = entry.keys[2];
@@ -393,9 +393,9 @@ static void test_keys_with_an_albedo(void **state)
     draft d = open_draft(SCENE("\"fog\": [" THIN "]"));
     nebel_volume_desc own = d.volumes[0];
     nebel_volume_key key = {5, own};
-    const nebel_volume_entry entry = {.contrast = .05, .keys = &key, .key_count = 1, .own = &own};
+    const nebel_volume_track entry = {.contrast = .05, .keys = &key, .key_count = 1, .base = &own};
     key.volume.albedo[0] = key.volume.albedo[1] = key.volume.albedo[2] = .5;
-    nebel_volume_entry entries[1] = {entry};
+    nebel_volume_track entries[1] = {entry};
     d.entries = entries;
     check_saved(&d, SCENE("\"fog\": [{" BOX ", \"extinction\": 0.1, \"keys\": [{ \"frame\": 5, \"albedo\": 0.5 }], "
                           "\"albedo\": 0}]"));
@@ -589,9 +589,9 @@ static void test_nebulae(void **state)
     d.nebulae[0].shape.radius = 3;
     d.nebulae[0].count = 20;
     d.nebulae[0].seed = 7;
-    d.nebulae[0].size[1] = .5;
-    d.nebulae[0].profile = NEBEL_PARTICLE_BALL;
-    d.nebulae[0].turbulence_size = 0;
+    d.nebulae[0].radius_range[1] = .5;
+    d.nebulae[0].profile = NEBEL_PARTICLE_UNIFORM;
+    d.nebulae[0].turbulence_scale = 0;
     for (int c = 0; c < 3; c++) d.nebulae[0].emission[c] = 10;
     check_saved(&d, SCENE("\"max_opacity\": 0.75, \"unit\": 0.1, \"fog\": [], \"nebula\": [ {\"shape\": {\"type\": "
                           "\"sphere\", \"center\": [0, 0, 0], \"radius\": 30}, \"count\": 20, \"turbulence\": 3, "
@@ -630,10 +630,10 @@ static void test_noise(void **state)
     draft d = open_draft(NOISE("[1, 1, 1]", ""));
     nebel_grid *grid = d.volumes[0].density.grid, *changed;
     nebel_scene_noise noise;
-    assert_true(nebel_find_scene_noise(d.scene, grid, &noise));
-    noise.desc.cells[1] = 2;
-    noise.drift[0] = .25;
-    assert_int_equal(nebel_change_scene_noise(d.scene, grid, &noise, &changed), NEBEL_OK);
+    assert_true(nebel_get_scene_noise(d.scene, grid, &noise));
+    noise.desc.frequency[1] = 2;
+    noise.velocity[0] = .25;
+    assert_int_equal(nebel_update_scene_noise(d.scene, grid, &noise, &changed), NEBEL_OK);
     d.volumes[0].density.grid = changed;
     check_saved(&d, NOISE("[1, 2, 1]", ", \"drift\": [0.25, 0, 0]"));
     nebel_release_grid(changed);
@@ -739,16 +739,16 @@ static void test_memory_runs_out(void **state)
         d.names[1] = "a \"new\" one";
         const nebel_volume_desc own = d.volumes[0];
         const nebel_volume_key key = {1, own};
-        const nebel_volume_entry entries[2] = {d.data.volume_entries[0],
-                                               {.contrast = .02, .own = &own, .keys = &key, .key_count = 1}};
-        d.data.volume_entries = entries;
+        const nebel_volume_track entries[2] = {d.data.volume_tracks[0],
+                                               {.contrast = .02, .base = &own, .keys = &key, .key_count = 1}};
+        d.data.volume_tracks = entries;
         d.data.classic = &(nebel_factor_desc){.density = 1};
         d.data.has_sun = 1;
         d.data.sun_direction[1] = 1;
         d.data.volumes = d.volumes;
         d.data.volume_names = d.names;
         d.data.volume_count = 2;
-        const nebel_result result = nebel_save_scene(file_path(), &desc, nebel_scene_contents(d.scene), &d.data,
+        const nebel_result result = nebel_save_scene(file_path(), &desc, nebel_get_scene_data(d.scene), &d.data,
                                                      (const size_t[]){0, NEBEL_NEW_VOLUME});
         assert_int_equal(m.live, 0);
         nebel_destroy_scene(d.scene);

@@ -24,7 +24,7 @@ static void test_layers_of_no_coverage_are_passed_over(void **state)
                                   "{ /* thin */ \"kind\": \"cirrus\" }"));
     assert_int_equal(planets[0].cloud_layer_count, 2);
     planets[0].cloud_layers[0].top = 2500;
-    planets[0].cloud_layers[1].detail = NEBEL_CLOUD_NONE;
+    planets[0].cloud_layers[1].erosion = NEBEL_CLOUD_NONE;
     planets[0].cloud_layers[1].extinction = .002;
     check_saved(&d, CLOUDS("{\"coverage\": 0}, {\"top\": 250}, {\"kind\": \"cirrus\", \"coverage\": 0}, "
                            "{ /* thin */ \"kind\": \"cirrus\", \"extinction\": 0.02, \"detail\": 0 }"));
@@ -35,9 +35,9 @@ static void test_an_empty_layer(void **state)
 {
     (void)state;
     draft d = open_planets(CLOUDS("{}"));
-    assert_int_equal(
-        nebel_resolve_cloud_layer(planets[0].air.thickness, planets[0].cloud_layers, NULL, planets[0].cloud_layers),
-        NEBEL_OK);
+    assert_int_equal(nebel_resolve_cloud_layer(planets[0].atmosphere_desc.thickness, planets[0].cloud_layers, NULL,
+                                               planets[0].cloud_layers),
+                     NEBEL_OK);
     check_saved(&d, CLOUDS("{}"));
     d = open_planets(CLOUDS("{}"));
     planets[0].cloud_layers[0].coverage = .25;
@@ -50,15 +50,16 @@ static void test_airs(void **state)
 {
     (void)state;
     draft d = open_planets(PLANET("{\"model\": \"physical\", \"preset\": \"moon\", \"ground_albedo\": 0.5}"));
-    planets[0].air.airs[0].scattering[1] = .001;
-    planets[0].air.airs[0].scale_height = 3000;
+    planets[0].atmosphere_desc.components[0].scattering[1] = .001;
+    planets[0].atmosphere_desc.components[0].scale_height = 3000;
     check_saved(&d, PLANET("{\"model\": \"physical\", \"preset\": \"moon\", \"ground_albedo\": 0.5, \"airs\": [{ "
                            "\"type\": \"exponential\", \"phase\": { \"type\": \"isotropic\" }, \"scattering\": [0, "
                            "0.01, 0], \"absorption\": 0, \"scale_height\": 300 }]}"));
     d = open_planets(
         PLANET("{\"model\": \"physical\", \"airs\": [ {\"type\": \"exponential\", \"scale_height\": 800} ]}"));
-    planets[0].air.airs[0].phase = (nebel_phase){.type = NEBEL_PHASE_RAYLEIGH};
-    planets[0].air.ground_albedo[0] = planets[0].air.ground_albedo[1] = planets[0].air.ground_albedo[2] = 1;
+    planets[0].atmosphere_desc.components[0].phase = (nebel_phase){.type = NEBEL_PHASE_RAYLEIGH};
+    planets[0].atmosphere_desc.ground_albedo[0] = planets[0].atmosphere_desc.ground_albedo[1] =
+        planets[0].atmosphere_desc.ground_albedo[2] = 1;
     check_saved(&d, PLANET("{\"model\": \"physical\", \"airs\": [ {\"type\": \"exponential\", \"scale_height\": 800, "
                            "\"phase\": { \"type\": \"rayleigh\" }} ], \"ground_albedo\": 1}"));
 }

@@ -221,15 +221,15 @@ static void write_file(const char *name, const char *text)
 
 static nebel_grid *first_grid(const nebel_scene *scene)
 {
-    return nebel_scene_contents(scene)->volumes[0].density.grid;
+    return nebel_get_scene_data(scene)->volumes[0].density.grid;
 }
 
 static void assert_same_noise(const nebel_scene_noise *got, const nebel_scene_noise *wanted)
 {
     for (int k = 0; k < 3; k++) assert_int_equal(got->desc.size[k], wanted->desc.size[k]);
-    assert_same(got->desc.cells, wanted->desc.cells, 3, 1);
-    assert_same(got->desc.edge, wanted->desc.edge, 3, 1);
-    assert_same(got->drift, wanted->drift, 3, 1);
+    assert_same(got->desc.frequency, wanted->desc.frequency, 3, 1);
+    assert_same(got->desc.falloff, wanted->desc.falloff, 3, 1);
+    assert_same(got->velocity, wanted->velocity, 3, 1);
 }
 
 /* The voxels of two grids, by fog in them. */
@@ -263,18 +263,18 @@ static void test_noise(void **state)
     nebel_grid *changed, *same;
     nebel_scene *ours_too = parse_in(BOX_IN "\"source\": 1, \"density\": " NOISE "}]}", &ours);
     for (int i = 0; i < 2; i++) trace_at(ours_too, 3 * i, wanted[i]);
-    assert_true(nebel_find_scene_noise(ours_too, first_grid(ours_too), &noise));
-    noise.drift[2] = .75;
-    noise.desc.cells[1] = 3;
-    assert_int_equal(nebel_change_scene_noise(ours_too, first_grid(ours_too), &noise, &changed), NEBEL_OK);
+    assert_true(nebel_get_scene_noise(ours_too, first_grid(ours_too), &noise));
+    noise.velocity[2] = .75;
+    noise.desc.frequency[1] = 3;
+    assert_int_equal(nebel_update_scene_noise(ours_too, first_grid(ours_too), &noise, &changed), NEBEL_OK);
     for (size_t k = 0; k < sizeof others / sizeof *others; k++) {
         nebel_scene *scene = parse_in(BOX_IN "\"source\": 1, \"density\": " NOISE "}]}", &others[k]);
         for (int i = 0; i < 2; i++) {
             trace_at(scene, 3 * i, got);
             for (int r = 0; r < RAYS; r++) assert_same(got[r].transmittance, wanted[i][r].transmittance, 3, 1);
         }
-        assert_int_equal(nebel_change_scene_noise(scene, first_grid(scene), &noise, &same), NEBEL_OK);
-        assert_true(nebel_find_scene_noise(scene, same, &there));
+        assert_int_equal(nebel_update_scene_noise(scene, first_grid(scene), &noise, &same), NEBEL_OK);
+        assert_true(nebel_get_scene_noise(scene, same, &there));
         assert_same_noise(&there, &noise);
         assert_same_grid(same, changed);
         nebel_release_grid(same);
@@ -387,15 +387,16 @@ static void test_cameras_and_sun(void **state)
     for (size_t k = 0; k < sizeof others / sizeof *others; k++) {
         nebel_scene *scenes[4] = {parse_in(full, &ours), parse_in(full, &others[k]), parse_in(bare, &ours),
                                   parse_in(bare, &others[k])};
-        const nebel_scene_data *wanted = nebel_scene_contents(scenes[0]), *got = nebel_scene_contents(scenes[1]);
+        const nebel_scene_data *wanted = nebel_get_scene_data(scenes[0]), *got = nebel_get_scene_data(scenes[1]);
         assert_same(got->sun_direction, wanted->sun_direction, 3, 1);
         assert_same(got->sun_irradiance, wanted->sun_irradiance, 3, 1);
         assert_same_camera(&got->camera, &wanted->camera);
         for (int frame = 0; frame <= 10; frame += 5) {
-            const nebel_camera a = nebel_scene_camera(scenes[1], frame), b = nebel_scene_camera(scenes[0], frame);
+            const nebel_camera a = nebel_get_scene_camera(scenes[1], frame),
+                               b = nebel_get_scene_camera(scenes[0], frame);
             assert_same_camera(&a, &b);
         }
-        wanted = nebel_scene_contents(scenes[2]), got = nebel_scene_contents(scenes[3]);
+        wanted = nebel_get_scene_data(scenes[2]), got = nebel_get_scene_data(scenes[3]);
         if (others[k].unit < 1) assert_same_view(&got->camera, &wanted->camera);
         if (others[k].unit < 1) assert_same_view(&got->camera_keys[0].camera, &wanted->camera_keys[0].camera);
         for (int i = 0; i < 4; i++) nebel_destroy_scene(scenes[i]);
@@ -406,7 +407,7 @@ static void test_a_scene_without_camera_has_the_usual_one(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_in("\"fog\": [], \"camera\": {\"vertical_fov\": 50}}", &others[2]);
-    const nebel_camera *camera = &nebel_scene_contents(scene)->camera;
+    const nebel_camera *camera = &nebel_get_scene_data(scene)->camera;
     const double position[3] = {0, 1.7, 0}, ahead[3] = {0, 1.7, -1}, up[3] = {0, 1, 0}, height = 10;
     assert_same(camera->position, position, 3, 1);
     assert_same(camera->look_at, ahead, 3, 1);
@@ -418,8 +419,8 @@ static void test_a_scene_without_camera_has_the_usual_one(void **state)
 static void load_mesh(nebel_scene *scene, double places[3][3])
 {
     assert_int_equal(nebel_load_scene_models(scene), NEBEL_OK);
-    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
-    assert_int_equal(nebel_scene_contents(scene)->mesh_count, 1);
+    const nebel_mesh *mesh = nebel_get_scene_data(scene)->meshes;
+    assert_int_equal(nebel_get_scene_data(scene)->mesh_count, 1);
     for (uint32_t i = 0; i < 3; i++)
         for (uint32_t k = 0; k < 3; k++)
             places[i][k] = mesh->origin[k] + (double)mesh->positions[3 * mesh->indices[i] + k];

@@ -14,11 +14,11 @@ static void test_what_a_key_leaves_out_it_takes_from_the_sun(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good(SCENE(TWO, EMPTY));
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_int_equal(data->sun_key_count, 2);
     assert_vector(data->sun_direction, 0, 1, 0);
-    const nebel_sun first = nebel_scene_sun(scene, -1e9), middle = nebel_scene_sun(scene, 20),
-                    last = nebel_scene_sun(scene, HUGE_VAL);
+    const nebel_sun first = nebel_get_scene_sun(scene, -1e9), middle = nebel_get_scene_sun(scene, 20),
+                    last = nebel_get_scene_sun(scene, HUGE_VAL);
     assert_vector(first.direction, 0, 1, 0);
     assert_vector(first.irradiance, 4, 3, 2);
     assert_vector(middle.direction, sqrt(.5), sqrt(.5), 0);
@@ -36,22 +36,22 @@ static void test_it_is_somewhere_at_every_frame(void **state)
         "\"direction\": [0, 0, 1]}, {\"frame\": 9, \"direction\": [1e-9, 0, -1]}]",
         EMPTY));
     for (int i = -10; i <= 100; i++) {
-        const nebel_sun sun = nebel_scene_sun(scene, i / 10.);
+        const nebel_sun sun = nebel_get_scene_sun(scene, i / 10.);
         assert_near(sqrt(pow(sun.direction[0], 2) + pow(sun.direction[1], 2) + pow(sun.direction[2], 2)), 1, 1e-12);
         assert_true(sun.irradiance[0] >= 0 && sun.irradiance[0] <= 4);
     }
     nebel_destroy_scene(scene);
     /* Halfway between opposite directions there is none: it stands where it stood. */
     scene = parse_good(SCENE(", \"keys\": [{\"frame\": 0}, {\"frame\": 2, \"direction\": [0, -1, 0]}]", EMPTY));
-    assert_vector(nebel_scene_sun(scene, 0.5).direction, 0, 1, 0);
-    assert_true(fabs(nebel_scene_sun(scene, 1).direction[1]) == 1);
-    assert_vector(nebel_scene_sun(scene, 1.5).direction, 0, -1, 0);
+    assert_vector(nebel_get_scene_sun(scene, 0.5).direction, 0, 1, 0);
+    assert_true(fabs(nebel_get_scene_sun(scene, 1).direction[1]) == 1);
+    assert_vector(nebel_get_scene_sun(scene, 1.5).direction, 0, -1, 0);
     nebel_destroy_scene(scene);
     scene = parse_good("{\"nebel\": 1, \"fog\": []}");
-    assert_vector(nebel_scene_sun(scene, 3).irradiance, 0, 0, 0);
-    assert_int_equal(nebel_light_scene_at(scene, 3), NEBEL_OK);
-    assert_int_equal(nebel_scene_contents(scene)->has_sun, 0);
-    assert_int_equal(nebel_light_scene_at(NULL, 3), NEBEL_ERROR_ARGUMENT);
+    assert_vector(nebel_get_scene_sun(scene, 3).irradiance, 0, 0, 0);
+    assert_int_equal(nebel_set_scene_frame(scene, 3), NEBEL_OK);
+    assert_int_equal(nebel_get_scene_data(scene)->has_sun, 0);
+    assert_int_equal(nebel_set_scene_frame(NULL, 3), NEBEL_ERROR_ARGUMENT);
     nebel_destroy_scene(scene);
 }
 
@@ -63,7 +63,7 @@ static void test_it_lights_fog(void **state)
                               "\"extinction\": 1, \"albedo\": 1}]"));
     for (int i = 0; i < 3; i++) {
         nebel_snapshot *moved, *standing;
-        const nebel_sun sun = nebel_scene_sun(scene, 10 + 10 * i);
+        const nebel_sun sun = nebel_get_scene_sun(scene, 10 + 10 * i);
         char text[400];
         (void)snprintf(text, sizeof text,
                        "{\"nebel\": 1, \"sun\": {\"direction\": [%.17g, %.17g, 0], \"irradiance\": [%.17g, 3, %.17g]}, "
@@ -71,7 +71,7 @@ static void test_it_lights_fog(void **state)
                        "\"extinction\": 1, \"albedo\": 1}]}",
                        sun.direction[0], sun.direction[1], sun.irradiance[0], sun.irradiance[2]);
         nebel_scene *other = parse_good(text);
-        assert_int_equal(nebel_light_scene_at(scene, 10 + 10 * i), NEBEL_OK);
+        assert_int_equal(nebel_set_scene_frame(scene, 10 + 10 * i), NEBEL_OK);
         assert_int_equal(nebel_commit_scene_fog(scene, &moved), NEBEL_OK);
         assert_int_equal(nebel_commit_scene_fog(other, &standing), NEBEL_OK);
         const nebel_ray ray = {{.3, 0, 5}, {0, .05, -1}, (double)INFINITY};
@@ -97,19 +97,19 @@ static void test_it_lights_the_air_of_a_planet(void **state)
     const double up[3] = {0, 1, 0};
     double noon[3], dusk[3], wanted[3];
     nebel_snapshot *before;
-    assert_int_equal(nebel_light_scene_at(scene, 10), NEBEL_OK);
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
-    assert_int_equal(nebel_load_scene_planet(low), NEBEL_OK);
-    const nebel_scene_data *data = nebel_scene_contents(scene);
+    assert_int_equal(nebel_set_scene_frame(scene, 10), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planets(low), NEBEL_OK);
+    const nebel_scene_data *data = nebel_get_scene_data(scene);
     const double left = data->planets[0].sun_left[2];
-    nebel_environment_radiance(&data->environment, up, noon);
+    nebel_evaluate_environment(&data->environment, up, noon);
     assert_int_equal(nebel_commit_scene_fog(scene, &before), NEBEL_OK);
-    assert_int_equal(nebel_light_scene_at(scene, 30), NEBEL_OK);
-    nebel_environment_radiance(&data->environment, up, dusk);
-    nebel_environment_radiance(&nebel_scene_contents(low)->environment, up, wanted);
+    assert_int_equal(nebel_set_scene_frame(scene, 30), NEBEL_OK);
+    nebel_evaluate_environment(&data->environment, up, dusk);
+    nebel_evaluate_environment(&nebel_get_scene_data(low)->environment, up, wanted);
     assert_true(data->planets[0].sun_left[2] < .5 * left);
     for (int c = 0; c < 3; c++) {
-        assert_near(data->planets[0].sun_left[c], nebel_scene_contents(low)->planets[0].sun_left[c], 1e-12);
+        assert_near(data->planets[0].sun_left[c], nebel_get_scene_data(low)->planets[0].sun_left[c], 1e-12);
         assert_near(dusk[c], wanted[c], 1e-12);
     }
     assert_true(fabs(dusk[1] - noon[1]) > .1 * noon[1]);
@@ -131,13 +131,13 @@ static void test_any_sun_lights_a_planet(void **state)
         nebel_scene *const wanted = parse_good(text);
         (void)snprintf(text, sizeof text, "{\"nebel\": 1, \"fog\": []%s%s}", suns[1 - i], TOY);
         nebel_scene *const scene = parse_good(text);
-        assert_int_equal(nebel_load_scene_planet(wanted), NEBEL_OK);
-        assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
-        assert_int_equal(nebel_light_scene_by(scene, i == 0 ? &bright : NULL), NEBEL_OK);
-        const nebel_scene_data *const a = nebel_scene_contents(wanted), *const b = nebel_scene_contents(scene);
+        assert_int_equal(nebel_load_scene_planets(wanted), NEBEL_OK);
+        assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
+        assert_int_equal(nebel_set_scene_sun(scene, i == 0 ? &bright : NULL), NEBEL_OK);
+        const nebel_scene_data *const a = nebel_get_scene_data(wanted), *const b = nebel_get_scene_data(scene);
         double sky[2][3];
-        nebel_environment_radiance(&a->environment, up, sky[0]);
-        nebel_environment_radiance(&b->environment, up, sky[1]);
+        nebel_evaluate_environment(&a->environment, up, sky[0]);
+        nebel_evaluate_environment(&b->environment, up, sky[1]);
         assert_int_equal(b->has_sun, i == 0);
         assert_true((sky[0][2] > 0) == (i == 0));
         for (int c = 0; c < 3; c++) {
@@ -153,16 +153,16 @@ static void test_suns_that_are_none(void **state)
 {
     (void)state;
     nebel_scene *const scene = parse_good(SCENE(TWO, EMPTY));
-    const nebel_sun before = nebel_scene_sun(scene, 0);
+    const nebel_sun before = nebel_get_scene_sun(scene, 0);
     static const nebel_sun suns[] = {{{0, 0, 0}, {1, 1, 1}},
                                      {{0, (double)NAN, 0}, {1, 1, 1}},
                                      {{0, 1e200, 0}, {1, 1, 1}},
                                      {{0, 1, 0}, {1, -1, 1}},
                                      {{0, 1, 0}, {1, 1, (double)INFINITY}}};
     for (size_t i = 0; i < sizeof suns / sizeof *suns; i++)
-        assert_int_equal(nebel_light_scene_by(scene, &suns[i]), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_light_scene_by(NULL, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_memory_equal(nebel_scene_contents(scene)->sun_direction, before.direction, sizeof before.direction);
+        assert_int_equal(nebel_set_scene_sun(scene, &suns[i]), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_scene_sun(NULL, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_memory_equal(nebel_get_scene_data(scene)->sun_direction, before.direction, sizeof before.direction);
     nebel_destroy_scene(scene);
 }
 
@@ -194,16 +194,16 @@ static void test_without_memory(void **state)
     nebel_scene *scene = NULL;
     const nebel_scene_desc desc = metered_desc(&m, &kept);
     assert_int_equal(nebel_parse_scene(text, strlen(text), "-", &desc, &scene), NEBEL_OK);
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
-    const nebel_environment_map *map = nebel_scene_contents(scene)->environment.map;
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
+    const nebel_environment_map *map = nebel_get_scene_data(scene)->environment.map;
     nebel_result result = NEBEL_ERROR_MEMORY;
     for (long calls = 0; result != NEBEL_OK; calls++) {
         assert_true(calls < 40);
         m.fail_at = m.made + calls;
-        result = nebel_light_scene_at(scene, 20);
+        result = nebel_set_scene_frame(scene, 20);
         if (result == NEBEL_OK) break;
         assert_int_equal(result, NEBEL_ERROR_MEMORY);
-        assert_ptr_equal(nebel_scene_contents(scene)->environment.map, map);
+        assert_ptr_equal(nebel_get_scene_data(scene)->environment.map, map);
     }
     nebel_destroy_scene(scene);
     assert_int_equal(m.live, 0);

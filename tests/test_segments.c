@@ -47,7 +47,7 @@ static void transmit(const nebel_snapshot *snapshot, nebel_isa isa, int channel,
                      float out[COUNT])
 {
     for (int i = 0; i < COUNT; i++) out[i] = -7;
-    assert_int_equal(nebel_transmit_segments(snapshot, isa, channel, COUNT, segments, out, 0), NEBEL_OK);
+    assert_int_equal(nebel_compute_segment_transmittance(snapshot, isa, channel, COUNT, segments, out, 0), NEBEL_OK);
     for (int i = 0; i < COUNT; i++) assert_true(out[i] >= 0 && out[i] <= 1);
 }
 
@@ -158,8 +158,9 @@ static void test_strides_and_instruction_sets_change_no_bit(void **unused)
             transmit(snapshot, (nebel_isa)isa, 2, &packed, out);
             assert_memory_equal(out, expected, sizeof out);
             memset(wide_out, 0x55, sizeof wide_out);
-            assert_int_equal(nebel_transmit_segments(snapshot, (nebel_isa)isa, 2, COUNT, &spread, wide_out[0], 12),
-                             NEBEL_OK);
+            assert_int_equal(
+                nebel_compute_segment_transmittance(snapshot, (nebel_isa)isa, 2, COUNT, &spread, wide_out[0], 12),
+                NEBEL_OK);
             for (int i = 0; i < COUNT; i++) {
                 assert_memory_equal(&wide_out[i][0], &expected[i], sizeof expected[i]);
                 for (int k = 1; k < 3; k++) assert_true(((unsigned char *)&wide_out[i][k])[0] == 0x55);
@@ -233,7 +234,8 @@ static void test_nothing_is_written_beyond_the_last_segment(void **unused)
     for (size_t n = 0; n < COUNT; n++) {
         float out[COUNT + 1];
         for (int i = 0; i <= COUNT; i++) out[i] = -7;
-        assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, n, &segments, out, 0), NEBEL_OK);
+        assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, n, &segments, out, 0),
+                         NEBEL_OK);
         for (size_t i = 0; i <= COUNT; i++) assert_true((out[i] == -7) == (i >= n));
     }
     nebel_release_snapshot(snapshot);
@@ -252,7 +254,8 @@ static void test_long_segments_cross_all_fog(void **unused)
         const float from[3] = {-4, 0, 0}, to[4][3] = {{4, 0, 0}, {1e6f, 0, 0}, {1e16f, 0, 0}, {1e18f, 0, 0}};
         const nebel_segments segments = {.from = from, .to = to[0]};
         float out[4];
-        assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, 4, &segments, out, 0), NEBEL_OK);
+        assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 4, &segments, out, 0),
+                         NEBEL_OK);
         for (int i = 0; i < 4; i++) assert_true(fabs((double)out[i] - exp(-1)) < 1e-6);
         nebel_release_snapshot(snapshot);
     }
@@ -270,19 +273,19 @@ static void test_segments_beyond_the_limits_are_refused_by_number(void **unused)
     nebel_segments segments = {.from = from.at[0], .from_stride = 12, .to = to.at[0]};
     float out[COUNT];
     from.at[101][1] = 1e20f;
-    assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, COUNT, &segments, out, 0),
+    assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, COUNT, &segments, out, 0),
                      NEBEL_ERROR_ARGUMENT);
     assert_non_null(strstr(messages.text, "segment 101"));
     const double origins[] = {(double)NAN, HUGE_VAL, -1.1e15};
     for (int i = 0; i < 3; i++) {
         segments.origin[i] = origins[i];
-        assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &segments, out, 0),
+        assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &segments, out, 0),
                          NEBEL_ERROR_ARGUMENT);
         assert_non_null(strstr(messages.text, "origin"));
         segments.origin[i] = 0;
     }
     segments.to_stride = 3;
-    assert_int_equal(nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &segments, out, 0),
+    assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &segments, out, 0),
                      NEBEL_ERROR_ARGUMENT);
     assert_int_equal(messages.count, 5);
     nebel_release_snapshot(snapshot);

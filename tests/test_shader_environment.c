@@ -40,10 +40,10 @@ static nebel_snapshot *commit(const nebel_environment *sky, size_t count, const 
     return snapshot;
 }
 
-static nebel_word *pack(const nebel_snapshot *snapshot, int surfaces, size_t *count)
+static nebel_texel_f32 *pack(const nebel_snapshot *snapshot, int surfaces, size_t *count)
 {
     assert_int_equal(nebel_pack_environment(snapshot, surfaces, NULL, 0, count), NEBEL_OK);
-    nebel_word *words = malloc((*count + 1) * sizeof *words);
+    nebel_texel_f32 *words = malloc((*count + 1) * sizeof *words);
     assert_non_null(words);
     memset(words, 0xff, (*count + 1) * sizeof *words); /* NaN wherever nothing is written */
     assert_int_equal(nebel_pack_environment(snapshot, surfaces, words, *count, count), NEBEL_OK);
@@ -61,12 +61,12 @@ static void media_name_their_filters(void **state)
     static const double g[] = {0.5, 0.3, 0.5, 0.3};
     size_t count, fog_count;
     nebel_snapshot *fog = commit(&dusk, 4, g, (nebel_log){0});
-    nebel_word *words = pack(fog, 0, &count), packed[64];
+    nebel_texel_f32 *words = pack(fog, 0, &count), packed[64];
     assert_int_equal(count, NB_ENVIRONMENT_WORDS + 2 * (1 + NB_FILTER_PIECES));
     assert_int_equal(nebel_pack_fog(fog, (const double[3]){1, 2, 3}, packed, 64, &fog_count), NEBEL_OK);
     int used[2] = {0, 0}, none = 0;
     for (int i = 0; i < 4; i++) {
-        const nebel_word *medium = &packed[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS];
+        const nebel_texel_f32 *medium = &packed[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS];
         const int filter = (int)medium[NB_MEDIUM_FILTER].v[3];
         none += filter == 0;
         if (filter == 0) continue;
@@ -93,13 +93,13 @@ static void maps_bring_what_surfaces_want(void **state)
     nebel_environment_map *map = make_map();
     const nebel_environment sky = {.type = NEBEL_ENVIRONMENT_MAP, .map = map, .rotation = 90, .intensity = 3};
     nebel_snapshot *fog = commit(&sky, 2, g, (nebel_log){0});
-    nebel_word *filter = pack(fog, 0, &alone), *all = pack(fog, 1, &count);
+    nebel_texel_f32 *filter = pack(fog, 0, &alone), *all = pack(fog, 1, &count);
     assert_true(count > alone + PIXELS);
     assert_memory_equal(filter + NB_ENVIRONMENT_WORDS, all + NB_ENVIRONMENT_WORDS,
                         (alone - NB_ENVIRONMENT_WORDS) * sizeof *all);
     assert_true(filter[1].v[0] == 0 && (size_t)all[1].v[0] == alone);
     assert_true(fabsf(all[0].v[1]) < 1e-6F && fabsf(all[0].v[2] - 1) < 1e-6F && all[0].v[3] == 3);
-    const nebel_word *picture = &all[(size_t)all[1].v[1]];
+    const nebel_texel_f32 *picture = &all[(size_t)all[1].v[1]];
     assert_true(picture->v[0] == 2 * HEIGHT && picture->v[1] == HEIGHT);
     for (int i = 0; i < PIXELS; i++)
         for (int c = 0; c < 3; c++) assert_true(picture[1 + i].v[c] == (float)(3 * i + c));
@@ -130,10 +130,10 @@ static void what_is_the_same(void **state)
     enum { FOGS = sizeof fogs / sizeof *fogs };
     for (int i = 0; i < FOGS; i++)
         for (int k = 0; k < FOGS; k++)
-            assert_int_equal(nebel_same_environment(fogs[i], fogs[k]), i == k || (i < 2 && k < 2));
+            assert_int_equal(nebel_is_same_environment(fogs[i], fogs[k]), i == k || (i < 2 && k < 2));
     assert_int_equal(nebel_pack_environment(fogs[FOGS - 1], 0, NULL, 0, &count), NEBEL_OK);
     assert_int_equal(count, 0);
-    nebel_word *words = pack(fogs[FOGS - 1], 1, &count);
+    nebel_texel_f32 *words = pack(fogs[FOGS - 1], 1, &count);
     assert_int_equal(count, NB_ENVIRONMENT_WORDS);
     assert_true((int)words[0].v[0] == NB_ENVIRONMENT_CONSTANT && words[1].v[2] == 0.2F);
     assert_false(nebel_pack_features(fogs[FOGS - 1]) & NEBEL_FEATURE_ENVIRONMENT);
@@ -147,7 +147,7 @@ static void bad_input_is_refused(void **state)
     (void)state;
     static const double g[] = {0.2, 0};
     fog_messages messages = {0};
-    nebel_word word = {{77, 0, 0, 0}};
+    nebel_texel_f32 word = {{77, 0, 0, 0}};
     size_t count = 0;
     nebel_snapshot *fog = commit(&dusk, 2, g, fog_messages_log(&messages));
     assert_int_equal(nebel_pack_environment(NULL, 0, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);

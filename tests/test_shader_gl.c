@@ -15,10 +15,10 @@
 
 /* All that NEBEL_FEATURES may name but what lights fog and voxels, which take drivers most of a minute to compile: the random
  * fog here has none of them. test_shader_grid_gl tries the whole text. */
-#define UNLIT "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 17301503\n"
+#define UNLIT "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES 17301503\n"
 
 /* And but bodies of several leaves, which take half of the rest. */
-#define UNGROUPED "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 17301375\n"
+#define UNGROUPED "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES 17301375\n"
 
 /* ---- random scenes --------------------------------------------------------------------------- */
 
@@ -47,7 +47,8 @@ static void test_soft_edges_in_haze(void **unused)
         random_fog_make(&fog, RANDOM_FOG_OVERLAP, seed);
         fog.count = 2;
         fog.max_opacity = 0;
-        fog.volumes[1].density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = .3 + (double)(seed % 7)};
+        fog.volumes[1].density =
+            (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = .3 + (double)(seed % 7)};
         char name[32];
         snprintf(name, sizeof name, "soft shape %d", (int)fog.volumes[1].shape.type);
         if (fog.volumes[1].shape.type != NEBEL_SHAPE_WORLD) try_fog(&t, name, seed);
@@ -71,7 +72,7 @@ static void test_priorities_among_many(void **unused)
     (void)unused;
     for (int slots = 8; slots <= 32; slots *= 4) {
         char defines[128];
-        snprintf(defines, sizeof defines, UNLIT "#define NEBEL_SLOTS %d\n", slots);
+        snprintf(defines, sizeof defines, UNLIT "#define NEBEL_MEDIUM_SLOTS %d\n", slots);
         tracer t;
         open_tracer(&t, NB_GL_330, TEXTURE, defines, trace_body);
         for (uint64_t seed = 0; seed < 8; seed++) {
@@ -90,7 +91,7 @@ static void test_rays_to_a_light_know_no_distances(void **unused)
     (void)unused;
     tracer t;
     open_tracer(&t, NB_GL_300ES, TEXTURE, UNGROUPED,
-                "out0 = vec4(nebel_transmit_light(in0.xyz, in1.xyz, in0.w), 0.0); out1 = vec4(0.0);\n");
+                "out0 = vec4(nebel_transmit_shadow(in0.xyz, in1.xyz, in0.w), 0.0); out1 = vec4(0.0);\n");
     const nebel_trace_desc desc = {.tolerance = 1e-5, .ignore_distances = 1, .transmittance_only = 1};
     for (uint64_t seed = 1; seed < 12; seed += 2) {
         random_fog_make(&fog, RANDOM_FOG_EXCLUDE, seed);
@@ -170,7 +171,7 @@ static void trace_sunlit_fog(random_fog_kind kind, uint64_t seed)
     for (int k = 0; k < 3; k++) eye[k] = fog.shift[k] + dice(&state, -20, 20) * (seed % 3 == 0 ? .2 : 1);
     snprintf(name, sizeof name, "sunlit %s %d", kinds[kind], (int)seed);
     camera_rays(eye, fog.shift, seed);
-    snprintf(features, sizeof features, "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n",
+    snprintf(features, sizeof features, "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES %u\n",
              (unsigned)nebel_pack_features(snapshot));
     open_tracer(&t, seed % 2 == 0 ? NB_GL_330 : NB_GL_300ES, TEXTURE, features, trace_body);
     pack_and_upload(&t, snapshot, eye);
@@ -237,7 +238,7 @@ static void try_volumes(const char *defines, const nebel_volume_desc *volumes, s
     static const double middle[3] = {0, 0, 0};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, count);
     char all[128];
-    snprintf(all, sizeof all, "%s#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n", defines,
+    snprintf(all, sizeof all, "%s#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES %u\n", defines,
              (unsigned)nebel_pack_features(snapshot));
     tracer t;
     open_tracer(&t, NB_GL_330, TEXTURE, all, trace_body);
@@ -259,8 +260,8 @@ static void test_more_than_slots(void **state)
     static nebel_volume_desc volumes[MOST];
     for (int varying = 0; varying < 2; varying++) {
         make_crowd(volumes, 20, varying);
-        try_volumes("#define NEBEL_SLOTS 4\n", volumes, 20, within, "20 volumes around the eye, 4 slots");
-        try_volumes("#define NEBEL_SLOTS 4\n", volumes, 20, outside, "20 volumes, 4 slots");
+        try_volumes("#define NEBEL_MEDIUM_SLOTS 4\n", volumes, 20, within, "20 volumes around the eye, 4 slots");
+        try_volumes("#define NEBEL_MEDIUM_SLOTS 4\n", volumes, 20, outside, "20 volumes, 4 slots");
         /* llvmpipe ends a shader's loops after 65,535 turns: fewer of the expensive ones */
         const size_t most = varying ? 40 : MOST;
         make_crowd(volumes, most, varying);
@@ -393,14 +394,14 @@ static void test_lists(void **state)
     memcpy(all, answers, sizeof all);
     nb_gl_close(&t.gl);
 
-    open_tracer(&t, NB_GL_330, TEXTURE, UNGROUPED "#define NEBEL_INDEX(i) (i)\n", list_body);
+    open_tracer(&t, NB_GL_330, TEXTURE, UNGROUPED "#define NEBEL_TILE_ENTRY(i) (i)\n", list_body);
     for (int i = 0; i < RAYS; i++) items[i].unused = (float)fog.count;
     pack_and_upload(&t, snapshot, eye);
     evaluate(&t);
     assert_memory_equal(all, answers, sizeof all);
     nb_gl_close(&t.gl);
 
-    open_tracer(&t, NB_GL_300ES, TEXTURE, UNGROUPED "#define NEBEL_INDEX(i) (2 * (i))\n", list_body);
+    open_tracer(&t, NB_GL_300ES, TEXTURE, UNGROUPED "#define NEBEL_TILE_ENTRY(i) (2 * (i))\n", list_body);
     for (int i = 0; i < RAYS; i++) items[i].unused = (float)kept;
     pack_and_upload(&t, snapshot, eye);
     evaluate(&t);
@@ -419,7 +420,7 @@ static void test_features(void **state)
         const double eye[3] = {fog.shift[0] + 8, fog.shift[1] + 3, fog.shift[2] - 11};
         char defines[96], name[64];
         snprintf(defines, sizeof defines, "%s#define NEBEL_FEATURES %u\n",
-                 kind % 2 ? "" : "#define NEBEL_PLAIN_FEATURES\n", (unsigned)nebel_pack_features(snapshot));
+                 kind % 2 ? "" : "#define NEBEL_FEATURES_LITERAL\n", (unsigned)nebel_pack_features(snapshot));
         snprintf(name, sizeof name, "%s with features %u", kinds[kind], (unsigned)nebel_pack_features(snapshot));
         tracer t;
         open_tracer(&t, NB_GL_330, TEXTURE, defines, trace_body);
@@ -511,7 +512,7 @@ static void test_block_layout(void **state)
     for (int language = NB_GL_330; language <= NB_GL_300ES; language++) {
         tracer t;
         open_tracer(&t, (nb_gl_language)language, BLOCK, UNLIT, trace_body);
-        const char *name = "nebel_words";
+        const char *name = "nebel_texels";
         GLuint index, block = glGetUniformBlockIndex(t.program, "nebel_fog_block");
         GLint offset, stride, type, length, size;
         glGetUniformIndices(t.program, 1, &name, &index);
@@ -522,10 +523,10 @@ static void test_block_layout(void **state)
         glGetActiveUniformsiv(t.program, 1, &index, GL_UNIFORM_SIZE, &length);
         glGetActiveUniformBlockiv(t.program, block, GL_UNIFORM_BLOCK_DATA_SIZE, &size);
         assert_int_equal(offset, 0);
-        assert_int_equal(stride, sizeof(nebel_word));
+        assert_int_equal(stride, sizeof(nebel_texel_f32));
         assert_int_equal(type, GL_FLOAT_VEC4);
-        assert_int_equal(length, NEBEL_BLOCK_WORDS);
-        assert_int_equal(size, NEBEL_BLOCK_WORDS * sizeof(nebel_word));
+        assert_int_equal(length, NEBEL_BLOCK_TEXELS);
+        assert_int_equal(size, NEBEL_BLOCK_TEXELS * sizeof(nebel_texel_f32));
         nb_gl_close(&t.gl);
     }
 }

@@ -21,7 +21,8 @@ static void test_grids(void **unused)
 {
     (void)unused;
     try_grids(NB_GL_330, "#define NEBEL_VOXELS\n", 0);
-    try_grids(NB_GL_300ES, "#define NEBEL_VOXELS\n#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 18350079\n", 6);
+    try_grids(NB_GL_300ES, "#define NEBEL_VOXELS\n#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES 18350079\n",
+              6);
 }
 
 /* ---- in sunlight ----------------------------------------------------------------------------- */
@@ -37,7 +38,7 @@ static void trace_packed(const nebel_snapshot *snapshot, const double eye[3], do
     char defines[128];
     tracer t;
     snprintf(defines, sizeof defines, "%s#define NEBEL_VOXELS\n#define NEBEL_FEATURES %u\n",
-             language == NB_GL_330 ? "#define NEBEL_PLAIN_FEATURES\n" : "", (unsigned)nebel_pack_features(snapshot));
+             language == NB_GL_330 ? "#define NEBEL_FEATURES_LITERAL\n" : "", (unsigned)nebel_pack_features(snapshot));
     open_tracer(&t, language, TEXTURE, defines, trace_body);
     pack_and_upload(&t, snapshot, eye);
     upload_voxels(&t, snapshot);
@@ -56,7 +57,7 @@ static nebel_volume_desc cloud_of(nebel_grid *grid, double extinction)
 }
 
 /* A puff: dense in the middle, with waves on it. */
-static nebel_grid *make_puff(nebel_filter filter)
+static nebel_grid *make_puff(nebel_grid_filter filter)
 {
     enum { SIZE = 40 };
     static uint8_t voxels[SIZE * SIZE * SIZE];
@@ -78,7 +79,7 @@ static void test_sunlit_puff(void **unused)
 {
     (void)unused;
     for (int i = tries_all ? 0 : 1; i < (tries_all ? 4 : 3); i++) {
-        nebel_grid *grid = make_puff(i < 2 ? NEBEL_FILTER_LINEAR : NEBEL_FILTER_NEAREST);
+        nebel_grid *grid = make_puff(i < 2 ? NEBEL_GRID_FILTER_LINEAR : NEBEL_GRID_FILTER_NEAREST);
         const nebel_volume_desc cloud = cloud_of(grid, i == 0 ? .4 : 2);
         nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.sun = low_sun, .ambient = {.1, .12, .15}}, &cloud, 1);
         const double *eye = i == 1 ? amid : before;
@@ -159,7 +160,7 @@ static void keep_rays(int count, const double eye[3])
 
 /* Voxels of which one is many optical depths wide, so that what lies between nodes of a lattice of one or two a cell matters: two
  * of them, a checkerboard, and any. */
-static nebel_grid *make_coarse(int kind, nebel_filter filter)
+static nebel_grid *make_coarse(int kind, nebel_grid_filter filter)
 {
     float voxels[6 * 5 * 4];
     const uint32_t sizes[3][3] = {{1, 2, 1}, {6, 5, 4}, {6, 5, 4}}, *size = sizes[kind];
@@ -175,11 +176,11 @@ static nebel_grid *make_coarse(int kind, nebel_filter filter)
     return grid;
 }
 
-static void try_dense(tracer *t, int kind, double extinction, nebel_filter filter, const nebel_sun *sun)
+static void try_dense(tracer *t, int kind, double extinction, nebel_grid_filter filter, const nebel_sun *sun)
 {
     char name[64];
     snprintf(name, sizeof name, "dense voxels %d, extinction %g, %s", kind, extinction,
-             filter == NEBEL_FILTER_LINEAR ? "linear" : "nearest");
+             filter == NEBEL_GRID_FILTER_LINEAR ? "linear" : "nearest");
     nebel_grid *grid = make_coarse(kind, filter);
     nebel_volume_desc cloud = cloud_of(grid, extinction);
     cloud.phase = (nebel_phase){0};
@@ -205,12 +206,13 @@ static void test_sunlit_dense_voxels(void **unused)
     const nebel_sun suns[2] = {{{0, 1, 0}, {3, 2.5, 2}}, low_sun};
     tracer t;
     open_tracer(&t, NB_GL_330, TEXTURE,
-                "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_VOXELS\n#define NEBEL_FEATURES 1572866\n", trace_body);
-    try_dense(&t, 0, 5, NEBEL_FILTER_LINEAR, &suns[0]);
+                "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_VOXELS\n#define NEBEL_FEATURES 1572866\n", trace_body);
+    try_dense(&t, 0, 5, NEBEL_GRID_FILTER_LINEAR, &suns[0]);
     for (int kind = 0; kind < 3; kind++)
         for (int i = 0; i < 4; i++)
             try_dense(&t, kind, (const double[]){.5, 5, 100, 3000}[i],
-                      i % 2 == kind % 2 ? NEBEL_FILTER_LINEAR : NEBEL_FILTER_NEAREST, &suns[(kind + i / 2) % 2]);
+                      i % 2 == kind % 2 ? NEBEL_GRID_FILTER_LINEAR : NEBEL_GRID_FILTER_NEAREST,
+                      &suns[(kind + i / 2) % 2]);
     nb_gl_close(&t.gl);
 }
 
@@ -220,13 +222,13 @@ static void test_sunlit_dense_voxels(void **unused)
 static nebel_snapshot *commit_lamplit(const nebel_volume_desc *volumes, size_t count)
 {
     const nebel_fog_desc desc = {.ambient = {.1, .12, .15}};
-    const nebel_lamp lamps[2] = {{.position = {1, -.5, .8}, .intensity = {9, 6, 3}, .radius = .1},
-                                 {.type = NEBEL_LAMP_SPOT,
-                                  .position = {-9, 3, 2},
-                                  .intensity = {200, 250, 300},
-                                  .direction = {9, -2.5, -2},
-                                  .inner_angle = 20,
-                                  .outer_angle = 40}};
+    const nebel_light lamps[2] = {{.position = {1, -.5, .8}, .intensity = {9, 6, 3}, .radius = .1},
+                                  {.type = NEBEL_LIGHT_SPOT,
+                                   .position = {-9, 3, 2},
+                                   .intensity = {200, 250, 300},
+                                   .direction = {9, -2.5, -2},
+                                   .inner_angle = 20,
+                                   .outer_angle = 40}};
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;
     assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
@@ -241,7 +243,7 @@ static void test_lamplit_puff(void **unused)
 {
     (void)unused;
     for (int i = 0; i < (tries_all ? 4 : 2); i++) {
-        nebel_grid *grid = make_puff(i % 2 == 0 ? NEBEL_FILTER_LINEAR : NEBEL_FILTER_NEAREST);
+        nebel_grid *grid = make_puff(i % 2 == 0 ? NEBEL_GRID_FILTER_LINEAR : NEBEL_GRID_FILTER_NEAREST);
         const nebel_volume_desc volumes[] = {cloud_of(grid, i < 2 ? 2 : .4),
                                              {.extinction = {.02, .02, .03}, .albedo = {.9, .9, .9}}};
         nebel_snapshot *snapshot = commit_lamplit(volumes, i == 0 ? 1 : 2);

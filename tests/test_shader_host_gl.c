@@ -1,16 +1,17 @@
-/* A host's shader as docs/shaders.md has it, with NEBEL_SUN_LIT: a wall's shadow in sunlit fog, against pieces of nebel_trace. The
+/* A host's shader as docs/shaders.md has it, with NEBEL_SUN_VISIBILITY: a wall's shadow in sunlit fog, against pieces of nebel_trace. The
  * argument `all` leaves NEBEL_FEATURES out, too: then drivers compile for some twenty seconds. */
 #include "shader_help.h"
 
 /* The wall keeps the sun from what lies beyond BORDER along x; `sun_lit` steps by 0.5 m, as the page has it. */
 #define BORDER 1.25
-static const char host_text[] = "float my_shadow(vec3 place) { return place.x > 1.25 ? 0.0 : 1.0; }\n"
-                                "vec2 sun_lit(vec3 origin, vec3 direction, float t, float end)\n"
-                                "{\n"
-                                "    float next = min(t + 0.5, end);\n"
-                                "    return vec2(my_shadow(origin + direction * (0.5 * (t + next))), next);\n"
-                                "}\n"
-                                "#define NEBEL_SUN_LIT(origin, direction, t, end) sun_lit(origin, direction, t, end)\n";
+static const char host_text[] =
+    "float my_shadow(vec3 place) { return place.x > 1.25 ? 0.0 : 1.0; }\n"
+    "vec2 sun_lit(vec3 origin, vec3 direction, float t, float end)\n"
+    "{\n"
+    "    float next = min(t + 0.5, end);\n"
+    "    return vec2(my_shadow(origin + direction * (0.5 * (t + next))), next);\n"
+    "}\n"
+    "#define NEBEL_SUN_VISIBILITY(origin, direction, t, end) sun_lit(origin, direction, t, end)\n";
 
 enum { ASKED = 512 };
 

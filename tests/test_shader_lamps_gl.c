@@ -44,7 +44,7 @@ static void strew_rays(const setting *s)
 static nebel_snapshot *commit_haze(const nebel_phase *phase, const setting *s)
 {
     const nebel_volume_desc volume = {.extinction = {.05, .06, .08}, .albedo = {.95, .95, .9}, .phase = *phase};
-    nebel_lamp lamp = {.intensity = {10, 8, 6}, .radius = s->radius};
+    nebel_light lamp = {.intensity = {10, 8, 6}, .radius = s->radius};
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;
     memcpy(lamp.position, s->place, sizeof lamp.position);
@@ -94,7 +94,7 @@ static void open_hazes(tracer *t, nb_gl_language language)
 {
     nebel_snapshot *const snapshot = commit_haze(&phases[1], &settings[0]);
     char defines[96];
-    snprintf(defines, sizeof defines, "#define NEBEL_MOST_LIGHT 1e9\n#define NEBEL_FEATURES %u\n",
+    snprintf(defines, sizeof defines, "#define NEBEL_MAX_RADIANCE 1e9\n#define NEBEL_FEATURES %u\n",
              (unsigned)nebel_pack_features(snapshot));
     open_tracer(t, language, BLOCK, defines, trace_body);
     nebel_release_snapshot(snapshot);

@@ -43,7 +43,7 @@ static void open_cases(tracer *t, int is_lamplit, int beside_voxels)
         features |= nebel_pack_features(snapshot);
         nebel_release_snapshot(snapshot);
     }
-    snprintf(defines, sizeof defines, "#define NEBEL_PLAIN_FEATURES\n%s#define NEBEL_FEATURES %u\n",
+    snprintf(defines, sizeof defines, "#define NEBEL_FEATURES_LITERAL\n%s#define NEBEL_FEATURES %u\n",
              beside_voxels ? "#define NEBEL_VOXELS\n" : "", (unsigned)features);
     open_tracer(t, NB_GL_330, TEXTURE, defines, trace_body);
 }

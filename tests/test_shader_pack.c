@@ -13,17 +13,17 @@
 
 static random_fog fog;
 
-static nebel_word *pack(const nebel_snapshot *snapshot, const double eye[3], size_t *count)
+static nebel_texel_f32 *pack(const nebel_snapshot *snapshot, const double eye[3], size_t *count)
 {
     assert_int_equal(nebel_pack_fog(snapshot, eye, NULL, 0, count), NEBEL_OK);
-    nebel_word *words = malloc(*count * sizeof *words);
+    nebel_texel_f32 *words = malloc(*count * sizeof *words);
     assert_non_null(words);
     memset(words, 0xff, *count * sizeof *words); /* NaN wherever nothing is written */
     assert_int_equal(nebel_pack_fog(snapshot, eye, words, *count, count), NEBEL_OK);
     return words;
 }
 
-static void assert_numbers(const nebel_word *words, size_t count)
+static void assert_numbers(const nebel_texel_f32 *words, size_t count)
 {
     for (size_t i = 0; i < count; i++)
         for (int c = 0; c < 4; c++)
@@ -39,9 +39,9 @@ static void test_words_are_numbers(void **state)
             nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, fog.volumes, fog.count);
             const double eye[3] = {fog.shift[0] + 3, fog.shift[1], fog.shift[2] - 7};
             size_t count;
-            nebel_word *words = pack(snapshot, eye, &count);
+            nebel_texel_f32 *words = pack(snapshot, eye, &count);
             assert_numbers(words, count);
-            assert_int_equal((size_t)words[0].v[0], nebel_snapshot_volume_count(snapshot));
+            assert_int_equal((size_t)words[0].v[0], nebel_get_volume_count(snapshot));
             free(words);
             nebel_release_snapshot(snapshot);
         }
@@ -53,7 +53,7 @@ static void test_extremes(void **state)
     (void)state;
     const nebel_volume_desc volumes[] = {
         {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-1e15, -1e15, -1e15}, .max = {1e15, 1e15, 1e15}},
-         .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = 1e-15},
+         .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = 1e-15},
          .extinction = {1e9, 1e9, 1e9},
          .source = {1e9, 1e9, 1e9},
          .emission = {1e9, 1e9, 1e9}},
@@ -72,7 +72,7 @@ static void test_extremes(void **state)
     const double eye[3] = {1e15, -1e15, 1e15};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, sizeof volumes / sizeof *volumes);
     size_t count;
-    nebel_word *words = pack(snapshot, eye, &count);
+    nebel_texel_f32 *words = pack(snapshot, eye, &count);
     assert_numbers(words, count);
     free(words);
     nebel_release_snapshot(snapshot);
@@ -89,9 +89,9 @@ static void test_layout(void **state)
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &box, 1);
     const double eye[3] = {1e7, -1e7, 2};
     size_t count;
-    nebel_word *words = pack(snapshot, eye, &count);
+    nebel_texel_f32 *words = pack(snapshot, eye, &count);
     assert_int_equal(count, NB_HEADER_WORDS + NB_MEDIUM_WORDS);
-    assert_true((NEBEL_BLOCK_WORDS - NB_HEADER_WORDS) / NB_MEDIUM_WORDS >= 100);
+    assert_true((NEBEL_BLOCK_TEXELS - NB_HEADER_WORDS) / NB_MEDIUM_WORDS >= 100);
     const float *m = words[NB_HEADER_WORDS].v, *leaf = words[NB_HEADER_WORDS + NB_MEDIUM_LEAF].v;
     const float expected[] = {.1f, .2f, .3f, NB_KIND_CONSTANT, .05f, .1f, 1.15f, 1, .5f, .5f, .5f, 1};
     for (int i = 0; i < 12; i++) assert_float_equal(m[i], expected[i], 1e-6f);
@@ -117,7 +117,7 @@ static void test_faces_of_a_turned_body(void **state)
                                     .extinction = {1, 1, 1}};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &body, 1);
     size_t count;
-    nebel_word *words = pack(snapshot, (const double[3]){0, 0, 0}, &count);
+    nebel_texel_f32 *words = pack(snapshot, (const double[3]){0, 0, 0}, &count);
     const float *leaf = words[NB_HEADER_WORDS + NB_MEDIUM_LEAF].v;
     unsigned found = 0;
     assert_int_equal((int)leaf[1], 6);
@@ -145,7 +145,7 @@ static void test_order_and_repetition(void **state)
     nebel_snapshot *two = fog_commit(&(nebel_fog_desc){0}, reversed, fog.count);
     const double eye[3] = {1, 2, 3};
     size_t n, m;
-    nebel_word *a = pack(one, eye, &n), *b = pack(two, eye, &m);
+    nebel_texel_f32 *a = pack(one, eye, &n), *b = pack(two, eye, &m);
     assert_int_equal(n, m);
     assert_memory_equal(a, b, n * sizeof *a);
     free(a);
@@ -163,7 +163,7 @@ static void test_bad_input(void **state)
     random_fog_make(&fog, RANDOM_FOG_PARTS, 1);
     nebel_snapshot *snapshot = fog_commit(&desc, fog.volumes, fog.count);
     const double eye[3] = {0, 0, 0}, nowhere[3] = {0, (double)NAN, 0}, far[3] = {2e15, 0, 0};
-    static nebel_word words[4096];
+    static nebel_texel_f32 words[4096];
     size_t count = 0;
     const size_t calls = memory.calls;
     assert_int_equal(nebel_pack_fog(NULL, eye, words, 4096, &count), NEBEL_ERROR_ARGUMENT);
@@ -184,7 +184,7 @@ static void test_bad_input(void **state)
 
 /* ---- voxels ---------------------------------------------------------------------------------- */
 
-static nebel_grid *grid_of(const uint8_t *voxels, size_t x, size_t y, size_t z, nebel_filter filter)
+static nebel_grid *grid_of(const uint8_t *voxels, size_t x, size_t y, size_t z, nebel_grid_filter filter)
 {
     nebel_grid *grid = NULL;
     const nebel_grid_desc desc = {
@@ -216,9 +216,9 @@ static void test_texels(void **state)
 {
     (void)state;
     const uint8_t voxels[9] = {0, 255, 51, 0, 0, 0, 0, 51, 51};
-    nebel_grid *grid = grid_of(voxels, 9, 1, 1, NEBEL_FILTER_LINEAR);
+    nebel_grid *grid = grid_of(voxels, 9, 1, 1, NEBEL_GRID_FILTER_LINEAR);
     nebel_snapshot *snapshot = boxes_of(&grid, 1, (nebel_log){0});
-    nebel_texel texels[3 + 512];
+    nebel_texel_u32 texels[3 + 512];
     size_t count = 0;
     assert_int_equal(nebel_pack_voxels(snapshot, NULL, 0, &count), NEBEL_OK);
     assert_int_equal(count, 3 + 512);
@@ -242,9 +242,9 @@ static void test_shared_and_same_voxels(void **state)
 {
     (void)state;
     const uint8_t voxels[8] = {1, 2, 3, 4, 5, 6, 7, 8}, even[8] = {0};
-    nebel_grid *one = grid_of(voxels, 2, 2, 2, NEBEL_FILTER_NEAREST),
-               *twin = grid_of(voxels, 2, 2, 2, NEBEL_FILTER_NEAREST);
-    nebel_grid *other = grid_of(even, 2, 2, 2, NEBEL_FILTER_NEAREST);
+    nebel_grid *one = grid_of(voxels, 2, 2, 2, NEBEL_GRID_FILTER_NEAREST),
+               *twin = grid_of(voxels, 2, 2, 2, NEBEL_GRID_FILTER_NEAREST);
+    nebel_grid *other = grid_of(even, 2, 2, 2, NEBEL_GRID_FILTER_NEAREST);
     nebel_snapshot *const alone = boxes_of(&one, 1, (nebel_log){0}), *const again = boxes_of(&twin, 1, (nebel_log){0});
     nebel_snapshot *const shared = boxes_of((nebel_grid *[]){one, one, one}, 3, (nebel_log){0});
     nebel_snapshot *const both = boxes_of((nebel_grid *[]){one, other}, 2, (nebel_log){0});
@@ -256,8 +256,10 @@ static void test_shared_and_same_voxels(void **state)
     assert_int_equal(count, 2 + 512 + 2);
     assert_int_equal(nebel_pack_voxels(none, NULL, 0, &count), NEBEL_OK);
     assert_int_equal(count, 0);
-    assert_true(nebel_same_voxels(alone, shared) && nebel_same_voxels(alone, again) && nebel_same_voxels(none, none));
-    assert_false(nebel_same_voxels(alone, both) || nebel_same_voxels(both, alone) || nebel_same_voxels(none, alone));
+    assert_true(nebel_is_same_voxels(alone, shared) && nebel_is_same_voxels(alone, again) &&
+                nebel_is_same_voxels(none, none));
+    assert_false(nebel_is_same_voxels(alone, both) || nebel_is_same_voxels(both, alone) ||
+                 nebel_is_same_voxels(none, alone));
     nebel_release_snapshot(alone);
     nebel_release_snapshot(again);
     nebel_release_snapshot(shared);
@@ -275,13 +277,13 @@ static void test_voxels_that_cannot_be_packed(void **state)
     const size_t voxels = (size_t)SIDE * SIDE * LAYERS;
     const double eye[3] = {0, 0, 0};
     fog_messages messages = {0};
-    nebel_texel texel = {{77, 0, 0, 0}};
+    nebel_texel_u32 texel = {{77, 0, 0, 0}};
     size_t count = 0;
     uint8_t *const many = malloc(voxels);
     assert_non_null(many);
     for (size_t i = 0; i < voxels; i++) many[i] = (uint8_t)i;
-    nebel_grid *small = grid_of(many, 2, 2, 2, NEBEL_FILTER_LINEAR),
-               *large = grid_of(many, SIDE, SIDE, LAYERS, NEBEL_FILTER_LINEAR);
+    nebel_grid *small = grid_of(many, 2, 2, 2, NEBEL_GRID_FILTER_LINEAR),
+               *large = grid_of(many, SIDE, SIDE, LAYERS, NEBEL_GRID_FILTER_LINEAR);
     nebel_snapshot *const fog_of_small = boxes_of(&small, 1, fog_messages_log(&messages));
     nebel_snapshot *const fog_of_large = boxes_of(&large, 1, fog_messages_log(&messages));
     assert_int_equal(nebel_pack_voxels(NULL, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
@@ -319,7 +321,7 @@ static void test_texts(void **state)
 {
     (void)state;
     for (int dialect = 0; dialect < NEBEL_DIALECT_COUNT; dialect++) {
-        const char *text = nebel_shader_text((nebel_dialect)dialect);
+        const char *text = nebel_get_shader_source((nebel_shader_dialect)dialect);
         assert_non_null(text);
         assert_null(strstr(text, "#version"));
         assert_null(strstr(text, "#include"));
@@ -327,7 +329,7 @@ static void test_texts(void **state)
         assert_int_equal(strstr(text, "nebel_fog_block") != NULL, dialect <= NEBEL_DIALECT_GLSL_300_ES);
         for (const char *c = text; *c != 0; c++) assert_true(*c == '\n' || (*c >= ' ' && *c <= '~'));
     }
-    assert_null(nebel_shader_text(NEBEL_DIALECT_COUNT));
+    assert_null(nebel_get_shader_source(NEBEL_DIALECT_COUNT));
 }
 
 int main(void)

@@ -29,7 +29,7 @@ static inline int is_in_shadow(const nb_geometry *geometry, const float place[3]
 }
 
 /* Of the lamp, relative to the place; its length. */
-static inline double way_to_lamp(const nb_geometry *geometry, const float place[3], const nebel_lamp *lamp,
+static inline double way_to_lamp(const nb_geometry *geometry, const float place[3], const nebel_light *lamp,
                                  double way[3])
 {
     for (int i = 0; i < 3; i++) way[i] = lamp->position[i] - geometry->origin[i] - (double)place[i];
@@ -38,7 +38,7 @@ static inline double way_to_lamp(const nb_geometry *geometry, const float place[
     return distance;
 }
 
-static inline int is_in_shadow_of_lamp(const nb_geometry *geometry, const float place[3], const nebel_lamp *lamp)
+static inline int is_in_shadow_of_lamp(const nb_geometry *geometry, const float place[3], const nebel_light *lamp)
 {
     double way[3];
     const double distance = way_to_lamp(geometry, place, lamp, way);

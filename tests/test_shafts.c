@@ -73,19 +73,19 @@ typedef struct trial {
 } trial;
 
 /* Whether a place t m from the fog's start is in shadow; NAN where an end is too near to say. */
-static float shadow_at(const nebel_lit_pieces *lit, int ray, float t)
+static float shadow_at(const nebel_ray_visibility *lit, int ray, float t)
 {
     float dark = 0;
-    for (uint32_t i = lit->first[ray]; i < lit->first[ray + 1]; i++) {
-        if (fabsf(lit->toggles[i] - t) < 2e-4f + 1e-5f * t) return NAN;
-        if (lit->toggles[i] <= t) dark = 1 - dark;
+    for (uint32_t i = lit->offsets[ray]; i < lit->offsets[ray + 1]; i++) {
+        if (fabsf(lit->boundaries[i] - t) < 2e-4f + 1e-5f * t) return NAN;
+        if (lit->boundaries[i] <= t) dark = 1 - dark;
     }
     return dark;
 }
 
 /* `lamp` NULL: the sun. */
-static void compare_places(trial *run, const nb_geometry *geometry, const nebel_lit_pieces *lit, const double sun[3],
-                           const nebel_lamp *lamp, int ray, uint64_t *numbers)
+static void compare_places(trial *run, const nb_geometry *geometry, const nebel_ray_visibility *lit,
+                           const double sun[3], const nebel_light *lamp, int ray, uint64_t *numbers)
 {
     const float skipped = (float)run->view.advance * run->rays.length[ray],
                 far = fminf(run->distance[ray], skipped + 60);
@@ -101,10 +101,10 @@ static void compare_places(trial *run, const nb_geometry *geometry, const nebel_
     }
 }
 
-static void expect_rising(const nebel_lit_pieces *lit, int ray)
+static void expect_rising(const nebel_ray_visibility *lit, int ray)
 {
-    for (uint32_t k = lit->first[ray] + 1; k < lit->first[ray + 1]; k++)
-        assert_true(lit->toggles[k] >= lit->toggles[k - 1]);
+    for (uint32_t k = lit->offsets[ray] + 1; k < lit->offsets[ray + 1]; k++)
+        assert_true(lit->boundaries[k] >= lit->boundaries[k - 1]);
 }
 
 static nb_geometry place_triangles(const nebel_scene_data *scene, const nebel_camera *camera, nb_view *view)
@@ -176,7 +176,7 @@ static void try_scene(const nebel_scene_data *scene, uint64_t seed, uint64_t num
                                         &run->rays, run->view.advance, run->distance, run->eye),
                          NEBEL_OK);
         run->toggles += run->shafts.toggle_count;
-        const nebel_lit_pieces lit = {run->shafts.first, run->shafts.toggles};
+        const nebel_ray_visibility lit = {run->shafts.first, run->shafts.toggles};
         for (int i = 0; i < NB_BATCH; i++) {
             expect_rising(&lit, i);
             if (seed != 2) compare_places(run, &geometry, &lit, sun, NULL, i, &numbers);
@@ -352,7 +352,7 @@ static void ends_among_leaves_are_those_of_visibility(void **state)
 
 enum { LAMPS = 4 };
 
-static nebel_snapshot *lamplit_fog(const nebel_volume_desc *volume, size_t count, const nebel_lamp *lamps)
+static nebel_snapshot *lamplit_fog(const nebel_volume_desc *volume, size_t count, const nebel_light *lamps)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
@@ -365,10 +365,10 @@ static nebel_snapshot *lamplit_fog(const nebel_volume_desc *volume, size_t count
 }
 
 /* Lamps among the triangles; the larger ones have some of them within their radius, wholly or in part. */
-static void draw_lamps(uint64_t *numbers, nebel_lamp *lamps)
+static void draw_lamps(uint64_t *numbers, nebel_light *lamps)
 {
     for (int i = 0; i < LAMPS; i++) {
-        lamps[i] = (nebel_lamp){.intensity = {1, 1, 1}, .radius = i > 0 ? pow(10, dice(numbers, -2, 0.5)) : 0};
+        lamps[i] = (nebel_light){.intensity = {1, 1, 1}, .radius = i > 0 ? pow(10, dice(numbers, -2, 0.5)) : 0};
         for (int c = 0; c < 3; c++) lamps[i].position[c] = dice(numbers, -10, 10);
     }
 }
@@ -382,7 +382,7 @@ static void ends_of_lamplight_are_those_of_visibility(void **state)
     (void)state;
     for (uint64_t seed = 0; seed < 12; seed++) {
         uint64_t numbers = 37 * seed + 5;
-        nebel_lamp lamps[LAMPS];
+        nebel_light lamps[LAMPS];
         draw_triangles(&numbers, positions);
         draw_lamps(&numbers, lamps);
         positions[5][1] = NAN;
@@ -462,7 +462,7 @@ static void the_shadow_of_a_box_is_cut_out(void **state)
     (void)state;
     camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     camera.view_height = 9;
-    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     const nebel_frame_desc frame = {.camera = camera, .width = SIDE, .height = SIDE, .samples = 1, .tolerance = 1e-6};
     assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
     for (uint32_t i = 0; i < SIDE; i++)
@@ -547,7 +547,7 @@ static void shafts_are_those_of_small_steps(void **state)
     nebel_renderer *renderer = NULL;
     (void)state;
     set_pillars(&p);
-    assert_int_equal(nebel_create_renderer(&p.scene, p.fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&p.scene, p.fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     const nebel_frame_desc frame = {.camera = p.camera, .width = SIDE, .height = SIDE, .samples = 1};
     assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
     double worst = 0, square = 0;
@@ -586,30 +586,30 @@ static void shafts_are_those_of_small_steps(void **state)
 }
 
 /* Lamps between the pillars in even fog; one has a bulb of triangles around it, one shines down. */
-static void set_lamplit_pillars(pillars *p, nebel_lamp lamps[2])
+static void set_lamplit_pillars(pillars *p, nebel_light lamps[2])
 {
     const nebel_volume_desc volume = {.extinction = {.05, .05, .05}, .albedo = {1, 1, 1}};
     set_pillars(p);
     nebel_release_snapshot(p->fog);
-    lamps[0] = (nebel_lamp){.position = {0.5, 5.2, 1}, .intensity = {50, 100, 150}, .radius = 0.3};
-    lamps[1] = (nebel_lamp){.type = NEBEL_LAMP_SPOT,
-                            .position = {-7, 8, 6},
-                            .intensity = {80, 120, 20},
-                            .radius = 0.2,
-                            .direction = {0.3, -1, -0.6},
-                            .inner_angle = 30,
-                            .outer_angle = 50};
+    lamps[0] = (nebel_light){.position = {0.5, 5.2, 1}, .intensity = {50, 100, 150}, .radius = 0.3};
+    lamps[1] = (nebel_light){.type = NEBEL_LIGHT_SPOT,
+                             .position = {-7, 8, 6},
+                             .intensity = {80, 120, 20},
+                             .radius = 0.2,
+                             .direction = {0.3, -1, -0.6},
+                             .inner_angle = 30,
+                             .outer_angle = 50};
     p->fog = lamplit_fog(&volume, 2, lamps);
 }
 
 /* What the lamp brings to a place, of intensity 1 on its axis, in even fog; see formulas/lamp.inc. */
-static double lamp_fluence(const nb_geometry *geometry, const float place[3], const nebel_lamp *lamp)
+static double lamp_fluence(const nb_geometry *geometry, const float place[3], const nebel_light *lamp)
 {
     double way[3], axis[3];
     const double distance = way_to_lamp(geometry, place, lamp, way), outside = fmax(distance, lamp->radius);
     const double share = lamp->radius / outside, clear = outside - lamp->radius;
     double fluence = 2 / (outside * outside * (1 + sqrt(1 - share * share))) * exp(-.05 * clear);
-    if (lamp->type == NEBEL_LAMP_SPOT) {
+    if (lamp->type == NEBEL_LIGHT_SPOT) {
         memcpy(axis, lamp->direction, sizeof axis);
         nb_vector_make_unit(axis);
         const double edge = cos(lamp->outer_angle * test_pi / 180), inner = cos(lamp->inner_angle * test_pi / 180);
@@ -620,7 +620,7 @@ static double lamp_fluence(const nb_geometry *geometry, const float place[3], co
 }
 
 static double stepped_lamplight(const nb_geometry *geometry, const float from[3], const float way[3], double begin,
-                                double end, const nebel_lamp *lamps)
+                                double end, const nebel_light *lamps)
 {
     const double s = 0.05, h = (end - begin) / STEPS;
     double sum = 0;
@@ -638,12 +638,12 @@ static double stepped_lamplight(const nb_geometry *geometry, const float from[3]
 static void lamp_shafts_are_those_of_small_steps(void **state)
 {
     pillars p;
-    nebel_lamp lamps[2];
+    nebel_light lamps[2];
     test_picture picture = test_picture_make(SIDE, SIDE);
     nebel_renderer *renderer = NULL;
     (void)state;
     set_lamplit_pillars(&p, lamps);
-    assert_int_equal(nebel_create_renderer(&p.scene, p.fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(&p.scene, p.fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     const nebel_frame_desc frame = {.camera = p.camera, .width = SIDE, .height = SIDE, .samples = 1};
     assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
     double worst = 0, square = 0;
@@ -675,7 +675,7 @@ static void lamp_shafts_are_those_of_small_steps(void **state)
     }
     const nebel_scene_data nothing = {0};
     test_picture bare = test_picture_make(SIDE, SIDE);
-    test_render(&nothing, p.fog, &(nebel_renderer_desc){.threads = 1}, &p.camera, 1, &bare);
+    test_render(&nothing, p.fog, &(nebel_cpu_renderer_desc){.thread_count = 1}, &p.camera, 1, &bare);
     for (uint32_t i = 0; i < SIDE * SIDE; i++) {
         const float *seen = test_in_scattering(&picture, i % SIDE, i / SIDE);
         if (isinf(test_depth(&picture, i % SIDE, i / SIDE)))
@@ -695,7 +695,7 @@ static void lamp_shafts_are_those_of_small_steps(void **state)
 static void threads_give_the_same_shafts(void **state)
 {
     pillars p;
-    nebel_lamp lamps[2];
+    nebel_light lamps[2];
     test_picture one = test_picture_make(2 * NB_REGION + 5, NB_REGION + 3),
                  three = test_picture_make(one.width, one.height);
     (void)state;
@@ -704,8 +704,8 @@ static void threads_give_the_same_shafts(void **state)
             set_lamplit_pillars(&p, lamps);
         else
             set_pillars(&p);
-        test_render(&p.scene, p.fog, &(nebel_renderer_desc){.threads = 1}, &p.camera, 2, &one);
-        test_render(&p.scene, p.fog, &(nebel_renderer_desc){.threads = 3}, &p.camera, 2, &three);
+        test_render(&p.scene, p.fog, &(nebel_cpu_renderer_desc){.thread_count = 1}, &p.camera, 2, &one);
+        test_render(&p.scene, p.fog, &(nebel_cpu_renderer_desc){.thread_count = 3}, &p.camera, 2, &three);
         assert_memory_equal(one.planes.color, three.planes.color, sizeof(float) * 3 * one.width * one.height);
         nebel_release_snapshot(p.fog);
     }
@@ -722,11 +722,11 @@ static size_t lose_memory(const pillars *p)
     size_t failed = 0;
     nebel_result result = NEBEL_ERROR_MEMORY;
     for (size_t k = 1; result == NEBEL_ERROR_MEMORY; k++) {
-        const nebel_renderer_desc desc = {
-            .allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages), .threads = 1};
+        const nebel_cpu_renderer_desc desc = {
+            .allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages), .thread_count = 1};
         nebel_renderer *renderer = NULL;
         memory.fail_first = 0;
-        assert_int_equal(nebel_create_renderer(&p->scene, p->fog, &desc, &renderer), NEBEL_OK);
+        assert_int_equal(nebel_create_cpu_renderer(&p->scene, p->fog, &desc, &renderer), NEBEL_OK);
         memory.fail_first = k;
         memory.fail_count = 1;
         const nebel_frame_desc frame = {.camera = p->camera, .width = SIDE, .height = SIDE, .samples = 1};
@@ -743,7 +743,7 @@ static size_t lose_memory(const pillars *p)
 static void lost_memory_is_told(void **state)
 {
     pillars p;
-    nebel_lamp lamps[2];
+    nebel_light lamps[2];
     (void)state;
     set_pillars(&p);
     assert_true(lose_memory(&p) >= 10); /* the tree's eight, shadows, and what toggles are made in */

@@ -99,7 +99,8 @@ static nebel_shape shape_of(const skin *s, uint64_t *state)
 /* Lamps shine on the surface about as brightly as the sun; for an eye within one is near it. */
 static void set_lamps(const skin *s, uint64_t *state, nebel_fog *made)
 {
-    nebel_lamp lamps[2] = {{.type = NEBEL_LAMP_POINT}, {.type = NEBEL_LAMP_SPOT, .inner_angle = 20, .outer_angle = 60}};
+    nebel_light lamps[2] = {{.type = NEBEL_LIGHT_POINT},
+                            {.type = NEBEL_LIGHT_SPOT, .inner_angle = 20, .outer_angle = 60}};
     for (int i = 0; i < 2; i++) {
         double away = s->radius * dice(state, 1.3, 6);
         turn_any(state, away, lamps[i].position);
@@ -194,7 +195,7 @@ static void try_light(int by_lamps, int seeds)
 {
     char defines[128];
     tracer t;
-    snprintf(defines, sizeof defines, "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n",
+    snprintf(defines, sizeof defines, "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES %u\n",
              features_of_all(by_lamps));
     open_tracer(&t, NB_GL_330, BLOCK, defines, trace_body);
     for (int i = 0; i < seeds; i++) {

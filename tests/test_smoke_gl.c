@@ -160,7 +160,7 @@ static void render_cpu(const nebel_scene_data *data, nebel_snapshot *fog, const 
                                     .height = HEIGHT,
                                     .samples = s->samples > 0 ? s->samples : 1,
                                     .tolerance = pair->tolerance};
-    assert_int_equal(nebel_create_renderer(data, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(data, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, s->method, &(nebel_method_desc){.factor = &factor}), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &pair->cpu), NEBEL_OK);
     nebel_destroy_renderer(renderer);
@@ -183,7 +183,7 @@ static void render_gl(const nebel_scene *scene, const nebel_scene_data *data, ne
                                     pair->gl.normal};
     assert_int_equal(nebel_create_gl_renderer(data, fog, &(nebel_gl_renderer_desc){0}, &renderer), NEBEL_OK);
     if (s->particles) {
-        assert_int_equal(nebel_make_scene_particles(scene, &particles), NEBEL_OK);
+        assert_int_equal(nebel_generate_scene_particles(scene, &particles), NEBEL_OK);
         assert_int_equal(nebel_commit_scene_volumes_at(scene, 0, &others), NEBEL_OK);
         assert_int_equal(nebel_set_gl_renderer_particles(renderer, particles, data->particle_count), NEBEL_OK);
         assert_int_equal(nebel_set_gl_renderer_fog(renderer, others), NEBEL_OK);
@@ -211,9 +211,9 @@ static void compare(const smoke *s)
     nebel_scene *const scene = parse(s->text);
     picture_pair pair = picture_make(WIDTH, HEIGHT);
     if (s->tolerance > 0) pair.tolerance = s->tolerance;
-    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    nebel_scene_data data = *nebel_scene_contents(scene);
+    nebel_scene_data data = *nebel_get_scene_data(scene);
     nebel_camera camera = data.camera;
     camera.projection = s->projection;
     make_boxes(meshes, positions);

@@ -11,7 +11,7 @@ enum { RAYS = 24 };
 
 static const nebel_sun suns[2] = {{{.3, .8, .2}, {1, 2, 3}}, {{.3, .8, .2}, {4, 5, 6}}};
 
-static const nebel_lamp lamp = {.position = {1, 5, -3}, .intensity = {30, 20, 10}, .radius = .1};
+static const nebel_light lamp = {.position = {1, 5, -3}, .intensity = {30, 20, 10}, .radius = .1};
 
 /* Scattering fog, fog that shines, fog with a source of its own. */
 static const nebel_volume_desc volumes[] = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 2, -8}, .radius = 6},
@@ -36,7 +36,7 @@ static nebel_snapshot *commit(size_t count, const nebel_volume_desc *given, int 
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     assert_int_equal(nebel_set_environment(fog, &sky), NEBEL_OK);
     assert_int_equal(nebel_set_lamps(fog, 1, &lamp), NEBEL_OK);
-    if (is_diffuse) assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.cells = 4096}), NEBEL_OK);
+    if (is_diffuse) assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.max_cells = 4096}), NEBEL_OK);
     for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(fog, &given[i], NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     nebel_destroy_fog(fog);

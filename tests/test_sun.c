@@ -218,14 +218,15 @@ static void pieces_are_those_of_the_closed_form(void **state)
         double ends[4];
     } lit[] = {{2, {0, 2, 3, 20}}, {0, {0}}, {1, {5, 20}}, {1, {0, 4}}, {1, {0, 20}}, {1, {0, 7}}};
     enum { CASES = sizeof lit / sizeof lit[0] };
-    const nebel_lit_pieces pieces = {first, toggles};
+    const nebel_ray_visibility pieces = {first, toggles};
     nebel_snapshot *snapshot = make_slab();
     nebel_ray rays[CASES];
     (void)state;
     for (int i = 0; i < CASES; i++) rays[i] = (nebel_ray){{0, 4, 0}, {1, 0, 0}, 20};
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         nebel_transfer transfers[CASES];
-        const nebel_trace_desc desc = {.precision = (nebel_precision)precision, .tolerance = 1e-7, .sunlit = &pieces};
+        const nebel_trace_desc desc = {
+            .precision = (nebel_precision)precision, .tolerance = 1e-7, .sun_visibility = &pieces};
         assert_int_equal(nebel_trace(snapshot, &desc, CASES, rays, sizeof *rays, transfers, sizeof *transfers),
                          NEBEL_OK);
         for (int i = 0; i < CASES; i++)
@@ -240,9 +241,10 @@ static void pieces_are_those_of_the_closed_form(void **state)
     for (int i = 0; i < MANY; i++) comb[i] = (float)i * 0.00390625f; /* to the end of the ray, and no rounding */
     double sum = 0;
     for (int i = 1; i < MANY; i += 2) sum += slab_light(0, (double)comb[i], (double)comb[i + 1]);
-    const nebel_lit_pieces thin = {(const uint32_t[]){0, MANY}, comb};
+    const nebel_ray_visibility thin = {(const uint32_t[]){0, MANY}, comb};
     nebel_transfer transfer;
-    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){.sunlit = &thin}, 1, rays, 0, &transfer, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){.sun_visibility = &thin}, 1, rays, 0, &transfer, 0),
+                     NEBEL_OK);
     assert_true(fabs(transfer.in_scattering[0] - sum) < 1e-6);
     nebel_release_snapshot(snapshot);
 }
@@ -251,15 +253,15 @@ static void pieces_that_are_none_are_refused(void **state)
 {
     static const float ascends[] = {1, 2, 3}, descends[] = {1, 3, 2}, below[] = {1, -1e-9f, 3}, none[] = {1, NAN, 3};
     static const uint32_t first[] = {0, 1, 3}, back[] = {0, 3, 1};
-    const nebel_lit_pieces wrong[] = {{first, descends}, {first, below},  {first, none},
-                                      {back, ascends},   {NULL, ascends}, {first, NULL}};
+    const nebel_ray_visibility wrong[] = {{first, descends}, {first, below},  {first, none},
+                                          {back, ascends},   {NULL, ascends}, {first, NULL}};
     const nebel_ray rays[2] = {{{0, 4, 0}, {1, 0, 0}, 20}, {{0, 4, 0}, {1, 0, 0}, 20}};
     nebel_snapshot *snapshot = make_slab();
     (void)state;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         nebel_transfer transfers[2];
         size_t failed = 9;
-        const nebel_trace_desc desc = {.sunlit = &wrong[i], .failed_ray = &failed};
+        const nebel_trace_desc desc = {.sun_visibility = &wrong[i], .failed_ray = &failed};
         assert_int_equal(nebel_trace(snapshot, &desc, 2, rays, sizeof *rays, transfers, sizeof *transfers),
                          NEBEL_ERROR_ARGUMENT);
         assert_int_equal(failed, i < 4 ? 1 : i == 4 ? 9 : 0);
@@ -286,28 +288,28 @@ static void pieces_are_the_same_in_any_set_and_split(void **state)
             for (uint32_t k = 0; k < count; k++) toggles[first[i] + k] = (float)(t += dice(&numbers, 0, 4));
             first[i + 1] = first[i] + count;
         }
-        const nebel_lit_pieces pieces = {first, toggles};
+        const nebel_ray_visibility pieces = {first, toggles};
         nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
         trace(snapshot, &desc, rays, all);
-        desc.sunlit = &pieces;
+        desc.sun_visibility = &pieces;
         trace(snapshot, &desc, rays, expected);
         for (int i = 0; i < RAYS; i++)
             assert_memory_equal(all[i].transmittance, expected[i].transmittance, sizeof all[i].transmittance);
         for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
             if (!nebel_isa_available(desc.isa)) continue;
-            desc.sunlit = &pieces;
+            desc.sun_visibility = &pieces;
             trace(snapshot, &desc, rays, other);
             assert_memory_equal(expected, other, sizeof expected);
             for (size_t i = 0; i < nb_test_count(RAYS); i++) {
-                const nebel_lit_pieces one = {first + i, toggles};
-                desc.sunlit = &one;
+                const nebel_ray_visibility one = {first + i, toggles};
+                desc.sun_visibility = &one;
                 assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
             }
             assert_memory_equal(expected, other, sizeof expected);
         }
         nebel_transfer fine[RAYS], reference[RAYS];
-        trace(snapshot, &(nebel_trace_desc){.tolerance = 2e-6, .sunlit = &pieces}, rays, fine);
-        trace(snapshot, &(nebel_trace_desc){.sunlit = &pieces}, rays, reference);
+        trace(snapshot, &(nebel_trace_desc){.tolerance = 2e-6, .sun_visibility = &pieces}, rays, fine);
+        trace(snapshot, &(nebel_trace_desc){.sun_visibility = &pieces}, rays, reference);
         for (int i = 0; i < RAYS; i++) {
             assert_true(apart(&reference[i], &fine[i]) <= reference[i].error + fine[i].error);
             assert_true(apart(&expected[i], &fine[i]) <= expected[i].error + fine[i].error);
@@ -389,7 +391,7 @@ static void closed_forms_are_what_marches_find(void **state)
     uint32_t first[RAYS + 1];
     (void)state;
     for (uint32_t i = 0; i <= RAYS; i++) first[i] = i <= RAYS / 2 ? 0 : 4;
-    const nebel_lit_pieces pieces = {first, toggles};
+    const nebel_ray_visibility pieces = {first, toggles};
     for (uint64_t seed = 0; seed < 4 * nb_test_count(11); seed++) {
         uint64_t numbers = 77 * seed + 1;
         nebel_volume_desc volumes[BODIES + 1];
@@ -410,7 +412,7 @@ static void closed_forms_are_what_marches_find(void **state)
             if (i % 5 == 0) memcpy(rays[i].direction, desc.sun.direction, sizeof desc.sun.direction);
         }
         for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-            nebel_trace_desc asked = {.tolerance = 1e-7, .sunlit = &pieces};
+            nebel_trace_desc asked = {.tolerance = 1e-7, .sun_visibility = &pieces};
             trace(other, &asked, rays, marched);
             asked.precision = (nebel_precision)precision;
             trace(simple, &asked, rays, closed);
@@ -453,7 +455,7 @@ typedef struct arrival {
 } arrival;
 
 /* The sun's where `lamp` is NULL. A lamp is a ball that shines alike from everywhere: radiance 1 / (pi r^2) times its solid angle. */
-static arrival light_arrives(const nebel_lamp *lamp, const double p[3])
+static arrival light_arrives(const nebel_light *lamp, const double p[3])
 {
     arrival a = {.distance = 1e9, .fluence = 1};
     memcpy(a.towards, sun_of_balls, sizeof sun_of_balls);
@@ -472,7 +474,7 @@ typedef struct forced {
 } forced;
 
 /* The midpoint rule in `count` steps, every optical depth by chords: isotropic, of one channel. */
-static forced light_by_force(const nebel_volume_desc *balls, size_t ball_count, const nebel_lamp *lamp,
+static forced light_by_force(const nebel_volume_desc *balls, size_t ball_count, const nebel_light *lamp,
                              const nebel_ray *ray, int c, int count)
 {
     const double step = ray->t_max / count, scale = (lamp != NULL ? lamp->intensity[c] : 1) * step / (4 * acos(-1));
@@ -523,7 +525,7 @@ static void strew_rays(nebel_ray *rays, int count, uint64_t *numbers)
 }
 
 /* `most`: what the light may be off by at a tolerance of 1e-5. */
-static void expect_brute_force(const nebel_fog_desc *desc, const nebel_lamp *lamp, size_t count, double thick,
+static void expect_brute_force(const nebel_fog_desc *desc, const nebel_light *lamp, size_t count, double thick,
                                double most)
 {
     static nebel_volume_desc balls[MOST_BALLS];
@@ -578,8 +580,8 @@ static void many_balls_are_what_brute_force_finds(void **state)
  * came to thousands. */
 static void many_balls_around_lamps_are_what_brute_force_finds(void **state)
 {
-    const nebel_lamp dim = {.position = {3, 4, -2}, .intensity = {40, 40, 40}, .radius = 0.2};
-    const nebel_lamp bright = {.position = {-4, 3, 3}, .intensity = {2000, 2000, 2000}, .radius = 0.2};
+    const nebel_light dim = {.position = {3, 4, -2}, .intensity = {40, 40, 40}, .radius = 0.2};
+    const nebel_light bright = {.position = {-4, 3, 3}, .intensity = {2000, 2000, 2000}, .radius = 0.2};
     (void)state;
     expect_brute_force(&(nebel_fog_desc){0}, &dim, 20, 1, 1e-4);
     expect_brute_force(&(nebel_fog_desc){0}, &bright, 40, 3, 4e-4);

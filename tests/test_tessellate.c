@@ -179,7 +179,7 @@ static nebel_shape random_shape(nebel_shape_type type)
 
 static nebel_density random_density(nebel_density_type type)
 {
-    nebel_density density = {.type = type, .power = 1 + (int)(3 * uniform()), .distance = .2 + 2 * uniform()};
+    nebel_density density = {.type = type, .power = 1 + (int)(3 * uniform()), .edge_width = .2 + 2 * uniform()};
     density.below = uniform() < .5 ? NEBEL_BELOW_GROW : NEBEL_BELOW_CONSTANT;
     density.base = 2 * uniform() - 1;
     density.scale_height = .3 + uniform();
@@ -247,8 +247,8 @@ static void test_the_bound_holds_everywhere(void **state)
         nebel_snapshot *fog = commit_limited(count, volumes, round % 8 == 5 ? .6 : 0);
         /* In the volumes, above, far away, and in the planes of a box's faces, where fog is not continuous. */
         nebel_tessellation_desc desc = {.eye = {8 * uniform() - 4, .1 + 3 * uniform(), 12 * uniform() - 4},
-                                        .bound = 1. / 255,
-                                        .deepest = 1 + (unsigned)(round % 9)};
+                                        .max_error = 1. / 255,
+                                        .max_depth = 1 + (unsigned)(round % 9)};
         if (round % 7 == 0) desc.eye[1] = 300, desc.eye[0] = -200;
         for (int k = 0; k < 3 && round % 5 == 0; k++)
             if (volumes[0].shape.max[k] != 0 && uniform() < .5) desc.eye[k] = volumes[0].shape.max[k];
@@ -326,7 +326,7 @@ static void test_each_triangle_has_its_own_bound(void **state)
     for (int round = 0; round < KINDS; round++) {
         const nebel_volume_desc volume = volume_of(round);
         nebel_snapshot *fog = commit(1, &volume);
-        const nebel_tessellation_desc desc = {.eye = {6 * uniform() - 3, 2 * uniform(), 8 * uniform()}, .bound = 2};
+        const nebel_tessellation_desc desc = {.eye = {6 * uniform() - 3, 2 * uniform(), 8 * uniform()}, .max_error = 2};
         for (size_t i = 0; i < 2 * SIDE * SIDE; i += 3) {
             nebel_triangles one = triangles_of(&g);
             one.indices += 3 * i;
@@ -355,8 +355,8 @@ static void test_the_bound_is_met_in_smooth_fog(void **state)
     size_t before = 0;
     for (double bound = .02; bound > 1e-4; bound /= 4) {
         nebel_tessellation *t =
-            tessellate(fog, &(nebel_tessellation_desc){.eye = {1, 3, 9}, .bound = bound}, &triangles);
-        assert_int_equal(t->over_count, 0);
+            tessellate(fog, &(nebel_tessellation_desc){.eye = {1, 3, 9}, .max_error = bound}, &triangles);
+        assert_int_equal(t->unresolved_count, 0);
         assert_true(t->error <= bound);
         assert_int_equal(t->added_triangles, t->triangle_count - triangles.triangle_count);
         if (before > 0) assert_true(t->triangle_count <= 6 * before); /* four times as many, about */
@@ -383,11 +383,11 @@ static void test_the_bound_is_met_in_soft_fog(void **state)
         {.density = {.type = NEBEL_DENSITY_GAUSSIAN, .center = {1, 0, 1}, .sigma = 1.5}},
         {.shape = ball, .density = {.type = NEBEL_DENSITY_RADIAL, .power = 1}},
         {.shape = ball, .density = {.type = NEBEL_DENSITY_RADIAL, .power = 3}},
-        {.shape = ball, .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = 1}},
-        {.shape = block, .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = 1}},
+        {.shape = ball, .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = 1}},
+        {.shape = block, .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = 1}},
         {.shape = {.type = NEBEL_SHAPE_CONVEX, .planes = wedge, .plane_count = 5},
-         .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = 1}},
-        {.shape = wall, .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = 1}},
+         .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = 1}},
+        {.shape = wall, .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = 1}},
         {.shape = wall},
         {.shape = {.type = NEBEL_SHAPE_CAPSULE, .from = {-9, 1, 0}, .to = {9, 1, 1}, .radius = 8}},
         {.shape = {.type = NEBEL_SHAPE_CONE, .from = {0, -9, 0}, .to = {0, 8, 0}, .radius_from = 20, .radius_to = 1}},
@@ -399,8 +399,8 @@ static void test_the_bound_is_met_in_soft_fog(void **state)
         volume.extinction[0] = .3;
         nebel_snapshot *fog = commit(1, &volume);
         nebel_tessellation *t = tessellate(fog, &(nebel_tessellation_desc){.eye = {1, 3, 9}}, &triangles);
-        if (t->over_count > 0 || t->triangle_count > 60000)
-            fail_msg("fog %zu: %zu of %zu triangles above the bound", i, t->over_count, t->triangle_count);
+        if (t->unresolved_count > 0 || t->triangle_count > 60000)
+            fail_msg("fog %zu: %zu of %zu triangles above the bound", i, t->unresolved_count, t->triangle_count);
         nebel_destroy_tessellation(t);
         nebel_release_snapshot(fog);
     }
@@ -460,7 +460,7 @@ static void test_there_are_no_junctions(void **state)
     apart.positions = loose;
     apart.indices = order;
     apart.vertex_count = 6 * SIDE * SIDE;
-    const nebel_tessellation_desc desc = {.eye = {4, 3, 8}, .deepest = 9};
+    const nebel_tessellation_desc desc = {.eye = {4, 3, 8}, .max_depth = 9};
     nebel_tessellation *t = tessellate(fog, &desc, &joined), *seams = tessellate(fog, &desc, &apart);
     assert_true(t->triangle_count > 500);
     assert_int_equal(t->triangle_count, seams->triangle_count);
@@ -480,11 +480,11 @@ static void test_added_vertices_are_between_their_parents(void **state)
     make_ground(&g, .4);
     nebel_snapshot *fog = commit(1, &box);
     const nebel_triangles triangles = triangles_of(&g);
-    nebel_tessellation *t = tessellate(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}, .deepest = 9}, &triangles);
-    assert_int_equal(t->vertex_count_before, triangles.vertex_count);
+    nebel_tessellation *t = tessellate(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}, .max_depth = 9}, &triangles);
+    assert_int_equal(t->input_vertex_count, triangles.vertex_count);
     assert_memory_equal(t->positions, g.positions, sizeof g.positions);
-    for (size_t v = t->vertex_count_before; v < t->vertex_count; v++) {
-        const uint32_t *parents = t->parents[v - t->vertex_count_before];
+    for (size_t v = t->input_vertex_count; v < t->vertex_count; v++) {
+        const uint32_t *parents = t->parents[v - t->input_vertex_count];
         assert_true(parents[0] < v && parents[1] < v);
         for (size_t i = 0; i < 3; i++) {
             const double mean = .5 * ((double)t->positions[parents[0]][i] + (double)t->positions[parents[1]][i]);
@@ -515,8 +515,8 @@ static void test_strides_and_origins(void **state)
     far.positions = wide[0].position;
     far.position_stride = sizeof *wide;
     far.origin[0] = 1024;
-    nebel_tessellation *a = tessellate(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}, .deepest = 7}, &near);
-    nebel_tessellation *b = tessellate(far_fog, &(nebel_tessellation_desc){.eye = {1028, 3, 8}, .deepest = 7}, &far);
+    nebel_tessellation *a = tessellate(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}, .max_depth = 7}, &near);
+    nebel_tessellation *b = tessellate(far_fog, &(nebel_tessellation_desc){.eye = {1028, 3, 8}, .max_depth = 7}, &far);
     assert_int_equal(a->triangle_count, b->triangle_count);
     assert_memory_equal(a->positions, b->positions, a->vertex_count * 12);
     assert_true(fabs(a->error - b->error) < 1e-9);
@@ -536,18 +536,19 @@ static void test_limits_are_told(void **state)
     nebel_snapshot *fog = commit(1, &box);
     const nebel_triangles triangles = triangles_of(&g);
     nebel_tessellation *none =
-        tessellate(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}, .most_triangles = 1}, &triangles);
+        tessellate(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}, .max_triangles = 1}, &triangles);
     nebel_tessellation *few =
-        tessellate(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}, .most_triangles = 400}, &triangles);
-    nebel_tessellation *flat = tessellate(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}, .deepest = 2}, &triangles);
+        tessellate(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}, .max_triangles = 400}, &triangles);
+    nebel_tessellation *flat =
+        tessellate(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}, .max_depth = 2}, &triangles);
     assert_int_equal(none->added_triangles, 0);
-    assert_true(none->over_count > 10 && none->error > .05);
-    assert_true(few->triangle_count >= 400 && few->triangle_count < 800 && few->over_count > 0);
+    assert_true(none->unresolved_count > 10 && none->error > .05);
+    assert_true(few->triangle_count >= 400 && few->triangle_count < 800 && few->unresolved_count > 0);
     assert_no_junctions(few);
-    assert_true(flat->over_count > 0 && flat->error > 1. / 255);
-    assert_int_equal(none->deepest_count, 0);
-    assert_int_equal(few->deepest_count, 0);
-    assert_int_equal(flat->deepest_count, flat->over_count);
+    assert_true(flat->unresolved_count > 0 && flat->error > 1. / 255);
+    assert_int_equal(none->depth_limited_count, 0);
+    assert_int_equal(few->depth_limited_count, 0);
+    assert_int_equal(flat->depth_limited_count, flat->unresolved_count);
     nebel_destroy_tessellation(none);
     nebel_destroy_tessellation(few);
     nebel_destroy_tessellation(flat);
@@ -563,7 +564,7 @@ static void test_nothing_to_do(void **state)
     nebel_triangles triangles = triangles_of(&g);
     nebel_tessellation *t = tessellate(clear, &(nebel_tessellation_desc){.eye = {4, 3, 8}}, &triangles);
     assert_int_equal(t->added_triangles, 0);
-    assert_true(t->error < 1.001e-6 && t->over_count == 0);
+    assert_true(t->error < 1.001e-6 && t->unresolved_count == 0);
     nebel_destroy_tessellation(t);
     triangles.triangle_count = 0;
     t = tessellate(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}}, &triangles);
@@ -590,7 +591,7 @@ static void test_degenerate_triangles(void **state)
         .positions = positions, .vertex_count = 7, .indices = indices, .triangle_count = 7};
     for (int round = 0; round < 4; round++) {
         const nebel_tessellation_desc desc = {.eye = {round == 1 ? 1 : 0, round == 2 ? 1.5 : 0, round == 3 ? 9 : 0},
-                                              .deepest = 12};
+                                              .max_depth = 12};
         nebel_tessellation *t = tessellate(fog, &desc, &triangles);
         for (size_t i = 0; i < t->triangle_count; i += 1 + t->triangle_count / 500) {
             double square = 0; /* a ray needs a direction */
@@ -636,7 +637,7 @@ static void test_bad_input(void **state)
     make_ground(&g, .4);
     nebel_snapshot *fog = commit(1, &box);
     const nebel_triangles good = triangles_of(&g);
-    const nebel_tessellation_desc desc = {.eye = {4, 3, 8}, .deepest = 6};
+    const nebel_tessellation_desc desc = {.eye = {4, 3, 8}, .max_depth = 6};
     nebel_tessellation_desc d = desc;
     nebel_triangles t = good;
     assert_refused(NULL, &d, &t, NEBEL_ERROR_ARGUMENT);
@@ -658,9 +659,9 @@ static void test_bad_input(void **state)
     assert_refused(fog, &d, &t, NEBEL_ERROR_VALUE);
     d.channel = 3;
     assert_refused(fog, &d, &good, NEBEL_ERROR_ARGUMENT);
-    d = desc, d.deepest = 49;
+    d = desc, d.max_depth = 49;
     assert_refused(fog, &d, &good, NEBEL_ERROR_ARGUMENT);
-    d = desc, d.bound = -1;
+    d = desc, d.max_error = -1;
     assert_refused(fog, &d, &good, NEBEL_ERROR_VALUE);
     d = desc, d.eye[0] = (double)INFINITY;
     assert_refused(fog, &d, &good, NEBEL_ERROR_VALUE);
@@ -686,7 +687,7 @@ static void test_fog_without_a_proof_is_refused(void **state)
     nebel_shape many[9];
     for (int i = 0; i < 3; i++) {
         volumes[i].shape = random_shape(soft[i]);
-        volumes[i].density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = .2};
+        volumes[i].density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = .2};
     }
     for (int i = 0; i < 9; i++) many[i] = random_shape(NEBEL_SHAPE_SPHERE);
     volumes[3].shape = (nebel_shape){.type = NEBEL_SHAPE_UNION, .parts = many, .part_count = 9};
@@ -707,10 +708,10 @@ static void test_no_proof_of_voxels_nor_above_a_ball(void **state)
     ground g;
     make_ground(&g, .4);
     const nebel_triangles good = triangles_of(&g);
-    const nebel_noise_desc noise = {.size = {4, 4, 4}, .cells = {1, 1, 1}};
+    const nebel_noise_desc noise = {.size = {4, 4, 4}, .frequency = {1, 1, 1}};
     nebel_volume_desc volumes[2] = {box, box};
     volumes[0].density = (nebel_density){.type = NEBEL_DENSITY_GRID};
-    assert_int_equal(nebel_create_noise(&noise, &volumes[0].density.grid), NEBEL_OK);
+    assert_int_equal(nebel_create_noise_grid(&noise, &volumes[0].density.grid), NEBEL_OK);
     volumes[1].density = (nebel_density){.type = NEBEL_DENSITY_ALTITUDE, .radius = 100, .scale_height = 1};
     for (int i = 0; i < 2; i++) {
         fog_messages messages = {0};
@@ -735,7 +736,7 @@ static void test_memory_ends(void **state)
         int left = allowed;
         nebel_tessellation *t = NULL;
         const nebel_tessellation_desc desc = {
-            .allocator = {no_memory_after, release, &left}, .eye = {4, 3, 8}, .deepest = 6};
+            .allocator = {no_memory_after, release, &left}, .eye = {4, 3, 8}, .max_depth = 6};
         const nebel_result result = nebel_tessellate(fog, &desc, &triangles, &t);
         worked = result == NEBEL_OK;
         if (!worked) assert_int_equal(result, NEBEL_ERROR_MEMORY);

@@ -33,8 +33,8 @@ static void ask(const nebel_snapshot *snapshot, const question *q, answers *a)
         nebel_trace(snapshot, &(nebel_trace_desc){0}, RAYS, q->rays, sizeof(nebel_ray), a->exact,
                     sizeof(nebel_transfer)),
         nebel_trace(snapshot, &in_float, RAYS, q->rays, sizeof(nebel_ray), a->transfers, sizeof(nebel_transfer)),
-        nebel_find_transmittance(snapshot, .5, 1, RAYS, q->rays, sizeof(nebel_ray), a->distances),
-        nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 2, RAYS, &segments, a->transmittances, 0)};
+        nebel_invert_transmittance(snapshot, .5, 1, RAYS, q->rays, sizeof(nebel_ray), a->distances),
+        nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 2, RAYS, &segments, a->transmittances, 0)};
     for (size_t i = 0; i < sizeof results / sizeof results[0]; i++) a->failures += results[i] != NEBEL_OK;
 }
 
@@ -124,7 +124,7 @@ static void *edit(void *user)
         if (nebel_add_volume(fog, &ball, &id) != NEBEL_OK) break;
         if (i % 3 == 0 && nebel_remove_volume(fog, id) != NEBEL_OK) break;
         if (i % 20 == 0 && nebel_commit_fog(fog, &snapshot) != NEBEL_OK) break;
-        if (snapshot != NULL) *count = nebel_snapshot_volume_count(snapshot);
+        if (snapshot != NULL) *count = nebel_get_volume_count(snapshot);
         nebel_release_snapshot(snapshot);
     }
     nebel_destroy_fog(fog);

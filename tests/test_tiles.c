@@ -101,8 +101,8 @@ static nebel_ray ray_of_pixel(const nebel_rays *rays, const double pixel[2])
 {
     nebel_ray ray = {.t_max = HUGE_VAL};
     for (int i = 0; i < 3; i++) {
-        const double o[3] = {(double)rays->words[0].v[i], (double)rays->words[1].v[i], (double)rays->words[2].v[i]};
-        const double d[3] = {(double)rays->words[3].v[i], (double)rays->words[4].v[i], (double)rays->words[5].v[i]};
+        const double o[3] = {(double)rays->texels[0].v[i], (double)rays->texels[1].v[i], (double)rays->texels[2].v[i]};
+        const double d[3] = {(double)rays->texels[3].v[i], (double)rays->texels[4].v[i], (double)rays->texels[5].v[i]};
         ray.origin[i] = rays->eye[i] + o[0] + pixel[0] * o[1] + pixel[1] * o[2];
         ray.direction[i] = d[0] + pixel[0] * d[1] + pixel[1] * d[2];
     }
@@ -113,10 +113,10 @@ static nebel_ray ray_of_pixel(const nebel_rays *rays, const double pixel[2])
 
 static uint32_t *tile(const nebel_snapshot *snapshot, const nebel_view *view, uint32_t size, size_t *count)
 {
-    assert_int_equal(nebel_tile_volumes(snapshot, view, size, NULL, 0, count), NEBEL_OK);
+    assert_int_equal(nebel_bin_volumes(snapshot, view, size, NULL, 0, count), NEBEL_OK);
     uint32_t *entries = malloc(*count * sizeof *entries);
     assert_non_null(entries);
-    assert_int_equal(nebel_tile_volumes(snapshot, view, size, entries, *count, count), NEBEL_OK);
+    assert_int_equal(nebel_bin_volumes(snapshot, view, size, entries, *count, count), NEBEL_OK);
     return entries;
 }
 
@@ -172,9 +172,9 @@ static void try_view(const nebel_snapshot *snapshot, const nebel_view *view, uin
     const uint32_t columns = (view->width + size - 1) / size, rows = (view->height + size - 1) / size;
     nebel_rays rays;
     size_t count;
-    assert_int_equal(nebel_view_rays(view, NULL, &rays), NEBEL_OK);
+    assert_int_equal(nebel_compute_view_rays(view, NULL, &rays), NEBEL_OK);
     uint32_t *entries = tile(snapshot, view, size, &count);
-    const size_t volumes = nebel_snapshot_volume_count(snapshot);
+    const size_t volumes = nebel_get_volume_count(snapshot);
     assert_well_formed(entries, (size_t)columns * rows, count, volumes);
     for (int i = 0; i < RAYS; i++) {
         const double pixel[2] = {dice(state, 0, view->width), dice(state, 0, view->height)};
@@ -204,7 +204,7 @@ static void test_never_misses(void **state)
             const random_fog_kind kinds[] = {RANDOM_FOG_EXCLUDE, RANDOM_FOG_PARTS, RANDOM_FOG_FAR, RANDOM_FOG_MANY};
             nebel_snapshot *snapshot = make_fog(kinds[seed % 4], seed);
             /* a body without a point would shift the order */
-            for (int i = 0; i < 2 && nebel_snapshot_volume_count(snapshot) == fog.count; i++) {
+            for (int i = 0; i < 2 && nebel_get_volume_count(snapshot) == fog.count; i++) {
                 nebel_view view = {.width = WIDTH, .height = HEIGHT};
                 double eye[3], target[3];
                 for (int k = 0; k < 3; k++) {
@@ -327,7 +327,7 @@ static void test_ten_thousand(void **state)
     double best = HUGE_VAL;
     for (int i = 0; i < 5; i++) {
         const clock_t start = clock();
-        assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, entries, count, &count), NEBEL_OK);
+        assert_int_equal(nebel_bin_volumes(snapshot, &view, 16, entries, count, &count), NEBEL_OK);
         best = fmin(best, (double)(clock() - start) / CLOCKS_PER_SEC);
     }
     print_message("10,000 volumes, 1280x720, tiles of 16 pixels: %.2f ms, %zu entries\n", best * 1e3, count);
@@ -348,29 +348,29 @@ static void test_bad_input(void **state)
     nebel_view view = straight_view(100, 60);
     uint32_t entries[200];
     size_t count = 0;
-    assert_int_equal(nebel_tile_volumes(NULL, &view, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_tile_volumes(snapshot, NULL, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, NULL, 5, &count), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_tile_volumes(snapshot, &view, 2, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_tile_volumes(snapshot, &view, 24, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_tile_volumes(snapshot, &view, 512, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_bin_volumes(NULL, &view, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_bin_volumes(snapshot, NULL, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_bin_volumes(snapshot, &view, 16, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_bin_volumes(snapshot, &view, 16, NULL, 5, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_bin_volumes(snapshot, &view, 2, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_bin_volumes(snapshot, &view, 24, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_bin_volumes(snapshot, &view, 512, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
     memset(&messages, 0, sizeof messages);
-    assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, entries, 1, &count), NEBEL_ERROR_LIMIT);
+    assert_int_equal(nebel_bin_volumes(snapshot, &view, 16, entries, 1, &count), NEBEL_ERROR_LIMIT);
     assert_string_equal(messages.text, ""); /* those who ask again with more room have made no mistake */
     const size_t live = memory.live;
     for (size_t fail = 1; fail <= 3; fail++) {
         memory.fail_first = fail;
         memory.fail_count = 1;
-        assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, entries, 200, &count), NEBEL_ERROR_MEMORY);
+        assert_int_equal(nebel_bin_volumes(snapshot, &view, 16, entries, 200, &count), NEBEL_ERROR_MEMORY);
         assert_int_equal(memory.live, live);
     }
     view.clip_from_eye[0] = (double)NAN;
-    assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_bin_volumes(snapshot, &view, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
     memset(view.clip_from_eye, 0, sizeof view.clip_from_eye);
-    assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_bin_volumes(snapshot, &view, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
     view = straight_view(0, 60);
-    assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_bin_volumes(snapshot, &view, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
     nebel_release_snapshot(snapshot);
     assert_int_equal(memory.live, 0);
 }

@@ -13,7 +13,7 @@
 
 static const char *dialect_of(nb_gl_language language)
 {
-    return nebel_shader_text(language == NB_GL_330 ? NEBEL_DIALECT_GLSL_330 : NEBEL_DIALECT_GLSL_300_ES);
+    return nebel_get_shader_source(language == NB_GL_330 ? NEBEL_DIALECT_GLSL_330 : NEBEL_DIALECT_GLSL_300_ES);
 }
 
 /* ---- soft particles -------------------------------------------------------------------------- */
@@ -31,9 +31,9 @@ typedef struct particle_light {
 
 static const char particle_body[] =
     "int profile = int(in1.w);\n"
-    "float way = profile < 4 ? nebel_ball_length(in0.xyz, in1.xyz, in0.w, in2.xyz, in2.w, profile)\n"
-    "    : nebel_gaussian_length(in0.xyz, in1.xyz, in0.w, in2.xyz, profile == 4 ? in2.w : 1e18, in3.w);\n"
-    "nebel_transfer l = nebel_medium_light(way, in3.xyz, in4.xyz);\n"
+    "float way = profile < 4 ? nebel_sphere_path_length(in0.xyz, in1.xyz, in0.w, in2.xyz, in2.w, profile)\n"
+    "    : nebel_gaussian_path_length(in0.xyz, in1.xyz, in0.w, in2.xyz, profile == 4 ? in2.w : 1e18, in3.w);\n"
+    "nebel_transfer l = nebel_medium_transfer(way, in3.xyz, in4.xyz);\n"
     "out0 = vec4(l.transmittance, 0.0); out1 = vec4(l.in_scattering, 0.0);\n";
 
 /* A ray from anywhere near the particle, inside of it too, towards anywhere in it, to an end before, in or behind it.
@@ -143,10 +143,10 @@ typedef struct verdict {
     float place[2], brightness, by_defaults;
 } verdict;
 
-static const char tap_body[] = "nebel_tap_constants taps;\n"
+static const char tap_body[] = "nebel_depth_taps taps;\n"
                                "taps.offset = in1.y; taps.nothing = in1.z; taps.edge = in1.w;\n"
                                "taps.margin = in2.x; taps.brightness = in2.y;\n"
-                               "vec2 place = nebel_screen_place(in0);\n"
+                               "vec2 place = nebel_screen_uv(in0);\n"
                                "out0 = vec4(place, nebel_five_taps(place, in1.x, taps),\n"
                                "            nebel_five_taps(place, in1.x, nebel_default_taps()));\n";
 

@@ -1,4 +1,4 @@
-/* Rays and lengths that shaders compute with nebel_see, against points brought back through the inverse of the whole
+/* Rays and lengths that shaders compute with nebel_make_view_ray, against points brought back through the inverse of the whole
  * matrix in long double: every projection times every convention of depth, in GLSL 3.30 and GLSL ES 3.00. */
 #include "gl_harness.h"
 #include "projections.h"
@@ -18,10 +18,10 @@ enum { WIDTH = 640, HEIGHT = 400, COUNT = 512, INPUTS = 4, OUTPUTS = 8 };
 static unsigned compile(nb_gl *gl)
 {
     const int es = gl->language == NB_GL_300ES;
-    const char *const texts[] = {"#define NEBEL_VIEW\n",
-                                 nebel_shader_text(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330), NULL};
+    const char *const texts[] = {
+        "#define NEBEL_VIEW\n", nebel_get_shader_source(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330), NULL};
     const unsigned program = nb_gl_compile_texts(gl, texts,
-                                                 "nebel_sight s = nebel_see(in0.xy, in0.z);\n"
+                                                 "nebel_view_ray s = nebel_make_view_ray(in0.xy, in0.z);\n"
                                                  "out0 = vec4(s.origin, s.t_max); out1 = vec4(s.direction, 0.0);\n",
                                                  1, 2);
     if (program == 0) fail_msg("%s", gl->fault);
@@ -33,7 +33,7 @@ static float inputs[COUNT][INPUTS], outputs[COUNT][OUTPUTS];
 static void see(nb_gl *gl, unsigned program, const nebel_rays *rays)
 {
     glUseProgram(program);
-    glUniform4fv(glGetUniformLocation(program, "nebel_rays"), NEBEL_RAY_WORDS, rays->words[0].v);
+    glUniform4fv(glGetUniformLocation(program, "nebel_rays"), NEBEL_RAY_TEXELS, rays->texels[0].v);
     if (!nb_gl_evaluate(gl, program, COUNT, &inputs[0][0], &outputs[0][0])) fail_msg("%s", gl->fault);
 }
 
@@ -116,7 +116,7 @@ static void check_window(nb_gl *gl, unsigned program, int projection, range r, d
     const nebel_depth_desc depth = {.zero_to_one = r.low == 0, .range = {first, last}};
     nebel_rays rays;
     miss worst = {0, 0, 0};
-    assert_int_equal(nebel_view_rays(&view, &depth, &rays), NEBEL_OK);
+    assert_int_equal(nebel_compute_view_rays(&view, &depth, &rays), NEBEL_OK);
     fill_window(&view, r, first, last);
     see(gl, program, &rays);
     for (int i = 0; i < COUNT; i++) {
@@ -145,7 +145,7 @@ static void check_kind(nb_gl *gl, unsigned program, int projection, const nebel_
     static float window[COUNT][OUTPUTS];
     const nebel_view view = make_view(projection, (range){-1, 0});
     nebel_rays rays;
-    assert_int_equal(nebel_view_rays(&view, NULL, &rays), NEBEL_OK);
+    assert_int_equal(nebel_compute_view_rays(&view, NULL, &rays), NEBEL_OK);
     fill_window(&view, (range){-1, 0}, 0, 1);
     see(gl, program, &rays);
     memcpy(window, outputs, sizeof window);
@@ -154,12 +154,12 @@ static void check_kind(nb_gl *gl, unsigned program, int projection, const nebel_
         double z = 0;
         for (int k = 0; k < 3; k++)
             z += row[4 * k + 2] * ((double)window[i][k] + (double)window[i][3] * (double)window[i][4 + k]);
-        inputs[i][2] = depth->kind == NEBEL_DEPTH_KIND_DISTANCE ? window[i][3]
-                       : depth->kind == NEBEL_DEPTH_KIND_AXIS
+        inputs[i][2] = depth->encoding == NEBEL_DEPTH_ENCODING_RADIAL ? window[i][3]
+                       : depth->encoding == NEBEL_DEPTH_ENCODING_AXIAL
                            ? (float)-z
                            : (float)(log1p(depth->log_scale * -z) / log1p(depth->log_scale * depth->log_far));
     }
-    assert_int_equal(nebel_view_rays(&view, depth, &rays), NEBEL_OK);
+    assert_int_equal(nebel_compute_view_rays(&view, depth, &rays), NEBEL_OK);
     see(gl, program, &rays);
     for (int i = 0; i < COUNT; i++) {
         double square = 0;
@@ -172,8 +172,9 @@ static void check_kind(nb_gl *gl, unsigned program, int projection, const nebel_
 
 static void check_kinds(nb_gl *gl, unsigned program)
 {
-    const nebel_depth_desc axis = {.kind = NEBEL_DEPTH_KIND_AXIS}, distance = {.kind = NEBEL_DEPTH_KIND_DISTANCE};
-    const nebel_depth_desc logarithm = {.kind = NEBEL_DEPTH_KIND_LOGARITHM, .log_scale = .5, .log_far = 1e5};
+    const nebel_depth_desc axis = {.encoding = NEBEL_DEPTH_ENCODING_AXIAL},
+                           distance = {.encoding = NEBEL_DEPTH_ENCODING_RADIAL};
+    const nebel_depth_desc logarithm = {.encoding = NEBEL_DEPTH_ENCODING_LOGARITHMIC, .log_scale = .5, .log_far = 1e5};
     check_kind(gl, program, PERSPECTIVE, &axis);
     check_kind(gl, program, PERSPECTIVE, &distance);
     check_kind(gl, program, PERSPECTIVE, &logarithm);
@@ -187,7 +188,7 @@ static double length_at(nb_gl *gl, unsigned program, int projection, range r, co
 {
     const nebel_view view = make_view(projection, r);
     nebel_rays rays;
-    assert_int_equal(nebel_view_rays(&view, depth, &rays), NEBEL_OK);
+    assert_int_equal(nebel_compute_view_rays(&view, depth, &rays), NEBEL_OK);
     inputs[0][0] = WIDTH / 2.f;
     inputs[0][1] = HEIGHT / 2.f;
     inputs[0][2] = stored;
@@ -200,8 +201,9 @@ static void check_sky(nb_gl *gl, unsigned program)
     const double endless = (double)1e18f;
     const range usual = {-1, 0}, reversed = {0, 1};
     const nebel_depth_desc none = {0}, zero_to_one = {.zero_to_one = 1};
-    const nebel_depth_desc wall = {.sky = NEBEL_SKY_NONE}, value = {.sky = NEBEL_SKY_VALUE, .sky_depth = .5};
-    const nebel_depth_desc axis = {.kind = NEBEL_DEPTH_KIND_AXIS};
+    const nebel_depth_desc wall = {.background = NEBEL_BACKGROUND_DEPTH_NONE},
+                           value = {.background = NEBEL_BACKGROUND_DEPTH_VALUE, .background_depth = .5};
+    const nebel_depth_desc axis = {.encoding = NEBEL_DEPTH_ENCODING_AXIAL};
     assert_true(length_at(gl, program, PERSPECTIVE, usual, &none, 1) == endless);
     assert_true(length_at(gl, program, PERSPECTIVE, usual, &none, 1 - 0x1p-24f) < 1000);
     assert_true(length_at(gl, program, PERSPECTIVE, reversed, &zero_to_one, 0) == endless);
@@ -221,7 +223,7 @@ static void check_sky(nb_gl *gl, unsigned program)
 static void check_start(nb_gl *gl, unsigned program)
 {
     const range r = {-1, 0};
-    const nebel_depth_desc near = {.start = NEBEL_START_NEAR}, eye = {0};
+    const nebel_depth_desc near = {.ray_start = NEBEL_RAY_START_NEAR}, eye = {0};
     const double whole = length_at(gl, program, PERSPECTIVE, r, &eye, .999f);
     assert_true(fabs(whole - length_at(gl, program, PERSPECTIVE, r, &near, .999f) - .1) < 1e-5);
     assert_true(fabs(length_at(gl, program, ORTHOGRAPHIC, r, &eye, 0) - 1) < 1e-6);
@@ -265,7 +267,7 @@ static void test_glsl_es_300_sees_through_every_projection(void **state)
 static void expect_refusal(const nebel_view *view, const nebel_depth_desc *depth)
 {
     nebel_rays rays;
-    assert_int_equal(nebel_view_rays(view, depth, &rays), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_view_rays(view, depth, &rays), NEBEL_ERROR_ARGUMENT);
 }
 
 static void refuse_view_with(int clip, int at, double value)
@@ -280,8 +282,8 @@ static void test_what_is_no_view_is_refused(void **state)
     (void)state;
     nebel_view view = make_view(PERSPECTIVE, (range){-1, 0});
     nebel_rays rays;
-    assert_int_equal(nebel_view_rays(&view, NULL, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_view_rays(NULL, NULL, &rays), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_view_rays(&view, NULL, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_compute_view_rays(NULL, NULL, &rays), NEBEL_ERROR_ARGUMENT);
     view.width = 0;
     expect_refusal(&view, NULL);
     view.width = 65537;
@@ -315,19 +317,19 @@ static void test_what_is_no_convention_is_refused(void **state)
     (void)state;
     const nebel_view view = make_view(PERSPECTIVE, (range){-1, 0}), parallel = make_view(ORTHOGRAPHIC, (range){-1, 0});
     const nebel_depth_desc wrong[] = {
-        {.kind = NEBEL_DEPTH_KIND_COUNT},
-        {.sky = (nebel_sky)7},
-        {.start = (nebel_start)-1},
+        {.encoding = NEBEL_DEPTH_ENCODING_COUNT},
+        {.background = (nebel_background_depth)7},
+        {.ray_start = (nebel_ray_start)-1},
         {.range = {1, 1}},
         {.range = {0, (double)NAN}},
-        {.kind = NEBEL_DEPTH_KIND_LOGARITHM},
-        {.kind = NEBEL_DEPTH_KIND_LOGARITHM, .log_far = HUGE_VAL},
-        {.kind = NEBEL_DEPTH_KIND_LOGARITHM, .log_far = 10, .log_scale = -1},
+        {.encoding = NEBEL_DEPTH_ENCODING_LOGARITHMIC},
+        {.encoding = NEBEL_DEPTH_ENCODING_LOGARITHMIC, .log_far = HUGE_VAL},
+        {.encoding = NEBEL_DEPTH_ENCODING_LOGARITHMIC, .log_far = 10, .log_scale = -1},
     };
-    const nebel_depth_desc logarithm = {.kind = NEBEL_DEPTH_KIND_LOGARITHM, .log_far = 10};
+    const nebel_depth_desc logarithm = {.encoding = NEBEL_DEPTH_ENCODING_LOGARITHMIC, .log_far = 10};
     nebel_rays rays;
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) expect_refusal(&view, &wrong[i]);
-    assert_int_equal(nebel_view_rays(&view, &logarithm, &rays), NEBEL_OK);
+    assert_int_equal(nebel_compute_view_rays(&view, &logarithm, &rays), NEBEL_OK);
     expect_refusal(&parallel, &logarithm);
 }
 

@@ -181,7 +181,7 @@ static void read_density(const char *s, nebel_density *d)
     if (member(s, "scale_height")) d->scale_height = number(s, "scale_height");
     if (member(s, "power")) d->power = (int)number(s, "power");
     if (member(s, "sigma")) d->sigma = number(s, "sigma");
-    if (member(s, "distance")) d->distance = number(s, "distance");
+    if (member(s, "distance")) d->edge_width = number(s, "distance");
     vector_or(s, "from", d->from);
     vector_or(s, "to", d->to);
     vector_or(s, "center", d->center);

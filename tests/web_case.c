@@ -47,7 +47,7 @@ static void *allocate(size_t count, size_t size)
     return memory;
 }
 
-static void print_words(const char *name, const nebel_word *words, size_t count)
+static void print_words(const char *name, const nebel_texel_f32 *words, size_t count)
 {
     printf("\"%s\": [", name);
     for (size_t i = 0; i < 4 * count; i++) printf("%s%.9g", i > 0 ? "," : "", (double)words[i / 4].v[i % 4]);
@@ -55,27 +55,27 @@ static void print_words(const char *name, const nebel_word *words, size_t count)
 }
 
 /* Packs words into `words`, or counts them where it is NULL. */
-typedef nebel_result (*pack_fn)(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
-                                size_t *count);
+typedef nebel_result (*pack_fn)(const nebel_snapshot *snapshot, const double eye[3], nebel_texel_f32 *words,
+                                size_t capacity, size_t *count);
 
 static void print_packed(const char *name, pack_fn pack, const nebel_snapshot *snapshot, const double eye[3])
 {
     size_t count = 0;
     require(pack(snapshot, eye, NULL, 0, &count));
-    nebel_word *words = allocate(count, sizeof *words);
+    nebel_texel_f32 *words = allocate(count, sizeof *words);
     require(pack(snapshot, eye, words, count, &count));
     print_words(name, words, count);
     free(words);
 }
 
-static nebel_result pack_nodes(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
-                               size_t *count)
+static nebel_result pack_nodes(const nebel_snapshot *snapshot, const double eye[3], nebel_texel_f32 *words,
+                               size_t capacity, size_t *count)
 {
     (void)eye;
     return nebel_pack_diffusion(snapshot, words, capacity, count);
 }
 
-static nebel_result pack_environment(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words,
+static nebel_result pack_environment(const nebel_snapshot *snapshot, const double eye[3], nebel_texel_f32 *words,
                                      size_t capacity, size_t *count)
 {
     (void)eye;
@@ -86,7 +86,7 @@ static void print_voxels(const nebel_snapshot *snapshot)
 {
     size_t count = 0;
     require(nebel_pack_voxels(snapshot, NULL, 0, &count));
-    nebel_texel *texels = allocate(count, sizeof *texels);
+    nebel_texel_u32 *texels = allocate(count, sizeof *texels);
     require(nebel_pack_voxels(snapshot, texels, count, &count));
     printf("\"voxels\": [");
     for (size_t i = 0; i < 4 * count; i++) printf("%s%u", i > 0 ? "," : "", (unsigned)texels[i / 4].v[i % 4]);
@@ -128,7 +128,7 @@ static frame frame_of(const nebel_camera *camera, unsigned width, unsigned heigh
     return f;
 }
 
-/* The words of nebel_see. The page brings distances along the rays, so that the planes of the projection do not matter. */
+/* The words of nebel_make_view_ray. The page brings distances along the rays, so that the planes of the projection do not matter. */
 static void print_rays(const frame *f)
 {
     const double near = .1;
@@ -146,10 +146,10 @@ static void print_rays(const frame *f)
     view.clip_from_eye[5] = 1 / f->slope;
     view.clip_from_eye[10] = view.clip_from_eye[11] = -1;
     view.clip_from_eye[14] = -2 * near;
-    const nebel_depth_desc depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE};
+    const nebel_depth_desc depth = {.encoding = NEBEL_DEPTH_ENCODING_RADIAL};
     nebel_rays rays;
-    require(nebel_view_rays(&view, &depth, &rays));
-    print_words("rays", rays.words, NEBEL_RAY_WORDS);
+    require(nebel_compute_view_rays(&view, &depth, &rays));
+    print_words("rays", rays.texels, NEBEL_RAY_TEXELS);
 }
 
 /* Surfaces up to twice as far away as where the camera looks, and none every fifth pixel: 0. The page gets it as a float. */
@@ -184,7 +184,7 @@ static void print_picture(const char *path, unsigned width, unsigned height)
     nebel_scene *scene = load(path);
     nebel_snapshot *snapshot = NULL;
     require(nebel_commit_scene_fog(scene, &snapshot));
-    const frame f = frame_of(&nebel_scene_contents(scene)->camera, width, height);
+    const frame f = frame_of(&nebel_get_scene_data(scene)->camera, width, height);
     printf("{\"features\": %u, \"width\": %u, \"height\": %u,\n", (unsigned)nebel_pack_features(snapshot), width,
            height);
     print_packed("fog", nebel_pack_fog, snapshot, f.position);
@@ -202,7 +202,7 @@ int main(int argc, char **argv)
 {
     const char *const task = argc > 1 ? argv[1] : "";
     if (strcmp(task, "text") == 0) {
-        (void)fputs(nebel_shader_text(NEBEL_DIALECT_GLSL_300_ES), stdout);
+        (void)fputs(nebel_get_shader_source(NEBEL_DIALECT_GLSL_300_ES), stdout);
     } else if (strcmp(task, "features") == 0) {
         for (int i = 2; i < argc; i++) print_features(argv[i]);
     } else if (strcmp(task, "picture") == 0 && argc == 5) {

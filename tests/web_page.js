@@ -10,13 +10,13 @@ layout(location = 0) out vec4 transmittance;
 layout(location = 1) out vec4 inScattering;
 void main()
 {
-    nebel_sight sight = nebel_see(gl_FragCoord.xy, texelFetch(distances, ivec2(gl_FragCoord.xy), 0).x);
+    nebel_view_ray sight = nebel_make_view_ray(gl_FragCoord.xy, texelFetch(distances, ivec2(gl_FragCoord.xy), 0).x);
     nebel_transfer fog = nebel_trace(sight.origin, sight.direction, sight.t_max);
     transmittance = vec4(fog.transmittance, 1.0);
     inScattering = vec4(fog.in_scattering, 1.0);
 }`;
 
-const sources = '#define NEBEL_TEXTURE\n#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n';
+const sources = '#define NEBEL_FOG_TEXTURE\n#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n';
 
 const gl = document.createElement('canvas').getContext('webgl2');
 
@@ -67,7 +67,7 @@ function readTarget(attachment, width, height) {
 
 function draw({features, width, height, fog, voxels, nodes, environment, rays, pixels}) {
     if (!gl.getExtension('EXT_color_buffer_float')) throw new Error('WebGL 2 here has no float targets');
-    const plain = `#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES ${features}\n#define NEBEL_DEPTH_KIND 3\n`;
+    const plain = `#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES ${features}\n#define NEBEL_DEPTH_ENCODING 3\n`;
     const program = build(sources + plain, pictureCalls);
     const fillFloats = (unit, name, words, columns) =>
         fillTexture(program, unit, name, columns, new Float32Array(words), gl.RGBA32F, gl.RGBA, gl.FLOAT);
@@ -79,7 +79,7 @@ function draw({features, width, height, fog, voxels, nodes, environment, rays, p
     gl.viewport(0, 0, width, height);
     gl.useProgram(program);
     fillFloats(0, 'nebel_fog_texture', fog, 1024);
-    fillFloats(1, 'nebel_node_texture', nodes, 1024);
+    fillFloats(1, 'nebel_diffusion_texture', nodes, 1024);
     fillFloats(2, 'nebel_environment_texture', environment, 1024);
     fillFloats(3, 'distances', pixels.flatMap(([, distance]) => [distance, 0, 0, 0]), width);
     fillTexture(program, 4, 'nebel_voxel_texture', 1024, new Uint32Array(voxels), gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT);

@@ -31,14 +31,15 @@ static inline void worlds_make(size_t count, const worlds_body *bodies, const do
     assert_true(nb_vector_make_unit(s->sun.direction));
     for (size_t i = 0; i < count; i++) {
         nebel_planet *planet = &s->planets[i];
-        planet->air = *nebel_find_atmosphere(bodies[i].name);
-        if (bodies[i].radius > 0) planet->air.radius = bodies[i].radius;
-        if (bodies[i].thickness > 0) planet->air.thickness = bodies[i].thickness;
+        planet->atmosphere_desc = *nebel_lookup_atmosphere(bodies[i].name);
+        if (bodies[i].radius > 0) planet->atmosphere_desc.radius = bodies[i].radius;
+        if (bodies[i].thickness > 0) planet->atmosphere_desc.thickness = bodies[i].thickness;
         for (int c = 0; c < 3 && i > 0; c++)
-            planet->air.ground[c] = bodies[i].center[c] + (c == 1 ? planet->air.radius : 0);
-        assert_int_equal(nebel_create_atmosphere(&planet->air, &s->atmospheres[i]), NEBEL_OK);
+            planet->atmosphere_desc.ground_point[c] =
+                bodies[i].center[c] + (c == 1 ? planet->atmosphere_desc.radius : 0);
+        assert_int_equal(nebel_create_atmosphere(&planet->atmosphere_desc, &s->atmospheres[i]), NEBEL_OK);
         planet->atmosphere = s->atmospheres[i];
-        planet->sun_diameter = sun_diameter;
+        planet->sun_angular_diameter = sun_diameter;
     }
     s->scene =
         (nebel_scene_data){.has_sun = 1, .sun_irradiance = {5, 4, 3}, .planet_count = count, .planets = s->planets};

@@ -12,18 +12,21 @@
 int nb_has_air(const nebel_planet *planet)
 {
     double sum = 0;
-    for (uint32_t i = 0; i < planet->air.air_count; i++)
-        for (int c = 0; c < 3; c++) sum += planet->air.airs[i].scattering[c] + planet->air.airs[i].absorption[c];
+    for (uint32_t i = 0; i < planet->atmosphere_desc.component_count; i++)
+        for (int c = 0; c < 3; c++)
+            sum += planet->atmosphere_desc.components[i].scattering[c] +
+                   planet->atmosphere_desc.components[i].absorption[c];
     return sum > 0;
 }
 
 void nb_find_air_depth(const nebel_planet *planet, double depth[3])
 {
-    const double *const ground = planet->air.ground;
+    const double *const ground = planet->atmosphere_desc.ground_point;
     const nebel_ray up = {{ground[0], ground[1], ground[2]}, {0, 1, 0}, (double)INFINITY};
     nebel_transfer transfer;
     for (int c = 0; c < 3; c++) depth[c] = 0;
-    if (planet->atmosphere == NULL || nebel_trace_air(planet->atmosphere, NULL, 1, &up, 0, &transfer, 0) != NEBEL_OK)
+    if (planet->atmosphere == NULL ||
+        nebel_trace_atmosphere(planet->atmosphere, NULL, 1, &up, 0, &transfer, 0) != NEBEL_OK)
         return;
     for (int c = 0; c < 3; c++) depth[c] = 0 - log(transfer.transmittance[c]);
 }

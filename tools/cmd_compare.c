@@ -196,7 +196,7 @@ static void print_psnr(double peak, double rmse)
 static void print_findings(const settings *wanted, const pair *both, const findings *found)
 {
     const nebel_image *const image = &both->images[0];
-    const int is_png = nebel_find_image_format(wanted->paths[0]) == NEBEL_IMAGE_PNG;
+    const int is_png = nebel_get_image_format(wanted->paths[0]) == NEBEL_IMAGE_PNG;
     const double rmse = rmse_of(both, found);
     (void)printf("size: %u x %u\nchannels:", (unsigned)image->width, (unsigned)image->height);
     for (uint32_t c = 0; c < both->channel_count; c++) {
@@ -229,7 +229,7 @@ static float shade(double difference, double amplify, nebel_image_format format)
 /* The first three channels, or the only one in all three. */
 static void paint(const pair *both, const settings *wanted, float *samples)
 {
-    const nebel_image_format format = nebel_find_image_format(wanted->output);
+    const nebel_image_format format = nebel_get_image_format(wanted->output);
     const size_t pixels = pixels_of(both);
     for (size_t i = 0; i < pixels; i++) {
         for (uint32_t c = 0; c < 3; c++) {
@@ -267,7 +267,7 @@ static int read_settings(nb_arguments *arguments, settings *wanted)
     wanted->amplify = nb_options_number(arguments, AMPLIFY, 0, 1e6, 8);
     if (wanted->amplify == 0) nb_options_reject(arguments, AMPLIFY, "is not more than 0");
     wanted->fail_above = nb_options_number(arguments, FAIL_ABOVE, 0, (double)INFINITY, (double)INFINITY);
-    if (wanted->output != NULL && nebel_find_image_format(wanted->output) == NEBEL_IMAGE_NONE) {
+    if (wanted->output != NULL && nebel_get_image_format(wanted->output) == NEBEL_IMAGE_NONE) {
         nb_options_reject(arguments, OUTPUT, "is no name that ends in .png or .exr");
     }
     return arguments->misused ? nb_report_misuse("compare", "compare: nothing was done") : -1;
@@ -286,7 +286,7 @@ static int read_pictures(const settings *wanted, pair *both, nb_report_listener 
                                  wanted->paths[0], (unsigned)a->width, (unsigned)a->height, wanted->paths[1],
                                  (unsigned)b->width, (unsigned)b->height);
     }
-    if (nebel_find_image_format(wanted->paths[0]) != nebel_find_image_format(wanted->paths[1])) {
+    if (nebel_get_image_format(wanted->paths[0]) != nebel_get_image_format(wanted->paths[1])) {
         nb_report_message("compare: one picture holds sRGB and the other linear light; the numbers compare as stored");
     }
     return choose_channels(wanted, both);

@@ -200,10 +200,10 @@ static int load_scene(crew *all)
     if (wanted->scene == NULL) return NB_DONE;
     const int status = nb_load_scene(wanted->scene, 0, wanted->frame, &all->listener, &all->loaded);
     if (status != NB_DONE) return status;
-    if (nebel_scene_camera(all->loaded.scene, wanted->frame).projection != NEBEL_PROJECTION_PERSPECTIVE)
+    if (nebel_get_scene_camera(all->loaded.scene, wanted->frame).projection != NEBEL_PROJECTION_PERSPECTIVE)
         return nb_report_failure("fog: %s: its camera must be a perspective one, as that of the picture",
                                  wanted->scene);
-    if (wanted->frame_of_name && nebel_scene_contents(all->loaded.scene)->sun_key_count > 1)
+    if (wanted->frame_of_name && nebel_get_scene_data(all->loaded.scene)->sun_key_count > 1)
         return nb_report_failure(
             "fog: %s: --frame name: the sun has keys, and light is prepared for one frame; name the frame",
             wanted->scene);
@@ -214,7 +214,7 @@ static int load_scene(crew *all)
 
 static const nebel_scene_data *contents_of(const crew *all)
 {
-    return all->shared.scene != NULL ? nebel_scene_contents(all->shared.scene) : NULL;
+    return all->shared.scene != NULL ? nebel_get_scene_data(all->shared.scene) : NULL;
 }
 
 /* The first process does so for all that joined. */

@@ -107,7 +107,7 @@ static int print_program(void)
     (void)printf("scene libraries: %s\n", nebel_scene_libraries());
     const char *const reader = nb_reader_path();
     (void)printf("model reader: %s\n", reader != NULL ? reader : "not beside this program");
-    (void)printf("renderer libraries: %s\n", nebel_renderer_libraries());
+    (void)printf("renderer libraries: %s\n", nebel_cpu_libraries());
     (void)printf("processor: %s\n", processor);
     print_instruction_sets();
     print_opengl();

@@ -197,7 +197,7 @@ static nebel_result trace_samples(studio *all, double time, uint32_t first_sampl
 {
     const nb_render_call *const wanted = all->wanted;
     const nebel_frame_desc desc = {
-        .camera = nebel_scene_camera(all->loaded.scene, time),
+        .camera = nebel_get_scene_camera(all->loaded.scene, time),
         .width = wanted->width,
         .height = wanted->height,
         .samples = wanted->samples,
@@ -231,7 +231,7 @@ static nebel_result move_to(studio *all, double time)
     const nebel_result result = nb_load_move_fog(&all->loaded, time);
     all->has_moved = result == NEBEL_OK;
     all->moved_to = time;
-    nb_finer_light(&all->finer, nebel_scene_contents(all->loaded.scene));
+    nb_finer_light(&all->finer, nebel_get_scene_data(all->loaded.scene));
     return result;
 }
 
@@ -269,7 +269,7 @@ static nebel_vertex_desc look_of(nebel_method method, const nebel_scene_data *sc
 
 static const nebel_scene_data *surfaces_of(const studio *all)
 {
-    return all->wanted->tessellation.bound > 0 ? &all->finer.data : nebel_scene_contents(all->loaded.scene);
+    return all->wanted->tessellation.max_error > 0 ? &all->finer.data : nebel_get_scene_data(all->loaded.scene);
 }
 
 #if defined(NEBEL_HAVE_GL)
@@ -289,10 +289,10 @@ static nebel_gl_method gl_method(nebel_method method)
 
 static nebel_result draw_frame(studio *all)
 {
-    const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
+    const nebel_scene_data *const scene = nebel_get_scene_data(all->loaded.scene);
     const nebel_vertex_desc look = look_of(all->wanted->method, scene);
     const nebel_gl_frame_desc desc = {
-        .camera = nebel_scene_camera(all->loaded.scene, all->item.frame),
+        .camera = nebel_get_scene_camera(all->loaded.scene, all->item.frame),
         .width = all->wanted->width,
         .height = all->wanted->height,
         .samples = all->wanted->samples,
@@ -400,15 +400,15 @@ static int do_item(studio *all, uint64_t number)
 static const char *name_movers(const nebel_scene_data *scene)
 {
     if (scene->planet_count == 0) return "";
-    return scene->planets->model == NEBEL_PLANET_LAYERS ? ", a planet of layers turns with \"day\""
-                                                        : ", clouds drift with \"wind\"";
+    return scene->planets->model == NEBEL_PLANET_TEXTURED ? ", a planet of layers turns with \"day\""
+                                                          : ", clouds drift with \"wind\"";
 }
 
 static void note_stillness(const nebel_scene *scene, const nb_render_call *wanted)
 {
-    const nebel_scene_data *const data = nebel_scene_contents(scene);
-    if (data->turntable_frames > 0 || data->camera_key_count > 1 || data->moving_volume_count > 0 || data->moves_on ||
-        data->sun_key_count > 1)
+    const nebel_scene_data *const data = nebel_get_scene_data(scene);
+    if (data->turntable_frames > 0 || data->camera_key_count > 1 || data->animated_volume_count > 0 ||
+        data->has_endless_motion || data->sun_key_count > 1)
         return;
     nb_report_message("note: %s: nothing moves, all frames are the same picture; "
                       "the camera turns with \"turntable\", camera and sun move with \"keys\"%s",
@@ -438,7 +438,7 @@ static int takes_cells(nebel_method method)
 static int make_cells(studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
-    const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
+    const nebel_scene_data *const scene = nebel_get_scene_data(all->loaded.scene);
     if (!takes_cells(wanted->method)) return NB_DONE;
     if (scene->cells == NULL)
         return nb_report_failure("render: %s: there is no section \"cells\" for --method cells; add one, or say "
@@ -475,7 +475,7 @@ static void note_coarseness(const nebel_scene_data *scene, const nb_render_call 
 static int check_classic(const studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
-    const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
+    const nebel_scene_data *const scene = nebel_get_scene_data(all->loaded.scene);
     if (wanted->method == NEBEL_METHOD_D3D9 && scene->classic_d3d9 == NULL)
         return nb_report_failure(
             "render: %s: there is no \"d3d9\" in a section \"classic\" for --method d3d9; add it, or "
@@ -484,7 +484,7 @@ static int check_classic(const studio *all)
     if (nb_render_takes_color(wanted->method) && scene->classic == NULL)
         return nb_report_failure("render: %s: there is no section \"classic\" for --method %s; add one, or say "
                                  "--method exact",
-                                 wanted->scene, nebel_method_word(wanted->method));
+                                 wanted->scene, nebel_method_name(wanted->method));
     note_coarseness(scene, wanted);
     return NB_DONE;
 }
@@ -492,7 +492,7 @@ static int check_classic(const studio *all)
 static int choose_method(studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
-    const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
+    const nebel_scene_data *const scene = nebel_get_scene_data(all->loaded.scene);
     const nebel_cell_stage stage =
         wanted->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL;
     const nebel_vertex_desc look = look_of(wanted->method, scene);
@@ -531,7 +531,7 @@ static int refuse_tessellation(const studio *all)
     const nebel_scene *const scene = all->loaded.scene;
     const size_t volume = nb_finer_find_unproven(scene, all->wanted->first_frame);
     char place[32] = "fog";
-    if (volume < nebel_scene_contents(scene)->volume_count) (void)snprintf(place, sizeof place, "fog[%zu]", volume);
+    if (volume < nebel_get_scene_data(scene)->volume_count) (void)snprintf(place, sizeof place, "fog[%zu]", volume);
     return nb_report_failure("render: %s: %s: %s, or leave out --tessellate", all->wanted->scene, place,
                              all->listener.kept);
 }
@@ -539,13 +539,13 @@ static int refuse_tessellation(const studio *all)
 static int tessellate(studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
-    if (wanted->tessellation.bound == 0) return NB_DONE;
-    const nebel_camera camera = nebel_scene_camera(all->loaded.scene, wanted->first_frame);
+    if (wanted->tessellation.max_error == 0) return NB_DONE;
+    const nebel_camera camera = nebel_get_scene_camera(all->loaded.scene, wanted->first_frame);
     nebel_tessellation_desc desc = wanted->tessellation;
     for (int i = 0; i < 3; i++) desc.eye[i] = camera.position[i];
     all->listener.mode = NB_REPORT_KEEP; /* which volume it is the library does not know */
     const nebel_result result =
-        nb_finer_make(nebel_scene_contents(all->loaded.scene), all->loaded.fog, &desc, &all->finer);
+        nb_finer_make(nebel_get_scene_data(all->loaded.scene), all->loaded.fog, &desc, &all->finer);
     all->listener.mode = NB_REPORT_PRINT;
     if (result == NEBEL_ERROR_UNSUPPORTED) return refuse_tessellation(all);
     if (result != NEBEL_OK)
@@ -557,20 +557,20 @@ static int tessellate(studio *all)
 
 static int open_renderer(studio *all)
 {
-    nebel_renderer_desc desc = all->wanted->renderer;
+    nebel_cpu_renderer_desc desc = all->wanted->renderer;
     desc.log = nb_report_log(&all->listener);
-    const nebel_result result = nebel_create_renderer(surfaces_of(all), all->loaded.fog, &desc, &all->renderer);
+    const nebel_result result = nebel_create_cpu_renderer(surfaces_of(all), all->loaded.fog, &desc, &all->renderer);
     return result == NEBEL_OK ? choose_method(all) : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 
 /* Before the long work. */
 static int check_count(const studio *all)
 {
-    const size_t count = nebel_scene_contents(all->loaded.scene)->volume_count;
-    if (!all->wanted->gl || count <= NEBEL_MOST_PACKED_VOLUMES) return NB_DONE;
+    const size_t count = nebel_get_scene_data(all->loaded.scene)->volume_count;
+    if (!all->wanted->gl || count <= NEBEL_MAX_PACKED_VOLUMES) return NB_DONE;
     return nb_report_failure("render: --device gl: %s: %zu volumes are too many for shaders, which take %d; use fewer, "
                              "or say --device cpu",
-                             all->wanted->scene, count, NEBEL_MOST_PACKED_VOLUMES);
+                             all->wanted->scene, count, NEBEL_MAX_PACKED_VOLUMES);
 }
 
 static int choose_scattering(studio *all)
@@ -580,7 +580,7 @@ static int choose_scattering(studio *all)
     const nebel_diffusion_desc by_default = {0};
     const int is_off = wanted->scattering == NB_SCATTERING_OFF;
     if (wanted->scattering == NB_SCATTERING_OF_FILE) return NB_DONE;
-    if (!is_off && nebel_scene_contents(scene)->diffusion != NULL) return NB_DONE;
+    if (!is_off && nebel_get_scene_data(scene)->diffusion != NULL) return NB_DONE;
     const nebel_result result = nebel_set_scene_diffusion(scene, is_off ? NULL : &by_default);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
@@ -618,7 +618,7 @@ static int load(studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
     int status = nb_load_file(wanted->scene, 1, &all->listener, &all->loaded);
-    if (status == NB_DONE) status = nb_render_out_spare(&all->out, nebel_scene_contents(all->loaded.scene));
+    if (status == NB_DONE) status = nb_render_out_spare(&all->out, nebel_get_scene_data(all->loaded.scene));
     if (status == NB_DONE) status = check_count(all);
     if (status == NB_DONE) status = choose_scattering(all);
     if (status == NB_DONE) status = charge_pictures(all);
@@ -631,7 +631,7 @@ static int set_up(studio *all)
     int status = load(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
-    if (all->jobs.is_chief) warn_of_light(nebel_scene_contents(all->loaded.scene), wanted);
+    if (all->jobs.is_chief) warn_of_light(nebel_get_scene_data(all->loaded.scene), wanted);
     status = check_classic(all);
     if (status == NB_DONE) status = make_cells(all);
     if (status == NB_DONE) status = tessellate(all);
@@ -666,7 +666,7 @@ static int prepare(studio *all)
     if (status == NB_DONE) status = nb_render_out_open(&all->out);
     if (status == NB_DONE) status = set_up(all);
     if (status == NB_DONE && !nb_interrupt_is_requested())
-        status = nb_render_out_sign(&all->out, nebel_scene_contents(all->loaded.scene));
+        status = nb_render_out_sign(&all->out, nebel_get_scene_data(all->loaded.scene));
     if (nb_interrupt_is_requested()) return status;
     nb_render_out_name_job(&all->out, name);
     if (status == NB_DONE && all->wanted->resume && !all->wanted->quiet)

@@ -308,9 +308,9 @@ static int trace_scene(const char *path, settings *wanted, nb_rays *rays)
     nb_load_result loaded;
     int status = nb_load_scene(path, 0, wanted->frame, &listener, &loaded);
     if (status != NB_DONE) return status;
-    nb_warn_of_darkness(nebel_scene_contents(loaded.scene), path);
-    nb_warn_of_deep_air(nebel_scene_contents(loaded.scene), path);
-    note_planets(nebel_scene_contents(loaded.scene), path);
+    nb_warn_of_darkness(nebel_get_scene_data(loaded.scene), path);
+    nb_warn_of_deep_air(nebel_get_scene_data(loaded.scene), path);
+    note_planets(nebel_get_scene_data(loaded.scene), path);
     status = read_rays(rays);
     if (status == NB_DONE) {
         wanted->threads = useful_threads(rays->count, wanted->threads);

@@ -67,7 +67,7 @@ static int view(nb_arguments *arguments)
     nb_reader_limit(nb_options_memory(arguments, MEMORY));
     wanted.screenshot = arguments->values[SCREENSHOT];
     wanted.controls = arguments->values[CONTROLS];
-    if (wanted.screenshot != NULL && nebel_find_image_format(wanted.screenshot) == NEBEL_IMAGE_NONE)
+    if (wanted.screenshot != NULL && nebel_get_image_format(wanted.screenshot) == NEBEL_IMAGE_NONE)
         nb_options_reject(arguments, SCREENSHOT, "is no name that ends in .png or .exr");
     if (arguments->misused) return nb_report_misuse("view", "view: nothing was done");
     if (wanted.screenshot != NULL && nb_target_check(wanted.screenshot) != NB_DONE) return NB_FAILED;

@@ -8,7 +8,7 @@
  */
 static const float *refine(const nebel_tessellation *made, const float *given, size_t channels, float *out)
 {
-    const size_t before = made->vertex_count_before;
+    const size_t before = made->input_vertex_count;
     if (given == NULL) return NULL;
     memcpy(out, given, before * channels * sizeof *out);
     for (size_t v = before; v < made->vertex_count; v++) {
@@ -46,8 +46,8 @@ static nebel_result add_mesh(const nebel_snapshot *fog, const nebel_tessellation
     const nebel_tessellation *const made = finer->made[i];
     finer->triangles_before += mesh->triangle_count;
     finer->triangles += made->triangle_count;
-    finer->over_count += made->over_count;
-    finer->deepest_count += made->deepest_count;
+    finer->over_count += made->unresolved_count;
+    finer->deepest_count += made->depth_limited_count;
     finer->error = made->error > finer->error ? made->error : finer->error;
     return refine_mesh(mesh, made, &finer->meshes[i], &finer->attributes[i]);
 }
@@ -81,12 +81,12 @@ static int is_unproven(const nebel_scene *scene, double frame, size_t count)
     nebel_tessellation *made = NULL;
     nebel_result result = nebel_create_fog(&(nebel_fog_desc){0}, &fog);
     for (size_t i = 0; i < count && result == NEBEL_OK; i++) {
-        const nebel_volume_desc volume = nebel_scene_volume(scene, i, frame);
+        const nebel_volume_desc volume = nebel_get_scene_volume(scene, i, frame);
         result = nebel_add_volume(fog, &volume, NULL);
     }
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
     if (result == NEBEL_OK)
-        result = nebel_tessellate(snapshot, &(nebel_tessellation_desc){.deepest = 1}, &(nebel_triangles){0}, &made);
+        result = nebel_tessellate(snapshot, &(nebel_tessellation_desc){.max_depth = 1}, &(nebel_triangles){0}, &made);
     nebel_destroy_tessellation(made);
     nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
@@ -96,7 +96,7 @@ static int is_unproven(const nebel_scene *scene, double frame, size_t count)
 /* By halves, because no volume proves anything of those before it. */
 size_t nb_finer_find_unproven(const nebel_scene *scene, double frame)
 {
-    size_t proven = 0, count = nebel_scene_contents(scene)->volume_count + 1;
+    size_t proven = 0, count = nebel_get_scene_data(scene)->volume_count + 1;
     while (count - proven > 1) {
         const size_t middle = proven + (count - proven) / 2;
         *(is_unproven(scene, frame, middle) ? &count : &proven) = middle;

@@ -245,7 +245,7 @@ static void need(nb_arguments *arguments, int option)
 static void check_ending(nb_arguments *arguments, int option)
 {
     const char *const name = arguments->values[option];
-    if (name != NULL && nebel_find_image_format(name) == NEBEL_IMAGE_NONE)
+    if (name != NULL && nebel_get_image_format(name) == NEBEL_IMAGE_NONE)
         nb_options_reject(arguments, option, "is no name that ends in .png or .exr");
 }
 

@@ -54,11 +54,11 @@ static void note_place(const char *path, size_t item, places *all)
 
 static int note_places(const nb_fog_list *list, const char *scene, const nebel_scene_data *contents, places *all)
 {
-    const size_t scene_files = contents != NULL ? contents->file_count : 0;
+    const size_t scene_files = contents != NULL ? contents->path_count : 0;
     *all = (places){malloc((3 * list->count + scene_files + 1) * sizeof *all->places), 0};
     if (all->places == NULL) return fail_memory();
     note_place(scene, SIZE_MAX, all);
-    for (size_t i = 0; i < scene_files; i++) note_place(contents->files[i], SIZE_MAX, all);
+    for (size_t i = 0; i < scene_files; i++) note_place(contents->paths[i], SIZE_MAX, all);
     for (size_t i = 0; i < list->count; i++) {
         note_place(list->files[i].image, i, all);
         note_place(list->files[i].depth, SIZE_MAX, all);

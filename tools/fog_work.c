@@ -69,7 +69,7 @@ static int read_picture(work *w)
     const nb_fog_files *const files = w->files;
     const int status = judge(w, files->image, nebel_read_photograph(files->image, &w->host, &w->photograph));
     if (status != NB_DONE) return status;
-    const int is_exr = nebel_find_image_format(files->output) == NEBEL_IMAGE_EXR;
+    const int is_exr = nebel_get_image_format(files->output) == NEBEL_IMAGE_EXR;
     if (is_exr != is_float(w))
         return fail(w, "%s: %s; name the result so: \"%s\"", files->image,
                     is_exr ? "a picture of whole numbers becomes a .png" : "an OpenEXR picture becomes an .exr",
@@ -87,7 +87,7 @@ static int find_frame(work *w)
     if (w->frame > NB_FOG_LAST_FRAME)
         return fail(w, "%s: --frame name: there is no number up to %d where the last * is", w->files->image,
                     NB_FOG_LAST_FRAME);
-    w->scene_camera = nebel_scene_camera(w->shared->scene, w->frame);
+    w->scene_camera = nebel_get_scene_camera(w->shared->scene, w->frame);
     return NB_DONE;
 }
 
@@ -190,7 +190,7 @@ static int choose_fog(work *w)
     if (wanted->has_seed) {
         const uint32_t seed = nb_fog_record_seed(wanted, w->files->image);
         result = nebel_commit_scene_fog_anew(w->shared->scene, w->frame, seed, &w->own_fog);
-    } else if (wanted->frame_of_name && nebel_scene_contents(w->shared->scene)->moving_volume_count > 0)
+    } else if (wanted->frame_of_name && nebel_get_scene_data(w->shared->scene)->animated_volume_count > 0)
         result = nebel_commit_scene_fog_at(w->shared->scene, w->frame, &w->own_fog);
     return judge(w, wanted->scene, result);
 }
@@ -202,7 +202,7 @@ static int aim(work *w)
         if (nebel_aim_pixels(&w->pixels, &w->camera, place) == NEBEL_OK) return NB_DONE;
         return fail(w, "%s: the camera of the scene looks nowhere", w->shared->wanted->scene);
     }
-    if (w->depth.type == NEBEL_DEPTH_RAY) { /* the direction does not matter */
+    if (w->depth.type == NEBEL_PIXEL_DEPTH_RADIAL) { /* the direction does not matter */
         w->pixels.corner[2] = -1;
         return NB_DONE;
     }
@@ -230,7 +230,7 @@ static void fog_rows(int worker, int count, void *user)
         shared->answer(shared->user);
         part.first_row = first;
         part.row_count = part.height - first < BAND ? part.height - first : BAND;
-        const nebel_result result = nebel_fog_pixels(all->fog, NEBEL_ISA_DEFAULT, &part);
+        const nebel_result result = nebel_apply_fog_to_pixels(all->fog, NEBEL_ISA_DEFAULT, &part);
         if (result != NEBEL_OK) all->results[worker] = result;
     }
 }
@@ -245,7 +245,7 @@ static int add_fog(work *w)
     p->width = w->depth.width;
     p->height = w->depth.height;
     p->depth = w->depth.depth;
-    p->color = p->out = w->photograph.pixels;
+    p->color = p->output = w->photograph.pixels;
     p->type = w->photograph.type;
     p->srgb = !is_float(w) && !shared->wanted->blends_stored;
     p->transmittance = w->transmittance;
@@ -271,7 +271,7 @@ static nebel_result write_transmittance(const work *w)
     const char *const record = w->shared->start != NULL ? w->records.transmittance : NULL;
     const uint32_t width = w->photograph.width, height = w->photograph.height;
     float *const t = w->transmittance;
-    if (nebel_find_image_format(path) == NEBEL_IMAGE_EXR) {
+    if (nebel_get_image_format(path) == NEBEL_IMAGE_EXR) {
         const nebel_photograph picture = {width, height, NEBEL_PIXEL_RGB_FLOAT, t};
         return nebel_write_photograph(path, &w->host, &picture, record);
     }

@@ -110,7 +110,7 @@ static void store_colors(float (*colors)[4], size_t count)
 
 static nebel_result fog_mesh(const work *w, const nebel_mesh *mesh, nebel_vertex_output *stream)
 {
-    const nebel_vertex_format format = format_of(nebel_gl_classic_method(w->classic));
+    const nebel_vertex_format format = format_of(nebel_gl_get_classic_method(w->classic));
     const nebel_vertex_desc *const look = w->desc->vertex;
     const size_t size = format == NEBEL_VERTEX_RGBA_FLOAT ? 4 * sizeof(float) : sizeof(float);
     nebel_vertices vertices = {.positions = mesh->positions};
@@ -119,7 +119,7 @@ static nebel_result fog_mesh(const work *w, const nebel_mesh *mesh, nebel_vertex
     *stream = (nebel_vertex_output){format, malloc(((size_t)mesh->vertex_count + 1) * size), size};
     if (stream->data == NULL) return NEBEL_ERROR_MEMORY;
     if (format == NEBEL_VERTEX_ALPHA) fill_colors(stream->data, mesh->vertex_count, look->color);
-    const nebel_result result = nebel_fog_vertices(w->fixed->fog, look, mesh->vertex_count, &vertices, stream, 1);
+    const nebel_result result = nebel_compute_vertex_fog(w->fixed->fog, look, mesh->vertex_count, &vertices, stream, 1);
     if (result == NEBEL_OK && format == NEBEL_VERTEX_RGBA_FLOAT) store_colors(stream->data, mesh->vertex_count);
     return result;
 }
@@ -226,18 +226,18 @@ static void draw_background(void)
 static nebel_result draw_fog(const work *w, const double projection[16])
 {
     const nebel_scene_data *const scene = w->fixed->scene;
-    const int one_pass = nebel_gl_classic_method(w->classic) == NEBEL_GL_CLASSIC_FOG_COORD;
+    const int one_pass = nebel_gl_get_classic_method(w->classic) == NEBEL_GL_CLASSIC_FOG_COORD;
     const double *const opaque = w->desc->vertex->color;
     float color[3] = {0, 0, 0};
     for (int c = 0; c < 3 && opaque != NULL; c++) color[c] = (float)store(opaque[c]);
-    nebel_result result = nebel_gl_begin_classic(w->classic, color);
+    nebel_result result = nebel_gl_begin_classic_fog(w->classic, color);
     for (size_t i = 0; i < scene->mesh_count && result == NEBEL_OK; i++) {
         set_matrices(w, projection, &scene->meshes[i]);
-        result = nebel_gl_feed_classic(w->classic, &w->streams[i], 0);
+        result = nebel_gl_bind_classic_stream(w->classic, &w->streams[i], 0);
         if (result == NEBEL_OK && one_pass) draw_lit_mesh(&scene->meshes[i]);
         if (result == NEBEL_OK && !one_pass) draw_mesh(&scene->meshes[i]);
     }
-    const nebel_result ended = nebel_gl_end_classic(w->classic);
+    const nebel_result ended = nebel_gl_end_classic_fog(w->classic);
     return result == NEBEL_OK ? ended : result;
 }
 
@@ -253,7 +253,7 @@ static nebel_result draw_picture(const work *w)
     glTexEnvi(GL_TEXTURE_ENV, GL_TEXTURE_ENV_MODE, GL_REPLACE);
     draw_background();
     for (size_t i = 0; i < scene->mesh_count; i++) {
-        if (nebel_gl_classic_method(w->classic) == NEBEL_GL_CLASSIC_FOG_COORD) break;
+        if (nebel_gl_get_classic_method(w->classic) == NEBEL_GL_CLASSIC_FOG_COORD) break;
         set_matrices(w, projection, &scene->meshes[i]);
         draw_lit_mesh(&scene->meshes[i]);
     }
@@ -411,7 +411,7 @@ static nebel_result draw(work *w, const nebel_gl_planes *planes)
     if (!allocate(w)) return say(w, NEBEL_ERROR_MEMORY, "frame: out of memory; ask for fewer pixels or samples");
     nebel_result result = draw_surfaces(w);
     if (result == NEBEL_OK)
-        result = nebel_gl_camera_view(&w->desc->camera, w->width, w->height, &w->fixed->log, &w->view);
+        result = nebel_view_from_camera(&w->desc->camera, w->width, w->height, &w->fixed->log, &w->view);
     if (result == NEBEL_OK) result = create_classic(w);
     if (result == NEBEL_OK) result = fog_meshes(w);
     if (result != NEBEL_OK) return result;

@@ -14,7 +14,7 @@ typedef struct nb_gl_fixed {
 
 /* Draws a frame of a perspective camera by FOG_COORD, TWO_PASS or ALPHA in a compatibility profile, and reads its
  * planes. Of n samples each pixel has k x k, the fewest that are no fewer. Errors: those of nebel_gl_render_frame,
- * nebel_fog_vertices and nebel_create_gl_classic; MEMORY. */
+ * nebel_compute_vertex_fog and nebel_create_gl_classic; MEMORY. */
 nebel_result nb_gl_fixed_draw(const nb_gl_fixed *fixed, const nebel_gl_frame_desc *desc, const nebel_gl_planes *planes);
 
 #endif

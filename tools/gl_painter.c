@@ -5,10 +5,10 @@
 static nebel_result set_particles(const nb_gl_painter *painter)
 {
     const nebel_scene *const scene = painter->loaded->scene;
-    const size_t count = nebel_scene_contents(scene)->particle_count;
+    const size_t count = nebel_get_scene_data(scene)->particle_count;
     nebel_particle *particles = NULL;
     if (count == 0) return NEBEL_OK;
-    nebel_result result = nebel_make_scene_particles(scene, &particles);
+    nebel_result result = nebel_generate_scene_particles(scene, &particles);
     if (result == NEBEL_OK) result = nebel_set_gl_renderer_particles(painter->renderer, particles, count);
     nebel_free_scene_particles(scene, particles);
     return result;
@@ -32,7 +32,7 @@ static void note_driver(const nb_gl_painter *painter, nebel_method method)
         nb_report_message("note: --device gl: OpenGL ES, because %s", painter->context.no_desktop);
     if (painter->is_fixed || !is_of_fixed(method)) return;
     nb_report_message("note: --device gl: --method %s is drawn by shaders, not by the fixed pipeline, because %s",
-                      nebel_method_word(method),
+                      nebel_method_name(method),
                       suits_fixed(painter->scene) ? "the driver has no compatibility profile"
                                                   : "that has neither particles nor this projection");
 }
@@ -40,7 +40,7 @@ static void note_driver(const nb_gl_painter *painter, nebel_method method)
 int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_result *loaded,
                        const nebel_scene_data *scene, nebel_method method, nb_report_listener *listener)
 {
-    const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener), .run = nebel_run_parts};
+    const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener), .run = nebel_parallel_for_openmp};
     *painter = (nb_gl_painter){.loaded = loaded, .scene = scene, .log = desc.log};
     const int fixed = is_of_fixed(method) && suits_fixed(scene);
     painter->is_fixed = fixed && nb_gl_context_open(&painter->context, NB_GL_API_FIXED) == 0;
@@ -61,7 +61,7 @@ int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_r
 static nebel_result set_fog(const nb_gl_painter *painter, double frame)
 {
     nebel_snapshot *volumes = NULL;
-    if (nebel_scene_contents(painter->loaded->scene)->particle_count == 0) {
+    if (nebel_get_scene_data(painter->loaded->scene)->particle_count == 0) {
         return nebel_set_gl_renderer_fog(painter->renderer, painter->loaded->fog);
     }
     nebel_result result = nebel_commit_scene_volumes_at(painter->loaded->scene, frame, &volumes);

@@ -60,11 +60,11 @@ static void print_ambient(const nebel_scene_data *scene)
         print_triple(", ground ", environment->ground);
         break;
     case NEBEL_ENVIRONMENT_MAP:
-        if (scene->environment_file == NULL) {
+        if (scene->environment_path == NULL) {
             (void)printf("ambient: the sky of the planet");
             break;
         }
-        (void)printf("ambient: environment %s, rotation %.4g degrees, intensity %.4g", scene->environment_file,
+        (void)printf("ambient: environment %s, rotation %.4g degrees, intensity %.4g", scene->environment_path,
                      environment->rotation, environment->intensity);
         break;
     default:
@@ -77,9 +77,10 @@ static void print_clouds(const nebel_planet *planet)
     for (uint32_t i = 0; i < planet->cloud_layer_count; i++) {
         static const char *const kinds[] = {"cumulus", "stratus", "cirrus"};
         nebel_cloud_layer layer;
-        if (nebel_resolve_cloud_layer(planet->air.thickness, &planet->cloud_layers[i], NULL, &layer) != NEBEL_OK)
+        if (nebel_resolve_cloud_layer(planet->atmosphere_desc.thickness, &planet->cloud_layers[i], NULL, &layer) !=
+            NEBEL_OK)
             return;
-        (void)printf("clouds: %s, %.6g to %.6g m, %.3g of the planet\n", kinds[layer.kind], layer.base, layer.top,
+        (void)printf("clouds: %s, %.6g to %.6g m, %.3g of the planet\n", kinds[layer.type], layer.base, layer.top,
                      layer.coverage);
     }
 }
@@ -99,13 +100,14 @@ static void print_depth(const nebel_planet *planet)
 
 static void print_planet(const nebel_planet *planet)
 {
-    const nebel_atmosphere_desc *air = &planet->air;
-    if (planet->model == NEBEL_PLANET_LAYERS)
-        (void)printf("planet: radius %.6g m, %u %s of clouds\n", planet->shells.radius,
-                     (unsigned)planet->shells.cloud_count, planet->shells.cloud_count == 1 ? "shell" : "shells");
+    const nebel_atmosphere_desc *air = &planet->atmosphere_desc;
+    if (planet->model == NEBEL_PLANET_TEXTURED)
+        (void)printf("planet: radius %.6g m, %u %s of clouds\n", planet->textured_desc.radius,
+                     (unsigned)planet->textured_desc.cloud_shell_count,
+                     planet->textured_desc.cloud_shell_count == 1 ? "shell" : "shells");
     else if (nb_has_air(planet))
         (void)printf("planet: radius %.6g m, %.6g m of air of %u %s\n", air->radius, air->thickness,
-                     (unsigned)air->air_count, air->air_count == 1 ? "kind" : "kinds");
+                     (unsigned)air->component_count, air->component_count == 1 ? "kind" : "kinds");
     else
         (void)printf("planet: radius %.6g m, no air\n", air->radius);
     if (planet->atmosphere != NULL && nb_has_air(planet)) print_depth(planet);
@@ -121,7 +123,7 @@ static void print_light(const nebel_scene_data *scene)
             (void)printf("sun: %zu keys, frames %g to %g\n", scene->sun_key_count, scene->sun_keys[0].frame,
                          scene->sun_keys[scene->sun_key_count - 1].frame);
     }
-    if (scene->lamp_count > 0) (void)printf("lamps: %zu\n", scene->lamp_count);
+    if (scene->light_count > 0) (void)printf("lamps: %zu\n", scene->light_count);
     print_ambient(scene);
     if (scene->shows_ambient)
         (void)printf("\nbackground: ambient");
@@ -231,7 +233,7 @@ static double left_at(const nebel_scene_data *scene, const nebel_snapshot *fog, 
     double left = nebel_trace(fog, NULL, 1, &ray, 0, &transfer, 0) == NEBEL_OK ? transfer.transmittance[1] : 0;
     for (size_t i = 0; i < scene->planet_count; i++)
         if (scene->planets[i].atmosphere != NULL &&
-            nebel_trace_air(scene->planets[i].atmosphere, NULL, 1, &ray, 0, &transfer, 0) == NEBEL_OK)
+            nebel_trace_atmosphere(scene->planets[i].atmosphere, NULL, 1, &ray, 0, &transfer, 0) == NEBEL_OK)
             left *= transfer.transmittance[1];
     return left;
 }
@@ -259,7 +261,7 @@ static double visibility_of(const nebel_scene_data *scene, const nebel_snapshot 
         ray.direction[axis] = camera->look_at[axis] - camera->position[axis];
     }
     double distance;
-    const nebel_result result = nebel_find_transmittance(fog, VISIBLE, 1, 1, &ray, sizeof ray, &distance);
+    const nebel_result result = nebel_invert_transmittance(fog, VISIBLE, 1, 1, &ray, sizeof ray, &distance);
     if (result != NEBEL_OK) return (double)NAN;
     return scene->planet_count > 0 ? visibility_in_air(scene, fog, &ray, distance) : distance;
 }
@@ -282,7 +284,7 @@ static int is_black(const double *color)
 
 static int is_lit(const nebel_scene_data *scene)
 {
-    return (scene->has_sun && !is_black(scene->sun_irradiance)) || nb_has_ambient(scene) || scene->lamp_count > 0;
+    return (scene->has_sun && !is_black(scene->sun_irradiance)) || nb_has_ambient(scene) || scene->light_count > 0;
 }
 
 static const char *find_mistake(const nebel_scene_data *scene, const nebel_volume_desc *volume)
@@ -331,11 +333,12 @@ static void warn_of_ground(const nebel_scene_data *scene)
 {
     for (size_t i = 0; i < scene->planet_count; i++) {
         const nebel_planet *planet = &scene->planets[i];
-        const int is_layers = planet->model == NEBEL_PLANET_LAYERS;
-        const double radius = is_layers ? planet->shells.radius : planet->air.radius;
+        const int is_layers = planet->model == NEBEL_PLANET_TEXTURED;
+        const double radius = is_layers ? planet->textured_desc.radius : planet->atmosphere_desc.radius;
         double square = 0;
         for (int c = 0; c < 3; c++) {
-            const double middle = is_layers ? planet->shells.center[c] : planet->air.ground[c] - (c == 1 ? radius : 0);
+            const double middle = is_layers ? planet->textured_desc.center[c]
+                                            : planet->atmosphere_desc.ground_point[c] - (c == 1 ? radius : 0);
             square += pow(scene->camera.position[c] - middle, 2);
         }
         if (radius - sqrt(square) >= 1)
@@ -364,7 +367,7 @@ int nb_info_print_scene(const char *path)
     nb_report_listener listener = {0};
     nb_load_result loaded;
     if (nb_load_scene(path, 1, 0, &listener, &loaded) != NB_DONE) return NB_FAILED;
-    const nebel_scene_data *const scene = nebel_scene_contents(loaded.scene);
+    const nebel_scene_data *const scene = nebel_get_scene_data(loaded.scene);
     const double visibility = visibility_of(scene, loaded.fog);
     (void)printf("scene: %s\n", path);
     print_camera(scene);

@@ -15,7 +15,7 @@ const nb_layer_kind nb_layer_kinds[NB_LAYER_COUNT] = {
 int nb_layer_is_known(nb_layer layer, int is_gl, nebel_method method)
 {
     if (layer == NB_LAYER_ERROR) return !is_gl && method == NEBEL_METHOD_EXACT;
-    return layer != NB_LAYER_STANDARD_ERROR || method == NEBEL_METHOD_REFERENCE;
+    return layer != NB_LAYER_STANDARD_ERROR || method == NEBEL_METHOD_PATH;
 }
 
 void nb_layer_interleave(nb_layer layer, const float *samples, size_t pixels, uint32_t first, uint32_t of, float *out)

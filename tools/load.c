@@ -14,9 +14,9 @@ void nb_load_free(nb_load_result *result)
 nebel_result nb_load_move_fog(nb_load_result *result, double frame)
 {
     nebel_snapshot *moved = NULL;
-    const nebel_scene_data *const scene = nebel_scene_contents(result->scene);
-    if (scene->moving_volume_count == 0 && scene->sun_key_count == 0) return NEBEL_OK;
-    nebel_result failed = nebel_light_scene_at(result->scene, frame);
+    const nebel_scene_data *const scene = nebel_get_scene_data(result->scene);
+    if (scene->animated_volume_count == 0 && scene->sun_key_count == 0) return NEBEL_OK;
+    nebel_result failed = nebel_set_scene_frame(result->scene, frame);
     if (failed != NEBEL_OK) return failed;
     failed = nebel_commit_scene_fog_at(result->scene, frame, &moved);
     if (failed != NEBEL_OK) return failed;
@@ -36,7 +36,7 @@ int nb_load_file(const char *path, int with_models, nb_report_listener *listener
 {
     *result = (nb_load_result){0};
     const nebel_scene_desc desc = {.log = nb_report_log(listener),
-                                   .run = nebel_run_parts,
+                                   .run = nebel_parallel_for_openmp,
                                    .model_reader = nb_reader_path(),
                                    .memory = nb_reader_memory()};
     nebel_result done = nebel_load_scene(path, &desc, &result->scene);
@@ -46,8 +46,8 @@ int nb_load_file(const char *path, int with_models, nb_report_listener *listener
 
 int nb_load_fog(const char *path, double frame, nb_report_listener *listener, nb_load_result *result)
 {
-    nebel_result done = nebel_light_scene_at(result->scene, frame);
-    if (done == NEBEL_OK) done = nebel_load_scene_planet(result->scene);
+    nebel_result done = nebel_set_scene_frame(result->scene, frame);
+    if (done == NEBEL_OK) done = nebel_load_scene_planets(result->scene);
     if (done == NEBEL_OK) done = nebel_commit_scene_fog_at(result->scene, frame, &result->fog);
     return finish(path, done, listener, result);
 }

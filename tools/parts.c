@@ -29,7 +29,7 @@ static char *name_in_folder(const nb_parts *parts, const char *text)
 char *nb_parts_name(const nb_parts *parts, uint32_t part)
 {
     char text[32];
-    const char *const ending = nebel_find_image_format(parts->file) == NEBEL_IMAGE_EXR ? "exr" : "png";
+    const char *const ending = nebel_get_image_format(parts->file) == NEBEL_IMAGE_EXR ? "exr" : "png";
     (void)snprintf(text, sizeof text, "%06lu.%s", (unsigned long)part, ending);
     return name_in_folder(parts, text);
 }
@@ -158,14 +158,14 @@ int nb_parts_join_picture(const nb_parts *parts, uint32_t width, uint32_t height
     return status;
 }
 
-static int add_frames(const nb_parts *parts, nebel_film *film)
+static int add_frames(const nb_parts *parts, nebel_movie *film)
 {
     for (uint32_t i = 0; i < parts->count; i++) {
         nebel_image picture;
         const int status = read_part(parts, i, &picture);
         if (status != NB_DONE) return status;
         nb_interrupt_hold(); /* whether there is room is tried with a file */
-        const nebel_result result = nebel_add_film_picture(film, &picture);
+        const nebel_result result = nebel_add_movie_frame(film, &picture);
         nb_interrupt_release();
         free_part(&picture);
         if (result != NEBEL_OK) return nb_report_result(parts->listener, parts->file, result);
@@ -174,21 +174,21 @@ static int add_frames(const nb_parts *parts, nebel_film *film)
     return NB_DONE;
 }
 
-int nb_parts_join_film(const nb_parts *parts, const nebel_film_desc *desc, const char *record)
+int nb_parts_join_film(const nb_parts *parts, const nebel_movie_desc *desc, const char *record)
 {
-    nebel_film *film = NULL;
+    nebel_movie *film = NULL;
     nb_interrupt_hold();
-    nebel_result result = nebel_create_film(parts->file, desc, &film);
+    nebel_result result = nebel_create_movie(parts->file, desc, &film);
     nb_interrupt_release();
     if (result == NEBEL_OK) result = nebel_set_film_record(film, record);
     int status = result == NEBEL_OK ? add_frames(parts, film) : nb_report_result(parts->listener, parts->file, result);
     if (status == NB_DONE && !nb_interrupt_is_requested()) {
         nb_interrupt_hold();
-        result = nebel_finish_film(film);
+        result = nebel_finish_movie(film);
         nb_interrupt_release();
         if (result != NEBEL_OK) status = nb_report_result(parts->listener, parts->file, result);
     }
-    nebel_destroy_film(film);
+    nebel_destroy_movie(film);
     return status;
 }
 

@@ -37,7 +37,7 @@ void nb_parts_unlock(int lock);
 int nb_parts_join_picture(const nb_parts *parts, uint32_t width, uint32_t height, const char *record);
 
 /* Joins frames to a film, and finishes it. */
-int nb_parts_join_film(const nb_parts *parts, const nebel_film_desc *desc, const char *record);
+int nb_parts_join_film(const nb_parts *parts, const nebel_movie_desc *desc, const char *record);
 
 /* Removes the parts, those that calls with other bands left, what ended processes left half written, and the folder.
  * Other files stay, and the folder with them. */

@@ -22,7 +22,7 @@ void nb_record_add_file(nb_fingerprint *print, const char *path)
 void nb_record_add_scene(nb_fingerprint *print, const char *path, const nebel_scene_data *contents)
 {
     nb_record_add_file(print, path);
-    for (size_t i = 0; i < contents->file_count; i++) nb_record_add_file(print, contents->files[i]);
+    for (size_t i = 0; i < contents->path_count; i++) nb_record_add_file(print, contents->paths[i]);
 }
 
 int nb_record_can_add_scene(const char *path)

@@ -157,8 +157,8 @@ enum { FILM_SIDE = 16383 };
 static void read_film(nb_arguments *arguments, nb_render_call *wanted)
 {
     static const int of_films[] = {FPS, QUALITY};
-    wanted->fps = nb_options_number(arguments, FPS, 1, NEBEL_MAX_FILM_RATE, NEBEL_DEFAULT_FILM_RATE);
-    wanted->quality = (int)nb_options_whole(arguments, QUALITY, 1, 100, NEBEL_DEFAULT_FILM_QUALITY);
+    wanted->fps = nb_options_number(arguments, FPS, 1, NEBEL_MAX_MOVIE_RATE, NEBEL_DEFAULT_MOVIE_RATE);
+    wanted->quality = (int)nb_options_whole(arguments, QUALITY, 1, 100, NEBEL_DEFAULT_MOVIE_QUALITY);
     if (!wanted->is_film) {
         for (size_t i = 0; i < sizeof of_films / sizeof *of_films; i++)
             if (arguments->values[of_films[i]] != NULL)
@@ -187,9 +187,9 @@ static void read_output(nb_arguments *arguments, nb_render_call *wanted)
     if (strcmp(wanted->output, "-") == 0) wanted->output = standard_output;
     if (strcmp(wanted->output, standard_output) == 0 && isatty(STDOUT_FILENO))
         nb_options_reject(arguments, OUTPUT, "is a terminal; send the picture to a file or to a program");
-    wanted->is_film = nebel_is_film_path(wanted->output);
+    wanted->is_film = nebel_is_movie_path(wanted->output);
     if (wanted->is_film) return;
-    wanted->format = nebel_find_image_format(wanted->output);
+    wanted->format = nebel_get_image_format(wanted->output);
     if (wanted->format == NEBEL_IMAGE_NONE) {
         nb_options_reject(arguments, OUTPUT, "is no name that ends in .png, .exr or .webp");
         return;
@@ -216,8 +216,8 @@ int nb_render_takes_color(nebel_method method)
 static void read_tessellate(nb_arguments *arguments, nb_render_call *wanted)
 {
     nebel_tessellation_desc *const desc = &wanted->tessellation;
-    desc->most_triangles = nb_options_whole(arguments, TESSELLATE_TRIANGLES, 1, 1000000000, 1 << 18);
-    desc->deepest = nb_options_whole(arguments, TESSELLATE_DEPTH, 1, 48, 20);
+    desc->max_triangles = nb_options_whole(arguments, TESSELLATE_TRIANGLES, 1, 1000000000, 1 << 18);
+    desc->max_depth = nb_options_whole(arguments, TESSELLATE_DEPTH, 1, 48, 20);
     if (arguments->values[TESSELLATE] == NULL) {
         static const int limits[] = {TESSELLATE_TRIANGLES, TESSELLATE_DEPTH};
         for (size_t i = 0; i < sizeof limits / sizeof *limits; i++)
@@ -225,8 +225,8 @@ static void read_tessellate(nb_arguments *arguments, nb_render_call *wanted)
                 nb_options_refuse(arguments, limits[i], "does nothing without --tessellate; add that, or leave it out");
         return;
     }
-    desc->bound = nb_options_number(arguments, TESSELLATE, 0, 1, 1);
-    if (desc->bound <= LEAST_TESSELLATION)
+    desc->max_error = nb_options_number(arguments, TESSELLATE, 0, 1, 1);
+    if (desc->max_error <= LEAST_TESSELLATION)
         nb_options_reject(arguments, TESSELLATE, "is not more than 1e-6, which rounding may take");
     if (wanted->method != NEBEL_METHOD_VERTEX && wanted->method != NEBEL_METHOD_ADDITIVE)
         nb_options_refuse(arguments, TESSELLATE, "needs --method vertex or additive; say so, or leave it out");
@@ -240,9 +240,9 @@ static void read_reference(nb_arguments *arguments, nb_render_call *wanted)
     wanted->bounces = nb_options_whole(arguments, BOUNCES, 1, 10000, 0);
     wanted->seed = nb_options_whole(arguments, SEED, 0, UINT32_MAX, 0);
     for (size_t i = 0; i < sizeof of_reference / sizeof *of_reference; i++)
-        if (arguments->values[of_reference[i]] != NULL && wanted->method != NEBEL_METHOD_REFERENCE)
+        if (arguments->values[of_reference[i]] != NULL && wanted->method != NEBEL_METHOD_PATH)
             nb_options_refuse(arguments, of_reference[i], "needs --method reference; say so, or leave it out");
-    if (wanted->method == NEBEL_METHOD_REFERENCE && wanted->gl)
+    if (wanted->method == NEBEL_METHOD_PATH && wanted->gl)
         nb_options_reject(arguments, METHOD, "is for --device cpu; leave out --device gl");
 }
 
@@ -251,7 +251,7 @@ static void read_device(nb_arguments *arguments, nb_render_call *wanted)
     static const char *const devices[] = {"cpu", "gl", NULL};
     static const int of_cpu[] = {TOLERANCE, ISA, THREADS};
     const char *methods[NEBEL_METHOD_COUNT + 1] = {NULL};
-    for (int i = 0; i < NEBEL_METHOD_COUNT; i++) methods[i] = nebel_method_word((nebel_method)i);
+    for (int i = 0; i < NEBEL_METHOD_COUNT; i++) methods[i] = nebel_method_name((nebel_method)i);
     wanted->method = (nebel_method)nb_options_choice(arguments, METHOD, methods, NEBEL_METHOD_EXACT);
     wanted->gl = nb_options_choice(arguments, DEVICE, devices, 0);
     for (size_t i = 0; i < sizeof of_cpu / sizeof *of_cpu && wanted->gl; i++) {
@@ -272,7 +272,7 @@ static void read_shutter(nb_arguments *arguments, nb_render_call *wanted)
     if (wanted->samples < 2)
         nb_options_refuse(arguments, SHUTTER, "needs a --samples for each time; ask for 2 or more, better 16");
     if (wanted->gl) nb_options_refuse(arguments, SHUTTER, "is for --device cpu; leave it out with gl");
-    if (wanted->tessellation.bound > 0)
+    if (wanted->tessellation.max_error > 0)
         nb_options_refuse(arguments, SHUTTER,
                           "has many cameras, and each needs other triangles; leave out --tessellate");
 }
@@ -281,7 +281,7 @@ static void read_scattering(nb_arguments *arguments, nb_render_call *wanted)
 {
     static const char *const models[] = {"off", "diffusion", NULL};
     static const nb_scattering chosen[] = {NB_SCATTERING_OFF, NB_SCATTERING_DIFFUSION};
-    const int is_reference = wanted->method == NEBEL_METHOD_REFERENCE;
+    const int is_reference = wanted->method == NEBEL_METHOD_PATH;
     /* The reference scatters light as often as it likes: a solution would be work for nothing. */
     wanted->scattering = is_reference ? NB_SCATTERING_OFF : NB_SCATTERING_OF_FILE;
     if (arguments->values[MULTIPLE_SCATTERING] == NULL) return;
@@ -315,7 +315,7 @@ int nb_render_call_read(nb_arguments *arguments, nb_render_call *wanted)
     wanted->exposure = nb_options_number(arguments, EXPOSURE, -20, 20, 0);
     wanted->tolerance = nb_options_number(arguments, TOLERANCE, 0, 1, NEBEL_DEFAULT_TOLERANCE);
     if (wanted->tolerance == 0) nb_options_reject(arguments, TOLERANCE, "is not more than 0");
-    wanted->renderer.threads = (int)nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
+    wanted->renderer.thread_count = (int)nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
     nb_reader_limit(nb_options_memory(arguments, MEMORY));
     wanted->renderer.isa = nb_isa_choose(arguments, ISA);
     read_size(arguments, wanted);

@@ -28,10 +28,10 @@ typedef struct nb_render_call {
     int resume;         /* what is there already, made from the same, stays */
     uint32_t band_rows; /* in which pictures are rendered; 0: as the job asks for */
     double fps;         /* of a film, and */
-    int quality;        /* NEBEL_DEFAULT_FILM_QUALITY */
+    int quality;        /* NEBEL_DEFAULT_MOVIE_QUALITY */
     nebel_method method;
     nb_scattering scattering;
-    nebel_renderer_desc renderer;
+    nebel_cpu_renderer_desc renderer;
 } nb_render_call;
 
 enum { NB_RENDER_OPTIONS = 26 };

@@ -102,7 +102,7 @@ int nb_render_out_check(const nb_render_out *out, const nb_jobs *jobs)
     const uint32_t step = jobs->shard.count > 0 && count_bands(out) == 1 ? jobs->shard.count : 1;
     const uint32_t first = step > 1 ? jobs->shard.number : 0;
     if (wanted->is_film)
-        return nb_folder_make_for(wanted->output); /* nebel_create_film does the rest, in each process */
+        return nb_folder_make_for(wanted->output); /* nebel_create_movie does the rest, in each process */
     if (!jobs->is_chief) return NB_DONE;
     for (uint64_t i = first; i < count_frames(wanted); i += step) {
         if (nb_interrupt_is_requested()) break;
@@ -125,9 +125,9 @@ int nb_render_out_spare(const nb_render_out *out, const nebel_scene_data *conten
     return NB_DONE;
 }
 
-static nebel_film_desc film_desc(const nb_render_out *out)
+static nebel_movie_desc film_desc(const nb_render_out *out)
 {
-    return (nebel_film_desc){
+    return (nebel_movie_desc){
         .log = nb_report_log(out->listener), .frames_per_second = out->wanted->fps, .quality = out->wanted->quality};
 }
 
@@ -135,13 +135,13 @@ int nb_render_out_open(nb_render_out *out)
 {
     const nb_render_call *const wanted = out->wanted;
     if (!wanted->is_film) return NB_DONE;
-    const nebel_film_desc desc = film_desc(out);
+    const nebel_movie_desc desc = film_desc(out);
     nb_interrupt_hold();
-    const nebel_result result = nebel_create_film(wanted->output, &desc, &out->film);
+    const nebel_result result = nebel_create_movie(wanted->output, &desc, &out->film);
     nb_interrupt_release();
     if (result != NEBEL_OK) return nb_report_result(out->listener, wanted->output, result);
     if (out->part_count == 0) return NB_DONE;
-    nebel_destroy_film(out->film); /* it could be made; who joins the parts makes it again */
+    nebel_destroy_movie(out->film); /* it could be made; who joins the parts makes it again */
     out->film = NULL;
     return NB_DONE;
 }
@@ -161,10 +161,10 @@ static void add_options(const nb_render_call *wanted, const nebel_scene_data *co
                               (uint64_t)(contents->diffusion != NULL),
                               wanted->bounces,
                               wanted->seed,
-                              wanted->tessellation.most_triangles,
-                              wanted->tessellation.deepest};
+                              wanted->tessellation.max_triangles,
+                              wanted->tessellation.max_depth};
     for (size_t i = 0; i < sizeof whole / sizeof *whole; i++) nb_fingerprint_add_whole(print, whole[i]);
-    const double numbers[] = {wanted->exposure, wanted->tolerance, wanted->shutter, wanted->tessellation.bound};
+    const double numbers[] = {wanted->exposure, wanted->tolerance, wanted->shutter, wanted->tessellation.max_error};
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) nb_fingerprint_add_number(print, numbers[i]);
 }
 
@@ -343,7 +343,7 @@ static int write_part(const nb_render_out *out, const nb_render_item *item, cons
 int nb_render_out_write(nb_render_out *out, const nb_render_item *item, const nebel_image *image)
 {
     if (out->film != NULL) {
-        const nebel_result result = nebel_add_film_picture(out->film, image);
+        const nebel_result result = nebel_add_movie_frame(out->film, image);
         return result == NEBEL_OK ? NB_DONE : nb_report_result(out->listener, out->wanted->output, result);
     }
     char *const name = name_picture(out->wanted, item->frame);
@@ -358,7 +358,7 @@ int nb_render_out_write(nb_render_out *out, const nb_render_item *item, const ne
 static int join_parts(const nb_render_out *out, const nb_parts *parts, uint32_t frame)
 {
     char record[NEBEL_MAX_RECORD + 1];
-    const nebel_film_desc desc = film_desc(out);
+    const nebel_movie_desc desc = film_desc(out);
     record_file(out, frame, record);
     return out->wanted->is_film ? nb_parts_join_film(parts, &desc, record)
                                 : nb_parts_join_picture(parts, out->wanted->width, out->wanted->height, record);
@@ -412,13 +412,13 @@ int nb_render_out_finish(nb_render_out *out)
     record_file(out, out->wanted->first_frame, record);
     nebel_result result = out->has_base ? nebel_set_film_record(out->film, record) : NEBEL_OK;
     nb_interrupt_hold();
-    if (result == NEBEL_OK) result = nebel_finish_film(out->film);
+    if (result == NEBEL_OK) result = nebel_finish_movie(out->film);
     nb_interrupt_release();
     return result == NEBEL_OK ? NB_DONE : nb_report_result(out->listener, out->wanted->output, result);
 }
 
 void nb_render_out_free(nb_render_out *out)
 {
-    nebel_destroy_film(out->film);
+    nebel_destroy_movie(out->film);
     out->film = NULL;
 }

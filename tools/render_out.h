@@ -17,7 +17,7 @@ typedef struct nb_render_out {
     nb_report_listener *listener;
     uint32_t band_rows;  /* 0: pictures are rendered as a whole */
     uint32_t part_count; /* of a file; 0: files are written directly */
-    nebel_film *film;    /* that is written directly; NULL: none */
+    nebel_movie *film;   /* that is written directly; NULL: none */
     nb_fingerprint base; /* of what all frames are made from */
     int has_base;
     int is_current; /* the file of `asked` needs no work */

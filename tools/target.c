@@ -31,10 +31,10 @@ int nb_target_spare(const char *path, const char *scene, const nebel_scene_data 
 {
     if (nb_target_is_same(path, scene))
         return nb_report_failure("cannot write \"%s\": it is the scene; name another file", path);
-    for (size_t i = 0; i < contents->file_count; i++)
-        if (nb_target_is_same(path, contents->files[i]))
+    for (size_t i = 0; i < contents->path_count; i++)
+        if (nb_target_is_same(path, contents->paths[i]))
             return nb_report_failure("cannot write \"%s\": the scene reads \"%s\" from there; name another file", path,
-                                     contents->files[i]);
+                                     contents->paths[i]);
     return NB_DONE;
 }
 

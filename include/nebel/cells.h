@@ -17,13 +17,13 @@
  *     const nebel_cell_view view = {.eye = {1, 1, 4}, .forward = {1, 0, 0}};
  *     const nebel_cell_point point = {.position = {9, 1, 4}};
  *     nebel_cell_fog fog;
- *     nebel_fog_cells(cells, &view, 1, &point, 0, &fog, 0);
+ *     nebel_compute_cell_fog(cells, &view, 1, &point, 0, &fog, 0);
  *     // fog.alpha = .1 * 5; pixel = fog.color + (1 - fog.alpha) * surface
  *
  * Two cells, each drawn in turn, give I_a + I_b - I_a I_b, while the linear model over both is I_a + I_b: a seam. Cells
  * that touch and have the same density and colour are therefore grouped along the ray and fogged once over their whole
  * span; `ungrouped` shows the seam. The exponential model I = 1 - exp(-D length) has none: with the span RAY it is the
- * fog of nebel_cell_volume for each cell, exactly.
+ * fog of nebel_volume_from_cell for each cell, exactly.
  *
  * Source: the technique of engines of cells and portals around 2000; docs/classic.md has its printed form, what is
  * wrong with it, and pictures. Nothing here calls a graphics interface.
@@ -63,10 +63,10 @@ typedef enum nebel_cell_model {
 
 /* What Zmax - Zmin is. */
 typedef enum nebel_cell_span {
-    NEBEL_SPAN_RAY = 0,  /* m along the ray from the eye to the point */
-    NEBEL_SPAN_DEPTH,    /* m of depth along the view's axis, where the ray crosses the planes: the formula as it was
+    NEBEL_SPAN_RAY = 0, /* m along the ray from the eye to the point */
+    NEBEL_SPAN_DEPTH,   /* m of depth along the view's axis, where the ray crosses the planes: the formula as it was
                             meant. Changes when the camera turns */
-    NEBEL_SPAN_FAITHFUL, /* m of depth as printed: Z = -(A x + B y + D) / C of the planes at the point's own x and y,
+    NEBEL_SPAN_PRINTED, /* m of depth as printed: Z = -(A x + B y + D) / C of the planes at the point's own x and y,
                             which with perspective is not where the ray crosses them */
     NEBEL_SPAN_COUNT
 } nebel_cell_span;
@@ -100,13 +100,13 @@ nebel_result nebel_create_cells(const nebel_cells_desc *desc, nebel_cells **cell
 void nebel_destroy_cells(nebel_cells *cells); /* NULL is fine */
 
 /* The portals, given or derived; arrays of the second live as long as the cells. Vertices of derived ones go
- * counterclockwise as seen from cells[1]. index < nebel_count_cell_portals. Any thread. */
-size_t nebel_count_cell_portals(const nebel_cells *cells);
+ * counterclockwise as seen from cells[1]. index < nebel_get_cell_portal_count. Any thread. */
+size_t nebel_get_cell_portal_count(const nebel_cells *cells);
 nebel_portal nebel_get_cell_portal(const nebel_cells *cells, size_t index);
 
 /* The same fog as a volume for nebel_add_volume: extinction D in all colours, source F. Its arrays are the cell's. Any
  * thread. */
-nebel_volume_desc nebel_cell_volume(const nebel_cell *cell);
+nebel_volume_desc nebel_volume_from_cell(const nebel_cell *cell);
 
 /* ---- asking ---------------------------------------------------------------------------------- */
 
@@ -121,7 +121,7 @@ typedef struct nebel_cell_view {
 typedef struct nebel_cell_point {
     double position[3];  /* m, of a vertex or another point of a surface */
     nebel_plane surface; /* of its polygon, for Zmax; normal 0, or seen edge-on: the point's own Z. Read with
-                            NEBEL_SPAN_FAITHFUL alone */
+                            NEBEL_SPAN_PRINTED alone */
 } nebel_cell_point;
 
 /* What the cells do to the point: pixel = color + (1 - alpha) P. */
@@ -131,12 +131,12 @@ typedef struct nebel_cell_fog {
 } nebel_cell_fog;
 
 /* One fog on the way, as an engine draws it: an alpha polygon in the colour, behind those that come before it. */
-typedef struct nebel_cell_layer {
+typedef struct nebel_cell_segment {
     double color[3];
-    double intensity;   /* I, 0 to 1 */
-    double from, to;    /* Zmin and Zmax, or m along the ray */
-    size_t first, last; /* cells in which it begins and ends */
-} nebel_cell_layer;
+    double intensity;             /* I, 0 to 1 */
+    double from, to;              /* Zmin and Zmax, or m along the ray */
+    size_t first_cell, last_cell; /* cells in which it begins and ends */
+} nebel_cell_segment;
 
 /* What the cells do to each of n points. Strides in bytes; 0: without gaps. points and fog share no bytes,
  * but may lie in the same structures.
@@ -149,15 +149,15 @@ typedef struct nebel_cell_layer {
  * and Z is kept between 0 and the point's Zmax. A way that runs in a face belongs to one of the two cells, by the rule
  * of docs/scene-file.md. A point that is not finite has no fog. Any thread. Errors: ARGUMENT (NULL, an eye that is not
  * finite, a forward that has no direction, a stride shorter than its elements, points and fog that share bytes). */
-nebel_result nebel_fog_cells(const nebel_cells *cells, const nebel_cell_view *view, size_t n,
-                             const nebel_cell_point *points, size_t point_stride, nebel_cell_fog *fog,
-                             size_t fog_stride);
+nebel_result nebel_compute_cell_fog(const nebel_cells *cells, const nebel_cell_view *view, size_t n,
+                                    const nebel_cell_point *points, size_t point_stride, nebel_cell_fog *fog,
+                                    size_t fog_stride);
 
 /* The layers of fog before one point, from the eye on, as many as there is room for; in *count how many there are, at
- * most NEBEL_MAX_CELLS. Any thread. Errors as nebel_fog_cells. */
-nebel_result nebel_find_cell_layers(const nebel_cells *cells, const nebel_cell_view *view,
-                                    const nebel_cell_point *point, size_t room, nebel_cell_layer *layers,
-                                    size_t *count);
+ * most NEBEL_MAX_CELLS. Any thread. Errors as nebel_compute_cell_fog. */
+nebel_result nebel_compute_cell_segments(const nebel_cells *cells, const nebel_cell_view *view,
+                                         const nebel_cell_point *point, size_t room, nebel_cell_segment *layers,
+                                         size_t *count);
 
 #ifdef __cplusplus
 }

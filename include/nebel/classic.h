@@ -7,10 +7,10 @@
  *     typedef struct vertex { float x, y, z; uint32_t diffuse, specular; } vertex;
  *
  *     nebel_vertices points = {.positions = mesh, .position_stride = sizeof(vertex)};
- *     nebel_find_eye(world_view, points.eye);                        // once a frame and object
+ *     nebel_compute_object_eye(world_view, points.eye);                        // once a frame and object
  *     const nebel_vertex_output alpha = {
  *         NEBEL_VERTEX_SPECULAR_ALPHA, &mesh[0].specular, sizeof(vertex)};
- *     nebel_fog_vertices(snapshot, NULL, count, &points, &alpha, 1);
+ *     nebel_compute_vertex_fog(snapshot, NULL, count, &points, &alpha, 1);
  *
  * `world_view` brings the mesh to the camera, and the snapshot's fog is placed in the coordinates of the mesh.
  * docs/classic.md shows how programs use it. Nothing here calls a graphics interface; OpenGL passes are in nebel/gl.h.
@@ -113,8 +113,8 @@ void nebel_reset_d3d9_fog(nebel_d3d9_fog *fog);
 
 /* SetRenderState and GetRenderState for the states above; start, end and density are the bits of a float, as there.
  * Any thread. Errors: ARGUMENT (NULL, another state), VALUE (a mode that is none); nothing has changed then. */
-nebel_result nebel_set_d3d9_fog(nebel_d3d9_fog *fog, uint32_t state, uint32_t value);
-nebel_result nebel_get_d3d9_fog(const nebel_d3d9_fog *fog, uint32_t state, uint32_t *value);
+nebel_result nebel_set_d3d9_state(nebel_d3d9_fog *fog, uint32_t state, uint32_t value);
+nebel_result nebel_get_d3d9_state(const nebel_d3d9_fog *fog, uint32_t state, uint32_t *value);
 
 /* Where a vertex comes from. */
 typedef enum nebel_d3d9_source {
@@ -125,7 +125,7 @@ typedef enum nebel_d3d9_source {
 
 typedef struct nebel_d3d9_vertex {
     nebel_d3d9_source source;
-    double place[3];       /* FIXED: in camera space [m] */
+    double position[3];    /* FIXED: in camera space [m] */
     double specular_alpha; /* FIXED without fog_vertex_mode, TRANSFORMED: 0 to 1 */
     double fog_register;   /* SHADER: oFog, clamped here; 0 where the shader does not write it */
 } nebel_d3d9_vertex;
@@ -162,7 +162,7 @@ typedef enum nebel_curve_type {
 
 typedef struct nebel_curve {
     nebel_curve_type type;
-    double k;           /* 1/m, >= 0; 0: 0.03 for EXP, 0.04 for EXP2, else 0.05 */
+    double scale;       /* 1/m, >= 0; 0: 0.03 for EXP, 0.04 for EXP2, else 0.05 */
     const float *table; /* TABLE: NEBEL_CURVE_ENTRIES weights, 0 to 1 */
 } nebel_curve;
 
@@ -183,7 +183,7 @@ double nebel_compute_curve_weight(const nebel_curve *resolved, double s);
  * numbers in the memory order of OpenGL and of Direct3D, which is the same: those of the translation are 12 to 14. One
  * inversion a frame and object stands for the transformation of each vertex. Any thread. Errors: ARGUMENT (NULL, not
  * finite, not affine, or without an inverse); then `eye` is as it was. */
-nebel_result nebel_find_eye(const double eye_from_object[16], double eye[3]);
+nebel_result nebel_compute_object_eye(const double eye_from_object[16], double eye[3]);
 
 typedef struct nebel_vertices {
     const void *positions;  /* three floats each, x y z [m] */
@@ -230,7 +230,7 @@ typedef struct nebel_vertex_desc {
 nebel_result nebel_resolve_vertex_desc(const nebel_vertex_desc *desc, nebel_vertex_desc *resolved);
 
 /* What fog does between the eye and each of n vertices, written to `output_count` streams at once. In float; through
- * boxes of constant density f is what nebel_transmit_segments gives, to the bit, and the fastest. A byte is 255 times
+ * boxes of constant density f is what nebel_compute_segment_transmittance gives, to the bit, and the fastest. A byte is 255 times
  * the number, rounded to nearest, halves upwards. A vertex that holds a NaN or an infinity gets f = 1 and no light; of
  * one more than 1e18 m away only the range of f is sure. Streams may lie in each other, as the members of a structure
  * do, but no two of them, nor an output and the positions, may share a byte; where arrays lie in each other their
@@ -239,9 +239,9 @@ nebel_result nebel_resolve_vertex_desc(const nebel_vertex_desc *desc, nebel_vert
  * an eye or origin that is not finite or more than 1e15 m away, curves as above), VALUE, UNSUPPORTED (isa not
  * available), MEMORY (scratch for very many volumes on one ray). Nothing has been written when the error is one of the
  * arguments. */
-nebel_result nebel_fog_vertices(const nebel_snapshot *snapshot, const nebel_vertex_desc *desc, size_t n,
-                                const nebel_vertices *vertices, const nebel_vertex_output *outputs,
-                                size_t output_count);
+nebel_result nebel_compute_vertex_fog(const nebel_snapshot *snapshot, const nebel_vertex_desc *desc, size_t n,
+                                      const nebel_vertices *vertices, const nebel_vertex_output *outputs,
+                                      size_t output_count);
 
 /* ---- tessellation ---------------------------------------------------------------------------- */
 
@@ -251,11 +251,11 @@ nebel_result nebel_fog_vertices(const nebel_snapshot *snapshot, const nebel_vert
  * {0}: the eye at the origin, red, 1/255. */
 typedef struct nebel_tessellation_desc {
     nebel_allocator allocator;
-    double eye[3];         /* m, in the coordinates of the fog; at most 1e15 */
-    int channel;           /* whose factor: 0 red, 1 green, 2 blue */
-    double bound;          /* of the error of the factor, > 0; 0: 1/255 */
-    unsigned deepest;      /* how often a triangle may be halved, at most 48; 0: 20 */
-    size_t most_triangles; /* no triangle is halved for its error where there are so many; 0: 2^18 */
+    double eye[3];        /* m, in the coordinates of the fog; at most 1e15 */
+    int channel;          /* whose factor: 0 red, 1 green, 2 blue */
+    double max_error;     /* of the error of the factor, > 0; 0: 1/255 */
+    unsigned max_depth;   /* how often a triangle may be halved, at most 48; 0: 20 */
+    size_t max_triangles; /* no triangle is halved for its error where there are so many; 0: 2^18 */
 } nebel_tessellation_desc;
 
 typedef struct nebel_triangles {
@@ -274,22 +274,22 @@ typedef struct nebel_tessellation {
     size_t vertex_count, triangle_count;
     const float (*positions)[3]; /* m from the same origin */
     const uint32_t *indices;     /* three for each triangle, turned as those of the input */
-    size_t vertex_count_before;  /* of the input */
+    size_t input_vertex_count;   /* of the input */
     const uint32_t (*parents)[2];
     size_t added_triangles;
-    double error;         /* proven bound of what is left, of all triangles; at most 1 */
-    size_t over_count;    /* triangles whose bound is above the one asked for: 0 where it was met */
-    size_t deepest_count; /* those of them that `deepest` left; the others were left by `most_triangles` */
+    double error;               /* proven bound of what is left, of all triangles; at most 1 */
+    size_t unresolved_count;    /* triangles whose bound is above the one asked for: 0 where it was met */
+    size_t depth_limited_count; /* those of them that `max_depth` left; the others were left by `max_triangles` */
 } nebel_tessellation;
 
 /* Splits triangles until |f - L| <= bound everywhere on each, where f is the exact transmittance between the eye and
  * the place, and L is linear between the exact f of the three corners. The bound is proven by interval arithmetic, not
  * sampled: it holds for every place of every triangle but for the rounding of double, for which 1e-6 is counted; a
- * bound below that cannot be met. What the factors of the vertices are off by themselves (nebel_fog_vertices) comes on
+ * bound below that cannot be met. What the factors of the vertices are off by themselves (nebel_compute_vertex_fog) comes on
  * top.
  *
  * Where a sharp edge of the fog crosses a triangle the error falls with the size of the triangle alone, and at the
- * silhouette of a round volume with its square root: `deepest` and `most_triangles` end that. Then the result is OK,
+ * silhouette of a round volume with its square root: `max_depth` and `max_triangles` end that. Then the result is OK,
  * over_count says how many triangles are left, and error how much.
  *
  * Edges are halved at their middle, for all triangles that share them: there are no T-junctions, also where vertices at

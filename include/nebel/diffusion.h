@@ -15,7 +15,7 @@ extern "C" {
 #endif
 
 typedef struct nebel_diffusion_desc {
-    uint32_t cells;          /* of its lattice, at most: NEBEL_MIN_DIFFUSION_CELLS to NEBEL_MAX_DIFFUSION_CELLS; 0:
+    uint32_t max_cells;      /* of its lattice, at most: NEBEL_MIN_DIFFUSION_CELLS to NEBEL_MAX_DIFFUSION_CELLS; 0:
                        NEBEL_DEFAULT_DIFFUSION_CELLS. Thin fog takes less */
     int has_ground;          /* a level one without end: what is below is left out, and light comes back from it */
     double ground_height;    /* m, along y */

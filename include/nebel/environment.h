@@ -5,7 +5,7 @@
  *     nebel_set_environment(fog, &dusk);
  *
  * Fog with an albedo then scatters along each ray what its phase function makes of that light; transmittance stays as
- * it is. For surfaces there is nebel_environment_reflected, for what is behind everything nebel_environment_radiance.
+ * it is. For surfaces there is nebel_evaluate_environment_diffuse, for what is behind everything nebel_evaluate_environment.
  *
  * Link with libnebel. Threads, results and conventions as in nebel/nebel.h; up is +y.
  */
@@ -58,19 +58,21 @@ typedef struct nebel_environment {
     double zenith[3], horizon[3], ground[3]; /* gradient: radiance from straight above, level and from straight below, 0
                                                 to 1e9; linear in the sine of the elevation between them */
     nebel_environment_map *map;              /* map: not NULL */
-    double rotation;  /* map: degrees about +y, within -NEBEL_MAX_ROTATION and that; > 0 takes what is at -z to -x */
+    double
+        rotation; /* map: degrees about +y, within -NEBEL_MAX_ENVIRONMENT_ROTATION and that; > 0 takes what is at -z to -x */
     double intensity; /* map: factor of its radiance, > 0, at most 1e9 of both together; 0: 1 */
 } nebel_environment;
 
-#define NEBEL_MAX_ROTATION 1e6
+#define NEBEL_MAX_ENVIRONMENT_ROTATION 1e6
 
 /* Radiance that comes from a direction, of any length. Where it is none, 0 or not finite, a constant environment sends
  * what it always does and others 0. `environment` must be in order. Any thread. */
-void nebel_environment_radiance(const nebel_environment *environment, const double direction[3], double radiance[3]);
+void nebel_evaluate_environment(const nebel_environment *environment, const double direction[3], double radiance[3]);
 
 /* Radiance of a white Lambertian surface of a normal, taken as the direction above, that nothing hides from the sky:
  * irradiance over pi. Of a gradient in closed form, of a map within 1e-3 of the brightest normal's. Any thread. */
-void nebel_environment_reflected(const nebel_environment *environment, const double normal[3], double radiance[3]);
+void nebel_evaluate_environment_diffuse(const nebel_environment *environment, const double normal[3],
+                                        double radiance[3]);
 
 /* More phase functions than these cannot scatter an environment that is not constant: a commit is LIMIT then. */
 #define NEBEL_MAX_ENVIRONMENT_PHASES 64

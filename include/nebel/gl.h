@@ -9,7 +9,7 @@
  *
  *     nebel_destroy_gl(gl);
  *
- * For fog in the host's own shaders see nebel/shader.h; nebel_gl_get_fog hands out the buffer and textures that they
+ * For fog in the host's own shaders see nebel/shader.h; nebel_gl_get_fog_resources hands out the buffer and textures that they
  * read. Link with libnebel_gl and libnebel.
  *
  * Light is linear, coming in and going out: colour textures and targets are float, or sRGB with the conversion switched
@@ -75,7 +75,7 @@ void nebel_destroy_gl(nebel_gl *gl);
  * where there are more than a few. It holds until the next call, and the snapshot is retained until then. Snapshot
  * NULL: no fog. O(volumes + tiles), plus what the driver takes for the upload; nothing is packed again where snapshot
  * and eye are those of the last call, to the last bit, and nothing at all is done where the view is, too. Errors:
- * ARGUMENT (also a view that nebel_view_rays refuses, with a width or height of 0 among them), MEMORY, LIMIT (more
+ * ARGUMENT (also a view that nebel_compute_view_rays refuses, with a width or height of 0 among them), MEMORY, LIMIT (more
  * volumes, larger grids or more phase functions of an environment than the largest texture holds), UNSUPPORTED (the
  * context is another one, or lost). On an error there is no fog.
  */
@@ -86,7 +86,7 @@ typedef enum nebel_gl_output {
     NEBEL_GL_OUTPUT_SPLIT,       /* in-scattering into draw buffer 0, transmittance into draw buffer 1; alpha 1 */
     NEBEL_GL_OUTPUT_BLEND, /* over what the target holds, each colour by its own transmittance; alpha stays. OpenGL, and
                               OpenGL ES with GL_EXT_blend_func_extended */
-    NEBEL_GL_OUTPUT_BLEND_GREY, /* the same with the mean of the three transmittances: right where fog takes all colours
+    NEBEL_GL_OUTPUT_BLEND_GRAY, /* the same with the mean of the three transmittances: right where fog takes all colours
                                    alike. Everywhere */
     NEBEL_GL_OUTPUT_COUNT
 } nebel_gl_output;
@@ -112,30 +112,30 @@ typedef struct nebel_gl_pass {
 /* Draws the fog of nebel_gl_set_fog over the pixels of its view.
  * Errors: ARGUMENT (no fog was set; a name that is no texture; a texture that is too small or of other samples, where
  * the context can tell; a colour texture that is also the target; a framebuffer that is incomplete, whose draw
- * buffers do not fit the output, or whose samples do not; a depth convention that nebel_view_rays refuses), MEMORY,
+ * buffers do not fit the output, or whose samples do not; a depth convention that nebel_compute_view_rays refuses), MEMORY,
  * UNSUPPORTED (multisampled textures in OpenGL ES 3.0, BLEND where the context cannot; a shader that the driver does
  * not take, with the driver's words; the context is another one, or lost). On an error nothing was drawn. */
 nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass);
 
 /* The fog of nebel_gl_set_fog, for the host's own shaders. */
-typedef struct nebel_gl_fog {
-    unsigned block;        /* uniform buffer of 16 KiB for nebel_fog_block; 0 where the fog is in the texture */
-    unsigned texture;      /* for nebel_fog_texture; 0 where the fog is in the block. Read with texelFetch alone */
-    unsigned voxels;       /* for nebel_voxel_texture; 0: there are no grids */
-    unsigned nodes;        /* for nebel_node_texture; 0: light is scattered once */
-    unsigned environment;  /* for nebel_environment_texture; 0: fog scatters no light by direction. For fog alone */
-    unsigned tiles;        /* for nebel_tile_texture; 0: without tiles, use nebel_trace */
-    uint32_t tile_size;    /* pixels */
-    uint32_t tile_columns; /* tile of a pixel: x / tile_size + y / tile_size * tile_columns */
-    uint32_t tile_most;    /* volumes that the fullest tile lists */
-    uint32_t features;     /* NEBEL_FEATURES: a shader compiled with these, or more, will do */
-    size_t word_count;
+typedef struct nebel_gl_fog_resources {
+    unsigned block;            /* uniform buffer of 16 KiB for nebel_fog_block; 0 where the fog is in the texture */
+    unsigned texture;          /* for nebel_fog_texture; 0 where the fog is in the block. Read with texelFetch alone */
+    unsigned voxels;           /* for nebel_voxel_texture; 0: there are no grids */
+    unsigned diffusion;        /* for nebel_diffusion_texture; 0: light is scattered once */
+    unsigned environment;      /* for nebel_environment_texture; 0: fog scatters no light by direction. For fog alone */
+    unsigned tiles;            /* for nebel_tile_texture; 0: without tiles, use nebel_trace */
+    uint32_t tile_size;        /* pixels */
+    uint32_t tile_columns;     /* tile of a pixel: x / tile_size + y / tile_size * tile_columns */
+    uint32_t max_tile_volumes; /* volumes that the fullest tile lists */
+    uint32_t features;         /* NEBEL_FEATURES: a shader compiled with these, or more, will do */
+    size_t texel_count;
     double eye[3]; /* what positions are relative to [m] */
-} nebel_gl_fog;
+} nebel_gl_fog_resources;
 
 /* The names stay what they are until the next nebel_gl_set_fog. Calls no OpenGL. Errors: ARGUMENT (also where no fog
  * was set). */
-nebel_result nebel_gl_get_fog(const nebel_gl *gl, nebel_gl_fog *fog);
+nebel_result nebel_gl_get_fog_resources(const nebel_gl *gl, nebel_gl_fog_resources *fog);
 
 #ifdef __cplusplus
 }

@@ -1,29 +1,29 @@
 /* Classic fog in OpenGL: fog per vertex, drawn as engines of 1999 to 2005 draw it.
  *
  * Such an engine has meshes and functions that draw them, each mesh in a layout of its own. So nothing is drawn here:
- * nebel_fog_vertices writes one number or colour per vertex into the engine's own arrays, and what follows puts OpenGL
+ * nebel_compute_vertex_fog writes one number or colour per vertex into the engine's own arrays, and what follows puts OpenGL
  * into the state in which the engine's own draw call makes fog of it, and back.
  *
  *     nebel_gl_classic *classic = NULL;
  *     nebel_create_gl_classic(&(nebel_gl_classic_desc){.log = log}, &classic);    // in the engine's context
- *     method = nebel_gl_classic_method(classic);          // TWO_PASS where the context lacks fog coordinates
+ *     method = nebel_gl_get_classic_method(classic);          // TWO_PASS where the context lacks fog coordinates
  *
  *     // The stream follows from the method: feed refuses another one.
  *     // FOG_COORD, one pass: the mesh as ever, within
  *     const nebel_vertex_output fog = {NEBEL_VERTEX_COORDINATE, &mesh[0].fog, sizeof *mesh};
- *     nebel_fog_vertices(snapshot, NULL, count, &points, &fog, 1);
- *     nebel_gl_begin_classic(classic, color);
- *     nebel_gl_feed_classic(classic, &fog, 0);
+ *     nebel_compute_vertex_fog(snapshot, NULL, count, &points, &fog, 1);
+ *     nebel_gl_begin_classic_fog(classic, color);
+ *     nebel_gl_bind_classic_stream(classic, &fog, 0);
  *     draw_mesh(mesh);
- *     nebel_gl_end_classic(classic);
+ *     nebel_gl_end_classic_fog(classic);
  *
  *     // TWO_PASS, ADDITIVE: the mesh as ever, and then its positions alone, within
  *     const nebel_vertex_output fog = {NEBEL_VERTEX_RGBA8, &mesh[0].fog, sizeof *mesh};
  *     draw_mesh(mesh);
- *     nebel_gl_begin_classic(classic, NULL);
- *     nebel_gl_feed_classic(classic, &fog, 0);
+ *     nebel_gl_begin_classic_fog(classic, NULL);
+ *     nebel_gl_bind_classic_stream(classic, &fog, 0);
  *     draw_positions(mesh);
- *     nebel_gl_end_classic(classic);
+ *     nebel_gl_end_classic_fog(classic);
  *
  * Between begin and end any number of meshes may be drawn, each after a feed of its own. A program that draws between
  * glBegin and glEnd feeds nothing: it calls glFogCoordf(coordinate) or glColor4ubv(color) before each vertex.
@@ -44,7 +44,7 @@
  * out the same: same matrices, same vertices, same kind of pipeline.
  *
  * Programs in GLSL: where a compatibility profile has a current program, and everywhere in core profiles and OpenGL ES,
- * the engine's own shaders take the place of the fixed pipeline; nebel_gl_classic_text is what they call. There begin
+ * the engine's own shaders take the place of the fixed pipeline; nebel_gl_classic_shader_source is what they call. There begin
  * sets blending and depth alone (for FOG_COORD nothing), and the engine hands the stream to an attribute of its own,
  * smooth, with glVertexAttribPointer. Vertex shaders of both passes declare `invariant gl_Position;` and compute it
  * alike, or depth is not equal.
@@ -100,22 +100,23 @@ nebel_result nebel_create_gl_classic(const nebel_gl_classic_desc *desc, nebel_gl
 void nebel_destroy_gl_classic(nebel_gl_classic *classic);
 
 /* The method that is used. */
-nebel_gl_classic_kind nebel_gl_classic_method(const nebel_gl_classic *classic);
+nebel_gl_classic_kind nebel_gl_get_classic_method(const nebel_gl_classic *classic);
 
 /* Sets the state of the method. `color` is that of the fog for FOG_COORD; the others have it in their streams, and NULL
  * will do. Errors: ARGUMENT (FOG_COORD without a colour; after another begin), LIMIT (an attribute stack is full).
  * Nothing has changed then. */
-nebel_result nebel_gl_begin_classic(nebel_gl_classic *classic, const float color[3]);
+nebel_result nebel_gl_begin_classic_fog(nebel_gl_classic *classic, const float color[3]);
 
-/* The next draw calls take their fog from `stream`, as nebel_fog_vertices wrote it: in memory, or in the buffer object
+/* The next draw calls take their fog from `stream`, as nebel_compute_vertex_fog wrote it: in memory, or in the buffer object
  * of that name, where `data` is the offset of the first vertex's (buffer 0: memory). It must lie there until they have
  * drawn. For the fixed pipeline alone. Errors: ARGUMENT (not after begin; a format that is not the method's; no data; a
  * stride that is shorter than the format or longer than INT32_MAX; a name that is no buffer; memory while a vertex
  * array object is bound), UNSUPPORTED (no fixed pipeline). */
-nebel_result nebel_gl_feed_classic(nebel_gl_classic *classic, const nebel_vertex_output *stream, unsigned buffer);
+nebel_result nebel_gl_bind_classic_stream(nebel_gl_classic *classic, const nebel_vertex_output *stream,
+                                          unsigned buffer);
 
 /* Puts the state back. Errors: ARGUMENT (not after begin). */
-nebel_result nebel_gl_end_classic(nebel_gl_classic *classic);
+nebel_result nebel_gl_end_classic_fog(nebel_gl_classic *classic);
 
 /* Functions for the engine's shaders, in every version of GLSL, for vertex and fragment stages; zero-terminated; lives
  * for ever; put it behind #version. It makes highp the default precision in OpenGL ES. Calls no OpenGL; any thread.
@@ -126,7 +127,7 @@ nebel_result nebel_gl_end_classic(nebel_gl_classic *classic);
  *         ALPHA: the second pass's output of the interpolated amount.
  *
  * TWO_PASS and ADDITIVE put out the interpolated stream as it is. */
-const char *nebel_gl_classic_text(void);
+const char *nebel_gl_classic_shader_source(void);
 
 #ifdef __cplusplus
 }

@@ -43,10 +43,11 @@ typedef struct nebel_gl_renderer nebel_gl_renderer;
 typedef struct nebel_gl_renderer_desc {
     nebel_allocator allocator;
     nebel_log log;
-    uint32_t shadow_size; /* texels of a side of each of the sun's four shadow maps, and of eight more where it lights
+    uint32_t
+        shadow_map_size; /* texels of a side of each of the sun's four shadow maps, and of eight more where it lights
                              fog, 64 to 16384; 0: 2048. A lamp's six have a quarter of it, less where they would take
                              more than 128 MiB together, but 64 */
-    nebel_air_run_fn
+    nebel_parallel_for_fn
         run; /* for threads that make tables of air, and walk through clouds; NULL: one part after the other */
     void *run_user;
 } nebel_gl_renderer_desc;
@@ -55,7 +56,7 @@ typedef struct nebel_gl_renderer_desc {
  * ambient are read anew for each frame, so `scene` must outlive the renderer. The maps around a lamp are drawn when it
  * is new or has moved. Where lamps are more than there is room for, GL_MAX_ARRAY_TEXTURE_LAYERS or 1,365, those that are
  * brightest at the eye cast shadows. The snapshot is retained; fog NULL: none.
- * On an error *renderer is NULL. O(vertices + triangles + texels). Errors: ARGUMENT and VALUE as nebel_create_renderer,
+ * On an error *renderer is NULL. O(vertices + triangles + texels). Errors: ARGUMENT and VALUE as nebel_create_cpu_renderer,
  * MEMORY, LIMIT (a texture larger than GL_MAX_TEXTURE_SIZE), UNSUPPORTED (no current context, or one that is too old or
  * cannot draw into textures of floats). */
 nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snapshot *fog,
@@ -81,12 +82,12 @@ typedef enum nebel_gl_method {
     NEBEL_GL_METHOD_EXACT = 0, /* fog of each pixel; particles count up to the surface, in closed form */
     NEBEL_GL_METHOD_FIVE_TAP,  /* each particle is a disc through its middle, across the view: all of it or nothing, by
                                   the classic comparison of depth at five places. Of a panorama depth is distance */
-    NEBEL_GL_METHOD_VERTEX,    /* fog at the vertices of surfaces, by nebel_fog_vertices, interpolated over triangles:
+    NEBEL_GL_METHOD_VERTEX, /* fog at the vertices of surfaces, by nebel_compute_vertex_fog, interpolated over triangles:
                                   what fog coordinates, a second pass and alpha polygons draw (nebel/gl_classic.h). It
                                   has one transmittance, that of red. Where no surface is there is no fog. Rays of
                                   an orthographic camera begin in its plane, for CELLS, too */
-    NEBEL_GL_METHOD_ADDITIVE,  /* the same, but fog only adds its light, and transmittance is 1 */
-    NEBEL_GL_METHOD_CELLS,     /* the same by nebel_fog_cells, in place of the renderer's fog, which still dims the sun:
+    NEBEL_GL_METHOD_ADDITIVE, /* the same, but fog only adds its light, and transmittance is 1 */
+    NEBEL_GL_METHOD_CELLS, /* the same by nebel_compute_cell_fog, in place of the renderer's fog, which still dims the sun:
                                   give it none where cells are all. Each ray of a panorama is its own axis of depth */
     NEBEL_GL_METHOD_CELLS_PIXEL, /* the same at each pixel, which the processor computes of the distances that OpenGL
                                     has drawn: half a microsecond for each, of few cells. For pictures, not for films */
@@ -104,18 +105,18 @@ typedef enum nebel_gl_method {
 } nebel_gl_method;
 
 /* Constants of FIVE_TAP, as those of nebel_five_taps in nebel/shader.h: a disc is drawn where the depths of the opaque
- * picture at the pixel and at four diagonal neighbours differ by more than `edge`, and where none of them is nearer
- * than the disc's own depth less `margin`. Depth is the distance along the camera's axis. */
-typedef struct nebel_gl_taps {
-    double offset;     /* of the neighbours, as a share of the picture either way, >= 0 */
-    double nothing;    /* depth where there is no surface [m] */
-    double edge;       /* m, >= 0 */
-    double margin;     /* m */
-    double brightness; /* what light of drawn particles is multiplied by, >= 0 */
-} nebel_gl_taps;
+ * picture at the pixel and at four diagonal neighbours differ by more than `edge_threshold`, and where none of them is nearer
+ * than the disc's own depth less `depth_margin`. Depth is the distance along the camera's axis. */
+typedef struct nebel_depth_taps {
+    double offset;           /* of the neighbours, as a share of the picture either way, >= 0 */
+    double background_depth; /* depth where there is no surface [m] */
+    double edge_threshold;   /* m, >= 0 */
+    double depth_margin;     /* m */
+    double brightness;       /* what light of drawn particles is multiplied by, >= 0 */
+} nebel_depth_taps;
 
 /* 0.0005, 100000, 0.5, 0.125, 1. Any thread. */
-nebel_gl_taps nebel_gl_default_taps(void);
+nebel_depth_taps nebel_gl_default_taps(void);
 
 typedef struct nebel_gl_frame_desc {
     nebel_camera camera;
@@ -126,7 +127,7 @@ typedef struct nebel_gl_frame_desc {
     int (*progress)(size_t done, size_t total, void *user);
     void *progress_user;
     nebel_gl_method method;
-    const nebel_gl_taps *taps;       /* of FIVE_TAP; NULL: nebel_gl_default_taps */
+    const nebel_depth_taps *taps;    /* of FIVE_TAP; NULL: nebel_gl_default_taps */
     const nebel_cells *cells;        /* of CELLS and CELLS_PIXEL */
     const nebel_factor_desc *factor; /* of LINEAR, EXP and EXP2, but for its mode */
     const nebel_vertex_desc *vertex; /* of FOG_COORD and ALPHA, with a color; of TWO_PASS, NULL: {0} */
@@ -178,11 +179,11 @@ typedef struct nebel_gl_planes {
  * nothing). */
 nebel_result nebel_gl_read_planes(nebel_gl_renderer *renderer, const nebel_gl_planes *planes);
 
-/* The view of a camera without near and far planes, for nebel_gl_set_fog and nebel_view_rays with
- * NEBEL_DEPTH_KIND_DISTANCE: the projection is infinite and begins 1e-6 m before the eye. Errors: ARGUMENT, VALUE as
+/* The view of a camera without near and far planes, for nebel_gl_set_fog and nebel_compute_view_rays with
+ * NEBEL_DEPTH_ENCODING_RADIAL: the projection is infinite and begins 1e-6 m before the eye. Errors: ARGUMENT, VALUE as
  * for nebel_render_frame, UNSUPPORTED (a panorama, which no matrix makes). Any thread. */
-nebel_result nebel_gl_camera_view(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
-                                  nebel_view *view);
+nebel_result nebel_view_from_camera(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
+                                    nebel_view *view);
 
 #ifdef __cplusplus
 }

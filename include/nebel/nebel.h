@@ -166,16 +166,16 @@ typedef struct nebel_shape {
     double from[3], to[3];         /* cylinder, capsule, cone: the axis */
     double radius_from, radius_to; /* cone */
     double point[3], normal[3];    /* half space */
-    const nebel_plane *planes;     /* convex: 1 to NEBEL_MAX_PLANES */
+    const nebel_plane *planes;     /* convex: 1 to NEBEL_MAX_SHAPE_PLANES */
     size_t plane_count;
     const struct nebel_shape
-        *parts; /* union, intersection: 1 to NEBEL_MAX_LEAVES leaves in all, NEBEL_MAX_DEPTH deep */
+        *parts; /* union, intersection: 1 to NEBEL_MAX_SHAPE_LEAVES leaves in all, NEBEL_MAX_SHAPE_NESTING deep */
     size_t part_count;
 } nebel_shape;
 
-#define NEBEL_MAX_PLANES 1024
-#define NEBEL_MAX_LEAVES 1024
-#define NEBEL_MAX_DEPTH 16
+#define NEBEL_MAX_SHAPE_PLANES 1024
+#define NEBEL_MAX_SHAPE_LEAVES 1024
+#define NEBEL_MAX_SHAPE_NESTING 16
 
 /* Voxels: measured or simulated densities. Immutable, owned by whoever retains it. */
 typedef struct nebel_grid nebel_grid;
@@ -186,10 +186,11 @@ typedef enum nebel_voxel_type {
     NEBEL_VOXEL_UINT16 /* 0 to 65535 stand for 0 to 1 */
 } nebel_voxel_type;
 
-typedef enum nebel_filter {
-    NEBEL_FILTER_LINEAR = 0, /* trilinear between the middles of voxels; level from the outermost middles outwards */
-    NEBEL_FILTER_NEAREST     /* each voxel is of one density */
-} nebel_filter;
+typedef enum nebel_grid_filter {
+    NEBEL_GRID_FILTER_LINEAR =
+        0,                    /* trilinear between the middles of voxels; level from the outermost middles outwards */
+    NEBEL_GRID_FILTER_NEAREST /* each voxel is of one density */
+} nebel_grid_filter;
 
 #define NEBEL_MAX_GRID_SIZE 4096         /* voxels along an axis */
 #define NEBEL_MAX_GRID_VOXELS 1073741824 /* voxels in all */
@@ -205,7 +206,7 @@ typedef struct nebel_grid_desc {
     const void *voxels; /* size[0] * size[1] * size[2] of them, x fastest, then y; copied */
     double scale;       /* density = offset + scale * voxel, 0 to 1e9 for every voxel; scale 0: 1 */
     double offset;
-    nebel_filter filter;
+    nebel_grid_filter filter;
     const char *name; /* what it is called; NULL: nothing; copied. Means nothing to nebel but in nebel/scene.h */
 } nebel_grid_desc;
 
@@ -221,16 +222,16 @@ nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid);
 typedef struct nebel_noise_desc {
     nebel_allocator allocator;
     nebel_log log;
-    size_t size[3];   /* voxels, as in nebel_grid_desc */
-    double cells[3];  /* of the first octave along each axis of the box, > 0, of two voxels each at least */
-    int octaves;      /* 1 to 16; 0: 1 */
-    double gain;      /* 0 to 1; 0: 0.5 */
-    double coverage;  /* 0 to 1; 0: 1. The less, the more apart are the wisps */
-    double edge[3];   /* 0 to 0.5: over this part of the box the density rises from 0 on its faces, along each axis */
-    double offset[3]; /* in cells of the first octave, within NEBEL_MAX_NOISE_OFFSET: how far the noise has drifted */
-    double time;      /* the same: in 1 it has become another; smaller octaves change sooner */
-    uint32_t seed;    /* any */
-    const char *name; /* as in nebel_grid_desc */
+    size_t size[3];      /* voxels, as in nebel_grid_desc */
+    double frequency[3]; /* of the first octave along each axis of the box, > 0, of two voxels each at least */
+    int octaves;         /* 1 to 16; 0: 1 */
+    double gain;         /* 0 to 1; 0: 0.5 */
+    double coverage;     /* 0 to 1; 0: 1. The less, the more apart are the wisps */
+    double falloff[3]; /* 0 to 0.5: over this part of the box the density rises from 0 on its faces, along each axis */
+    double offset[3];  /* in cells of the first octave, within NEBEL_MAX_NOISE_OFFSET: how far the noise has drifted */
+    double time;       /* the same: in 1 it has become another; smaller octaves change sooner */
+    uint32_t seed;     /* any */
+    const char *name;  /* as in nebel_grid_desc */
 } nebel_noise_desc;
 
 #define NEBEL_MAX_NOISE_OFFSET 1e9
@@ -238,10 +239,10 @@ typedef struct nebel_noise_desc {
 
 /* Makes a grid of noise in *grid, with one owner; on an error *grid is NULL. Cost: voxels times octaves. Any thread.
  * Errors: ARGUMENT, VALUE, LIMIT, MEMORY. */
-nebel_result nebel_create_noise(const nebel_noise_desc *desc, nebel_grid **grid);
+nebel_result nebel_create_noise_grid(const nebel_noise_desc *desc, nebel_grid **grid);
 
 /* The grid's name, "" where it has none; lives as long as the grid. Any thread. */
-const char *nebel_grid_name(const nebel_grid *grid);
+const char *nebel_get_grid_name(const nebel_grid *grid);
 
 /* One more owner of the grid; any thread. Returns its argument. */
 nebel_grid *nebel_retain_grid(nebel_grid *grid);
@@ -258,14 +259,14 @@ typedef enum nebel_density_type {
     NEBEL_DENSITY_LINEAR,    /* 0 at `from`, 1 at `to`, clamped, level across */
     NEBEL_DENSITY_RADIAL,    /* (1 - r^2)^power, r = 1 on the surface; sphere and ellipsoid only */
     NEBEL_DENSITY_GAUSSIAN,  /* exp(-r^2 / (2 sigma^2)) around center */
-    NEBEL_DENSITY_SOFT_EDGE, /* 0 on the surface, 1 from `distance` within: see below; not world or groups */
+    NEBEL_DENSITY_SOFT_EDGE, /* 0 on the surface, 1 from `edge_width` within: see below; not world or groups */
     NEBEL_DENSITY_GRID,      /* voxels that fill a box: see nebel_grid_desc; boxes only */
     NEBEL_DENSITY_ALTITUDE, /* as height, above the ground of a ball: exp(-(|p - center| - radius - base) / scale_height);
                                 optical depth within 4e-9 of itself */
     NEBEL_DENSITY_COUNT
 } nebel_density_type;
 
-/* NEBEL_DENSITY_SOFT_EDGE, with e = `distance` and all lengths in the shape's own coordinates. The density is a
+/* NEBEL_DENSITY_SOFT_EDGE, with e = `edge_width` and all lengths in the shape's own coordinates. The density is a
  * polynomial along a ray between kinks, so that integrals are exact; near edges and in tapering bodies it is not quite
  * the distance to the surface.
  *
@@ -290,7 +291,7 @@ typedef enum nebel_below {
 
 /* The base of an altitude density is at least so many scale heights from the centre: the optical depth of fog on balls
  * that bend more would be off by more. */
-#define NEBEL_MIN_CURVATURE 50
+#define NEBEL_MIN_ALTITUDE_RATIO 50
 
 typedef struct nebel_density {
     nebel_density_type type;
@@ -302,7 +303,7 @@ typedef struct nebel_density {
     double center[3];      /* gaussian, altitude: m */
     double radius;         /* altitude: m, > 0 */
     double sigma;          /* gaussian: m, > 0 */
-    double distance;       /* soft edge: m in the shape's own coordinates, > 0 */
+    double edge_width;     /* soft edge: m in the shape's own coordinates, > 0 */
     nebel_grid *grid;      /* grid: not NULL; a volume becomes one more owner of it */
 } nebel_density;
 
@@ -320,13 +321,13 @@ typedef enum nebel_phase_type {
 
 #define NEBEL_MAX_G 0.9999
 #define NEBEL_MAX_ALPHA 1e9
-#define NEBEL_MAX_DROPLET 50
+#define NEBEL_MAX_DROPLET_DIAMETER 50
 
 typedef struct nebel_phase {
     nebel_phase_type type;
     double g;        /* -NEBEL_MAX_G to NEBEL_MAX_G; < 0: backwards */
     double alpha;    /* 0 to NEBEL_MAX_ALPHA */
-    double diameter; /* micrometres, 1e-6 to NEBEL_MAX_DROPLET */
+    double diameter; /* micrometres, 1e-6 to NEBEL_MAX_DROPLET_DIAMETER */
 } nebel_phase;
 
 typedef enum nebel_operation {
@@ -359,14 +360,14 @@ typedef struct nebel_volume_desc {
  * NaN when the phase function or the cosine is out of range. Any thread. Sources: Henyey and Greenstein 1941; Cornette
  * and Shanks 1992; Draine 2003; droplets: Jendersie and d'Eon 2023, a fit of Mie's theory for 5 to 50 micrometres with
  * others below. */
-double nebel_phase_value(const nebel_phase *phase, double cosine);
+double nebel_evaluate_phase(const nebel_phase *phase, double cosine);
 
 /* The mean cosine over all scattered light, -1 to 1. NaN when the phase function is out of range. Any thread. */
 double nebel_phase_mean_cosine(const nebel_phase *phase);
 
 /* Sampling: the cosine below which `part`, 0 to 1, of the light is scattered; random parts give random cosines as the
  * phase function has them. NaN when something is out of range. Any thread. */
-double nebel_phase_sample(const nebel_phase *phase, double part);
+double nebel_sample_phase(const nebel_phase *phase, double part);
 
 /* ---- fog as it is measured ------------------------------------------------------------------- */
 
@@ -395,35 +396,35 @@ double nebel_droplet_radius(double water, double number);
 
 /* How many droplets of which size: scale r^power exp(-rate r^exponent) to the cm^3 and micrometre of radius r, a
  * modified gamma distribution (Deirmendjian 1969). */
-typedef struct nebel_droplet_sizes {
+typedef struct nebel_droplet_distribution {
     double scale, power, rate, exponent; /* > 0, > -1, > 0, > 0 */
-} nebel_droplet_sizes;
+} nebel_droplet_distribution;
 
-typedef struct nebel_droplet_sums {
-    double number;           /* to the cm^3 */
+typedef struct nebel_droplet_properties {
+    double number_density;   /* to the cm^3 */
     double effective_radius; /* micrometres: the third moment over the second */
     double water;            /* g/m^3 */
     double extinction;       /* 1/m: twice the area of the droplets */
-} nebel_droplet_sums;
+} nebel_droplet_properties;
 
 /* What all droplets together are, in closed form. Any thread. Errors: ARGUMENT (NULL), VALUE (a number out of range, or
  * sums that are not finite); *sums stays as it is then. */
-nebel_result nebel_sum_droplets(const nebel_droplet_sizes *sizes, nebel_droplet_sums *sums);
+nebel_result nebel_compute_droplet_properties(const nebel_droplet_distribution *sizes, nebel_droplet_properties *sums);
 
 /* Fog with a name: what a volume takes of it, and its droplets where they are known (else all 0). */
-typedef struct nebel_preset {
+typedef struct nebel_fog_preset {
     const char *name;
-    const char *source; /* where the numbers come from */
-    nebel_droplet_sizes sizes;
+    const char *citation; /* where the numbers come from */
+    nebel_droplet_distribution droplets;
     double extinction[3]; /* 1/m at 0.65, 0.55 and 0.45 micrometres */
     double albedo[3];
     nebel_phase phase;
-} nebel_preset;
+} nebel_fog_preset;
 
 /* heavy_advection, moderate_advection, heavy_radiation, moderate_radiation, mist, haze, smoke, black_smoke: all of them
  * in this order, and one by its name; NULL where there is none. They live as long as the program. Any thread. */
-const nebel_preset *nebel_list_presets(size_t *count);
-const nebel_preset *nebel_find_preset(const char *name);
+const nebel_fog_preset *nebel_list_fog_presets(size_t *count);
+const nebel_fog_preset *nebel_lookup_fog_preset(const char *name);
 
 /* ---- fog that can be edited ------------------------------------------------------------------ */
 
@@ -438,24 +439,24 @@ typedef struct nebel_sun {
     double irradiance[3]; /* 0 to 1e9, on a surface that faces it; all zero: no sun */
 } nebel_sun;
 
-typedef enum nebel_lamp_type {
-    NEBEL_LAMP_POINT = 0, /* shines alike in all directions */
-    NEBEL_LAMP_SPOT       /* shines into a cone */
-} nebel_lamp_type;
+typedef enum nebel_light_type {
+    NEBEL_LIGHT_POINT = 0, /* shines alike in all directions */
+    NEBEL_LIGHT_SPOT       /* shines into a cone */
+} nebel_light_type;
 
 /* A ball that shines. Its light reaches a place through all fog on the straight way there, scattered once, as the
  * sun's. What it brings is the irradiance from all sides of a ball that is equally bright everywhere; phase functions
  * take it for light from the ball's centre, and fog dims it from the ball's surface on, with
  * radius 0 from its centre. */
-typedef struct nebel_lamp {
-    nebel_lamp_type type;
+typedef struct nebel_light {
+    nebel_light_type type;
     double position[3];  /* m */
     double intensity[3]; /* W/sr, 0 to 1e9, seen from far away; of a spot along its axis */
     double radius;       /* m, 1e-3 to 1e6; 0: 1e-3. Rays that pass nearer see no more than at its surface */
     double direction[3]; /* spot: where it shines to, any length but 0 */
     double inner_angle, outer_angle; /* spot: degrees from the axis, 0 <= inner <= outer, 0 < outer <= 180: full light
                                         within the inner one, none beyond the outer one, smooth between */
-} nebel_lamp;
+} nebel_light;
 
 typedef struct nebel_fog_desc {
     nebel_allocator allocator;
@@ -479,7 +480,7 @@ nebel_result nebel_add_volume(nebel_fog *fog, const nebel_volume_desc *desc, neb
 
 /* Replaces the description of a volume, which keeps its id. Cost and errors as nebel_add_volume; an unknown id is
  * ARGUMENT. */
-nebel_result nebel_change_volume(nebel_fog *fog, nebel_volume_id id, const nebel_volume_desc *desc);
+nebel_result nebel_update_volume(nebel_fog *fog, nebel_volume_id id, const nebel_volume_desc *desc);
 
 /* Removes a volume. Cost O(1). An id that is unknown or was removed is ARGUMENT. */
 nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id);
@@ -494,7 +495,7 @@ nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun);
 /* Sets the lamps, `count` of them, in place of those before; they are copied. They light volumes with an albedo. A query
  * asks for each lamp as it does for the sun, except for lamps too weak or too far away to matter: their light is left
  * out, and counted in `error`. Cost O(count). Errors: ARGUMENT, VALUE, MEMORY; the lamps are then as they were. */
-nebel_result nebel_set_lamps(nebel_fog *fog, size_t count, const nebel_lamp *lamps);
+nebel_result nebel_set_lamps(nebel_fog *fog, size_t count, const nebel_light *lamps);
 
 /* Sets the most that all fog together hides, 0 to 1; 0: no limit, as 1. Where transmittance T of a channel is less than
  * 1 - max_opacity it becomes that, and in-scattering is weakened by as much as opacity is: S max_opacity / (1 - T).
@@ -515,9 +516,9 @@ nebel_snapshot *nebel_retain_snapshot(nebel_snapshot *snapshot);
 void nebel_release_snapshot(nebel_snapshot *snapshot);
 
 /* How many volumes the snapshot holds. */
-size_t nebel_snapshot_volume_count(const nebel_snapshot *snapshot);
+size_t nebel_get_volume_count(const nebel_snapshot *snapshot);
 
-/* What a renderer that casts the shadows of its surfaces into fog wants to know: see nebel_lit_pieces. */
+/* What a renderer that casts the shadows of its surfaces into fog wants to know: see nebel_ray_visibility. */
 typedef struct nebel_sunlit_fog {
     double direction[3];   /* towards the sun, of length 1 */
     double min[3], max[3]; /* m: no fog that the sun lights is outside of this box; infinite where it has no end */
@@ -590,11 +591,11 @@ typedef enum nebel_precision {
  * ray begins where the light reaches it; at each of its toggles [m from its start] the light ceases to reach it, or
  * begins to again. One that begins in shadow has 0 as its first toggle. Toggles are 0 or more and do not descend;
  * INFINITY, those beyond the ray's end and pairs of equal ones are legal and do nothing. */
-typedef struct nebel_lit_pieces {
-    const uint32_t *first; /* n + 1 numbers that do not descend: those of ray i are toggles[first[i]] up to but not
+typedef struct nebel_ray_visibility {
+    const uint32_t *offsets; /* n + 1 numbers that do not descend: those of ray i are toggles[first[i]] up to but not
                               toggles[first[i + 1]] */
-    const float *toggles;  /* may be NULL where there are none */
-} nebel_lit_pieces;
+    const float *boundaries; /* may be NULL where there are none */
+} nebel_ray_visibility;
 
 typedef struct nebel_trace_desc {
     nebel_precision precision;
@@ -607,10 +608,12 @@ typedef struct nebel_trace_desc {
                              transmittance. */
     int ignore_distances;   /* nonzero: volumes act wherever their shape is. For rays that do not begin at the eye, as
                              those to a light, since `start` and `cutoff` of a volume count from where a ray starts. */
-    const nebel_lit_pieces *sunlit;  /* of the rays of the call: where the sun reaches them past surfaces. NULL:
+    const nebel_ray_visibility
+        *sun_visibility; /* of the rays of the call: where the sun reaches them past surfaces. NULL:
                              everywhere. Fog in shadow scatters no sunlight; transmittance stays as it is, to the bit.
                              The ends of pieces are taken as exact: `error` says nothing of them */
-    const nebel_lit_pieces *lamplit; /* the same of the lamps, one for each lamp of the snapshot, in their order */
+    const nebel_ray_visibility
+        *light_visibility; /* the same of the lamps, one for each lamp of the snapshot, in their order */
 } nebel_trace_desc;
 
 #define NEBEL_DEFAULT_TOLERANCE 0.002
@@ -637,8 +640,8 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
  * `transmittance` (0 < transmittance < 1): distances[i] in metres, INFINITY where it does not within t_max. In double
  * precision, to 1e-12 relative where the fog is not vanishing. `start` and `cutoff` of volumes count. Errors as
  * nebel_trace. Any thread. */
-nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
-                                      const nebel_ray *rays, size_t ray_stride, double *distances);
+nebel_result nebel_invert_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
+                                        const nebel_ray *rays, size_t ray_stride, double *distances);
 
 /* ---- planes of rays in, planes of light out: the hot path of a renderer ---------------------- */
 
@@ -674,7 +677,7 @@ typedef struct nebel_transfer_planes {
 
 /* What the fog does along each of n rays, as nebel_trace in float does: the same rays give the same bits of
  * transmittance and in-scattering, and with in-scattering wanted the same error. Of desc (NULL: the same as all zero)
- * `isa`, `tolerance`, `failed_ray`, `ignore_distances`, `sunlit` and `lamplit` are read. rays and transfers must not overlap. Same
+ * `isa`, `tolerance`, `failed_ray`, `ignore_distances`, `sun_visibility` and `light_visibility` are read. rays and transfers must not overlap. Same
  * bits for every isa and for every way of splitting the rays into calls; a few hundred rays are enough for a call to be
  * worth it. Any thread. Errors as nebel_trace. */
 nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
@@ -697,15 +700,16 @@ typedef struct nebel_segments {
 /* The transmittance of one colour channel over each segment, in float throughout: out[i] within 0..1, out_stride in
  * bytes (0: 4). Boxes of constant density take the shortest way; everything else goes through nebel_trace in float. A
  * segment that holds a NaN gives 1. Same bits for every isa. Any thread. Errors as nebel_trace. */
-nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
-                                     const nebel_segments *segments, float *out, size_t out_stride);
+nebel_result nebel_compute_segment_transmittance(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
+                                                 const nebel_segments *segments, float *out, size_t out_stride);
 
 /* ---- pixels in, pixels out: fog over a finished picture -------------------------------------- */
 
-typedef enum nebel_depth {
-    NEBEL_DEPTH_AXIS = 0, /* how many times the pixel's way at depth 1: for a camera, the distance along its axis */
-    NEBEL_DEPTH_RAY       /* m along the pixel's ray */
-} nebel_depth;
+typedef enum nebel_pixel_depth {
+    NEBEL_PIXEL_DEPTH_AXIAL =
+        0,                   /* how many times the pixel's way at depth 1: for a camera, the distance along its axis */
+    NEBEL_PIXEL_DEPTH_RADIAL /* m along the pixel's ray */
+} nebel_pixel_depth;
 
 /* What the samples of a picture are. Floats hold light, 1 is white; whole numbers are 0 to 1 as 0 to the largest. Numbers of
  * more than a byte have the byte order and the alignment of the machine. */
@@ -729,14 +733,14 @@ typedef struct nebel_pixels {
     double eye[3];                         /* m, where all rays start */
     float corner[3], step_x[3], step_y[3]; /* the way from the eye to depth 1 through pixel (x, y), x and y counted from
                                               0: corner + x step_x + y step_y */
-    nebel_depth depth_type;
+    nebel_pixel_depth depth_type;
     uint32_t width, height; /* 1 to 65536 */
     const float *depth;     /* one per pixel; INFINITY where nothing is */
     size_t depth_pitch;
     const void *color; /* of the type below */
     size_t color_pitch;
-    void *out; /* may be color, with the same pitch */
-    size_t out_pitch;
+    void *output; /* may be color, with the same pitch */
+    size_t output_pitch;
     uint32_t first_row, row_count; /* the rows to be done, for threads that share a picture; row_count 0: to the last */
     nebel_pixel_type type;
     int srgb; /* nonzero: whole numbers are sRGB (IEC 61966-2-1), and fog is added to the light they stand for; 0: to the
@@ -754,7 +758,7 @@ typedef struct nebel_pixels {
  * all colours alike and have one source, take the shortest way; everything else goes
  * through nebel_trace_planes with the default tolerance. A pixel whose depth is a NaN or negative stays as it is.
  * Same bits for every isa and for every way of splitting the rows. Any thread. Errors as nebel_trace. */
-nebel_result nebel_fog_pixels(const nebel_snapshot *snapshot, nebel_isa isa, const nebel_pixels *pixels);
+nebel_result nebel_apply_fog_to_pixels(const nebel_snapshot *snapshot, nebel_isa isa, const nebel_pixels *pixels);
 
 /* ---- transparent surfaces in fog ------------------------------------------------------------- */
 

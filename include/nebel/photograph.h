@@ -1,5 +1,5 @@
 /* nebel/photograph.h: photographs and rendered pictures that exist, how far away everything in them is, and the cameras that
- * took them: all that nebel_fog_pixels wants to put fog into them.
+ * took them: all that nebel_apply_fog_to_pixels wants to put fog into them.
  *
  *     const nebel_scene_desc host = {0};
  *     nebel_photograph photograph;
@@ -12,7 +12,7 @@
  *     nebel_pixels pixels = {.width = map.width, .height = map.height, .depth = map.depth, .depth_type = map.type,
  *                            .type = photograph.type, .srgb = 1, .color = photograph.pixels, .out = photograph.pixels};
  *     nebel_aim_pixels(&pixels, &camera, NULL);
- *     nebel_fog_pixels(fog, NEBEL_ISA_DEFAULT, &pixels);
+ *     nebel_apply_fog_to_pixels(fog, NEBEL_ISA_DEFAULT, &pixels);
  *     nebel_write_photograph("street_foggy.png", &host, &photograph, NULL);
  *
  * Of nebel_scene_desc `allocator` and `log` are read. Messages begin with the file. All functions are thread safe. Link with
@@ -137,7 +137,7 @@ typedef struct nebel_depth_source {
 /* One float a pixel, as nebel_pixels has it: INFINITY where nothing is, NaN where nothing is known. */
 typedef struct nebel_depth_map {
     uint32_t width, height;
-    nebel_depth type;
+    nebel_pixel_depth type;
     float *depth;
     size_t unknown_count, infinite_count; /* NaN and INFINITY among them, as read */
 } nebel_depth_map;

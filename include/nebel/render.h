@@ -1,7 +1,7 @@
 /* The nebel CPU renderer: surfaces by Embree, fog by nebel, one picture.
  *
  *     nebel_renderer *renderer = NULL;
- *     nebel_create_renderer(scene_data, fog, &(nebel_renderer_desc){0}, &renderer);
+ *     nebel_create_cpu_renderer(scene_data, fog, &(nebel_cpu_renderer_desc){0}, &renderer);
  *     nebel_render_frame(renderer, &(nebel_frame_desc){.camera = camera, .width = 1280, .height = 720}, &frame);
  *
  * Lambert surfaces lit by the sun and the scene's lamps (ray-traced shadows; their light is attenuated by all fog on
@@ -23,17 +23,17 @@ extern "C" {
 
 typedef struct nebel_renderer nebel_renderer;
 
-typedef struct nebel_renderer_desc {
+typedef struct nebel_cpu_renderer_desc {
     nebel_allocator allocator;
     nebel_log log;
-    nebel_isa isa; /* for fog and for Embree; DEFAULT: the best of this processor */
-    int threads;   /* 0: all */
-} nebel_renderer_desc;
+    nebel_isa isa;    /* for fog and for Embree; DEFAULT: the best of this processor */
+    int thread_count; /* 0: all */
+} nebel_cpu_renderer_desc;
 
 /* Builds the acceleration structure over the meshes of `scene`, which must outlive the renderer, as must nothing else:
  * the snapshot is retained. fog NULL: none. Errors: ARGUMENT, VALUE, MEMORY, UNSUPPORTED. */
-nebel_result nebel_create_renderer(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_renderer_desc *desc,
-                                   nebel_renderer **renderer);
+nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_snapshot *fog,
+                                       const nebel_cpu_renderer_desc *desc, nebel_renderer **renderer);
 void nebel_destroy_renderer(nebel_renderer *renderer);
 
 /* The fog of the frames from now on, for fog that moves. The snapshot is retained; NULL: none. Not while a frame is
@@ -47,7 +47,7 @@ typedef enum nebel_cell_stage {
     NEBEL_CELL_STAGE_COUNT
 } nebel_cell_stage;
 
-/* Fogs surfaces by cells from now on, in place of the snapshot's fog: an alpha polygon of nebel_fog_cells over each.
+/* Fogs surfaces by cells from now on, in place of the snapshot's fog: an alpha polygon of nebel_compute_cell_fog over each.
  * Classic: where no surface is there is no fog, and sunlight comes through undimmed. Of a frame, `error` is then 0. Of
  * an orthographic camera all rays begin in its plane; of a panorama each ray is its own axis of depth. The cells must
  * outlive the frames; NULL: the snapshot's fog again. Not while a frame is rendered. Errors: ARGUMENT, MEMORY. */
@@ -59,10 +59,10 @@ typedef enum nebel_method {
     NEBEL_METHOD_EXACT = 0,   /* the snapshot's fog, at each sample */
     NEBEL_METHOD_CELLS,       /* nebel_set_renderer_cells, at vertices */
     NEBEL_METHOD_CELLS_PIXEL, /* the same at each sample */
-    NEBEL_METHOD_VERTEX,      /* the snapshot's fog at vertices, by nebel_fog_vertices, between them linear over the
+    NEBEL_METHOD_VERTEX,   /* the snapshot's fog at vertices, by nebel_compute_vertex_fog, between them linear over the
                                  triangle, with perspective. It has one transmittance, that of red */
-    NEBEL_METHOD_ADDITIVE,    /* the same, but fog only adds its light, and transmittance is 1 */
-    NEBEL_METHOD_LINEAR,      /* a fog factor in place of the snapshot's fog, at vertices or at each sample */
+    NEBEL_METHOD_ADDITIVE, /* the same, but fog only adds its light, and transmittance is 1 */
+    NEBEL_METHOD_LINEAR,   /* a fog factor in place of the snapshot's fog, at vertices or at each sample */
     NEBEL_METHOD_EXP,
     NEBEL_METHOD_EXP2,
     NEBEL_METHOD_FIVE_TAP,  /* of OpenGL: nebel/gl_render.h */
@@ -70,13 +70,13 @@ typedef enum nebel_method {
     NEBEL_METHOD_TWO_PASS, /* the light that it adds and its amount: as VERTEX, but with a response curve or a colour */
     NEBEL_METHOD_ALPHA,    /* a byte of alpha over polygons in one colour, of bytes, too */
     NEBEL_METHOD_D3D9,     /* the fog states of a Direct3D 9 device */
-    NEBEL_METHOD_REFERENCE, /* paths of light, by chance and without bias: docs/reference.md. Fog, surfaces, air and
+    NEBEL_METHOD_PATH,     /* paths of light, by chance and without bias: docs/reference.md. Fog, surfaces, air and
                                clouds are lit by each other too; slow */
     NEBEL_METHOD_COUNT
 } nebel_method;
 
 /* The word of `nebel render --method`; NULL: there is no such method. Any thread. */
-const char *nebel_method_word(nebel_method method);
+const char *nebel_method_name(nebel_method method);
 
 /* 1: the method imitates hardware of its time, LINEAR to D3D9 but FIVE_TAP and TWO_PASS's kin VERTEX and ADDITIVE. What such
  * hardware stores in its frame buffer is blended: colors in sRGB, at most 1. `color` of a frame is linear light again; what
@@ -164,10 +164,10 @@ void nebel_encode_srgb(size_t n, const float *linear, double exposure, float *sr
 
 /* Runs parts on threads of OpenMP: for the `run` of descriptions of scenes and of air. `user` is a const int *, how many
  * threads there are, 1 to 1024; NULL: as many as processors. Any thread. */
-void nebel_run_parts(size_t parts, void (*part)(void *data, size_t i), void *data, void *user);
+void nebel_parallel_for_openmp(size_t parts, void (*part)(void *data, size_t i), void *data, void *user);
 
 /* The Embree version this build uses, "Embree 3.13.5". Never NULL. */
-const char *nebel_renderer_libraries(void);
+const char *nebel_cpu_libraries(void);
 
 #ifdef __cplusplus
 }

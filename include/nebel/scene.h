@@ -79,17 +79,17 @@ typedef struct nebel_volume_key {
 } nebel_volume_key;
 
 /* What the file says of a volume, beside what it is at one frame. */
-typedef struct nebel_volume_entry {
-    double contrast;              /* that is left at its visibility, 0 < contrast < 1 */
-    size_t key_count;             /* 0: it stands still */
-    const nebel_volume_key *keys; /* ascending frames */
-    const nebel_volume_desc *own; /* without its keys; NULL where there are none */
-} nebel_volume_entry;
+typedef struct nebel_volume_track {
+    double contrast;               /* that is left at its visibility, 0 < contrast < 1 */
+    size_t key_count;              /* 0: it stands still */
+    const nebel_volume_key *keys;  /* ascending frames */
+    const nebel_volume_desc *base; /* without its keys; NULL where there are none */
+} nebel_volume_track;
 
 /* A model as the file places it, in metres with y up. */
-typedef struct nebel_model {
-    size_t source;    /* which model of the file it is */
-    const char *file; /* as it is opened */
+typedef struct nebel_scene_model {
+    size_t model_index; /* which model of the file it is */
+    const char *path;   /* as it is opened */
     int is_heightfield;
     int has_fog; /* its nodes bring some */
     double position[3];
@@ -98,11 +98,11 @@ typedef struct nebel_model {
     double size[2], height; /* m, > 0: of height fields */
     int has_color;
     double color[3]; /* 0 to 1: in place of its own */
-} nebel_model;
+} nebel_scene_model;
 
 typedef enum nebel_planet_model {
     NEBEL_PLANET_PHYSICAL = 0,
-    NEBEL_PLANET_LAYERS,
+    NEBEL_PLANET_TEXTURED,
     NEBEL_PLANET_MODEL_COUNT
 } nebel_planet_model;
 
@@ -111,18 +111,19 @@ typedef enum nebel_planet_model {
 /* One of the section "planet". */
 typedef struct nebel_planet {
     nebel_planet_model model;
-    nebel_atmosphere_desc air; /* resolved; allocator and log are not set */
-    double sun_diameter;       /* degrees; 0: the sun is not seen */
+    nebel_atmosphere_desc atmosphere_desc; /* resolved; allocator and log are not set */
+    double sun_angular_diameter;           /* degrees; 0: the sun is not seen */
 
-    const nebel_atmosphere *atmosphere; /* the scene's; NULL until nebel_load_scene_planet */
+    const nebel_atmosphere *atmosphere; /* the scene's; NULL until nebel_load_scene_planets */
     double sun_left[3];                 /* of the first one: what planets leave of sunlight at the scene's origin */
 
     nebel_cloud_layer cloud_layers[NEBEL_MAX_CLOUD_LAYERS]; /* PHYSICAL: wind in m per frame; maps are the scene's */
     uint32_t cloud_layer_count;
-    const nebel_clouds *clouds; /* the scene's; NULL until nebel_load_scene_planet, and where there are no layers */
+    const nebel_clouds *clouds; /* the scene's; NULL until nebel_load_scene_planets, and where there are no layers */
 
-    nebel_layers_desc shells;   /* LAYERS: a day is counted in frames; maps are the scene's; no allocator and log */
-    const nebel_layers *layers; /* the scene's; NULL until nebel_load_scene_planet */
+    nebel_textured_planet_desc
+        textured_desc; /* LAYERS: a day is counted in frames; maps are the scene's; no allocator and log */
+    const nebel_textured_planet *textured; /* the scene's; NULL until nebel_load_scene_planets */
 } nebel_planet;
 
 /* The sun at a frame. */
@@ -147,26 +148,26 @@ typedef struct nebel_scene_data {
     const nebel_sun_key *sun_keys; /* ascending frames; until a frame is lit, the sun above is the section's */
     double ambient[3];             /* radiance, the same from everywhere, */
     nebel_environment environment; /* or where it is not CONSTANT this in its place; a map is the scene's */
-    const char *environment_file;  /* of a map, as it is opened; NULL: none */
-    size_t lamp_count;             /* the section "lights" */
-    const nebel_lamp *lamps;
-    const char *const *lamp_names; /* UTF-8; "" where the file gives none */
-    double max_opacity;            /* of all fog; 0: no limit */
+    const char *environment_path;  /* of a map, as it is opened; NULL: none */
+    size_t light_count;            /* the section "lights" */
+    const nebel_light *lights;
+    const char *const *light_names; /* UTF-8; "" where the file gives none */
+    double max_opacity;             /* of all fog; 0: no limit */
 
     size_t volume_count; /* the fog, in the order of the file; what moves stands as it is at frame 0 */
     const nebel_volume_desc *volumes;
     const char *const *volume_names; /* UTF-8; "" where the file gives none */
 
-    const nebel_volume_entry *volume_entries; /* of the same volumes */
+    const nebel_volume_track *volume_tracks; /* of the same volumes */
 
-    size_t moving_volume_count; /* that have keys, or noise that moves; 0: the fog is the same at every frame */
-    int moves_on;               /* something moves from frame to frame without end: noise, or a planet that turns */
+    size_t animated_volume_count; /* that have keys, or noise that moves; 0: the fog is the same at every frame */
+    int has_endless_motion;       /* something moves from frame to frame without end: noise, or a planet that turns */
 
-    size_t nebula_count; /* strewn by nebel_make_scene_particles; allocator and log are not set */
+    size_t nebula_count; /* strewn by nebel_generate_scene_particles; allocator and log are not set */
     const nebel_nebula_desc *nebulae;
     const char *const *nebula_names;
-    const nebel_transform *nebula_places; /* where the file puts their points; of no meaning without points */
-    size_t particle_count;                /* of all nebulae */
+    const nebel_transform *nebula_transforms; /* where the file puts their points; of no meaning without points */
+    size_t particle_count;                    /* of all nebulae */
 
     const nebel_cells_desc *cells; /* good for nebel_create_cells; allocator and log are not set. NULL: none */
     const char *const *cell_names; /* UTF-8; "" where the file gives none */
@@ -182,11 +183,11 @@ typedef struct nebel_scene_data {
 
     const nebel_diffusion_desc *diffusion; /* the section "multiple_scattering"; NULL: none */
 
-    size_t file_count; /* that it names, as they are opened; and, once models are loaded, what those name in turn */
-    const char *const *files;
+    size_t path_count; /* that it names, as they are opened; and, once models are loaded, what those name in turn */
+    const char *const *paths;
 
     size_t model_count;
-    const nebel_model *models;
+    const nebel_scene_model *models;
 
     size_t mesh_count; /* 0 until nebel_load_scene_models */
     const nebel_mesh *meshes;
@@ -198,8 +199,8 @@ typedef struct nebel_scene nebel_scene;
 
 typedef struct nebel_scene_desc {
     nebel_allocator allocator;
-    nebel_log log;        /* errors as "FILE:LINE:COLUMN: key: what is wrong; what is allowed" */
-    nebel_air_run_fn run; /* for threads that make the air of the scene's planet; NULL: one part after the other */
+    nebel_log log;             /* errors as "FILE:LINE:COLUMN: key: what is wrong; what is allowed" */
+    nebel_parallel_for_fn run; /* for threads that make the air of the scene's planet; NULL: one part after the other */
     void *run_user;
 
     /* Models are read by a program of their own, nebel-read-model, within limits of memory and time: a damaged or hostile
@@ -234,47 +235,47 @@ nebel_result nebel_load_scene_models(nebel_scene *scene);
  * others, leave of the sun at the scene's origin and, where the file has no ambient light, by the first one's sky there: `environment` becomes a map of it. Without this call, and for the light of
  * fog before it, there is no air. Idempotent. Some 0.25 s a planet with air on one thread, 1 s with quality "precise". Not thread safe against readers of
  * the same scene. Errors: MEMORY; there is no air then. */
-nebel_result nebel_load_scene_planet(nebel_scene *scene);
+nebel_result nebel_load_scene_planets(nebel_scene *scene);
 
-/* Gives planets other numbers, once nebel_load_scene_planet has made them: as many planets as the contents have, of which airs count but for
+/* Gives planets other numbers, once nebel_load_scene_planets has made them: as many planets as the contents have, of which airs count but for
  * their profiles, the ground's albedo and the sun's diameter; of layers of clouds all but kind, seed and weather; of layers day, coverage, the shell of
  * air, and shells of clouds but for seeds and maps. All else stays. What was made is made anew, at the same cost, with the light at the scene's origin;
  * the atmospheres, clouds and layers of before are gone. On an error all stays as it was. Not thread safe against readers of the same scene, nor
  * while a frame of it is rendered; renderers are to be made anew. Errors: ARGUMENT, VALUE (a number out of range; the log says which), MEMORY. */
-nebel_result nebel_change_scene_planets(nebel_scene *scene, const nebel_planet *planets);
+nebel_result nebel_update_scene_planets(nebel_scene *scene, const nebel_planet *planets);
 
 /* Loads models again, placed and coloured as `models` says; those of the file that are not among them are left out.
  * Contents have meshes and textures of these then, and what they pointed to before is gone, as nodes with fog are where
  * they were. Where that fails all stays as it was. O(what their files hold). Thread safety and errors: as above;
  * ARGUMENT (a source that the file has not). */
-nebel_result nebel_load_models_anew(nebel_scene *scene, const nebel_model *models, size_t count);
+nebel_result nebel_reload_scene_models(nebel_scene *scene, const nebel_scene_model *models, size_t count);
 
 /* The contents; lives as long as the scene (mesh pointers change with nebel_load_scene_models). Never NULL. */
-const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene);
+const nebel_scene_data *nebel_get_scene_data(const nebel_scene *scene);
 
 /* The camera at a frame: standing, turning or between its keys (smooth cubic through the keys, still before the first
  * and after the last). */
-nebel_camera nebel_scene_camera(const nebel_scene *scene, double frame);
+nebel_camera nebel_get_scene_camera(const nebel_scene *scene, double frame);
 
 /* The same of any 1 or more keys. */
-nebel_camera nebel_camera_between_keys(const nebel_camera_key *keys, size_t count, double frame);
+nebel_camera nebel_interpolate_camera(const nebel_camera_key *keys, size_t count, double frame);
 
 /* The sun at a frame: standing, or between its keys, on a cubic through their directions, made unit ones, and within the
  * range of their irradiances; still before the first and after the last. Without a sun one of no light. */
-nebel_sun nebel_scene_sun(const nebel_scene *scene, double frame);
+nebel_sun nebel_get_scene_sun(const nebel_scene *scene, double frame);
 
 /* The same of any 1 or more keys. */
-nebel_sun nebel_sun_between_keys(const nebel_sun_key *keys, size_t count, double frame);
+nebel_sun nebel_interpolate_sun(const nebel_sun_key *keys, size_t count, double frame);
 
 /* Lights the scene by the sun of a frame, where it has keys: the sun of the contents becomes that, and what the air of a
- * planet leaves of it at the scene's origin, with the sky there, is made anew (0.1 s), as far as nebel_load_scene_planet has
+ * planet leaves of it at the scene's origin, with the sky there, is made anew (0.1 s), as far as nebel_load_scene_planets has
  * made it before. Frames and snapshots from now on have that light. Not thread safe against readers of the same scene, nor
  * while a frame of it is rendered. Errors: ARGUMENT (NULL), VALUE (a frame beyond 1e12), MEMORY; the sky is then as it was. */
-nebel_result nebel_light_scene_at(nebel_scene *scene, double frame);
+nebel_result nebel_set_scene_frame(nebel_scene *scene, double frame);
 
 /* The same by any sun, also in a scene without one; NULL: none. Errors: as above; ARGUMENT also for a sun with numbers that are not
  * finite, without a direction, or of less than no light. */
-nebel_result nebel_light_scene_by(nebel_scene *scene, const nebel_sun *sun);
+nebel_result nebel_set_scene_sun(nebel_scene *scene, const nebel_sun *sun);
 
 /* The light of the sun that fog of a snapshot has: of the sun of the contents what the planets' air, their shadows and, as
  * the wind has moved them until the frame, their clouds leave at the scene's origin. Without a sun one of no light. Where
@@ -289,48 +290,48 @@ nebel_result nebel_find_scene_light(const nebel_scene *scene, double frame, nebe
 
 /* The particles of all nebulae, contents->particle_count of them, one nebula after the other. Free them before the
  * scene. Errors: ARGUMENT, MEMORY, VALUE (a nebula in whose shape no place is found). */
-nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle **particles);
+nebel_result nebel_generate_scene_particles(const nebel_scene *scene, nebel_particle **particles);
 void nebel_free_scene_particles(const nebel_scene *scene, nebel_particle *particles); /* NULL is fine */
 
 /* A volume at a frame: at its first key before, at its last after, between them on a cubic through the keys on which no
  * number leaves its range. Noise is that of frame 0. Its arrays are the scene's. index < contents->volume_count. */
-nebel_volume_desc nebel_scene_volume(const nebel_scene *scene, size_t index, double frame);
+nebel_volume_desc nebel_get_scene_volume(const nebel_scene *scene, size_t index, double frame);
 
 /* The same of any 1 or more keys of one volume. */
-nebel_volume_desc nebel_volume_between_keys(const nebel_volume_key *keys, size_t count, double frame);
+nebel_volume_desc nebel_interpolate_volume(const nebel_volume_key *keys, size_t count, double frame);
 
 /* What the grid of a volume is at a frame, with one more owner, who releases it: noise that moves is made anew, at the
- * cost of nebel_create_noise; any other grid is itself. `grid` NULL: NULL. On an error *at is NULL. Errors: LIMIT, VALUE
+ * cost of nebel_create_noise_grid; any other grid is itself. `grid` NULL: NULL. On an error *at is NULL. Errors: LIMIT, VALUE
  * (drifted too far), MEMORY. */
-nebel_result nebel_scene_grid(const nebel_scene *scene, nebel_grid *grid, double frame, nebel_grid **at);
+nebel_result nebel_get_scene_grid(const nebel_scene *scene, nebel_grid *grid, double frame, nebel_grid **at);
 
 /* What a scene file says of noise. */
 typedef struct nebel_scene_noise {
-    nebel_noise_desc desc;   /* its offset, time, name, allocator and log are none */
-    double drift[3], change; /* of its offset and its time, per frame */
+    nebel_noise_desc desc;         /* its offset, time, name, allocator and log are none */
+    double velocity[3], evolution; /* of its offset and its time, per frame */
 } nebel_scene_noise;
 
-/* Whether a grid is noise of the scene, or of nebel_change_scene_noise; then *noise is what the file says of it, along
+/* Whether a grid is noise of the scene, or of nebel_update_scene_noise; then *noise is what the file says of it, along
  * our axes (y up) and with the defaults of what it leaves out. Its name tells. 0 also where memory is out. Any thread. */
-int nebel_find_scene_noise(const nebel_scene *scene, const nebel_grid *grid, nebel_scene_noise *noise);
+int nebel_get_scene_noise(const nebel_scene *scene, const nebel_grid *grid, nebel_scene_noise *noise);
 
 /* Such a grid with other numbers, in *changed with one owner; on an error *changed is NULL. Offset, time, name, allocator
- * and log of *noise do not count. It moves with nebel_scene_grid, and nebel_save_scene writes it. The scene's allocator
- * must be usable as long as the grid lives. Cost: that of nebel_create_noise. Any thread. Errors: ARGUMENT (no such grid),
+ * and log of *noise do not count. It moves with nebel_get_scene_grid, and nebel_save_scene writes it. The scene's allocator
+ * must be usable as long as the grid lives. Cost: that of nebel_create_noise_grid. Any thread. Errors: ARGUMENT (no such grid),
  * FORMAT (out of range), VALUE (cells of less than two voxels), LIMIT, MEMORY. */
-nebel_result nebel_change_scene_noise(const nebel_scene *scene, const nebel_grid *grid, const nebel_scene_noise *noise,
+nebel_result nebel_update_scene_noise(const nebel_scene *scene, const nebel_grid *grid, const nebel_scene_noise *noise,
                                       nebel_grid **changed);
 
 /* What a volume comes from. */
 typedef enum nebel_volume_origin {
-    NEBEL_VOLUME_WRITTEN = 0, /* its numbers stand in the section "fog", and hold at every frame */
-    NEBEL_VOLUME_MOVING,      /* it has keys */
-    NEBEL_VOLUME_IMPORTED,    /* the settings of another program */
-    NEBEL_VOLUME_OF_NODE      /* a node of a model */
+    NEBEL_VOLUME_STATIC = 0, /* its numbers stand in the section "fog", and hold at every frame */
+    NEBEL_VOLUME_ANIMATED,   /* it has keys */
+    NEBEL_VOLUME_IMPORTED,   /* the settings of another program */
+    NEBEL_VOLUME_FROM_NODE   /* a node of a model */
 } nebel_volume_origin;
 
 /* index < contents->volume_count. */
-nebel_volume_origin nebel_scene_volume_origin(const nebel_scene *scene, size_t index);
+nebel_volume_origin nebel_get_volume_origin(const nebel_scene *scene, size_t index);
 
 /* Light that fog scatters more than once, of snapshots from now on: what the section "multiple_scattering" says, in place
  * of it. NULL: none; the description is copied. Not thread safe against readers of the same scene. Errors: ARGUMENT; LIMIT
@@ -350,7 +351,7 @@ nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, n
 nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot);
 
 /* The same at a frame with other noise: each noise of the scene gets a seed made of `seed` and its own, so that seeds give
- * independent fog and the same seed the same. Makes every noise anew, at the cost of nebel_create_noise. Any thread. */
+ * independent fog and the same seed the same. Makes every noise anew, at the cost of nebel_create_noise_grid. Any thread. */
 nebel_result nebel_commit_scene_fog_anew(const nebel_scene *scene, double frame, uint32_t seed,
                                          nebel_snapshot **snapshot);
 
@@ -360,16 +361,16 @@ nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double fram
 /* NULL is fine. */
 void nebel_destroy_scene(nebel_scene *scene);
 
-/* Writes changes back into a scene file. `before` is what nebel_scene_contents gave for this file; `changed` is a copy
+/* Writes changes back into a scene file. `before` is what nebel_get_scene_data gave for this file; `changed` is a copy
  * of it with other numbers in the camera and its motion, the background, the sun, the ambient light (of the map that the file names, or of none), max_opacity, the
- * classic fog, noise (by nebel_change_scene_noise), the nebulae (points by their place alone) and their names, the cells with their names, portals, model,
+ * classic fog, noise (by nebel_update_scene_noise), the nebulae (points by their place alone) and their names, the cells with their names, portals, model,
  * span and grouping (as many cells, each of the same kind), the models (fewer may be left, in their order), the lamps (as many, each of the same
- * type), the planets (as far as nebel_change_scene_planets takes them), and with
+ * type), the planets (as far as nebel_update_scene_planets takes them), and with
  * other names, numbers or kinds of volumes of origin WRITTEN or MOVING. The sun and the section "classic" may come and
  * go. Its volumes may be others: sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or
  * NEBEL_NEW_VOLUME; volumes of `before` that are missing leave the file, as long as they are of origin WRITTEN or
  * MOVING. sources NULL: the same volumes. changed->volume_entries is as long as changed->volumes; of a volume with keys
- * `own` counts and not what stands in `volumes`. NULL: keys and contrast are as they were.
+ * `base` counts and not what stands in `volumes`. NULL: keys and contrast are as they were.
  *
  * What differs between the two is written in its place, in the file's own unit, axes and words (a visibility stays a
  * visibility, where the fog is not of extinction 0), with 15 digits; a key that is missing is added, one that has
@@ -407,7 +408,7 @@ typedef enum nebel_image_format {
 
 /* What nebel_write_image writes at `path`: by the ending of the name, .png or .exr in any case. /dev/null and
  * what is open already (/dev/stdout, /dev/fd/3) take PNG where their name has neither. Thread safe. */
-nebel_image_format nebel_find_image_format(const char *path);
+nebel_image_format nebel_get_image_format(const char *path);
 
 /* Regular files are written to a temporary name beside the target and renamed, so that on an error nothing of the
  * target has changed and no temporary file is left. /dev/null is written directly; /dev/stdout, /dev/stderr
@@ -456,51 +457,51 @@ nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *de
 /* Pictures one after the other in one file: an animated WebP that begins again at its end. Each is compressed when it
  * is added; what is compressed stays in memory, libwebp's own, until the film is finished. Films are independent of
  * each other; one belongs to one thread at a time. nebel may be built without libwebp: nebel_scene_libraries tells. */
-typedef struct nebel_film nebel_film;
+typedef struct nebel_movie nebel_movie;
 
-enum { NEBEL_MAX_FILM_RATE = 100, NEBEL_DEFAULT_FILM_RATE = 24, NEBEL_DEFAULT_FILM_QUALITY = 85 };
+enum { NEBEL_MAX_MOVIE_RATE = 100, NEBEL_DEFAULT_MOVIE_RATE = 24, NEBEL_DEFAULT_MOVIE_QUALITY = 85 };
 
-typedef struct nebel_film_desc {
+typedef struct nebel_movie_desc {
     nebel_allocator allocator;
     nebel_log log;
-    double frames_per_second; /* 1 to NEBEL_MAX_FILM_RATE, 0: 24; each picture begins at the nearest millisecond */
+    double frames_per_second; /* 1 to NEBEL_MAX_MOVIE_RATE, 0: 24; each picture begins at the nearest millisecond */
     int quality;              /* 1 to 99: more is larger and better; 100: the bytes of a PNG, without loss; 0: 85 */
-} nebel_film_desc;
+} nebel_movie_desc;
 
 /* Whether a name is one of a film: it ends in .webp, in any case. Thread safe. */
-int nebel_is_film_path(const char *path);
+int nebel_is_movie_path(const char *path);
 
 /* Nothing is at `path` before the film is finished, but whether it can be written is tried, as by
  * nebel_check_image_path. Errors: ARGUMENT, VALUE, FORMAT (unknown ending), FILE, MEMORY, UNSUPPORTED (built without). */
-nebel_result nebel_create_film(const char *path, const nebel_film_desc *desc, nebel_film **film);
+nebel_result nebel_create_movie(const char *path, const nebel_movie_desc *desc, nebel_movie **film);
 
 /* Channels R, G, B in 0..1, already in sRGB, become the bytes that nebel_write_image gives a PNG. All pictures of a
  * film have one size, at most 16383 x 16383. On an error the film is as it was. Errors: ARGUMENT, LIMIT, MEMORY. */
-nebel_result nebel_add_film_picture(nebel_film *film, const nebel_image *image);
+nebel_result nebel_add_movie_frame(nebel_movie *film, const nebel_image *image);
 
 /* The record that the file will have, as that of nebel_image_desc; it is copied. Errors: ARGUMENT. */
-nebel_result nebel_set_film_record(nebel_film *film, const char *record);
+nebel_result nebel_set_film_record(nebel_movie *film, const char *record);
 
 /* Writes the file, once, as nebel_write_image does: as a whole or not at all. Pictures that
  * follow each other and are equal, or nearly so below a quality of 100, become one that lasts longer. Errors: ARGUMENT (no pictures), FILE, MEMORY. */
-nebel_result nebel_finish_film(nebel_film *film);
+nebel_result nebel_finish_movie(nebel_movie *film);
 
 /* A film that was not finished is given up, without a trace. NULL is fine. */
-void nebel_destroy_film(nebel_film *film);
+void nebel_destroy_movie(nebel_movie *film);
 
 /* ---- grids ----------------------------------------------------------------------------------- */
 
 /* Voxels in files. Which kind a file is says its name: .nvdb NanoVDB, .vdb OpenVDB (builds that have it: see
  * nebel_scene_libraries), .png one picture for each slice, anything else numbers one after the other. */
 typedef struct nebel_grid_file {
-    const char *file; /* PNG: with a run of # in its name, in whose place the number of a slice stands, from 0, as wide
+    const char *path; /* PNG: with a run of # in its name, in whose place the number of a slice stands, from 0, as wide
                          as the run */
-    nebel_filter filter;
-    const char *grid;      /* NanoVDB, OpenVDB: the name of the grid among those in the file; NULL: the first */
-    size_t slices;         /* PNG: how many, 1 to NEBEL_MAX_GRID_SIZE; slice k is the k-th layer along z */
+    nebel_grid_filter filter;
+    const char *grid_name; /* NanoVDB, OpenVDB: the name of the grid among those in the file; NULL: the first */
+    size_t slice_count;    /* PNG: how many, 1 to NEBEL_MAX_GRID_SIZE; slice k is the k-th layer along z */
     size_t size[3];        /* numbers: voxels along x, y and z; x fastest, least significant byte first */
     nebel_voxel_type type; /* numbers */
-    const char *name;      /* nebel_grid_name of the grid; NULL: none */
+    const char *name;      /* nebel_get_grid_name of the grid; NULL: none */
 } nebel_grid_file;
 
 /* Reads a grid; release it with nebel_release_grid. On an error *grid is NULL.

@@ -4,7 +4,7 @@
 
 #include <nebel/clouds.h>
 
-enum { NB_SHADED_PIECES = NEBEL_MAX_AIR_SHADES + 1 };
+enum { NB_SHADED_PIECES = NEBEL_MAX_AIR_SHADOW_SEGMENTS + 1 };
 
 /* From t on light up to a place is `rest` and `part` of that of clear air. The last piece is behind all shade. */
 typedef struct nb_shaded_piece {
@@ -12,14 +12,14 @@ typedef struct nb_shaded_piece {
 } nb_shaded_piece;
 
 /* clear: light of clear air up to shade->t. Returns how many pieces there are; 0: no shade. */
-static inline uint32_t nb_shaded_set(const nebel_air_shade *shade, float (*const clear)[NB_SHADED_PIECES],
+static inline uint32_t nb_shaded_set(const nebel_air_shadow *shade, float (*const clear)[NB_SHADED_PIECES],
                                      nb_shaded_piece pieces[NB_SHADED_PIECES])
 {
     if (shade->count == 0) return 0;
     for (int c = 0; c < 3; c++) {
         float light = clear[c][0];
         for (uint32_t k = 0; k <= shade->count; k++) {
-            const float part = k < shade->count ? shade->part[k][c] : 1;
+            const float part = k < shade->count ? shade->transmittance[k][c] : 1;
             pieces[k].t = shade->t[k];
             pieces[k].part[c] = part;
             pieces[k].rest[c] = light - part * clear[c][k];

@@ -13,11 +13,11 @@ static inline void nb_cloud_uneclipsed(const nb_world *worlds, int count, int cl
 {
     const double left = nb_worlds_uneclipsed(worlds, count, cloudy, place, to_sun, disc);
     const nebel_sun sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
-    nebel_air_light light;
+    nebel_irradiance light;
     for (int c = 0; c < 3; c++) part[c] = 1;
     if (left == 1) return;
-    if (nebel_light_air(worlds[cloudy].planet->atmosphere, &sun, 1, (const double(*)[3])place, 0, &light, 0) !=
-        NEBEL_OK)
+    if (nebel_compute_atmosphere_irradiance(worlds[cloudy].planet->atmosphere, &sun, 1, (const double(*)[3])place, 0,
+                                            &light, 0) != NEBEL_OK)
         return; /* places and suns are in order, so that it cannot fail */
     for (int c = 0; c < 3; c++) {
         const double all = light.sun[c] + light.sky[c];
@@ -28,7 +28,7 @@ static inline void nb_cloud_uneclipsed(const nb_world *worlds, int count, int cl
 /* Dims what clouds send from between two places of a ray by what is left in the middle. `to_sun` and `disc` as of
  * nb_worlds_light. */
 static inline void nb_cloud_eclipse(const nb_world *worlds, int count, const nebel_ray *ray, const double to_sun[3],
-                                    double disc, nebel_cloud_knots *knots)
+                                    double disc, nebel_cloud_transfer *knots)
 {
     const nb_world *const cloudy = nb_worlds_cloudy(worlds, count);
     const double length = nb_vector_length(ray->direction);

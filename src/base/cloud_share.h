@@ -26,8 +26,8 @@ typedef struct nb_cloud_block {
     int is_wanted[NB_CLOUD_SHARE]; /* they need clouds */
     int is_open[NB_CLOUD_SHARE];   /* and end at no surface: in the sky, or on the planet's ground */
     float ground[NB_CLOUD_SHARE];  /* m, of the planet with clouds, through their middles; 0: they do not meet it */
-    nebel_cloud_knots *knots[NB_CLOUD_SHARE]; /* and keep them here */
-    int level[NB_CLOUD_SHARE];                /* by nb_cloud_block_begin */
+    nebel_cloud_transfer *knots[NB_CLOUD_SHARE]; /* and keep them here */
+    int level[NB_CLOUD_SHARE];                   /* by nb_cloud_block_begin */
 } nb_cloud_block;
 
 /* How far apart transmittances around a pixel are at most, as a part of the largest or of LEAST_LEFT where that is more; and light, of
@@ -42,7 +42,7 @@ static const float nb_cloud_alike[NB_CLOUD_SHARE_LEVELS] = {0, 0.05f, 0.07f};
 /* ---- what is alike --------------------------------------------------------------------------- */
 
 /* Of clouds up to t: what they leave, and the light of each colour. */
-static inline void nb_cloud_up_to(const nebel_cloud_knots *knots, float t, float of[4])
+static inline void nb_cloud_up_to(const nebel_cloud_transfer *knots, float t, float of[4])
 {
     uint32_t k = 0;
     while (k < knots->count && knots->t[k] <= t) k++;
@@ -54,7 +54,7 @@ static inline void nb_cloud_up_to(const nebel_cloud_knots *knots, float t, float
 }
 
 /* The least and the largest of all that is left behind clouds, and of light. */
-static inline void nb_cloud_bounds(const nebel_cloud_knots *const around[NB_CLOUD_SHARE_AROUND], int count,
+static inline void nb_cloud_bounds(const nebel_cloud_transfer *const around[NB_CLOUD_SHARE_AROUND], int count,
                                    float low[4], float high[4])
 {
     for (int i = 0; i < count; i++) {
@@ -68,7 +68,8 @@ static inline void nb_cloud_bounds(const nebel_cloud_knots *const around[NB_CLOU
 }
 
 /* How far apart transmittances are; HUGE_VALF: they or light are too far. */
-static inline float nb_cloud_apart(const nebel_cloud_knots *const around[NB_CLOUD_SHARE_AROUND], int count, float most)
+static inline float nb_cloud_apart(const nebel_cloud_transfer *const around[NB_CLOUD_SHARE_AROUND], int count,
+                                   float most)
 {
     float low[4], high[4], apart = 0, brightest = 0;
     nb_cloud_bounds(around, count, low, high);
@@ -83,11 +84,11 @@ static inline float nb_cloud_apart(const nebel_cloud_knots *const around[NB_CLOU
 }
 
 /* In the mean, at the knots of that which has more, from where the first begins to where the last ends. */
-static inline nebel_cloud_knots nb_cloud_mean(const nebel_cloud_knots *a, const nebel_cloud_knots *b)
+static inline nebel_cloud_transfer nb_cloud_mean(const nebel_cloud_transfer *a, const nebel_cloud_transfer *b)
 {
-    const nebel_cloud_knots *most = a->count < b->count ? b : a, *least = most == a ? b : a;
+    const nebel_cloud_transfer *most = a->count < b->count ? b : a, *least = most == a ? b : a;
     const uint32_t end = most->count - 1;
-    nebel_cloud_knots mean = *most;
+    nebel_cloud_transfer mean = *most;
     mean.error = fmaxf(a->error, b->error);
     if (least->count > 0) {
         mean.t[0] = fminf(a->t[0], b->t[0]);
@@ -105,13 +106,14 @@ static inline nebel_cloud_knots nb_cloud_mean(const nebel_cloud_knots *a, const 
 
 /* ---- where they are -------------------------------------------------------------------------- */
 
-static inline void nb_cloud_stretch(nebel_cloud_knots *knots, float times)
+static inline void nb_cloud_stretch(nebel_cloud_transfer *knots, float times)
 {
     for (uint32_t k = 0; k < knots->count; k++) knots->t[k] *= times;
 }
 
 /* How far from each other clouds begin and end along two rays. */
-static inline float nb_cloud_shift(const nebel_cloud_knots *a, float scale_a, const nebel_cloud_knots *b, float scale_b)
+static inline float nb_cloud_shift(const nebel_cloud_transfer *a, float scale_a, const nebel_cloud_transfer *b,
+                                   float scale_b)
 {
     return fabsf(scale_a * a->t[0] - scale_b * b->t[0]) +
            fabsf(scale_a * a->t[a->count - 1] - scale_b * b->t[b->count - 1]);
@@ -120,7 +122,7 @@ static inline float nb_cloud_shift(const nebel_cloud_knots *a, float scale_a, co
 /* Whether clouds of two rays that meet the ground lie at the same parts of the ways to it, rather than as far from the eye: seen
  * aslant from above a sheet is many of its heights nearer in one row than in the next, and what lies below it, fog and the ground, is as
  * well. By how far the ground is on each way, and between them. */
-static inline int nb_cloud_is_by_ground(const nebel_cloud_knots *a, float ground_a, const nebel_cloud_knots *b,
+static inline int nb_cloud_is_by_ground(const nebel_cloud_transfer *a, float ground_a, const nebel_cloud_transfer *b,
                                         float ground_b, float ground)
 {
     if (!(ground_a > 0 && ground_b > 0 && ground > 0)) return 0;
@@ -129,9 +131,9 @@ static inline int nb_cloud_is_by_ground(const nebel_cloud_knots *a, float ground
 }
 
 /* The mean of pixels a and b for pixel i, which is between them. */
-static inline nebel_cloud_knots nb_cloud_between(const nb_cloud_block *block, int i, int a, int b)
+static inline nebel_cloud_transfer nb_cloud_between(const nb_cloud_block *block, int i, int a, int b)
 {
-    nebel_cloud_knots of_a = *block->knots[a], of_b = *block->knots[b];
+    nebel_cloud_transfer of_a = *block->knots[a], of_b = *block->knots[b];
     const float *const ground = block->ground;
     if (nb_cloud_is_by_ground(&of_a, ground[a], &of_b, ground[b], ground[i])) {
         nb_cloud_stretch(&of_a, ground[i] / ground[a]);
@@ -179,16 +181,17 @@ static inline void nb_cloud_block_begin(nb_cloud_block *block)
 }
 
 /* Whether hardly any cloud is along a ray but it is not far from some: others beside it may see puffs. */
-static inline int nb_cloud_is_lone(const nebel_cloud_knots *knots)
+static inline int nb_cloud_is_lone(const nebel_cloud_transfer *knots)
 {
-    return knots->looks > 0 && (knots->count == 0 || knots->transmittance[knots->count - 1] > NB_CLOUD_HARDLY);
+    return knots->density_queries > 0 &&
+           (knots->count == 0 || knots->transmittance[knots->count - 1] > NB_CLOUD_HARDLY);
 }
 
 /* Whether a pixel has the mean of two beside it, those above and below where they are nearer than left and right. */
 static inline int nb_cloud_share(const nb_cloud_block *block, int i)
 {
     const int level = block->level[i];
-    const nebel_cloud_knots *knots[NB_CLOUD_SHARE_AROUND];
+    const nebel_cloud_transfer *knots[NB_CLOUD_SHARE_AROUND];
     int around[NB_CLOUD_SHARE_AROUND];
     const int count = nb_cloud_around(block, i, around), first = level == 1 && count == 4 ? 2 : 0;
     for (int k = 0; k < count; k++) {

@@ -38,13 +38,13 @@ static inline double nb_daylight_spread(double sun)
     return copysign(log(1 + fabs(sun) / NB_DAYLIGHT_TWILIGHT), sun);
 }
 
-static inline nebel_air_light nb_daylight_ask(const nebel_sun *sun, const nebel_atmosphere *atmosphere,
-                                              const double place[3])
+static inline nebel_irradiance nb_daylight_ask(const nebel_sun *sun, const nebel_atmosphere *atmosphere,
+                                               const double place[3])
 {
-    nebel_air_light light;
+    nebel_irradiance light;
     /* Places and suns are in order, so that it cannot fail. */
     memset(&light, 0, sizeof light);
-    (void)nebel_light_air(atmosphere, sun, 1, (const double(*)[3])place, 0, &light, 0);
+    (void)nebel_compute_atmosphere_irradiance(atmosphere, sun, 1, (const double(*)[3])place, 0, &light, 0);
     return light;
 }
 
@@ -55,7 +55,7 @@ static inline nebel_air_light nb_daylight_ask(const nebel_sun *sun, const nebel_
 /* unless the sun is so much brighter somewhere about it, or dimmer, as a part of the brighter one. */
 #define NB_DAYLIGHT_OTHER (1 / 16.)
 
-static inline int nb_daylight_is_other(const nebel_air_light *a, const nebel_air_light *b)
+static inline int nb_daylight_is_other(const nebel_irradiance *a, const nebel_irradiance *b)
 {
     double brightest = 0, change = 0;
     for (int c = 0; c < 3; c++) {
@@ -70,16 +70,16 @@ static inline int nb_daylight_is_near(const nebel_planet *home, const double to_
                                       const double max[3])
 {
     static const double origin[3] = {0, 0, 0};
-    const double most = fmin(NB_DAYLIGHT_NEAR, NB_DAYLIGHT_NEAR_PART * home->air.radius);
+    const double most = fmin(NB_DAYLIGHT_NEAR, NB_DAYLIGHT_NEAR_PART * home->atmosphere_desc.radius);
     for (int c = 0; c < 3; c++)
         if (min[c] < -most || max[c] > most) return 0;
     const nebel_sun sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
-    const nebel_air_light here = nb_daylight_ask(&sun, home->atmosphere, origin);
+    const nebel_irradiance here = nb_daylight_ask(&sun, home->atmosphere, origin);
     for (int corner = 0; corner < 8; corner++) {
         double place[3];
         for (int c = 0; c < 3; c++) place[c] = (corner >> c & 1) != 0 ? max[c] : min[c];
         place[1] = fmax(0, place[1]);
-        const nebel_air_light there = nb_daylight_ask(&sun, home->atmosphere, place);
+        const nebel_irradiance there = nb_daylight_ask(&sun, home->atmosphere, place);
         if (nb_daylight_is_other(&here, &there)) return 0;
     }
     return 1;
@@ -102,7 +102,7 @@ static inline void nb_daylight_set_depths(nb_daylight *daylight, const double ac
             const double root = s / (NB_DAYLIGHT_SUNS - 1.);
             double place[3];
             nb_daylight_place(daylight, across, height, root * root, place);
-            const nebel_air_light light = nb_daylight_ask(&daylight->sun, daylight->atmosphere, place);
+            const nebel_irradiance light = nb_daylight_ask(&daylight->sun, daylight->atmosphere, place);
             for (int c = 0; c < 3; c++)
                 daylight->depth[h][s][c] = (float)(light.sun[c] > 0 ? fmin(NB_DAYLIGHT_MOST_DEPTH, -log(light.sun[c]))
                                                                     : NB_DAYLIGHT_MOST_DEPTH);
@@ -137,11 +137,11 @@ static inline void nb_daylight_around(const nebel_planet *planet, const nebel_su
                                           0.95308992296933198};
     static const double weights[SLOPES] = {0.11846344252809454, 0.23931433524968324, 0.28444444444444444,
                                            0.23931433524968324, 0.11846344252809454};
-    const nebel_atmosphere_desc *const air = &planet->air;
+    const nebel_atmosphere_desc *const air = &planet->atmosphere_desc;
     double center[3], axes[3][3], ground[3];
     nebel_ray rays[SLOPES * TURNS];
     nebel_transfer found[SLOPES * TURNS];
-    nb_vector_ball_middle(air->ground, air->radius, center);
+    nb_vector_ball_middle(air->ground_point, air->radius, center);
     nb_daylight_turn(center, sun->direction, place, axes);
     for (int c = 0; c < 3; c++) ground[c] = center[c] + air->radius * axes[0][c];
     for (int i = 0; i < SLOPES * TURNS; i++) {
@@ -153,8 +153,8 @@ static inline void nb_daylight_around(const nebel_planet *planet, const nebel_su
         }
     }
     memset(found, 0, sizeof found);
-    (void)nebel_trace_air(planet->atmosphere, sun, SLOPES * TURNS, rays, sizeof *rays, found, sizeof *found);
-    const nebel_air_light on_ground = nb_daylight_ask(sun, planet->atmosphere, ground);
+    (void)nebel_trace_atmosphere(planet->atmosphere, sun, SLOPES * TURNS, rays, sizeof *rays, found, sizeof *found);
+    const nebel_irradiance on_ground = nb_daylight_ask(sun, planet->atmosphere, ground);
     const double rise = fmax(0, nb_vector_dot(axes[0], sun->direction));
     for (int c = 0; c < 3; c++) {
         light[c] = 2 * air->ground_albedo[c] * (on_ground.sky[c] + rise * on_ground.sun[c]);
@@ -179,11 +179,11 @@ static inline void nb_daylight_place_of(const nb_daylight *daylight, const doubl
 static inline void nb_daylight_set_level_skies(nb_daylight *daylight, const nebel_planet *home, const double across[3])
 {
     static const double origin[3] = {0, 0, 0};
-    const nebel_air_light there = nb_daylight_ask(&daylight->sun, home->atmosphere, origin);
+    const nebel_irradiance there = nb_daylight_ask(&daylight->sun, home->atmosphere, origin);
     for (int row = 0; row < NB_DAYLIGHT_SKIES; row++) {
         double place[3];
         nb_daylight_place_of(daylight, across, row, place);
-        const nebel_air_light light = nb_daylight_ask(&daylight->sun, daylight->atmosphere, place);
+        const nebel_irradiance light = nb_daylight_ask(&daylight->sun, daylight->atmosphere, place);
         for (int c = 0; c < 3; c++)
             daylight->sky[NB_DAYLIGHT_OF_SURFACES][row][c] = nb_daylight_part(light.sky[c], there.sky[c]);
     }
@@ -213,11 +213,11 @@ static inline void nb_daylight_set(nb_daylight *daylight, const nebel_planet *pl
                                    const double to_sun[3])
 {
     daylight->atmosphere = planet->atmosphere;
-    daylight->radius = planet->air.radius;
-    daylight->thickness = planet->air.thickness;
+    daylight->radius = planet->atmosphere_desc.radius;
+    daylight->thickness = planet->atmosphere_desc.thickness;
     daylight->sun = (nebel_sun){.irradiance = {1, 1, 1}};
     memcpy(daylight->sun.direction, to_sun, sizeof daylight->sun.direction);
-    nb_vector_ball_middle(planet->air.ground, planet->air.radius, daylight->center);
+    nb_vector_ball_middle(planet->atmosphere_desc.ground_point, planet->atmosphere_desc.radius, daylight->center);
     const double axis[3] = {fabs(to_sun[0]) < 0.5, 0, !(fabs(to_sun[0]) < 0.5)};
     double across[3];
     nb_vector_cross(to_sun, axis, across);

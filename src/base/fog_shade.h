@@ -39,8 +39,8 @@ static inline nebel_result nb_fog_roof_ask(nebel_cloud_workspace *clouds, double
                                            nb_part_range *sun, nb_part_range *sky)
 {
     float of_sun, of_sky;
-    nebel_result result = nebel_shade_clouds(clouds, width, 1, place, 0, &of_sun);
-    if (result == NEBEL_OK) result = nebel_shade_sky(clouds, width, 1, place, 0, &of_sky);
+    nebel_result result = nebel_compute_cloud_sun_transmittance(clouds, width, 1, place, 0, &of_sun);
+    if (result == NEBEL_OK) result = nebel_compute_cloud_sky_transmittance(clouds, width, 1, place, 0, &of_sky);
     if (result != NEBEL_OK) return result;
     nb_part_widen(sun, of_sun);
     nb_part_widen(sky, of_sky);
@@ -92,7 +92,7 @@ static inline nebel_result nb_fog_roof_set(nebel_cloud_workspace *clouds, const 
 /* What clouds leave, in parts: of the sun, and of the sky as of that which fog has at the origin. */
 typedef struct nb_fog_shade {
     int is_found;
-    nebel_fog_shade pieces;
+    nebel_fog_shadow pieces;
     float end;       /* m, no fog is beyond */
     float clear_sky; /* over clouds, from the last piece on */
 } nb_fog_shade;
@@ -114,7 +114,7 @@ static inline int nb_fog_roof_cross(const nb_fog_roof *roof, const nebel_ray *ra
     return at[0] < at[1];
 }
 
-/* Along the whole ray, whatever its t_max; spread as of nebel_shade_fog. Errors: ARGUMENT. */
+/* Along the whole ray, whatever its t_max; spread as of nebel_trace_cloud_shadow_on_fog. Errors: ARGUMENT. */
 static inline nebel_result nb_fog_shade_along(nebel_cloud_workspace *clouds, const nb_fog_roof *roof, nebel_ray ray,
                                               double spread, nb_fog_shade *shade)
 {
@@ -125,10 +125,11 @@ static inline nebel_result nb_fog_shade_along(nebel_cloud_workspace *clouds, con
     if (!nb_fog_roof_cross(roof, &ray, unit, at)) return NEBEL_OK;
     ray.t_max = at[1];
     shade->end = (float)at[1];
-    const nebel_result result = nebel_shade_fog(clouds, &ray, at[0], spread, &shade->pieces);
+    const nebel_result result = nebel_trace_cloud_shadow_on_fog(clouds, &ray, at[0], spread, &shade->pieces);
     if (shade->pieces.count == 0) shade->pieces.t[0] = (float)at[0]; /* all of it is in clear light */
     for (uint32_t k = 0; k < shade->pieces.count; k++)
-        shade->pieces.sky[k] = roof->owns_ambient ? shade->pieces.sky[k] * roof->clear_sky : 1;
+        shade->pieces.sky_transmittance[k] =
+            roof->owns_ambient ? shade->pieces.sky_transmittance[k] * roof->clear_sky : 1;
     return result;
 }
 

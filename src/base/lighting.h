@@ -29,7 +29,7 @@ static inline nebel_environment nb_scene_environment(const nebel_scene_data *sce
 /* Whether ambient light is the planet's sky. */
 static inline int nb_scene_owns_ambient(const nebel_scene_data *scene)
 {
-    return scene->environment.type == NEBEL_ENVIRONMENT_MAP && scene->environment_file == NULL;
+    return scene->environment.type == NEBEL_ENVIRONMENT_MAP && scene->environment_path == NULL;
 }
 
 /* Above all air; where there is none one of no light. */
@@ -56,8 +56,8 @@ static inline nebel_result nb_lighting_set(nb_lighting *lighting, const nebel_sc
         (scene->has_sun && !nb_lighting_is_light(scene->sun_irradiance))) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "scene: background, ambient and sun must be finite and not negative");
     }
-    for (size_t i = 0; i < scene->lamp_count; i++) {
-        const nebel_lamp *lamp = &scene->lamps[i];
+    for (size_t i = 0; i < scene->light_count; i++) {
+        const nebel_light *lamp = &scene->lights[i];
         if (!nb_lighting_is_light(lamp->intensity) ||
             !isfinite(lamp->position[0] + lamp->position[1] + lamp->position[2]))
             return nb_fail(log, NEBEL_ERROR_VALUE,

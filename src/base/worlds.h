@@ -11,7 +11,7 @@
 typedef struct nb_world {
     const nebel_planet *planet;
     double center[3], radius, top; /* m; top: of its air, from the centre */
-    nebel_air_view *view;
+    nebel_sky_view *view;
     nb_daylight *daylight; /* NULL: there are no models in sunlight */
 } nb_world;
 
@@ -28,9 +28,10 @@ static inline double nb_world_power(const nb_world *world, const double place[3]
 
 static inline nb_world nb_world_of(const nebel_planet *planet)
 {
-    nb_world world = {
-        .planet = planet, .radius = planet->air.radius, .top = planet->air.radius + planet->air.thickness};
-    nb_vector_ball_middle(planet->air.ground, planet->air.radius, world.center);
+    nb_world world = {.planet = planet,
+                      .radius = planet->atmosphere_desc.radius,
+                      .top = planet->atmosphere_desc.radius + planet->atmosphere_desc.thickness};
+    nb_vector_ball_middle(planet->atmosphere_desc.ground_point, planet->atmosphere_desc.radius, world.center);
     return world;
 }
 
@@ -65,7 +66,7 @@ static inline double nb_worlds_reach(const nb_world *worlds, int count, const do
 /* The angular radius of the sun's disc; 0: there is none. The scene has a planet. */
 static inline double nb_worlds_disc(const nebel_scene_data *scene)
 {
-    return scene->has_sun ? 0.5 * scene->planets[0].sun_diameter * (3.14159265358979323846 / 180) : 0;
+    return scene->has_sun ? 0.5 * scene->planets[0].sun_angular_diameter * (3.14159265358979323846 / 180) : 0;
 }
 
 /* Its mean radiance above all air. */
@@ -154,15 +155,16 @@ static inline double nb_worlds_uneclipsed(const nb_world *worlds, int count, int
 }
 
 /* The light at a place, of a sun of irradiance 1. */
-static inline nebel_air_light nb_worlds_light(const nb_world *worlds, int count, const double place[3],
-                                              const double to_sun[3], double disc)
+static inline nebel_irradiance nb_worlds_light(const nb_world *worlds, int count, const double place[3],
+                                               const double to_sun[3], double disc)
 {
     const int nearest = nb_worlds_nearest(worlds, count, place);
     const nebel_sun sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
-    nebel_air_light light;
+    nebel_irradiance light;
     /* Places and suns are in order, so that it cannot fail. */
     memset(&light, 0, sizeof light);
-    (void)nebel_light_air(worlds[nearest].planet->atmosphere, &sun, 1, (const double(*)[3])place, 0, &light, 0);
+    (void)nebel_compute_atmosphere_irradiance(worlds[nearest].planet->atmosphere, &sun, 1, (const double(*)[3])place, 0,
+                                              &light, 0);
     const double left = nb_worlds_uneclipsed(worlds, count, nearest, place, to_sun, disc);
     for (int c = 0; c < 3; c++) light.sun[c] *= left;
     return light;
@@ -177,23 +179,23 @@ typedef struct nb_worlds_part {
     float left[3][NB_WORLDS_RAYS], light[3][NB_WORLDS_RAYS], error[NB_WORLDS_RAYS];
 } nb_worlds_part;
 
-static inline void nb_worlds_lay_behind(const nb_worlds_part *part, size_t n, const nebel_transfer_planes *lights)
+static inline void nb_worlds_lay_behind(const nb_worlds_part *part, size_t n, const nebel_transfer_planes *transfers)
 {
     for (size_t i = 0; i < n; i++) {
         float most = 0;
         for (int c = 0; c < 3; c++) {
-            most = fmaxf(most, lights->transmittance[c][i]);
-            lights->in_scattering[c][i] += lights->transmittance[c][i] * part->light[c][i];
-            lights->transmittance[c][i] *= part->left[c][i];
+            most = fmaxf(most, transfers->transmittance[c][i]);
+            transfers->in_scattering[c][i] += transfers->transmittance[c][i] * part->light[c][i];
+            transfers->transmittance[c][i] *= part->left[c][i];
         }
-        if (lights->error != NULL) lights->error[i] += most * part->error[i];
+        if (transfers->error != NULL) transfers->error[i] += most * part->error[i];
     }
 }
 
-/* nebel_trace_air_view, through the air of all; at most NB_WORLDS_RAYS rays. */
+/* nebel_trace_sky_view, through the air of all; at most NB_WORLDS_RAYS rays. */
 static inline nebel_result nb_worlds_trace(const nb_world *worlds, int count, size_t n,
                                            const double *const direction[3], const float *t_max,
-                                           const nebel_transfer_planes *lights)
+                                           const nebel_transfer_planes *transfers)
 {
     nb_worlds_part part;
     nebel_transfer_planes planes = {.error = part.error};
@@ -201,10 +203,10 @@ static inline nebel_result nb_worlds_trace(const nb_world *worlds, int count, si
         planes.transmittance[c] = part.left[c];
         planes.in_scattering[c] = part.light[c];
     }
-    nebel_result result = nebel_trace_air_view(worlds[0].view, n, direction, t_max, lights);
+    nebel_result result = nebel_trace_sky_view(worlds[0].view, n, direction, t_max, transfers);
     for (int k = 1; k < count && result == NEBEL_OK; k++) {
-        result = nebel_trace_air_view(worlds[k].view, n, direction, t_max, &planes);
-        if (result == NEBEL_OK) nb_worlds_lay_behind(&part, n, lights);
+        result = nebel_trace_sky_view(worlds[k].view, n, direction, t_max, &planes);
+        if (result == NEBEL_OK) nb_worlds_lay_behind(&part, n, transfers);
     }
     return result;
 }

@@ -10,7 +10,7 @@
 #include <string.h>
 
 /* A square that is cut by the planes of two cells; each cut adds one vertex at most. */
-enum { MOST_VERTICES = 4 + 2 * NEBEL_MAX_PLANES };
+enum { MOST_VERTICES = 4 + 2 * NEBEL_MAX_SHAPE_PLANES };
 
 /* Of the tolerance: how far beyond a plane a vertex may lie and is still kept, so that planes that go through vertices
  * take none away. */
@@ -140,7 +140,7 @@ static int keep_portal(nebel_cells *cells, const size_t ends[2], const double (*
     return 1;
 }
 
-size_t nebel_count_cell_portals(const nebel_cells *cells)
+size_t nebel_get_cell_portal_count(const nebel_cells *cells)
 {
     if (cells == NULL) return 0;
     return cells->portal_count;

@@ -153,7 +153,7 @@ static double find_from(const walk *way, const piece *p)
 
 static double find_to(const walk *way, const piece *p)
 {
-    if (p->exit == NULL && way->cells->span == NEBEL_SPAN_FAITHFUL) return way->depth;
+    if (p->exit == NULL && way->cells->span == NEBEL_SPAN_PRINTED) return way->depth;
     return find_place(way, p->to, p->exit);
 }
 
@@ -179,18 +179,18 @@ static double find_intensity(const nebel_cells *cells, double density, double sp
     return fmin(amount, 1);
 }
 
-static nebel_cell_layer make_layer(const walk *way, const piece *first, const piece *last)
+static nebel_cell_segment make_layer(const walk *way, const piece *first, const piece *last)
 {
     const nb_cell *cell = &way->cells->cells[first->cell];
-    nebel_cell_layer layer = {
-        .from = find_from(way, first), .to = find_to(way, last), .first = first->cell, .last = last->cell};
+    nebel_cell_segment layer = {
+        .from = find_from(way, first), .to = find_to(way, last), .first_cell = first->cell, .last_cell = last->cell};
     memcpy(layer.color, cell->color, sizeof layer.color);
     layer.intensity = find_intensity(way->cells, cell->density, layer.to - layer.from);
     return layer;
 }
 
 /* Called for each layer, from the eye on. */
-typedef void take_layer(const nebel_cell_layer *layer, void *user);
+typedef void take_layer(const nebel_cell_segment *layer, void *user);
 
 static void find_layers(const walk *way, take_layer *take, void *user)
 {
@@ -200,7 +200,7 @@ static void find_layers(const walk *way, take_layer *take, void *user)
         last = first;
         if (way->cells->cells[pieces[first].cell].density == 0) continue;
         while (last + 1 < count && continues(way, &pieces[last], &pieces[last + 1])) last++;
-        const nebel_cell_layer layer = make_layer(way, &pieces[first], &pieces[last]);
+        const nebel_cell_segment layer = make_layer(way, &pieces[first], &pieces[last]);
         take(&layer, user);
     }
 }
@@ -234,12 +234,12 @@ static int set_point(walk *way, const nebel_cell_point *point)
     way->length = nb_vector_length(way->step);
     const double depth = nb_vector_dot(way->step, way->forward);
     way->depth = depth;
-    if (way->cells->span == NEBEL_SPAN_FAITHFUL)
+    if (way->cells->span == NEBEL_SPAN_PRINTED)
         way->depth = find_printed_depth(way, point->surface.normal, point->surface.distance, depth);
     return way->length > 0 && isfinite(way->length) && (way->cells->span == NEBEL_SPAN_RAY || depth > 0);
 }
 
-static void add_layer(const nebel_cell_layer *layer, void *user)
+static void add_layer(const nebel_cell_segment *layer, void *user)
 {
     nebel_cell_fog *fog = user;
     const double seen = 1 - fog->alpha;
@@ -255,9 +255,9 @@ static int are_streams(const nb_span *points, const nb_span *fog, size_t n)
            nb_span_fits(fog, n) && !nb_spans_share_bytes(points, fog, n);
 }
 
-nebel_result nebel_fog_cells(const nebel_cells *cells, const nebel_cell_view *view, size_t n,
-                             const nebel_cell_point *points, size_t point_stride, nebel_cell_fog *fog,
-                             size_t fog_stride)
+nebel_result nebel_compute_cell_fog(const nebel_cells *cells, const nebel_cell_view *view, size_t n,
+                                    const nebel_cell_point *points, size_t point_stride, nebel_cell_fog *fog,
+                                    size_t fog_stride)
 {
     walk way;
     if (cells == NULL || view == NULL || (n > 0 && (points == NULL || fog == NULL))) return NEBEL_ERROR_ARGUMENT;
@@ -278,19 +278,20 @@ nebel_result nebel_fog_cells(const nebel_cells *cells, const nebel_cell_view *vi
 }
 
 typedef struct list {
-    nebel_cell_layer *layers;
+    nebel_cell_segment *layers;
     size_t room, count;
 } list;
 
-static void list_layer(const nebel_cell_layer *layer, void *user)
+static void list_layer(const nebel_cell_segment *layer, void *user)
 {
     list *to = user;
     if (to->count < to->room) to->layers[to->count] = *layer;
     to->count++;
 }
 
-nebel_result nebel_find_cell_layers(const nebel_cells *cells, const nebel_cell_view *view,
-                                    const nebel_cell_point *point, size_t room, nebel_cell_layer *layers, size_t *count)
+nebel_result nebel_compute_cell_segments(const nebel_cells *cells, const nebel_cell_view *view,
+                                         const nebel_cell_point *point, size_t room, nebel_cell_segment *layers,
+                                         size_t *count)
 {
     walk way;
     if (cells == NULL || view == NULL || point == NULL || count == NULL || (room > 0 && layers == NULL))

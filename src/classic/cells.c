@@ -14,7 +14,7 @@
 #define TOLERANCE_OF_EXTENT 1e-6
 #define TOLERANCE_OF_PLACE 1e-12
 
-nebel_volume_desc nebel_cell_volume(const nebel_cell *cell)
+nebel_volume_desc nebel_volume_from_cell(const nebel_cell *cell)
 {
     if (cell == NULL) return (nebel_volume_desc){.priority = 0};
     nebel_volume_desc volume = {.shape = cell->shape};
@@ -113,7 +113,7 @@ static nebel_result set_cell(nebel_cells *cells, const nebel_log *log, const neb
     nebel_result result = check_cell(log, from);
     if (result != NEBEL_OK) return result;
     nb_volume volume;
-    const nebel_volume_desc desc = nebel_cell_volume(from);
+    const nebel_volume_desc desc = nebel_volume_from_cell(from);
     result = nb_volume_resolve(&cells->allocator, log, &desc, &volume);
     if (result != NEBEL_OK) return result;
     *cell = (nb_cell){.first_plane = cells->plane_count, .density = from->density};
@@ -171,7 +171,7 @@ static int overlap(const nebel_cells *cells, const nb_cell *a, const nb_cell *b,
 
 static nebel_result check_overlaps(nebel_cells *cells, const nebel_cells_desc *desc)
 {
-    double(*planes)[4] = nb_allocate(&cells->allocator, 2 * (size_t)NEBEL_MAX_PLANES, sizeof *planes);
+    double(*planes)[4] = nb_allocate(&cells->allocator, 2 * (size_t)NEBEL_MAX_SHAPE_PLANES, sizeof *planes);
     nebel_result result = NEBEL_OK;
     if (planes == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "cells: out of memory");
     for (size_t b = 1; b < cells->cell_count && result == NEBEL_OK; b++)

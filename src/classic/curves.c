@@ -12,9 +12,10 @@ nebel_result nebel_resolve_curve(const nebel_curve *curve, nebel_curve *resolved
 {
     if (curve == NULL || resolved == NULL || (unsigned)curve->type >= NEBEL_CURVE_COUNT) return NEBEL_ERROR_ARGUMENT;
     if (curve->type == NEBEL_CURVE_TABLE && curve->table == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (!isfinite(curve->k) || curve->k < 0) return NEBEL_ERROR_VALUE;
+    if (!isfinite(curve->scale) || curve->scale < 0) return NEBEL_ERROR_VALUE;
     *resolved = *curve;
-    if (curve->k == 0) resolved->k = curve->type == NEBEL_CURVE_EXP ? .03 : curve->type == NEBEL_CURVE_EXP2 ? .04 : .05;
+    if (curve->scale == 0)
+        resolved->scale = curve->type == NEBEL_CURVE_EXP ? .03 : curve->type == NEBEL_CURVE_EXP2 ? .04 : .05;
     return NEBEL_OK;
 }
 
@@ -32,7 +33,7 @@ static double look_up(const float *table, double x)
 double nebel_compute_curve_amount(const nebel_curve *resolved, double s)
 {
     if (resolved == NULL || (resolved->type == NEBEL_CURVE_TABLE && resolved->table == NULL)) return 0;
-    const double x = s > 0 ? resolved->k * s : 0;
+    const double x = s > 0 ? resolved->scale * s : 0;
     switch (resolved->type) {
     case NEBEL_CURVE_LINEAR:
         return x;

@@ -40,7 +40,7 @@ static size_t find_member(uint32_t state)
     return i;
 }
 
-nebel_result nebel_set_d3d9_fog(nebel_d3d9_fog *fog, uint32_t state, uint32_t value)
+nebel_result nebel_set_d3d9_state(nebel_d3d9_fog *fog, uint32_t state, uint32_t value)
 {
     const size_t i = find_member(state);
     if (fog == NULL || i == MEMBERS) return NEBEL_ERROR_ARGUMENT;
@@ -49,7 +49,7 @@ nebel_result nebel_set_d3d9_fog(nebel_d3d9_fog *fog, uint32_t state, uint32_t va
     return NEBEL_OK;
 }
 
-nebel_result nebel_get_d3d9_fog(const nebel_d3d9_fog *fog, uint32_t state, uint32_t *value)
+nebel_result nebel_get_d3d9_state(const nebel_d3d9_fog *fog, uint32_t state, uint32_t *value)
 {
     const size_t i = find_member(state);
     if (fog == NULL || value == NULL || i == MEMBERS) return NEBEL_ERROR_ARGUMENT;
@@ -87,7 +87,7 @@ static double fixed_factor(const nebel_d3d9_fog *fog, const nebel_d3d9_vertex *v
     if (fog->fog_vertex_mode == NEBEL_D3DFOG_NONE) return clamp_factor(vertex->specular_alpha);
     const nebel_factor_desc range = {.coordinate =
                                          fog->range_fog_enable ? NEBEL_COORDINATE_RADIAL : NEBEL_COORDINATE_PLANE};
-    const double c = nebel_compute_fog_coordinate(&range, vertex->place, 0);
+    const double c = nebel_compute_fog_coordinate(&range, vertex->position, 0);
     return evaluate(fog, fog->fog_vertex_mode, NEBEL_STAGE_VERTEX, c);
 }
 

@@ -13,7 +13,7 @@ static int is_affine(const double m[16])
 }
 
 /* Cramer's rule for matrix eye = -translation. */
-nebel_result nebel_find_eye(const double eye_from_object[16], double eye[3])
+nebel_result nebel_compute_object_eye(const double eye_from_object[16], double eye[3])
 {
     const double *const m = eye_from_object;
     if (m == NULL || eye == NULL || !is_affine(m)) return NEBEL_ERROR_ARGUMENT;

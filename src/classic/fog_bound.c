@@ -291,7 +291,7 @@ static jet integrate_soft_planes(const part *p, const stretch *inside, const sig
     stretch plateau = *inside;
     for (size_t i = 0; i < count; i++) {
         const nb_face *const face = &own->body->faces[own->leaf->first_face + i];
-        const double scale = face->inverse_length / own->body->density.distance;
+        const double scale = face->inverse_length / own->body->density.edge_width;
         const line along = line_along(face->normal, own->eye, origin, s);
         depths[i] = plus(face->distance * scale, -scale, &along);
         const line over = plus(-1, 1, &depths[i]);
@@ -326,7 +326,7 @@ static jet integrate_soft_box(const part *p, const stretch *inside, const sight 
     if (axis == 3) return integrate_lines(lines, count, inside);
     const known_leaf *const own = &p->leaves[0];
     const double low = own->leaf->low[axis], high = own->leaf->high[axis];
-    const double width = own->body->density.distance, edge = smaller(width, .5 * (high - low));
+    const double width = own->body->density.edge_width, edge = smaller(width, .5 * (high - low));
     stretch near = *inside, far = *inside, plateau = *inside;
     const double at[3] = {s->way[0][axis], s->way[1][axis], s->way[2][axis]};
     const jet rise = linear(at);

@@ -59,7 +59,7 @@ typedef struct mesh {
 
 static nebel_result grow_vertices(mesh *m)
 {
-    const size_t added = m->vertex_count - m->made.vertex_count_before;
+    const size_t added = m->vertex_count - m->made.input_vertex_count;
     if (m->vertex_count >= NONE) return NEBEL_ERROR_LIMIT;
     if (!GROW(m, positions, vertex_count, vertex_room) || !GROW(m, points, vertex_count, point_room) ||
         !nb_grow(&m->allocator, (void **)&m->parents, sizeof *m->parents, added, &m->parent_room, added + 1))
@@ -114,7 +114,7 @@ static nebel_result add_vertex(mesh *m, uint32_t a, uint32_t b, uint32_t *vertex
     const nebel_result result = grow_vertices(m);
     if (result != NEBEL_OK) return result;
     const uint32_t made = (uint32_t)m->vertex_count;
-    const size_t added = m->vertex_count - m->made.vertex_count_before;
+    const size_t added = m->vertex_count - m->made.input_vertex_count;
     for (int i = 0; i < 3; i++)
         m->positions[made][i] = (float)(.5 * ((double)m->positions[a][i] + (double)m->positions[b][i]));
     m->parents[added][0] = a < b ? a : b;
@@ -127,7 +127,7 @@ static nebel_result add_vertex(mesh *m, uint32_t a, uint32_t b, uint32_t *vertex
 
 static int has_parents(const mesh *m, uint32_t vertex, uint32_t a, uint32_t b)
 {
-    const uint32_t *const parents = m->parents[vertex - m->made.vertex_count_before];
+    const uint32_t *const parents = m->parents[vertex - m->made.input_vertex_count];
     return parents[0] == (a < b ? a : b) && parents[1] == (a < b ? b : a);
 }
 
@@ -200,8 +200,8 @@ static int choose_edge(const mesh *m, triangle *t)
 {
     if (has_halved_edge(m, t)) return find_longest(m, t);
     if (t->error < 0) set_error(m, t);
-    const int is_over =
-        (double)t->error > m->desc.bound && t->depth < m->desc.deepest && m->triangle_count < m->desc.most_triangles;
+    const int is_over = (double)t->error > m->desc.max_error && t->depth < m->desc.max_depth &&
+                        m->triangle_count < m->desc.max_triangles;
     return is_over ? find_longest(m, t) : 3;
 }
 
@@ -333,7 +333,7 @@ static void copy_positions(mesh *m, const nebel_triangles *given)
 
 static int make_rooms(mesh *m, const nebel_triangles *given)
 {
-    m->vertex_count = m->made.vertex_count_before = given->vertex_count;
+    m->vertex_count = m->made.input_vertex_count = given->vertex_count;
     m->triangle_count = given->triangle_count;
     m->vertex_room = m->point_room = given->vertex_count;
     m->triangle_room = given->triangle_count;
@@ -384,7 +384,7 @@ static const char *fault_of(const nebel_tessellation_desc *desc, const nebel_tri
 {
     if (!nb_allocator_is_valid(&desc->allocator)) return "the allocator needs both functions or neither";
     if (desc->channel < 0 || desc->channel > 2) return "channel is none of 0, 1, 2";
-    if (desc->deepest > 48) return "deepest is more than 48";
+    if (desc->max_depth > 48) return "deepest is more than 48";
     if (given->position_stride != 0 && given->position_stride < 12) return "position_stride is less than 12";
     if ((given->vertex_count > 0 && given->positions == NULL) || (given->triangle_count > 0 && given->indices == NULL))
         return "positions and indices must not be NULL";
@@ -399,7 +399,7 @@ static int are_values(const nebel_tessellation_desc *desc, const nebel_triangles
 {
     for (int i = 0; i < 3; i++)
         if (!(fabs(desc->eye[i]) <= NEBEL_MAX_LENGTH) || !(fabs(given->origin[i]) <= NEBEL_MAX_LENGTH)) return 0;
-    return desc->bound >= 0 && isfinite(desc->bound);
+    return desc->max_error >= 0 && isfinite(desc->max_error);
 }
 
 static void *finish_indices(mesh *m)
@@ -409,9 +409,9 @@ static void *finish_indices(mesh *m)
         const triangle *const t = &m->triangles[i];
         for (size_t k = 0; k < 3; k++) m->indices[3 * i + k] = t->corners[k];
         m->made.error = fmax(m->made.error, (double)t->error);
-        if ((double)t->error <= m->desc.bound) continue;
-        m->made.over_count++;
-        m->made.deepest_count += t->depth >= m->desc.deepest;
+        if ((double)t->error <= m->desc.max_error) continue;
+        m->made.unresolved_count++;
+        m->made.depth_limited_count += t->depth >= m->desc.max_depth;
     }
     return m->indices;
 }
@@ -472,9 +472,9 @@ nebel_result nebel_tessellate(const nebel_snapshot *snapshot, const nebel_tessel
     m->allocator = allocator;
     m->snapshot = snapshot;
     m->desc = *desc;
-    if (desc->bound == 0) m->desc.bound = 1. / 255;
-    if (desc->deepest == 0) m->desc.deepest = 20;
-    if (desc->most_triangles == 0) m->desc.most_triangles = (size_t)1 << 18;
+    if (desc->max_error == 0) m->desc.max_error = 1. / 255;
+    if (desc->max_depth == 0) m->desc.max_depth = 20;
+    if (desc->max_triangles == 0) m->desc.max_triangles = (size_t)1 << 18;
     for (int i = 0; i < 3; i++) m->from_eye[i] = triangles->origin[i] - desc->eye[i];
     const nebel_result result = tessellate(m, triangles);
     *tessellation = &m->made;

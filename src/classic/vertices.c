@@ -103,14 +103,14 @@ static nebel_result trace_block(const call *c, block *b)
     const float *const points = gather_points(&c->vertices, b);
     for (size_t i = 0; i < b->count; i++) set_ray(c, points + 3 * i, b, i);
     nebel_ray_planes rays = {.t_max = b->t_max};
-    nebel_transfer_planes lights = {0};
-    lights.transmittance[c->desc.channel] = b->factor;
+    nebel_transfer_planes transfers = {0};
+    transfers.transmittance[c->desc.channel] = b->factor;
     for (int k = 0; k < 3; k++) {
         rays.origin[k] = c->vertices.eye[k];
         rays.direction_float[k] = b->direction[k];
-        if (c->traces_light) lights.in_scattering[k] = b->light[k];
+        if (c->traces_light) transfers.in_scattering[k] = b->light[k];
     }
-    return nebel_trace_planes(c->snapshot, &(nebel_trace_desc){.isa = c->desc.isa}, b->count, &rays, &lights);
+    return nebel_trace_planes(c->snapshot, &(nebel_trace_desc){.isa = c->desc.isa}, b->count, &rays, &transfers);
 }
 
 /* ---- blocks ---------------------------------------------------------------------------------- */
@@ -240,8 +240,9 @@ static void choose_way(call *c, int wants_light)
     }
 }
 
-nebel_result nebel_fog_vertices(const nebel_snapshot *snapshot, const nebel_vertex_desc *desc, size_t n,
-                                const nebel_vertices *vertices, const nebel_vertex_output *outputs, size_t output_count)
+nebel_result nebel_compute_vertex_fog(const nebel_snapshot *snapshot, const nebel_vertex_desc *desc, size_t n,
+                                      const nebel_vertices *vertices, const nebel_vertex_output *outputs,
+                                      size_t output_count)
 {
     static const nebel_vertex_desc none;
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;

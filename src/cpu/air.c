@@ -29,8 +29,11 @@ nebel_result nb_air_set_daylights(nb_air *air, const nebel_planet *home, const n
 nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_allocator *allocator,
                         const nebel_log *log, const double position[3], const double to_sun[3], int ends, int threads)
 {
-    nebel_air_view_desc desc = {
-        .sun = nb_scene_sun(scene), .run = nebel_run_parts, .run_user = &threads, .allocator = *allocator, .log = *log};
+    nebel_sky_view_desc desc = {.sun = nb_scene_sun(scene),
+                                .run = nebel_parallel_for_openmp,
+                                .run_user = &threads,
+                                .allocator = *allocator,
+                                .log = *log};
     nebel_result result = NEBEL_OK;
     air->allocator = allocator;
     air->count = nb_worlds_set(air->worlds, scene, position);
@@ -39,13 +42,13 @@ nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_
     memcpy(air->to_sun, to_sun, sizeof air->to_sun);
     memcpy(air->position, position, sizeof air->position);
     memcpy(desc.position, position, sizeof desc.position);
-    air->ends = desc.has_distances = ends || air->count > 1; /* the ground of one planet ends the air of others */
+    air->ends = desc.has_ray_ends = ends || air->count > 1; /* the ground of one planet ends the air of others */
     air->owns_ambient = nb_scene_owns_ambient(scene);
     air->reach = nb_worlds_reach(air->worlds, air->count, position);
     for (int i = 0; i < air->count && result == NEBEL_OK; i++) {
         nb_world *world = &air->worlds[i];
         desc.atmosphere = world->planet->atmosphere;
-        result = nebel_create_air_view(&desc, &world->view);
+        result = nebel_create_sky_view(&desc, &world->view);
     }
     if (result == NEBEL_OK && scene->has_sun && scene->mesh_count > 0)
         result = nb_air_set_daylights(air, &scene->planets[0], log);
@@ -55,7 +58,7 @@ nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_
 void nb_air_free(nb_air *air)
 {
     for (int i = 0; i < air->count; i++) {
-        nebel_destroy_air_view(air->worlds[i].view);
+        nebel_destroy_sky_view(air->worlds[i].view);
         nb_release(air->allocator, air->worlds[i].daylight);
     }
     nebel_release_split_light(&air->fog);
@@ -64,9 +67,9 @@ void nb_air_free(nb_air *air)
 /* ---- along rays ------------------------------------------------------------------------------ */
 
 nebel_result nb_air_trace(const nb_air *air, size_t n, const double *const direction[3], const float *t_max,
-                          const nebel_transfer_planes *lights)
+                          const nebel_transfer_planes *transfers)
 {
-    return nb_worlds_trace(air->worlds, air->count, n, direction, t_max, lights);
+    return nb_worlds_trace(air->worlds, air->count, n, direction, t_max, transfers);
 }
 
 static double uneclipsed(const nb_air *air, int world, const double place[3])
@@ -89,7 +92,7 @@ static void find_ground_of(const nb_world *world, const nb_rays *rays, nb_ground
                                         .normal = {ground->normal[0], ground->normal[1], ground->normal[2]},
                                         .sun = {ground->sun[0], ground->sun[1], ground->sun[2]},
                                         .sky = {ground->sky[0], ground->sky[1], ground->sky[2]}};
-    nebel_find_ground(world->view, NB_BATCH, direction, &planes);
+    nebel_trace_ground(world->view, NB_BATCH, direction, &planes);
 }
 
 static void keep_nearer(int world, const nb_ground *next, nb_air_scratch *scratch)
@@ -169,7 +172,7 @@ void nb_air_set_points(const nb_air *air, double advance, const double position[
         const float height = 0x1p-20f * (distance + largest), left = (float)uneclipsed(air, world, in_scene);
         for (int c = 0; c < 3; c++) {
             points->normal[c][i] = points->side[c][i] = ground->normal[c][i];
-            points->reflectance[c][i] = (float)air->worlds[world].planet->air.ground_albedo[c];
+            points->reflectance[c][i] = (float)air->worlds[world].planet->atmosphere_desc.ground_albedo[c];
             points->start[c][i] = nb_clamp_coordinate(place[c] + height * ground->normal[c][i]);
             ground->sun[c][i] *= left;
         }
@@ -190,7 +193,7 @@ void nb_air_light_at(const nb_air *air, nb_daylight_of of, const double place[3]
     for (int c = 0; c < 3; c++) sun[c] *= left;
 }
 
-nebel_air_light nb_air_ask(const nb_air *air, const double place[3])
+nebel_irradiance nb_air_ask(const nb_air *air, const double place[3])
 {
     return nb_worlds_light(air->worlds, air->count, place, air->to_sun, air->sun_radius);
 }
@@ -301,6 +304,6 @@ void nb_air_background(const nb_air *air, const nb_lighting *lighting, const nb_
         cosine += unit[c] * lighting->sun_direction[c];
         light[c] = (double)lighting->background[c];
     }
-    if (lighting->shows_ambient) nebel_environment_radiance(&lighting->environment, unit, light);
+    if (lighting->shows_ambient) nebel_evaluate_environment(&lighting->environment, unit, light);
     if (air->sun_radius > 0 && lighting->has_sun) add_sun(air, cosine, air->pixel / (double)rays->length[lane], light);
 }

@@ -54,7 +54,7 @@ typedef struct nb_air_knots {
     nb_shade_between shade[NB_BATCH]; /* of clouds, from the place before, of fog that is shaded by its place */
 } nb_air_knots;
 
-/* Ground that rays meet, as nebel_find_ground says it. */
+/* Ground that rays meet, as nebel_trace_ground says it. */
 typedef struct nb_ground {
     float distance[NB_BATCH]; /* INFINITY where none is seen */
     float normal[3][NB_BATCH], sun[3][NB_BATCH], sky[3][NB_BATCH];
@@ -87,11 +87,11 @@ nebel_result nb_air_set_daylights(nb_air *air, const nebel_planet *home, const n
 void nb_air_light_at(const nb_air *air, nb_daylight_of of, const double place[3], double sun[3], double sky[3]);
 
 /* Without tables: for a sun of irradiance 1. */
-nebel_air_light nb_air_ask(const nb_air *air, const double place[3]);
+nebel_irradiance nb_air_ask(const nb_air *air, const double place[3]);
 
-/* nebel_trace_air_view, through the air of all planets; at most NB_BATCH rays. */
+/* nebel_trace_sky_view, through the air of all planets; at most NB_BATCH rays. */
 nebel_result nb_air_trace(const nb_air *air, size_t n, const double *const direction[3], const float *t_max,
-                          const nebel_transfer_planes *lights);
+                          const nebel_transfer_planes *transfers);
 
 /* Where the nearest ground is seen, to scratch->ground; what lies behind it is no hit any more. `advance` as of nb_view. */
 void nb_air_find_ground(const nb_air *air, double advance, const nb_rays *rays, const int *inside, nb_hits *hits,

@@ -74,7 +74,7 @@ static nebel_transfer_planes light_samples(const nb_frame *frame, nb_light_sampl
 }
 
 /* Where the lights reach fog, to `trace`; `sunlit` lives as long as that. */
-static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebel_lit_pieces *sunlit,
+static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebel_ray_visibility *sunlit,
                                 nebel_trace_desc *trace)
 {
     const nebel_renderer *renderer = frame->renderer;
@@ -82,13 +82,13 @@ static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebe
     if (frame->has_shafts) {
         result = nb_shafts_find(&scratch->shafts, &renderer->allocator, &renderer->sun_cells, &frame->sunlit_box,
                                 &scratch->rays, frame->view.advance, scratch->distance, frame->eye);
-        *sunlit = (nebel_lit_pieces){scratch->shafts.first, scratch->shafts.toggles};
-        trace->sunlit = sunlit;
+        *sunlit = (nebel_ray_visibility){scratch->shafts.first, scratch->shafts.toggles};
+        trace->sun_visibility = sunlit;
     }
     if (frame->has_lamp_shafts && result == NEBEL_OK) {
         result = nb_lamp_shafts_find(&scratch->lamp_shafts, &renderer->allocator, &renderer->lamp_tree, renderer->fog,
                                      &frame->lamplit_box, &scratch->rays, frame->view.advance, scratch->distance);
-        trace->lamplit = scratch->lamp_shafts.pieces;
+        trace->light_visibility = scratch->lamp_shafts.pieces;
     }
     return result;
 }
@@ -106,11 +106,11 @@ static nebel_result trace_haze(const nb_frame *frame, nb_scratch *scratch)
     set_clear(samples);
     if (!frame->air.has_fog) return nb_haze_add(frame, NULL, NULL, scratch);
     const nebel_ray_planes rays = camera_rays(frame, scratch);
-    const nebel_transfer_planes lights = light_samples(frame, samples);
+    const nebel_transfer_planes transfers = light_samples(frame, samples);
     nebel_trace_desc trace = frame->trace;
-    nebel_lit_pieces pieces;
+    nebel_ray_visibility pieces;
     nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
-    if (result == NEBEL_OK) result = nb_daylit_fog_trace(frame, &rays, &trace, &lights, &scratch->air.knots[0]);
+    if (result == NEBEL_OK) result = nb_daylit_fog_trace(frame, &rays, &trace, &transfers, &scratch->air.knots[0]);
     return result == NEBEL_OK ? nb_haze_add(frame, &rays, &trace, scratch) : result;
 }
 
@@ -132,12 +132,12 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
     if (has_shells) end_at_ground(scratch->shells.ground, scratch->distance);
     if (!has_fog) return nb_haze_add(frame, NULL, NULL, scratch);
     const nebel_ray_planes rays = camera_rays(frame, scratch);
-    const nebel_transfer_planes lights = light_samples(frame, samples);
+    const nebel_transfer_planes transfers = light_samples(frame, samples);
     nebel_trace_desc trace = frame->trace;
-    nebel_lit_pieces pieces;
+    nebel_ray_visibility pieces;
     const nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
     if (result != NEBEL_OK) return result;
-    const nebel_result traced = nb_daylit_fog_trace(frame, &rays, &trace, &lights, &scratch->air.knots[0]);
+    const nebel_result traced = nb_daylit_fog_trace(frame, &rays, &trace, &transfers, &scratch->air.knots[0]);
     if (traced == NEBEL_OK && has_air) return nb_haze_add(frame, &rays, &trace, scratch);
     return traced == NEBEL_OK && has_shells ? nb_shells_trace(frame, &rays, &trace, scratch) : traced;
 }
@@ -183,17 +183,17 @@ static nebel_result trace_sun_fog(const nb_frame *frame, nb_scratch *scratch, fl
 {
     const nb_starts starts = starts_of(frame, scratch);
     nebel_ray_planes rays = {.t_max = scratch->distance};
-    nebel_transfer_planes lights = {.error = NULL};
+    nebel_transfer_planes transfers = {.error = NULL};
     for (int c = 0; c < 3; c++) {
         rays.origin[c] = starts.origin[c];
         rays.offset[c] = starts.offset[c];
         rays.direction[c] = frame->lighting.sun_direction[c];
-        lights.transmittance[c] = transmittance[c];
+        transfers.transmittance[c] = transmittance[c];
     }
     mask_ends(scratch->points.lit, scratch->distance);
     nebel_trace_desc trace = frame->trace;
     trace.ignore_distances = 1;
-    return nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &lights);
+    return nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &transfers);
 }
 
 NB_CLONES static void dim(const float (*restrict transmittance)[NB_BATCH], float (*restrict color)[NB_BATCH])
@@ -239,20 +239,20 @@ static nebel_result trace_lamp_fog(const nb_frame *frame, const nb_starts *start
 {
     nb_lamp_ways *ways = &scratch->lamp;
     nebel_ray_planes rays = {.t_max = ways->reach};
-    nebel_transfer_planes lights = {.error = NULL};
+    nebel_transfer_planes transfers = {.error = NULL};
     for (int c = 0; c < 3; c++) {
         rays.origin[c] = starts->origin[c];
         rays.offset[c] = starts->offset[c];
         rays.direction_float[c] = ways->direction[c];
-        lights.transmittance[c] = scratch->light_transmittance[c];
+        transfers.transmittance[c] = scratch->light_transmittance[c];
     }
     for (int i = 0; i < NB_BATCH; i++) ways->reach[i] = ways->lit[i] ? ways->reach[i] : 0;
     nebel_trace_desc trace = frame->trace;
     trace.ignore_distances = 1;
-    return nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &lights);
+    return nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &transfers);
 }
 
-static void add_lamp(const nebel_lamp *lamp, int is_dimmed, nb_scratch *scratch)
+static void add_lamp(const nebel_light *lamp, int is_dimmed, nb_scratch *scratch)
 {
     const nb_lamp_ways *ways = &scratch->lamp;
     for (int c = 0; c < 3; c++) {
@@ -280,8 +280,8 @@ static nebel_result add_lamplight(const nb_frame *frame, nb_scratch *scratch)
     const nb_starts starts = starts_of(frame, scratch);
     const int is_dimmed = dims_sun(renderer);
     nebel_result result = NEBEL_OK;
-    for (size_t i = 0; i < renderer->scene->lamp_count && result == NEBEL_OK; i++) {
-        const nebel_lamp *lamp = &renderer->scene->lamps[i];
+    for (size_t i = 0; i < renderer->scene->light_count && result == NEBEL_OK; i++) {
+        const nebel_light *lamp = &renderer->scene->lights[i];
         nb_lamp_ways_set(lamp, &starts, &scratch->hits, &scratch->points, &scratch->lamp);
         nb_lamp_ways_shadow(geometry->scene, &scratch->points, &scratch->lamp, &scratch->packets);
         if (!is_lit_anywhere(&scratch->lamp)) continue;
@@ -319,9 +319,9 @@ static void set_colors_by_direction(const nb_lighting *lighting, nb_scratch *scr
         for (int c = 0; c < 3; c++)
             direction[c] = is_surface ? (double)scratch->points.normal[c][i] : scratch->rays.direction[c][i];
         if (is_surface)
-            nebel_environment_reflected(&lighting->environment, direction, light);
+            nebel_evaluate_environment_diffuse(&lighting->environment, direction, light);
         else if (lighting->shows_ambient)
-            nebel_environment_radiance(&lighting->environment, direction, light);
+            nebel_evaluate_environment(&lighting->environment, direction, light);
         for (int c = 0; c < 3; c++) {
             const float ambient = (float)light[c];
             const float reflected = scratch->points.reflectance[c][i] * (samples->color[c][i] + ambient);
@@ -348,7 +348,7 @@ static void set_colors_in_air(const nb_frame *frame, nb_scratch *scratch)
                 ambient[c] = 0.31830988618379067 * (double)scratch->air.ground.sky[c][i];
             }
             if (surface != NB_GROUND) {
-                nebel_environment_reflected(&frame->lighting.environment, normal, ambient);
+                nebel_evaluate_environment_diffuse(&frame->lighting.environment, normal, ambient);
                 for (int c = 0; c < 3; c++) ambient[c] *= (double)scratch->air.sky_there[c][i];
             }
             for (int c = 0; c < 3; c++)
@@ -467,7 +467,7 @@ nebel_result nb_batch_light(const nb_frame *frame, nb_scratch *scratch)
 nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)
 {
     nb_batch_find(frame, place, sample, scratch);
-    if (frame->renderer->method == NEBEL_METHOD_REFERENCE) return nb_reference_trace(frame, place, scratch);
+    if (frame->renderer->method == NEBEL_METHOD_PATH) return nb_reference_trace(frame, place, scratch);
     find_ground(frame, scratch);
     return nb_batch_light(frame, scratch);
 }

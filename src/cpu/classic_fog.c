@@ -35,7 +35,7 @@ static nb_vertex_fog fog_of_cells(const nb_frame *frame, const double place[3])
     view.ignore_walls = frame->renderer->method == NEBEL_METHOD_CELLS;
     const nebel_cell_point point = {.position = {place[0], place[1], place[2]}};
     nebel_cell_fog fog;
-    if (nebel_fog_cells(frame->renderer->cells, &view, 1, &point, 0, &fog, 0) != NEBEL_OK)
+    if (nebel_compute_cell_fog(frame->renderer->cells, &view, 1, &point, 0, &fog, 0) != NEBEL_OK)
         return (nb_vertex_fog){{0, 0, 0}, 0};
     return (nb_vertex_fog){{(float)fog.color[0], (float)fog.color[1], (float)fog.color[2]}, (float)fog.alpha};
 }
@@ -77,7 +77,8 @@ static nb_vertex_fog fog_of_device(const nb_frame *frame, const nebel_d3d9_verte
     const nebel_d3d9_fog *const d3d9 = &renderer->d3d9;
     const double of_vertex = nebel_compute_d3d9_vertex_factor(d3d9, vertex);
     const int parallel = frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
-    const double depth = parallel ? nb_device_depth(&renderer->device_planes, vertex->place[2]) : vertex->place[2];
+    const double depth =
+        parallel ? nb_device_depth(&renderer->device_planes, vertex->position[2]) : vertex->position[2];
     double color[3];
     nebel_get_d3d9_color(d3d9, color);
     return fog_of_color(1 - nebel_compute_d3d9_pixel_factor(d3d9, of_vertex, depth), color);
@@ -89,9 +90,9 @@ static nb_vertex_fog fog_at(const nb_frame *frame, const double place[3])
     const nebel_method method = renderer->method;
     if (method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_CELLS_PIXEL) return fog_of_cells(frame, place);
     nebel_d3d9_vertex vertex = {.source = NEBEL_D3D9_FIXED};
-    set_eye_coordinates(&frame->view, place, vertex.place);
+    set_eye_coordinates(&frame->view, place, vertex.position);
     if (method == NEBEL_METHOD_D3D9) return fog_of_device(frame, &vertex);
-    return fog_of_coordinate(&renderer->factor, nebel_compute_fog_coordinate(&renderer->factor, vertex.place, 0));
+    return fog_of_coordinate(&renderer->factor, nebel_compute_fog_coordinate(&renderer->factor, vertex.position, 0));
 }
 
 /* ---- fog of the snapshot --------------------------------------------------------------------- */
@@ -204,7 +205,7 @@ static nebel_result trace_vertices(const nb_frame *frame, const nebel_mesh *mesh
     const nebel_vertex_output output = {format, fog + first, sizeof *fog};
     nebel_result result = NEBEL_OK;
     if (renderer->fog != NULL)
-        result = nebel_fog_vertices(renderer->fog, &desc, count, &vertices, &output, 1);
+        result = nebel_compute_vertex_fog(renderer->fog, &desc, count, &vertices, &output, 1);
     else
         memset(fog + first, format == NEBEL_VERTEX_SPECULAR_ALPHA ? 0xff : 0, count * sizeof *fog);
     for (size_t v = first; v < first + count && result == NEBEL_OK; v++) fog[v] = unpack(frame, &fog[v]);

@@ -41,12 +41,12 @@ static void ask(const nb_cloud_scratch *clouds, uint32_t lane, uint32_t count, c
 static nebel_result trace(const nb_frame *frame, nb_air_asked *asked)
 {
     const double *const direction[3] = {asked->direction[0], asked->direction[1], asked->direction[2]};
-    nebel_transfer_planes lights = {.error = NULL};
+    nebel_transfer_planes transfers = {.error = NULL};
     for (int c = 0; c < 3; c++) {
-        lights.transmittance[c] = asked->left[c];
-        lights.in_scattering[c] = asked->light[c];
+        transfers.transmittance[c] = asked->left[c];
+        transfers.in_scattering[c] = asked->light[c];
     }
-    return nb_air_trace(&frame->air, asked->count, direction, asked->t, &lights);
+    return nb_air_trace(&frame->air, asked->count, direction, asked->t, &transfers);
 }
 
 /* ---- shade ----------------------------------------------------------------------------------- */
@@ -57,7 +57,7 @@ static nebel_result trace(const nb_frame *frame, nb_air_asked *asked)
 #define ALIKE_PART 0.05f
 
 /* The shade of those that were asked; begins anew. */
-static nebel_result set_shade(const nb_frame *frame, const nebel_air_shade *shades, nb_cloud_scratch *clouds,
+static nebel_result set_shade(const nb_frame *frame, const nebel_air_shadow *shades, nb_cloud_scratch *clouds,
                               nb_air_asked *asked)
 {
     if (asked->count == 0) return NEBEL_OK;
@@ -77,13 +77,13 @@ static nebel_result set_shade(const nb_frame *frame, const nebel_air_shade *shad
 static nebel_result find_shade(const nb_frame *frame, const int is_own[NB_BATCH], nb_cloud_scratch *clouds)
 {
     nebel_result result = NEBEL_OK;
-    nebel_air_shade shades[NB_BATCH];
+    nebel_air_shadow shades[NB_BATCH];
     nb_air_asked asked;
     asked.lane_count = asked.count = 0;
     for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
         if (!is_own[i]) continue;
         const nebel_ray ray = nb_cloud_air_ray(frame, clouds, i);
-        result = nebel_shade_air(clouds->workspace, 1, &ray, 0, &shades[i], 0);
+        result = nebel_trace_cloud_shadow_on_air(clouds->workspace, 1, &ray, 0, &shades[i], 0);
         if (result != NEBEL_OK || shades[i].count == 0) continue;
         if (!has_room(&asked, shades[i].count + 1)) result = set_shade(frame, shades, clouds, &asked);
         ask(clouds, i, shades[i].count + 1, shades[i].t, &asked);
@@ -194,7 +194,7 @@ static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_
     const nebel_result result = trace(frame, asked);
     for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
         const uint32_t lane = asked->lanes[i], first = asked->first[i];
-        const nebel_cloud_knots *knots = &clouds->knots[lane];
+        const nebel_cloud_transfer *knots = &clouds->knots[lane];
         nb_cloud_haze *air = &clouds->air[lane];
         for (int c = 0; c < 3; c++)
             for (uint32_t k = 0; k < knots->count; k++) {
@@ -213,7 +213,7 @@ nebel_result nb_cloud_air_find(const nb_frame *frame, const int is_asked[NB_BATC
     nb_air_asked asked;
     asked.lane_count = asked.count = 0;
     for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
-        const nebel_cloud_knots *knots = &clouds->knots[i];
+        const nebel_cloud_transfer *knots = &clouds->knots[i];
         if (!is_asked[i]) continue;
         if (!has_room(&asked, knots->count)) result = set_air(frame, clouds, &asked);
         ask(clouds, i, knots->count, knots->t, &asked);

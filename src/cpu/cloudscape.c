@@ -20,14 +20,14 @@ nebel_result nb_cloudscape_set(nb_frame *frame, const nebel_frame_desc *desc)
     nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
     if (frame->air.count == 0 || scene->planets[0].clouds == NULL) return NEBEL_OK;
-    const nebel_cloud_view_desc view = {.clouds = scene->planets[0].clouds,
-                                        .sun = nb_scene_sun(scene),
-                                        .time = desc->time,
-                                        .tolerance = fmin(1, desc->tolerance),
-                                        .isa = renderer->fog_isa,
-                                        .allocator = renderer->allocator,
-                                        .log = renderer->log};
-    nebel_result result = nebel_create_cloud_view(&view, &frame->cloud_view);
+    const nebel_cloud_lighting_desc view = {.clouds = scene->planets[0].clouds,
+                                            .sun = nb_scene_sun(scene),
+                                            .time = desc->time,
+                                            .tolerance = fmin(1, desc->tolerance),
+                                            .isa = renderer->fog_isa,
+                                            .allocator = renderer->allocator,
+                                            .log = renderer->log};
+    nebel_result result = nebel_create_cloud_lighting(&view, &frame->cloud_view);
     for (int i = 0; i < renderer->threads && result == NEBEL_OK; i++)
         result = nebel_create_cloud_workspace(frame->cloud_view, &renderer->scratch[i].clouds.workspace);
     return result;
@@ -40,7 +40,7 @@ void nb_cloudscape_free(nb_frame *frame)
         nebel_destroy_cloud_workspace(frame->renderer->scratch[i].clouds.workspace);
         frame->renderer->scratch[i].clouds.workspace = NULL;
     }
-    nebel_destroy_cloud_view(frame->cloud_view);
+    nebel_destroy_cloud_lighting(frame->cloud_view);
 }
 
 /* ---- along the middles of pixels ------------------------------------------------------------- */
@@ -105,7 +105,7 @@ static float end_of(const nb_frame *frame, const nb_scratch *scratch, uint32_t l
 /* Whether what was found for another sample of a pixel does for one. */
 static int is_found(const nb_cloud_scratch *clouds, int lane)
 {
-    const nebel_cloud_knots *knots = &clouds->knots[lane];
+    const nebel_cloud_transfer *knots = &clouds->knots[lane];
     const float last = knots->count > 0 ? knots->t[knots->count - 1] : 0;
     return nb_cloud_is_found(knots->count, knots->t[0], last, clouds->reach[lane], clouds->end[lane]);
 }
@@ -226,7 +226,7 @@ static nebel_result choose(const nb_frame *frame, nb_cloud_scratch *clouds, int 
     int is_longer[NB_BATCH] = {0};
     *any = 0;
     for (int i = 0; i < NB_BATCH; i++) {
-        nebel_cloud_knots *knots = &clouds->knots[i];
+        nebel_cloud_transfer *knots = &clouds->knots[i];
         const uint32_t count = knots->count;
         clouds->next[i] = -1;
         if (!clouds->is_new[i]) continue;
@@ -259,11 +259,11 @@ static nebel_result find_fog(const nb_frame *frame, nb_haze_fn haze, nb_scratch 
 /* Of one ray. */
 static void mix_lane(int has_fog, nb_cloud_scratch *clouds, int lane)
 {
-    const nebel_cloud_knots *knots = &clouds->knots[lane];
+    const nebel_cloud_transfer *knots = &clouds->knots[lane];
     const nb_cloud_haze *air = &clouds->air[lane];
     nb_cloud_haze haze = *air;
     for (int c = 0; c < 3; c++) {
-        float over[NEBEL_MAX_CLOUD_KNOTS];
+        float over[NEBEL_MAX_CLOUD_NODES];
         if (has_fog) nb_cloud_haze_add_fog(knots, &clouds->marks[lane], c, air, &haze);
         nb_cloud_haze_sum(knots, c, &haze, over);
         for (uint32_t k = 0; k < knots->count; k++) clouds->over[k][c][lane] = over[k];
@@ -293,7 +293,7 @@ static nebel_result mix(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scra
 static void lay_over(nb_scratch *scratch, int lane)
 {
     const nb_cloud_scratch *clouds = &scratch->clouds;
-    const nebel_cloud_knots *knots = &clouds->knots[lane];
+    const nebel_cloud_transfer *knots = &clouds->knots[lane];
     nb_light_samples *samples = &scratch->samples;
     const float end = clouds->end[lane];
     float part;
@@ -340,8 +340,8 @@ nebel_result nb_cloudscape_shade(const nb_frame *frame, nb_scratch *scratch, flo
         float part;
         if (!scratch->points.lit[i]) continue;
         const double width = find_place(frame, scratch, i, place);
-        const nebel_result result =
-            nebel_shade_clouds(scratch->clouds.workspace, width, 1, (const double(*)[3])place, 0, &part);
+        const nebel_result result = nebel_compute_cloud_sun_transmittance(scratch->clouds.workspace, width, 1,
+                                                                          (const double(*)[3])place, 0, &part);
         if (result != NEBEL_OK) return result;
         for (int c = 0; c < 3; c++) color[c][i] *= part;
     }
@@ -356,8 +356,8 @@ nebel_result nb_cloudscape_shade_sky(const nb_frame *frame, nb_scratch *scratch)
         float part;
         if (surface == NB_NONE || (surface != NB_GROUND && !frame->air.owns_ambient)) continue;
         const double width = find_place(frame, scratch, i, place);
-        const nebel_result result =
-            nebel_shade_sky(scratch->clouds.workspace, width, 1, (const double(*)[3])place, 0, &part);
+        const nebel_result result = nebel_compute_cloud_sky_transmittance(scratch->clouds.workspace, width, 1,
+                                                                          (const double(*)[3])place, 0, &part);
         if (result != NEBEL_OK) return result;
         for (int c = 0; c < 3; c++) {
             scratch->air.ground.sky[c][i] *= part;

@@ -39,7 +39,7 @@ void nb_daylight_at(const nb_daylight *daylight, nb_daylight_of of, const double
     if (height <= daylight->thickness && cosine >= 0) {
         find_sun(daylight, height, cosine, sun);
     } else {
-        const nebel_air_light light = nb_daylight_ask(&daylight->sun, daylight->atmosphere, place);
+        const nebel_irradiance light = nb_daylight_ask(&daylight->sun, daylight->atmosphere, place);
         memcpy(sun, light.sun, sizeof light.sun);
     }
 }

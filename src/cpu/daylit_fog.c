@@ -11,7 +11,7 @@
 /* ---- the frame ------------------------------------------------------------------------------- */
 
 /* Whether two places have another light. */
-static int differ(const nb_air *air, const nebel_air_light *a, const nebel_air_light *b)
+static int differ(const nb_air *air, const nebel_irradiance *a, const nebel_irradiance *b)
 {
     double brightest = 0, sun = 0;
     int sky = 0;
@@ -35,11 +35,11 @@ static int is_even(const nb_air *air, const double min[3], const double max[3])
     for (int c = 0; c < 3; c++)
         if (!(max[c] - min[c] < air->worlds[0].top - air->worlds[0].radius)) return 0;
     find_middle(min, max, middle);
-    const nebel_air_light light = nb_air_ask(air, middle);
+    const nebel_irradiance light = nb_air_ask(air, middle);
     for (int corner = 0; corner < 8; corner++) {
         double place[3];
         for (int c = 0; c < 3; c++) place[c] = (corner >> c & 1) != 0 ? max[c] : min[c];
-        const nebel_air_light there = nb_air_ask(air, place);
+        const nebel_irradiance there = nb_air_ask(air, place);
         if (differ(air, &light, &there)) return 0;
     }
     return 1;
@@ -51,7 +51,8 @@ static nebel_result find_cloud_shade(const nb_frame *frame, float *part)
     static const double origin[1][3] = {{0, 0, 0}};
     *part = 1;
     if (frame->cloud_view == NULL || frame->air.roof.is_shaded) return NEBEL_OK;
-    return nebel_shade_clouds(frame->renderer->scratch[0].clouds.workspace, NB_FOG_SHADE_ORIGIN, 1, origin, 0, part);
+    return nebel_compute_cloud_sun_transmittance(frame->renderer->scratch[0].clouds.workspace, NB_FOG_SHADE_ORIGIN, 1,
+                                                 origin, 0, part);
 }
 
 static void light_at(const nb_air *air, const double place[3], double sun[3], double sky[3])
@@ -67,7 +68,7 @@ static void light_at(const nb_air *air, const double place[3], double sun[3], do
 static void set_even_light(nb_air *air, const nebel_planet *home, const double place[3], nebel_sun *sun)
 {
     static const double origin[3] = {0, 0, 0};
-    const nebel_air_light there = nb_air_ask(air, place);
+    const nebel_irradiance there = nb_air_ask(air, place);
     const nebel_sun bright = {.direction = {air->to_sun[0], air->to_sun[1], air->to_sun[2]}, .irradiance = {1, 1, 1}};
     double around_there[3], around_here[3];
     nb_daylight_around(air->worlds[nb_worlds_nearest(air->worlds, air->count, place)].planet, &bright, place,
@@ -110,29 +111,30 @@ static nebel_result trace_part(const nebel_snapshot *fog, const nebel_ray_planes
                                float *error, float *const light[3])
 {
     float own[NB_BATCH];
-    const nebel_transfer_planes lights = {.in_scattering = {light[0], light[1], light[2]},
-                                          .error = error != NULL ? own : NULL};
-    const nebel_result result = nebel_trace_planes(fog, trace, NB_BATCH, rays, &lights);
+    const nebel_transfer_planes transfers = {.in_scattering = {light[0], light[1], light[2]},
+                                             .error = error != NULL ? own : NULL};
+    const nebel_result result = nebel_trace_planes(fog, trace, NB_BATCH, rays, &transfers);
     for (int i = 0; i < NB_BATCH && error != NULL && result == NEBEL_OK; i++) error[i] += own[i];
     return result;
 }
 
 nebel_result nb_daylit_fog_trace(const nb_frame *frame, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
-                                 const nebel_transfer_planes *lights, nb_air_knots *knot)
+                                 const nebel_transfer_planes *transfers, nb_air_knots *knot)
 {
     const nebel_split_fog *fog = &frame->air.fog;
-    if (!nb_daylit_fog_is(&frame->air)) return nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, rays, lights);
+    if (!nb_daylit_fog_is(&frame->air))
+        return nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, rays, transfers);
     nebel_trace_desc by_sky = *trace, by_sun = *trace;
-    nebel_transfer_planes with_sky = *lights;
-    by_sky.sunlit = by_sky.lamplit = by_sun.lamplit = NULL;
+    nebel_transfer_planes with_sky = *transfers;
+    by_sky.sun_visibility = by_sky.light_visibility = by_sun.light_visibility = NULL;
     for (int c = 0; c < 3; c++) with_sky.in_scattering[c] = knot->fog_sky[c];
     nebel_result result = nebel_trace_planes(fog->sky, &by_sky, NB_BATCH, rays, &with_sky);
     if (result == NEBEL_OK)
-        result = trace_part(fog->sun, rays, &by_sun, lights->error,
+        result = trace_part(fog->sun, rays, &by_sun, transfers->error,
                             (float *const[]){knot->fog_sun[0], knot->fog_sun[1], knot->fog_sun[2]});
     if (fog->own != NULL && result == NEBEL_OK)
-        return trace_part(fog->own, rays, trace, lights->error, lights->in_scattering);
-    for (int c = 0; c < 3; c++) memset(lights->in_scattering[c], 0, NB_BATCH * sizeof(float));
+        return trace_part(fog->own, rays, trace, transfers->error, transfers->in_scattering);
+    for (int c = 0; c < 3; c++) memset(transfers->in_scattering[c], 0, NB_BATCH * sizeof(float));
     return result;
 }
 

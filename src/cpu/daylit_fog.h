@@ -16,7 +16,7 @@ static inline int nb_daylit_fog_is(const nb_air *air)
 /* nebel_trace_planes, of the frame's fog. Where it is daylit, in-scattering is that of its own light, and the others are in
  * the knot. */
 nebel_result nb_daylit_fog_trace(const nb_frame *frame, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
-                                 const nebel_transfer_planes *lights, nb_air_knots *knot);
+                                 const nebel_transfer_planes *transfers, nb_air_knots *knot);
 
 /* What the sun and the sky are at the places of a knot; nothing is asked where that is 0. */
 void nb_daylit_fog_light(const nb_frame *frame, const nb_rays *rays, nb_air_knots *knot);

@@ -65,14 +65,14 @@ static float mean_of(const sum *s, float *doubt, float *within)
 
 nb_shade_between nb_fog_shade_between(const nb_fog_shade *shade, float a, float b)
 {
-    const nebel_fog_shade *const p = &shade->pieces;
+    const nebel_fog_shadow *const p = &shade->pieces;
     nb_shade_between between;
     sum sun = {.range = {HUGE_VALF, -HUGE_VALF}}, sky = sun;
     for (uint32_t k = 0; k < p->count && p->t[k] < b; k++) {
         const float length = fminf(b, p->t[k + 1]) - fmaxf(a, p->t[k]);
         if (!(length > 0)) continue;
-        add(&sun, length, p->sun[k], p->error[k]);
-        add(&sky, length, p->sky[k], p->error[k]);
+        add(&sun, length, p->sun_transmittance[k], p->error[k]);
+        add(&sky, length, p->sky_transmittance[k], p->error[k]);
     }
     /* Fog over clouds. */
     const float over = fminf(b, shade->end) - fmaxf(a, p->t[p->count]);
@@ -87,7 +87,7 @@ nb_shade_between nb_fog_shade_between(const nb_fog_shade *shade, float a, float 
 
 float nb_fog_shade_cut(const nb_fog_shade *shade, float a, float b)
 {
-    const nebel_fog_shade *const p = &shade->pieces;
+    const nebel_fog_shadow *const p = &shade->pieces;
     uint32_t first = 0, end = 0;
     for (uint32_t k = 0; k <= p->count; k++) {
         if (!(p->t[k] > a)) first = k + 1;

@@ -109,7 +109,7 @@ static nebel_result set_air(nb_frame *frame, const nebel_frame_desc *desc)
     nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
     if (scene->planet_count == 0 || scene->planets[0].atmosphere == NULL) return NEBEL_OK;
-    if (renderer->method != NEBEL_METHOD_EXACT && renderer->method != NEBEL_METHOD_REFERENCE)
+    if (renderer->method != NEBEL_METHOD_EXACT && renderer->method != NEBEL_METHOD_PATH)
         return nb_fail(
             &renderer->log, NEBEL_ERROR_UNSUPPORTED,
             "planets are drawn by the methods exact and reference alone: ask for no other method, or leave the "
@@ -117,11 +117,11 @@ static nebel_result set_air(nb_frame *frame, const nebel_frame_desc *desc)
     if (frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
                        "frame: orthographic cameras see no planets; take a perspective one or a panorama");
-    if (renderer->method == NEBEL_METHOD_REFERENCE) return NEBEL_OK;
+    if (renderer->method == NEBEL_METHOD_PATH) return NEBEL_OK;
     const double tolerance = desc->tolerance > 0 ? desc->tolerance : NEBEL_DEFAULT_TOLERANCE;
     frame->air.tolerance = (float)tolerance;
     frame->air.pixel = nb_view_pixel(&frame->view, frame->height);
-    frame->air.has_fog = renderer->fog != NULL && nebel_snapshot_volume_count(renderer->fog) > 0;
+    frame->air.has_fog = renderer->fog != NULL && nebel_get_volume_count(renderer->fog) > 0;
     return nb_air_set(
         &frame->air, scene, &renderer->allocator, &renderer->log, frame->view.position, frame->lighting.sun_direction,
         frame->air.has_fog || scene->planets[0].clouds != NULL || renderer->geometry.scene != NULL, renderer->threads);
@@ -249,7 +249,7 @@ static void render_region(const nb_frame *frame, size_t number, nb_state *state,
     nb_place place = {left, top, 0, 0};
     for (; place.first < NB_PIXELS && top + nb_lane_y(place.first) < frame->height; place.first += NB_BATCH) {
         nb_planes_finish(frame, &place, scratch);
-        if (frame->renderer->method == NEBEL_METHOD_REFERENCE) nb_reference_finish(frame, &place, scratch);
+        if (frame->renderer->method == NEBEL_METHOD_PATH) nb_reference_finish(frame, &place, scratch);
     }
 }
 

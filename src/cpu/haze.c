@@ -295,15 +295,15 @@ static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fo
     const double *const direction[3] = {scratch->rays.direction[0], scratch->rays.direction[1],
                                         scratch->rays.direction[2]};
     nebel_ray_planes rays = *fog;
-    nebel_transfer_planes lights = {.error = NULL}, air = {.error = knot->air_error};
+    nebel_transfer_planes transfers = {.error = NULL}, air = {.error = knot->air_error};
     rays.t_max = knot->at;
     for (int c = 0; c < 3; c++) {
-        lights.transmittance[c] = knot->fog_left[c];
-        lights.in_scattering[c] = knot->fog_light[c];
+        transfers.transmittance[c] = knot->fog_left[c];
+        transfers.in_scattering[c] = knot->fog_light[c];
         air.transmittance[c] = knot->air_left[c];
         air.in_scattering[c] = knot->air_light[c];
     }
-    nebel_result result = nb_daylit_fog_trace(frame, &rays, trace, &lights, knot);
+    nebel_result result = nb_daylit_fog_trace(frame, &rays, trace, &transfers, knot);
     if (nb_daylit_fog_is(&frame->air)) nb_daylit_fog_light(frame, &scratch->rays, knot);
     if (result == NEBEL_OK) result = nb_air_trace(&frame->air, NB_BATCH, direction, knot->at, &air);
     if (result == NEBEL_OK && frame->cloud_view != NULL) shade(&scratch->clouds, knot);
@@ -427,13 +427,14 @@ nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, con
     nb_air_knots *first = &scratch->air.knots[0];
     const double *const direction[3] = {scratch->rays.direction[0], scratch->rays.direction[1],
                                         scratch->rays.direction[2]};
-    nebel_transfer_planes lights = {.error = first->air_error};
+    nebel_transfer_planes transfers = {.error = first->air_error};
     for (int c = 0; c < 3; c++) {
-        lights.transmittance[c] = first->air_left[c];
-        lights.in_scattering[c] = first->air_light[c];
+        transfers.transmittance[c] = first->air_left[c];
+        transfers.in_scattering[c] = first->air_light[c];
     }
     set_first(frame, scratch);
-    nebel_result result = nb_air_trace(&frame->air, NB_BATCH, direction, frame->air.ends ? first->at : NULL, &lights);
+    nebel_result result =
+        nb_air_trace(&frame->air, NB_BATCH, direction, frame->air.ends ? first->at : NULL, &transfers);
     if (result == NEBEL_OK && frame->cloud_view != NULL) shade(&scratch->clouds, first);
     if (fog == NULL) {
         take_air(scratch);

@@ -378,9 +378,9 @@ nebel_result nb_lamp_shafts_find(nb_lamp_shafts *shafts, const nebel_allocator *
         uint32_t *numbers = shafts->numbers + i * (NB_BATCH + 1);
         if (!find_lamp(&shafts->shafts, allocator, tree, &lamp, from, to, rays, advance, numbers))
             return NEBEL_ERROR_MEMORY;
-        shafts->pieces[i].first = numbers;
+        shafts->pieces[i].offsets = numbers;
     }
-    for (size_t i = 0; i < count; i++) shafts->pieces[i].toggles = shafts->shafts.toggles;
+    for (size_t i = 0; i < count; i++) shafts->pieces[i].boundaries = shafts->shafts.toggles;
     return NEBEL_OK;
 }
 

@@ -12,7 +12,7 @@ typedef struct nb_lamp_shafts {
     nb_shafts shafts;  /* the toggles of all lamps */
     uint32_t *numbers; /* the member `first` of all pieces */
     size_t number_capacity;
-    nebel_lit_pieces *pieces; /* one for each lamp of the fog: what nebel_trace_desc.lamplit takes */
+    nebel_ray_visibility *pieces; /* one for each lamp of the fog: what nebel_trace_desc.lamplit takes */
     size_t piece_capacity;
 } nb_lamp_shafts;
 

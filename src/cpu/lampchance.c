@@ -13,9 +13,9 @@ static double largest(const double rgb[3])
 /* ---- places ---------------------------------------------------------------------------------- */
 
 /* The part of its light that a spot sends off its axis. */
-static double cone_of(const nebel_lamp *lamp, const double direction[3])
+static double cone_of(const nebel_light *lamp, const double direction[3])
 {
-    if (lamp->type != NEBEL_LAMP_SPOT) return 1;
+    if (lamp->type != NEBEL_LIGHT_SPOT) return 1;
     const double outer = cos(lamp->outer_angle * (PI / 180)), inner = cos(lamp->inner_angle * (PI / 180));
     double axis[3] = {lamp->direction[0], lamp->direction[1], lamp->direction[2]};
     (void)nb_vector_make_unit(axis);
@@ -26,7 +26,7 @@ static double cone_of(const nebel_lamp *lamp, const double direction[3])
     return s * s * (3 - 2 * s);
 }
 
-nb_lamp_sight nb_lamp_sight_from(const nebel_lamp *lamp, const double place[3])
+nb_lamp_sight nb_lamp_sight_from(const nebel_light *lamp, const double place[3])
 {
     nb_lamp_sight sight;
     for (int i = 0; i < 3; i++) sight.direction[i] = lamp->position[i] - place[i];
@@ -42,7 +42,7 @@ nb_lamp_sight nb_lamp_sight_from(const nebel_lamp *lamp, const double place[3])
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
-nb_passing nb_passing_of(const nebel_lamp *lamp, const nebel_ray *ray)
+nb_passing nb_passing_of(const nebel_light *lamp, const nebel_ray *ray)
 {
     double to_lamp[3], aside[3];
     for (int i = 0; i < 3; i++) to_lamp[i] = lamp->position[i] - ray->origin[i];
@@ -69,12 +69,12 @@ double nb_passing_density(const nb_passing *p, double t)
 
 /* ---- one of many ----------------------------------------------------------------------------- */
 
-double nb_lamp_weight_at(const nebel_lamp *lamp, const nebel_ray *ray)
+double nb_lamp_weight_at(const nebel_light *lamp, const nebel_ray *ray)
 {
     return largest(lamp->intensity) * nb_lamp_sight_from(lamp, ray->origin).fluence;
 }
 
-double nb_lamp_weight_along(const nebel_lamp *lamp, const nebel_ray *ray)
+double nb_lamp_weight_along(const nebel_light *lamp, const nebel_ray *ray)
 {
     const nb_passing passing = nb_passing_of(lamp, ray);
     return largest(lamp->intensity) * passing.angle / passing.aside;
@@ -83,18 +83,18 @@ double nb_lamp_weight_along(const nebel_lamp *lamp, const nebel_ray *ray)
 double nb_lamps_sum(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray)
 {
     double sum = 0;
-    for (size_t i = 0; i < scene->lamp_count; i++) sum += weigh(&scene->lamps[i], ray);
+    for (size_t i = 0; i < scene->light_count; i++) sum += weigh(&scene->lights[i], ray);
     return sum;
 }
 
-const nebel_lamp *nb_lamps_choose(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray, double sum,
-                                  double chance)
+const nebel_light *nb_lamps_choose(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray,
+                                   double sum, double chance)
 {
-    const nebel_lamp *chosen = NULL;
+    const nebel_light *chosen = NULL;
     double left = chance * sum;
-    for (size_t i = 0; i < scene->lamp_count && (chosen == NULL || left >= 0); i++) {
-        const double weight = weigh(&scene->lamps[i], ray);
-        if (weight > 0) chosen = &scene->lamps[i]; /* the last one, where rounding leaves some */
+    for (size_t i = 0; i < scene->light_count && (chosen == NULL || left >= 0); i++) {
+        const double weight = weigh(&scene->lights[i], ray);
+        if (weight > 0) chosen = &scene->lights[i]; /* the last one, where rounding leaves some */
         left -= weight;
     }
     return chosen;
@@ -103,9 +103,9 @@ const nebel_lamp *nb_lamps_choose(const nebel_scene_data *scene, nb_lamp_weigh *
 double nb_lamps_density(const nebel_scene_data *scene, const nebel_ray *ray, double sum, double t)
 {
     double density = 0;
-    for (size_t i = 0; i < scene->lamp_count; i++) {
-        const nb_passing passing = nb_passing_of(&scene->lamps[i], ray);
-        const double part = nb_lamp_weight_along(&scene->lamps[i], ray) / sum;
+    for (size_t i = 0; i < scene->light_count; i++) {
+        const nb_passing passing = nb_passing_of(&scene->lights[i], ray);
+        const double part = nb_lamp_weight_along(&scene->lights[i], ray) / sum;
         if (part > 0) density += part * nb_passing_density(&passing, t);
     }
     return density;

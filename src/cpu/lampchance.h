@@ -14,20 +14,20 @@ typedef struct nb_lamp_sight {
 } nb_lamp_sight;
 
 /* Before anything that is in the way. Of a lamp without a radius, and nearer than 1 mm, as everywhere. */
-nb_lamp_sight nb_lamp_sight_from(const nebel_lamp *lamp, const double place[3]);
+nb_lamp_sight nb_lamp_sight_from(const nebel_light *lamp, const double place[3]);
 
 /* What a lamp weighs among others where one of them is chosen: at the ray's origin, by the light that it brings there;
  * along the ray up to t_max, by what its light would add up to, were there no cone and the fog thin and even. */
-typedef double nb_lamp_weigh(const nebel_lamp *lamp, const nebel_ray *ray);
-double nb_lamp_weight_at(const nebel_lamp *lamp, const nebel_ray *ray);
-double nb_lamp_weight_along(const nebel_lamp *lamp, const nebel_ray *ray);
+typedef double nb_lamp_weigh(const nebel_light *lamp, const nebel_ray *ray);
+double nb_lamp_weight_at(const nebel_light *lamp, const nebel_ray *ray);
+double nb_lamp_weight_along(const nebel_light *lamp, const nebel_ray *ray);
 
 /* Of all lamps together. */
 double nb_lamps_sum(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray);
 
 /* The lamp that 0 <= chance < 1 falls to, each as often as its part of `sum`, which is more than 0. */
-const nebel_lamp *nb_lamps_choose(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray, double sum,
-                                  double chance);
+const nebel_light *nb_lamps_choose(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray,
+                                   double sum, double chance);
 
 /* A ray from its origin to t_max, which is finite, as a lamp sees it pass. */
 typedef struct nb_passing {
@@ -37,7 +37,7 @@ typedef struct nb_passing {
     double t_max;
 } nb_passing;
 
-nb_passing nb_passing_of(const nebel_lamp *lamp, const nebel_ray *ray);
+nb_passing nb_passing_of(const nebel_light *lamp, const nebel_ray *ray);
 
 /* Equiangular sampling: Kulla and Fajardo, "Importance Sampling Techniques for Path Tracing in Participating Media",
  * 2012, section 4. A place from 0 <= chance < 1, m along the ray, and the density of such places, 1/m. */

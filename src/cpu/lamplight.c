@@ -11,9 +11,9 @@ typedef struct cone {
     float axis[3], edge, rise;
 } cone;
 
-static cone cone_of(const nebel_lamp *lamp)
+static cone cone_of(const nebel_light *lamp)
 {
-    if (lamp->type != NEBEL_LAMP_SPOT) return (cone){{0, 0, 0}, -1, 1e30f}; /* everything is within */
+    if (lamp->type != NEBEL_LIGHT_SPOT) return (cone){{0, 0, 0}, -1, 1e30f}; /* everything is within */
     const double edge = cos(lamp->outer_angle * (PI / 180)), inner = cos(lamp->inner_angle * (PI / 180));
     const double *d = lamp->direction, length = hypot(hypot(d[0], d[1]), d[2]);
     return (cone){{(float)(d[0] / length), (float)(d[1] / length), (float)(d[2] / length)},
@@ -51,7 +51,7 @@ NB_CLONES static void set_ways(const cone *within, float radius, float clear, co
     }
 }
 
-void nb_lamp_ways_set(const nebel_lamp *lamp, const nb_starts *starts, const nb_hits *hits, const nb_points *points,
+void nb_lamp_ways_set(const nebel_light *lamp, const nb_starts *starts, const nb_hits *hits, const nb_points *points,
                       nb_lamp_ways *ways)
 {
     const cone within = cone_of(lamp);

@@ -14,7 +14,7 @@ typedef struct nb_lamp_ways {
 } nb_lamp_ways;
 
 /* Lanes are lit where they are hits, the lamp is above shading normal and triangle, and within the lamp's cone. */
-void nb_lamp_ways_set(const nebel_lamp *lamp, const nb_starts *starts, const nb_hits *hits, const nb_points *points,
+void nb_lamp_ways_set(const nebel_light *lamp, const nb_starts *starts, const nb_hits *hits, const nb_points *points,
                       nb_lamp_ways *ways);
 
 /* Lanes behind a surface are no longer lit. */

@@ -19,39 +19,41 @@ static int is_grey(const double rgb[3])
 int nb_media_are_grey(const nb_media *media)
 {
     for (int i = 0; i < media->planet_count; i++) {
-        const nebel_atmosphere_desc *desc = &media->planets[i].world.planet->air;
-        for (uint32_t k = 0; k < desc->air_count; k++) {
+        const nebel_atmosphere_desc *desc = &media->planets[i].world.planet->atmosphere_desc;
+        for (uint32_t k = 0; k < desc->component_count; k++) {
             double extinction[3];
-            for (int c = 0; c < 3; c++) extinction[c] = desc->airs[k].scattering[c] + desc->airs[k].absorption[c];
+            for (int c = 0; c < 3; c++)
+                extinction[c] = desc->components[k].scattering[c] + desc->components[k].absorption[c];
             if (!is_grey(extinction)) return 0;
         }
         if (!nb_planet_medium_is_grey(&media->planets[i])) return 0;
     }
-    return media->fog == NULL || nebel_is_fog_grey(media->fog);
+    return media->fog == NULL || nebel_is_extinction_gray(media->fog);
 }
 
 /* ---- places ---------------------------------------------------------------------------------- */
 
-static void add_planet(const nb_planet_matter *planet, nebel_matter *all)
+static void add_planet(const nb_planet_matter *planet, nebel_medium_properties *all)
 {
-    const nebel_atmosphere_desc *desc = &planet->medium->world.planet->air;
+    const nebel_atmosphere_desc *desc = &planet->medium->world.planet->atmosphere_desc;
     for (int c = 0; c < 3; c++) {
-        for (uint32_t k = 0; k < desc->air_count; k++) {
-            const double scattering = planet->density[k] * desc->airs[k].scattering[c];
+        for (uint32_t k = 0; k < desc->component_count; k++) {
+            const double scattering = planet->density[k] * desc->components[k].scattering[c];
             all->scattering[c] += scattering;
-            all->extinction[c] += scattering + planet->density[k] * desc->airs[k].absorption[c];
+            all->extinction[c] += scattering + planet->density[k] * desc->components[k].absorption[c];
         }
         all->scattering[c] += planet->clouds;
         all->extinction[c] += planet->clouds;
     }
 }
 
-nebel_result nb_media_look(const nb_media *media, const nebel_place *place, nb_media_part part, nb_matter *matter)
+nebel_result nb_media_look(const nb_media *media, const nebel_sample_point *place, nb_media_part part,
+                           nb_matter *matter)
 {
     nebel_result result = NEBEL_OK;
     memset(matter, 0, sizeof *matter);
     if (media->fog != NULL)
-        result = nebel_sample_fog(media->fog, 1, place, sizeof *place, &matter->all, sizeof matter->all);
+        result = nebel_sample_medium(media->fog, 1, place, sizeof *place, &matter->all, sizeof matter->all);
     memcpy(matter->fog, matter->all.scattering, sizeof matter->fog);
     for (int i = 0; i < media->planet_count && matter->planet.medium == NULL; i++)
         matter->planet = nb_planet_matter_at(&media->planets[i], place->position, part == NB_MEDIA_ALL);
@@ -67,7 +69,7 @@ void nb_media_walk_start(const nb_media *media, const nebel_ray *ray, int ignore
     walk->media = media;
     walk->ray = ray;
     walk->ignore_distances = ignore_distances;
-    walk->fog = (nebel_bound){.end = media->fog != NULL ? 0 : HUGE_VAL};
+    walk->fog = (nebel_majorant_segment){.end = media->fog != NULL ? 0 : HUGE_VAL};
     for (int i = 0; i < media->planet_count; i++)
         nb_planet_walk_start(&media->planets[i], ray, part == NB_MEDIA_ALL, &walk->planets[i]);
 }
@@ -98,7 +100,7 @@ nebel_result nb_media_walk_to(nb_media_walk *walk, double t)
 {
     nebel_result result = NEBEL_OK;
     if (walk->fog.end <= t)
-        result = nebel_bound_fog(walk->media->fog, walk->ray, walk->ignore_distances, t, &walk->fog);
+        result = nebel_next_majorant(walk->media->fog, walk->ray, walk->ignore_distances, t, &walk->fog);
     for (int i = 0; i < walk->media->planet_count; i++) nb_planet_walk_to(&walk->planets[i], t);
     sum_bounds(walk);
     return result;
@@ -111,7 +113,7 @@ double nb_media_air_transmittance(const nb_media *media, const nebel_ray *ray, i
         nebel_transfer transfer;
         memset(&transfer, 0, sizeof transfer);
         /* Rays are in order, so that it cannot fail. */
-        (void)nebel_trace_air(media->planets[i].world.planet->atmosphere, NULL, 1, ray, 0, &transfer, 0);
+        (void)nebel_trace_atmosphere(media->planets[i].world.planet->atmosphere, NULL, 1, ray, 0, &transfer, 0);
         left *= (double)transfer.transmittance[channel];
     }
     return left;
@@ -136,14 +138,15 @@ static void choose_of_planet(const nb_planet_matter *planet, double all, int cha
                              nb_scatterer *scatterer)
 {
     const nb_planet_medium *medium = planet->medium;
-    const nebel_atmosphere_desc *desc = &medium->world.planet->air;
-    for (uint32_t k = 0; k < desc->air_count; k++) {
+    const nebel_atmosphere_desc *desc = &medium->world.planet->atmosphere_desc;
+    for (uint32_t k = 0; k < desc->component_count; k++) {
         double scattering[3];
-        for (int c = 0; c < 3; c++) scattering[c] = planet->density[k] * desc->airs[k].scattering[c];
+        for (int c = 0; c < 3; c++) scattering[c] = planet->density[k] * desc->components[k].scattering[c];
         const double part = part_of(scattering, channel);
         if (!(part > 0)) continue;
         /* The last one is kept where rounding leaves some of the chance. */
-        *scatterer = (nb_scatterer){.phase = desc->airs[k].phase, .turns = &medium->airs[k], .probability = part / all};
+        *scatterer =
+            (nb_scatterer){.phase = desc->components[k].phase, .turns = &medium->airs[k], .probability = part / all};
         memcpy(scatterer->scattering, scattering, sizeof scattering);
         if (falls_on(part, &chance)) return;
     }
@@ -154,8 +157,8 @@ static void choose_of_planet(const nb_planet_matter *planet, double all, int cha
     memcpy(scatterer->scattering, clouds, sizeof clouds);
 }
 
-nebel_result nb_media_choose(const nb_media *media, const nebel_place *place, const nb_matter *matter, int channel,
-                             double chance, nb_scatterer *scatterer)
+nebel_result nb_media_choose(const nb_media *media, const nebel_sample_point *place, const nb_matter *matter,
+                             int channel, double chance, nb_scatterer *scatterer)
 {
     const double all = part_of(matter->all.scattering, channel), fog = part_of(matter->fog, channel);
     memset(scatterer, 0, sizeof *scatterer);
@@ -167,7 +170,7 @@ nebel_result nb_media_choose(const nb_media *media, const nebel_place *place, co
     }
     nebel_scatterer chosen;
     const double within = fog < all ? fmin(left / fog, 1 - 0x1p-53) : chance;
-    const nebel_result result = nebel_choose_scatterer(media->fog, place, channel, within, &chosen);
+    const nebel_result result = nebel_sample_scatterer(media->fog, place, channel, within, &chosen);
     if (result != NEBEL_OK) return result;
     scatterer->phase = chosen.phase;
     scatterer->probability = chosen.probability * (fog / all);
@@ -178,7 +181,7 @@ nebel_result nb_media_choose(const nb_media *media, const nebel_place *place, co
 double nb_scatterer_value(const nb_scatterer *scatterer, double cosine)
 {
     return scatterer->turns != NULL ? nb_turns_value(scatterer->turns, cosine)
-                                    : nebel_phase_value(&scatterer->phase, cosine);
+                                    : nebel_evaluate_phase(&scatterer->phase, cosine);
 }
 
 /* ---- grounds --------------------------------------------------------------------------------- */

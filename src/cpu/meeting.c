@@ -105,7 +105,7 @@ void nb_meeting_end_at_ground(const nb_path_world *world, nebel_ray *ray, nb_mee
     *meeting = (nb_meeting){.t = hit.t, .is_ground = 1};
     ray->t_max = hit.t;
     for (int c = 0; c < 3; c++) {
-        meeting->reflectance[c] = (float)hit.world->planet->air.ground_albedo[c];
+        meeting->reflectance[c] = (float)hit.world->planet->atmosphere_desc.ground_albedo[c];
         meeting->normal[c] = meeting->side[c] = (float)hit.normal[c];
         meeting->place[c] = hit.place[c];
     }

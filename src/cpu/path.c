@@ -121,7 +121,7 @@ typedef struct lit_ray {
 
 /* A lamp that was chosen for a place, as often as its probability says. */
 typedef struct chosen_lamp {
-    const nebel_lamp *lamp; /* NULL: none shines there */
+    const nebel_light *lamp; /* NULL: none shines there */
     nb_lamp_sight sight;
     double probability;
 } chosen_lamp;
@@ -129,7 +129,7 @@ typedef struct chosen_lamp {
 static lit_ray light_ray(const nb_path_world *world, const nb_track *track)
 {
     lit_ray lit = {.track = *track, .sum = 0};
-    if (nb_media_are_empty(&world->media) || world->scene->lamp_count == 0) return lit;
+    if (nb_media_are_empty(&world->media) || world->scene->light_count == 0) return lit;
     lit.track.ray.t_max = nb_track_reach(&track->ray);
     lit.sum = nb_lamps_sum(world->scene, nb_lamp_weight_along, &lit.track.ray);
     return lit;
@@ -141,7 +141,7 @@ static chosen_lamp choose_lamp(path *p, const double place[3])
     const nebel_ray here = {.origin = {place[0], place[1], place[2]}};
     const double sum = nb_lamps_sum(scene, nb_lamp_weight_at, &here);
     if (!(sum > 0)) return (chosen_lamp){.lamp = NULL};
-    const nebel_lamp *lamp = nb_lamps_choose(scene, nb_lamp_weight_at, &here, sum, nb_chance_next(&p->chance));
+    const nebel_light *lamp = nb_lamps_choose(scene, nb_lamp_weight_at, &here, sum, nb_chance_next(&p->chance));
     return (chosen_lamp){lamp, nb_lamp_sight_from(lamp, place), nb_lamp_weight_at(lamp, &here) / sum};
 }
 
@@ -159,7 +159,7 @@ static nebel_result add_scattered(path *p, const double place[3], const nb_scatt
 }
 
 /* One of the media that scatter at a place, by chance. */
-static nebel_result choose_scatterer(path *p, const nebel_place *place, const nb_matter *matter,
+static nebel_result choose_scatterer(path *p, const nebel_sample_point *place, const nb_matter *matter,
                                      nb_scatterer *scatterer)
 {
     const nb_path_world *world = p->world;
@@ -192,12 +192,12 @@ static nebel_result add_passing_light(path *p, const lit_ray *lit)
     const nb_path_world *world = p->world;
     if (!(lit->sum > 0)) return NEBEL_OK;
     const nebel_ray *ray = &lit->track.ray;
-    const nebel_lamp *lamp =
+    const nebel_light *lamp =
         nb_lamps_choose(world->scene, nb_lamp_weight_along, ray, lit->sum, nb_chance_next(&p->chance));
     const nb_passing passing = nb_passing_of(lamp, ray);
     nb_track way = lit->track;
     way.ray.t_max = nb_passing_draw(&passing, nb_chance_next(&p->chance));
-    nebel_place place;
+    nebel_sample_point place;
     nb_matter matter;
     nb_scatterer scatterer;
     double transmittance, share[3];
@@ -216,7 +216,7 @@ static nebel_result add_reflected(path *p, const nb_meeting *at)
 {
     const double normal[3] = {(double)at->normal[0], (double)at->normal[1], (double)at->normal[2]};
     const double side[3] = {(double)at->side[0], (double)at->side[1], (double)at->side[2]};
-    if (p->world->scene->lamp_count == 0) return NEBEL_OK;
+    if (p->world->scene->light_count == 0) return NEBEL_OK;
     const chosen_lamp chosen = choose_lamp(p, p->ray.origin);
     const nb_lamp_sight *sight = &chosen.sight;
     if (chosen.lamp == NULL || nb_vector_dot(side, sight->direction) <= 0) return NEBEL_OK;
@@ -229,7 +229,7 @@ static nebel_result add_reflected(path *p, const nb_meeting *at)
 static void add_ambient(path *p)
 {
     double ambient[3];
-    nebel_environment_radiance(&p->world->environment, p->ray.direction, ambient);
+    nebel_evaluate_environment(&p->world->environment, p->ray.direction, ambient);
     add(p, ambient, 1);
 }
 
@@ -292,7 +292,7 @@ static void turn(path *p, const nb_scatterer *scatterer, const double place[3])
     const double chance = nb_chance_next(&p->chance);
     double direction[3];
     if (turns == NULL) {
-        turn_about(p->ray.direction, nebel_phase_sample(&scatterer->phase, chance), &p->chance, direction);
+        turn_about(p->ray.direction, nebel_sample_phase(&scatterer->phase, chance), &p->chance, direction);
         p->promise = 1;
         head(p, place, direction, 1);
         return;

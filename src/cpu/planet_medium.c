@@ -13,8 +13,8 @@
 static void set_turns(nb_turns *turns, const nebel_phase *phase)
 {
     turns->phase = *phase;
-    turns->is_peaked = nebel_phase_value(phase, 1) > PEAK;
-    for (int i = 0; i <= NB_TURNS; i++) turns->cosines[i] = nebel_phase_sample(phase, (double)i / NB_TURNS);
+    turns->is_peaked = nebel_evaluate_phase(phase, 1) > PEAK;
+    for (int i = 0; i <= NB_TURNS; i++) turns->cosines[i] = nebel_sample_phase(phase, (double)i / NB_TURNS);
     turns->cosines[0] = -1;
     turns->cosines[NB_TURNS] = 1;
 }
@@ -46,7 +46,7 @@ static void set_drops(nb_turns *turns, const nebel_clouds *clouds, uint32_t laye
 double nb_turns_value(const nb_turns *turns, double cosine)
 {
     double values[3] = {0, 0, 0};
-    if (turns->clouds == NULL) return nebel_phase_value(&turns->phase, cosine);
+    if (turns->clouds == NULL) return nebel_evaluate_phase(&turns->phase, cosine);
     /* Cosines and layers are in order, so that it cannot fail. */
     (void)nebel_cloud_phase(turns->clouds, turns->layer, 1, &cosine, &values);
     return values[turns->color];
@@ -72,16 +72,16 @@ double nb_turns_density(const nb_turns *turns, double cosine)
 /* ---- air ------------------------------------------------------------------------------------- */
 
 /* docs/planet.md: e^(-height / scale height), or straight lines from a layer's middle. */
-static double density_at(const nebel_air *air, double height)
+static double density_at(const nebel_atmosphere_component *air, double height)
 {
-    if (air->profile == NEBEL_AIR_EXPONENTIAL) return exp(-height / air->scale_height);
-    return fmax(0, 1 - fabs(height - air->middle) / air->width);
+    if (air->profile == NEBEL_COMPONENT_EXPONENTIAL) return exp(-height / air->scale_height);
+    return fmax(0, 1 - fabs(height - air->center_height) / air->half_width);
 }
 
 /* Between two heights. */
-static double most_density(const nebel_air *air, double low, double high)
+static double most_density(const nebel_atmosphere_component *air, double low, double high)
 {
-    if (air->profile == NEBEL_AIR_LAYER) return density_at(air, fmin(fmax(air->middle, low), high));
+    if (air->profile == NEBEL_COMPONENT_TENT) return density_at(air, fmin(fmax(air->center_height, low), high));
     return density_at(air, low);
 }
 
@@ -99,12 +99,12 @@ static void add_shell(nb_shells *shells, double radius, double top)
 }
 
 /* Exponentials fall to a third from one shell to the next; light layers are cut at their edges and within. */
-static void cut_air(nb_shells *shells, const nebel_air *air, double ground, double top)
+static void cut_air(nb_shells *shells, const nebel_atmosphere_component *air, double ground, double top)
 {
     for (int i = 0; i < NB_SHELLS_PER_AIR; i++) {
-        const double height = air->profile == NEBEL_AIR_EXPONENTIAL
+        const double height = air->profile == NEBEL_COMPONENT_EXPONENTIAL
                                   ? (i + 1) * air->scale_height
-                                  : air->middle + air->width * (2. * i / (NB_SHELLS_PER_AIR - 1) - 1);
+                                  : air->center_height + air->half_width * (2. * i / (NB_SHELLS_PER_AIR - 1) - 1);
         if (height > 0) add_shell(shells, ground + height, top);
     }
 }
@@ -120,13 +120,13 @@ static void cut_clouds(const nb_planet_medium *medium, nb_shells *shells, double
 /* What is below radii[i] and above the shell before. Below the ground all is as on it. */
 static void bound_shell(const nb_planet_medium *medium, int with_air, nb_shells *shells, int i)
 {
-    const nebel_atmosphere_desc *desc = &medium->world.planet->air;
+    const nebel_atmosphere_desc *desc = &medium->world.planet->atmosphere_desc;
     const double low = fmax(0, i > 0 ? shells->radii[i - 1] - desc->radius : 0);
     const double high = fmax(0, shells->radii[i] - desc->radius);
-    for (uint32_t k = 0; k < desc->air_count && with_air; k++) {
-        const double most = most_density(&desc->airs[k], low, high);
+    for (uint32_t k = 0; k < desc->component_count && with_air; k++) {
+        const double most = most_density(&desc->components[k], low, high);
         for (int c = 0; c < 3; c++)
-            shells->air[i][c] += most * (desc->airs[k].scattering[c] + desc->airs[k].absorption[c]);
+            shells->air[i][c] += most * (desc->components[k].scattering[c] + desc->components[k].absorption[c]);
     }
     for (uint32_t k = 0; k < medium->layer_count; k++) {
         const double middle = 0.5 * (low + high);
@@ -153,23 +153,24 @@ static void set_clouds(nb_planet_medium *medium, const nebel_planet *planet)
 {
     medium->layer_count = planet->clouds != NULL ? planet->cloud_layer_count : 0;
     for (uint32_t k = 0; k < medium->layer_count; k++) {
-        (void)nebel_resolve_cloud_layer(planet->air.thickness, &planet->cloud_layers[k], NULL, &medium->layers[k]);
+        (void)nebel_resolve_cloud_layer(planet->atmosphere_desc.thickness, &planet->cloud_layers[k], NULL,
+                                        &medium->layers[k]);
         for (int c = 0; c < 3; c++) set_drops(&medium->drops[k][c], planet->clouds, k, c);
     }
 }
 
 void nb_planet_medium_set(nb_planet_medium *medium, const nebel_planet *planet, double time)
 {
-    const nebel_atmosphere_desc *desc = &planet->air;
+    const nebel_atmosphere_desc *desc = &planet->atmosphere_desc;
     const double top = desc->radius + desc->thickness;
     memset(medium, 0, sizeof *medium);
     medium->world = nb_world_of(planet);
     medium->time = time;
     set_clouds(medium, planet);
     add_shell(&medium->shells, desc->radius, top);
-    for (uint32_t k = 0; k < desc->air_count; k++) {
-        cut_air(&medium->shells, &desc->airs[k], desc->radius, top);
-        set_turns(&medium->airs[k], &desc->airs[k].phase);
+    for (uint32_t k = 0; k < desc->component_count; k++) {
+        cut_air(&medium->shells, &desc->components[k], desc->radius, top);
+        set_turns(&medium->airs[k], &desc->components[k].phase);
     }
     cut_clouds(medium, &medium->shells, top);
     cut_clouds(medium, &medium->sheets, top);
@@ -180,7 +181,7 @@ void nb_planet_medium_set(nb_planet_medium *medium, const nebel_planet *planet, 
 int nb_planet_medium_is_grey(const nb_planet_medium *medium)
 {
     for (uint32_t k = 0; k < medium->layer_count; k++)
-        if (medium->layers[k].kind != NEBEL_CLOUD_CIRRUS) return 0;
+        if (medium->layers[k].type != NEBEL_CLOUD_CIRRUS) return 0;
     return 1;
 }
 
@@ -195,7 +196,8 @@ static void look_at_clouds(const nb_planet_medium *medium, const double place[3]
         float extinction = 0;
         if (!(height > layer->base && height < layer->top)) continue;
         /* Places and the frame's time are in order, so that it cannot fail. */
-        (void)nebel_cloud_extinction(planet->clouds, medium->time, 0, 1, (const double(*)[3])place, 0, &extinction);
+        (void)nebel_compute_cloud_extinction(planet->clouds, medium->time, 0, 1, (const double(*)[3])place, 0,
+                                             &extinction);
         matter->clouds = (double)extinction;
         matter->layer = (int)k;
     }
@@ -203,14 +205,15 @@ static void look_at_clouds(const nb_planet_medium *medium, const double place[3]
 
 nb_planet_matter nb_planet_matter_at(const nb_planet_medium *medium, const double place[3], int with_air)
 {
-    const nebel_atmosphere_desc *desc = &medium->world.planet->air;
+    const nebel_atmosphere_desc *desc = &medium->world.planet->atmosphere_desc;
     nb_planet_matter matter = {.medium = NULL};
     double from[3];
     for (int c = 0; c < 3; c++) from[c] = place[c] - medium->world.center[c];
     const double height = fmax(0, nb_vector_length(from) - desc->radius);
     if (!(height < desc->thickness)) return matter;
     matter.medium = medium;
-    for (uint32_t k = 0; k < desc->air_count && with_air; k++) matter.density[k] = density_at(&desc->airs[k], height);
+    for (uint32_t k = 0; k < desc->component_count && with_air; k++)
+        matter.density[k] = density_at(&desc->components[k], height);
     look_at_clouds(medium, place, height, &matter);
     return matter;
 }

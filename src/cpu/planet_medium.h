@@ -1,5 +1,5 @@
 /* The air and clouds of a planet as the reference renderer asks for them: what is at a place, and how much there may be on
- * a piece of a ray. Densities come from the description, those of clouds from nebel_cloud_extinction. */
+ * a piece of a ray. Densities come from the description, those of clouds from nebel_compute_cloud_extinction. */
 #ifndef NB_CPU_PLANET_MEDIUM_H
 #define NB_CPU_PLANET_MEDIUM_H
 
@@ -19,7 +19,10 @@ typedef struct nb_turns {
     double cosines[NB_TURNS + 1]; /* from -1 to 1 */
 } nb_turns;
 
-enum { NB_SHELLS_PER_AIR = 17, NB_MEDIUM_SHELLS = 2 + NEBEL_MAX_AIRS * NB_SHELLS_PER_AIR + 2 * NEBEL_MAX_CLOUD_LAYERS };
+enum {
+    NB_SHELLS_PER_AIR = 17,
+    NB_MEDIUM_SHELLS = 2 + NEBEL_MAX_COMPONENTS * NB_SHELLS_PER_AIR + 2 * NEBEL_MAX_CLOUD_LAYERS
+};
 
 /* Spheres about the planet's center, from the ground to the top of the air. */
 typedef struct nb_shells {
@@ -34,16 +37,16 @@ typedef struct nb_planet_medium {
     double time; /* of clouds */
     nebel_cloud_layer layers[NEBEL_MAX_CLOUD_LAYERS];
     uint32_t layer_count;
-    nb_shells shells, sheets;                                        /* sheets: of clouds alone */
-    nb_turns airs[NEBEL_MAX_AIRS], drops[NEBEL_MAX_CLOUD_LAYERS][3]; /* drops: by color */
+    nb_shells shells, sheets;                                              /* sheets: of clouds alone */
+    nb_turns airs[NEBEL_MAX_COMPONENTS], drops[NEBEL_MAX_CLOUD_LAYERS][3]; /* drops: by color */
 } nb_planet_medium;
 
 /* What is at a place. All 0 outside the air. */
 typedef struct nb_planet_matter {
-    const nb_planet_medium *medium; /* NULL: outside */
-    double density[NEBEL_MAX_AIRS]; /* of each kind of air, 1 where its coefficients hold */
-    double clouds;                  /* extinction, which is all scattering [1/m] */
-    int layer;                      /* of these clouds */
+    const nb_planet_medium *medium;       /* NULL: outside */
+    double density[NEBEL_MAX_COMPONENTS]; /* of each kind of air, 1 where its coefficients hold */
+    double clouds;                        /* extinction, which is all scattering [1/m] */
+    int layer;                            /* of these clouds */
 } nb_planet_matter;
 
 /* A walk along a ray from shell to shell, and what the piece that it is in holds at most. */

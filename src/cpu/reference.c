@@ -41,11 +41,11 @@ nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc)
     const nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
     nb_path_world *world = &frame->world;
-    if (renderer->method != NEBEL_METHOD_REFERENCE) return NEBEL_OK;
+    if (renderer->method != NEBEL_METHOD_PATH) return NEBEL_OK;
     if (scene->max_opacity > 0 && scene->max_opacity < 1)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
                        "frame: max_opacity is a look that no light has; the reference cannot show it");
-    const int has_fog = renderer->fog != NULL && nebel_snapshot_volume_count(renderer->fog) > 0;
+    const int has_fog = renderer->fog != NULL && nebel_get_volume_count(renderer->fog) > 0;
     *world = (nb_path_world){.media.fog = has_fog ? renderer->fog : NULL,
                              .scene = scene,
                              .geometry = &renderer->geometry,

@@ -6,20 +6,20 @@
 
 enum { ALIGNMENT = 64, MOST_THREADS = 1024 };
 
-const char *nebel_renderer_libraries(void)
+const char *nebel_cpu_libraries(void)
 {
     return "Embree " RTC_VERSION_STRING;
 }
 
-static nebel_result check(const nebel_scene_data *scene, const nebel_renderer_desc *desc)
+static nebel_result check(const nebel_scene_data *scene, const nebel_cpu_renderer_desc *desc)
 {
     if (scene == NULL) return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "renderer: scene is NULL");
     if (!nb_allocator_is_valid(&desc->allocator)) {
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "renderer: the allocator needs both functions or neither");
     }
-    if (desc->threads < 0 || desc->threads > MOST_THREADS) {
+    if (desc->thread_count < 0 || desc->thread_count > MOST_THREADS) {
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "renderer: %d threads; 0 (all) to %d are possible",
-                       desc->threads, MOST_THREADS);
+                       desc->thread_count, MOST_THREADS);
     }
     if (desc->isa != NEBEL_ISA_DEFAULT && !nebel_isa_available(desc->isa)) {
         return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED, "renderer: instruction set %s is not available here",
@@ -35,7 +35,7 @@ static int count_threads(int wanted)
     return all < MOST_THREADS ? all : MOST_THREADS;
 }
 
-void nebel_run_parts(size_t parts, void (*part)(void *data, size_t i), void *data, void *user)
+void nebel_parallel_for_openmp(size_t parts, void (*part)(void *data, size_t i), void *data, void *user)
 {
     if (part == NULL) return;
     const int *wanted = user;
@@ -70,8 +70,8 @@ static nebel_result set_up(nebel_renderer *renderer, nebel_isa isa)
     return result;
 }
 
-nebel_result nebel_create_renderer(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_renderer_desc *desc,
-                                   nebel_renderer **renderer)
+nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_snapshot *fog,
+                                       const nebel_cpu_renderer_desc *desc, nebel_renderer **renderer)
 {
     if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
     *renderer = NULL;
@@ -86,7 +86,7 @@ nebel_result nebel_create_renderer(const nebel_scene_data *scene, nebel_snapshot
     made->scene = scene;
     made->fog = fog != NULL ? nebel_retain_snapshot(fog) : NULL;
     made->fog_isa = desc->isa;
-    made->threads = count_threads(desc->threads);
+    made->threads = count_threads(desc->thread_count);
     nb_srgb_table_set(&made->table);
     result = set_up(made, desc->isa);
     if (result != NEBEL_OK) {
@@ -112,7 +112,7 @@ nebel_result nebel_set_renderer_fog(nebel_renderer *renderer, nebel_snapshot *fo
 
 /* ---- methods --------------------------------------------------------------------------------- */
 
-const char *nebel_method_word(nebel_method method)
+const char *nebel_method_name(nebel_method method)
 {
     static const char *const words[] = {
         [NEBEL_METHOD_EXACT] = "exact",
@@ -128,7 +128,7 @@ const char *nebel_method_word(nebel_method method)
         [NEBEL_METHOD_TWO_PASS] = "two-pass",
         [NEBEL_METHOD_ALPHA] = "alpha",
         [NEBEL_METHOD_D3D9] = "d3d9",
-        [NEBEL_METHOD_REFERENCE] = "reference",
+        [NEBEL_METHOD_PATH] = "reference",
     };
     _Static_assert(sizeof words / sizeof *words == NEBEL_METHOD_COUNT, "each method has its word");
     return (unsigned)method < NEBEL_METHOD_COUNT ? words[method] : NULL;
@@ -232,7 +232,7 @@ static nebel_result set_numbers(nebel_renderer *renderer, nebel_method method, c
     case NEBEL_METHOD_D3D9:
         return set_d3d9(renderer, desc);
     case NEBEL_METHOD_EXACT:
-    case NEBEL_METHOD_REFERENCE:
+    case NEBEL_METHOD_PATH:
     case NEBEL_METHOD_VERTEX:
     case NEBEL_METHOD_ADDITIVE:
         return NEBEL_OK;
@@ -245,7 +245,7 @@ nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method me
 {
     static const nebel_method_desc nothing = {.factor = NULL};
     if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (method != NEBEL_METHOD_EXACT && method != NEBEL_METHOD_REFERENCE) {
+    if (method != NEBEL_METHOD_EXACT && method != NEBEL_METHOD_PATH) {
         const nebel_result result = make_room_at_vertices(renderer);
         if (result != NEBEL_OK) return result;
     }

@@ -37,7 +37,7 @@ typedef struct nb_sums {
 /* What a thread works in: allocated once, aligned to 64 bytes. */
 /* Shells of a planet, ray by ray, and what is laid over each other. */
 typedef struct nb_shell_scratch {
-    nebel_layer_hits hits[NB_BATCH];
+    nebel_shell_hits hits[NB_BATCH];
     uint32_t most;                          /* of their counts, without the ground */
     float ground[NB_BATCH];                 /* its distance; INFINITY where it is not seen */
     float left[NB_BATCH], sum[3][NB_BATCH]; /* what the shells so far leave, and their light */
@@ -54,13 +54,13 @@ typedef struct nb_cloud_scratch {
     int is_lifted[NB_BATCH], has_lifted[NB_BATCH];
     float reach[NB_BATCH]; /* m, how far they are known */
     int is_new[NB_BATCH];
-    nebel_cloud_knots knots[NB_BATCH];
+    nebel_cloud_transfer knots[NB_BATCH];
     nebel_ray asked[NB_BATCH]; /* one behind the other: rays that clouds are looked for along, and what is found */
     double spreads[NB_BATCH];
-    nebel_cloud_knots found[NB_BATCH];
+    nebel_cloud_transfer found[NB_BATCH];
     nb_shaded_piece shaded[NB_BATCH][NB_SHADED_PIECES]; /* the air */
     uint32_t shaded_count[NB_BATCH];
-    float over[NEBEL_MAX_CLOUD_KNOTS][3][NB_BATCH]; /* what a knot adds to light that came from behind */
+    float over[NEBEL_MAX_CLOUD_NODES][3][NB_BATCH]; /* what a knot adds to light that came from behind */
     nb_cloud_haze air[NB_BATCH];
     nb_cloud_marks marks[NB_BATCH];
     int next[NB_BATCH];    /* the knot to mark; -1: none */
@@ -140,9 +140,9 @@ typedef struct nb_frame {
     uint32_t first_sample, sample_count; /* those of the samples that are rendered */
     nebel_window window;                 /* of the picture that is rendered; the planes are as large */
     nb_air air;
-    const nebel_layers *layers;   /* NULL: none */
-    nebel_cloud_view *cloud_view; /* the same */
-    nebel_layer_view layer_view;
+    const nebel_textured_planet *layers; /* NULL: none */
+    nebel_cloud_lighting *cloud_view;    /* the same */
+    nebel_textured_planet_query layer_view;
     nb_path_world world;       /* of the method REFERENCE */
     nb_planet_medium *planets; /* of the same: those with air; NULL: none */
     uint32_t seed;

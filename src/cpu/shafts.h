@@ -31,7 +31,7 @@ typedef struct nb_shafts {
     size_t sorted_capacity;
     float *toggles; /* m from where fog begins to count, which is before a ray is advanced */
     size_t toggle_count, toggle_capacity;
-    uint32_t first[NB_BATCH + 1]; /* see nebel_lit_pieces */
+    uint32_t first[NB_BATCH + 1]; /* see nebel_ray_visibility */
     size_t by_walls, by_prisms;   /* packets, up to now */
 } nb_shafts;
 

@@ -8,16 +8,17 @@ nebel_result nb_shells_set(nb_frame *frame, const nebel_frame_desc *desc)
     static const double up[3] = {0, 1, 0};
     nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
-    if (scene->planet_count == 0 || scene->planets[0].layers == NULL) return NEBEL_OK;
+    if (scene->planet_count == 0 || scene->planets[0].textured == NULL) return NEBEL_OK;
     if (renderer->method != NEBEL_METHOD_EXACT)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
                        "planets are drawn by the method exact alone: ask for no other method, or leave the planet out");
     const double pixel = nb_view_pixel(&frame->view, frame->height);
-    frame->layers = scene->planets[0].layers;
-    frame->layer_view = (nebel_layer_view){.time = desc->time, .spread = pixel / sqrt((double)frame->samples)};
+    frame->layers = scene->planets[0].textured;
+    frame->layer_view =
+        (nebel_textured_planet_query){.time = desc->time, .pixel_spread = pixel / sqrt((double)frame->samples)};
     /* The pixels of parallel rays do not grow. */
-    if (frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC) frame->layer_view.spread = 0;
-    nebel_environment_reflected(&frame->lighting.environment, up, frame->layer_view.ambient);
+    if (frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC) frame->layer_view.pixel_spread = 0;
+    nebel_evaluate_environment_diffuse(&frame->lighting.environment, up, frame->layer_view.ambient);
     if (!scene->has_sun) return NEBEL_OK;
     memcpy(frame->layer_view.sun.direction, scene->sun_direction, sizeof scene->sun_direction);
     memcpy(frame->layer_view.sun.irradiance, scene->sun_irradiance, sizeof scene->sun_irradiance);
@@ -40,14 +41,14 @@ nebel_result nb_shells_find(const nb_frame *frame, nb_scratch *scratch)
     nb_shell_scratch *shells = &scratch->shells;
     shells->most = 0;
     for (int i = 0; i < NB_BATCH; i++) {
-        nebel_layer_hits *hits = &shells->hits[i];
+        nebel_shell_hits *hits = &shells->hits[i];
         hits->count = 0;
         shells->ground[i] = HUGE_VALF;
         if (!scratch->inside[i]) continue;
         nebel_ray ray = ray_of(frame, &scratch->rays, i);
         if (scratch->hits.surface[i] != NB_NONE)
             ray.t_max = frame->view.advance * (double)scratch->rays.length[i] + (double)scratch->hits.t[i];
-        const nebel_result result = nebel_trace_layers(frame->layers, &frame->layer_view, 1, &ray, 0, hits, 0);
+        const nebel_result result = nebel_trace_textured_planet(frame->layers, &frame->layer_view, 1, &ray, 0, hits, 0);
         if (result != NEBEL_OK) return result;
         if (hits->count > 0 && hits->hits[hits->count - 1].is_ground) {
             hits->count--;
@@ -63,10 +64,10 @@ nebel_result nb_shells_find(const nb_frame *frame, nb_scratch *scratch)
 static void show_ground(const nb_frame *frame, nb_scratch *scratch, int lane)
 {
     const nb_light_samples *samples = &scratch->samples;
-    const nebel_layer_hits *hits = &scratch->shells.hits[lane];
-    const nebel_layer_hit *ground = &hits->hits[hits->count];
+    const nebel_shell_hits *hits = &scratch->shells.hits[lane];
+    const nebel_shell_hit *ground = &hits->hits[hits->count];
     const nebel_ray ray = ray_of(frame, &scratch->rays, lane);
-    const nebel_layers_desc *planet = &frame->renderer->scene->planets[0].shells;
+    const nebel_textured_planet_desc *planet = &frame->renderer->scene->planets[0].textured_desc;
     const double length = (double)scratch->rays.length[lane];
     for (int c = 0; c < 3; c++) {
         const double place = ray.origin[c] + ground->t * ray.direction[c] / length;
@@ -83,13 +84,13 @@ static void add_shell(nb_shell_scratch *shells, uint32_t number)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         if (number >= shells->hits[i].count) continue;
-        const nebel_layer_hit *hit = &shells->hits[i].hits[number];
+        const nebel_shell_hit *hit = &shells->hits[i].hits[number];
         for (int c = 0; c < 3; c++) {
             const float light = shells->light[c][i] - shells->light_before[c][i];
             shells->sum[c][i] += shells->left[i] * (light + shells->fog_left[c][i] * (float)hit->radiance[c]);
             shells->light_before[c][i] = shells->light[c][i];
         }
-        shells->left[i] *= (float)(1 - hit->cover);
+        shells->left[i] *= (float)(1 - hit->opacity);
     }
 }
 
@@ -98,15 +99,15 @@ static nebel_result trace_shell(const nb_frame *frame, const nebel_ray_planes *f
                                 nb_shell_scratch *shells, uint32_t number)
 {
     nebel_ray_planes rays = *fog;
-    nebel_transfer_planes lights = {.error = NULL};
+    nebel_transfer_planes transfers = {.error = NULL};
     for (int i = 0; i < NB_BATCH; i++)
         shells->distance[i] = number < shells->hits[i].count ? (float)shells->hits[i].hits[number].t : 0;
     rays.t_max = shells->distance;
     for (int c = 0; c < 3; c++) {
-        lights.transmittance[c] = shells->fog_left[c];
-        lights.in_scattering[c] = shells->light[c];
+        transfers.transmittance[c] = shells->fog_left[c];
+        transfers.in_scattering[c] = shells->light[c];
     }
-    return nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, &rays, &lights);
+    return nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, &rays, &transfers);
 }
 
 static void start(nb_shell_scratch *shells)

@@ -100,7 +100,8 @@ static nebel_result next_piece(const nb_track *track, nb_media_walk *walk, doubl
     return NEBEL_OK;
 }
 
-nebel_result nb_track_look(const nb_track *track, double t, nb_media_part part, nebel_place *place, nb_matter *matter)
+nebel_result nb_track_look(const nb_track *track, double t, nb_media_part part, nebel_sample_point *place,
+                           nb_matter *matter)
 {
     const nebel_ray *ray = &track->ray;
     for (int i = 0; i < 3; i++) place->position[i] = ray->origin[i] + t * ray->direction[i];
@@ -174,7 +175,7 @@ nebel_result nb_track_transmittance(const nb_track *track, nb_chance *chance, do
         if (result != NEBEL_OK) return result;
         const double rate = walk.extinction[channel], end = fmin(walk.end, reach);
         while ((t += draw_way(rate, chance)) < end) {
-            nebel_place place;
+            nebel_sample_point place;
             nb_matter matter;
             result = nb_track_look(track, t, NB_MEDIA_WITHOUT_AIR, &place, &matter);
             if (result != NEBEL_OK) return result;

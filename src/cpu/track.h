@@ -22,7 +22,7 @@ typedef struct nb_flight {
     int collided;  /* else t_max was reached */
     double t;      /* m; there */
     double weight; /* of what comes from there, mean 1 for the chances of analog flights */
-    nebel_place place;
+    nebel_sample_point place;
     nb_matter matter; /* there */
     double shone[3];  /* what the fog on the way emits towards the start, dimmed */
 } nb_flight;
@@ -31,7 +31,8 @@ typedef struct nb_flight {
 double nb_track_reach(const nebel_ray *ray);
 
 /* The media at t. */
-nebel_result nb_track_look(const nb_track *track, double t, nb_media_part part, nebel_place *place, nb_matter *matter);
+nebel_result nb_track_look(const nb_track *track, double t, nb_media_part part, nebel_sample_point *place,
+                           nb_matter *matter);
 
 /* Delta tracking: Woodcock et al., "Techniques used in the GEM code", 1965. The mean of `collided` times weight is the
  * opacity; that of `shone` the integral of emission times transmittance, which is gathered wherever the bound's rate stops

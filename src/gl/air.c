@@ -23,11 +23,11 @@ enum {
     DAYLIGHT_WORDS = DEPTHS + SKIES
 };
 
-static int are_same(const nb_gl_air *air, const nebel_air_view_desc *desc, const nb_world *worlds, int count,
+static int are_same(const nb_gl_air *air, const nebel_sky_view_desc *desc, const nb_world *worlds, int count,
                     int is_lit)
 {
-    const nebel_air_view_desc *const of = &air->of;
-    int same = air->count == count && of->has_distances == desc->has_distances && (air->light[0] >= 0) == is_lit;
+    const nebel_sky_view_desc *const of = &air->of;
+    int same = air->count == count && of->has_ray_ends == desc->has_ray_ends && (air->light[0] >= 0) == is_lit;
     for (int i = 0; i < count; i++) same = same && air->made[i] == worlds[i].planet->atmosphere;
     for (int c = 0; c < 3; c++)
         same = same && of->position[c] == desc->position[c] && of->sun.direction[c] == desc->sun.direction[c] &&
@@ -37,7 +37,7 @@ static int are_same(const nb_gl_air *air, const nebel_air_view_desc *desc, const
 
 static void forget_views(nb_gl_air *air)
 {
-    for (int i = 0; i < air->count; i++) nebel_destroy_air_view(air->worlds[i].view);
+    for (int i = 0; i < air->count; i++) nebel_destroy_sky_view(air->worlds[i].view);
     air->count = 0;
 }
 
@@ -49,12 +49,12 @@ static void forget_daylight(nb_gl_air *air, const nebel_allocator *allocator)
     }
 }
 
-static nebel_result make_views(nb_gl_air *air, nebel_air_view_desc desc, int count)
+static nebel_result make_views(nb_gl_air *air, nebel_sky_view_desc desc, int count)
 {
     nebel_result result = NEBEL_OK;
     for (int i = 0; i < count && result == NEBEL_OK; i++) {
         desc.atmosphere = air->made[i] = air->worlds[i].planet->atmosphere;
-        result = nebel_create_air_view(&desc, &air->worlds[i].view);
+        result = nebel_create_sky_view(&desc, &air->worlds[i].view);
         if (result == NEBEL_OK) air->count = i + 1;
     }
     if (result != NEBEL_ERROR_ARGUMENT) return result;
@@ -97,7 +97,7 @@ static nebel_result measure(nb_gl_air *air, size_t *total)
     for (int i = 0; i < air->count && result == NEBEL_OK; i++) {
         const nb_world *const world = &air->worlds[i];
         size_t count = 0;
-        result = nebel_pack_air_view(world->view, NULL, 0, &count);
+        result = nebel_pack_sky_view(world->view, NULL, 0, &count);
         air->first[i] = (int)*total;
         air->light[i] = world->daylight != NULL ? (int)count : -1;
         *total += count + (world->daylight != NULL ? DAYLIGHT_WORDS : 0);
@@ -105,20 +105,22 @@ static nebel_result measure(nb_gl_air *air, size_t *total)
     return result;
 }
 
-static void pack_daylight(const nb_daylight *daylight, nebel_word *words)
+static void pack_daylight(const nb_daylight *daylight, nebel_texel_f32 *words)
 {
     const float *const depth = daylight->depth[0][0], *const sky = daylight->sky[0][0];
-    for (int i = 0; i < DEPTHS; i++) words[i] = (nebel_word){{depth[3 * i], depth[3 * i + 1], depth[3 * i + 2], 0}};
-    for (int i = 0; i < SKIES; i++) words[DEPTHS + i] = (nebel_word){{sky[3 * i], sky[3 * i + 1], sky[3 * i + 2], 0}};
+    for (int i = 0; i < DEPTHS; i++)
+        words[i] = (nebel_texel_f32){{depth[3 * i], depth[3 * i + 1], depth[3 * i + 2], 0}};
+    for (int i = 0; i < SKIES; i++)
+        words[DEPTHS + i] = (nebel_texel_f32){{sky[3 * i], sky[3 * i + 1], sky[3 * i + 2], 0}};
 }
 
-static nebel_result pack(const nb_gl_air *air, nebel_word *words, size_t total)
+static nebel_result pack(const nb_gl_air *air, nebel_texel_f32 *words, size_t total)
 {
     nebel_result result = NEBEL_OK;
     for (int i = 0; i < air->count && result == NEBEL_OK; i++) {
-        nebel_word *const own = words + air->first[i];
+        nebel_texel_f32 *const own = words + air->first[i];
         size_t count = 0;
-        result = nebel_pack_air_view(air->worlds[i].view, own, total - (size_t)air->first[i], &count);
+        result = nebel_pack_sky_view(air->worlds[i].view, own, total - (size_t)air->first[i], &count);
         if (air->light[i] >= 0) pack_daylight(air->worlds[i].daylight, own + air->light[i]);
     }
     return result;
@@ -131,7 +133,7 @@ static nebel_result fill(nb_gl_air *air, const nebel_allocator *allocator, const
     nebel_result result = measure(air, &count);
     if (result != NEBEL_OK) return nb_fail(log, result, "the planet's air: %s", nebel_result_text(result));
     const size_t rows = (count + NEBEL_TEXTURE_WIDTH - 1) / NEBEL_TEXTURE_WIDTH;
-    nebel_word *const words = nb_allocate_zero(allocator, rows * NEBEL_TEXTURE_WIDTH, sizeof *words);
+    nebel_texel_f32 *const words = nb_allocate_zero(allocator, rows * NEBEL_TEXTURE_WIDTH, sizeof *words);
     if (words == NULL) return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL: out of memory for the planet's air");
     result = pack(air, words, count);
     if (result == NEBEL_OK)
@@ -147,9 +149,9 @@ nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, con
     nb_world worlds[NEBEL_MAX_PLANETS];
     const int count = nb_worlds_set(worlds, scene, eye);
     /* The ground of one planet ends the air of others. */
-    const nebel_air_view_desc desc = {.sun = nb_scene_sun(scene),
+    const nebel_sky_view_desc desc = {.sun = nb_scene_sun(scene),
                                       .position = {eye[0], eye[1], eye[2]},
-                                      .has_distances = ends || count > 1,
+                                      .has_ray_ends = ends || count > 1,
                                       .run = air->run,
                                       .run_user = air->run_user,
                                       .allocator = *allocator,
@@ -194,10 +196,10 @@ void nb_gl_air_set_worlds(const nb_gl_air *air, unsigned program)
     GLint words[NEBEL_MAX_PLANETS][3];
     GLfloat eyes[NEBEL_MAX_PLANETS][4], sizes[NEBEL_MAX_PLANETS][2], albedos[NEBEL_MAX_PLANETS][3];
     for (int i = 0; i < air->count; i++) {
-        const nebel_atmosphere_desc *const desc = &air->worlds[i].planet->air;
+        const nebel_atmosphere_desc *const desc = &air->worlds[i].planet->atmosphere_desc;
         words[i][0] = air->first[i];
         words[i][1] = air->light[i];
-        words[i][2] = desc->air_count > 0;
+        words[i][2] = desc->component_count > 0;
         look_from(air, &air->worlds[i], eyes[i]);
         sizes[i][0] = (float)desc->radius;
         sizes[i][1] = (float)desc->thickness;

@@ -7,10 +7,10 @@
 #include "base/worlds.h"
 
 typedef struct nb_gl_air {
-    nebel_air_run_fn run; /* for threads; NULL: none */
+    nebel_parallel_for_fn run; /* for threads; NULL: none */
     void *run_user;
     unsigned texture;                                /* all tables, in OpenGL; 0: not made yet */
-    nebel_air_view_desc of;                          /* what they are made of, but for the planet */
+    nebel_sky_view_desc of;                          /* what they are made of, but for the planet */
     const nebel_atmosphere *made[NEBEL_MAX_PLANETS]; /* the same */
     nb_world worlds[NEBEL_MAX_PLANETS];              /* in the order of their tables */
     int count;                                       /* 0: nothing is made */

@@ -9,7 +9,7 @@ const char *nb_air_head(int worlds, char text[NB_AIR_HEAD])
     text[0] = '\0';
     if (worlds > 0)
         (void)snprintf(text, NB_AIR_HEAD,
-                       "#define NEBEL_AIR\n#define SCENE_WORLDS %d\n#define NB_DAYLIGHT_HEIGHTS %d.0\n#define "
+                       "#define NEBEL_SKY_VIEW\n#define SCENE_WORLDS %d\n#define NB_DAYLIGHT_HEIGHTS %d.0\n#define "
                        "NB_DAYLIGHT_SUNS %d.0\n#define NB_DAYLIGHT_SKIES %d.0\n#define NB_DAYLIGHT_TWILIGHT %g\n"
                        "#define NB_DAYLIGHT_OF_SURFACES %d\n#define NB_DAYLIGHT_OF_FOG %d\n",
                        worlds, NB_DAYLIGHT_HEIGHTS, NB_DAYLIGHT_SUNS, NB_DAYLIGHT_SKIES, NB_DAYLIGHT_TWILIGHT,
@@ -18,20 +18,21 @@ const char *nb_air_head(int worlds, char text[NB_AIR_HEAD])
 }
 
 /* The tables of several planets lie in one texture, one behind the other. */
-const char nb_air_words_text[] = "uniform highp sampler2D nebel_air_texture;\n"
-                                 "highp int air_first = 0;\n" /* of the planet that is asked */
-                                 "#define NEBEL_AIR_WORD(i) texelFetch(nebel_air_texture, ivec2((air_first + (i)) & "
-                                 "1023, (air_first + (i)) >> 10), 0)\n"
-                                 /* What fog has of the sun, and of the sky of the origin. */
-                                 "#if defined(PASS_DAYLIGHT) || defined(PASS_SHADE)\n"
-                                 "#define PASS_RELIT\n"
-                                 "highp vec3 fog_sun = vec3(1.0), fog_sky = vec3(1.0);\n"
-                                 "#define NEBEL_SUN_PART fog_sun\n"
-                                 "#define NEBEL_SKY_PART fog_sky\n"
-                                 "#endif\n"
-                                 "#ifdef PASS_DAYLIGHT\n"
-                                 "uniform highp vec3 scene_sun;\n"
-                                 "#endif\n";
+const char nb_air_words_text[] =
+    "uniform highp sampler2D nebel_sky_view_texture;\n"
+    "highp int air_first = 0;\n" /* of the planet that is asked */
+    "#define NEBEL_SKY_VIEW_TEXEL(i) texelFetch(nebel_sky_view_texture, ivec2((air_first + (i)) & "
+    "1023, (air_first + (i)) >> 10), 0)\n"
+    /* What fog has of the sun, and of the sky of the origin. */
+    "#if defined(PASS_DAYLIGHT) || defined(PASS_SHADE)\n"
+    "#define PASS_RELIT\n"
+    "highp vec3 fog_sun = vec3(1.0), fog_sky = vec3(1.0);\n"
+    "#define NEBEL_SUN_SCALE fog_sun\n"
+    "#define NEBEL_ENVIRONMENT_SCALE fog_sky\n"
+    "#endif\n"
+    "#ifdef PASS_DAYLIGHT\n"
+    "uniform highp vec3 scene_sun;\n"
+    "#endif\n";
 
 const char nb_air_worlds_text[] =
     "uniform ivec3 world_words[SCENE_WORLDS];\n" /* of its table; from there on of light at places, -1: none; has it air? */
@@ -44,10 +45,10 @@ const char nb_air_worlds_text[] =
     "{\n"
     "    world = 0;\n"
     "    choose_world(0);\n"
-    "    nebel_ground nearest = nebel_find_ground(direction);\n"
+    "    nebel_ground nearest = nebel_trace_ground(direction);\n"
     "    for (int k = 1; k < SCENE_WORLDS; k++) {\n"
     "        choose_world(k);\n"
-    "        nebel_ground ground = nebel_find_ground(direction);\n"
+    "        nebel_ground ground = nebel_trace_ground(direction);\n"
     "        if (ground.distance < nearest.distance) {\n"
     "            nearest = ground;\n"
     "            world = k;\n"
@@ -131,8 +132,8 @@ const char nb_air_places_text[] =
     "    vec2 h = nb_air_place(sqrt(clamp(height, 0.0, 1.0)) * (NB_DAYLIGHT_HEIGHTS - 1.0), NB_DAYLIGHT_HEIGHTS);\n"
     "    vec2 s = nb_air_place(sqrt(clamp(cosine, 0.0, 1.0)) * (NB_DAYLIGHT_SUNS - 1.0), NB_DAYLIGHT_SUNS);\n"
     "    int at = first + int(h.x) * int(NB_DAYLIGHT_SUNS) + int(s.x), above = at + int(NB_DAYLIGHT_SUNS);\n"
-    "    vec3 low = nb_toward(NEBEL_AIR_WORD(at).xyz, NEBEL_AIR_WORD(at + 1).xyz, s.y);\n"
-    "    vec3 high = nb_toward(NEBEL_AIR_WORD(above).xyz, NEBEL_AIR_WORD(above + 1).xyz, s.y);\n"
+    "    vec3 low = nb_toward(NEBEL_SKY_VIEW_TEXEL(at).xyz, NEBEL_SKY_VIEW_TEXEL(at + 1).xyz, s.y);\n"
+    "    vec3 high = nb_toward(NEBEL_SKY_VIEW_TEXEL(above).xyz, NEBEL_SKY_VIEW_TEXEL(above + 1).xyz, s.y);\n"
     "    return nb_toward(low, high, h.y);\n"
     "}\n"
     /* A sun below the level is seen along the whole level ray through the lowest place of the way to it, but for the part
@@ -141,7 +142,7 @@ const char nb_air_places_text[] =
     "{\n"
     "    float radius = world_sizes[world].x, thickness = world_sizes[world].y;\n"
     "    float height = height_of(radius, power), cosine = rise / (radius + height);\n"
-    "    vec3 own = vec3(0.0), low = vec3(0.0);\n"
+    "    vec3 own = vec3(0), low = vec3(0);\n"
     "    if (height <= thickness) own = daylight_depth(first, height / thickness, abs(cosine));\n"
     "    if (cosine >= 0.0) return exp(-own);\n"
     "    float lowest = height_of(radius, power - rise * rise);\n"
@@ -151,11 +152,11 @@ const char nb_air_places_text[] =
     "}\n"
     "vec3 daylight_sky(int first, int of, float cosine)\n"
     "{\n"
-    "    float spread = sign(cosine) * log(1.0 + abs(cosine) / NB_DAYLIGHT_TWILIGHT) / log(1.0 + 1.0 / "
+    "    float x = sign(cosine) * log(1.0 + abs(cosine) / NB_DAYLIGHT_TWILIGHT) / log(1.0 + 1.0 / "
     "NB_DAYLIGHT_TWILIGHT);\n"
-    "    vec2 s = nb_air_place(0.5 * (spread + 1.0) * (NB_DAYLIGHT_SKIES - 1.0), NB_DAYLIGHT_SKIES);\n"
+    "    vec2 s = nb_air_place(0.5 * (x + 1.0) * (NB_DAYLIGHT_SKIES - 1.0), NB_DAYLIGHT_SKIES);\n"
     "    int at = first + int(NB_DAYLIGHT_HEIGHTS * NB_DAYLIGHT_SUNS) + of * int(NB_DAYLIGHT_SKIES) + int(s.x);\n"
-    "    return exp(nb_toward(NEBEL_AIR_WORD(at).xyz, NEBEL_AIR_WORD(at + 1).xyz, s.y));\n"
+    "    return exp(nb_toward(NEBEL_SKY_VIEW_TEXEL(at).xyz, NEBEL_SKY_VIEW_TEXEL(at + 1).xyz, s.y));\n"
     "}\n"
     /* What is left of the sun, and how much brighter the sky is than at the scene's origin, for whom: those of the planet that is
        nearest by tangents to the balls of air. */
@@ -201,13 +202,13 @@ const char nb_air_pieces_text[] =
     "#endif\n"
     "struct pass_knot { float at; nebel_transfer fog; nebel_transfer air; vec3 sun; vec3 sky; };\n" /* the last two: of daylight */
     /* Goes on with the fog of a ray, up to t. */
-    "nebel_transfer pass_on(inout nb_progress progress, nebel_sight sight, int entry, float t)\n"
+    "nebel_transfer pass_on(inout nb_progress progress, nebel_view_ray sight, int entry, float t)\n"
     "{\n"
     "    if (!nb_is_ray(sight.origin, sight.direction, t)) return nb_clear();\n"
     "#ifdef NEBEL_TILES\n"
-    "    nb_media media = nb_media_of(NEBEL_INDEX(entry), NEBEL_INDEX(entry + 1), true);\n"
+    "    nb_media media = nb_media_of(NEBEL_TILE_ENTRY(entry), NEBEL_TILE_ENTRY(entry + 1), true);\n"
     "#else\n"
-    "    nb_media media = nb_media_of(0, int(NEBEL_WORD(0).x), false);\n"
+    "    nb_media media = nb_media_of(0, int(NEBEL_FOG_TEXEL(0).x), false);\n"
     "#endif\n"
     "    progress.stage = NB_STAGE_WALK;\n"
     "    return nb_trace_further(progress, nb_ray_up_to(sight.origin, sight.direction, t, true), media, true, true);\n"
@@ -260,7 +261,7 @@ const char nb_air_pieces_text[] =
     "}\n";
 
 const char nb_air_haze_text[] =
-    "nebel_transfer pass_haze(nebel_sight sight, int entry)\n"
+    "nebel_transfer pass_haze(nebel_view_ray sight, int entry)\n"
     "{\n"
     "    nb_progress progress = nb_open_progress();\n"
     "    pass_knot from, here;\n"

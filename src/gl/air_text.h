@@ -1,4 +1,4 @@
-/* Texts of the air of planets, behind the fog's text with NEBEL_AIR and SCENE_WORLDS, the number of planets. */
+/* Texts of the air of planets, behind the fog's text with NEBEL_SKY_VIEW and SCENE_WORLDS, the number of planets. */
 #ifndef NB_GL_AIR_TEXT_H
 #define NB_GL_AIR_TEXT_H
 

@@ -60,8 +60,8 @@ nebel_result nb_camera_look(const nebel_camera *camera, uint32_t width, uint32_t
     return NEBEL_OK;
 }
 
-nebel_result nebel_gl_camera_view(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
-                                  nebel_view *view)
+nebel_result nebel_view_from_camera(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
+                                    nebel_view *view)
 {
     const nebel_log silent = {0};
     if (log == NULL) log = &silent;

@@ -7,7 +7,7 @@
 
 #include <nebel/gl_render.h>
 
-/* The view of a camera as nebel_gl_camera_view makes it; of a panorama its size and eye_from_world alone, clip_from_eye
+/* The view of a camera as nebel_view_from_camera makes it; of a panorama its size and eye_from_world alone, clip_from_eye
  * 0. */
 nebel_result nb_camera_look(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
                             nebel_view *view);

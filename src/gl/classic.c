@@ -34,7 +34,7 @@ static const char text[] = "#ifdef GL_ES\n"
                            "    return vec4(color, clamp(amount, 0.0, 1.0));\n"
                            "}\n";
 
-const char *nebel_gl_classic_text(void)
+const char *nebel_gl_classic_shader_source(void)
 {
     return text;
 }
@@ -129,7 +129,7 @@ void nebel_destroy_gl_classic(nebel_gl_classic *classic)
     nb_release(&allocator, classic);
 }
 
-nebel_gl_classic_kind nebel_gl_classic_method(const nebel_gl_classic *classic)
+nebel_gl_classic_kind nebel_gl_get_classic_method(const nebel_gl_classic *classic)
 {
     if (classic == NULL) return NEBEL_GL_CLASSIC_FOG_COORD;
     return classic->kind;
@@ -244,7 +244,7 @@ static void end_pass(const nebel_gl_classic *classic)
     if (classic->context.version != 0) nb_blending_restore(&classic->context, &classic->blending);
 }
 
-nebel_result nebel_gl_begin_classic(nebel_gl_classic *classic, const float color[3])
+nebel_result nebel_gl_begin_classic_fog(nebel_gl_classic *classic, const float color[3])
 {
     nebel_result result = NEBEL_OK;
     if (classic == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -263,7 +263,7 @@ nebel_result nebel_gl_begin_classic(nebel_gl_classic *classic, const float color
 
 /* What Mesa 22 leaves out of its stacks comes behind them: the source of fog coordinates, the colour sum, the blend
  * functions of draw buffers that differ. */
-nebel_result nebel_gl_end_classic(nebel_gl_classic *classic)
+nebel_result nebel_gl_end_classic_fog(nebel_gl_classic *classic)
 {
     if (classic == NULL) return NEBEL_ERROR_ARGUMENT;
     if (!classic->is_begun) return fail(classic, NEBEL_ERROR_ARGUMENT, "end without begin");
@@ -336,7 +336,7 @@ static void point(const nebel_vertex_output *stream)
     }
 }
 
-nebel_result nebel_gl_feed_classic(nebel_gl_classic *classic, const nebel_vertex_output *stream, unsigned buffer)
+nebel_result nebel_gl_bind_classic_stream(nebel_gl_classic *classic, const nebel_vertex_output *stream, unsigned buffer)
 {
     if (classic == NULL || stream == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_result result = check_stream(classic, stream, buffer);

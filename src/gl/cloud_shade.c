@@ -53,8 +53,9 @@ uint32_t nb_gl_cloud_shade_write(const nb_shaded_piece *air, uint32_t air_count,
             pack(air[k].part[0], 2047) | pack(air[k].part[1], 2047) << 11 | pack(air[k].part[2], 1023) << 22);
     const uint32_t first = t.count;
     if (fog != NULL) {
-        const nebel_fog_shade *const p = &fog->pieces;
-        for (uint32_t k = 0; k < p->count; k++) add_fog(&t, first, p->t[k + 1], p->sun[k], p->sky[k] / fog->clear_sky);
+        const nebel_fog_shadow *const p = &fog->pieces;
+        for (uint32_t k = 0; k < p->count; k++)
+            add_fog(&t, first, p->t[k + 1], p->sun_transmittance[k], p->sky_transmittance[k] / fog->clear_sky);
         if (fog->end > p->t[p->count]) add_fog(&t, first, fog->end, 1, 1);
     }
     words[0] = bits_of(fog != NULL ? fog->pieces.t[0] : 0);

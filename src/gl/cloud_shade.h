@@ -9,9 +9,9 @@
 #include "base/fog_shade.h"
 
 enum {
-    NB_AIR_SHADE_LAYERS = 1 + NB_SHADED_PIECES,                             /* the head, air */
-    NB_CLOUD_SHADE_LAYERS = NB_AIR_SHADE_LAYERS + NEBEL_MAX_FOG_SHADES + 1, /* fog, and that over clouds */
-    NB_CLOUD_SHADE_WORDS = 2                                                /* of a texel */
+    NB_AIR_SHADE_LAYERS = 1 + NB_SHADED_PIECES,                                      /* the head, air */
+    NB_CLOUD_SHADE_LAYERS = NB_AIR_SHADE_LAYERS + NEBEL_MAX_FOG_SHADOW_SEGMENTS + 1, /* fog, and that over clouds */
+    NB_CLOUD_SHADE_WORDS = 2                                                         /* of a texel */
 };
 
 typedef struct nb_gl_cloud_shade {

@@ -120,7 +120,7 @@ static double first_ray_at(const nb_cloud_picture *picture, uint32_t x, uint32_t
 
 /* ---- the view -------------------------------------------------------------------------------- */
 
-static int are_same(const nebel_cloud_view_desc *a, const nebel_cloud_view_desc *b)
+static int are_same(const nebel_cloud_lighting_desc *a, const nebel_cloud_lighting_desc *b)
 {
     return a->clouds == b->clouds && a->time == b->time && memcmp(&a->sun, &b->sun, sizeof a->sun) == 0;
 }
@@ -131,7 +131,7 @@ static void forget(nb_gl_clouds *clouds)
         nebel_destroy_cloud_workspace(clouds->parts[i].workspace);
         clouds->parts[i].workspace = NULL;
     }
-    nebel_destroy_cloud_view(clouds->view);
+    nebel_destroy_cloud_lighting(clouds->view);
     clouds->view = NULL;
     clouds->of.clouds = NULL;
 }
@@ -139,11 +139,11 @@ static void forget(nb_gl_clouds *clouds)
 nebel_result nb_gl_clouds_set(nb_gl_clouds *clouds, const nebel_clouds *of, const nebel_sun *sun, double time,
                               const nebel_log *log)
 {
-    const nebel_cloud_view_desc desc = {
+    const nebel_cloud_lighting_desc desc = {
         .clouds = of, .sun = *sun, .time = time, .allocator = clouds->allocator, .log = *log};
     if (are_same(&clouds->of, &desc)) return NEBEL_OK;
     forget(clouds);
-    const nebel_result result = nebel_create_cloud_view(&desc, &clouds->view);
+    const nebel_result result = nebel_create_cloud_lighting(&desc, &clouds->view);
     if (result == NEBEL_OK) clouds->of = desc;
     return result;
 }
@@ -169,7 +169,7 @@ void nb_gl_clouds_release(nb_gl_clouds *clouds)
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
-static void set_knots(const nebel_cloud_knots *knots, nb_cloud_knot *list)
+static void set_knots(const nebel_cloud_transfer *knots, nb_cloud_knot *list)
 {
     for (uint32_t k = 0; k < knots->count; k++) {
         list[k] = (nb_cloud_knot){.t = knots->t[k], .left = knots->transmittance[k]};
@@ -177,7 +177,8 @@ static void set_knots(const nebel_cloud_knots *knots, nb_cloud_knot *list)
     }
 }
 
-static nebel_result keep_knots(const job *j, nb_cloud_part *part, const nebel_cloud_knots *knots, nb_cloud_pixel *pixel)
+static nebel_result keep_knots(const job *j, nb_cloud_part *part, const nebel_cloud_transfer *knots,
+                               nb_cloud_pixel *pixel)
 {
     void *list = part->knots;
     if (!nb_grow(&j->clouds->allocator, &list, sizeof *part->knots, part->count, &part->capacity,
@@ -203,22 +204,23 @@ static int grow_pieces(const nebel_allocator *allocator, nb_cloud_part *part)
 
 static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray *ray, nb_cloud_pixel *pixel)
 {
-    nebel_air_shade shade;
+    nebel_air_shadow shade;
     float left[3][NB_SHADED_PIECES], light[3][NB_SHADED_PIECES];
     double along[3][NB_SHADED_PIECES];
     const double *const direction[3] = {along[0], along[1], along[2]};
-    nebel_transfer_planes lights = {.error = NULL};
+    nebel_transfer_planes transfers = {.error = NULL};
     pixel->first_piece = (uint32_t)part->piece_count;
     pixel->piece_count = 0;
-    nebel_result result = nebel_shade_air(part->workspace, 1, ray, 0, &shade, 0);
+    nebel_result result = nebel_trace_cloud_shadow_on_air(part->workspace, 1, ray, 0, &shade, 0);
     if (result != NEBEL_OK || shade.count == 0) return result;
     if (!grow_pieces(&j->clouds->allocator, part)) return NEBEL_ERROR_MEMORY;
     for (int c = 0; c < 3; c++) {
         for (int k = 0; k < NB_SHADED_PIECES; k++) along[c][k] = ray->direction[c];
-        lights.transmittance[c] = left[c];
-        lights.in_scattering[c] = light[c];
+        transfers.transmittance[c] = left[c];
+        transfers.in_scattering[c] = light[c];
     }
-    result = nb_worlds_trace(j->picture->worlds, j->picture->world_count, shade.count + 1, direction, shade.t, &lights);
+    result =
+        nb_worlds_trace(j->picture->worlds, j->picture->world_count, shade.count + 1, direction, shade.t, &transfers);
     if (result != NEBEL_OK) return result;
     pixel->piece_count = nb_shaded_set(&shade, light, part->pieces + part->piece_count);
     part->piece_count += pixel->piece_count;
@@ -226,7 +228,7 @@ static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray
 }
 
 static nebel_result trace_rays(const nb_cloud_picture *picture, nb_cloud_part *part, uint32_t count,
-                               const nebel_ray *rays, const double *spreads, nebel_cloud_knots *knots)
+                               const nebel_ray *rays, const double *spreads, nebel_cloud_transfer *knots)
 {
     const nebel_result result =
         nebel_trace_clouds(part->workspace, count, rays, sizeof *rays, spreads, sizeof *spreads, knots, sizeof *knots);
@@ -368,7 +370,7 @@ static float shaded_at(const nb_cloud_part *part, const nb_cloud_pixel *pixel, i
 
 /* All that is known of a ray. */
 typedef struct nb_cloud_mix {
-    nebel_cloud_knots knots;
+    nebel_cloud_transfer knots;
     nb_cloud_haze air;
     nb_cloud_marks marks;
 } nb_cloud_mix;
@@ -377,7 +379,7 @@ static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_c
                              const nb_cloud_pixel *pixel, const double direction[3], nb_cloud_mix *mix)
 {
     nb_cloud_rays rays;
-    mix->knots = (nebel_cloud_knots){.count = pixel->count};
+    mix->knots = (nebel_cloud_transfer){.count = pixel->count};
     memset(&mix->marks, 0, sizeof mix->marks);
     for (uint32_t k = 0; k < pixel->count; k++) {
         mix->knots.t[k] = list[k].t;
@@ -386,7 +388,7 @@ static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_c
     }
     nb_cloud_haze_ask(&mix->knots, direction, &mix->air, &rays);
     const nebel_result result = nb_worlds_trace(j->picture->worlds, j->picture->world_count, pixel->count,
-                                                rays.direction, mix->knots.t, &rays.lights);
+                                                rays.direction, mix->knots.t, &rays.transfers);
     for (uint32_t k = 0; k < pixel->count && result == NEBEL_OK; k++) {
         if (list[k].is_marked) nb_cloud_mark(&mix->marks, k, list[k].haze_left, list[k].haze_light);
         for (int c = 0; c < 3; c++) mix->air.light[c][k] = shaded_at(part, pixel, c, list[k].t, mix->air.light[c][k]);
@@ -484,7 +486,7 @@ static nebel_result mix_pixel(const job *j, const nb_cloud_part *part, const nb_
     if (result != NEBEL_OK) return result;
     nb_cloud_haze haze = mix.air;
     for (int c = 0; c < 3; c++) {
-        float over[NEBEL_MAX_CLOUD_KNOTS];
+        float over[NEBEL_MAX_CLOUD_NODES];
         if (mix.marks.is_set[0]) nb_cloud_haze_add_fog(&mix.knots, &mix.marks, c, &mix.air, &haze);
         nb_cloud_haze_sum(&mix.knots, c, &haze, over);
         for (uint32_t k = 0; k < pixel->count; k++) list[k].light[c] = over[k];
@@ -517,7 +519,7 @@ nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *pict
 static void lay_over(const nb_cloud_knot *knots, uint32_t count, float end, float over[4])
 {
     static const float clear[4] = {0, 0, 0, 1};
-    float t[NEBEL_MAX_CLOUD_KNOTS], part;
+    float t[NEBEL_MAX_CLOUD_NODES], part;
     memcpy(over, clear, sizeof clear);
     if (count == 0 || !(end > knots[0].t)) return;
     for (uint32_t i = 0; i < count; i++) t[i] = knots[i].t;
@@ -571,8 +573,8 @@ static nebel_result lay_anew(const job *j, nb_cloud_part *part, const nb_cloud_p
                              double spread, float over[4])
 {
     nb_cloud_pixel anew = *pixel;
-    nb_cloud_knot list[NEBEL_MAX_CLOUD_KNOTS];
-    nebel_cloud_knots knots;
+    nb_cloud_knot list[NEBEL_MAX_CLOUD_NODES];
+    nebel_cloud_transfer knots;
     nebel_result result = trace_rays(j->picture, part, 1, ray, &spread, &knots);
     if (result != NEBEL_OK) return result;
     anew.count = knots.count;
@@ -604,9 +606,11 @@ static nebel_result shade(const job *j, nb_cloud_part *part, const double direct
     double place[1][3];
     const double length = nb_vector_length(direction), width = 4 * j->picture->pixel * t;
     for (int c = 0; c < 3; c++) place[0][c] = j->picture->eye[c] + t * direction[c] / length;
-    const nebel_result result = nebel_shade_clouds(part->workspace, width, 1, (const double(*)[3])place, 0, &left[0]);
+    const nebel_result result =
+        nebel_compute_cloud_sun_transmittance(part->workspace, width, 1, (const double(*)[3])place, 0, &left[0]);
     left[1] = left[2] = left[0];
-    return result == NEBEL_OK ? nebel_shade_sky(part->workspace, width, 1, (const double(*)[3])place, 0, &left[3])
+    return result == NEBEL_OK ? nebel_compute_cloud_sky_transmittance(part->workspace, width, 1,
+                                                                      (const double(*)[3])place, 0, &left[3])
                               : result;
 }
 

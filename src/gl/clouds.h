@@ -27,7 +27,7 @@ typedef struct nb_cloud_knot {
 typedef struct nb_cloud_bundle {
     nebel_ray rays[NB_CLOUD_SHARE], asked[NB_CLOUD_SHARE];
     double spreads[NB_CLOUD_SHARE], asked_spreads[NB_CLOUD_SHARE];
-    nebel_cloud_knots knots[NB_CLOUD_SHARE], found[NB_CLOUD_SHARE];
+    nebel_cloud_transfer knots[NB_CLOUD_SHARE], found[NB_CLOUD_SHARE];
 } nb_cloud_bundle;
 
 typedef struct nb_cloud_part {
@@ -49,10 +49,10 @@ typedef struct nb_cloud_pixel {
 
 typedef struct nb_gl_clouds {
     nebel_allocator allocator;
-    nebel_air_run_fn run; /* NULL: one part after the other */
+    nebel_parallel_for_fn run; /* NULL: one part after the other */
     void *run_user;
-    nebel_cloud_view_desc of; /* what the view is made of; no clouds: of nothing */
-    nebel_cloud_view *view;
+    nebel_cloud_lighting_desc of; /* what the view is made of; no clouds: of nothing */
+    nebel_cloud_lighting *view;
     nb_cloud_part parts[NB_CLOUD_PARTS];
     nb_cloud_pixel *pixels; /* the lowest row first */
     size_t pixel_capacity;

@@ -21,7 +21,7 @@ static nebel_result find_changes(const nebel_scene_data *scene, nebel_cloud_work
     if (fog == NULL || nb_gl_air_planet(scene) == NULL || !scene->has_sun) return NEBEL_OK;
     found->by_air = nebel_snapshot_scattering_fog(fog, min, max) &&
                     !nb_daylight_is_near(&scene->planets[0], scene->sun_direction, min, max);
-    if (clouds == NULL || nebel_snapshot_volume_count(fog) == 0) return NEBEL_OK;
+    if (clouds == NULL || nebel_get_volume_count(fog) == 0) return NEBEL_OK;
     return nb_fog_roof_set(clouds, fog, nb_scene_owns_ambient(scene), &found->roof);
 }
 
@@ -45,7 +45,7 @@ static nebel_sun dim(const nebel_scene_data *scene, nebel_sun sun)
     double to_sun[3] = {sun.direction[0], sun.direction[1], sun.direction[2]};
     (void)nb_vector_make_unit(to_sun);
     const int count = nb_worlds_set(worlds, scene, origin);
-    const nebel_air_light light = nb_worlds_light(worlds, count, origin, to_sun, nb_worlds_disc(scene));
+    const nebel_irradiance light = nb_worlds_light(worlds, count, origin, to_sun, nb_worlds_disc(scene));
     for (int c = 0; c < 3; c++) sun.irradiance[c] *= light.sun[c];
     return sun;
 }

@@ -12,7 +12,7 @@ static nebel_result fill(nb_environment *e, const nebel_allocator *allocator, co
     nebel_result result = nebel_pack_environment(snapshot, surfaces, NULL, 0, &count);
     if (result != NEBEL_OK) return result;
     const size_t rows = (count + NEBEL_TEXTURE_WIDTH - 1) / NEBEL_TEXTURE_WIDTH;
-    nebel_word *const words = nb_allocate_zero(allocator, rows * NEBEL_TEXTURE_WIDTH, sizeof *words);
+    nebel_texel_f32 *const words = nb_allocate_zero(allocator, rows * NEBEL_TEXTURE_WIDTH, sizeof *words);
     if (words == NULL) return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL: out of memory for the environment");
     result = nebel_pack_environment(snapshot, surfaces, words, count, &count);
     if (result == NEBEL_OK)
@@ -25,7 +25,7 @@ static nebel_result fill(nb_environment *e, const nebel_allocator *allocator, co
 nebel_result nb_environment_set(nb_environment *e, const nebel_allocator *allocator, const nebel_log *log,
                                 const nb_context *context, nebel_snapshot *snapshot, int surfaces)
 {
-    if (e->of != NULL && nebel_same_environment(e->of, snapshot)) return NEBEL_OK;
+    if (e->of != NULL && nebel_is_same_environment(e->of, snapshot)) return NEBEL_OK;
     const nebel_result result = fill(e, allocator, log, context, snapshot, surfaces);
     nebel_release_snapshot(e->of);
     e->of = result == NEBEL_OK ? nebel_retain_snapshot(snapshot) : NULL;

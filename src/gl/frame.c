@@ -102,7 +102,7 @@ void nb_frame_set_rays(const frame *f, unsigned program)
 {
     float rays[6][3];
     for (int i = 0; i < 6; i++) {
-        for (int k = 0; k < 3; k++) rays[i][k] = f->rays.words[i].v[k];
+        for (int k = 0; k < 3; k++) rays[i][k] = f->rays.texels[i].v[k];
     }
     glUniform3fv(glGetUniformLocation(program, "scene_rays"), 6, rays[0]);
 }
@@ -191,7 +191,7 @@ static void draw_surfaces(const frame *f)
 
 static int has_lamps(const frame *f)
 {
-    return f->renderer->scene->lamp_count > 0 && (f->renderer->meshes.count > 0 || f->planet != NULL);
+    return f->renderer->scene->light_count > 0 && (f->renderer->meshes.count > 0 || f->planet != NULL);
 }
 
 /* ---- fog ------------------------------------------------------------------------------------- */
@@ -280,7 +280,7 @@ static void set_lamps(const frame *f, unsigned program)
     const nb_lamps *const lamps = &f->renderer->lamps;
     nb_frame_bind_texture(NB_UNIT_LAMPS, GL_TEXTURE_2D, lamps->words);
     nb_frame_bind_texture(NB_UNIT_LAMP_MAPS, GL_TEXTURE_2D_ARRAY, lamps->maps);
-    glUniform1i(glGetUniformLocation(program, "lamp_count"), (GLint)f->renderer->scene->lamp_count);
+    glUniform1i(glGetUniformLocation(program, "lamp_count"), (GLint)f->renderer->scene->light_count);
     glUniform1f(glGetUniformLocation(program, "map_face"), (float)lamps->face);
     glUniform1f(glGetUniformLocation(program, "map_share"), 1 - 2.f * NB_LAMP_BORDER / (float)lamps->face);
 }
@@ -298,7 +298,7 @@ static nebel_result draw_exact_fog(const frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
     const nebel_gl_pass pass = {
-        .output = NEBEL_GL_OUTPUT_SPLIT, .depth_texture = f->place, .depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE}};
+        .output = NEBEL_GL_OUTPUT_SPLIT, .depth_texture = f->place, .depth = {.encoding = NEBEL_DEPTH_ENCODING_RADIAL}};
     nb_gl_picture picture = {.rays = f->rays,
                              .width = f->view.width,
                              .height = f->view.height,
@@ -312,7 +312,7 @@ static nebel_result draw_exact_fog(const frame *f)
     double low[3], high[3];
     if (has_lamps(f) && r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, low, high))
         picture.shade = (nb_gl_shade){{nb_lamp_map_text, nb_lamp_shade_text}, set_lamp_shade, f};
-    if (!f->panorama && nebel_view_rays(&f->sample_view, &pass.depth, &picture.rays) != NEBEL_OK)
+    if (!f->panorama && nebel_compute_view_rays(&f->sample_view, &pass.depth, &picture.rays) != NEBEL_OK)
         return NEBEL_ERROR_ARGUMENT;
     return nb_gl_draw_fog(r->eye_fog, &pass, &picture);
 }
@@ -381,22 +381,23 @@ nebel_result nb_frame_draw_fog(const frame *f)
 
 /* ---- particles ------------------------------------------------------------------------------- */
 
-nebel_gl_taps nebel_gl_default_taps(void)
+nebel_depth_taps nebel_gl_default_taps(void)
 {
-    return (nebel_gl_taps){.offset = .0005, .nothing = 100000, .edge = .5, .margin = .125, .brightness = 1};
+    return (nebel_depth_taps){
+        .offset = .0005, .background_depth = 100000, .edge_threshold = .5, .depth_margin = .125, .brightness = 1};
 }
 
 static void set_taps(const frame *f, unsigned program)
 {
     const double *const eye = f->view.eye_from_world;
-    const nebel_gl_taps taps = f->desc->taps != NULL ? *f->desc->taps : nebel_gl_default_taps();
+    const nebel_depth_taps taps = f->desc->taps != NULL ? *f->desc->taps : nebel_gl_default_taps();
     glUniform3f(glGetUniformLocation(program, "scene_axis"), (float)-eye[2], (float)-eye[6], (float)-eye[10]);
-    glUniform4f(glGetUniformLocation(program, "scene_taps"), (float)taps.offset, (float)taps.nothing, (float)taps.edge,
-                (float)taps.margin);
+    glUniform4f(glGetUniformLocation(program, "scene_taps"), (float)taps.offset, (float)taps.background_depth,
+                (float)taps.edge_threshold, (float)taps.depth_margin);
     glUniform1f(glGetUniformLocation(program, "scene_brightness"), (float)taps.brightness);
 }
 
-static void set_face_tiles(const frame *f, const nebel_gl_fog *fog, unsigned program)
+static void set_face_tiles(const frame *f, const nebel_gl_fog_resources *fog, unsigned program)
 {
     const nebel_gl *const gl = f->renderer->eye_fog;
     glUniform3i(glGetUniformLocation(program, "face_tiling"), (GLint)gl->views[0].width, NB_GL_TILE_SHIFT,
@@ -404,16 +405,16 @@ static void set_face_tiles(const frame *f, const nebel_gl_fog *fog, unsigned pro
     glUniform1iv(glGetUniformLocation(program, "face_first"), 6, gl->face_first);
 }
 
-static void bind_media(const nebel_gl_fog *fog)
+static void bind_media(const nebel_gl_fog_resources *fog)
 {
     if (fog->texture != 0) nb_frame_bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
     if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
     if (fog->environment != 0) nb_frame_bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, fog->environment);
     if (fog->voxels != 0) nb_frame_bind_texture(NB_UNIT_VOXELS, GL_TEXTURE_2D, fog->voxels);
-    if (fog->nodes != 0) nb_frame_bind_texture(NB_UNIT_NODES, GL_TEXTURE_2D, fog->nodes);
+    if (fog->diffusion != 0) nb_frame_bind_texture(NB_UNIT_NODES, GL_TEXTURE_2D, fog->diffusion);
 }
 
-static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned program)
+static void set_particles(const frame *f, const nebel_gl_fog_resources *fog, unsigned program)
 {
     const int parallel = f->view.clip_from_eye[15] != 0;
     const double *const eye = f->view.eye_from_world;
@@ -436,19 +437,19 @@ static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned prog
     }
 }
 
-nebel_result nb_frame_find_light(const frame *f, const nebel_gl *passes, nb_light_kind kind, nebel_gl_fog *fog,
-                                 unsigned *program)
+nebel_result nb_frame_find_light(const frame *f, const nebel_gl *passes, nb_light_kind kind,
+                                 nebel_gl_fog_resources *fog, unsigned *program)
 {
     nebel_gl_renderer *const r = f->renderer;
-    *fog = (nebel_gl_fog){0};
-    const nebel_result result = passes != NULL ? nebel_gl_get_fog(passes, fog) : NEBEL_OK;
+    *fog = (nebel_gl_fog_resources){0};
+    const nebel_result result = passes != NULL ? nebel_gl_get_fog_resources(passes, fog) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
     kind.panorama = f->panorama;
     kind.has_surfaces = r->meshes.count > 0 || f->planet != NULL || f->layers != NULL;
     kind.has_fog = passes != NULL;
     kind.in_texture = fog->texture != 0;
     kind.tiled = fog->tiles != 0 && !kind.air; /* ground reaches beyond all lists along the sun's light */
-    const uint32_t lights = NEBEL_FEATURE_LAMPS | NEBEL_FEATURE_DIFFUSION | NEBEL_FEATURE_ENVIRONMENT;
+    const uint32_t lights = NEBEL_FEATURE_LIGHTS | NEBEL_FEATURE_DIFFUSION | NEBEL_FEATURE_ENVIRONMENT;
     kind.features = kind.of_particles ? fog->features : fog->features & ~lights;
     return nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, program);
 }
@@ -463,12 +464,12 @@ nebel_result nb_frame_draw_particles(const frame *f)
 {
     static const GLfloat clear[2][4] = {{0, 0, 0, 1}, {0, 1, 0, 0}};
     nebel_gl_renderer *const r = f->renderer;
-    nebel_gl_fog fog;
+    nebel_gl_fog_resources fog;
     unsigned program = 0;
     const int layers = nb_frame_count_veil_layers(f);
     if (layers == 0) return NEBEL_OK;
     nb_renderer_judge_particles(r);
-    const int has_fog = r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0;
+    const int has_fog = r->fog != NULL && nebel_get_volume_count(r->fog) > 0;
     const nb_light_kind kind = {.of_particles = r->particles.profiles,
                                 .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
                                 .veil_layers = layers,
@@ -502,7 +503,7 @@ static nebel_result prepare_lamps(const frame *f)
 
 /* ---- light ----------------------------------------------------------------------------------- */
 
-static void bind_fog(const frame *f, const nebel_gl_fog *fog, unsigned program)
+static void bind_fog(const frame *f, const nebel_gl_fog_resources *fog, unsigned program)
 {
     bind_media(fog);
     if (fog->tiles != 0 && f->casts && f->planet == NULL) nb_frame_set_tiles(f, fog, program);
@@ -512,7 +513,7 @@ static void bind_fog(const frame *f, const nebel_gl_fog *fog, unsigned program)
 static nebel_result draw_dimming(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    nebel_gl_fog fog;
+    nebel_gl_fog_resources fog;
     unsigned program = 0;
     if (!f->dims) return NEBEL_OK;
     const nebel_result result = nb_frame_find_light(f, r->sun_cloud, (nb_light_kind){.of_dimming = 1}, &fog, &program);
@@ -535,8 +536,7 @@ static nebel_result prepare_air(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     const int is_lit = r->scene->has_sun && (r->scene->mesh_count > 0 || r->daylit.by_air);
-    const int ends =
-        r->meshes.count > 0 || f->clouds != NULL || (r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0);
+    const int ends = r->meshes.count > 0 || f->clouds != NULL || (r->fog != NULL && nebel_get_volume_count(r->fog) > 0);
     if (f->planet == NULL) return NEBEL_OK;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_AIR);
     nebel_result result = nb_gl_air_set(&r->air, &r->allocator, &r->log, &r->context, r->scene, f->eye, ends, is_lit);
@@ -562,7 +562,7 @@ static nebel_result prepare_environment(const frame *f)
     return result;
 }
 
-static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
+static void set_light(const frame *f, const nebel_gl_fog_resources *fog, unsigned program)
 {
     const nebel_gl_renderer *const r = f->renderer;
     const nb_targets *const t = &r->targets;
@@ -604,7 +604,7 @@ static void start_picture(const frame *f, uint32_t sample)
 static nebel_result draw_light(const frame *f, uint32_t sample)
 {
     nebel_gl_renderer *const r = f->renderer;
-    nebel_gl_fog fog;
+    nebel_gl_fog_resources fog;
     unsigned program = 0;
     const int is_lit = f->casts || has_lamps(f) || f->planet != NULL, dims = r->fog != NULL && !f->method.replaces_fog,
               along_sun = f->casts && f->planet == NULL;
@@ -637,7 +637,7 @@ static nebel_result set_sample(frame *f, nb_pixel_point point)
         return NEBEL_OK;
     }
     f->sample_view = nb_camera_move(&f->view, point);
-    if (nebel_view_rays(&f->sample_view, NULL, &f->rays) == NEBEL_OK) return NEBEL_OK;
+    if (nebel_compute_view_rays(&f->sample_view, NULL, &f->rays) == NEBEL_OK) return NEBEL_OK;
     return nb_fail(&f->renderer->log, NEBEL_ERROR_VALUE,
                    "camera: it is too far out, or its view too narrow, for numbers");
 }

@@ -16,12 +16,12 @@ typedef struct nb_gl_frame {
     nb_lighting light;
     double eye[3];
     int panorama;
-    const nebel_planet *planet; /* with air; NULL: none */
-    const nebel_layers *layers; /* a planet of them; NULL: none */
-    const nebel_clouds *clouds; /* with volume, in that air; NULL: none */
-    nebel_snapshot *fog;        /* the renderer's, or that of r->daylit; NULL: none */
-    float even_shade;           /* part of that sun that clouds leave to it, where that is the same everywhere */
-    unsigned place, depth;      /* where rays end now: as those of the targets */
+    const nebel_planet *planet;          /* with air; NULL: none */
+    const nebel_textured_planet *layers; /* a planet of them; NULL: none */
+    const nebel_clouds *clouds;          /* with volume, in that air; NULL: none */
+    nebel_snapshot *fog;                 /* the renderer's, or that of r->daylit; NULL: none */
+    float even_shade;      /* part of that sun that clouds leave to it, where that is the same everywhere */
+    unsigned place, depth; /* where rays end now: as those of the targets */
     nb_method method;
     double reach;            /* [m]: 1, or how far models are, where they are nearer */
     nebel_view view;         /* through the pixels' centres; of a panorama without clip_from_eye */
@@ -58,8 +58,8 @@ nebel_result nb_frame_draw_particles(const nb_gl_frame *f);
 int nb_frame_count_veil_layers(const nb_gl_frame *f);
 
 /* The program that asks the fog of `passes`, NULL: none, and that fog. The kind is given but for its fog. */
-nebel_result nb_frame_find_light(const nb_gl_frame *f, const nebel_gl *passes, nb_light_kind kind, nebel_gl_fog *fog,
-                                 unsigned *program);
+nebel_result nb_frame_find_light(const nb_gl_frame *f, const nebel_gl *passes, nb_light_kind kind,
+                                 nebel_gl_fog_resources *fog, unsigned *program);
 
 /* ---- the sun --------------------------------------------------------------------------------- */
 
@@ -68,7 +68,7 @@ nebel_result nb_frame_prepare_sun(nb_gl_frame *f);
 
 /* Uniforms of the maps, and of the lists of fog along the sun's light. */
 void nb_frame_set_shadows(const nb_gl_frame *f, unsigned program);
-void nb_frame_set_tiles(const nb_gl_frame *f, const nebel_gl_fog *fog, unsigned program);
+void nb_frame_set_tiles(const nb_gl_frame *f, const nebel_gl_fog_resources *fog, unsigned program);
 
 /* ---- planets of layers ----------------------------------------------------------------------- */
 

@@ -46,9 +46,9 @@ static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_fram
     }
     if (nb_method_takes_cells(desc->method) && desc->cells == NULL)
         return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: this method needs cells; they are NULL");
-    const nebel_gl_taps taps = desc->taps != NULL ? *desc->taps : nebel_gl_default_taps();
-    if (taps.offset >= 0 && taps.edge >= 0 && taps.brightness >= 0 &&
-        isfinite(taps.offset + taps.nothing + taps.edge + taps.margin + taps.brightness)) {
+    const nebel_depth_taps taps = desc->taps != NULL ? *desc->taps : nebel_gl_default_taps();
+    if (taps.offset >= 0 && taps.edge_threshold >= 0 && taps.brightness >= 0 &&
+        isfinite(taps.offset + taps.background_depth + taps.edge_threshold + taps.depth_margin + taps.brightness)) {
         return NEBEL_OK;
     }
     return nb_fail(&r->log, NEBEL_ERROR_VALUE,
@@ -203,7 +203,7 @@ static nebel_result refuse_pixels(const nebel_gl_renderer *r, const nebel_gl_fra
 static nebel_result check_fog(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
     const int is_exact = desc->method == NEBEL_GL_METHOD_EXACT || desc->method == NEBEL_GL_METHOD_FIVE_TAP;
-    if (!is_exact || nebel_snapshot_volume_count(r->fog) == 0) return NEBEL_OK;
+    if (!is_exact || nebel_get_volume_count(r->fog) == 0) return NEBEL_OK;
     const nebel_view_error error = find_fog_error(r, desc);
     if (r->meshes.count > 0 && error.by_surface > MOST_SURFACE_ERROR)
         return nb_fail(

@@ -30,7 +30,7 @@ static float *make_plane(const nb_gl_frame *f)
 
 static int has_fog(const nb_gl_frame *f)
 {
-    return f->renderer->fog != NULL && nebel_snapshot_volume_count(f->renderer->fog) > 0;
+    return f->renderer->fog != NULL && nebel_get_volume_count(f->renderer->fog) > 0;
 }
 
 static nebel_result ask(void *user)
@@ -135,7 +135,8 @@ static nebel_result find_shade(nb_gl_frame *f)
     const nebel_gl_renderer *const r = f->renderer;
     return r->daylit.lit == NULL || r->cloud_shade.clear_sky > 0
                ? NEBEL_OK
-               : nebel_shade_clouds(r->clouds.parts[0].workspace, NB_FOG_SHADE_ORIGIN, 1, origin, 0, &f->even_shade);
+               : nebel_compute_cloud_sun_transmittance(r->clouds.parts[0].workspace, NB_FOG_SHADE_ORIGIN, 1, origin, 0,
+                                                       &f->even_shade);
 }
 
 /* On air, and on fog by its place, for all samples. */

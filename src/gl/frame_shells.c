@@ -11,14 +11,15 @@
 /* ---- balls ----------------------------------------------------------------------------------- */
 
 /* Clouds are counted from 0; as many as there are of them: the air. */
-static double radius_of(const nebel_layers_desc *desc, uint32_t shell)
+static double radius_of(const nebel_textured_planet_desc *desc, uint32_t shell)
 {
-    return desc->radius + (shell < desc->cloud_count ? desc->clouds[shell].height : desc->air.height);
+    return desc->radius +
+           (shell < desc->cloud_shell_count ? desc->cloud_shells[shell].height : desc->atmosphere.height);
 }
 
 static double eye_from_middle(const nb_gl_frame *f, double from[3])
 {
-    const nebel_layers_desc *const desc = nebel_describe_layers(f->layers);
+    const nebel_textured_planet_desc *const desc = nebel_get_textured_planet_desc(f->layers);
     for (int i = 0; i < 3; i++) from[i] = f->eye[i] - desc->center[i];
     return nb_vector_length(from);
 }
@@ -40,14 +41,14 @@ static void set_ambient(const nb_gl_frame *f, unsigned program, const char *name
 {
     static const double up[3] = {0, 1, 0};
     double ambient[3];
-    nebel_environment_reflected(&f->light.environment, up, ambient);
+    nebel_evaluate_environment_diffuse(&f->light.environment, up, ambient);
     const float as_float[3] = {(float)ambient[0], (float)ambient[1], (float)ambient[2]};
     nb_frame_set_vector(program, name, as_float);
 }
 
 static void set_ball(const nb_gl_frame *f, unsigned program, double radius, double turned)
 {
-    const nebel_layers_desc *const desc = nebel_describe_layers(f->layers);
+    const nebel_textured_planet_desc *const desc = nebel_get_textured_planet_desc(f->layers);
     double from[3], axes[3][3];
     float frame[9];
     const double away = eye_from_middle(f, from), above = nb_vector_above_ball(away, radius);
@@ -82,9 +83,9 @@ static void draw_whole(const nb_gl_frame *f)
 void nb_frame_draw_shell_ground(const nb_gl_frame *f)
 {
     const nb_gl_shells *const shells = &f->renderer->shells;
-    const nebel_layers_desc *const desc = nebel_describe_layers(f->layers);
+    const nebel_textured_planet_desc *const desc = nebel_get_textured_planet_desc(f->layers);
     const unsigned program = shells->programs[f->panorama][NB_SHELL_GROUND];
-    set_ball(f, program, desc->radius, turns(desc->day, f->desc->time));
+    set_ball(f, program, desc->radius, turns(desc->rotation_period, f->desc->time));
     set_map(program, &shells->ground, NB_UNIT_NORMAL, "shell_map_sizes");
     draw_whole(f);
 }
@@ -94,15 +95,16 @@ void nb_frame_draw_shell_ground(const nb_gl_frame *f)
 static void set_clouds(const nb_gl_frame *f, uint32_t number, unsigned program)
 {
     const nb_gl_shells *const shells = &f->renderer->shells;
-    const nebel_layers_desc *const desc = nebel_describe_layers(f->layers);
-    const nebel_cloud_shell *const shell = &desc->clouds[number];
+    const nebel_textured_planet_desc *const desc = nebel_get_textured_planet_desc(f->layers);
+    const nebel_cloud_shell *const shell = &desc->cloud_shells[number];
     const nb_gl_map *const detail =
         shells->details[number].name != 0 ? &shells->details[number] : &shells->clouds[number];
-    set_ball(f, program, radius_of(desc, number), turns(desc->day, f->desc->time) + turns(shell->day, f->desc->time));
+    set_ball(f, program, radius_of(desc, number),
+             turns(desc->rotation_period, f->desc->time) + turns(shell->rotation_period, f->desc->time));
     set_map(program, &shells->clouds[number], NB_UNIT_NORMAL, "shell_map_sizes");
     set_map(program, detail, NB_UNIT_REFLECTANCE, "shell_detail_sizes");
-    glUniform3f(glGetUniformLocation(program, "shell_wrap"), (float)shell->wrap[0], (float)shell->wrap[1],
-                (float)shell->wrap[2]);
+    glUniform3f(glGetUniformLocation(program, "shell_wrap"), (float)shell->uv_tiling[0], (float)shell->uv_tiling[1],
+                (float)shell->uv_tiling[2]);
     glUniform3f(glGetUniformLocation(program, "shell_color"), (float)shell->color[0], (float)shell->color[1],
                 (float)shell->color[2]);
     glUniform1f(glGetUniformLocation(program, "shell_gain"), (float)shell->gain);
@@ -110,20 +112,21 @@ static void set_clouds(const nb_gl_frame *f, uint32_t number, unsigned program)
 
 static void set_air(const nb_gl_frame *f, unsigned program)
 {
-    const nebel_layers_desc *const desc = nebel_describe_layers(f->layers);
-    float ramp[NEBEL_MAX_RAMP][3] = {{0}};
-    for (uint32_t i = 0; i < 3 * desc->air.ramp_count; i++) ramp[i / 3][i % 3] = (float)desc->air.ramp[i / 3][i % 3];
-    set_ball(f, program, radius_of(desc, desc->cloud_count), 0);
-    glUniform3fv(glGetUniformLocation(program, "air_ramp"), NEBEL_MAX_RAMP, ramp[0]);
-    glUniform1i(glGetUniformLocation(program, "air_ramp_count"), (GLint)desc->air.ramp_count);
-    glUniform1f(glGetUniformLocation(program, "air_brightness"), (float)desc->air.brightness);
+    const nebel_textured_planet_desc *const desc = nebel_get_textured_planet_desc(f->layers);
+    float ramp[NEBEL_MAX_RAMP_COLORS][3] = {{0}};
+    for (uint32_t i = 0; i < 3 * desc->atmosphere.ramp_count; i++)
+        ramp[i / 3][i % 3] = (float)desc->atmosphere.ramp[i / 3][i % 3];
+    set_ball(f, program, radius_of(desc, desc->cloud_shell_count), 0);
+    glUniform3fv(glGetUniformLocation(program, "air_ramp"), NEBEL_MAX_RAMP_COLORS, ramp[0]);
+    glUniform1i(glGetUniformLocation(program, "air_ramp_count"), (GLint)desc->atmosphere.ramp_count);
+    glUniform1f(glGetUniformLocation(program, "air_brightness"), (float)desc->atmosphere.brightness);
 }
 
 /* Where one side of a shell is, and what it shows. */
 static void draw_side(const nb_gl_frame *f, uint32_t number, int is_far)
 {
     const nebel_gl_renderer *const r = f->renderer;
-    const int is_air = number == nebel_describe_layers(f->layers)->cloud_count;
+    const int is_air = number == nebel_get_textured_planet_desc(f->layers)->cloud_shell_count;
     const unsigned program = r->shells.programs[f->panorama][is_air ? NB_SHELL_AIR : NB_SHELL_CLOUDS];
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->shells.shell_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
@@ -142,7 +145,7 @@ static nebel_result lay_over(const nb_gl_frame *f)
     const nebel_gl_renderer *const r = f->renderer;
     const nb_light_kind kind = {
         .of_shells = 1, .in_fog = nb_frame_has_fog(f), .veil_layers = nb_frame_count_veil_layers(f)};
-    nebel_gl_fog fog;
+    nebel_gl_fog_resources fog;
     unsigned program = 0;
     const nebel_result result = nb_frame_find_light(f, NULL, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
@@ -169,10 +172,10 @@ static nebel_result add_side(nb_gl_frame *f, uint32_t number, int is_far)
 }
 
 /* From the smallest to the largest; of equal ones the first before the second, or behind it. */
-static uint32_t sort_shells(const nebel_layers_desc *desc, int first_is_last,
+static uint32_t sort_shells(const nebel_textured_planet_desc *desc, int first_is_last,
                             uint32_t order[NEBEL_MAX_CLOUD_SHELLS + 1])
 {
-    const uint32_t count = desc->cloud_count + (desc->air.is_absent ? 0 : 1);
+    const uint32_t count = desc->cloud_shell_count + (desc->atmosphere.is_disabled ? 0 : 1);
     for (uint32_t i = 0; i < count; i++) {
         uint32_t k = i;
         for (; k > 0; k--) {
@@ -189,7 +192,7 @@ nebel_result nb_frame_draw_shells(nb_gl_frame *f)
 {
     static const GLfloat nothing[4] = {0, 0, 0, 1};
     const nebel_gl_renderer *const r = f->renderer;
-    const nebel_layers_desc *const desc = nebel_describe_layers(f->layers);
+    const nebel_textured_planet_desc *const desc = nebel_get_textured_planet_desc(f->layers);
     const int parts = f->desc->camera.projection == NEBEL_PROJECTION_ORTHOGRAPHIC; /* rays begin in several places */
     uint32_t order[NEBEL_MAX_CLOUD_SHELLS + 1];
     double from[3];

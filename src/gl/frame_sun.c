@@ -88,7 +88,7 @@ void nb_frame_set_shadows(const nb_gl_frame *f, unsigned program)
     glUniform3f(glGetUniformLocation(program, "map_heights"), s->low, s->high, s->rounding);
 }
 
-void nb_frame_set_tiles(const nb_gl_frame *f, const nebel_gl_fog *fog, unsigned program)
+void nb_frame_set_tiles(const nb_gl_frame *f, const nebel_gl_fog_resources *fog, unsigned program)
 {
     const nb_shadows *const s = &f->renderer->shadows;
     float place[4];

@@ -88,10 +88,11 @@ void nebel_destroy_gl(nebel_gl *gl)
     nb_release(&allocator, gl);
 }
 
-nebel_result nebel_gl_get_fog(const nebel_gl *gl, nebel_gl_fog *fog)
+nebel_result nebel_gl_get_fog_resources(const nebel_gl *gl, nebel_gl_fog_resources *fog)
 {
     if (gl == NULL || fog == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (!gl->has_fog) return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT, "nebel_gl_get_fog: call nebel_gl_set_fog first");
+    if (!gl->has_fog)
+        return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT, "nebel_gl_get_fog_resources: call nebel_gl_set_fog first");
     *fog = gl->fog;
     return NEBEL_OK;
 }

@@ -34,8 +34,8 @@ struct nebel_gl {
     nebel_view views[6];       /* one, or six of a panorama */
     int view_count;
     int face_first[6]; /* entry of the first tile of each */
-    nebel_gl_fog fog;
-    nebel_word *words;
+    nebel_gl_fog_resources fog;
+    nebel_texel_f32 *words;
     size_t word_capacity;
     uint32_t *entries;
     size_t entry_capacity;
@@ -45,7 +45,7 @@ struct nebel_gl {
 nebel_result nb_gl_set_fog_around(nebel_gl *gl, nebel_snapshot *snapshot, const double eye[3], uint32_t width,
                                   uint32_t height);
 
-/* What keeps light away from fog, as the fog's text asks for it (NEBEL_LAMP_LIT). `set` sets the uniforms of a program
+/* What keeps light away from fog, as the fog's text asks for it (NEBEL_LIGHT_VISIBILITY). `set` sets the uniforms of a program
  * that is current. */
 typedef struct nb_gl_shade {
     const char *texts[2]; /* before that of the fog; they live for ever. NULL: none */

@@ -103,7 +103,7 @@ const char nb_lamp_text[] =
     "vec3 lamp_transmittance(vec3 place, vec3 direction, float reach)\n"
     "{\n"
     "#ifdef SCENE_FOG\n"
-    "    return nebel_transmit_light(place, direction, reach);\n"
+    "    return nebel_transmit_shadow(place, direction, reach);\n"
     "#else\n"
     "    return vec3(1.0);\n"
     "#endif\n"
@@ -138,7 +138,7 @@ const char nb_lamp_text[] =
  * steps; those of a few texels are the finest. */
 
 const char nb_lamp_shade_text[] =
-    "#define NEBEL_LAMP_LIT(lamp, origin, direction, t, end) lamp_lit(lamp, origin, direction, t, end)\n"
+    "#define NEBEL_LIGHT_VISIBILITY(lamp, origin, direction, t, end) lamp_lit(lamp, origin, direction, t, end)\n"
     "bool lamp_reaches(int layer, vec3 at)\n"
     "{\n"
     "    lamp_face face = find_lamp_face(layer, at, vec3(0.0));\n"

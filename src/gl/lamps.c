@@ -30,17 +30,17 @@ static nebel_result out_of_memory(const nebel_log *log)
 /* ---- words ----------------------------------------------------------------------------------- */
 
 /* As formulas/lamp.inc has it. Without a cone everything is within. */
-static void set_cone(const nebel_lamp *lamp, float *axis, float *rise)
+static void set_cone(const nebel_light *lamp, float *axis, float *rise)
 {
     const double edge = cos(lamp->outer_angle * (PI / 180)), inner = cos(lamp->inner_angle * (PI / 180));
     double direction[3] = {lamp->direction[0], lamp->direction[1], lamp->direction[2]};
-    const int is_spot = lamp->type == NEBEL_LAMP_SPOT && nb_vector_make_unit(direction);
+    const int is_spot = lamp->type == NEBEL_LIGHT_SPOT && nb_vector_make_unit(direction);
     for (int i = 0; i < 3; i++) axis[i] = is_spot ? (float)direction[i] : 0;
     axis[3] = is_spot ? (float)edge : -1;
     *rise = is_spot ? (float)fmin(1 / (inner - edge), 1e30) : 1e30f;
 }
 
-static void set_words(const nebel_lamp *lamp, const double eye[3], int layer, int fog_layer, float *words)
+static void set_words(const nebel_light *lamp, const double eye[3], int layer, int fog_layer, float *words)
 {
     const double radius = nb_bulb(lamp->radius);
     nb_camera_subtract(lamp->position, eye, words);
@@ -54,7 +54,7 @@ static void set_words(const nebel_lamp *lamp, const double eye[3], int layer, in
 }
 
 /* Whether it is the lamp of this number in the fog, too. */
-static int is_in_fog(const nebel_lamp *lamp, const nebel_snapshot *fog, size_t number)
+static int is_in_fog(const nebel_light *lamp, const nebel_snapshot *fog, size_t number)
 {
     double place[3], radius;
     if (fog == NULL || number >= nebel_snapshot_lamp_count(fog)) return 0;
@@ -106,7 +106,7 @@ static int compare_candidates(const void *a, const void *b)
     return p->lamp < q->lamp ? -1 : p->lamp > q->lamp;
 }
 
-static double light_at(const nebel_lamp *lamp, const double eye[3])
+static double light_at(const nebel_light *lamp, const double eye[3])
 {
     const double way[3] = {lamp->position[0] - eye[0], lamp->position[1] - eye[1], lamp->position[2] - eye[2]};
     const double most = fmax(fmax(lamp->intensity[0], lamp->intensity[1]), lamp->intensity[2]);
@@ -116,8 +116,8 @@ static double light_at(const nebel_lamp *lamp, const double eye[3])
 static size_t choose_lamps(const nebel_scene_data *scene, const double eye[3], size_t room, candidate *list)
 {
     size_t count = 0;
-    for (size_t i = 0; i < scene->lamp_count; i++) {
-        const double light = light_at(&scene->lamps[i], eye);
+    for (size_t i = 0; i < scene->light_count; i++) {
+        const double light = light_at(&scene->lights[i], eye);
         if (light > 0) list[count++] = (candidate){light, i};
     }
     if (count <= room) return count;
@@ -151,7 +151,7 @@ static int resize(nb_lamps *lamps, const nebel_allocator *allocator, size_t coun
     return lamps->layer_count == count;
 }
 
-static int shows(const nb_lamp_source *source, const nebel_lamp *lamp)
+static int shows(const nb_lamp_source *source, const nebel_light *lamp)
 {
     return source->is_drawn && memcmp(source->place, lamp->position, sizeof source->place) == 0 &&
            memcmp(&source->radius, &lamp->radius, sizeof source->radius) == 0;
@@ -161,19 +161,19 @@ static int shows(const nb_lamp_source *source, const nebel_lamp *lamp)
 static void assign_layers(nb_lamps *lamps, const nebel_scene_data *scene, const candidate *list)
 {
     const size_t count = lamps->layer_count;
-    for (size_t i = 0; i < scene->lamp_count; i++) lamps->layers[i] = -1;
+    for (size_t i = 0; i < scene->light_count; i++) lamps->layers[i] = -1;
     for (size_t k = 0; k < count; k++) {
         int kept = 0;
         for (size_t i = 0; i < count && !kept; i++) {
             const size_t lamp = list[i].lamp;
-            kept = lamps->layers[lamp] < 0 && shows(&lamps->sources[k], &scene->lamps[lamp]);
+            kept = lamps->layers[lamp] < 0 && shows(&lamps->sources[k], &scene->lights[lamp]);
             if (kept) lamps->layers[lamp] = (int)k;
         }
         if (!kept) lamps->sources[k].is_drawn = 0;
     }
     size_t next = 0;
     for (size_t i = 0; i < count; i++) {
-        const nebel_lamp *const lamp = &scene->lamps[list[i].lamp];
+        const nebel_light *const lamp = &scene->lights[list[i].lamp];
         if (lamps->layers[list[i].lamp] >= 0) continue;
         while (lamps->sources[next].is_drawn) next++;
         memcpy(lamps->sources[next].place, lamp->position, sizeof lamp->position);
@@ -187,7 +187,7 @@ static int choose_layers(nb_lamps *lamps, const nebel_allocator *allocator, cons
 {
     GLint most = 0;
     glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &most);
-    candidate *const list = nb_allocate(allocator, scene->lamp_count, sizeof *list);
+    candidate *const list = nb_allocate(allocator, scene->light_count, sizeof *list);
     if (list == NULL) return 0;
     const size_t room = MOST_TEXELS / (FACES * LEAST_FACE * LEAST_FACE);
     const size_t count = choose_lamps(scene, eye, (size_t)most < room ? (size_t)most : room, list);
@@ -200,16 +200,16 @@ static int choose_layers(nb_lamps *lamps, const nebel_allocator *allocator, cons
 nebel_result nb_lamps_set(nb_lamps *lamps, const nebel_allocator *allocator, const nebel_log *log,
                           const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3])
 {
-    const uint32_t rows = (uint32_t)(scene->lamp_count * NB_LAMP_TEXELS / NEBEL_TEXTURE_WIDTH + 1);
-    if (scene->lamp_count == 0) return NEBEL_OK;
-    if (scene->lamp_count > NB_LAMPS_MOST) {
+    const uint32_t rows = (uint32_t)(scene->light_count * NB_LAMP_TEXELS / NEBEL_TEXTURE_WIDTH + 1);
+    if (scene->light_count == 0) return NEBEL_OK;
+    if (scene->light_count > NB_LAMPS_MOST) {
         return nb_fail(log, NEBEL_ERROR_LIMIT,
                        "frame: %zu lamps; OpenGL lights with at most %d. The CPU renderer has no such bound",
-                       scene->lamp_count, (int)NB_LAMPS_MOST);
+                       scene->light_count, (int)NB_LAMPS_MOST);
     }
     if (!make_room(lamps, allocator, rows) || !choose_layers(lamps, allocator, scene, eye)) return out_of_memory(log);
-    for (size_t i = 0; i < scene->lamp_count; i++) {
-        const nebel_lamp *const lamp = &scene->lamps[i];
+    for (size_t i = 0; i < scene->light_count; i++) {
+        const nebel_light *const lamp = &scene->lights[i];
         const int layer = lamps->layers[i];
         set_words(lamp, eye, layer, is_in_fog(lamp, fog, i) ? layer : -1, lamps->texels + 4 * NB_LAMP_TEXELS * i);
     }

@@ -43,7 +43,7 @@ void nb_lamps_delete(const nb_lamps *lamps);
 void nb_lamps_release(const nebel_allocator *allocator, const nb_lamps *lamps);
 
 /* The programs that make the maps, and functions that read them and the words: lamp_visible; lamplight; what
- * nebel_shader_text asks of surfaces, to stand before it. The last two behind the first. */
+ * nebel_get_shader_source asks of surfaces, to stand before it. The last two behind the first. */
 extern const char nb_lamp_map_vertex_text[], nb_lamp_map_fragment_text[], nb_lamp_map_text[], nb_lamp_text[],
     nb_lamp_shade_text[];
 

@@ -118,19 +118,19 @@ void nb_panorama_rays(const nebel_view *view, const double eye[3], nb_pixel_poin
     const double *const axes = view->eye_from_world;
     const double step[2] = {4. / view->width, 2. / view->height};
     *rays = (nebel_rays){.eye = {eye[0], eye[1], eye[2]}, .from_eye = 1};
-    rays->words[0].v[0] = (float)(-2 + (point.x - .5) * step[0]);
-    rays->words[0].v[1] = (float)(-1 + (.5 - point.y) * step[1]);
-    for (int i = 0; i < 2; i++) rays->words[1].v[i] = (float)step[i];
+    rays->texels[0].v[0] = (float)(-2 + (point.x - .5) * step[0]);
+    rays->texels[0].v[1] = (float)(-1 + (.5 - point.y) * step[1]);
+    for (int i = 0; i < 2; i++) rays->texels[1].v[i] = (float)step[i];
     for (int i = 0; i < 3; i++) {
-        rays->words[3].v[i] = (float)-axes[4 * i + 2];
-        rays->words[4].v[i] = (float)axes[4 * i];
-        rays->words[5].v[i] = (float)axes[4 * i + 1];
+        rays->texels[3].v[i] = (float)-axes[4 * i + 2];
+        rays->texels[4].v[i] = (float)axes[4 * i];
+        rays->texels[5].v[i] = (float)axes[4 * i + 1];
     }
 }
 
 void nb_panorama_direction(const nebel_rays *rays, double x, double y, double direction[3])
 {
-    const nebel_word *const w = rays->words;
+    const nebel_texel_f32 *const w = rays->texels;
     const double longitude = .5 * pi * ((double)w[0].v[0] + x * (double)w[1].v[0]);
     const double latitude = .5 * pi * ((double)w[0].v[1] + y * (double)w[1].v[1]);
     const double along = cos(latitude) * cos(longitude), across = cos(latitude) * sin(longitude);

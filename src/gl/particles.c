@@ -23,7 +23,7 @@ static nebel_result check(const nebel_log *log, const nebel_particle *list, size
 {
     for (size_t i = 0; i < count; i++) {
         const nebel_particle *const p = &list[i];
-        if ((unsigned)p->profile >= NEBEL_PARTICLE_COUNT)
+        if ((unsigned)p->profile >= NEBEL_PARTICLE_PROFILE_COUNT)
             return nb_fail(log, NEBEL_ERROR_ARGUMENT, "particles: particle %zu: profile %d is unknown", i,
                            (int)p->profile);
         if (!is_within(p->center, 3, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH) ||
@@ -72,7 +72,7 @@ nebel_result nb_particles_commit(const nb_particles *particles, const nebel_allo
     const nebel_fog_desc desc = {.allocator = *allocator, .log = *log};
     nebel_result result = nebel_create_fog(&desc, &fog);
     for (size_t i = 0; i < particles->count && result == NEBEL_OK; i++) {
-        const nebel_volume_desc volume = nebel_particle_volume(&particles->list[i]);
+        const nebel_volume_desc volume = nebel_volume_from_particle(&particles->list[i]);
         result = nebel_add_volume(fog, &volume, NULL);
     }
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, cloud);

@@ -26,7 +26,7 @@ static nebel_result fail(const nebel_gl *gl, nebel_result result, const char *wh
 
 static int is_by_sample(const nebel_gl_pass *pass)
 {
-    return pass->samples > 1 && (pass->output == NEBEL_GL_OUTPUT_BLEND || pass->output == NEBEL_GL_OUTPUT_BLEND_GREY);
+    return pass->samples > 1 && (pass->output == NEBEL_GL_OUTPUT_BLEND || pass->output == NEBEL_GL_OUTPUT_BLEND_GRAY);
 }
 
 static nebel_result check_samples(const nebel_gl *gl, const nebel_gl_pass *pass)
@@ -63,7 +63,7 @@ static nebel_result check_output(const nebel_gl *gl, const nebel_gl_pass *pass)
         return fail(gl, NEBEL_ERROR_UNSUPPORTED,
                     "this context cannot blend each color by its own transmittance (GL_EXT_blend_func_extended is "
                     "missing); use "
-                    "NEBEL_GL_OUTPUT_COMPOSE, or NEBEL_GL_OUTPUT_BLEND_GREY where fog takes all colors alike");
+                    "NEBEL_GL_OUTPUT_COMPOSE, or NEBEL_GL_OUTPUT_BLEND_GRAY where fog takes all colors alike");
     }
     return check_samples(gl, pass);
 }
@@ -190,7 +190,7 @@ static nebel_result bind_textures(const task *t)
     if (gl->fog.texture != 0) bind_texture(gl, NB_UNIT_FOG, GL_TEXTURE_2D, gl->fog.texture);
     if (gl->fog.block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, gl->fog.block);
     if (gl->fog.voxels != 0) bind_texture(gl, NB_UNIT_VOXELS, GL_TEXTURE_2D, gl->fog.voxels);
-    if (gl->fog.nodes != 0) bind_texture(gl, NB_UNIT_NODES, GL_TEXTURE_2D, gl->fog.nodes);
+    if (gl->fog.diffusion != 0) bind_texture(gl, NB_UNIT_NODES, GL_TEXTURE_2D, gl->fog.diffusion);
     if (gl->fog.environment != 0) bind_texture(gl, NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, gl->fog.environment);
     if (gl->fog.tiles != 0) bind_texture(gl, NB_UNIT_TILES, GL_TEXTURE_2D, gl->fog.tiles);
     bind_host_texture(gl, NB_UNIT_DEPTH, target, t->pass->depth_texture);
@@ -258,7 +258,7 @@ static int is_shaded(const nb_gl_picture *picture)
 static void set_uniforms(const task *t, GLuint target_framebuffer)
 {
     const nb_program *const p = t->program;
-    glUniform4fv(p->rays, NEBEL_RAY_WORDS, t->picture->rays.words[0].v);
+    glUniform4fv(p->rays, NEBEL_RAY_TEXELS, t->picture->rays.texels[0].v);
     glUniform2i(p->corner, (GLint)t->pass->x, (GLint)t->pass->y);
     if (t->gl->fog.tiles != 0) set_tiling(t);
     if (t->pass->samples > 1) set_samples(t, target_framebuffer);
@@ -292,7 +292,7 @@ static void set_target(const task *t, const nb_band *band)
     const nb_context *const context = &t->gl->context;
     nb_state_clear(context, band->x, band->y, band->width, band->height);
     if (t->pass->output == NEBEL_GL_OUTPUT_BLEND) nb_state_blend(context, GL_ONE, GL_SRC1_COLOR);
-    if (t->pass->output == NEBEL_GL_OUTPUT_BLEND_GREY) nb_state_blend(context, GL_ONE, GL_SRC_ALPHA);
+    if (t->pass->output == NEBEL_GL_OUTPUT_BLEND_GRAY) nb_state_blend(context, GL_ONE, GL_SRC_ALPHA);
 }
 
 static nebel_result draw(const task *t, GLuint target_framebuffer)
@@ -325,7 +325,7 @@ void nb_gl_warn_of_turns(nebel_gl *gl, const char *why)
                   "evenly mixed, and that of lamps left out there. A graphics processor or the CPU renderer has no "
                   "such bound",
                   (const char *)glGetString(GL_RENDERER), why,
-                  (unsigned)(gl->fog.tiles != 0 ? gl->fog.tile_most : nebel_snapshot_volume_count(gl->packed)));
+                  (unsigned)(gl->fog.tiles != 0 ? gl->fog.max_tile_volumes : nebel_get_volume_count(gl->packed)));
 }
 
 /* Units that have textures of several layers while steps are drawn. */
@@ -387,7 +387,7 @@ static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
                                   .tiled = gl->fog.tiles != 0,
                                   .multisampled = t->pass->samples > 1,
                                   .output = in_steps ? NEBEL_GL_OUTPUT_SPLIT : t->pass->output,
-                                  .depth = t->pass->depth.kind,
+                                  .depth = t->pass->depth.encoding,
                                   .from_eye = t->picture->rays.from_eye,
                                   .panorama = t->picture->panorama,
                                   .shafts = t->picture->shafts != NULL,
@@ -407,7 +407,7 @@ static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
     return draw(t, target_framebuffer);
 }
 
-/* Says which field of a convention that nebel_view_rays refuses is the first that it refuses by itself. */
+/* Says which field of a convention that nebel_compute_view_rays refuses is the first that it refuses by itself. */
 static const char *find_depth_fault(const nebel_view *view, const nebel_depth_desc *depth)
 {
     const struct {
@@ -416,17 +416,18 @@ static const char *find_depth_fault(const nebel_view *view, const nebel_depth_de
     } fields[] = {
         {{.range = {depth->range[0], depth->range[1]}},
          "depth.range must be two different finite numbers, or both 0, which stands for 0 and 1"},
-        {{.sky = depth->sky}, "depth.sky must be NEBEL_SKY_FAR, VALUE or NONE"},
-        {{.start = depth->start}, "depth.start must be NEBEL_START_EYE or NEAR"},
-        {{.kind = depth->kind, .log_far = 1},
-         "depth.kind must be a nebel_depth_kind that fits clip_from_eye: LOGARITHM needs rays that meet in a point, "
+        {{.background = depth->background}, "depth.sky must be NEBEL_BACKGROUND_DEPTH_FAR, VALUE or NONE"},
+        {{.ray_start = depth->ray_start}, "depth.start must be NEBEL_RAY_START_EYE or NEAR"},
+        {{.encoding = depth->encoding, .log_far = 1},
+         "depth.kind must be a nebel_depth_encoding that fits clip_from_eye: LOGARITHM needs rays that meet in a "
+         "point, "
          "AXIS a middle ray that is not across the axis"},
-        {{.kind = depth->kind, .log_far = 1, .log_scale = depth->log_scale},
+        {{.encoding = depth->encoding, .log_far = 1, .log_scale = depth->log_scale},
          "depth.log_scale must be finite and more than 0, or 0, which stands for 1"},
     };
     nebel_rays rays;
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++) {
-        if (nebel_view_rays(view, &fields[i].alone, &rays) != NEBEL_OK) return fields[i].fault;
+        if (nebel_compute_view_rays(view, &fields[i].alone, &rays) != NEBEL_OK) return fields[i].fault;
     }
     return "depth.log_far must be finite and more than 0: the distance that is stored as 1";
 }
@@ -437,7 +438,7 @@ nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass)
     if (pass == NULL) return fail(gl, NEBEL_ERROR_ARGUMENT, "the pass is missing");
     if (!gl->has_fog) return fail(gl, NEBEL_ERROR_ARGUMENT, "call nebel_gl_set_fog first");
     nb_gl_picture picture = {.width = gl->views[0].width, .height = gl->views[0].height};
-    if (nebel_view_rays(&gl->views[0], &pass->depth, &picture.rays) != NEBEL_OK) {
+    if (nebel_compute_view_rays(&gl->views[0], &pass->depth, &picture.rays) != NEBEL_OK) {
         return fail(gl, NEBEL_ERROR_ARGUMENT, find_depth_fault(&gl->views[0], &pass->depth));
     }
     return nb_gl_draw_fog(gl, pass, &picture);

@@ -19,7 +19,7 @@ typedef struct work {
 /* As the texts of the shaders have it. */
 static void find_ray(const work *w, double x, double y, double origin[3], double direction[3])
 {
-    const nebel_word *const words = w->rays->words;
+    const nebel_texel_f32 *const words = w->rays->texels;
     double length2 = 0;
     for (int i = 0; i < 3; i++) {
         origin[i] = (double)words[0].v[i] + x * (double)words[1].v[i] + y * (double)words[2].v[i];

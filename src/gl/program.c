@@ -48,20 +48,20 @@ static const char fragment_text[] =
     "layout(location = PASS_SECOND) out highp vec4 pass_second;\n"
     "#endif\n"
     "\n"
-    "nebel_sight pass_sight(vec2 pixel, float depth)\n"
+    "nebel_view_ray pass_sight(vec2 pixel, float depth)\n"
     "{\n"
     "#ifdef PASS_PANORAMA\n"
-    "    nebel_sight sight;\n"
+    "    nebel_view_ray sight;\n"
     "    sight.origin = vec3(0.0);\n"
     "    sight.direction = ray_direction(pixel);\n"
     "    sight.t_max = depth > 0.0 && depth < 1e18 ? depth : 1e18;\n"
     "    return sight;\n"
     "#else\n"
-    "    return nebel_see(pixel, depth);\n"
+    "    return nebel_make_view_ray(pixel, depth);\n"
     "#endif\n"
     "}\n"
     "\n"
-    "int pass_entry(nebel_sight sight, vec2 pixel)\n"
+    "int pass_entry(nebel_view_ray sight, vec2 pixel)\n"
     "{\n"
     "    int entry = 0;\n"
     "#if defined(NEBEL_TILES) && defined(PASS_PANORAMA)\n"
@@ -76,15 +76,16 @@ static const char fragment_text[] =
 static const char whole_text[] =
     "nebel_transfer pass_fog(vec2 pixel, vec4 place)\n"
     "{\n"
-    "    nebel_sight sight = pass_sight(pixel, place.x);\n"
+    "    nebel_view_ray sight = pass_sight(pixel, place.x);\n"
     "#ifdef PASS_CLOUDS\n"
     "    if (pass_is_turned) sight.direction = place.yzw;\n"
     "#endif\n"
     "    int entry = pass_entry(sight, pixel);\n"
-    "#ifdef NEBEL_AIR\n"
+    "#ifdef NEBEL_SKY_VIEW\n"
     "    return pass_haze(sight, entry);\n"
     "#elif defined(NEBEL_TILES)\n"
-    "    return nebel_trace_list(sight.origin, sight.direction, sight.t_max, NEBEL_INDEX(entry), NEBEL_INDEX(entry + "
+    "    return nebel_trace_list(sight.origin, sight.direction, sight.t_max, NEBEL_TILE_ENTRY(entry), "
+    "NEBEL_TILE_ENTRY(entry + "
     "1));\n"
     "#else\n"
     "    return nebel_trace(sight.origin, sight.direction, sight.t_max);\n"
@@ -143,7 +144,7 @@ const char *nb_program_limits(const nb_context *context, const char *shares, cha
 {
     text[0] = '\0';
     if (context->most_turns > 0) {
-        (void)snprintf(text, size, "#define NEBEL_MOST_TURNS (%d %s)\n", context->most_turns, shares);
+        (void)snprintf(text, size, "#define NEBEL_MAX_ITERATIONS (%d %s)\n", context->most_turns, shares);
     }
     return text;
 }
@@ -154,7 +155,7 @@ const char *nb_program_output(nebel_gl_output output)
         [NEBEL_GL_OUTPUT_COMPOSE] = "#define PASS_COMPOSE\n#define PASS_FIRST\n",
         [NEBEL_GL_OUTPUT_SPLIT] = "#define PASS_FIRST\n#define PASS_SECOND 1\n",
         [NEBEL_GL_OUTPUT_BLEND] = "#define PASS_FIRST , index = 0\n#define PASS_SECOND 0, index = 1\n",
-        [NEBEL_GL_OUTPUT_BLEND_GREY] = "#define PASS_FIRST\n",
+        [NEBEL_GL_OUTPUT_BLEND_GRAY] = "#define PASS_FIRST\n",
     };
     return texts[output];
 }
@@ -173,20 +174,20 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
     /* Turns that are not known before are counted one by one, so that a walk through cells ends in time; others may be too
        many once: what a driver has not let end is found again in the next step. */
     const int is_counted = (kind->features & NEBEL_FEATURE_GRID) != 0;
-    const char *const step = "#define PASS_STEP\n#define NEBEL_RESUMES\n";
+    const char *const step = "#define PASS_STEP\n#define NEBEL_RESUMABLE\n";
     char limits[128], air[NB_AIR_HEAD];
     const char *const shares = kind->multisampled ? "/ (pass_sample_range.y - pass_sample_range.x)"
                                : kind->air        ? "* 3 / 4" /* what is left of a ray that was cut is summed twice */
                                : kind->step && !is_counted ? "* 2"
                                                            : "";
     (void)snprintf(text, size,
-                   "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define "
-                   "NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n"
+                   "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_ENCODING %d\n#define "
+                   "NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES %u\n"
                    "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n"
                    "#define RAY_WORD(i) pass_rays[i].xyz\n%s",
                    nb_program_version(context), kind->step ? "" : nb_program_extension(context, kind->output),
                    nb_program_limits(context, shares, limits, sizeof limits),
-                   kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
+                   kind->in_texture ? "#define NEBEL_FOG_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
                    (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
                    (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
                    (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
@@ -274,9 +275,9 @@ static void set_uniforms(nb_program *program)
     glUniform1i(glGetUniformLocation(name, "nebel_fog_texture"), NB_UNIT_FOG);
     glUniform1i(glGetUniformLocation(name, "nebel_tile_texture"), NB_UNIT_TILES);
     glUniform1i(glGetUniformLocation(name, "nebel_voxel_texture"), NB_UNIT_VOXELS);
-    glUniform1i(glGetUniformLocation(name, "nebel_node_texture"), NB_UNIT_NODES);
+    glUniform1i(glGetUniformLocation(name, "nebel_diffusion_texture"), NB_UNIT_NODES);
     glUniform1i(glGetUniformLocation(name, "nebel_environment_texture"), NB_UNIT_ENVIRONMENT);
-    glUniform1i(glGetUniformLocation(name, "nebel_air_texture"), NB_UNIT_AIR);
+    glUniform1i(glGetUniformLocation(name, "nebel_sky_view_texture"), NB_UNIT_AIR);
     glUniform1i(glGetUniformLocation(name, "pass_depth"), NB_UNIT_DEPTH);
     glUniform1i(glGetUniformLocation(name, program->kind.step ? "pass_progress" : "pass_color"), NB_UNIT_COLOR);
 }
@@ -289,7 +290,7 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
 {
     char head[1024];
     write_head(context, kind, head, sizeof head);
-    const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
+    const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const nb_texts vertex = {{nb_program_version(context), vertex_text}, 2};
     const char *const ray = kind->panorama ? nb_panorama_ray_text : "";
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";

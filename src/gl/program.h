@@ -35,7 +35,7 @@ nebel_result nb_program_build(const nebel_log *log, const nb_texts *vertex, cons
 typedef struct nb_program_kind {
     int in_texture, tiled, multisampled;
     nebel_gl_output output;
-    nebel_depth_kind depth;
+    nebel_depth_encoding depth;
     int from_eye;         /* all rays start where the fog was packed for */
     int panorama;         /* rays go all around, and tiles are of six faces; depth is the distance */
     int shafts;           /* surfaces shade fog */

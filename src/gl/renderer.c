@@ -14,9 +14,10 @@ static nebel_result check(const nebel_scene_data *scene, const nebel_gl_renderer
     if (!nb_allocator_is_valid(&desc->allocator)) {
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "OpenGL renderer: the allocator needs both functions or neither");
     }
-    if (desc->shadow_size != 0 && (desc->shadow_size < LEAST_SHADOW_SIZE || desc->shadow_size > MOST_SHADOW_SIZE)) {
+    if (desc->shadow_map_size != 0 &&
+        (desc->shadow_map_size < LEAST_SHADOW_SIZE || desc->shadow_map_size > MOST_SHADOW_SIZE)) {
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "OpenGL renderer: shadow_size is %u; %d to %d, or 0, are possible",
-                       (unsigned)desc->shadow_size, LEAST_SHADOW_SIZE, MOST_SHADOW_SIZE);
+                       (unsigned)desc->shadow_map_size, LEAST_SHADOW_SIZE, MOST_SHADOW_SIZE);
     }
     return NEBEL_OK;
 }
@@ -76,7 +77,7 @@ nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snaps
     made->log = made->meshes.log = desc->log;
     made->scene = scene;
     made->context = context;
-    const uint32_t size = desc->shadow_size != 0 ? desc->shadow_size : USUAL_SHADOW_SIZE;
+    const uint32_t size = desc->shadow_map_size != 0 ? desc->shadow_map_size : USUAL_SHADOW_SIZE;
     made->shadows.size = made->shafts.maps.size = size < context.widest ? size : context.widest;
     made->shadows.count = NB_CASCADES;
     made->shafts.maps.count = NB_MOST_MAPS;
@@ -166,7 +167,7 @@ static int dim_lamps(const nebel_gl_renderer *r)
                         high[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
     double fog_low[3], fog_high[3];
     const int are_lit =
-        r->scene->lamp_count > 0 || (r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, fog_low, fog_high));
+        r->scene->light_count > 0 || (r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, fog_low, fog_high));
     return are_lit && nb_particles_shade(&r->particles, any, low, high);
 }
 

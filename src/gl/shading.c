@@ -48,7 +48,7 @@ static const char surface_vertex_text[] = "layout(location = 0) in vec3 mesh_pos
                                           "    gl_Position = scene_clip * vec4(surface_place, 1.0);\n"
                                           "}\n";
 
-/* The ray of a pixel: scene_rays are the words of nebel_view_rays, or of a panorama. */
+/* The ray of a pixel: scene_rays are the words of nebel_compute_view_rays, or of a panorama. */
 const char nb_words_text[] = "uniform vec3 scene_rays[6];\n"
                              "#define RAY_WORD(i) scene_rays[i]\n";
 
@@ -359,9 +359,10 @@ static const char sun_text[] =
     "    ivec2 pixel = clamp(ivec2((at - tile_place.xy) * tile_place.zw), ivec2(0), tile_grid.xy - 1);\n"
     "    ivec2 tile = pixel / tile_grid.z;\n"
     "    int entry = 2 * (tile.x + tile.y * tile_grid.w);\n"
-    "    return nebel_transmit_light_list(place, scene_sun, 1e18, NEBEL_INDEX(entry), NEBEL_INDEX(entry + 1));\n"
+    "    return nebel_transmit_shadow_list(place, scene_sun, 1e18, NEBEL_TILE_ENTRY(entry), NEBEL_TILE_ENTRY(entry + "
+    "1));\n"
     "#else\n"
-    "    return nebel_transmit_light(place, scene_sun, 1e18);\n"
+    "    return nebel_transmit_shadow(place, scene_sun, 1e18);\n"
     "#endif\n"
     "}\n";
 
@@ -385,19 +386,15 @@ static const char dimming_text[] = "uniform mat3 scene_light;\n"
                                    "}\n";
 
 static const char light_text[] =
-    "uniform highp sampler2D scene_place;\n"
-    "uniform highp sampler2D scene_normal;\n"
-    "uniform highp sampler2D scene_reflectance;\n"
-    "uniform highp sampler2D scene_in_scattering;\n"
-    "uniform highp sampler2D scene_transmittance;\n"
+    "uniform highp sampler2D scene_place, scene_normal, scene_reflectance, scene_in_scattering, scene_transmittance;\n"
     "uniform vec3 scene_background;\n"
     "#ifdef NEBEL_ENVIRONMENT\n" /* the scene's, whatever lights the fog: that is asked for transmittance alone */
     "uniform bool scene_shows_ambient;\n"
     "vec3 background(vec3 direction)\n"
     "{\n"
-    "    return scene_shows_ambient ? nebel_environment_radiance(direction) : scene_background;\n"
+    "    return scene_shows_ambient ? nebel_evaluate_environment(direction) : scene_background;\n"
     "}\n"
-    "vec3 ambient(vec3 normal) { return nebel_environment_reflected(normal); }\n"
+    "vec3 ambient(vec3 normal) { return nebel_evaluate_environment_diffuse(normal); }\n"
     "#else\n"
     "uniform vec3 scene_ambient;\n"
     "vec3 background(vec3 direction) { return scene_background; }\n"
@@ -421,7 +418,7 @@ static const char light_text[] =
        stand for, unless they shade it themselves (rise -1). */
     "vec3 sunlight(vec3 place, vec3 normal, float rise, vec3 side, float t, vec3 shining)\n"
     "{\n"
-    "#if !defined(SCENE_SUNLIT) && !defined(NEBEL_AIR)\n"
+    "#if !defined(SCENE_SUNLIT) && !defined(NEBEL_SKY_VIEW)\n"
     "    return vec3(0.0);\n"
     "#else\n"
     "    float cosine = dot(normal, scene_sun);\n"
@@ -464,14 +461,14 @@ static const char light_text[] =
     "    vec3 direction = ray_direction(gl_FragCoord.xy), surface;\n"
     "    if (!(place.x > 0.0)) {\n"
     "        surface = background(direction);\n"
-    "#ifdef NEBEL_AIR\n"
+    "#ifdef NEBEL_SKY_VIEW\n"
     "        surface += sun_disc(direction, gl_FragCoord.xy);\n"
     "#endif\n"
     "    } else {\n"
     "        vec3 at = ray_origin(gl_FragCoord.xy) + place.x * direction;\n"
     "        vec4 reflectance = texelFetch(scene_reflectance, texel, 0);\n"
     "        vec3 light = ambient(normal.xyz), shining = scene_sunlight;\n"
-    "#ifdef NEBEL_AIR\n"
+    "#ifdef NEBEL_SKY_VIEW\n"
     "        if (reflectance.a > 0.5) light_ground(direction, at, light, shining);\n"
     "        else light_model(at, light, shining);\n"
     "#endif\n"
@@ -607,7 +604,7 @@ nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *conte
 nebel_result nb_shading_make_ground(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama,
                                     int worlds)
 {
-    const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
+    const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     char head[NB_AIR_HEAD];
     const nb_texts vertex = {{nb_program_version(context), nb_whole_vertex_text}, 2};
     const nb_texts fragment = {{nb_program_version(context), nb_air_head(worlds, head), precision_of(context),
@@ -625,7 +622,7 @@ nebel_result nb_shading_make_ground(nb_shading *shading, const nb_context *conte
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
     if (result != NEBEL_OK) return result;
     glUseProgram(*name);
-    set_unit(*name, "nebel_air_texture", NB_UNIT_AIR);
+    set_unit(*name, "nebel_sky_view_texture", NB_UNIT_AIR);
     return NEBEL_OK;
 }
 
@@ -663,13 +660,13 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
         text, size,
         "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define "
         "NB_CASCADES "
-        "%d\n#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n%s",
+        "%d\n#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES %u\n%s",
         nb_program_version(context), nb_program_limits(context, "", limits, sizeof limits),
         kind->has_fog ? "#define SCENE_FOG\n" : "", kind->has_surfaces ? "#define SCENE_SURFACES\n" : "",
         kind->in_fog ? "#define SCENE_IN_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
         kind->sunlit ? "#define SCENE_SUNLIT\n" : "", kind->lamplit ? "#define SCENE_LAMPLIT\n" : "",
         kind->panorama ? "#define SCENE_PANORAMA\n" : "", kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
-        kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
+        kind->in_texture ? "#define NEBEL_FOG_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
         (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
         (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
         kind->environment || (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
@@ -686,7 +683,7 @@ static void set_units(unsigned program)
     set_unit(program, "nebel_fog_texture", NB_UNIT_FOG);
     set_unit(program, "nebel_tile_texture", NB_UNIT_TILES);
     set_unit(program, "nebel_voxel_texture", NB_UNIT_VOXELS);
-    set_unit(program, "nebel_node_texture", NB_UNIT_NODES);
+    set_unit(program, "nebel_diffusion_texture", NB_UNIT_NODES);
     set_unit(program, "nebel_environment_texture", NB_UNIT_ENVIRONMENT);
     set_unit(program, "scene_place", NB_UNIT_PLACE);
     set_unit(program, "scene_depth", NB_UNIT_PLACE);
@@ -699,7 +696,7 @@ static void set_units(unsigned program)
     set_unit(program, "scene_veil", NB_UNIT_VEIL);
     set_unit(program, "scene_lamps", NB_UNIT_LAMPS);
     set_unit(program, "lamp_maps", NB_UNIT_LAMP_MAPS);
-    set_unit(program, "nebel_air_texture", NB_UNIT_AIR);
+    set_unit(program, "nebel_sky_view_texture", NB_UNIT_AIR);
     set_unit(program, "scene_shells", NB_UNIT_SHELLS);
     set_unit(program, "scene_clouds", NB_UNIT_CLOUDS);
     set_unit(program, "shell_seen", NB_UNIT_REFLECTANCE);
@@ -718,7 +715,7 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
 {
     char head[1280];
     write_head(context, kind, head, sizeof head);
-    const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
+    const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const char *const ray = kind->panorama ? nb_panorama_ray_text : nb_ray_text;
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
     const nb_texts light = {{head, kind->air ? nb_air_words_text : "",

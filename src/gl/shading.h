@@ -67,7 +67,7 @@ typedef struct nb_shading {
 } nb_shading;
 
 /* What is drawn over the whole picture: its vertices, and the ray of a pixel. nb_words_text: scene_rays are the words of
- * nebel_view_rays, or of a panorama, whose ray is another. */
+ * nebel_compute_view_rays, or of a panorama, whose ray is another. */
 extern const char nb_whole_vertex_text[], nb_words_text[], nb_ray_text[];
 
 /* Compile and link what is not there yet, which changes the current program. UNSUPPORTED with the driver's words;

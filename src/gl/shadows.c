@@ -128,7 +128,7 @@ static void set_ends(nb_shadows *shadows, const survey *s)
 }
 
 /* words + x words + y words */
-static void combine(const nebel_word words[3], double x, double y, double v[3])
+static void combine(const nebel_texel_f32 words[3], double x, double y, double v[3])
 {
     for (int i = 0; i < 3; i++) v[i] = (double)words[0].v[i] + x * (double)words[1].v[i] + y * (double)words[2].v[i];
 }
@@ -155,12 +155,12 @@ static beam make_beam(const survey *s, const extent *e)
 {
     beam b = {.least_size = HUGE_VAL};
     double middle[3];
-    combine(s->rays->words + 3, .5 * (e->left + e->right), .5 * (e->low + e->high), middle);
+    combine(s->rays->texels + 3, .5 * (e->left + e->right), .5 * (e->low + e->high), middle);
     const double size = nb_vector_length(middle);
     for (int i = 0; i < 4; i++) {
         const double x = i & 1 ? e->right : e->left, y = i & 2 ? e->high : e->low;
-        combine(s->rays->words, x, y, b.origin[i]);
-        combine(s->rays->words + 3, x, y, b.way[i]);
+        combine(s->rays->texels, x, y, b.origin[i]);
+        combine(s->rays->texels + 3, x, y, b.way[i]);
         b.least_size = fmin(b.least_size, nb_vector_dot(middle, b.way[i]) / size);
         b.most_size = fmax(b.most_size, nb_vector_length(b.way[i]));
     }
@@ -254,8 +254,8 @@ static double pixel_width(const survey *s, double t)
     double width = 0;
     if (s->panorama) return t * fmax(6.3 / s->width, 3.2 / s->height);
     for (int i = 0; i < 3; i++) {
-        width = fmax(width, fabs((double)s->rays->words[1].v[i]) + t * fabs((double)s->rays->words[4].v[i]));
-        width = fmax(width, fabs((double)s->rays->words[2].v[i]) + t * fabs((double)s->rays->words[5].v[i]));
+        width = fmax(width, fabs((double)s->rays->texels[1].v[i]) + t * fabs((double)s->rays->texels[4].v[i]));
+        width = fmax(width, fabs((double)s->rays->texels[2].v[i]) + t * fabs((double)s->rays->texels[5].v[i]));
     }
     return width;
 }
@@ -521,7 +521,7 @@ static int are_parallel(const survey *s)
 {
     int same = !s->panorama;
     for (int i = 0; i < 3; i++)
-        same = same && s->rays->words[4].v[i] == 0 && s->rays->words[5].v[i] == 0; /* directions do not change */
+        same = same && s->rays->texels[4].v[i] == 0 && s->rays->texels[5].v[i] == 0; /* directions do not change */
     return same;
 }
 

@@ -28,16 +28,10 @@ const char nb_shaft_text[] =
     "    float depth = texelFetch(shaft_maps, ivec3(cell, map), 0).x;\n"
     "    return vec2(depth < 1.0 ? depth : 1e30);\n"
     "}\n"
-    "float shaft_inverse(float x)\n"
-    "{\n"
-    "    return abs(x) < 1e-20 ? (x < 0.0 ? -1e20 : 1e20) : 1.0 / x;\n"
-    "}\n"
+    "float shaft_inverse(float x) { return abs(x) < 1e-20 ? (x < 0.0 ? -1e20 : 1e20) : 1.0 / x; }\n"
     /* Whether light or shadow is at t, and how far it reaches, within one map. z is how deep the ray is, and how fast it
        gets deeper. */
-    "struct shaft_piece {\n"
-    "    bool known, dark;\n"
-    "    float end;\n"
-    "};\n"
+    "struct shaft_piece { bool known, dark; float end; };\n"
     "void shaft_walk(inout shaft_piece piece, int map, vec2 at, vec2 rate, vec2 z, float end)\n"
     "{\n"
     "    vec2 inverse = vec2(shaft_inverse(rate.x), shaft_inverse(rate.y));\n"
@@ -112,8 +106,8 @@ const char nb_shaft_text[] =
     "    }\n"
     "    return vec2(piece.dark ? 0.0 : 1.0, piece.end);\n"
     "}\n"
-    "#define NEBEL_SUN_LIT(origin, direction, t, end) shaft_lit(origin, direction, t, end)\n"
-    "#define NEBEL_SUN_LIT_TURNS shaft_turns\n";
+    "#define NEBEL_SUN_VISIBILITY(origin, direction, t, end) shaft_lit(origin, direction, t, end)\n"
+    "#define NEBEL_SUN_VISIBILITY_ITERATIONS shaft_turns\n";
 
 /* ---- blocks ---------------------------------------------------------------------------------- */
 

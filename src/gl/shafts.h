@@ -25,7 +25,7 @@ void nb_shafts_set(const nb_shafts *shafts, unsigned program);
 
 void nb_shafts_delete(const nb_shafts *shafts);
 
-/* Comes before the fog's text, which takes NEBEL_SUN_LIT from it. */
+/* Comes before the fog's text, which takes NEBEL_SUN_VISIBILITY from it. */
 extern const char nb_shaft_text[];
 
 #endif

@@ -8,36 +8,38 @@
 #include <epoxy/gl.h>
 #include <nebel/shader.h>
 
-const nebel_layers *nb_gl_shells_planet(const nebel_scene_data *scene)
+const nebel_textured_planet *nb_gl_shells_planet(const nebel_scene_data *scene)
 {
-    return scene->planet_count > 0 ? scene->planets[0].layers : NULL;
+    return scene->planet_count > 0 ? scene->planets[0].textured : NULL;
 }
 
 /* ---- maps ------------------------------------------------------------------------------------ */
 
 /* What nb_shell_ball_text reads. Columns of the levels behind the first are no more than those of the first, but of maps of
  * few columns. */
-static void upload_levels(const nebel_layers *layers, const nebel_map *map, GLenum format, nb_gl_map *out)
+static void upload_levels(const nebel_textured_planet *layers, const nebel_planet_map *map, GLenum format,
+                          nb_gl_map *out)
 {
-    nebel_map level;
+    nebel_planet_map level;
     GLint x = 0;
-    for (out->levels = 0; nebel_find_map_level(layers, map, (uint32_t)out->levels, &level) == NEBEL_OK; out->levels++) {
+    for (out->levels = 0; nebel_get_planet_map_mip(layers, map, (uint32_t)out->levels, &level) == NEBEL_OK;
+         out->levels++) {
         glTexSubImage2D(GL_TEXTURE_2D, 0, x, out->levels > 0 ? out->height : 0, (GLsizei)level.width,
                         (GLsizei)level.height, format, GL_FLOAT, level.texels);
         if (out->levels > 0) x += (GLint)level.width;
     }
 }
 
-static size_t width_of_all(const nebel_layers *layers, const nebel_map *map)
+static size_t width_of_all(const nebel_textured_planet *layers, const nebel_planet_map *map)
 {
-    nebel_map level;
+    nebel_planet_map level;
     size_t width = 0;
-    for (uint32_t i = 1; nebel_find_map_level(layers, map, i, &level) == NEBEL_OK; i++) width += level.width;
+    for (uint32_t i = 1; nebel_get_planet_map_mip(layers, map, i, &level) == NEBEL_OK; i++) width += level.width;
     return width > map->width ? width : map->width;
 }
 
-static nebel_result make_map(const nb_context *context, const nebel_log *log, const nebel_layers *layers,
-                             const nebel_map *map, nb_gl_map *out)
+static nebel_result make_map(const nb_context *context, const nebel_log *log, const nebel_textured_planet *layers,
+                             const nebel_planet_map *map, nb_gl_map *out)
 {
     if (map->texels == NULL) return NEBEL_OK;
     const size_t width = width_of_all(layers, map), height = map->height + map->height / 2 + 1;
@@ -69,19 +71,20 @@ static void delete_maps(nb_gl_shells *shells)
 }
 
 static nebel_result make_maps(nb_gl_shells *shells, const nb_context *context, const nebel_log *log,
-                              const nebel_layers *layers)
+                              const nebel_textured_planet *layers)
 {
-    const nebel_layers_desc *const desc = nebel_describe_layers(layers);
-    nebel_result result = make_map(context, log, layers, &desc->ground, &shells->ground);
-    for (uint32_t i = 0; i < desc->cloud_count && result == NEBEL_OK; i++) {
-        result = make_map(context, log, layers, &desc->clouds[i].map, &shells->clouds[i]);
-        if (result == NEBEL_OK) result = make_map(context, log, layers, &desc->clouds[i].detail, &shells->details[i]);
+    const nebel_textured_planet_desc *const desc = nebel_get_textured_planet_desc(layers);
+    nebel_result result = make_map(context, log, layers, &desc->color_map, &shells->ground);
+    for (uint32_t i = 0; i < desc->cloud_shell_count && result == NEBEL_OK; i++) {
+        result = make_map(context, log, layers, &desc->cloud_shells[i].coverage_map, &shells->clouds[i]);
+        if (result == NEBEL_OK)
+            result = make_map(context, log, layers, &desc->cloud_shells[i].detail_map, &shells->details[i]);
     }
     return result;
 }
 
 static nebel_result fit_maps(nb_gl_shells *shells, const nb_context *context, const nebel_log *log,
-                             const nebel_layers *layers)
+                             const nebel_textured_planet *layers)
 {
     if (shells->of == layers) return NEBEL_OK;
     delete_maps(shells);
@@ -140,7 +143,7 @@ static nebel_result fit_program(const nb_context *context, const nebel_log *log,
 {
     const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : nb_ray_text;
     const char *const precision = context->es ? "precision highp float;\nprecision highp int;\n" : "";
-    const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
+    const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const nb_texts vertex = {{version, nb_whole_vertex_text}, 2};
     const nb_texts fragment = {{version, precision, fog, nb_words_text, ray, nb_shell_ball_text, text}, 7};
     if (*name != 0) return NEBEL_OK;
@@ -150,7 +153,7 @@ static nebel_result fit_program(const nb_context *context, const nebel_log *log,
 }
 
 nebel_result nb_gl_shells_set(nb_gl_shells *shells, const nb_context *context, const nebel_log *log,
-                              const nebel_layers *layers, uint32_t width, uint32_t height, int panorama)
+                              const nebel_textured_planet *layers, uint32_t width, uint32_t height, int panorama)
 {
     static const char *const texts[NB_SHELL_PROGRAMS] = {[NB_SHELL_GROUND] = nb_shell_ground_text,
                                                          [NB_SHELL_CLOUDS] = nb_shell_clouds_text,

@@ -16,7 +16,7 @@ typedef struct nb_gl_map {
 enum { NB_SHELL_GROUND, NB_SHELL_CLOUDS, NB_SHELL_AIR, NB_SHELL_PROGRAMS };
 
 typedef struct nb_gl_shells {
-    const nebel_layers *of; /* whose maps are here; NULL: nobody's */
+    const nebel_textured_planet *of; /* whose maps are here; NULL: nobody's */
     nb_gl_map ground, clouds[NEBEL_MAX_CLOUD_SHELLS], details[NEBEL_MAX_CLOUD_SHELLS];
     unsigned programs[2][NB_SHELL_PROGRAMS]; /* the second of panoramas */
     uint32_t width, height;                  /* of the targets; 0: there are none */
@@ -27,12 +27,12 @@ typedef struct nb_gl_shells {
 } nb_gl_shells;
 
 /* The planet of a scene that has layers; NULL: there is none. */
-const nebel_layers *nb_gl_shells_planet(const nebel_scene_data *scene);
+const nebel_textured_planet *nb_gl_shells_planet(const nebel_scene_data *scene);
 
 /* Makes what is not there yet, or is of another planet or size. Changes the active unit's TEXTURE_2D, the draw framebuffer and
  * the program; wants the usual unpacking. MEMORY, LIMIT (a map larger than textures), UNSUPPORTED. */
 nebel_result nb_gl_shells_set(nb_gl_shells *shells, const nb_context *context, const nebel_log *log,
-                              const nebel_layers *layers, uint32_t width, uint32_t height, int panorama);
+                              const nebel_textured_planet *layers, uint32_t width, uint32_t height, int panorama);
 
 /* In OpenGL. */
 void nb_gl_shells_delete(nb_gl_shells *shells);

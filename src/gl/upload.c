@@ -43,7 +43,7 @@ static nebel_result pack(nebel_gl *gl, const nebel_snapshot *snapshot)
     const int room = make_room(gl, &words, sizeof *gl->words, count, &gl->word_capacity);
     gl->words = words;
     if (!room) return out_of_memory(gl);
-    gl->fog.word_count = count;
+    gl->fog.texel_count = count;
     return nebel_pack_fog(snapshot, gl->fog.eye, gl->words, gl->word_capacity, &count);
 }
 
@@ -52,7 +52,7 @@ static nebel_result list_view(nebel_gl *gl, const nebel_snapshot *snapshot, int 
 {
     uint32_t *const entries = before < gl->entry_capacity ? gl->entries + before : NULL;
     const size_t capacity = entries != NULL ? gl->entry_capacity - before : 0;
-    const nebel_result result = nebel_tile_volumes(snapshot, &gl->views[view], TILE_SIZE, entries, capacity, count);
+    const nebel_result result = nebel_bin_volumes(snapshot, &gl->views[view], TILE_SIZE, entries, capacity, count);
     if (result == NEBEL_OK || *count > capacity) return NEBEL_OK;
     return nb_fail(&gl->log, result, "nebel_gl_set_fog: the volumes of the tiles cannot be listed: %s",
                    nebel_result_text(result));
@@ -117,10 +117,10 @@ static uint32_t fullest_tile(const nebel_gl *gl)
 static double most_turns_of(const nebel_gl *gl, double listed, double all, double lamps)
 {
     const uint32_t features = gl->fog.features;
-    const int is_walked = (features & (NEBEL_FEATURE_MIXED | NEBEL_FEATURE_COVER)) != 0;
+    const int is_walked = (features & (NEBEL_FEATURE_MIXED | NEBEL_FEATURE_OVERRIDE)) != 0;
     const double walk = is_walked ? 2 * listed * 8 * listed : 0;
     const double sunlight = (features & NEBEL_FEATURE_SUN) != 0 ? 4 * listed * (8 * listed + 14 * all) : 0;
-    const double lamplight = (features & NEBEL_FEATURE_LAMPS) != 0 ? lamps * 2 * listed * 16 * (listed + all) : 0;
+    const double lamplight = (features & NEBEL_FEATURE_LIGHTS) != 0 ? lamps * 2 * listed * 16 * (listed + all) : 0;
     return walk + sunlight + lamplight;
 }
 
@@ -129,8 +129,8 @@ static double most_turns_of(const nebel_gl *gl, double listed, double all, doubl
 static int may_tire(const nebel_gl *gl)
 {
     const uint32_t features = gl->fog.features;
-    const int is_walked = (features & (NEBEL_FEATURE_MIXED | NEBEL_FEATURE_COVER)) != 0;
-    const int is_lit = (features & (NEBEL_FEATURE_SUN | NEBEL_FEATURE_LAMPS)) != 0;
+    const int is_walked = (features & (NEBEL_FEATURE_MIXED | NEBEL_FEATURE_OVERRIDE)) != 0;
+    const int is_lit = (features & (NEBEL_FEATURE_SUN | NEBEL_FEATURE_LIGHTS)) != 0;
     return gl->context.most_turns > 0 && !gl->dims_alone &&
            (is_lit || (is_walked && (features & NEBEL_FEATURE_GROUP) != 0));
 }
@@ -138,9 +138,9 @@ static int may_tire(const nebel_gl *gl)
 /* How many cells of voxels a ray passes is not known. */
 static int find_crowd(const nebel_gl *gl, const nebel_snapshot *snapshot)
 {
-    const uint32_t lit = NEBEL_FEATURE_SUN | NEBEL_FEATURE_LAMPS | NEBEL_FEATURE_MIXED;
-    const double all = (double)nebel_snapshot_volume_count(snapshot);
-    const double listed = gl->fog.tiles != 0 ? (double)gl->fog.tile_most : all;
+    const uint32_t lit = NEBEL_FEATURE_SUN | NEBEL_FEATURE_LIGHTS | NEBEL_FEATURE_MIXED;
+    const double all = (double)nebel_get_volume_count(snapshot);
+    const double listed = gl->fog.tiles != 0 ? (double)gl->fog.max_tile_volumes : all;
     if (gl->context.most_turns == 0 || gl->dims_alone) return 0;
     if ((gl->fog.features & NEBEL_FEATURE_GRID) != 0 && (gl->fog.features & lit) != 0) return 1;
     const double lamps = (double)nebel_snapshot_lamp_count(snapshot);
@@ -198,23 +198,23 @@ static nebel_result fill_texture(const nebel_gl *gl, const texel_kind *kind, con
 /* Fresh memory each time: the last frame may still be reading the old one. */
 static nebel_result fill_block(nebel_gl *gl)
 {
-    const GLsizeiptr size = NEBEL_BLOCK_WORDS * sizeof(nebel_word);
+    const GLsizeiptr size = NEBEL_BLOCK_TEXELS * sizeof(nebel_texel_f32);
     if (gl->block == 0) glGenBuffers(1, &gl->block);
     glBindBuffer(GL_UNIFORM_BUFFER, gl->block);
     glBufferData(GL_UNIFORM_BUFFER, size, NULL, GL_STREAM_DRAW);
-    glBufferSubData(GL_UNIFORM_BUFFER, 0, (GLsizeiptr)(gl->fog.word_count * sizeof(nebel_word)), gl->words);
+    glBufferSubData(GL_UNIFORM_BUFFER, 0, (GLsizeiptr)(gl->fog.texel_count * sizeof(nebel_texel_f32)), gl->words);
     return NEBEL_OK;
 }
 
 static nebel_result upload_words(nebel_gl *gl)
 {
-    if (gl->storage == NEBEL_GL_STORAGE_BLOCK_OR_TEXTURE && gl->fog.word_count <= NEBEL_BLOCK_WORDS) {
+    if (gl->storage == NEBEL_GL_STORAGE_BLOCK_OR_TEXTURE && gl->fog.texel_count <= NEBEL_BLOCK_TEXELS) {
         const nebel_result result = fill_block(gl);
         gl->fog.block = gl->block;
         return result;
     }
     const nebel_result result =
-        fill_texture(gl, &word_texels, gl->words, gl->fog.word_count, &gl->texture, &gl->texture_rows);
+        fill_texture(gl, &word_texels, gl->words, gl->fog.texel_count, &gl->texture, &gl->texture_rows);
     gl->fog.texture = gl->texture;
     return result;
 }
@@ -222,7 +222,7 @@ static nebel_result upload_words(nebel_gl *gl)
 static nebel_result write_voxels(nebel_gl *gl, const nebel_snapshot *snapshot, size_t count)
 {
     const size_t room = whole_rows(count);
-    nebel_texel *const texels = nb_allocate(&gl->allocator, room, sizeof *texels);
+    nebel_texel_u32 *const texels = nb_allocate(&gl->allocator, room, sizeof *texels);
     if (texels == NULL) return out_of_memory(gl);
     nebel_result result = nebel_pack_voxels(snapshot, texels, count, &count);
     memset(texels + count, 0, (room - count) * sizeof *texels);
@@ -241,7 +241,7 @@ static void keep(nebel_snapshot **kept, nebel_snapshot *snapshot)
 
 static int is_lent(const nebel_gl *gl, const nebel_snapshot *snapshot)
 {
-    return gl->lender != NULL && gl->lender->voxels_of != NULL && nebel_same_voxels(gl->lender->voxels_of, snapshot);
+    return gl->lender != NULL && gl->lender->voxels_of != NULL && nebel_is_same_voxels(gl->lender->voxels_of, snapshot);
 }
 
 /* Voxels stay where they are while other fog and the eye change. */
@@ -254,7 +254,7 @@ static nebel_result upload_voxels(nebel_gl *gl, nebel_snapshot *snapshot)
         gl->fog.voxels = gl->lender->voxels;
         return NEBEL_OK;
     }
-    if (gl->voxels_of == NULL || !nebel_same_voxels(gl->voxels_of, snapshot)) {
+    if (gl->voxels_of == NULL || !nebel_is_same_voxels(gl->voxels_of, snapshot)) {
         result = write_voxels(gl, snapshot, count);
         keep(&gl->voxels_of, result == NEBEL_OK ? snapshot : NULL);
     }
@@ -265,7 +265,7 @@ static nebel_result upload_voxels(nebel_gl *gl, nebel_snapshot *snapshot)
 /* A lattice belongs to one snapshot. */
 static nebel_result write_nodes(nebel_gl *gl, const nebel_snapshot *snapshot, size_t count)
 {
-    nebel_word *const words = nb_allocate_zero(&gl->allocator, whole_rows(count), sizeof *words);
+    nebel_texel_f32 *const words = nb_allocate_zero(&gl->allocator, whole_rows(count), sizeof *words);
     if (words == NULL) return out_of_memory(gl);
     nebel_result result = nebel_pack_diffusion(snapshot, words, count, &count);
     if (result == NEBEL_OK) result = fill_texture(gl, &node_texels, words, count, &gl->nodes, &gl->node_rows);
@@ -282,7 +282,7 @@ static nebel_result upload_nodes(nebel_gl *gl, nebel_snapshot *snapshot)
         result = write_nodes(gl, snapshot, count);
         keep(&gl->nodes_of, result == NEBEL_OK ? snapshot : NULL);
     }
-    gl->fog.nodes = gl->nodes;
+    gl->fog.diffusion = gl->nodes;
     return result;
 }
 
@@ -301,7 +301,7 @@ static nebel_result upload_tiles(nebel_gl *gl, size_t count)
     gl->fog.tiles = gl->tiles;
     gl->fog.tile_size = TILE_SIZE;
     gl->fog.tile_columns = (gl->views[0].width + TILE_SIZE - 1) / TILE_SIZE;
-    gl->fog.tile_most = fullest_tile(gl);
+    gl->fog.max_tile_volumes = fullest_tile(gl);
     return result;
 }
 
@@ -347,10 +347,10 @@ static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const double
     memcpy(gl->views, views, (size_t)view_count * sizeof *views);
     gl->view_count = view_count;
     if (!has_words) {
-        gl->fog = (nebel_gl_fog){.eye = {eye[0], eye[1], eye[2]}, .features = nebel_pack_features(snapshot)};
+        gl->fog = (nebel_gl_fog_resources){.eye = {eye[0], eye[1], eye[2]}, .features = nebel_pack_features(snapshot)};
         result = pack(gl, snapshot);
     }
-    if (result == NEBEL_OK && nebel_snapshot_volume_count(snapshot) > FEW_VOLUMES) {
+    if (result == NEBEL_OK && nebel_get_volume_count(snapshot) > FEW_VOLUMES) {
         result = list_tiles(gl, snapshot, &entry_count);
     }
     if (result == NEBEL_OK) result = upload(gl, has_words ? NULL : snapshot, entry_count);
@@ -361,14 +361,14 @@ static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const double
     return result;
 }
 
-/* Says which matrix of a view that nebel_view_rays refuses is the first that it refuses by itself. */
+/* Says which matrix of a view that nebel_compute_view_rays refuses is the first that it refuses by itself. */
 static const char *find_view_fault(const nebel_view *view)
 {
     static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     nebel_view turned = *view;
     nebel_rays rays;
     memcpy(turned.eye_from_world, identity, sizeof identity);
-    if (nebel_view_rays(&turned, NULL, &rays) != NEBEL_OK)
+    if (nebel_compute_view_rays(&turned, NULL, &rays) != NEBEL_OK)
         return "clip_from_eye must be a projection: finite numbers, rays that meet in a point or are parallel, and a "
                "depth that changes along them";
     return "eye_from_world must be a rotation and a translation: finite numbers, 0 0 0 1 in the last row";
@@ -386,7 +386,7 @@ nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebe
         return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog: the view has %u x %u pixels; 1 to 65536 each",
                        (unsigned)view->width, (unsigned)view->height);
     }
-    if (nebel_view_rays(view, NULL, &rays) != NEBEL_OK) {
+    if (nebel_compute_view_rays(view, NULL, &rays) != NEBEL_OK) {
         return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog: %s", find_view_fault(view));
     }
     return prepare(gl, snapshot != NULL ? snapshot : gl->empty, rays.eye, view, 1);

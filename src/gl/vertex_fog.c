@@ -59,7 +59,7 @@ static nebel_result fog_by_cells(const nb_vertex_source *source, size_t count, c
         find_place(vertices, v, point.position);
         const nebel_cell_view view = view_towards(source, point.position);
         const int is_eye = view.forward[0] == 0 && view.forward[1] == 0 && view.forward[2] == 0;
-        if (!is_eye) result = nebel_fog_cells(source->cells, &view, 1, &point, 0, &fog, 0);
+        if (!is_eye) result = nebel_compute_cell_fog(source->cells, &view, 1, &point, 0, &fog, 0);
         for (int i = 0; i < 3; i++) out[v][i] = (float)fog.color[i];
         out[v][3] = (float)fog.alpha;
     }
@@ -120,11 +120,11 @@ static void fog_by_place(const nb_vertex_source *source, size_t count, const neb
         nebel_d3d9_vertex vertex = {.source = NEBEL_D3D9_FIXED};
         double place[3];
         find_place(vertices, v, place);
-        find_seen(source, place, vertex.place);
+        find_seen(source, place, vertex.position);
         if (source->d3d9 != NULL)
             set_device(source->d3d9, &vertex, out[v]);
         else
-            set_factor(source->factor, nebel_compute_fog_coordinate(source->factor, vertex.place, 0), out[v]);
+            set_factor(source->factor, nebel_compute_fog_coordinate(source->factor, vertex.position, 0), out[v]);
     }
 }
 
@@ -133,7 +133,7 @@ static void fog_by_place(const nb_vertex_source *source, size_t count, const neb
 static nebel_result trace(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices, float (*out)[4])
 {
     const nebel_vertex_output output = {source->format, out, sizeof *out};
-    if (source->fog != NULL) return nebel_fog_vertices(source->fog, source->look, count, vertices, &output, 1);
+    if (source->fog != NULL) return nebel_compute_vertex_fog(source->fog, source->look, count, vertices, &output, 1);
     memset(out, source->format == NEBEL_VERTEX_SPECULAR_ALPHA ? 0xff : 0, count * sizeof *out);
     return NEBEL_OK;
 }

@@ -19,7 +19,7 @@ typedef struct nb_vertex_source {
 } nb_vertex_source;
 
 /* Fills the attribute NB_ATTRIBUTE_FOG of all meshes. Changes the bindings of ARRAY_BUFFER and the vertex array.
- * Errors: MEMORY, and those of nebel_fog_vertices or nebel_fog_cells. */
+ * Errors: MEMORY, and those of nebel_compute_vertex_fog or nebel_compute_cell_fog. */
 nebel_result nb_vertex_fog_set(nb_meshes *meshes, const nb_vertex_source *source);
 
 /* The same of places in memory, whose stride is not 0: the light that fog adds, and the amount of fog. Calls no OpenGL. */

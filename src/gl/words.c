@@ -13,8 +13,8 @@ void nb_words_bind(unsigned *name)
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
 }
 
-nebel_result nb_words_upload(unsigned *name, const nebel_log *log, const nb_context *context, const nebel_word *words,
-                             size_t rows, const char *what, const char *remedy)
+nebel_result nb_words_upload(unsigned *name, const nebel_log *log, const nb_context *context,
+                             const nebel_texel_f32 *words, size_t rows, const char *what, const char *remedy)
 {
     if (rows > context->widest)
         return nb_fail(log, NEBEL_ERROR_LIMIT, "%s needs %zu rows, this context has %u (GL_MAX_TEXTURE_SIZE)%s", what,

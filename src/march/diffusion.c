@@ -23,19 +23,19 @@ static nebel_result trace_sun(const nb_diffusion *d, const nebel_snapshot *fog, 
     const nb_lattice *l = &d->lattice;
     float offset[3][BATCH];
     nebel_ray_planes rays = {.t_max = NULL};
-    nebel_transfer_planes lights = {.error = NULL};
+    nebel_transfer_planes transfers = {.error = NULL};
     for (int a = 0; a < 3; a++) {
         rays.origin[a] = l->low[a] + (l->high[a] - l->low[a]) / 2;
         rays.direction[a] = d->to_sun[a];
         rays.offset[a] = offset[a];
-        lights.transmittance[a] = out[a];
+        transfers.transmittance[a] = out[a];
     }
     for (size_t i = 0; i < count; i++) {
         double place[3];
         nb_lattice_node(l, first + i, place);
         for (int a = 0; a < 3; a++) offset[a][i] = (float)(place[a] - rays.origin[a]);
     }
-    return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, count, &rays, &lights);
+    return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, count, &rays, &transfers);
 }
 
 static nebel_result light_nodes(const nb_diffusion *d, const nebel_snapshot *fog, nb_node_sun *sun)

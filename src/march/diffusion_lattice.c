@@ -236,7 +236,7 @@ nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapsh
         hold_own_light(snapshot, scaled, lattice);
     for (int a = 0; a < 3; a++)
         if (!(lattice->low[a] < lattice->high[a])) return NEBEL_OK;
-    set_cells(snapshot, fog->diffusion.cells, is_own, lattice);
+    set_cells(snapshot, fog->diffusion.max_cells, is_own, lattice);
     *lit = 1;
     return NEBEL_OK;
 }

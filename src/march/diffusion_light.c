@@ -370,14 +370,14 @@ static int prepare(block *b)
 static nebel_result ask(block *b, const nebel_snapshot *fog, float out[3][BLOCK])
 {
     nebel_ray_planes rays = {.t_max = b->length};
-    nebel_transfer_planes lights = {.error = NULL};
+    nebel_transfer_planes transfers = {.error = NULL};
     for (int a = 0; a < 3; a++) {
         rays.origin[a] = b->middle[a];
         rays.offset[a] = b->offset[a];
         rays.direction_double[a] = b->direction[a];
-        if (a < b->diffusion->channel_count) lights.transmittance[a] = out[a];
+        if (a < b->diffusion->channel_count) transfers.transmittance[a] = out[a];
     }
-    return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, b->count, &rays, &lights);
+    return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, b->count, &rays, &transfers);
 }
 
 static nebel_result go_through(block *b)

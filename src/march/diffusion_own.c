@@ -411,14 +411,14 @@ static void look(const nb_lattice *l, const nb_lamp *lamp, size_t first, view *v
 static nebel_result ask(const nb_lattice *l, const nebel_snapshot *fog, view *v, float out[3][BATCH])
 {
     nebel_ray_planes rays = {.t_max = v->length};
-    nebel_transfer_planes lights = {.error = NULL};
+    nebel_transfer_planes transfers = {.error = NULL};
     for (int a = 0; a < 3; a++) {
         rays.origin[a] = l->low[a] + (l->high[a] - l->low[a]) / 2;
         rays.offset[a] = v->offset[a];
         rays.direction_double[a] = v->direction[a];
-        lights.transmittance[a] = out[a];
+        transfers.transmittance[a] = out[a];
     }
-    return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, v->count, &rays, &lights);
+    return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, v->count, &rays, &transfers);
 }
 
 static double turned_cosine(const nb_transport *t, int channel)

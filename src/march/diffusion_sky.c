@@ -41,7 +41,7 @@ int nb_sky_is_dimmed(const nebel_fog *fog, const nebel_snapshot *snapshot)
 static void add_reflected(const nebel_environment *sky, const double direction[3], double weight, double sum[3])
 {
     double seen[3];
-    nebel_environment_reflected(sky, direction, seen);
+    nebel_evaluate_environment_diffuse(sky, direction, seen);
     for (int c = 0; c < 3; c++) sum[c] += weight * seen[c];
 }
 

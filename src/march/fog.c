@@ -111,7 +111,7 @@ nebel_result nebel_add_volume(nebel_fog *fog, const nebel_volume_desc *desc, neb
     return NEBEL_OK;
 }
 
-nebel_result nebel_change_volume(nebel_fog *fog, nebel_volume_id id, const nebel_volume_desc *desc)
+nebel_result nebel_update_volume(nebel_fog *fog, nebel_volume_id id, const nebel_volume_desc *desc)
 {
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
     if (desc == NULL) return lacks_description(fog);
@@ -174,14 +174,14 @@ nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun)
     return result;
 }
 
-static nb_lamp *resolve_lamps(const nebel_allocator *allocator, size_t count, const nebel_lamp *lamps)
+static nb_lamp *resolve_lamps(const nebel_allocator *allocator, size_t count, const nebel_light *lamps)
 {
     nb_lamp *made = nb_allocate(allocator, count, sizeof *made);
     for (size_t i = 0; i < count && made != NULL; i++) made[i] = nb_lamp_resolve(&lamps[i]);
     return made;
 }
 
-nebel_result nebel_set_lamps(nebel_fog *fog, size_t count, const nebel_lamp *lamps)
+nebel_result nebel_set_lamps(nebel_fog *fog, size_t count, const nebel_light *lamps)
 {
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
     if (count > 0 && lamps == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "lamps: must not be NULL");
@@ -206,7 +206,8 @@ nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity)
 
 static const char *fault_of_diffusion(const nebel_diffusion_desc *desc)
 {
-    if (desc->cells != 0 && (desc->cells < NEBEL_MIN_DIFFUSION_CELLS || desc->cells > NEBEL_MAX_DIFFUSION_CELLS))
+    if (desc->max_cells != 0 &&
+        (desc->max_cells < NEBEL_MIN_DIFFUSION_CELLS || desc->max_cells > NEBEL_MAX_DIFFUSION_CELLS))
         return "cells: must be 0 or within " NB_TEXT(NEBEL_MIN_DIFFUSION_CELLS) " and " NB_TEXT(
             NEBEL_MAX_DIFFUSION_CELLS);
     if (!desc->has_ground) return NULL;
@@ -227,6 +228,6 @@ nebel_result nebel_set_diffusion(nebel_fog *fog, const nebel_diffusion_desc *des
     const char *fault = fault_of_diffusion(desc);
     if (fault != NULL) return nb_fail(&fog->log, NEBEL_ERROR_VALUE, "diffusion: %s", fault);
     fog->diffusion = *desc;
-    if (desc->cells == 0) fog->diffusion.cells = NEBEL_DEFAULT_DIFFUSION_CELLS;
+    if (desc->max_cells == 0) fog->diffusion.max_cells = NEBEL_DEFAULT_DIFFUSION_CELLS;
     return NEBEL_OK;
 }

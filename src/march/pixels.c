@@ -55,24 +55,25 @@ static const char *fault_of_pitches(const nebel_pixels *p)
 {
     const size_t row = p->width * nebel_pixel_size(p->type), number = kinds[p->type].sample_size;
     if ((p->depth_pitch != 0 && p->depth_pitch < 4 * (size_t)p->width) ||
-        (p->color_pitch != 0 && p->color_pitch < row) || (p->out_pitch != 0 && p->out_pitch < row) ||
+        (p->color_pitch != 0 && p->color_pitch < row) || (p->output_pitch != 0 && p->output_pitch < row) ||
         (p->transmittance_pitch != 0 && p->transmittance_pitch < 12 * (size_t)p->width))
         return "a pitch is shorter than a row";
     if (p->transmittance_pitch % sizeof(float) != 0) return "transmittance_pitch must be a multiple of 4";
-    if (p->color_pitch % number != 0 || p->out_pitch % number != 0)
+    if (p->color_pitch % number != 0 || p->output_pitch % number != 0)
         return "the pitches of color and out must be multiples of the size of a sample";
     return NULL;
 }
 
 static const char *fault_of(const nebel_pixels *p)
 {
-    if (p->depth == NULL || p->color == NULL || p->out == NULL) return "depth, color and out must not be NULL";
+    if (p->depth == NULL || p->color == NULL || p->output == NULL) return "depth, color and out must not be NULL";
     if (p->width < 1 || p->width > 65536 || p->height < 1 || p->height > 65536)
         return "width and height must be 1 to 65536";
     if (!is_known(p->type)) return "type is unknown";
     if (p->srgb && !kinds[p->type].is_whole) return "srgb must be 0 where samples are floats, which are light";
     if (p->first_row >= p->height || p->row_count > p->height - p->first_row) return "the rows are not in the picture";
-    if (p->depth_type != NEBEL_DEPTH_AXIS && p->depth_type != NEBEL_DEPTH_RAY) return "depth_type is unknown";
+    if (p->depth_type != NEBEL_PIXEL_DEPTH_AXIAL && p->depth_type != NEBEL_PIXEL_DEPTH_RADIAL)
+        return "depth_type is unknown";
     const char *fault = fault_of_pitches(p);
     return fault != NULL ? fault : fault_of_rays(p);
 }
@@ -103,16 +104,16 @@ static void fog_boxes(const nebel_snapshot *snapshot, nb_pixels_fn *kernel, cons
     const size_t row = 4 * (size_t)p->width;
     nb_pixels_job job = {.boxes = boxes,
                          .box_count = snapshot->medium_count,
-                         .along_ray = p->depth_type == NEBEL_DEPTH_RAY,
+                         .along_ray = p->depth_type == NEBEL_PIXEL_DEPTH_RADIAL,
                          .width = p->width,
                          .first_row = p->first_row,
                          .row_count = end_row(p) - p->first_row,
                          .depth = (const unsigned char *)p->depth,
                          .color = p->color,
-                         .out = p->out,
+                         .out = p->output,
                          .depth_pitch = pitch_of(p->depth_pitch, row),
                          .color_pitch = pitch_of(p->color_pitch, row),
-                         .out_pitch = pitch_of(p->out_pitch, row)};
+                         .out_pitch = pitch_of(p->output_pitch, row)};
     memcpy(job.corner, p->corner, sizeof job.corner);
     memcpy(job.step_x, p->step_x, sizeof job.step_x);
     memcpy(job.step_y, p->step_y, sizeof job.step_y);
@@ -149,7 +150,7 @@ static nb_picture_job make_job(const piece *at)
                           .count = at->count,
                           .color =
                               (const unsigned char *)p->color + at->y * pitch_of(p->color_pitch, row) + at->x * size,
-                          .out = (unsigned char *)p->out + at->y * pitch_of(p->out_pitch, row) + at->x * size,
+                          .out = (unsigned char *)p->output + at->y * pitch_of(p->output_pitch, row) + at->x * size,
                           .haze = at->haze};
     if (p->transmittance != NULL)
         job.kept = (unsigned char *)p->transmittance + at->y * pitch_of(p->transmittance_pitch, kept * p->width) +
@@ -174,7 +175,7 @@ static void set_ray(const nebel_pixels *p, uint32_t x, uint32_t y, float depth, 
     }
     all->t_max[i] = 0;
     if (!(depth > 0) || !(square > 0)) return;
-    all->t_max[i] = p->depth_type == NEBEL_DEPTH_RAY ? depth : (float)((double)depth * sqrt(square));
+    all->t_max[i] = p->depth_type == NEBEL_PIXEL_DEPTH_RADIAL ? depth : (float)((double)depth * sqrt(square));
 }
 
 static nebel_result trace_piece(const piece *at)
@@ -189,14 +190,14 @@ static nebel_result trace_piece(const piece *at)
     }
     nb_picture_job job = make_job(at);
     nebel_ray_planes rays = {.origin = {p->eye[0], p->eye[1], p->eye[2]}, .t_max = all.t_max};
-    nebel_transfer_planes lights = {0};
+    nebel_transfer_planes transfers = {0};
     for (int c = 0; c < 3; c++) {
         rays.direction_double[c] = all.direction[c];
-        job.transmittance[c] = lights.transmittance[c] = all.transmittance[c];
-        job.in_scattering[c] = lights.in_scattering[c] = all.in_scattering[c];
+        job.transmittance[c] = transfers.transmittance[c] = all.transmittance[c];
+        job.in_scattering[c] = transfers.in_scattering[c] = all.in_scattering[c];
     }
     const nebel_result result =
-        nebel_trace_planes(at->snapshot, &(nebel_trace_desc){.isa = at->isa}, at->count, &rays, &lights);
+        nebel_trace_planes(at->snapshot, &(nebel_trace_desc){.isa = at->isa}, at->count, &rays, &transfers);
     if (result == NEBEL_OK) at->kernel(&job);
     return result;
 }
@@ -230,7 +231,7 @@ static nb_picture_haze make_haze(const nebel_snapshot *snapshot, const nebel_pix
     const double ln2 = 0.69314718055994531, most = 1e30; /* 0 times it is 0 */
     const nb_medium *medium = &snapshot->media[0];
     nb_picture_haze haze = {.octaves = (float)(-fmin(medium->body.extinction[0], most) / ln2),
-                            .along_ray = p->depth_type == NEBEL_DEPTH_RAY};
+                            .along_ray = p->depth_type == NEBEL_PIXEL_DEPTH_RADIAL};
     for (int c = 0; c < 3; c++) haze.radiance[c] = (float)medium->radiance[c];
     memcpy(haze.step_x, p->step_x, sizeof haze.step_x);
     return haze;
@@ -238,7 +239,7 @@ static nb_picture_haze make_haze(const nebel_snapshot *snapshot, const nebel_pix
 
 /* ---- the public query ------------------------------------------------------------------------ */
 
-nebel_result nebel_fog_pixels(const nebel_snapshot *snapshot, nebel_isa isa, const nebel_pixels *pixels)
+nebel_result nebel_apply_fog_to_pixels(const nebel_snapshot *snapshot, nebel_isa isa, const nebel_pixels *pixels)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     const char *fault = pixels != NULL ? fault_of(pixels) : "must not be NULL";

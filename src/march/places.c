@@ -48,14 +48,14 @@ static void begin_at(walk *w, const nebel_snapshot *snapshot, const double place
 
 /* ---- at a place ------------------------------------------------------------------------------ */
 
-static int is_at(const nb_volume *body, const nebel_place *place)
+static int is_at(const nb_volume *body, const nebel_sample_point *place)
 {
     if (place->distance >= 0 && !(body->start <= place->distance && place->distance < body->cutoff)) return 0;
     return nb_volume_holds(body, place->position);
 }
 
 /* The highest rank of what covers the place: fog below it is not there. */
-static int64_t find_cover(const nebel_snapshot *snapshot, const nebel_place *place)
+static int64_t find_cover(const nebel_snapshot *snapshot, const nebel_sample_point *place)
 {
     int64_t rank = INT64_MIN;
     walk w;
@@ -68,17 +68,17 @@ static int64_t find_cover(const nebel_snapshot *snapshot, const nebel_place *pla
     return rank;
 }
 
-static int shows_at(const nb_medium *medium, const nebel_place *place, int64_t cover)
+static int shows_at(const nb_medium *medium, const nebel_sample_point *place, int64_t cover)
 {
     const nb_volume *body = &medium->body;
     return nb_volume_has_fog(body) && body->rank >= cover && is_at(body, place);
 }
 
-static void sample(const nebel_snapshot *snapshot, const nebel_place *place, nebel_matter *matter)
+static void sample(const nebel_snapshot *snapshot, const nebel_sample_point *place, nebel_medium_properties *matter)
 {
     const int64_t cover = find_cover(snapshot, place);
     walk w;
-    *matter = (nebel_matter){{0}, {0}, {0}};
+    *matter = (nebel_medium_properties){{0}, {0}, {0}};
     begin_at(&w, snapshot, place->position);
     for (const nb_medium *medium; (medium = walk_on(&w)) != NULL;) {
         const nb_volume *body = &medium->body;
@@ -94,7 +94,7 @@ static void sample(const nebel_snapshot *snapshot, const nebel_place *place, neb
 
 void nb_sample_transport(const nebel_snapshot *snapshot, const double position[3], nb_transport *sum)
 {
-    const nebel_place place = {{position[0], position[1], position[2]}, -1};
+    const nebel_sample_point place = {{position[0], position[1], position[2]}, -1};
     const int64_t cover = find_cover(snapshot, &place);
     walk w;
     begin_at(&w, snapshot, position);
@@ -114,21 +114,21 @@ void nb_sample_transport(const nebel_snapshot *snapshot, const double position[3
     }
 }
 
-static const char *fault_of_place(const nebel_place *place)
+static const char *fault_of_place(const nebel_sample_point *place)
 {
     for (int i = 0; i < 3; i++)
         if (!(fabs(place->position[i]) <= NEBEL_MAX_LENGTH)) return "position must be finite and at most 1e15 m away";
     return isnan(place->distance) ? "distance must be a number" : NULL;
 }
 
-nebel_result nebel_sample_fog(const nebel_snapshot *snapshot, size_t n, const nebel_place *places, size_t place_stride,
-                              nebel_matter *matter, size_t matter_stride)
+nebel_result nebel_sample_medium(const nebel_snapshot *snapshot, size_t n, const nebel_sample_point *places,
+                                 size_t place_stride, nebel_medium_properties *matter, size_t matter_stride)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (n > 0 && (places == NULL || matter == NULL))
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "places and matter: must not be NULL");
     for (size_t i = 0; i < n; i++) {
-        const nebel_place *place = nb_stride_from(places, place_stride, i);
+        const nebel_sample_point *place = nb_stride_from(places, place_stride, i);
         const char *fault = fault_of_place(place);
         if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "place %zu: %s", i, fault);
         sample(snapshot, place, nb_stride_to(matter, matter_stride, i));
@@ -147,7 +147,7 @@ static double scattering_at(const nb_volume *body, const double position[3], int
 }
 
 /* Takes the first volume with which the sum exceeds `wanted`; rounding may leave it to the last. Returns the sum. */
-static double choose(const nebel_snapshot *snapshot, const nebel_place *place, int channel, int64_t cover,
+static double choose(const nebel_snapshot *snapshot, const nebel_sample_point *place, int channel, int64_t cover,
                      double wanted, nebel_scatterer *scatterer)
 {
     double sum = 0;
@@ -165,7 +165,7 @@ static double choose(const nebel_snapshot *snapshot, const nebel_place *place, i
     return sum;
 }
 
-nebel_result nebel_choose_scatterer(const nebel_snapshot *snapshot, const nebel_place *place, int channel,
+nebel_result nebel_sample_scatterer(const nebel_snapshot *snapshot, const nebel_sample_point *place, int channel,
                                     double chance, nebel_scatterer *scatterer)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -265,10 +265,10 @@ static int64_t find_cover_on(const asked *a, double end)
     return rank;
 }
 
-static void bound_piece(const asked *a, nebel_bound *bound)
+static void bound_piece(const asked *a, nebel_majorant_segment *bound)
 {
     walk w;
-    *bound = (nebel_bound){find_end(a), {0}, {0}};
+    *bound = (nebel_majorant_segment){find_end(a), {0}, {0}};
     const int64_t cover = find_cover_on(a, bound->end);
     begin_on(&w, a);
     for (const nb_medium *medium; (medium = walk_on(&w)) != NULL;) {
@@ -282,8 +282,8 @@ static void bound_piece(const asked *a, nebel_bound *bound)
     }
 }
 
-nebel_result nebel_bound_fog(const nebel_snapshot *snapshot, const nebel_ray *ray, int ignore_distances, double from,
-                             nebel_bound *bound)
+nebel_result nebel_next_majorant(const nebel_snapshot *snapshot, const nebel_ray *ray, int ignore_distances,
+                                 double from, nebel_majorant_segment *bound)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_log *log = &snapshot->log;
@@ -304,7 +304,7 @@ nebel_result nebel_bound_fog(const nebel_snapshot *snapshot, const nebel_ray *ra
     return NEBEL_OK;
 }
 
-int nebel_is_fog_grey(const nebel_snapshot *snapshot)
+int nebel_is_extinction_gray(const nebel_snapshot *snapshot)
 {
     if (snapshot == NULL) return 1;
     for (size_t i = 0; i < snapshot->medium_count; i++) {

@@ -65,8 +65,8 @@ static nebel_result trace_segments(const nebel_snapshot *snapshot, nebel_isa isa
     return NEBEL_OK;
 }
 
-nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
-                                     const nebel_segments *segments, float *out, size_t out_stride)
+nebel_result nebel_compute_segment_transmittance(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
+                                                 const nebel_segments *segments, float *out, size_t out_stride)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (segments == NULL || (n > 0 && (segments->from == NULL || segments->to == NULL || out == NULL)))

@@ -442,7 +442,7 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
         return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "snapshot: the place for it must not be NULL");
     nebel_snapshot *s;
     nebel_result result = make_snapshot(fog, (selection){0}, &s);
-    if (result == NEBEL_OK && fog->diffusion.cells > 0) result = diffuse(fog, s);
+    if (result == NEBEL_OK && fog->diffusion.max_cells > 0) result = diffuse(fog, s);
     if (result == NEBEL_OK) {
         *snapshot = s;
         return NEBEL_OK;
@@ -464,7 +464,7 @@ void nebel_release_snapshot(nebel_snapshot *snapshot)
     if (atomic_fetch_sub_explicit(&snapshot->owners, 1, memory_order_acq_rel) == 1) free_snapshot(snapshot);
 }
 
-size_t nebel_snapshot_volume_count(const nebel_snapshot *snapshot)
+size_t nebel_get_volume_count(const nebel_snapshot *snapshot)
 {
     if (snapshot == NULL) return 0;
     return snapshot->medium_count;

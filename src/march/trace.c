@@ -126,24 +126,24 @@ static nebel_result explain(const nb_trace_job *job, nebel_result result, size_t
     return nb_fail(&job->snapshot->log, result, "ray %zu: out of memory for the fog it meets", job->failed);
 }
 
-static const char *fault_of_pieces(const nebel_lit_pieces *pieces, size_t i)
+static const char *fault_of_pieces(const nebel_ray_visibility *pieces, size_t i)
 {
-    const uint32_t first = pieces->first[i], end = pieces->first[i + 1];
+    const uint32_t first = pieces->offsets[i], end = pieces->offsets[i + 1];
     if (first > end) return "`first` must not descend";
-    if (first < end && pieces->toggles == NULL) return "toggles must not be NULL";
+    if (first < end && pieces->boundaries == NULL) return "toggles must not be NULL";
     float last = 0;
     for (uint32_t k = first; k < end; k++) {
-        if (!(pieces->toggles[k] >= last)) return "toggles must be 0 or more and not descend";
-        last = pieces->toggles[k];
+        if (!(pieces->boundaries[k] >= last)) return "toggles must be 0 or more and not descend";
+        last = pieces->boundaries[k];
     }
     return NULL;
 }
 
 /* `what` names the light. */
-static nebel_result check_pieces(const nebel_snapshot *snapshot, const nebel_lit_pieces *pieces, const char *what,
+static nebel_result check_pieces(const nebel_snapshot *snapshot, const nebel_ray_visibility *pieces, const char *what,
                                  size_t n, size_t *failed)
 {
-    if (pieces->first == NULL)
+    if (pieces->offsets == NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "%s: `first` must not be NULL", what);
     for (size_t i = 0; i < n; i++) {
         const char *fault = fault_of_pieces(pieces, i);
@@ -158,9 +158,10 @@ static nebel_result check_pieces(const nebel_snapshot *snapshot, const nebel_lit
 static nebel_result check_shadows(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n)
 {
     nebel_result result = NEBEL_OK;
-    if (desc->sunlit != NULL) result = check_pieces(snapshot, desc->sunlit, "sunlit", n, desc->failed_ray);
-    for (size_t i = 0; i < snapshot->lamp_count && desc->lamplit != NULL && result == NEBEL_OK; i++)
-        result = check_pieces(snapshot, &desc->lamplit[i], "lamplit", n, desc->failed_ray);
+    if (desc->sun_visibility != NULL)
+        result = check_pieces(snapshot, desc->sun_visibility, "sunlit", n, desc->failed_ray);
+    for (size_t i = 0; i < snapshot->lamp_count && desc->light_visibility != NULL && result == NEBEL_OK; i++)
+        result = check_pieces(snapshot, &desc->light_visibility[i], "lamplit", n, desc->failed_ray);
     return result;
 }
 
@@ -180,11 +181,11 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
                        nebel_isa_name(desc->isa));
     const nebel_result shadows = check_shadows(snapshot, desc, n);
     if (shadows != NEBEL_OK) return shadows;
-    if (desc->sunlit != NULL) {
-        job->first_toggle = desc->sunlit->first;
-        job->toggles = desc->sunlit->toggles;
+    if (desc->sun_visibility != NULL) {
+        job->first_toggle = desc->sun_visibility->offsets;
+        job->toggles = desc->sun_visibility->boundaries;
     }
-    job->lamplit = desc->lamplit;
+    job->lamplit = desc->light_visibility;
     job->snapshot = snapshot;
     job->budget = tolerance * fmax(1, snapshot->largest_radiance);
     job->promised = job->budget + (kernel == nb_trace_double ? DOUBLE_ROUNDING : FLOAT_ROUNDING);
@@ -292,8 +293,8 @@ nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trac
 
 /* ---- visibility ------------------------------------------------------------------------------ */
 
-nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
-                                      const nebel_ray *rays, size_t ray_stride, double *distances)
+nebel_result nebel_invert_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
+                                        const nebel_ray *rays, size_t ray_stride, double *distances)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (n > 0 && distances == NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "distances: must not be NULL");

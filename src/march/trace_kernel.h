@@ -20,9 +20,9 @@ typedef struct nb_trace_job {
     const nebel_transfer_planes *light_planes;
     const uint32_t *first_toggle; /* of each ray in `toggles`, and one more; NULL: the sun reaches all of every ray */
     const float *toggles;         /* checked */
-    const nebel_lit_pieces *lamplit; /* of each lamp; NULL: every lamp reaches all of every ray. Checked */
-    size_t first_lamplit;            /* by which number the job's first ray goes there */
-    size_t failed;                   /* out: the ray that was an error */
+    const nebel_ray_visibility *lamplit; /* of each lamp; NULL: every lamp reaches all of every ray. Checked */
+    size_t first_lamplit;                /* by which number the job's first ray goes there */
+    size_t failed;                       /* out: the ray that was an error */
 } nb_trace_job;
 
 typedef nebel_result nb_trace_fn(nb_trace_job *job);

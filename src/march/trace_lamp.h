@@ -279,7 +279,7 @@ static void begin_lights(sunlight *sun, const nb_trace_job *job, size_t first, s
     sun->has_turns = 0;
     begin_shade(&sun->shade, job->first_toggle != NULL ? job->first_toggle + first : NULL, job->toggles, count);
     for (size_t i = 0; sun->lamp_shades != NULL && i < sun->snapshot->lamp_count; i++) {
-        const nebel_lit_pieces *lit = &job->lamplit[i];
-        begin_shade(&sun->lamp_shades[i], lit->first + job->first_lamplit + first, lit->toggles, count);
+        const nebel_ray_visibility *lit = &job->lamplit[i];
+        begin_shade(&sun->lamp_shades[i], lit->offsets + job->first_lamplit + first, lit->boundaries, count);
     }
 }

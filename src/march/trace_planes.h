@@ -81,7 +81,7 @@ FORCE_INLINE void store_colors(float *const plane[3], size_t stride, size_t firs
 /* What the rays of a call share. */
 typedef struct stream {
     const nebel_ray_planes *rays;
-    const nebel_transfer_planes *lights;
+    const nebel_transfer_planes *transfers;
     nb_wvec3 origin;
     nb_wvec3 direction; /* of unit length; any where rays have their own */
     int has_offsets, has_directions;
@@ -90,7 +90,7 @@ typedef struct stream {
 static void open_stream(stream *s, const nb_trace_job *job)
 {
     s->rays = job->ray_planes;
-    s->lights = job->light_planes;
+    s->transfers = job->light_planes;
     s->origin = wide_vector(s->rays->origin);
     s->has_offsets = s->rays->offset[0] != NULL;
     s->has_directions = s->rays->direction_float[0] != NULL || s->rays->direction_double[0] != NULL;
@@ -199,7 +199,7 @@ static nebel_result march_planes(nb_trace_job *job, workspace *w, const allowanc
     const nebel_result result = answer_packet(job, w, may, first, count, &g);
     if (result != NEBEL_OK) return result;
     const nb_real error = job->wants_error ? reported_error(job, &w->m, &g) : NB_F(0.0);
-    const nebel_transfer_planes *to = s->lights;
+    const nebel_transfer_planes *to = s->transfers;
     limit_opacity(job->snapshot, g.transmittance, g.radiance);
     store_colors(to->transmittance, to->transmittance_stride, first, count, g.transmittance);
     store_colors(to->in_scattering, to->in_scattering_stride, first, count, g.radiance);
@@ -330,7 +330,7 @@ FORCE_INLINE void store_clear(const nebel_transfer_planes *to, size_t first, siz
 FORCE_INLINE nebel_result trace_straight(nb_trace_job *job, const straight *way, const stream *s, size_t first,
                                          size_t count)
 {
-    const nebel_transfer_planes *to = s->lights;
+    const nebel_transfer_planes *to = s->transfers;
     loaded p;
     const nebel_result valid = load_rays(job, s, first, count, &p);
     if (valid != NEBEL_OK) return valid;

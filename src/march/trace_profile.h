@@ -186,7 +186,7 @@ static void profile_contact(contact *k, const packet *rays)
         radial_contact(k, rays, &body->leaves[0]);
         break;
     case NEBEL_DENSITY_SOFT_EDGE:
-        soft_edge_contact(k, rays, &body->leaves[0], body->density.distance);
+        soft_edge_contact(k, rays, &body->leaves[0], body->density.edge_width);
         break;
     case NEBEL_DENSITY_GRID:
         grid_contact(k, rays, &body->leaves[0]);

@@ -185,7 +185,7 @@ static void note_soft_edges(sunlight *sun, const packet *rays, const nb_volume *
     const nb_leaf *leaf = &body->leaves[0];
     const local_ray local = localize(rays, leaf);
     const ways s = make_ways(local.p, local.d, in_frame(leaf, sun->direction), 0);
-    const double distance = body->density.distance;
+    const double distance = body->density.edge_width;
     for (int i = 0; i < 3 && leaf->type == NB_LEAF_BOX; i++) {
         const nb_wvec3 n = nb_wvec3(WIDE(i == 0), WIDE(i == 1), WIDE(i == 2));
         note_level(sun, &s, n, WIDE(leaf->low[i] + distance));

@@ -241,7 +241,7 @@ static nb_real error_of_voxels(const contact *k, nb_real amount, nb_real length)
 /* Whether the packet may walk: between nearest voxels noise moves whole steps of the density. */
 static int walks_voxels(const contact *k)
 {
-    return k->medium->body.density.grid->filter == NEBEL_FILTER_LINEAR;
+    return k->medium->body.density.grid->filter == NEBEL_GRID_FILTER_LINEAR;
 }
 
 /* The lanes on, from bricks without fog to the next cell of one that has some. Returns those that were moved. */

@@ -119,8 +119,9 @@ static nebel_result check_convex(const nebel_log *log, const nebel_shape *shape)
 {
     if (shape->planes == NULL || shape->plane_count == 0)
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "convex: needs at least one plane");
-    if (shape->plane_count > NEBEL_MAX_PLANES)
-        return nb_fail(log, NEBEL_ERROR_LIMIT, "convex: %zu planes; at most %d", shape->plane_count, NEBEL_MAX_PLANES);
+    if (shape->plane_count > NEBEL_MAX_SHAPE_PLANES)
+        return nb_fail(log, NEBEL_ERROR_LIMIT, "convex: %zu planes; at most %d", shape->plane_count,
+                       NEBEL_MAX_SHAPE_PLANES);
     for (size_t i = 0; i < shape->plane_count; i++) {
         const nebel_plane *plane = &shape->planes[i];
         const double length = length_of(plane->normal);
@@ -146,14 +147,14 @@ static nebel_result check_parts(const nebel_log *log, const nebel_shape *shape, 
 
 static nebel_result check_shape(const nebel_log *log, const nebel_shape *shape, int depth, size_t *leaves)
 {
-    if (depth > NEBEL_MAX_DEPTH)
-        return nb_fail(log, NEBEL_ERROR_LIMIT, "shape: parts are nested more than %d deep", NEBEL_MAX_DEPTH);
+    if (depth > NEBEL_MAX_SHAPE_NESTING)
+        return nb_fail(log, NEBEL_ERROR_LIMIT, "shape: parts are nested more than %d deep", NEBEL_MAX_SHAPE_NESTING);
     const nebel_result result = check_transform(log, &shape->transform);
     if (result != NEBEL_OK) return result;
     if (shape->type == NEBEL_SHAPE_UNION || shape->type == NEBEL_SHAPE_INTERSECTION)
         return check_parts(log, shape, depth, leaves);
-    if (++*leaves > NEBEL_MAX_LEAVES)
-        return nb_fail(log, NEBEL_ERROR_LIMIT, "shape: more than %d parts", NEBEL_MAX_LEAVES);
+    if (++*leaves > NEBEL_MAX_SHAPE_LEAVES)
+        return nb_fail(log, NEBEL_ERROR_LIMIT, "shape: more than %d parts", NEBEL_MAX_SHAPE_LEAVES);
     switch (shape->type) {
     case NEBEL_SHAPE_WORLD:
         return NEBEL_OK;
@@ -192,9 +193,9 @@ static nebel_result check_altitude(const nebel_log *log, const nebel_density *de
     if (!is_extent(density->radius)) return bad(log, "altitude radius", EXTENT_RULE);
     const nebel_result result = check_height(log, density);
     if (result != NEBEL_OK) return result;
-    if (!(density->radius + density->base >= NEBEL_MIN_CURVATURE * density->scale_height))
+    if (!(density->radius + density->base >= NEBEL_MIN_ALTITUDE_RATIO * density->scale_height))
         return bad(log, "altitude base",
-                   "must be at least " NB_TEXT(NEBEL_MIN_CURVATURE) " scale heights from the center");
+                   "must be at least " NB_TEXT(NEBEL_MIN_ALTITUDE_RATIO) " scale heights from the center");
     return NEBEL_OK;
 }
 
@@ -221,7 +222,7 @@ static nebel_result check_density(const nebel_log *log, const nebel_density *den
         if (shape->type == NEBEL_SHAPE_WORLD || shape->type == NEBEL_SHAPE_UNION ||
             shape->type == NEBEL_SHAPE_INTERSECTION)
             return bad(log, "soft edge", "needs a shape with a surface that is no union or intersection");
-        return is_extent(density->distance) ? NEBEL_OK : bad(log, "soft edge distance", EXTENT_RULE);
+        return is_extent(density->edge_width) ? NEBEL_OK : bad(log, "soft edge distance", EXTENT_RULE);
     case NEBEL_DENSITY_GRID:
         if (density->grid == NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "grid density: grid must not be NULL");
         return shape->type == NEBEL_SHAPE_BOX ? NEBEL_OK : bad(log, "grid density", "needs a box");

@@ -106,7 +106,7 @@ static double radial_density(const nb_volume *volume, const double place[3])
 static double soft_edge_density(const nb_volume *volume, const double place[3])
 {
     const nb_leaf *box = &volume->leaves[0];
-    const nb_wide inverse = 1 / (nb_wide)volume->density.distance;
+    const nb_wide inverse = 1 / (nb_wide)volume->density.edge_width;
     const nb_wvec3 p = to_leaf(box, place);
     const nb_wvec3 low = nb_wvec3((nb_wide)box->low[0], (nb_wide)box->low[1], (nb_wide)box->low[2]);
     const nb_wvec3 high = nb_wvec3((nb_wide)box->high[0], (nb_wide)box->high[1], (nb_wide)box->high[2]);
@@ -138,7 +138,7 @@ static double planes_edge_density(const nb_volume *volume, const double place[3]
         const nb_face *face = &volume->faces[leaf->first_face + i];
         const double along =
             face->normal[0] * (double)p.x + face->normal[1] * (double)p.y + face->normal[2] * (double)p.z;
-        least = fmin(least, (face->distance - along) * face->inverse_length / volume->density.distance);
+        least = fmin(least, (face->distance - along) * face->inverse_length / volume->density.edge_width);
     }
     return fmax(least, 0);
 }

@@ -34,7 +34,7 @@ static nebel_result check_desc(const nebel_grid_desc *desc, size_t *count)
     if (desc->voxels == NULL) return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "grid: voxels must not be NULL");
     if (desc->type != NEBEL_VOXEL_FLOAT && desc->type != NEBEL_VOXEL_UINT8 && desc->type != NEBEL_VOXEL_UINT16)
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "grid: voxel type %d is unknown", (int)desc->type);
-    if (desc->filter != NEBEL_FILTER_LINEAR && desc->filter != NEBEL_FILTER_NEAREST)
+    if (desc->filter != NEBEL_GRID_FILTER_LINEAR && desc->filter != NEBEL_GRID_FILTER_NEAREST)
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "grid: filter %d is unknown", (int)desc->filter);
     if (!isfinite(desc->scale) || !isfinite(desc->offset))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "grid: scale and offset must be finite");
@@ -149,7 +149,7 @@ static int allocate_grid(nebel_grid *grid, size_t count)
 {
     size_t bricks = 1;
     for (int i = 0; i < 3; i++) {
-        grid->cells[i] = grid->size[i] + (grid->filter == NEBEL_FILTER_LINEAR);
+        grid->cells[i] = grid->size[i] + (grid->filter == NEBEL_GRID_FILTER_LINEAR);
         grid->bricks[i] = (grid->cells[i] + BRICK - 1) / BRICK;
         bricks *= (size_t)grid->bricks[i];
     }
@@ -217,7 +217,7 @@ nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid)
     return result;
 }
 
-const char *nebel_grid_name(const nebel_grid *grid)
+const char *nebel_get_grid_name(const nebel_grid *grid)
 {
     if (grid == NULL) return "";
     return grid->name;
@@ -237,12 +237,12 @@ void nebel_release_grid(nebel_grid *grid)
 
 double nb_grid_margin(const nebel_grid *grid)
 {
-    return grid->filter == NEBEL_FILTER_LINEAR ? 0.5 : 0;
+    return grid->filter == NEBEL_GRID_FILTER_LINEAR ? 0.5 : 0;
 }
 
 int nb_grid_is_linear(const nebel_grid *grid)
 {
-    return grid->filter == NEBEL_FILTER_LINEAR;
+    return grid->filter == NEBEL_GRID_FILTER_LINEAR;
 }
 
 int nb_grid_cells(const nebel_grid *grid, int axis)

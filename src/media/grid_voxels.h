@@ -24,7 +24,7 @@ struct nebel_grid {
     int bricks[3];
     size_t uneven_bricks; /* whose voxels are not all equal */
     nebel_voxel_type type;
-    nebel_filter filter;
+    nebel_grid_filter filter;
     double scale, offset; /* density = offset + scale * voxel, voxels of integers counted from 0 to 1 */
     double least, most;   /* density */
     uint64_t hash;        /* of what is stored */

@@ -12,7 +12,7 @@ typedef struct pair {
 
 INLINE pair pair_of(const nebel_grid *grid, int axis, int cell)
 {
-    if (grid->filter == NEBEL_FILTER_NEAREST) return (pair){cell, cell};
+    if (grid->filter == NEBEL_GRID_FILTER_NEAREST) return (pair){cell, cell};
     return (pair){cell > 0 ? cell - 1 : 0, cell < grid->size[axis] ? cell : cell - 1};
 }
 
@@ -236,8 +236,8 @@ INLINE brick_sum walk_linear(const nebel_grid *grid, nebel_voxel_type type, cons
 INLINE brick_sum walk_brick(const nebel_grid *grid, nebel_voxel_type type, const nb_grid_line *line, const walk *bricks,
                             double start, double end)
 {
-    return grid->filter == NEBEL_FILTER_NEAREST ? walk_nearest(grid, type, line, bricks, start, end)
-                                                : walk_linear(grid, type, line, bricks, start, end);
+    return grid->filter == NEBEL_GRID_FILTER_NEAREST ? walk_nearest(grid, type, line, bricks, start, end)
+                                                     : walk_linear(grid, type, line, bricks, start, end);
 }
 
 /* One copy for each type, so that the innermost loop asks for none. */
@@ -298,7 +298,7 @@ static double error_of_noise(const nebel_grid *grid, const nb_grid_line *line, d
     double error = 0;
     for (int i = 0; i < 3; i++) {
         const double own = noise_along(line, i, length, noise);
-        error += grid->filter == NEBEL_FILTER_LINEAR ? own * length : error_of_faces(line, i, length, own);
+        error += grid->filter == NEBEL_GRID_FILTER_LINEAR ? own * length : error_of_faces(line, i, length, own);
     }
     return error * (grid->most - grid->least);
 }
@@ -379,7 +379,7 @@ static stretch cell_stretch(cursor *c)
     const int *cell = c->cells.block;
     const double end = larger(smaller(c->cells.next[nearest_axis(&c->cells)], c->brick_end), c->t);
     stretch s;
-    if (grid->filter == NEBEL_FILTER_NEAREST) {
+    if (grid->filter == NEBEL_GRID_FILTER_NEAREST) {
         s = even_stretch(c, end, nearest_voxel(grid, grid->type, cell));
     } else {
         const corners corner = corners_of(grid, grid->type, cell);
@@ -512,7 +512,7 @@ double nb_grid_ceiling(const nebel_grid *grid, const double place[3], const doub
     const corners c = corners_of(grid, grid->type, at.cell);
     double most = 0;
     for (int i = 0; i < 8; i++) most = larger(most, density_of(grid, c.v[i]));
-    if (grid->filter == NEBEL_FILTER_NEAREST) return most;
+    if (grid->filter == NEBEL_GRID_FILTER_NEAREST) return most;
     /* |1 - x| + |x| <= 1 + 2 |x - its nearest point of the cell|, so the weights of the corners come to no more. */
     for (int i = 0; i < 3; i++) most *= 1 + 2 * reach[i];
     return most;
@@ -559,6 +559,6 @@ double nb_grid_kink(const nebel_grid *grid, const nb_grid_line *line, double lea
 
 double nb_grid_border(const nebel_grid *grid, const nb_grid_line *line, double least)
 {
-    if (grid->filter == NEBEL_FILTER_NEAREST) return nb_grid_kink(grid, line, least);
+    if (grid->filter == NEBEL_GRID_FILTER_NEAREST) return nb_grid_kink(grid, line, least);
     return distance_to_faces(line, BRICK, least);
 }

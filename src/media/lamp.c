@@ -20,7 +20,7 @@ static double length_of(const double v[3])
     return hypot(hypot(v[0], v[1]), v[2]);
 }
 
-static const char *fault_of_cone(const nebel_lamp *lamp)
+static const char *fault_of_cone(const nebel_light *lamp)
 {
     const double length = length_of(lamp->direction);
     if (!(length >= NEBEL_MIN_DIRECTION && length <= NEBEL_MAX_DIRECTION))
@@ -33,19 +33,19 @@ static const char *fault_of_cone(const nebel_lamp *lamp)
     return NULL;
 }
 
-static const char *fault_of_lamp(const nebel_lamp *lamp)
+static const char *fault_of_lamp(const nebel_light *lamp)
 {
-    if (lamp->type != NEBEL_LAMP_POINT && lamp->type != NEBEL_LAMP_SPOT) return "the type is unknown";
+    if (lamp->type != NEBEL_LIGHT_POINT && lamp->type != NEBEL_LIGHT_SPOT) return "the type is unknown";
     if (!is_within(lamp->position, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH))
         return "position: must be three finite numbers, at most " NB_TEXT(NEBEL_MAX_LENGTH) " m from the origin";
     if (!is_within(lamp->intensity, 0, NEBEL_MAX_AMOUNT))
         return "intensity: every channel must be within 0 and " NB_TEXT(NEBEL_MAX_AMOUNT);
     if (lamp->radius != 0 && !(lamp->radius >= NB_LEAST_BULB && lamp->radius <= largest_radius))
         return "radius: must be 0 or a length from 1e-3 to 1e6 m";
-    return lamp->type == NEBEL_LAMP_SPOT ? fault_of_cone(lamp) : NULL;
+    return lamp->type == NEBEL_LIGHT_SPOT ? fault_of_cone(lamp) : NULL;
 }
 
-nebel_result nb_check_lamps(const nebel_log *log, size_t count, const nebel_lamp *lamps)
+nebel_result nb_check_lamps(const nebel_log *log, size_t count, const nebel_light *lamps)
 {
     for (size_t i = 0; i < count; i++) {
         const char *fault = fault_of_lamp(&lamps[i]);
@@ -55,7 +55,7 @@ nebel_result nb_check_lamps(const nebel_log *log, size_t count, const nebel_lamp
 }
 
 /* Adding +0 makes every zero positive, as the march does with directions of its own. */
-static void set_cone(const nebel_lamp *lamp, nb_lamp *made)
+static void set_cone(const nebel_light *lamp, nb_lamp *made)
 {
     const double length = length_of(lamp->direction);
     for (int i = 0; i < 3; i++) made->axis[i] = lamp->direction[i] / length + 0;
@@ -65,7 +65,7 @@ static void set_cone(const nebel_lamp *lamp, nb_lamp *made)
     made->rise = fmin(1 / (made->inner - made->edge), 1e30);
 }
 
-nb_lamp nb_lamp_resolve(const nebel_lamp *lamp)
+nb_lamp nb_lamp_resolve(const nebel_light *lamp)
 {
     const double radius = nb_bulb(lamp->radius);
     nb_lamp made = {.radius2 = radius * radius, .clear = lamp->radius};
@@ -73,6 +73,6 @@ nb_lamp nb_lamp_resolve(const nebel_lamp *lamp)
         made.place[i] = lamp->position[i] + 0;
         made.intensity[i] = lamp->intensity[i] + 0;
     }
-    if (lamp->type == NEBEL_LAMP_SPOT) set_cone(lamp, &made);
+    if (lamp->type == NEBEL_LIGHT_SPOT) set_cone(lamp, &made);
     return made;
 }

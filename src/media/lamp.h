@@ -16,9 +16,9 @@ typedef struct nb_lamp {
 } nb_lamp;
 
 /* Says through the log which of the lamps is not in order, and why. */
-nebel_result nb_check_lamps(const nebel_log *log, size_t count, const nebel_lamp *lamps);
+nebel_result nb_check_lamps(const nebel_log *log, size_t count, const nebel_light *lamps);
 
 /* Of a lamp that is in order. */
-nb_lamp nb_lamp_resolve(const nebel_lamp *lamp);
+nb_lamp nb_lamp_resolve(const nebel_light *lamp);
 
 #endif

@@ -260,7 +260,7 @@ static int is_sharp(const nb_leaf *leaf, const nb_face *face)
  * empty. */
 static int bound_faces(const nb_leaf *leaf, const nb_face *faces, int side, double low[3], double high[3])
 {
-    double planes[NEBEL_MAX_PLANES][4];
+    double planes[NEBEL_MAX_SHAPE_PLANES][4];
     for (size_t k = 0; k < leaf->face_count; k++) {
         const nb_face *face = &faces[k];
         long double n[3] = {0, 0, 0}, square = 0;

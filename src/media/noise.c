@@ -128,7 +128,7 @@ static int octaves_in(const nebel_noise_desc *desc)
     int count = 1;
     for (double scale = 2; count < wanted; count++, scale *= 2)
         for (int i = 0; i < 3; i++)
-            if (2 * desc->cells[i] * scale > (double)desc->size[i]) return count;
+            if (2 * desc->frequency[i] * scale > (double)desc->size[i]) return count;
     return count;
 }
 
@@ -166,7 +166,7 @@ static double sum_octaves(const nebel_noise_desc *desc, point *points, const oct
                           const double place[3])
 {
     double sum = 0, cells[3];
-    for (int i = 0; i < 3; i++) cells[i] = place[i] * desc->cells[i] - desc->offset[i];
+    for (int i = 0; i < 3; i++) cells[i] = place[i] * desc->frequency[i] - desc->offset[i];
     for (const octave *o = octaves; o < octaves + count; o++) {
         double at[3];
         for (int i = 0; i < 3; i++)
@@ -184,7 +184,7 @@ static double fade(const nebel_noise_desc *desc, const double place[3])
     double all = 1;
     for (int i = 0; i < 3; i++) {
         const double depth = fmin(place[i], 1 - place[i]);
-        const double u = depth < desc->edge[i] ? depth / desc->edge[i] : 1;
+        const double u = depth < desc->falloff[i] ? depth / desc->falloff[i] : 1;
         all *= u * u * (3 - 2 * u);
     }
     return all;
@@ -216,11 +216,11 @@ static nebel_result check_axis(const nebel_noise_desc *desc, int i)
     if (desc->size[i] < 1 || desc->size[i] > NEBEL_MAX_GRID_SIZE)
         return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "noise: %zu x %zu x %zu voxels; must be 1 to %d on each axis",
                        desc->size[0], desc->size[1], desc->size[2], NEBEL_MAX_GRID_SIZE);
-    if (!(desc->cells[i] > 0 && 2 * desc->cells[i] <= (double)desc->size[i]))
-        return bad(desc, "cells", desc->cells[i], "more than 0, and of two voxels each at least");
+    if (!(desc->frequency[i] > 0 && 2 * desc->frequency[i] <= (double)desc->size[i]))
+        return bad(desc, "cells", desc->frequency[i], "more than 0, and of two voxels each at least");
     if (!(fabs(desc->offset[i]) <= NEBEL_MAX_NOISE_OFFSET))
         return bad(desc, "offset", desc->offset[i], "within -1e9 and 1e9");
-    if (!(desc->edge[i] >= 0 && desc->edge[i] <= 0.5)) return bad(desc, "edge", desc->edge[i], "0 to 0.5");
+    if (!(desc->falloff[i] >= 0 && desc->falloff[i] <= 0.5)) return bad(desc, "edge", desc->falloff[i], "0 to 0.5");
     return NEBEL_OK;
 }
 
@@ -239,7 +239,7 @@ static nebel_result check(const nebel_noise_desc *desc)
     return NEBEL_OK;
 }
 
-nebel_result nebel_create_noise(const nebel_noise_desc *desc, nebel_grid **grid)
+nebel_result nebel_create_noise_grid(const nebel_noise_desc *desc, nebel_grid **grid)
 {
     if (grid != NULL) *grid = NULL;
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;

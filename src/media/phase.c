@@ -24,7 +24,7 @@ const char *nb_phase_fault(const nebel_phase *phase)
     case NEBEL_PHASE_CORNETTE_SHANKS:
         return fabs(phase->g) <= NEBEL_MAX_G ? NULL : "phase g: must be within -0.9999 and 0.9999";
     case NEBEL_PHASE_DROPLETS:
-        return phase->diameter >= 1e-6 && phase->diameter <= NEBEL_MAX_DROPLET
+        return phase->diameter >= 1e-6 && phase->diameter <= NEBEL_MAX_DROPLET_DIAMETER
                    ? NULL
                    : "phase diameter: must be within 1e-6 and 50 micrometres";
     default:
@@ -117,7 +117,7 @@ double nb_phase_at(const nb_phase *phase, double cosine)
     return sum;
 }
 
-double nebel_phase_value(const nebel_phase *phase, double cosine)
+double nebel_evaluate_phase(const nebel_phase *phase, double cosine)
 {
     if (nb_phase_fault(phase) != NULL || !(fabs(cosine) <= 1)) return (double)NAN;
     const nb_phase resolved = nb_phase_resolve(phase);
@@ -222,7 +222,7 @@ static double invert_light_below(const nb_phase *phase, double part)
     return c;
 }
 
-double nebel_phase_sample(const nebel_phase *phase, double part)
+double nebel_sample_phase(const nebel_phase *phase, double part)
 {
     if (nb_phase_fault(phase) != NULL || !(part >= 0 && part <= 1)) return (double)NAN;
     const nb_phase resolved = nb_phase_resolve(phase);

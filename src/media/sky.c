@@ -25,9 +25,9 @@
 static nebel_result check_map(const nebel_log *log, const nebel_environment *sky)
 {
     if (sky->map == NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "environment: a map must not be NULL");
-    if (!(fabs(sky->rotation) <= NEBEL_MAX_ROTATION))
+    if (!(fabs(sky->rotation) <= NEBEL_MAX_ENVIRONMENT_ROTATION))
         return nb_fail(log, NEBEL_ERROR_VALUE, "environment: rotation is %g; must be within -%s and %s degrees",
-                       sky->rotation, NB_TEXT(NEBEL_MAX_ROTATION), NB_TEXT(NEBEL_MAX_ROTATION));
+                       sky->rotation, NB_TEXT(NEBEL_MAX_ENVIRONMENT_ROTATION), NB_TEXT(NEBEL_MAX_ENVIRONMENT_ROTATION));
     if (!(sky->intensity >= 0 && sky->intensity <= NEBEL_MAX_AMOUNT))
         return nb_fail(log, NEBEL_ERROR_VALUE, "environment: intensity is %g; must be within 0 and %s", sky->intensity,
                        NB_TEXT(NEBEL_MAX_AMOUNT));
@@ -246,7 +246,7 @@ static int is_missing(const nebel_environment *environment, const double *direct
     return 1;
 }
 
-void nebel_environment_radiance(const nebel_environment *environment, const double direction[3], double radiance[3])
+void nebel_evaluate_environment(const nebel_environment *environment, const double direction[3], double radiance[3])
 {
     if (is_missing(environment, direction, radiance)) return;
     double unit[3] = {direction[0], direction[1], direction[2]}, turned[3];
@@ -263,7 +263,8 @@ void nebel_environment_radiance(const nebel_environment *environment, const doub
     }
 }
 
-void nebel_environment_reflected(const nebel_environment *environment, const double normal[3], double radiance[3])
+void nebel_evaluate_environment_diffuse(const nebel_environment *environment, const double normal[3],
+                                        double radiance[3])
 {
     if (is_missing(environment, normal, radiance)) return;
     double unit[3] = {normal[0], normal[1], normal[2]}, turned[3];

@@ -125,7 +125,7 @@ static nebel_density resolve_density(const nebel_density *from)
         to.sigma = from->sigma;
         break;
     case NEBEL_DENSITY_SOFT_EDGE:
-        to.distance = from->distance;
+        to.edge_width = from->edge_width;
         break;
     case NEBEL_DENSITY_GRID:
         to.grid = nebel_retain_grid(from->grid);
@@ -195,7 +195,7 @@ nebel_result nb_volume_resolve(const nebel_allocator *allocator, const nebel_log
     if (nb_volume_has_fog(volume)) {
         volume->density = resolve_density(&desc->density);
         if (desc->density.type == NEBEL_DENSITY_SOFT_EDGE && is_round(&desc->shape))
-            volume->edge = resolve_edge(&desc->shape, desc->density.distance);
+            volume->edge = resolve_edge(&desc->shape, desc->density.edge_width);
         resolve_light(desc, volume);
     }
     builder b = {log, volume, {0, 0, 0}};
@@ -244,10 +244,10 @@ static int compare_density(const nebel_density *a, const nebel_density *b)
 {
     const double x[] = {(double)a->type, (double)a->below, a->base,  a->scale_height, a->from[0], a->from[1],
                         a->from[2],      a->to[0],         a->to[1], a->to[2],        a->power,   a->center[0],
-                        a->center[1],    a->center[2],     a->sigma, a->distance};
+                        a->center[1],    a->center[2],     a->sigma, a->edge_width};
     const double y[] = {(double)b->type, (double)b->below, b->base,  b->scale_height, b->from[0], b->from[1],
                         b->from[2],      b->to[0],         b->to[1], b->to[2],        b->power,   b->center[0],
-                        b->center[1],    b->center[2],     b->sigma, b->distance};
+                        b->center[1],    b->center[2],     b->sigma, b->edge_width};
     const int order = compare_numbers(x, y, sizeof x / sizeof *x);
     return order == 0 ? nb_grid_compare(a->grid, b->grid) : order;
 }

@@ -59,7 +59,7 @@ typedef struct nb_leaf {
 typedef enum nb_step { NB_STEP_LEAF, NB_STEP_ANY, NB_STEP_ALL } nb_step;
 
 /* The deepest stack a program needs. */
-#define NB_STEP_STACK (NEBEL_MAX_DEPTH + 2)
+#define NB_STEP_STACK (NEBEL_MAX_SHAPE_NESTING + 2)
 
 /* The numbers of a soft edge, see nb_round_edge in formulas/profiles.inc. */
 typedef struct nb_edge {

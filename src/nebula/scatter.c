@@ -31,7 +31,7 @@ typedef struct cloud {
     double eddy; /* m */
 } cloud;
 
-nebel_volume_desc nebel_particle_volume(const nebel_particle *particle)
+nebel_volume_desc nebel_volume_from_particle(const nebel_particle *particle)
 {
     if (particle == NULL) return (nebel_volume_desc){.priority = 0};
     nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = particle->radius}};
@@ -73,20 +73,20 @@ static int is_radius(const nebel_nebula_desc *desc, double radius)
 
 static nebel_result check_lengths(const nebel_nebula_desc *desc)
 {
-    const int default_size = desc->size[0] == 0 && desc->size[1] == 0;
-    if (!default_size && !(is_radius(desc, desc->size[0]) && is_radius(desc, desc->size[1])))
+    const int default_size = desc->radius_range[0] == 0 && desc->radius_range[1] == 0;
+    if (!default_size && !(is_radius(desc, desc->radius_range[0]) && is_radius(desc, desc->radius_range[1])))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
                        "nebula: sizes are %g to %g m; they must be from %g (a gaussian: 3 times that) to %g m",
-                       desc->size[0], desc->size[1], NEBEL_MIN_LENGTH, NEBEL_MAX_LENGTH);
-    if (!(desc->size[0] <= desc->size[1]))
+                       desc->radius_range[0], desc->radius_range[1], NEBEL_MIN_LENGTH, NEBEL_MAX_LENGTH);
+    if (!(desc->radius_range[0] <= desc->radius_range[1]))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: sizes are %g to %g m; the smaller must come first",
-                       desc->size[0], desc->size[1]);
-    if (!(desc->fade >= 0 && desc->fade <= 1))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: fade is %g; it must be from 0 to 1", desc->fade);
+                       desc->radius_range[0], desc->radius_range[1]);
+    if (!(desc->dimming >= 0 && desc->dimming <= 1))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: fade is %g; it must be from 0 to 1", desc->dimming);
     if (!(desc->turbulence >= 0 && desc->turbulence <= NEBEL_MAX_LENGTH))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: turbulence is %g m; it must be from 0 to %g",
                        desc->turbulence, NEBEL_MAX_LENGTH);
-    const double eddy = desc->turbulence_size;
+    const double eddy = desc->turbulence_scale;
     if (!(eddy == 0 || (eddy >= NEBEL_MIN_LENGTH && eddy <= NEBEL_MAX_LENGTH)))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: turbulence_size is %g m; it must be 0, or from %g to %g",
                        eddy, NEBEL_MIN_LENGTH, NEBEL_MAX_LENGTH);
@@ -98,7 +98,7 @@ static nebel_result check_desc(const nebel_nebula_desc *desc)
     if (!nb_allocator_is_valid(&desc->allocator))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT,
                        "nebula: the allocator needs allocate and release, or neither");
-    if (desc->profile < 0 || desc->profile >= NEBEL_PARTICLE_COUNT)
+    if (desc->profile < 0 || desc->profile >= NEBEL_PARTICLE_PROFILE_COUNT)
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: %d is no profile of a particle", (int)desc->profile);
     const nebel_result result = check_lengths(desc);
     return result == NEBEL_OK ? check_amounts(desc) : result;
@@ -143,8 +143,8 @@ static nebel_result open_cloud(const nebel_nebula_desc *desc, cloud *made)
     double extent = 0;
     *made = (cloud){.desc = desc,
                     .allocator = nb_resolve_allocator(&desc->allocator),
-                    .size = {desc->size[0], desc->size[1]},
-                    .eddy = desc->turbulence_size};
+                    .size = {desc->radius_range[0], desc->radius_range[1]},
+                    .eddy = desc->turbulence_scale};
     const nebel_result result = desc->points != NULL ? measure_points(desc, &extent) : open_shape(made, &extent);
     if (result != NEBEL_OK) return result;
     if (made->size[1] == 0) made->size[0] = 0.05, made->size[1] = 0.2;
@@ -181,8 +181,8 @@ static int find_place(const cloud *from, size_t particle, double place[3], doubl
         for (uint64_t i = 0; i < 3; i++)
             place[i] = low[i] + (high[i] - low[i]) * chance(from, STREAM_PLACE, particle, 4 * n + i);
         const double density = nb_density_at(&from->volume, place);
-        *share = power(density, from->desc->fade);
-        if (chance(from, STREAM_PLACE, particle, 4 * n + 3) < power(density, 1 - from->desc->fade)) return 1;
+        *share = power(density, from->desc->dimming);
+        if (chance(from, STREAM_PLACE, particle, 4 * n + 3) < power(density, 1 - from->desc->dimming)) return 1;
     }
     return 0;
 }
@@ -234,7 +234,7 @@ static int make_particle(const cloud *from, size_t number, nebel_particle *parti
     return 1;
 }
 
-nebel_result nebel_scatter_nebula(const nebel_nebula_desc *desc, nebel_particle *particles)
+nebel_result nebel_generate_nebula(const nebel_nebula_desc *desc, nebel_particle *particles)
 {
     if (desc == NULL || (particles == NULL && desc->count > 0) || (desc->colors == NULL && desc->color_count > 0))
         return NEBEL_ERROR_ARGUMENT;

@@ -130,7 +130,7 @@ double nb_track_enter(nb_track track, double sphere)
 
 static void add_rising(const nb_airs *airs, nb_track track, double length, double depth[3])
 {
-    double met[NEBEL_MAX_AIRS] = {0};
+    double met[NEBEL_MAX_COMPONENTS] = {0};
     nb_add_rising(airs, (nb_tracks){track.radius, track.rise}, length, met);
     for (int c = 0; c < 3; c++) depth[c] += nb_depth_of(airs, met, c);
 }

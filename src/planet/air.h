@@ -20,14 +20,14 @@ typedef struct nb_air {
     double peak;                    /* by nb_airs_smooth: the part of scattered light that goes nearly straight ahead */
 } nb_air;
 
-enum { NB_MOST_SHELLS = 3 + 3 * NEBEL_MAX_AIRS };
+enum { NB_MOST_SHELLS = 3 + 3 * NEBEL_MAX_COMPONENTS };
 
 /* Air around a ball. */
 typedef struct nb_airs {
     double radius, top;            /* m from the centre */
     double shells[NB_MOST_SHELLS]; /* m from the centre: where rays are cut, since the air is another above */
     int shell_count;
-    nb_air airs[NEBEL_MAX_AIRS];
+    nb_air airs[NEBEL_MAX_COMPONENTS];
     int count;
     int is_smooth; /* of nb_airs_smooth: nothing had to be changed */
 } nb_airs;

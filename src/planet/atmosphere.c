@@ -18,12 +18,12 @@ static double lobe_moment(const nb_lobe *lobe, int order)
     return (pow(g, l) + lobe->alpha * square) / (1 + lobe->alpha * (1 + 2 * g * g) / 3);
 }
 
-static void resolve_air(const nebel_air *desc, nb_air *air)
+static void resolve_air(const nebel_atmosphere_component *desc, nb_air *air)
 {
     air->phase = nb_phase_resolve(&desc->phase);
-    air->scale = desc->profile == NEBEL_AIR_EXPONENTIAL ? desc->scale_height : 0;
-    air->center = desc->middle;
-    air->width = desc->width;
+    air->scale = desc->profile == NEBEL_COMPONENT_EXPONENTIAL ? desc->scale_height : 0;
+    air->center = desc->center_height;
+    air->width = desc->half_width;
     for (int c = 0; c < 3; c++) {
         air->scattering[c] = desc->scattering[c];
         air->extinction[c] = desc->scattering[c] + desc->absorption[c];
@@ -56,18 +56,18 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
     made->allocator = allocator;
     made->airs.radius = whole.radius;
     made->airs.top = whole.radius + whole.thickness;
-    made->airs.count = (int)whole.air_count;
+    made->airs.count = (int)whole.component_count;
     for (int c = 0; c < 3; c++) made->ground_albedo[c] = whole.ground_albedo[c];
-    for (int i = 0; i < made->airs.count; i++) resolve_air(&whole.airs[i], &made->airs.airs[i]);
+    for (int i = 0; i < made->airs.count; i++) resolve_air(&whole.components[i], &made->airs.airs[i]);
     nb_airs_cut(&made->airs);
-    nb_vector_ball_middle(whole.ground, whole.radius, made->center);
+    nb_vector_ball_middle(whole.ground_point, whole.radius, made->center);
     made->rule = nb_rule_make(NB_RULE_MOST);
     made->gather = nb_gather_choose(NEBEL_ISA_DEFAULT);
     const nb_parts parts = {whole.run, whole.run_user};
-    nb_airs_smooth(&made->airs, whole.quality == NEBEL_AIR_PRECISE ? NB_MOMENTS : NB_FEW_MOMENTS, &made->smooth);
+    nb_airs_smooth(&made->airs, whole.quality == NEBEL_ATMOSPHERE_PRECISE ? NB_MOMENTS : NB_FEW_MOMENTS, &made->smooth);
     result = nb_scatter_make(&allocator, &parts, &made->airs, &made->smooth, whole.quality, whole.ground_albedo,
                              &made->scatter);
-    made->share_off = (whole.quality == NEBEL_AIR_PRECISE ? 0.02 : 0.1) + made->scatter.missing;
+    made->share_off = (whole.quality == NEBEL_ATMOSPHERE_PRECISE ? 0.02 : 0.1) + made->scatter.missing;
     if (result == NEBEL_OK) {
         *atmosphere = made;
         return NEBEL_OK;

@@ -31,7 +31,7 @@ static inline const nb_airs *nb_atmosphere_smooth(const nebel_atmosphere *atmosp
 /* What a ray gathers for a sun of irradiance 1: scattered once, by each kind of air, for phase functions of 1; more
  * often; and about how much of that is missing for want of moments, and in twilight for want of entries. */
 typedef struct nb_gathered {
-    double once[NEBEL_MAX_AIRS][3], often[3], missing[3];
+    double once[NEBEL_MAX_COMPONENTS][3], often[3], missing[3];
 } nb_gathered;
 
 /* Where the ray enters and leaves the shadow of the planet, in any order; below 0 where it does not. */

@@ -7,13 +7,13 @@
 
 nebel_atmosphere_desc nb_atmosphere_resolve(const nebel_atmosphere_desc *desc)
 {
-    const nebel_atmosphere_desc *earth = nebel_find_atmosphere("earth");
+    const nebel_atmosphere_desc *earth = nebel_lookup_atmosphere("earth");
     nebel_atmosphere_desc whole = *desc;
     if (whole.radius == 0) whole.radius = earth->radius;
     if (whole.thickness == 0) whole.thickness = earth->thickness;
-    if (whole.air_count == 0) {
-        memcpy(whole.airs, earth->airs, sizeof whole.airs);
-        whole.air_count = earth->air_count;
+    if (whole.component_count == 0) {
+        memcpy(whole.components, earth->components, sizeof whole.components);
+        whole.component_count = earth->component_count;
     }
     return whole;
 }
@@ -52,26 +52,26 @@ static nebel_result check_all(const subject *of, const char *what, const double 
     return result;
 }
 
-static nebel_result check_profile(const subject *of, const nebel_air *air, double thickness)
+static nebel_result check_profile(const subject *of, const nebel_atmosphere_component *air, double thickness)
 {
     static const meaning at_least = {" m", " (a thousandth of the thickness)", ""},
                          within = {" m", "", " (the thickness)"};
-    const double least = thickness / NEBEL_MAX_AIR_RATIO;
+    const double least = thickness / NEBEL_MAX_COMPONENT_RATIO;
     nebel_result result;
     switch (air->profile) {
-    case NEBEL_AIR_EXPONENTIAL:
+    case NEBEL_COMPONENT_EXPONENTIAL:
         return check(of, "scale_height", air->scale_height, least, NEBEL_MAX_LENGTH, &at_least);
-    case NEBEL_AIR_LAYER:
-        result = check(of, "middle", air->middle, 0, thickness, &within);
-        return result == NEBEL_OK ? check(of, "width", air->width, least, NEBEL_MAX_LENGTH, &at_least) : result;
+    case NEBEL_COMPONENT_TENT:
+        result = check(of, "middle", air->center_height, 0, thickness, &within);
+        return result == NEBEL_OK ? check(of, "width", air->half_width, least, NEBEL_MAX_LENGTH, &at_least) : result;
     default:
         return refuse(of, "profile", "is unknown");
     }
 }
 
-static nebel_result check_air(const subject *of, const nebel_air *air, double thickness)
+static nebel_result check_air(const subject *of, const nebel_atmosphere_component *air, double thickness)
 {
-    const double most = NEBEL_MAX_AIR_EXTINCTION;
+    const double most = NEBEL_MAX_COMPONENT_EXTINCTION;
     nebel_result result = check_all(of, "scattering", air->scattering, 0, most, &per_metre);
     if (result == NEBEL_OK) result = check_all(of, "absorption", air->absorption, 0, most, &per_metre);
     if (result == NEBEL_OK) result = check_profile(of, air, thickness);
@@ -84,16 +84,17 @@ nebel_result nb_atmosphere_check(const nebel_atmosphere_desc *desc)
 {
     static const meaning at_least = {" m", " (a millionth of the radius)", ""};
     subject of = {&desc->log, ""};
-    nebel_result result = check_all(&of, "ground", desc->ground, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH, &length);
+    nebel_result result = check_all(&of, "ground", desc->ground_point, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH, &length);
     if (result == NEBEL_OK) result = check(&of, "radius", desc->radius, 1, 1e12, &length);
     if (result == NEBEL_OK) result = check(&of, "thickness", desc->thickness, desc->radius / 1e6, 1e12, &at_least);
     if (result == NEBEL_OK) result = check_all(&of, "ground_albedo", desc->ground_albedo, 0, 1, &pure);
     if (result != NEBEL_OK) return result;
-    if (desc->air_count > NEBEL_MAX_AIRS) return refuse(&of, "air_count", "must be at most 4");
-    if ((int)desc->quality < 0 || desc->quality >= NEBEL_AIR_QUALITY_COUNT) return refuse(&of, "quality", "is unknown");
-    for (uint32_t i = 0; i < desc->air_count && result == NEBEL_OK; i++) {
+    if (desc->component_count > NEBEL_MAX_COMPONENTS) return refuse(&of, "air_count", "must be at most 4");
+    if ((int)desc->quality < 0 || desc->quality >= NEBEL_ATMOSPHERE_QUALITY_COUNT)
+        return refuse(&of, "quality", "is unknown");
+    for (uint32_t i = 0; i < desc->component_count && result == NEBEL_OK; i++) {
         (void)snprintf(of.name, sizeof of.name, "airs[%u].", (unsigned)i);
-        result = check_air(&of, &desc->airs[i], desc->thickness);
+        result = check_air(&of, &desc->components[i], desc->thickness);
     }
     return result;
 }

@@ -58,7 +58,7 @@ static void spread(int i, double unit[3], double *height, double *turn)
     *turn = 2 * PI * parts[3];
 }
 
-static void find_places(const nebel_cloud_view *view, int k, nb_cloud_crowd *crowd)
+static void find_places(const nebel_cloud_lighting *view, int k, nb_cloud_crowd *crowd)
 {
     const nb_cloud_layer *layer = &view->clouds->layers[k];
     const nb_cloud_pose *pose = &view->poses[k];

@@ -87,7 +87,7 @@ typedef struct nb_way {
 /* The pieces of a way in a layer. Just below the horizon it may leave the layer over the planet's bulge and enter it again
  * behind; but not through the ground: who looks down from below a layer sees none of its clouds, not those on the planet's other
  * side. */
-static int stays_of(const nebel_cloud_view *view, int k, const nb_way *way, double pieces[2][2])
+static int stays_of(const nebel_cloud_lighting *view, int k, const nb_way *way, double pieces[2][2])
 {
     const nb_cloud_layer *layer = &view->clouds->layers[k];
     const int count = nb_cloud_pieces(layer->low, layer->high, way->from, way->unit, way->reach, pieces);
@@ -107,7 +107,7 @@ typedef struct nb_stride {
 /* Begins anew. */
 static void stride(nb_stride *steps)
 {
-    const nebel_cloud_view *view = steps->workspace->view;
+    const nebel_cloud_lighting *view = steps->workspace->view;
     nb_cloud_looks *looks = &steps->looks;
     if (looks->count == 0) return;
     if (steps->is_alone)
@@ -121,7 +121,7 @@ static void stride(nb_stride *steps)
 /* Each step takes the mean over its length. */
 static void march(nb_way *way, nb_stride *steps)
 {
-    const nebel_cloud_view *view = steps->workspace->view;
+    const nebel_cloud_lighting *view = steps->workspace->view;
     const nb_cloud_layer *layer = &view->clouds->layers[steps->layer];
     const float most_hidden = nb_smaller(layer->hidden_height, layer->hidden_width);
     double pieces[2][2], own[3], unit[3], step = (double)way->steps.first;

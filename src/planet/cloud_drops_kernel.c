@@ -103,7 +103,7 @@ static inline nb_real step_up(nb_real x)
 }
 
 /* Bases are flat, where vapour begins to condense, and thin there: drops grow on their way up. */
-static inline nb_real thin_out(nebel_cloud_kind kind, nb_real height)
+static inline nb_real thin_out(nebel_cloud_type kind, nb_real height)
 {
     const nb_real end = step_up(nb_splat(NB_CLOUD_TOP_THINS) * (NB_F(1.0) - height)) *
                         step_up(nb_splat(nb_cloud_base_thins(kind)) * height);
@@ -112,7 +112,7 @@ static inline nb_real thin_out(nebel_cloud_kind kind, nb_real height)
 }
 
 /* nb_cloud_least_rank. */
-static inline nb_real least_rank(nebel_cloud_kind kind, nb_real height)
+static inline nb_real least_rank(nebel_cloud_type kind, nb_real height)
 {
     const nb_real from_middle = NB_F(2.0) * height - NB_F(1.0);
     if (kind == NEBEL_CLOUD_CUMULUS) return height * height;

@@ -8,7 +8,7 @@
 
 #include "formulas/elementary.inc"
 
-enum { MOST = NEBEL_MAX_CLOUD_KNOTS };
+enum { MOST = NEBEL_MAX_CLOUD_NODES };
 
 /* Between two knots transmittance falls by no more than about that. */
 #define MOST_FALL 0.12
@@ -115,7 +115,7 @@ static void add_end(nb_cloud_tally *tally)
     write_knot(tally, &end);
 }
 
-void nb_cloud_tally_end(nb_cloud_tally *tally, double through, nebel_cloud_knots *knots)
+void nb_cloud_tally_end(nb_cloud_tally *tally, double through, nebel_cloud_transfer *knots)
 {
     add_end(tally);
     knots->count = tally->count;

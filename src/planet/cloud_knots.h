@@ -19,7 +19,7 @@ typedef struct nb_cloud_tally {
     double end;            /* of the last cloud */
     nb_cloud_knot gap_end; /* the end of the last long gap between clouds */
     uint32_t count;
-    nb_cloud_knot knots[NEBEL_MAX_CLOUD_KNOTS];
+    nb_cloud_knot knots[NEBEL_MAX_CLOUD_NODES];
 } nb_cloud_tally;
 
 /* Cloud begins at t, behind a gap or none. */
@@ -31,6 +31,6 @@ void nb_cloud_tally_leave(nb_cloud_tally *tally, double t);
 /* Light of the first stretch that has none yet, for all that lies behind it. */
 void nb_cloud_tally_light(nb_cloud_tally *tally, const double light[3], const double ahead[3]);
 /* Nothing follows, and all light has come; so much comes through all clouds. Sets all but the error. */
-void nb_cloud_tally_end(nb_cloud_tally *tally, double through, nebel_cloud_knots *knots);
+void nb_cloud_tally_end(nb_cloud_tally *tally, double through, nebel_cloud_transfer *knots);
 
 #endif

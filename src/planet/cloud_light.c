@@ -26,7 +26,7 @@ static float falling(float depth)
 
 /* ---- clear air ------------------------------------------------------------------------------- */
 
-static nb_cloud_light clear_light(const nebel_cloud_view *view, double radius, double sun)
+static nb_cloud_light clear_light(const nebel_cloud_lighting *view, double radius, double sun)
 {
     const nebel_atmosphere *atmosphere = view->clouds->atmosphere;
     const nb_field field = nb_scatter_look_up(&atmosphere->scatter, &atmosphere->airs, radius, sun);
@@ -45,7 +45,7 @@ static nb_cloud_light clear_light(const nebel_cloud_view *view, double radius, d
     return light;
 }
 
-nebel_result nb_cloud_light_make(nebel_cloud_view *view)
+nebel_result nb_cloud_light_make(nebel_cloud_lighting *view)
 {
     view->lights = nb_allocate(&view->allocator, NB_CLOUD_HEIGHTS, sizeof *view->lights);
     if (view->lights == NULL) return NEBEL_ERROR_MEMORY;
@@ -68,7 +68,7 @@ static nb_between between(double place, int count)
     return (nb_between){low, (float)(bounded - low)};
 }
 
-nb_cloud_light nb_cloud_clear_light(const nebel_cloud_view *view, const double place[3], double radius)
+nb_cloud_light nb_cloud_clear_light(const nebel_cloud_lighting *view, const double place[3], double radius)
 {
     const double sun = nb_vector_dot(place, view->sun.direction) / radius;
     const nb_between h =
@@ -103,7 +103,8 @@ static float integral_of_rise(float x)
     return x < 1 ? x * x * x * (1 - 0.5f * x) : x - 0.5f;
 }
 
-nb_cloud_depths nb_cloud_bound_depths(const nebel_cloud_view *view, int k, double radius, const nb_cloud_depths *depths)
+nb_cloud_depths nb_cloud_bound_depths(const nebel_cloud_lighting *view, int k, double radius,
+                                      const nb_cloud_depths *depths)
 {
     const nb_cloud_layer *layer = &view->clouds->layers[k];
     const float height = (float)(radius - layer->low) * layer->per_thickness;
@@ -141,7 +142,7 @@ static double part_within(double cosine, double from, double to)
     return part * part * (3 - 2 * part);
 }
 
-static void add_direction(const nebel_cloud_view *view, double cosine, double weight, nb_cloud_ray *ray)
+static void add_direction(const nebel_cloud_lighting *view, double cosine, double weight, nb_cloud_ray *ray)
 {
     const double ahead = part_within(cosine, AHEAD_ANGLE, ASIDE_ANGLE);
     ray->ahead += (float)(weight * ahead);
@@ -157,7 +158,7 @@ static void add_direction(const nebel_cloud_view *view, double cosine, double we
 }
 
 /* Over a pixel where the phase function's peak is near, else of its middle. */
-static void set_phases(const nebel_cloud_view *view, double spread, nb_cloud_ray *ray)
+static void set_phases(const nebel_cloud_lighting *view, double spread, nb_cloud_ray *ray)
 {
     const double width = nb_min(0.5, spread), near = nb_min(1.5, ASIDE_ANGLE + NEAR_WIDTHS * width);
     const int is_near = 2 - 2 * ray->sun < near * near;
@@ -177,7 +178,7 @@ static void set_phases(const nebel_cloud_view *view, double spread, nb_cloud_ray
     }
 }
 
-nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3], double spread)
+nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_lighting *view, const double direction[3], double spread)
 {
     nb_cloud_ray ray = {.sun = nb_max(-1, nb_min(1, nb_vector_dot(direction, view->sun.direction)))};
     memcpy(ray.direction, direction, sizeof ray.direction);

@@ -98,7 +98,7 @@ static void integrate(const nb_cloud_phase *phase, double sums[3][NB_CLOUD_PHASE
     }
 }
 
-void nb_cloud_phase_make(nebel_cloud_kind kind, double diameter, nb_cloud_phase *phase)
+void nb_cloud_phase_make(nebel_cloud_type kind, double diameter, nb_cloud_phase *phase)
 {
     double sums[3][NB_CLOUD_PHASE_MOMENTS];
     if (kind == NEBEL_CLOUD_CIRRUS)

@@ -25,7 +25,7 @@ typedef struct nb_cloud_phase {
 } nb_cloud_phase;
 
 /* Diameters of less than 4 micrometers count as 4, and above 50 as 50. */
-void nb_cloud_phase_make(nebel_cloud_kind kind, double diameter, nb_cloud_phase *phase);
+void nb_cloud_phase_make(nebel_cloud_type kind, double diameter, nb_cloud_phase *phase);
 
 /* Of red, green, blue and their mean at a cosine within -1 and 1. */
 void nb_cloud_phase_at(const nb_cloud_phase *phase, double cosine, float values[4]);

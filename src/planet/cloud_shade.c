@@ -9,7 +9,7 @@
 #include <string.h>
 
 /* Pieces of rays end so far from where they come under clouds, in heights of the lowest layer's top; the last one has no end. */
-static const double ends[NEBEL_MAX_AIR_SHADES - 1] = {0.75, 2.2, 6, 15, 40};
+static const double ends[NEBEL_MAX_AIR_SHADOW_SEGMENTS - 1] = {0.75, 2.2, 6, 15, 40};
 
 /* A mean over that part of a piece's length; finer than this part of the clouds' height is too fine. */
 #define WIDTH_PART 0.7
@@ -62,7 +62,7 @@ static nb_cloud_roof roof_over(nebel_cloud_workspace *workspace, int k, const do
 /* Sunlight and the sky's light count as what a drop of air has of them from all sides. */
 static void find_parts(nebel_cloud_workspace *workspace, const double place[3], float width, float part[3])
 {
-    const nebel_cloud_view *view = workspace->view;
+    const nebel_cloud_lighting *view = workspace->view;
     const double radius = nb_vector_length(place);
     const int k = layer_over(view->clouds, radius);
     part[0] = part[1] = part[2] = 1;
@@ -82,7 +82,7 @@ typedef struct nb_under {
     double scale; /* m, how high the lowest layer's top is */
 } nb_under;
 
-static int find_under(const nebel_cloud_view *view, const nebel_ray *ray, const double unit[3], nb_under *under)
+static int find_under(const nebel_cloud_lighting *view, const nebel_ray *ray, const double unit[3], nb_under *under)
 {
     const nebel_atmosphere *atmosphere = view->clouds->atmosphere;
     const double ground = atmosphere->airs.radius;
@@ -104,7 +104,7 @@ static void find_middle(const nb_under *under, double t, double next, double pla
     for (int c = 0; c < 3; c++) place[c] = under->from[c] + 0.5 * (t + next) * under->unit[c];
 }
 
-static void shade(nebel_cloud_workspace *workspace, const nebel_ray *ray, const double unit[3], nebel_air_shade *shade)
+static void shade(nebel_cloud_workspace *workspace, const nebel_ray *ray, const double unit[3], nebel_air_shadow *shade)
 {
     nb_under under;
     int is_shaded = 0;
@@ -113,13 +113,13 @@ static void shade(nebel_cloud_workspace *workspace, const nebel_ray *ray, const 
     const double begin = under.begin, far = under.end, scale = under.scale;
     double t = begin;
     shade->t[0] = (float)begin;
-    for (int i = 0; i < NEBEL_MAX_AIR_SHADES && t < far; i++) {
-        const double next = i < NEBEL_MAX_AIR_SHADES - 1 ? fmin(far, begin + ends[i] * scale) : far;
+    for (int i = 0; i < NEBEL_MAX_AIR_SHADOW_SEGMENTS && t < far; i++) {
+        const double next = i < NEBEL_MAX_AIR_SHADOW_SEGMENTS - 1 ? fmin(far, begin + ends[i] * scale) : far;
         const double width = fmax(LEAST_WIDTH * scale, fmax(WIDTH_PART * (next - t), FAR_PART * t));
         double place[3];
         find_middle(&under, t, next, place);
-        find_parts(workspace, place, (float)width, shade->part[i]);
-        for (int c = 0; c < 3; c++) is_shaded |= shade->part[i][c] < 1;
+        find_parts(workspace, place, (float)width, shade->transmittance[i]);
+        for (int c = 0; c < 3; c++) is_shaded |= shade->transmittance[i][c] < 1;
         shade->t[i + 1] = (float)next;
         shade->count++;
         t = next;
@@ -127,8 +127,8 @@ static void shade(nebel_cloud_workspace *workspace, const nebel_ray *ray, const 
     if (!is_shaded) shade->count = 0;
 }
 
-nebel_result nebel_shade_air(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
-                             nebel_air_shade *shades, size_t shade_stride)
+nebel_result nebel_trace_cloud_shadow_on_air(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays,
+                                             size_t ray_stride, nebel_air_shadow *shades, size_t shade_stride)
 {
     if (workspace == NULL || (n > 0 && (rays == NULL || shades == NULL))) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
@@ -141,12 +141,12 @@ nebel_result nebel_shade_air(nebel_cloud_workspace *workspace, size_t n, const n
 }
 
 /* Below clouds their shadow is that of the place where the way to the sun enters them. */
-nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
-                                size_t place_stride, float *parts)
+nebel_result nebel_compute_cloud_sun_transmittance(nebel_cloud_workspace *workspace, double width, size_t n,
+                                                   const double (*places)[3], size_t place_stride, float *parts)
 {
     if (workspace == NULL || (n > 0 && (places == NULL || parts == NULL)) || !(width >= 0 && width <= NEBEL_MAX_LENGTH))
         return NEBEL_ERROR_ARGUMENT;
-    const nebel_cloud_view *view = workspace->view;
+    const nebel_cloud_lighting *view = workspace->view;
     const nebel_clouds *clouds = view->clouds;
     const double *sun = view->sun.direction, least = fmax(width, 1e-3 * (view->high - view->low));
     for (size_t i = 0; i < n; i++) {
@@ -164,8 +164,8 @@ nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, 
     return NEBEL_OK;
 }
 
-nebel_result nebel_shade_sky(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
-                             size_t place_stride, float *parts)
+nebel_result nebel_compute_cloud_sky_transmittance(nebel_cloud_workspace *workspace, double width, size_t n,
+                                                   const double (*places)[3], size_t place_stride, float *parts)
 {
     if (workspace == NULL || (n > 0 && (places == NULL || parts == NULL)) || !(width >= 0 && width <= NEBEL_MAX_LENGTH))
         return NEBEL_ERROR_ARGUMENT;
@@ -192,7 +192,7 @@ nebel_result nebel_shade_sky(nebel_cloud_workspace *workspace, double width, siz
 
 /* Over piece i. */
 static void shade_piece(nebel_cloud_workspace *workspace, const double place[3], float width, int i,
-                        nebel_fog_shade *shade)
+                        nebel_fog_shadow *shade)
 {
     const double radius = nb_vector_length(place);
     const int k = layer_over(workspace->view->clouds, radius);
@@ -201,13 +201,13 @@ static void shade_piece(nebel_cloud_workspace *workspace, const double place[3],
         roof = roof_over(workspace, k, place, radius, width);
         wide = roof_over(workspace, k, place, radius, 2 * width);
     }
-    shade->sun[i] = roof.sun;
-    shade->sky[i] = roof.up;
+    shade->sun_transmittance[i] = roof.sun;
+    shade->sky_transmittance[i] = roof.up;
     shade->error[i] = nb_larger(fabsf(wide.sun - roof.sun), fabsf(wide.up - roof.up));
 }
 
-nebel_result nebel_shade_fog(nebel_cloud_workspace *workspace, const nebel_ray *ray, double begin, double spread,
-                             nebel_fog_shade *shade)
+nebel_result nebel_trace_cloud_shadow_on_fog(nebel_cloud_workspace *workspace, const nebel_ray *ray, double begin,
+                                             double spread, nebel_fog_shadow *shade)
 {
     nb_under under;
     double unit[3];
@@ -220,14 +220,14 @@ nebel_result nebel_shade_fog(nebel_cloud_workspace *workspace, const nebel_ray *
     const double first = fmax(begin, under.begin), scale = under.scale;
     double t = first;
     shade->t[0] = (float)first;
-    for (int i = 0; i < NEBEL_MAX_FOG_SHADES && t < under.end; i++) {
+    for (int i = 0; i < NEBEL_MAX_FOG_SHADOW_SEGMENTS && t < under.end; i++) {
         const double length = FIRST_PIECE * scale + PIECE_GROWTH * fmax(0, fmin(t - first, under.end - t));
-        const double next = i < NEBEL_MAX_FOG_SHADES - 1 ? fmin(under.end, t + length) : under.end;
+        const double next = i < NEBEL_MAX_FOG_SHADOW_SEGMENTS - 1 ? fmin(under.end, t + length) : under.end;
         const double width = fmax(LEAST_WIDTH * scale, fmax(WIDTH_PART * (next - t), spread * t));
         double place[3];
         find_middle(&under, t, next, place);
         shade_piece(workspace, place, (float)width, i, shade);
-        is_shaded |= shade->sun[i] < 1 || shade->sky[i] < 1 || shade->error[i] > 0;
+        is_shaded |= shade->sun_transmittance[i] < 1 || shade->sky_transmittance[i] < 1 || shade->error[i] > 0;
         shade->t[i + 1] = (float)next;
         shade->count++;
         t = next;

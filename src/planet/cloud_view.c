@@ -5,7 +5,7 @@
 #include <math.h>
 
 /* What a view needs that is not in the description as it is. */
-static nebel_result check(const nebel_cloud_view_desc *desc, nebel_sun *sun, const nb_cloud_kernel **kernel)
+static nebel_result check(const nebel_cloud_lighting_desc *desc, nebel_sun *sun, const nb_cloud_kernel **kernel)
 {
     if (desc->clouds == NULL)
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "clouds: view: clouds: is NULL; make some first");
@@ -24,7 +24,7 @@ static nebel_result check(const nebel_cloud_view_desc *desc, nebel_sun *sun, con
 }
 
 /* Where layers are at a time, and how low the sun is at most where light is asked for. */
-static void set_layers(nebel_cloud_view *view, double time)
+static void set_layers(nebel_cloud_lighting *view, double time)
 {
     const nebel_clouds *clouds = view->clouds;
     const double ground = clouds->atmosphere->airs.radius;
@@ -40,7 +40,7 @@ static void set_layers(nebel_cloud_view *view, double time)
     view->lowest_sun = -1.05 * sqrt((1 - ratio) * (1 + ratio)) - 0.2;
 }
 
-nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cloud_view **view)
+nebel_result nebel_create_cloud_lighting(const nebel_cloud_lighting_desc *desc, nebel_cloud_lighting **view)
 {
     nebel_sun sun;
     const nb_cloud_kernel *kernel;
@@ -50,7 +50,7 @@ nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cl
     nebel_result result = check(desc, &sun, &kernel);
     if (result != NEBEL_OK) return result;
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
-    nebel_cloud_view *made = nb_allocate_zero(&allocator, 1, sizeof *made);
+    nebel_cloud_lighting *made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
     made->allocator = allocator;
     made->log = desc->log;
@@ -64,11 +64,11 @@ nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cl
         *view = made;
         return NEBEL_OK;
     }
-    nebel_destroy_cloud_view(made);
+    nebel_destroy_cloud_lighting(made);
     return nb_fail(&desc->log, result, "clouds: out of memory");
 }
 
-void nebel_destroy_cloud_view(nebel_cloud_view *view)
+void nebel_destroy_cloud_lighting(nebel_cloud_lighting *view)
 {
     if (view == NULL) return;
     const nebel_allocator allocator = view->allocator;
@@ -76,7 +76,7 @@ void nebel_destroy_cloud_view(nebel_cloud_view *view)
     nb_release(&allocator, view);
 }
 
-nebel_result nebel_create_cloud_workspace(const nebel_cloud_view *view, nebel_cloud_workspace **workspace)
+nebel_result nebel_create_cloud_workspace(const nebel_cloud_lighting *view, nebel_cloud_workspace **workspace)
 {
     if (workspace == NULL) return NEBEL_ERROR_ARGUMENT;
     *workspace = NULL;

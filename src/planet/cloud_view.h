@@ -24,7 +24,7 @@ typedef struct nb_cloud_light {
     nb_four sun, above, below;
 } nb_cloud_light;
 
-struct nebel_cloud_view {
+struct nebel_cloud_lighting {
     nebel_allocator allocator;
     nebel_log log;
     const nebel_clouds *clouds;
@@ -132,7 +132,7 @@ typedef struct nb_cloud_crowd {
 } nb_cloud_crowd;
 
 struct nebel_cloud_workspace {
-    const nebel_cloud_view *view;
+    const nebel_cloud_lighting *view;
     nb_cloud_lattice lattices[NB_CLOUD_WAYS]; /* nb_cloud_ways; those of layers that are */
     nb_cloud_point *points;
     nb_cloud_patch *patches;
@@ -165,10 +165,10 @@ double nb_cloud_way_in_block(const nebel_cloud_workspace *workspace, nb_cloud_ou
 /* Whether the rank of any column there is above `least`, with all that a width hides. */
 int nb_cloud_is_block_above(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, float least);
 
-nebel_result nb_cloud_light_make(nebel_cloud_view *view);
+nebel_result nb_cloud_light_make(nebel_cloud_lighting *view);
 
 /* Light of clear air at a place from the centre. */
-nb_cloud_light nb_cloud_clear_light(const nebel_cloud_view *view, const double place[3], double radius);
+nb_cloud_light nb_cloud_clear_light(const nebel_cloud_lighting *view, const double place[3], double radius);
 
 /* All along a way; the first step is so long, and what is narrower than a width is seen as a mean. is_alone: of a place that has
  * no neighbours. */
@@ -212,7 +212,7 @@ float nb_cloud_part_through(const nb_cloud_layer *layer, float depth, double sun
 
 /* Nodes of lattices are as far apart as a layer takes to become dense from its ends on, and depths that are linear between them
  * are too deep there by far: no cloud up or down is denser than its layer's. Only where no other layer lies that way. */
-nb_cloud_depths nb_cloud_bound_depths(const nebel_cloud_view *view, int layer, double radius,
+nb_cloud_depths nb_cloud_bound_depths(const nebel_cloud_lighting *view, int layer, double radius,
                                       const nb_cloud_depths *depths);
 
 nb_cloud_parts nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths,
@@ -241,7 +241,7 @@ typedef struct nb_cloud_ray {
 } nb_cloud_ray;
 
 /* Of a pixel, so wide at a distance of 1. */
-nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3], double spread);
+nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_lighting *view, const double direction[3], double spread);
 
 nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_parts *parts,
                                    const nb_cloud_light *light);

@@ -117,7 +117,7 @@ typedef enum nb_wait { NB_WAIT_NOTHING, NB_WAIT_ENTRY, NB_WAIT_STEP, NB_WAIT_PIE
 typedef struct nb_party nb_party;
 
 typedef struct nb_walk {
-    const nebel_cloud_view *view;
+    const nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
     nb_party *party;
     double from[3], unit[3], spread; /* from the planet's centre */
@@ -146,7 +146,7 @@ typedef struct nb_walk {
     double missed;
     nb_stretch stretch;
     nb_cloud_tally tally;
-    nebel_cloud_knots *knots;
+    nebel_cloud_transfer *knots;
 } nb_walk;
 
 static double radius_at(const nb_walk *walk, double t, double place[3])
@@ -636,7 +636,7 @@ static double through_all(nb_walk *walk)
                  seen = visibly > 0 ? tally->left * visibly / tally->left_apart : 0;
     double end[3], pieces[2][2];
     if (!(walk->ray.ahead > 0 && seen > 0 && walk->t_max < HUGE_VAL)) return seen;
-    const nebel_cloud_view *view = walk->view;
+    const nebel_cloud_lighting *view = walk->view;
     (void)radius_at(walk, walk->t_max, end);
     if (nb_cloud_pieces(view->low, view->high, end, view->sun.direction, HUGE_VAL, pieces) == 0) return seen;
     for (int c = 0; c < 3; c++) end[c] += pieces[0][0] * view->sun.direction[c];
@@ -645,7 +645,7 @@ static double through_all(nb_walk *walk)
 }
 
 static void begin(nebel_cloud_workspace *workspace, nb_party *party, const nebel_ray *ray, const double unit[3],
-                  double spread, nebel_cloud_knots *knots, nb_walk *walk)
+                  double spread, nebel_cloud_transfer *knots, nb_walk *walk)
 {
     const nebel_atmosphere *atmosphere = workspace->view->clouds->atmosphere;
     *walk = (nb_walk){.view = workspace->view,
@@ -676,7 +676,7 @@ typedef struct nb_rays {
     size_t n, next;
     const nebel_ray *rays;
     const double *spreads;
-    nebel_cloud_knots *knots;
+    nebel_cloud_transfer *knots;
     size_t ray_stride, spread_stride, knot_stride;
 } nb_rays;
 
@@ -745,7 +745,7 @@ static void attend(nb_rays *rays, nb_walk *walk, nb_party *party)
     }
     nb_cloud_tally_end(&walk->tally, through_all(walk), walk->knots);
     walk->knots->error = (float)walk->missed;
-    walk->knots->looks = walk->looks;
+    walk->knots->density_queries = walk->looks;
     if (rays->next < rays->n) begin_next(rays, walk, party);
 }
 
@@ -778,7 +778,7 @@ static void trace(nb_rays *rays)
 /* ---- the face -------------------------------------------------------------------------------- */
 
 nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
-                                const double *spreads, size_t spread_stride, nebel_cloud_knots *knots,
+                                const double *spreads, size_t spread_stride, nebel_cloud_transfer *knots,
                                 size_t knot_stride)
 {
     nb_rays all = {.workspace = workspace,

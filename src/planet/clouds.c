@@ -198,7 +198,7 @@ void nb_cloud_find_means(const nebel_clouds *clouds, int layer, nb_cloud_looks *
 static const struct {
     double base, top, coverage, extinction, size, detail, variation, diameter;
     float softness;
-} kinds[NEBEL_CLOUD_KIND_COUNT] = {
+} kinds[NEBEL_CLOUD_TYPE_COUNT] = {
     [NEBEL_CLOUD_CUMULUS] = {900, 2700, 0.4, 0.05, 2200, 0.8, 0.3, 20, 0.07f},
     [NEBEL_CLOUD_STRATUS] = {300, 800, 0.85, 0.03, 2600, 0.35, 0.2, 14, 0.5f},
     [NEBEL_CLOUD_CIRRUS] = {8000, 9500, 0.5, 4e-4, 6000, 0.9, 0.4, 40, 1.2f},
@@ -212,17 +212,17 @@ static void set_default(double *number, double value)
 /* In little air heaps are as small as it is, or as the layer is that was asked for. */
 static nebel_cloud_layer resolve(double thickness, const nebel_cloud_layer *desc)
 {
-    const double scale = fmin(1, thickness / 1e5), depth = kinds[desc->kind].top - kinds[desc->kind].base;
+    const double scale = fmin(1, thickness / 1e5), depth = kinds[desc->type].top - kinds[desc->type].base;
     nebel_cloud_layer whole = *desc;
-    set_default(&whole.base, scale * kinds[desc->kind].base);
+    set_default(&whole.base, scale * kinds[desc->type].base);
     set_default(&whole.top, whole.base + scale * depth);
     const double wide = fmin(1, fmax(scale, (whole.top - whole.base) / depth));
-    set_default(&whole.coverage, kinds[desc->kind].coverage);
-    set_default(&whole.extinction, fmin(NEBEL_MAX_AIR_EXTINCTION, kinds[desc->kind].extinction / wide));
-    set_default(&whole.size, wide * kinds[desc->kind].size);
-    set_default(&whole.detail, kinds[desc->kind].detail);
-    set_default(&whole.variation, kinds[desc->kind].variation);
-    set_default(&whole.diameter, kinds[desc->kind].diameter);
+    set_default(&whole.coverage, kinds[desc->type].coverage);
+    set_default(&whole.extinction, fmin(NEBEL_MAX_COMPONENT_EXTINCTION, kinds[desc->type].extinction / wide));
+    set_default(&whole.cell_size, wide * kinds[desc->type].size);
+    set_default(&whole.erosion, kinds[desc->type].detail);
+    set_default(&whole.patchiness, kinds[desc->type].variation);
+    set_default(&whole.droplet_diameter, kinds[desc->type].diameter);
     return whole;
 }
 
@@ -257,12 +257,12 @@ static nebel_result check_heights(double thickness, const nebel_cloud_layer *giv
     if (!(top <= thickness))
         return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: top: is %.8g m%s; must be within the air, %.8g m", top,
                        of_top, thickness);
-    if (!(top - base >= thickness / NEBEL_MAX_CLOUD_RATIO))
+    if (!(top - base >= thickness / NEBEL_MAX_CLOUD_THICKNESS_RATIO))
         return nb_fail(
             log, NEBEL_ERROR_VALUE,
             "cloud layer: top: is %.8g m%s; must be at least %g m (a millionth of the air's thickness) above the base, "
             "%.8g m%s",
-            top, of_top, thickness / NEBEL_MAX_CLOUD_RATIO, base, of_base);
+            top, of_top, thickness / NEBEL_MAX_CLOUD_THICKNESS_RATIO, base, of_base);
     return NEBEL_OK;
 }
 
@@ -271,17 +271,17 @@ static nebel_result check_looks(const nebel_cloud_layer *layer, const nebel_log 
     static const char part[] = "within 0 and 1, or none (-1)";
     if (!(layer->coverage > 0 && layer->coverage <= 1))
         return refuse(log, "coverage", layer->coverage, "", "within 0 and 1 (0: the number of its kind)");
-    if (!(layer->extinction > 0 && layer->extinction <= NEBEL_MAX_AIR_EXTINCTION))
+    if (!(layer->extinction > 0 && layer->extinction <= NEBEL_MAX_COMPONENT_EXTINCTION))
         return refuse(log, "extinction", layer->extinction, " per m", "within 0 and 1e3 (0: the number of its kind)");
-    if (!(layer->size >= 1e-3 && layer->size <= 1e9))
-        return refuse(log, "size", layer->size, " m", "within 1e-3 and 1e9");
-    if (!is_part(layer->detail)) return refuse(log, "detail", layer->detail, "", part);
-    if (!is_part(layer->variation)) return refuse(log, "variation", layer->variation, "", part);
-    if (!(layer->diameter >= 4 && layer->diameter <= NEBEL_MAX_DROPLET))
-        return refuse(log, "diameter", layer->diameter, " um", "within 4 and 50");
+    if (!(layer->cell_size >= 1e-3 && layer->cell_size <= 1e9))
+        return refuse(log, "size", layer->cell_size, " m", "within 1e-3 and 1e9");
+    if (!is_part(layer->erosion)) return refuse(log, "detail", layer->erosion, "", part);
+    if (!is_part(layer->patchiness)) return refuse(log, "variation", layer->patchiness, "", part);
+    if (!(layer->droplet_diameter >= 4 && layer->droplet_diameter <= NEBEL_MAX_DROPLET_DIAMETER))
+        return refuse(log, "diameter", layer->droplet_diameter, " um", "within 4 and 50");
     for (int i = 0; i < 2; i++)
         if (!(fabs(layer->wind[i]) <= 1e12)) return refuse(log, "wind", layer->wind[i], " m", "within -1e12 and 1e12");
-    const char *fault = nb_map_fault(&layer->weather, 1);
+    const char *fault = nb_map_fault(&layer->weather_map, 1);
     return fault == NULL ? NEBEL_OK : nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: weather: %s", fault);
 }
 
@@ -289,7 +289,7 @@ nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer
                                        nebel_cloud_layer *resolved)
 {
     if (desc == NULL || resolved == NULL || !(thickness > 0)) return NEBEL_ERROR_ARGUMENT;
-    if ((int)desc->kind < 0 || desc->kind >= NEBEL_CLOUD_KIND_COUNT)
+    if ((int)desc->type < 0 || desc->type >= NEBEL_CLOUD_TYPE_COUNT)
         return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: kind: is unknown");
     const nebel_cloud_layer whole = resolve(thickness, desc);
     nebel_result result = check_heights(thickness, desc, &whole, log);
@@ -316,8 +316,8 @@ static void turn_further(const double last[3][3], double next[3][3])
 static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_layer *layer)
 {
     static const double weights[NB_CLOUD_OCTAVES] = {1, 1, 1, 0.45, 0.14};
-    const double cells[NB_CLOUD_OCTAVES] = {fmax(radius / 5, 60 * desc->size), 9.7 * desc->size, desc->size,
-                                            desc->size / 2.1, desc->size / 4.3};
+    const double cells[NB_CLOUD_OCTAVES] = {fmax(radius / 5, 60 * desc->cell_size), 9.7 * desc->cell_size,
+                                            desc->cell_size, desc->cell_size / 2.1, desc->cell_size / 4.3};
     double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     uint32_t hash = nb_mix_bits(desc->seed + 1);
     layer->slope = layer->most = 0;
@@ -327,7 +327,7 @@ static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_l
         turn_further((const double(*)[3])axes, next);
         memcpy(axes, next, sizeof axes);
         octave->cell = (float)cells[k];
-        octave->weight = (float)(weights[k] * (k < 2 ? fmax(0, desc->variation) : 1));
+        octave->weight = (float)(weights[k] * (k < 2 ? fmax(0, desc->patchiness) : 1));
         for (int i = 0; i < 3; i++) {
             for (int j = 0; j < 3; j++) octave->turn[i][j] = axes[i][j] / cells[k];
             hash = nb_mix_bits(hash + 1);
@@ -337,10 +337,11 @@ static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_l
         layer->most += octave->weight; /* noise is within -1 and 1 */
     }
     for (int i = 0; i < 3; i++) layer->billow_shift[i] = (double)nb_mix_bits(hash + (uint32_t)i) * 0x1p-32;
-    double period = 0.9 * desc->size;
+    double period = 0.9 * desc->cell_size;
     for (int i = 0; i < NB_CLOUD_BILLOWS; i++, period /= (double)NB_BILLOW_RATIO) {
         layer->per_billow[i] = 1 / period;
-        layer->billow_slopes[i] = nb_billow_weights[i] * (float)fmax(0, desc->detail) * NB_BILLOW_SLOPE / (float)period;
+        layer->billow_slopes[i] =
+            nb_billow_weights[i] * (float)fmax(0, desc->erosion) * NB_BILLOW_SLOPE / (float)period;
     }
     layer->last_billow = NB_BILLOW_SIZE * (float)layer->per_billow[NB_CLOUD_BILLOWS - 1];
     layer->grid = layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 12;
@@ -349,7 +350,7 @@ static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_l
         layer->grids[i] = (nb_cloud_grid){wide / layer->low, layer->low / wide, i == 0 ? 0 : (float)wide};
     }
     /* Wisps are bent, and that noise has a slope, too. */
-    if (desc->kind == NEBEL_CLOUD_CIRRUS) layer->slope *= 2;
+    if (desc->type == NEBEL_CLOUD_CIRRUS) layer->slope *= 2;
 }
 
 static void sort(float *values, int count)
@@ -384,30 +385,30 @@ static void set_ranks(const nb_cloud_noise *noise, nb_cloud_layer *layer)
 static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *desc, nb_cloud_layer *layer)
 {
     const double radius = clouds->atmosphere->airs.radius, speed = hypot(desc->wind[0], desc->wind[1]);
-    layer->kind = desc->kind;
+    layer->kind = desc->type;
     layer->low = radius + desc->base;
     layer->high = radius + desc->top;
     layer->per_thickness = (float)(1 / (desc->top - desc->base));
     layer->extinction = (float)desc->extinction;
-    layer->detail = (float)fmax(0, desc->detail);
-    layer->softness = kinds[desc->kind].softness;
+    layer->detail = (float)fmax(0, desc->erosion);
+    layer->softness = kinds[desc->type].softness;
     layer->coverage = (float)desc->coverage;
     /* Up cross the wind: by that axis the ground place over the centre moves with it. */
     layer->axis[0] = speed > 0 ? desc->wind[1] / speed : 1;
     layer->axis[2] = speed > 0 ? -desc->wind[0] / speed : 0;
     layer->per_time = speed / layer->low;
-    nb_cloud_phase_make(desc->kind, desc->diameter, &layer->phase);
+    nb_cloud_phase_make(desc->type, desc->droplet_diameter, &layer->phase);
     layer->slab = nb_slab_make(&clouds->allocator, &layer->phase);
     if (layer->slab == NULL) return NEBEL_ERROR_MEMORY;
     layer->apart = layer->slab->apart;
     layer->shallow = LEAST_SHALLOW + SHALLOW_PART * layer->extinction / layer->per_thickness;
-    layer->size = (float)desc->size;
-    layer->hidden_height = hidden_heights[desc->kind != NEBEL_CLOUD_CUMULUS] / layer->per_thickness;
-    layer->hidden_width = hidden_widths[desc->kind != NEBEL_CLOUD_CUMULUS] * (float)desc->size;
+    layer->size = (float)desc->cell_size;
+    layer->hidden_height = hidden_heights[desc->type != NEBEL_CLOUD_CUMULUS] / layer->per_thickness;
+    layer->hidden_width = hidden_widths[desc->type != NEBEL_CLOUD_CUMULUS] * (float)desc->cell_size;
     set_octaves(desc, radius, layer);
     set_ranks(&clouds->noise, layer);
-    return desc->weather.texels != NULL ? nb_layer_map_make(&clouds->allocator, &desc->weather, &layer->weather)
-                                        : NEBEL_OK;
+    return desc->weather_map.texels != NULL ? nb_layer_map_make(&clouds->allocator, &desc->weather_map, &layer->weather)
+                                            : NEBEL_OK;
 }
 
 static int overlap(const nebel_cloud_layer *a, const nebel_cloud_layer *b)
@@ -429,10 +430,10 @@ static nebel_result check(const nebel_clouds_desc *desc, nebel_cloud_layer *laye
             nebel_resolve_cloud_layer(airs->top - airs->radius, &desc->layers[i], &desc->log, &layers[i]);
         if (result != NEBEL_OK) return result;
         /* Larger ones do not change over the planet but by what is left of rounding. */
-        if (layers[i].size > NEBEL_MAX_CLOUD_RADII * airs->radius)
+        if (layers[i].cell_size > NEBEL_MAX_CLOUD_CELL_RADII * airs->radius)
             return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
-                           "clouds: layers[%u] size: is %g; must be at most %g (4 radii)", (unsigned)i, layers[i].size,
-                           NEBEL_MAX_CLOUD_RADII * airs->radius);
+                           "clouds: layers[%u] size: is %g; must be at most %g (4 radii)", (unsigned)i,
+                           layers[i].cell_size, NEBEL_MAX_CLOUD_CELL_RADII * airs->radius);
         for (uint32_t k = 0; k < i; k++)
             if (overlap(&layers[k], &layers[i]))
                 return nb_fail(
@@ -502,8 +503,8 @@ static void add_layer(const nebel_clouds *clouds, int k, double time, float widt
     }
 }
 
-nebel_result nebel_cloud_extinction(const nebel_clouds *clouds, double time, double width, size_t n,
-                                    const double (*places)[3], size_t place_stride, float *extinction)
+nebel_result nebel_compute_cloud_extinction(const nebel_clouds *clouds, double time, double width, size_t n,
+                                            const double (*places)[3], size_t place_stride, float *extinction)
 {
     if (clouds == NULL || (n > 0 && (places == NULL || extinction == NULL)) || !(fabs(time) <= 1e12) ||
         !(width >= 0 && width <= NEBEL_MAX_LENGTH))

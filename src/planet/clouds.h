@@ -36,7 +36,7 @@ typedef struct nb_cloud_grid {
 } nb_cloud_grid;
 
 typedef struct nb_cloud_layer {
-    nebel_cloud_kind kind;
+    nebel_cloud_type kind;
     double low, high;    /* m from the planet's centre */
     float per_thickness; /* 1/m */
     float extinction, detail, softness;
@@ -90,7 +90,7 @@ nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_l
 /* ---- shapes ---------------------------------------------------------------------------------- */
 
 /* Sheets are thickest in the middle of their height. */
-static inline float nb_cloud_sheet_bulge(nebel_cloud_kind kind)
+static inline float nb_cloud_sheet_bulge(nebel_cloud_type kind)
 {
     return kind == NEBEL_CLOUD_STRATUS ? 0.5f : 0.7f;
 }
@@ -98,7 +98,7 @@ static inline float nb_cloud_sheet_bulge(nebel_cloud_kind kind)
 /* Clouds are thin at both ends of a layer: extinction is 3 x^2 - 2 x^3 of it, or less, where the part of the layer's height to that
  * end, times so much, is x below 1. */
 #define NB_CLOUD_TOP_THINS 10.0f
-static inline float nb_cloud_base_thins(nebel_cloud_kind kind)
+static inline float nb_cloud_base_thins(nebel_cloud_type kind)
 {
     return kind == NEBEL_CLOUD_CUMULUS ? 16.0f : 6.0f;
 }
@@ -106,7 +106,7 @@ static inline float nb_cloud_base_thins(nebel_cloud_kind kind)
 /* Where rank is less there is no cloud at a part of the layer's height; a width is counted by the column's variance. Heaps are domes:
  * where their rank falls as a parabola from the middle, its root is a half ball. */
 #define NB_CLOUD_RANK_SLOPE 2.8f /* of it over height, at most */
-static inline float nb_cloud_least_rank(nebel_cloud_kind kind, float height)
+static inline float nb_cloud_least_rank(nebel_cloud_type kind, float height)
 {
     const float from_middle = 2 * height - 1;
     if (kind == NEBEL_CLOUD_CUMULUS) return height * height;

@@ -106,7 +106,7 @@ static inline nb_mask nb_tracks_are_dark(const nb_airs *airs, nb_tracks track)
 
 /* What rays to the sun meet of each kind of air. Returns the mask of those in the shadow of the planet. A ray that goes down first
  * goes up from its lowest place on both sides. */
-static inline nb_mask nb_tracks_meet(const nb_airs *airs, nb_tracks track, nb_real met[NEBEL_MAX_AIRS])
+static inline nb_mask nb_tracks_meet(const nb_airs *airs, nb_tracks track, nb_real met[NEBEL_MAX_COMPONENTS])
 {
     const nb_mask dark = nb_tracks_are_dark(airs, track), falls = track.rise < NB_F(0.0);
     for (int i = 0; i < airs->count; i++) met[i] = NB_F(0.0);
@@ -122,7 +122,7 @@ static inline nb_mask nb_tracks_meet(const nb_airs *airs, nb_tracks track, nb_re
 /* What air leaves of the sun's light: 0 in the shadow of the planet. */
 static inline void nb_tracks_sunlight(const nb_airs *airs, nb_tracks track, nb_real light[3])
 {
-    nb_real met[NEBEL_MAX_AIRS];
+    nb_real met[NEBEL_MAX_COMPONENTS];
     const nb_mask dark = nb_tracks_meet(airs, track, met);
     for (int c = 0; c < 3; c++) light[c] = nb_select(dark, NB_F(0.0), nb_exp(-nb_depth_of(airs, met, c)));
 }

@@ -25,8 +25,8 @@ typedef struct nb_gather_job {
     const nb_scatter *scatter; /* NULL: sunlight alone */
     int wants_sun;
     nb_track track;
-    nb_aspect aspect;            /* of the ray's direction, where it starts */
-    double rest[NEBEL_MAX_AIRS]; /* by nb_gather_aim, else 0: nothing is missing */
+    nb_aspect aspect;                  /* of the ray's direction, where it starts */
+    double rest[NEBEL_MAX_COMPONENTS]; /* by nb_gather_aim, else 0: nothing is missing */
     const nb_path *path;
     int first, count; /* nodes; first: a multiple of NB_PATH_LANES */
 } nb_gather_job;

@@ -58,7 +58,7 @@ typedef struct nb_scattered {
 static void add_sun(const nb_gather_job *job, const nb_nodes *nodes, nb_node_light *light)
 {
     const int to = nodes->at - job->first;
-    nb_real met[NEBEL_MAX_AIRS];
+    nb_real met[NEBEL_MAX_COMPONENTS];
     const nb_mask dark = nb_tracks_meet(job->airs, (nb_tracks){nodes->radius, nodes->radius * nodes->sun}, met);
     for (int c = 0; c < 3; c++) {
         const nb_real sun = nb_select(dark, NB_F(0.0), nb_exp(-nb_depth_of(job->airs, met, c)));

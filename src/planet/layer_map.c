@@ -9,10 +9,11 @@
 #include "formulas/elementary.inc"
 #include "formulas/layers.inc"
 
-const char *nb_map_fault(const nebel_map *map, int channels)
+const char *nb_map_fault(const nebel_planet_map *map, int channels)
 {
     if (map->texels == NULL) return map->width > 0 || map->height > 0 ? "has a size, but no texels" : NULL;
-    if (map->width < 1 || map->width > NEBEL_MAX_MAP_SIZE || map->height < 1 || map->height > NEBEL_MAX_MAP_SIZE)
+    if (map->width < 1 || map->width > NEBEL_MAX_PLANET_MAP_SIZE || map->height < 1 ||
+        map->height > NEBEL_MAX_PLANET_MAP_SIZE)
         return "must have 1 to 16384 rows and columns";
     if (map->channels != channels) return channels == 1 ? "must have 1 channel" : "must have 3 channels";
     for (size_t i = 0; i < map->width * map->height * (size_t)channels; i++)
@@ -71,7 +72,7 @@ static size_t count_texels(const nb_layer_map *map, int level)
 }
 
 /* Sizes of all levels; their texels in all. */
-static size_t set_sizes(const nebel_map *desc, nb_layer_map *map)
+static size_t set_sizes(const nebel_planet_map *desc, nb_layer_map *map)
 {
     map->channels = desc->channels;
     map->width[0] = desc->width;
@@ -87,7 +88,7 @@ static size_t set_sizes(const nebel_map *desc, nb_layer_map *map)
     return all;
 }
 
-nebel_result nb_layer_map_make(const nebel_allocator *allocator, const nebel_map *desc, nb_layer_map *map)
+nebel_result nb_layer_map_make(const nebel_allocator *allocator, const nebel_planet_map *desc, nb_layer_map *map)
 {
     const size_t all = set_sizes(desc, map);
     float *texels = nb_allocate(allocator, all, sizeof *texels);
@@ -109,9 +110,9 @@ void nb_layer_map_free(const nebel_allocator *allocator, nb_layer_map *map)
     *map = (nb_layer_map){.channels = 0};
 }
 
-nebel_map nb_layer_map_level(const nb_layer_map *map, int level)
+nebel_planet_map nb_layer_map_level(const nb_layer_map *map, int level)
 {
-    return (nebel_map){map->width[level], map->height[level], map->channels, map->levels[level]};
+    return (nebel_planet_map){map->width[level], map->height[level], map->channels, map->levels[level]};
 }
 
 /* ---- reading --------------------------------------------------------------------------------- */

@@ -93,7 +93,7 @@ static void drift(uint32_t seed, double by, const double place[3], double out[3]
         out[i] = place[i] + by * sum_octaves(nb_mix_bits(seed ^ 0x51ed270bu) + 16 * (i + 1), place, 0, 4, 0.55);
 }
 
-static double paint_cloud(const nebel_map_desc *desc, const double unit[3])
+static double paint_cloud(const nebel_planet_map_desc *desc, const double unit[3])
 {
     double place[3], moved[3];
     /* flat whirls: bands along the latitudes are wider than high */
@@ -103,7 +103,7 @@ static double paint_cloud(const nebel_map_desc *desc, const double unit[3])
     return smooth(edge - 0.02, edge + 0.5, n);
 }
 
-static double paint_detail(const nebel_map_desc *desc, double u, double v)
+static double paint_detail(const nebel_planet_map_desc *desc, double u, double v)
 {
     enum { PERIOD = 12 }; /* twice as many cells across as down: around a ball it is twice as far */
     const double place[3] = {u * PERIOD, v * PERIOD / 2, 0.5};
@@ -117,7 +117,7 @@ static void mix(const double a[3], const double b[3], double share, double out[3
 }
 
 /* Seas by depth, land from forest over steppe to rock, ice about the poles and on heights. */
-static void paint_ground(const nebel_map_desc *desc, const double unit[3], double color[3])
+static void paint_ground(const nebel_planet_map_desc *desc, const double unit[3], double color[3])
 {
     static const double deep[3] = {0.010, 0.035, 0.11}, shelf[3] = {0.03, 0.13, 0.21}, forest[3] = {0.045, 0.09, 0.03},
                         steppe[3] = {0.33, 0.25, 0.13}, rock[3] = {0.23, 0.18, 0.14}, ice[3] = {0.85, 0.88, 0.92};
@@ -142,15 +142,15 @@ static void unit_at(double u, double v, double unit[3])
     unit[2] = cos(latitude) * sin(longitude);
 }
 
-static void paint(const nebel_map_desc *desc, double u, double v, double *color)
+static void paint(const nebel_planet_map_desc *desc, double u, double v, double *color)
 {
     double unit[3];
     unit_at(u, v, unit);
-    switch (desc->kind) {
-    case NEBEL_MAP_DETAIL:
+    switch (desc->type) {
+    case NEBEL_PLANET_MAP_DETAIL:
         color[0] = paint_detail(desc, u, v);
         break;
-    case NEBEL_MAP_GROUND:
+    case NEBEL_PLANET_MAP_GROUND:
         paint_ground(desc, unit, color);
         break;
     default:
@@ -161,43 +161,43 @@ static void paint(const nebel_map_desc *desc, double u, double v, double *color)
 
 /* ---- the face -------------------------------------------------------------------------------- */
 
-static nebel_map_desc resolve(const nebel_map_desc *desc)
+static nebel_planet_map_desc resolve(const nebel_planet_map_desc *desc)
 {
-    nebel_map_desc whole = *desc;
+    nebel_planet_map_desc whole = *desc;
     if (whole.height == 0) whole.height = 512;
     if (whole.width == 0) whole.width = 1024;
     if (whole.coverage == 0) whole.coverage = 0.5;
     return whole;
 }
 
-static const char *find_fault(const nebel_map_desc *desc)
+static const char *find_fault(const nebel_planet_map_desc *desc)
 {
-    if (!((int)desc->kind >= 0 && desc->kind < NEBEL_MAP_KIND_COUNT)) return "kind is unknown";
-    if (desc->width > NEBEL_MAX_MAP_SIZE || desc->height > NEBEL_MAX_MAP_SIZE)
+    if (!((int)desc->type >= 0 && desc->type < NEBEL_PLANET_MAP_TYPE_COUNT)) return "kind is unknown";
+    if (desc->width > NEBEL_MAX_PLANET_MAP_SIZE || desc->height > NEBEL_MAX_PLANET_MAP_SIZE)
         return "width and height: must be at most 16384";
     if (!(desc->coverage >= 0 && desc->coverage <= 1)) return "coverage: must be within 0 and 1";
     return NULL;
 }
 
-nebel_result nebel_size_map(const nebel_map_desc *desc, nebel_map *map)
+nebel_result nebel_get_planet_map_size(const nebel_planet_map_desc *desc, nebel_planet_map *map)
 {
     if (desc == NULL || map == NULL) return NEBEL_ERROR_ARGUMENT;
     const char *fault = find_fault(desc);
     if (fault != NULL) return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "map: %s", fault);
-    const nebel_map_desc whole = resolve(desc);
+    const nebel_planet_map_desc whole = resolve(desc);
     map->width = whole.width;
     map->height = whole.height;
-    map->channels = whole.kind == NEBEL_MAP_GROUND ? 3 : 1;
+    map->channels = whole.type == NEBEL_PLANET_MAP_GROUND ? 3 : 1;
     return NEBEL_OK;
 }
 
-nebel_result nebel_make_map(const nebel_map_desc *desc, float *texels)
+nebel_result nebel_generate_planet_map(const nebel_planet_map_desc *desc, float *texels)
 {
-    nebel_map map;
+    nebel_planet_map map;
     if (texels == NULL) return NEBEL_ERROR_ARGUMENT;
-    const nebel_result result = nebel_size_map(desc, &map);
+    const nebel_result result = nebel_get_planet_map_size(desc, &map);
     if (result != NEBEL_OK) return result;
-    const nebel_map_desc whole = resolve(desc);
+    const nebel_planet_map_desc whole = resolve(desc);
     for (size_t y = 0; y < map.height; y++) {
         for (size_t x = 0; x < map.width; x++) {
             double color[3];

@@ -19,9 +19,9 @@ typedef struct nb_shell {
     nb_layer_map map, detail; /* detail without levels: it is the map */
 } nb_shell;
 
-struct nebel_layers {
-    nebel_layers_desc desc; /* completed; its maps are the first levels of those here, its log is none */
-    double frame[3][3];     /* the planet's axes in the scene */
+struct nebel_textured_planet {
+    nebel_textured_planet_desc desc; /* completed; its maps are the first levels of those here, its log is none */
+    double frame[3][3];              /* the planet's axes in the scene */
     nb_layer_map ground;
     nb_shell shells[NEBEL_MAX_CLOUD_SHELLS];
 };
@@ -47,24 +47,24 @@ static void resolve_shell(double radius, uint32_t number, nebel_cloud_shell *she
     static const double white[3] = {1, 1, 1}, wrap[3] = {3, 7, 13};
     if (shell->height == 0) shell->height = radius * 0.01 * (number + 1);
     if (is_zero(shell->color, 3)) memcpy(shell->color, white, sizeof white);
-    if (is_zero(shell->wrap, 3)) memcpy(shell->wrap, wrap, sizeof wrap);
+    if (is_zero(shell->uv_tiling, 3)) memcpy(shell->uv_tiling, wrap, sizeof wrap);
     if (shell->gain == 0) shell->gain = 0.6;
     if (shell->seed == 0) shell->seed = number + 1;
 }
 
-static nebel_layers_desc resolve(const nebel_layers_desc *desc)
+static nebel_textured_planet_desc resolve(const nebel_textured_planet_desc *desc)
 {
     static const double blue[3] = {0.25, 0.5, 1};
-    nebel_layers_desc whole = *desc;
+    nebel_textured_planet_desc whole = *desc;
     if (whole.radius == 0) whole.radius = 6.36e6;
-    for (uint32_t i = 0; i < whole.cloud_count && i < NEBEL_MAX_CLOUD_SHELLS; i++)
-        resolve_shell(whole.radius, i, &whole.clouds[i]);
-    if (whole.air.height == 0) whole.air.height = whole.radius / 40;
-    if (whole.air.brightness == 0) whole.air.brightness = 1;
-    if (whole.air.ramp_count == 0) {
-        whole.air.ramp_count = 3;
-        memset(whole.air.ramp, 0, sizeof whole.air.ramp);
-        memcpy(whole.air.ramp[1], blue, sizeof blue);
+    for (uint32_t i = 0; i < whole.cloud_shell_count && i < NEBEL_MAX_CLOUD_SHELLS; i++)
+        resolve_shell(whole.radius, i, &whole.cloud_shells[i]);
+    if (whole.atmosphere.height == 0) whole.atmosphere.height = whole.radius / 40;
+    if (whole.atmosphere.brightness == 0) whole.atmosphere.brightness = 1;
+    if (whole.atmosphere.ramp_count == 0) {
+        whole.atmosphere.ramp_count = 3;
+        memset(whole.atmosphere.ramp, 0, sizeof whole.atmosphere.ramp);
+        memcpy(whole.atmosphere.ramp[1], blue, sizeof blue);
     }
     return whole;
 }
@@ -102,7 +102,7 @@ static nebel_result check_height(const subject *of, const char *what, double hei
                    height);
 }
 
-static nebel_result check_map(const subject *of, const char *what, const nebel_map *map, int channels)
+static nebel_result check_map(const subject *of, const char *what, const nebel_planet_map *map, int channels)
 {
     const char *fault = nb_map_fault(map, channels);
     return fault == NULL ? NEBEL_OK : refuse(of, what, fault);
@@ -110,105 +110,108 @@ static nebel_result check_map(const subject *of, const char *what, const nebel_m
 
 static nebel_result check_shell(const subject *of, const nebel_cloud_shell *shell)
 {
-    nebel_result result = check_map(of, "map", &shell->map, 1);
-    if (result == NEBEL_OK) result = check_map(of, "detail", &shell->detail, 1);
+    nebel_result result = check_map(of, "map", &shell->coverage_map, 1);
+    if (result == NEBEL_OK) result = check_map(of, "detail", &shell->detail_map, 1);
     if (result == NEBEL_OK) result = check_height(of, "height", shell->height);
-    if (result == NEBEL_OK) result = check_one(of, "day", shell->day, -1e12, 1e12);
+    if (result == NEBEL_OK) result = check_one(of, "day", shell->rotation_period, -1e12, 1e12);
     if (result == NEBEL_OK) result = check_all(of, "color", shell->color, 3, 0, 1);
-    if (result == NEBEL_OK) result = check_all(of, "wrap", shell->wrap, 3, -1e3, 1e3);
+    if (result == NEBEL_OK) result = check_all(of, "wrap", shell->uv_tiling, 3, -1e3, 1e3);
     if (result == NEBEL_OK) result = check_one(of, "gain", shell->gain, 0, 1e3);
     return result == NEBEL_OK ? check_one(of, "coverage", shell->coverage, 0, 1) : result;
 }
 
-static nebel_result check_air(const subject *of, const nebel_air_shell *air)
+static nebel_result check_air(const subject *of, const nebel_atmosphere_shell *air)
 {
     nebel_result result = check_height(of, "air.height", air->height);
     if (result == NEBEL_OK) result = check_one(of, "air.brightness", air->brightness, 0, 1e6);
-    if (result == NEBEL_OK && air->ramp_count > NEBEL_MAX_RAMP)
+    if (result == NEBEL_OK && air->ramp_count > NEBEL_MAX_RAMP_COLORS)
         result = refuse(of, "air.ramp_count", "must be at most 16");
     for (uint32_t i = 0; result == NEBEL_OK && i < air->ramp_count; i++)
         result = check_all(of, "air.ramp", air->ramp[i], 3, 0, 1e6);
     return result;
 }
 
-static nebel_result check_ball(const subject *of, const nebel_layers_desc *desc)
+static nebel_result check_ball(const subject *of, const nebel_textured_planet_desc *desc)
 {
     nebel_result result = check_all(of, "center", desc->center, 3, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH);
     if (result == NEBEL_OK) result = check_one(of, "radius", desc->radius, 1, 1e12);
     if (result == NEBEL_OK) result = check_all(of, "rotation", desc->rotation, 4, -1e6, 1e6);
-    if (result == NEBEL_OK) result = check_one(of, "day", desc->day, -1e12, 1e12);
-    if (result == NEBEL_OK) result = check_one(of, "coverage", desc->coverage, 0, 1);
-    if (result == NEBEL_OK && desc->cloud_count > NEBEL_MAX_CLOUD_SHELLS)
+    if (result == NEBEL_OK) result = check_one(of, "day", desc->rotation_period, -1e12, 1e12);
+    if (result == NEBEL_OK) result = check_one(of, "coverage", desc->land_coverage, 0, 1);
+    if (result == NEBEL_OK && desc->cloud_shell_count > NEBEL_MAX_CLOUD_SHELLS)
         result = refuse(of, "cloud_count", "must be at most 8");
-    return result == NEBEL_OK ? check_map(of, "ground", &desc->ground, 3) : result;
+    return result == NEBEL_OK ? check_map(of, "ground", &desc->color_map, 3) : result;
 }
 
-static nebel_result check(const nebel_layers_desc *desc)
+static nebel_result check(const nebel_textured_planet_desc *desc)
 {
     subject of = {&desc->log, ""};
     nebel_result result = check_ball(&of, desc);
-    if (result == NEBEL_OK && !desc->air.is_absent) result = check_air(&of, &desc->air);
-    for (uint32_t i = 0; result == NEBEL_OK && i < desc->cloud_count; i++) {
+    if (result == NEBEL_OK && !desc->atmosphere.is_disabled) result = check_air(&of, &desc->atmosphere);
+    for (uint32_t i = 0; result == NEBEL_OK && i < desc->cloud_shell_count; i++) {
         (void)snprintf(of.name, sizeof of.name, "clouds[%u]: ", (unsigned)i);
-        result = check_shell(&of, &desc->clouds[i]);
+        result = check_shell(&of, &desc->cloud_shells[i]);
     }
     return result;
 }
 
 /* ---- making ---------------------------------------------------------------------------------- */
 
-static nebel_result paint_map(const nebel_allocator *allocator, const nebel_map_desc *desc, nb_layer_map *map)
+static nebel_result paint_map(const nebel_allocator *allocator, const nebel_planet_map_desc *desc, nb_layer_map *map)
 {
-    nebel_map painted = {.width = 0};
-    nebel_result result = nebel_size_map(desc, &painted);
+    nebel_planet_map painted = {.width = 0};
+    nebel_result result = nebel_get_planet_map_size(desc, &painted);
     if (result != NEBEL_OK) return result;
     float *texels = nb_allocate(allocator, painted.width * painted.height, (size_t)painted.channels * sizeof *texels);
     if (texels == NULL) return NEBEL_ERROR_MEMORY;
-    result = nebel_make_map(desc, texels);
+    result = nebel_generate_planet_map(desc, texels);
     painted.texels = texels;
     if (result == NEBEL_OK) result = nb_layer_map_make(allocator, &painted, map);
     nb_release(allocator, texels);
     return result;
 }
 
-static nebel_result make_map(const nebel_allocator *allocator, const nebel_map *given, const nebel_map_desc *desc,
-                             nb_layer_map *map)
+static nebel_result make_map(const nebel_allocator *allocator, const nebel_planet_map *given,
+                             const nebel_planet_map_desc *desc, nb_layer_map *map)
 {
     return given->texels != NULL ? nb_layer_map_make(allocator, given, map) : paint_map(allocator, desc, map);
 }
 
 static nebel_result make_shell(const nebel_allocator *allocator, nebel_cloud_shell *desc, nb_shell *shell)
 {
-    const nebel_map_desc clouds = {.kind = NEBEL_MAP_CLOUDS, .seed = desc->seed, .coverage = desc->coverage};
-    const nebel_map_desc detail = {.kind = NEBEL_MAP_DETAIL, .seed = desc->seed, .coverage = desc->coverage};
-    const int is_one = desc->map.texels != NULL && desc->detail.texels == NULL;
-    nebel_result result = make_map(allocator, &desc->map, &clouds, &shell->map);
-    if (result == NEBEL_OK && !is_one) result = make_map(allocator, &desc->detail, &detail, &shell->detail);
-    desc->map = nb_layer_map_level(&shell->map, 0);
-    desc->detail = nb_layer_map_level(&shell->detail, 0);
+    const nebel_planet_map_desc clouds = {
+        .type = NEBEL_PLANET_MAP_CLOUDS, .seed = desc->seed, .coverage = desc->coverage};
+    const nebel_planet_map_desc detail = {
+        .type = NEBEL_PLANET_MAP_DETAIL, .seed = desc->seed, .coverage = desc->coverage};
+    const int is_one = desc->coverage_map.texels != NULL && desc->detail_map.texels == NULL;
+    nebel_result result = make_map(allocator, &desc->coverage_map, &clouds, &shell->map);
+    if (result == NEBEL_OK && !is_one) result = make_map(allocator, &desc->detail_map, &detail, &shell->detail);
+    desc->coverage_map = nb_layer_map_level(&shell->map, 0);
+    desc->detail_map = nb_layer_map_level(&shell->detail, 0);
     return result;
 }
 
-static nebel_result make_maps(nebel_layers *layers)
+static nebel_result make_maps(nebel_textured_planet *layers)
 {
-    nebel_layers_desc *const desc = &layers->desc;
-    const nebel_map_desc ground = {.kind = NEBEL_MAP_GROUND, .seed = desc->seed, .coverage = desc->coverage};
-    nebel_result result = make_map(&desc->allocator, &desc->ground, &ground, &layers->ground);
-    desc->ground = nb_layer_map_level(&layers->ground, 0);
-    for (uint32_t i = 0; i < desc->cloud_count && result == NEBEL_OK; i++)
-        result = make_shell(&desc->allocator, &desc->clouds[i], &layers->shells[i]);
+    nebel_textured_planet_desc *const desc = &layers->desc;
+    const nebel_planet_map_desc ground = {
+        .type = NEBEL_PLANET_MAP_GROUND, .seed = desc->seed, .coverage = desc->land_coverage};
+    nebel_result result = make_map(&desc->allocator, &desc->color_map, &ground, &layers->ground);
+    desc->color_map = nb_layer_map_level(&layers->ground, 0);
+    for (uint32_t i = 0; i < desc->cloud_shell_count && result == NEBEL_OK; i++)
+        result = make_shell(&desc->allocator, &desc->cloud_shells[i], &layers->shells[i]);
     return result;
 }
 
-nebel_result nebel_create_layers(const nebel_layers_desc *desc, nebel_layers **layers)
+nebel_result nebel_create_textured_planet(const nebel_textured_planet_desc *desc, nebel_textured_planet **layers)
 {
     if (layers != NULL) *layers = NULL;
     if (desc == NULL || layers == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
-    const nebel_layers_desc whole = resolve(desc);
+    const nebel_textured_planet_desc whole = resolve(desc);
     nebel_result result = check(&whole);
     if (result != NEBEL_OK) return result;
     const nebel_allocator allocator = nb_resolve_allocator(&whole.allocator);
-    nebel_layers *made = nb_allocate_zero(&allocator, 1, sizeof *made);
+    nebel_textured_planet *made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&whole.log, NEBEL_ERROR_MEMORY, "planet: out of memory");
     made->desc = whole;
     made->desc.allocator = allocator;
@@ -219,11 +222,11 @@ nebel_result nebel_create_layers(const nebel_layers_desc *desc, nebel_layers **l
         *layers = made;
         return NEBEL_OK;
     }
-    nebel_destroy_layers(made);
+    nebel_destroy_textured_planet(made);
     return nb_fail(&whole.log, result, "planet: out of memory");
 }
 
-void nebel_destroy_layers(nebel_layers *layers)
+void nebel_destroy_textured_planet(nebel_textured_planet *layers)
 {
     if (layers == NULL) return;
     const nebel_allocator allocator = layers->desc.allocator;
@@ -237,15 +240,15 @@ void nebel_destroy_layers(nebel_layers *layers)
 
 /* ---- for those who draw it themselves -------------------------------------------------------- */
 
-const nebel_layers_desc *nebel_describe_layers(const nebel_layers *layers)
+const nebel_textured_planet_desc *nebel_get_textured_planet_desc(const nebel_textured_planet *layers)
 {
     return layers != NULL ? &layers->desc : NULL;
 }
 
-static const nb_layer_map *find_map(const nebel_layers *layers, const float *texels)
+static const nb_layer_map *find_map(const nebel_textured_planet *layers, const float *texels)
 {
     if (texels == layers->ground.levels[0]) return &layers->ground;
-    for (uint32_t i = 0; i < layers->desc.cloud_count; i++) {
+    for (uint32_t i = 0; i < layers->desc.cloud_shell_count; i++) {
         const nb_shell *const shell = &layers->shells[i];
         if (texels == shell->map.levels[0]) return &shell->map;
         if (texels == shell->detail.levels[0]) return &shell->detail;
@@ -253,9 +256,10 @@ static const nb_layer_map *find_map(const nebel_layers *layers, const float *tex
     return NULL;
 }
 
-nebel_result nebel_find_map_level(const nebel_layers *layers, const nebel_map *map, uint32_t level, nebel_map *coarser)
+nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *layers, const nebel_planet_map *map, uint32_t level,
+                                      nebel_planet_map *coarser)
 {
-    if (coarser != NULL) *coarser = (nebel_map){0};
+    if (coarser != NULL) *coarser = (nebel_planet_map){0};
     if (layers == NULL || map == NULL || map->texels == NULL || coarser == NULL) return NEBEL_ERROR_ARGUMENT;
     const nb_layer_map *const found = find_map(layers, map->texels);
     if (found == NULL || level >= (uint32_t)found->level_count) return NEBEL_ERROR_ARGUMENT;
@@ -267,7 +271,7 @@ nebel_result nebel_find_map_level(const nebel_layers *layers, const nebel_map *m
 
 /* A ray from a planet's middle, and its light. */
 typedef struct nb_sight {
-    const nebel_layers *layers;
+    const nebel_textured_planet *layers;
     double from[3], to[3]; /* to: of length 1 */
     double far;            /* m, from the middle */
     double closest;        /* m along the ray, of the middle */
@@ -329,7 +333,7 @@ static double cover_at(const nb_shell *shell, const nebel_cloud_shell *desc, con
 {
     const nb_layer_map *detail = shell->detail.level_count > 0 ? &shell->detail : &shell->map;
     double parts[3];
-    for (int i = 0; i < 3; i++) parts[i] = read_map(detail, spot, desc->wrap[i], 1);
+    for (int i = 0; i < 3; i++) parts[i] = read_map(detail, spot, desc->uv_tiling[i], 1);
     return nb_cloud_cover(read_map(&shell->map, spot, 1, 0), parts[0], parts[1], parts[2], spot->pole, desc->gain);
 }
 
@@ -338,51 +342,51 @@ static void reflect(const nb_sight *s, double sun, const double color[3], double
     for (int c = 0; c < 3; c++) radiance[c] = cover * color[c] * (s->irradiance[c] * fmax(sun, 0) / PI + s->ambient[c]);
 }
 
-static void insert(nebel_layer_hits *hits, const nebel_layer_hit *hit)
+static void insert(nebel_shell_hits *hits, const nebel_shell_hit *hit)
 {
     uint32_t i = hits->count++;
     for (; i > 0 && hits->hits[i - 1].t > hit->t; i--) hits->hits[i] = hits->hits[i - 1];
     hits->hits[i] = *hit;
 }
 
-static void add_ground(const nb_sight *s, double t, nebel_layer_hits *hits)
+static void add_ground(const nb_sight *s, double t, nebel_shell_hits *hits)
 {
-    const double days[2] = {s->layers->desc.day, 0};
+    const double days[2] = {s->layers->desc.rotation_period, 0};
     const nb_spot spot = spot_at(s, s->layers->desc.radius, t, days);
     const nb_layer_map *map = &s->layers->ground;
     const double texels = spot.level * (double)map->width[0];
-    nebel_layer_hit hit = {.t = t, .cover = 1, .is_ground = 1};
+    nebel_shell_hit hit = {.t = t, .opacity = 1, .is_ground = 1};
     double color[3];
     nb_layer_map_read(map, spot.u, spot.v, texels > 1 ? log2(texels) : 0, 0, color);
     reflect(s, spot.sun, color, 1, hit.radiance);
     insert(hits, &hit);
 }
 
-static double radius_of(const nebel_layers_desc *desc, uint32_t shell)
+static double radius_of(const nebel_textured_planet_desc *desc, uint32_t shell)
 {
-    return desc->radius + desc->clouds[shell].height;
+    return desc->radius + desc->cloud_shells[shell].height;
 }
 
-static void add_clouds(const nb_sight *s, uint32_t number, double t, nebel_layer_hits *hits)
+static void add_clouds(const nb_sight *s, uint32_t number, double t, nebel_shell_hits *hits)
 {
-    const nebel_layers_desc *const desc = &s->layers->desc;
-    const nebel_cloud_shell *const shell = &desc->clouds[number];
-    const double days[2] = {desc->day, shell->day};
+    const nebel_textured_planet_desc *const desc = &s->layers->desc;
+    const nebel_cloud_shell *const shell = &desc->cloud_shells[number];
+    const double days[2] = {desc->rotation_period, shell->rotation_period};
     const nb_spot spot = spot_at(s, radius_of(desc, number), t, days);
-    nebel_layer_hit hit = {.t = t, .cover = cover_at(&s->layers->shells[number], shell, &spot)};
-    reflect(s, spot.sun, shell->color, hit.cover, hit.radiance);
+    nebel_shell_hit hit = {.t = t, .opacity = cover_at(&s->layers->shells[number], shell, &spot)};
+    reflect(s, spot.sun, shell->color, hit.opacity, hit.radiance);
     insert(hits, &hit);
 }
 
-static void add_air(const nb_sight *s, double t, nebel_layer_hits *hits)
+static void add_air(const nb_sight *s, double t, nebel_shell_hits *hits)
 {
     static const double days[2] = {0, 0};
-    const nebel_air_shell *air = &s->layers->desc.air;
+    const nebel_atmosphere_shell *air = &s->layers->desc.atmosphere;
     const nb_spot spot = spot_at(s, s->layers->desc.radius + air->height, t, days);
     const nb_glow glow = nb_air_glow(spot.sun, spot.view);
     const double place = glow.place * (double)(air->ramp_count - 1);
     const uint32_t low = (uint32_t)place, high = low + 1 < air->ramp_count ? low + 1 : low;
-    nebel_layer_hit hit = {.t = t, .cover = 0};
+    nebel_shell_hit hit = {.t = t, .opacity = 0};
     for (int c = 0; c < 3; c++) {
         const double color = air->ramp[low][c] + (place - low) * (air->ramp[high][c] - air->ramp[low][c]);
         hit.radiance[c] = air->brightness * glow.amount * color;
@@ -390,26 +394,26 @@ static void add_air(const nb_sight *s, double t, nebel_layer_hits *hits)
     insert(hits, &hit);
 }
 
-static void look(const nb_sight *s, nebel_layer_hits *hits)
+static void look(const nb_sight *s, nebel_shell_hits *hits)
 {
-    const nebel_layers_desc *desc = &s->layers->desc;
+    const nebel_textured_planet_desc *desc = &s->layers->desc;
     const double ground = meet(s, desc->radius), end = ground >= 0 ? fmin(ground, s->t_max) : s->t_max;
     hits->count = 0;
-    for (uint32_t i = 0; i < desc->cloud_count; i++) {
+    for (uint32_t i = 0; i < desc->cloud_shell_count; i++) {
         const double t = meet(s, radius_of(desc, i));
         if (t >= 0 && t <= end) add_clouds(s, i, t, hits);
     }
-    const double t = desc->air.is_absent ? -1 : meet(s, desc->radius + desc->air.height);
+    const double t = desc->atmosphere.is_disabled ? -1 : meet(s, desc->radius + desc->atmosphere.height);
     if (t >= 0 && t <= end) add_air(s, t, hits);
     if (ground >= 0 && ground <= s->t_max) add_ground(s, ground, hits);
 }
 
 /* ---- the face -------------------------------------------------------------------------------- */
 
-static int set_view(const nebel_layers *layers, const nebel_layer_view *view, nb_sight *s)
+static int set_view(const nebel_textured_planet *layers, const nebel_textured_planet_query *view, nb_sight *s)
 {
-    *s = (nb_sight){.layers = layers, .time = view->time, .spread = view->spread};
-    if (!(fabs(view->time) <= 1e12 && view->spread >= 0 && view->spread <= 1e12)) return 0;
+    *s = (nb_sight){.layers = layers, .time = view->time, .spread = view->pixel_spread};
+    if (!(fabs(view->time) <= 1e12 && view->pixel_spread >= 0 && view->pixel_spread <= 1e12)) return 0;
     if (!all_within(view->ambient, 3, 0, 1e9) || !all_within(view->sun.irradiance, 3, 0, 1e9)) return 0;
     memcpy(s->ambient, view->ambient, sizeof s->ambient);
     memcpy(s->irradiance, view->sun.irradiance, sizeof s->irradiance);
@@ -435,8 +439,9 @@ static int set_ray(const nebel_ray *ray, nb_sight *s)
     return 1;
 }
 
-nebel_result nebel_trace_layers(const nebel_layers *layers, const nebel_layer_view *view, size_t n,
-                                const nebel_ray *rays, size_t ray_stride, nebel_layer_hits *hits, size_t hit_stride)
+nebel_result nebel_trace_textured_planet(const nebel_textured_planet *layers, const nebel_textured_planet_query *view,
+                                         size_t n, const nebel_ray *rays, size_t ray_stride, nebel_shell_hits *hits,
+                                         size_t hit_stride)
 {
     nb_sight s;
     if (layers == NULL || view == NULL || (n > 0 && (rays == NULL || hits == NULL))) return NEBEL_ERROR_ARGUMENT;

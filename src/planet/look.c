@@ -16,7 +16,7 @@ const nb_look_kernel *nb_look_choose(nebel_isa isa)
     return kernels[nb_cpu_choose(isa)];
 }
 
-static nb_look_table table_of(const nebel_air_view *view)
+static nb_look_table table_of(const nebel_sky_view *view)
 {
     const nb_outlook *outlook = &view->outlook;
     nb_look_table table = {.radius = outlook->radius,
@@ -57,22 +57,22 @@ static int has_directions(const double *const direction[3])
     return direction != NULL && direction[0] != NULL && direction[1] != NULL && direction[2] != NULL;
 }
 
-nebel_result nebel_trace_air_view(const nebel_air_view *view, size_t n, const double *const direction[3],
-                                  const float *t_max, const nebel_transfer_planes *lights)
+nebel_result nebel_trace_sky_view(const nebel_sky_view *view, size_t n, const double *const direction[3],
+                                  const float *t_max, const nebel_transfer_planes *transfers)
 {
-    if (view == NULL || !has_directions(direction) || lights == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (view == NULL || !has_directions(direction) || transfers == NULL) return NEBEL_ERROR_ARGUMENT;
     const nb_look_table table = table_of(view);
     const nb_look_job job = {.table = &table,
                              .count = n,
                              .direction = {direction[0], direction[1], direction[2]},
                              .t_max = t_max,
-                             .lights = *lights};
+                             .transfers = *transfers};
     view->look->along(&job);
     return NEBEL_OK;
 }
 
-nebel_result nebel_find_ground(const nebel_air_view *view, size_t n, const double *const direction[3],
-                               const nebel_ground_planes *planes)
+nebel_result nebel_trace_ground(const nebel_sky_view *view, size_t n, const double *const direction[3],
+                                const nebel_ground_planes *planes)
 {
     if (view == NULL || !has_directions(direction) || planes == NULL) return NEBEL_ERROR_ARGUMENT;
     const nb_look_table table = table_of(view);

@@ -5,7 +5,7 @@
 #include "scatter.h"
 
 /* Numbers of an entry, three of each kind of air that scatters, and five; a multiple of four. */
-enum { NB_VIEW_SIZE = 3 * NEBEL_MAX_AIRS + 8 };
+enum { NB_VIEW_SIZE = 3 * NEBEL_MAX_COMPONENTS + 8 };
 
 /* A view in plain numbers: kernels have the structures of formulas in lanes. */
 typedef struct nb_look_table {
@@ -15,7 +15,7 @@ typedef struct nb_look_table {
     const float *entries;
     const double (*extinction)[4], (*sunlight)[3];
     int scatterer_count;
-    const nb_phase *phases[NEBEL_MAX_AIRS]; /* of those that scatter */
+    const nb_phase *phases[NEBEL_MAX_COMPONENTS]; /* of those that scatter */
     double irradiance[3], least_off;
     const nb_scatter *scatter;
 } nb_look_table;
@@ -25,7 +25,7 @@ typedef struct nb_look_job {
     size_t count;
     const double *direction[3];
     const float *t_max; /* NULL: as far as they go */
-    nebel_transfer_planes lights;
+    nebel_transfer_planes transfers;
     nebel_ground_planes ground;
 } nb_look_job;
 

@@ -313,7 +313,7 @@ static inline nb_real light_of(const nb_look_table *table, const nb_looks *looks
 
 static void look_along(const nb_look_job *job)
 {
-    const nebel_transfer_planes *lights = &job->lights;
+    const nebel_transfer_planes *transfers = &job->transfers;
     for (size_t first = 0; first < job->count; first += NB_WIDTH) {
         const nb_part part = part_from(job, first);
         const nb_looks looks = looks_along(job, part);
@@ -327,10 +327,10 @@ static void look_along(const nb_look_job *job)
         for (int c = 0; c < 3; c++) {
             const nb_real left = nb_exp(-(looks.along * nb_load_lanes(read.extinction[c])));
             error = nb_max(error, off * left + rounding);
-            store_floats(part, left, lights->transmittance[c]);
-            store_floats(part, nb_select(has_air, light[c], NB_F(0.0)), lights->in_scattering[c]);
+            store_floats(part, left, transfers->transmittance[c]);
+            store_floats(part, nb_select(has_air, light[c], NB_F(0.0)), transfers->in_scattering[c]);
         }
-        store_floats(part, error, lights->error);
+        store_floats(part, error, transfers->error);
     }
 }
 

@@ -5,7 +5,7 @@
 #include <nebel/planet.h>
 
 typedef struct nb_parts {
-    nebel_air_run_fn run; /* NULL: one part after the other */
+    nebel_parallel_for_fn run; /* NULL: one part after the other */
     void *user;
 } nb_parts;
 

@@ -22,7 +22,7 @@ typedef struct nb_path {
     double weight[NB_PATH_MOST];           /* m */
     double transmittance[3][NB_PATH_MOST]; /* from the start to here */
     double smooth[3][NB_PATH_MOST];        /* the same of smooth air; not set where the path was laid without */
-    double density[NEBEL_MAX_AIRS][NB_PATH_MOST];
+    double density[NEBEL_MAX_COMPONENTS][NB_PATH_MOST];
     double left[3]; /* transmittance of the whole ray */
     /* Where there is smooth air: the ends of pieces, cuts among them, and transmittance up to there, of all air and of smooth air. */
     int ends;

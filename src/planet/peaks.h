@@ -10,19 +10,19 @@ enum { NB_PEAK_POWERS = 8 };
 
 /* Sums over nodes of a ray, for phase functions of 1. */
 typedef struct nb_peak_sums {
-    double often[3], missing[3];     /* as of nb_node_light */
-    double ahead[NEBEL_MAX_AIRS][3]; /* scattering times sunlight ahead */
+    double often[3], missing[3];           /* as of nb_node_light */
+    double ahead[NEBEL_MAX_COMPONENTS][3]; /* scattering times sunlight ahead */
     /* Scattering times straight sunlight times powers of t, from 0 on, and behind them the rest of the series. */
-    double powers[NEBEL_MAX_AIRS][3][NB_PEAK_POWERS + 1];
+    double powers[NEBEL_MAX_COMPONENTS][3][NB_PEAK_POWERS + 1];
 } nb_peak_sums;
 
 /* What phase functions give towards a ray, of sunlight. */
 typedef struct nb_peaks {
     int air_count;
-    double peak[NEBEL_MAX_AIRS]; /* the part of what is scattered that the peak turns; 0: there is none */
-    double smooth[NEBEL_MAX_AIRS];
+    double peak[NEBEL_MAX_COMPONENTS]; /* the part of what is scattered that the peak turns; 0: there is none */
+    double smooth[NEBEL_MAX_COMPONENTS];
     /* Per power; the first is not used: light scattered once has its own phase function. */
-    double turned[NEBEL_MAX_AIRS][NB_PEAK_POWERS + 1];
+    double turned[NEBEL_MAX_COMPONENTS][NB_PEAK_POWERS + 1];
 } nb_peaks;
 
 /* Orders of moments behind those that are kept of a function of Henyey and Greenstein, in units of the first of them. */

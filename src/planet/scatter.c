@@ -147,9 +147,9 @@ typedef struct nb_effort {
     double most_missing;
 } nb_effort;
 
-static const nb_effort efforts[NEBEL_AIR_QUALITY_COUNT] = {
-    [NEBEL_AIR_FAST] = {12, 32, 8, 3, 3, 4, NB_FEW_MOMENTS, 1e-2},
-    [NEBEL_AIR_PRECISE] = {20, 40, 8, 5, 4, 5, NB_MOMENTS, 2e-3},
+static const nb_effort efforts[NEBEL_ATMOSPHERE_QUALITY_COUNT] = {
+    [NEBEL_ATMOSPHERE_FAST] = {12, 32, 8, 3, 3, 4, NB_FEW_MOMENTS, 1e-2},
+    [NEBEL_ATMOSPHERE_PRECISE] = {20, 40, 8, 5, 4, 5, NB_MOMENTS, 2e-3},
 };
 
 typedef struct nb_maker {
@@ -218,7 +218,7 @@ static void gather_air(const nb_fan *fan, nb_aspect aspect, double light[3])
                          .track = fan->track,
                          .aspect = aspect,
                          .path = &fan->path};
-    double phases[NEBEL_MAX_AIRS];
+    double phases[NEBEL_MAX_COMPONENTS];
     if (maker->first) phases_of(maker->airs, maker->effort->moments, aspect.sun, phases);
     for (; job.first < fan->path.count; job.first += NB_GATHER_NODES) {
         nb_node_light nodes;
@@ -469,7 +469,7 @@ static void free_rounds(const nebel_allocator *allocator, nb_rounds *rounds)
 }
 
 nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *parts, const nb_airs *airs,
-                             const nb_airs *smooth, nebel_air_quality quality, const double albedo[3],
+                             const nb_airs *smooth, nebel_atmosphere_quality quality, const double albedo[3],
                              nb_scatter *scatter)
 {
     const nb_effort *effort = &efforts[quality];

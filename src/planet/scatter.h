@@ -26,7 +26,7 @@ void nb_scatter_look_up_ground(const nb_scatter *scatter, double sun, double irr
 
 /* Makes the table; `albedo` is the ground's; smooth: nb_airs_smooth of the airs. Errors: MEMORY. */
 nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *parts, const nb_airs *airs,
-                             const nb_airs *smooth, nebel_air_quality quality, const double albedo[3],
+                             const nb_airs *smooth, nebel_atmosphere_quality quality, const double albedo[3],
                              nb_scatter *scatter);
 void nb_scatter_free(const nebel_allocator *allocator, nb_scatter *scatter);
 

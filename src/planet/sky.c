@@ -137,7 +137,7 @@ static nb_gathered finish(const nb_gathering *gathering, const nb_peak_sums *bef
 {
     const nb_peak_light light = nb_peaks_before(&gathering->peaks, before);
     nb_gathered gathered;
-    for (int k = 0; k < NEBEL_MAX_AIRS; k++)
+    for (int k = 0; k < NEBEL_MAX_COMPONENTS; k++)
         for (int c = 0; c < 3; c++) gathered.once[k][c] = before->powers[k][c][0];
     memcpy(gathered.often, light.light, sizeof gathered.often);
     memcpy(gathered.missing, light.missing, sizeof gathered.missing);
@@ -362,8 +362,9 @@ int nb_air_is_ray(const nebel_ray *ray, double unit[3])
     return nb_air_is_place(ray->origin) && nb_vector_make_unit(unit) && ray->t_max >= 0;
 }
 
-nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n, const nebel_ray *rays,
-                             size_t ray_stride, nebel_transfer *transfers, size_t transfer_stride)
+nebel_result nebel_trace_atmosphere(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
+                                    const nebel_ray *rays, size_t ray_stride, nebel_transfer *transfers,
+                                    size_t transfer_stride)
 {
     nebel_sun resolved;
     if (atmosphere == NULL || (n > 0 && (rays == NULL || transfers == NULL))) return NEBEL_ERROR_ARGUMENT;
@@ -381,7 +382,7 @@ nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun
 
 /* The sky is that of the ground straight below, wherever the way to the sun comes into the air, or if it never does. */
 static void light_place(const nebel_atmosphere *atmosphere, const nebel_sun *sun, const double place[3],
-                        nebel_air_light *light)
+                        nebel_irradiance *light)
 {
     double from[3];
     const double radius = place_over(atmosphere, place, from);
@@ -398,17 +399,17 @@ static void light_place(const nebel_atmosphere *atmosphere, const nebel_sun *sun
     }
 }
 
-nebel_result nebel_light_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
-                             const double (*places)[3], size_t place_stride, nebel_air_light *lights,
-                             size_t light_stride)
+nebel_result nebel_compute_atmosphere_irradiance(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
+                                                 const double (*places)[3], size_t place_stride,
+                                                 nebel_irradiance *irradiances, size_t irradiance_stride)
 {
     nebel_sun resolved;
-    if (atmosphere == NULL || (n > 0 && (places == NULL || lights == NULL))) return NEBEL_ERROR_ARGUMENT;
+    if (atmosphere == NULL || (n > 0 && (places == NULL || irradiances == NULL))) return NEBEL_ERROR_ARGUMENT;
     if (!nb_air_resolve_sun(sun, &resolved)) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++)
         if (!nb_air_is_place(nb_stride_from(places, place_stride, i))) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++)
         light_place(atmosphere, &resolved, nb_stride_from(places, place_stride, i),
-                    nb_stride_to(lights, light_stride, i));
+                    nb_stride_to(irradiances, irradiance_stride, i));
     return NEBEL_OK;
 }

@@ -18,7 +18,7 @@ enum { NODES = 4 }; /* of a piece of a ray: pieces are many */
 #define SAFETY_AMID 2
 
 /* Rows may be asked for between those of the table. */
-static nb_slope row_slope(const nebel_air_view *view, double row, nb_reach *reach)
+static nb_slope row_slope(const nebel_sky_view *view, double row, nb_reach *reach)
 {
     if (row < NB_VIEW_FALLING) return nb_outlook_slope(&view->outlook, 1, row / (NB_VIEW_FALLING - 1.0), reach);
     return nb_outlook_slope(&view->outlook, 0, (row - NB_VIEW_FALLING) / (NB_VIEW_RISING - 1.0), reach);
@@ -27,13 +27,13 @@ static nb_slope row_slope(const nebel_air_view *view, double row, nb_reach *reac
 /* ---- making ---------------------------------------------------------------------------------- */
 
 /* Columns lie evenly over the sine of half the turn, in which light is smooth at both ends. */
-static double column_cosine(const nebel_air_view *view, double column)
+static double column_cosine(const nebel_sky_view *view, double column)
 {
     const double half = column / (view->columns - 1.0);
     return 1 - 2 * half * half;
 }
 
-static void write_entry(const nebel_air_view *view, const nb_gathered *gathered, double per, float *entry)
+static void write_entry(const nebel_sky_view *view, const nb_gathered *gathered, double per, float *entry)
 {
     const nebel_atmosphere *atmosphere = view->atmosphere;
     static const double none[3] = {0, 0, 0};
@@ -57,7 +57,7 @@ typedef struct nb_row {
     nb_path path;
 } nb_row;
 
-static nb_aspect column_aspect(const nebel_air_view *view, const nb_row *row, double column)
+static nb_aspect column_aspect(const nebel_sky_view *view, const nb_row *row, double column)
 {
     const nb_slope slope = row->slope, to_sun = view->sun_slope;
     const double sun = slope.cosine * to_sun.cosine + slope.sine * to_sun.sine * column_cosine(view, column);
@@ -67,7 +67,7 @@ static nb_aspect column_aspect(const nebel_air_view *view, const nb_row *row, do
 }
 
 /* Returns what is scattered just where the ray begins. */
-static nb_gathered gather_column(const nebel_air_view *view, const nb_row *row, nb_aspect aspect,
+static nb_gathered gather_column(const nebel_sky_view *view, const nb_row *row, nb_aspect aspect,
                                  nb_gathered gathered[])
 {
     const nebel_atmosphere *atmosphere = view->atmosphere;
@@ -79,7 +79,7 @@ static nb_gathered gather_column(const nebel_air_view *view, const nb_row *row, 
     return nb_gather_path(atmosphere, row->track, aspect, &row->path, view->levels, row->ends, gathered);
 }
 
-static void fill_column(nebel_air_view *view, int number, const nb_row *row, int column)
+static void fill_column(nebel_sky_view *view, int number, const nb_row *row, int column)
 {
     nb_gathered gathered[NB_VIEW_MORE_LEVELS];
     const nb_gathered start = gather_column(view, row, column_aspect(view, row, column), gathered);
@@ -89,7 +89,7 @@ static void fill_column(nebel_air_view *view, int number, const nb_row *row, int
                     row->reach.span > 0 ? 1 / row->ends[level] : 1, nb_view_entry(view, number, column, level + 1));
 }
 
-static void fill_extinction(nebel_air_view *view, int row, nb_track track, const double ends[])
+static void fill_extinction(nebel_sky_view *view, int row, nb_track track, const double ends[])
 {
     const nb_airs *airs = &view->atmosphere->airs;
     for (int c = 0; c < 3; c++) nb_view_extinction(view, row, 0)[c] = 0;
@@ -109,7 +109,7 @@ static void fill_extinction(nebel_air_view *view, int row, nb_track track, const
 
 /* before: how far before the levels of the table its ends are, 0 or 1/2 of a step; the first one half of the way, as means are
  * linear there. */
-static void set_row(const nebel_air_view *view, double number, double before, nb_row *row)
+static void set_row(const nebel_sky_view *view, double number, double before, nb_row *row)
 {
     const nb_airs *airs = &view->atmosphere->airs;
     row->slope = row_slope(view, number, &row->reach);
@@ -126,7 +126,7 @@ static void set_row(const nebel_air_view *view, double number, double before, nb
 
 static void fill_row(void *data, size_t number)
 {
-    nebel_air_view *view = data;
+    nebel_sky_view *view = data;
     nb_row row;
     set_row(view, (double)number, 0, &row);
     fill_extinction(view, (int)number, row.track, row.ends);
@@ -134,7 +134,7 @@ static void fill_row(void *data, size_t number)
 }
 
 /* Of one colour, as if all scattered evenly. */
-static double brightness(const nebel_air_view *view, const float *entry, int c)
+static double brightness(const nebel_sky_view *view, const float *entry, int c)
 {
     const int often = nb_view_often(view);
     double sum = (double)entry[often + c];
@@ -149,18 +149,18 @@ typedef struct nb_missed {
 } nb_missed;
 
 typedef struct nb_estimates {
-    nebel_air_view *view;
+    nebel_sky_view *view;
     /* Behind the row, and before the level; that at the start is not counted. */
     nb_missed missed[NB_VIEW_ROWS][NB_VIEW_MORE_LEVELS];
 } nb_estimates;
 
 /* The two levels between which an end of set_row with `before` is; whole rays have entries of their own. */
-static int first_level(const nebel_air_view *view, int cell)
+static int first_level(const nebel_sky_view *view, int cell)
 {
     return view->levels > 1 ? cell : 1;
 }
 
-static double missed_extinction(nebel_air_view *view, int number, const nb_row *row, int cell)
+static double missed_extinction(nebel_sky_view *view, int number, const nb_row *row, int cell)
 {
     double depth[3] = {0, 0, 0}, most = 0;
     nb_track_depth(&view->atmosphere->airs, row->track, row->ends[cell], depth);
@@ -174,7 +174,7 @@ static double missed_extinction(nebel_air_view *view, int number, const nb_row *
     return most;
 }
 
-static double missed_light(const nebel_air_view *view, int number, int column, const nb_gathered *gathered, double end,
+static double missed_light(const nebel_sky_view *view, int number, int column, const nb_gathered *gathered, double end,
                            int cell)
 {
     float exact[NB_VIEW_SIZE];
@@ -197,7 +197,7 @@ static double missed_light(const nebel_air_view *view, int number, int column, c
 static void measure_row(void *data, size_t row_number)
 {
     nb_estimates *estimates = data;
-    nebel_air_view *view = estimates->view;
+    nebel_sky_view *view = estimates->view;
     const int number = (int)row_number;
     nb_row row;
     nb_gathered gathered[NB_VIEW_MORE_LEVELS];
@@ -231,7 +231,7 @@ static nb_missed missed_around(const nb_estimates *estimates, int row, int level
 }
 
 /* The second difference of three entries, of which the first and last may be missing; `most` becomes at least as bright as each. */
-static double bend(const nebel_air_view *view, const float *before, const float *entry, const float *behind, int c,
+static double bend(const nebel_sky_view *view, const float *before, const float *entry, const float *behind, int c,
                    double *most)
 {
     if (before == NULL || behind == NULL) return 0;
@@ -241,7 +241,7 @@ static double bend(const nebel_air_view *view, const float *before, const float 
 }
 
 /* Linear interpolation between values a step apart misses an eighth of the second difference. */
-static void estimate_extinction(nebel_air_view *view, int row, int level, double missed)
+static void estimate_extinction(nebel_sky_view *view, int row, int level, double missed)
 {
     const int first = row == 0 || row == NB_VIEW_FALLING, last = row == NB_VIEW_FALLING - 1 || row == NB_VIEW_ROWS - 1;
     double worst = 0;
@@ -263,7 +263,7 @@ static void estimate_extinction(nebel_air_view *view, int row, int level, double
 static void estimate_row(void *data, size_t number)
 {
     const nb_estimates *estimates = data;
-    nebel_air_view *view = estimates->view;
+    nebel_sky_view *view = estimates->view;
     const int row = (int)number;
     const int first = row == 0 || row == NB_VIEW_FALLING, last = row == NB_VIEW_FALLING - 1 || row == NB_VIEW_ROWS - 1;
     for (int level = 0; level <= view->levels; level++) {
@@ -289,14 +289,14 @@ static void estimate_row(void *data, size_t number)
     }
 }
 
-static void estimate(nebel_air_view *view, const nb_parts *parts)
+static void estimate(nebel_sky_view *view, const nb_parts *parts)
 {
     nb_estimates estimates = {.view = view};
     nb_parts_run(parts, NB_VIEW_ROWS, measure_row, &estimates);
     nb_parts_run(parts, NB_VIEW_ROWS, estimate_row, &estimates);
 }
 
-static void set_sunlight(nebel_air_view *view)
+static void set_sunlight(nebel_sky_view *view)
 {
     const nb_airs *airs = &view->atmosphere->airs;
     for (int i = 0; i < NB_VIEW_SUNS; i++) {
@@ -305,7 +305,7 @@ static void set_sunlight(nebel_air_view *view)
     }
 }
 
-static double brightest_of(const nebel_air_view *view)
+static double brightest_of(const nebel_sky_view *view)
 {
     double most = 0;
     for (int row = 0; row < NB_VIEW_ROWS; row++) {
@@ -319,7 +319,7 @@ static double brightest_of(const nebel_air_view *view)
 }
 
 /* Up, and level towards the sun; anywhere level where the sun is in the zenith. */
-static void set_axes(nebel_air_view *view, const double place[3])
+static void set_axes(nebel_sky_view *view, const double place[3])
 {
     static const double top[3] = {0, 1, 0};
     memcpy(view->up, place, sizeof view->up);
@@ -336,7 +336,7 @@ static void set_axes(nebel_air_view *view, const double place[3])
     nb_vector_cross(view->up, view->ahead, view->aside);
 }
 
-static nebel_result allocate(nebel_air_view *view)
+static nebel_result allocate(nebel_sky_view *view)
 {
     const size_t count = (size_t)NB_VIEW_ROWS * (size_t)view->columns * ((size_t)view->levels + 1);
     view->size = (3 * view->scatterer_count + 5 + 3) / 4 * 4;
@@ -347,19 +347,19 @@ static nebel_result allocate(nebel_air_view *view)
 }
 
 /* From space day and night are seen at once, and so they are in air that is deep for the planet. */
-static int sees_day_and_night(const nebel_air_view *view)
+static int sees_day_and_night(const nebel_sky_view *view)
 {
     const nb_outlook *outlook = &view->outlook;
     return outlook->height > outlook->thickness || outlook->thickness > 0.1 * view->atmosphere->airs.radius;
 }
 
 /* Rays may pass places where air is many times as dense as at the eye. */
-static int is_high(const nebel_air_view *view)
+static int is_high(const nebel_sky_view *view)
 {
     return view->outlook.height > 0.2 * view->outlook.thickness;
 }
 
-static void set_up(nebel_air_view *view, const nebel_air_view_desc *desc)
+static void set_up(nebel_sky_view *view, const nebel_sky_view_desc *desc)
 {
     const nebel_atmosphere *atmosphere = desc->atmosphere;
     double place[3];
@@ -367,15 +367,15 @@ static void set_up(nebel_air_view *view, const nebel_air_view_desc *desc)
     set_axes(view, place);
     view->outlook = nb_outlook_make(&atmosphere->airs, fmax(atmosphere->airs.radius, nb_vector_length(place)));
     view->columns = sees_day_and_night(view) ? NB_VIEW_MORE_COLUMNS : NB_VIEW_COLUMNS;
-    view->levels = !desc->has_distances ? 1 : is_high(view) ? NB_VIEW_MORE_LEVELS : NB_VIEW_LEVELS;
-    view->rule = nb_rule_make(desc->has_distances ? NODES : NB_RULE_MOST);
+    view->levels = !desc->has_ray_ends ? 1 : is_high(view) ? NB_VIEW_MORE_LEVELS : NB_VIEW_LEVELS;
+    view->rule = nb_rule_make(desc->has_ray_ends ? NODES : NB_RULE_MOST);
     for (int k = 0; k < atmosphere->airs.count; k++) {
         const double *scattering = atmosphere->airs.airs[k].scattering;
         if (scattering[0] + scattering[1] + scattering[2] > 0) view->scatterers[view->scatterer_count++] = k;
     }
 }
 
-nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_view **view)
+nebel_result nebel_create_sky_view(const nebel_sky_view_desc *desc, nebel_sky_view **view)
 {
     nebel_sun sun;
     if (view == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -390,7 +390,7 @@ nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_vi
                        "air view: position: is (%g, %g, %g); each must be within -1e15 and 1e15", desc->position[0],
                        desc->position[1], desc->position[2]);
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
-    nebel_air_view *made = nb_allocate_zero(&allocator, 1, sizeof *made);
+    nebel_sky_view *made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "air: out of memory");
     made->allocator = allocator;
     made->atmosphere = desc->atmosphere;
@@ -398,7 +398,7 @@ nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_vi
     made->look = nb_look_choose(NEBEL_ISA_DEFAULT);
     set_up(made, desc);
     if (allocate(made) != NEBEL_OK) {
-        nebel_destroy_air_view(made);
+        nebel_destroy_sky_view(made);
         return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "air: out of memory");
     }
     const nb_parts parts = {desc->run, desc->run_user};
@@ -412,7 +412,7 @@ nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_vi
     return NEBEL_OK;
 }
 
-void nebel_destroy_air_view(nebel_air_view *view)
+void nebel_destroy_sky_view(nebel_sky_view *view)
 {
     if (view == NULL) return;
     const nebel_allocator allocator = view->allocator;

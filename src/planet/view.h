@@ -17,7 +17,7 @@ enum {
     NB_VIEW_SUNS = 257,
 };
 
-struct nebel_air_view {
+struct nebel_sky_view {
     nebel_allocator allocator;
     const nebel_atmosphere *atmosphere;
     nebel_sun sun;
@@ -26,7 +26,7 @@ struct nebel_air_view {
     nb_slope sun_slope;
     int columns;
     int levels; /* NB_VIEW_LEVELS or NB_VIEW_MORE_LEVELS, or 1: the ends alone */
-    int scatterers[NEBEL_MAX_AIRS], scatterer_count;
+    int scatterers[NEBEL_MAX_COMPONENTS], scatterer_count;
     int size;                /* of an entry, a multiple of four: see below */
     float *entries;          /* [row][column][level 0..levels] */
     double (*extinction)[4]; /* [row][level 0..levels], 1/m, and what interpolation may miss of it */
@@ -40,19 +40,19 @@ struct nebel_air_view {
 /* In an entry, all per metre and for a sun of irradiance 1 but for the last two: what was scattered once by each kind of
  * air that scatters, for a phase function of 1; more often; how much of that is in doubt, of the brightest colour under
  * the view's sun; and what part of the light interpolation may miss. */
-static inline int nb_view_often(const nebel_air_view *view)
+static inline int nb_view_often(const nebel_sky_view *view)
 {
     return 3 * view->scatterer_count;
 }
 
-static inline float *nb_view_entry(const nebel_air_view *view, int row, int column, int level)
+static inline float *nb_view_entry(const nebel_sky_view *view, int row, int column, int level)
 {
     const size_t place =
         ((size_t)row * (size_t)view->columns + (size_t)column) * ((size_t)view->levels + 1) + (size_t)level;
     return view->entries + place * (size_t)view->size;
 }
 
-static inline double *nb_view_extinction(const nebel_air_view *view, int row, int level)
+static inline double *nb_view_extinction(const nebel_sky_view *view, int row, int level)
 {
     return view->extinction[row * (view->levels + 1) + level];
 }

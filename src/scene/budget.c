@@ -95,7 +95,7 @@ nebel_result nebel_set_scene_diffusion(nebel_scene *scene, const nebel_diffusion
 double nb_diffusion_cells(const nebel_diffusion_desc *desc)
 {
     if (desc == NULL) return 0;
-    return desc->cells != 0 ? fmin(desc->cells, NEBEL_MAX_DIFFUSION_CELLS) : NEBEL_DEFAULT_DIFFUSION_CELLS;
+    return desc->max_cells != 0 ? fmin(desc->max_cells, NEBEL_MAX_DIFFUSION_CELLS) : NEBEL_DEFAULT_DIFFUSION_CELLS;
 }
 
 /* ---- noise ----------------------------------------------------------------------------------- */

@@ -85,7 +85,7 @@ static nebel_camera mend(const nebel_camera *between, const nebel_camera *nearer
     return nb_camera_is_apart(&camera) && nb_camera_is_upright(&camera) ? camera : *nearer;
 }
 
-nebel_camera nebel_camera_between_keys(const nebel_camera_key *keys, size_t count, double frame)
+nebel_camera nebel_interpolate_camera(const nebel_camera_key *keys, size_t count, double frame)
 {
     if (keys == NULL || count == 0) return nb_camera_default();
     nb_keyframes around;
@@ -117,11 +117,11 @@ static nebel_camera turn(const nebel_camera *start, double frame, uint32_t frame
     return camera;
 }
 
-nebel_camera nebel_scene_camera(const nebel_scene *scene, double frame)
+nebel_camera nebel_get_scene_camera(const nebel_scene *scene, double frame)
 {
     if (scene == NULL) return nb_camera_default();
     const nebel_scene_data *data = &scene->data;
-    if (data->camera_key_count > 0) return nebel_camera_between_keys(data->camera_keys, data->camera_key_count, frame);
+    if (data->camera_key_count > 0) return nebel_interpolate_camera(data->camera_keys, data->camera_key_count, frame);
     const bool turns = data->turntable_frames > 0 && isfinite(frame) && fmod(frame, data->turntable_frames) != 0;
     return turns ? turn(&data->camera, frame, data->turntable_frames) : data->camera;
 }

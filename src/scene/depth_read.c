@@ -249,7 +249,8 @@ static nebel_result make_map(const nb_codec *codec, const nb_depth_numbers *numb
 {
     *map = (nebel_depth_map){.width = numbers->width,
                              .height = numbers->height,
-                             .type = r->measure == NEBEL_MEASURE_RADIAL ? NEBEL_DEPTH_RAY : NEBEL_DEPTH_AXIS};
+                             .type = r->measure == NEBEL_MEASURE_RADIAL ? NEBEL_PIXEL_DEPTH_RADIAL
+                                                                        : NEBEL_PIXEL_DEPTH_AXIAL};
     map->depth = nb_allocate(&codec->allocator, (size_t)map->width * map->height, sizeof *map->depth);
     if (map->depth == NULL) return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", codec->name);
     const nebel_result result = convert(codec, numbers, r, map->depth);

@@ -10,7 +10,7 @@
  * file of the fewest pictures, and then of a part of what there are. */
 enum { LEAST_ROOM = 1 << 14, PICTURE_ROOM = 1 << 12 };
 
-struct nebel_film {
+struct nebel_movie {
     nb_codec codec;
     char *path;
     double rate;
@@ -22,23 +22,23 @@ struct nebel_film {
     char record[NEBEL_MAX_RECORD + 1]; /* "": none */
 };
 
-int nebel_is_film_path(const char *path)
+int nebel_is_movie_path(const char *path)
 {
     return path != NULL && nb_image_ends_in(path, ".webp");
 }
 
-static nebel_result check_desc(const nb_codec *codec, const nebel_film_desc *desc)
+static nebel_result check_desc(const nb_codec *codec, const nebel_movie_desc *desc)
 {
     const double rate = desc->frames_per_second;
     if (!nb_allocator_is_valid(&desc->allocator))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
-    if (rate != 0 && !(rate >= 1 && rate <= NEBEL_MAX_FILM_RATE))
+    if (rate != 0 && !(rate >= 1 && rate <= NEBEL_MAX_MOVIE_RATE))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "%s: %g pictures a second; must be 1 to %d", codec->name, rate,
-                       NEBEL_MAX_FILM_RATE);
+                       NEBEL_MAX_MOVIE_RATE);
     if (desc->quality < 0 || desc->quality > 100)
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "%s: a quality of %d; must be 1 to 100", codec->name,
                        desc->quality);
-    if (!nebel_is_film_path(codec->name))
+    if (!nebel_is_movie_path(codec->name))
         return nb_fail(&desc->log, NEBEL_ERROR_FORMAT, "%s: unknown film format; the name must end in .webp",
                        codec->name);
     if (!nb_webp_is_built())
@@ -49,7 +49,7 @@ static nebel_result check_desc(const nb_codec *codec, const nebel_film_desc *des
     return NEBEL_OK;
 }
 
-nebel_result nebel_create_film(const char *path, const nebel_film_desc *desc, nebel_film **film)
+nebel_result nebel_create_movie(const char *path, const nebel_movie_desc *desc, nebel_movie **film)
 {
     if (film != NULL) *film = NULL;
     if (path == NULL || desc == NULL || film == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -57,24 +57,24 @@ nebel_result nebel_create_film(const char *path, const nebel_film_desc *desc, ne
     nebel_result result = check_desc(&codec, desc);
     if (result == NEBEL_OK) result = nb_file_try_room(&codec.allocator, &codec.log, path, LEAST_ROOM);
     if (result != NEBEL_OK) return result;
-    nebel_film *made = nb_allocate_zero(&codec.allocator, 1, sizeof *made + strlen(path) + 1);
+    nebel_movie *made = nb_allocate_zero(&codec.allocator, 1, sizeof *made + strlen(path) + 1);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
     made->path = strcpy((char *)(made + 1), path);
     made->codec = codec;
     made->codec.name = made->path;
-    made->rate = desc->frames_per_second == 0 ? NEBEL_DEFAULT_FILM_RATE : desc->frames_per_second;
-    made->quality = desc->quality == 0 ? NEBEL_DEFAULT_FILM_QUALITY : desc->quality;
+    made->rate = desc->frames_per_second == 0 ? NEBEL_DEFAULT_MOVIE_RATE : desc->frames_per_second;
+    made->quality = desc->quality == 0 ? NEBEL_DEFAULT_MOVIE_QUALITY : desc->quality;
     *film = made;
     return NEBEL_OK;
 }
 
 /* Milliseconds are whole in the file; rounded so, pictures do not drift from their time. */
-static double start_of(const nebel_film *film, uint64_t number)
+static double start_of(const nebel_movie *film, uint64_t number)
 {
     return floor(1000 * (double)number / film->rate + 0.5);
 }
 
-static nebel_result check_picture(nebel_film *film, const nebel_image *image)
+static nebel_result check_picture(nebel_movie *film, const nebel_image *image)
 {
     const nb_codec *codec = &film->codec;
     if (film->is_finished)
@@ -90,7 +90,7 @@ static nebel_result check_picture(nebel_film *film, const nebel_image *image)
     return NEBEL_OK;
 }
 
-nebel_result nebel_add_film_picture(nebel_film *film, const nebel_image *image)
+nebel_result nebel_add_movie_frame(nebel_movie *film, const nebel_image *image)
 {
     if (film == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = check_picture(film, image);
@@ -107,7 +107,7 @@ nebel_result nebel_add_film_picture(nebel_film *film, const nebel_image *image)
     return result;
 }
 
-nebel_result nebel_set_film_record(nebel_film *film, const char *record)
+nebel_result nebel_set_film_record(nebel_movie *film, const char *record)
 {
     if (film == NULL || record == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_result result = nb_record_check(&film->codec, record);
@@ -121,7 +121,7 @@ static void put_number(uint32_t number, unsigned char bytes[4])
 }
 
 /* The size in the first header counts all that follows it. */
-static void write_record(const nebel_film *film, nb_sink *sink)
+static void write_record(const nebel_movie *film, nb_sink *sink)
 {
     unsigned char chunk[8 + NEBEL_MAX_RECORD + 1] = NB_FILM_RECORD, size[4];
     const size_t length = strlen(film->record);
@@ -132,7 +132,7 @@ static void write_record(const nebel_film *film, nb_sink *sink)
     nb_sink_write(sink, 4, size, sizeof size);
 }
 
-static nebel_result write_film(const nebel_film *film, const nb_bytes *bytes)
+static nebel_result write_film(const nebel_movie *film, const nb_bytes *bytes)
 {
     const nb_codec *codec = &film->codec;
     nb_sink *sink;
@@ -145,7 +145,7 @@ static nebel_result write_film(const nebel_film *film, const nb_bytes *bytes)
     return result;
 }
 
-nebel_result nebel_finish_film(nebel_film *film)
+nebel_result nebel_finish_movie(nebel_movie *film)
 {
     nb_bytes bytes;
     if (film == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -158,7 +158,7 @@ nebel_result nebel_finish_film(nebel_film *film)
     return result == NEBEL_OK ? write_film(film, &bytes) : result;
 }
 
-void nebel_destroy_film(nebel_film *film)
+void nebel_destroy_movie(nebel_movie *film)
 {
     if (film == NULL) return;
     const nebel_allocator allocator = film->codec.allocator;

@@ -66,7 +66,7 @@ bool nb_image_ends_in(const char *path, const char *ending)
     return size > length && strcasecmp(path + size - length, ending) == 0;
 }
 
-nebel_image_format nebel_find_image_format(const char *path)
+nebel_image_format nebel_get_image_format(const char *path)
 {
     if (path == NULL) return NEBEL_IMAGE_NONE;
     if (nb_image_ends_in(path, ".png")) return NEBEL_IMAGE_PNG;
@@ -108,6 +108,6 @@ nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *de
     nb_codec codec;
     const nebel_result result = nb_codec_prepare(desc, path, &codec);
     if (result != NEBEL_OK) return result;
-    if (nebel_find_image_format(path) == NEBEL_IMAGE_NONE) return fail_ending(&codec);
+    if (nebel_get_image_format(path) == NEBEL_IMAGE_NONE) return fail_ending(&codec);
     return nb_file_try(&codec.allocator, &codec.log, path);
 }

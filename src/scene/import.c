@@ -41,7 +41,7 @@ static bool check_density(nb_json *json, const nb_json_node *node, const nb_impo
                check(json, nb_import_either(from->scale_height, node), "the scale height", &density->scale_height, 1,
                      &nb_range_extent);
     return density->type != NEBEL_DENSITY_SOFT_EDGE ||
-           check(json, nb_import_either(from->edge, node), "the depth of the edge", &density->distance, 1,
+           check(json, nb_import_either(from->edge, node), "the depth of the edge", &density->edge_width, 1,
                  &nb_range_extent);
 }
 

@@ -123,7 +123,7 @@ static bool make_faces(nb_scene_reader *in, const nb_json_node *node, nebel_shap
 static bool soften(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume, double edge)
 {
     if (edge == 0 || volume->shape.type == NEBEL_SHAPE_WORLD) return true;
-    volume->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = edge};
+    volume->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = edge};
     return volume->shape.type != NEBEL_SHAPE_BOX || make_faces(in, node, &volume->shape);
 }
 

@@ -66,7 +66,7 @@ static void set_faded_box(nebel_volume_desc *volume, const double size[3], const
     const int fades = edges[0] > 0 || edges[1] > 0 || edges[2] > 0;
     const int even = fabs(edges[1] - edges[0]) <= 1e-5 * edges[0] && fabs(edges[2] - edges[0]) <= 1e-5 * edges[0];
     volume->shape.type = NEBEL_SHAPE_BOX;
-    if (fades) volume->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = even ? edges[0] : 1};
+    if (fades) volume->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = even ? edges[0] : 1};
     for (int i = 0; i < 3; i++) {
         const double unit = even ? 1 : fmax(edges[i], 1e-6 * size[i]);
         volume->shape.transform.scale[i] = unit;

@@ -167,7 +167,7 @@ void nb_models_release(nebel_scene *scene)
 /* ---- loading --------------------------------------------------------------------------------- */
 
 /* The model of the file, as it is wanted. */
-static nb_model_source place_source(const nb_model_source *source, const nebel_model *model)
+static nb_model_source place_source(const nb_model_source *source, const nebel_scene_model *model)
 {
     nb_model_source placed = *source;
     memcpy(placed.position, model->position, sizeof placed.position);
@@ -185,11 +185,11 @@ static nb_model_source place_source(const nb_model_source *source, const nebel_m
 bool nb_scene_keep_file(nebel_scene *scene, const char *file)
 {
     void *files = (void *)scene->files;
-    const size_t count = scene->data.file_count;
+    const size_t count = scene->data.path_count;
     const bool room = nb_grow(&scene->allocator, &files, sizeof file, count, &scene->file_capacity, count + 1);
     scene->files = files;
     if (!room) return false;
-    scene->files[scene->data.file_count++] = file;
+    scene->files[scene->data.path_count++] = file;
     return true;
 }
 
@@ -198,21 +198,21 @@ void nb_scene_note_file(void *user, const char *path, const struct stat *status)
 {
     nebel_scene *scene = user;
     (void)status;
-    for (size_t i = 0; i < scene->data.file_count; i++)
+    for (size_t i = 0; i < scene->data.path_count; i++)
         if (strcmp(scene->files[i], path) == 0) return;
     const char *kept =
-        scene->data.file_count < NB_MOST_FILES ? nb_arena_copy_text(&scene->arena, path, strlen(path)) : NULL;
+        scene->data.path_count < NB_MOST_FILES ? nb_arena_copy_text(&scene->arena, path, strlen(path)) : NULL;
     if (kept != NULL) nb_scene_keep_file(scene, kept);
-    scene->data.files = scene->files;
+    scene->data.paths = scene->files;
 }
 
-static nebel_result load_all(nebel_scene *scene, const nebel_model *models, size_t count, nb_model_set *set)
+static nebel_result load_all(nebel_scene *scene, const nebel_scene_model *models, size_t count, nb_model_set *set)
 {
     nebel_result result = NEBEL_OK;
     double seconds = scene->budget.seconds;
     set->bytes = scene->budget.memory;
     for (size_t i = 0; i < count && result == NEBEL_OK; i++) {
-        const nb_model_source source = place_source(&scene->models[models[i].source], &models[i]);
+        const nb_model_source source = place_source(&scene->models[models[i].model_index], &models[i]);
         const nb_model_load load = {.allocator = scene->allocator,
                                     .log = scene->log,
                                     .source = &source,
@@ -231,15 +231,15 @@ static nebel_result load_all(nebel_scene *scene, const nebel_model *models, size
 nebel_result nebel_load_scene_models(nebel_scene *scene)
 {
     if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
-    return scene->models_loaded ? NEBEL_OK : nebel_load_models_anew(scene, scene->placements, scene->model_count);
+    return scene->models_loaded ? NEBEL_OK : nebel_reload_scene_models(scene, scene->placements, scene->model_count);
 }
 
-nebel_result nebel_load_models_anew(nebel_scene *scene, const nebel_model *models, size_t count)
+nebel_result nebel_reload_scene_models(nebel_scene *scene, const nebel_scene_model *models, size_t count)
 {
     nb_model_set set = {0};
     if (scene == NULL || (models == NULL && count > 0)) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < count; i++)
-        if (models[i].source >= scene->model_count)
+        if (models[i].model_index >= scene->model_count)
             return nb_fail(&scene->log, NEBEL_ERROR_ARGUMENT, "models: number %zu comes from none of the file", i);
     const nebel_result result = load_all(scene, models, count, &set);
     if (result != NEBEL_OK) {

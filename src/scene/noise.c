@@ -26,7 +26,7 @@ static bool take_density(nb_json *json, const nb_json_node *value, void *user)
 {
     noise_task *task = user;
     if (nb_json_parent(json, value) == NULL || !is_noise_type(json, value)) return true;
-    *task->noise = (nebel_scene_noise){.change = 0};
+    *task->noise = (nebel_scene_noise){.evolution = 0};
     if (!nb_read_noise_numbers(json, value, task->noise)) return false;
     task->is_noise = true;
     const nb_edit_object object = nb_edit_find(json, value);
@@ -70,8 +70,8 @@ static nebel_result find_noise(const nebel_allocator *allocator, const nebel_gri
     noise_task task = {.noise = noise};
     char *whole;
     *is_noise = false;
-    if (grid == NULL || nebel_grid_name(grid)[0] == '\0') return NEBEL_OK;
-    nebel_result result = wrap(allocator, nebel_grid_name(grid), &whole);
+    if (grid == NULL || nebel_get_grid_name(grid)[0] == '\0') return NEBEL_OK;
+    nebel_result result = wrap(allocator, nebel_get_grid_name(grid), &whole);
     if (result != NEBEL_OK) return result;
     result = read_words(allocator, &(nebel_log){.write = NULL}, whole, &task);
     nb_release(allocator, whole);
@@ -79,7 +79,7 @@ static nebel_result find_noise(const nebel_allocator *allocator, const nebel_gri
     return result == NEBEL_ERROR_MEMORY ? result : NEBEL_OK;
 }
 
-int nebel_find_scene_noise(const nebel_scene *scene, const nebel_grid *grid, nebel_scene_noise *noise)
+int nebel_get_scene_noise(const nebel_scene *scene, const nebel_grid *grid, nebel_scene_noise *noise)
 {
     bool is_noise;
     if (scene == NULL || noise == NULL) return 0;
@@ -90,7 +90,7 @@ int nebel_find_scene_noise(const nebel_scene *scene, const nebel_grid *grid, neb
 
 /* ---- at a frame ------------------------------------------------------------------------------ */
 
-nebel_result nebel_scene_grid(const nebel_scene *scene, nebel_grid *grid, double frame, nebel_grid **at)
+nebel_result nebel_get_scene_grid(const nebel_scene *scene, nebel_grid *grid, double frame, nebel_grid **at)
 {
     nebel_scene_noise noise;
     bool is_noise = false;
@@ -108,10 +108,10 @@ nebel_result nebel_scene_grid(const nebel_scene *scene, nebel_grid *grid, double
     nebel_noise_desc desc = noise.desc;
     desc.allocator = scene->allocator;
     desc.log = scene->log;
-    desc.name = nebel_grid_name(grid);
-    for (int k = 0; k < 3; k++) desc.offset[k] = noise.drift[k] * frame;
-    desc.time = noise.change * frame;
-    return nebel_create_noise(&desc, at);
+    desc.name = nebel_get_grid_name(grid);
+    for (int k = 0; k < 3; k++) desc.offset[k] = noise.velocity[k] * frame;
+    desc.time = noise.evolution * frame;
+    return nebel_create_noise_grid(&desc, at);
 }
 
 /* ---- with other numbers ---------------------------------------------------------------------- */
@@ -122,8 +122,9 @@ nebel_result nebel_scene_grid(const nebel_scene *scene, nebel_grid *grid, double
     }
 
 static const nb_place places[] = {
-    NOISE_PLACE("cells", desc.cells, 3), NOISE_PLACE("gain", desc.gain, 1), NOISE_PLACE("coverage", desc.coverage, 1),
-    NOISE_PLACE("edge", desc.edge, 3),   NOISE_PLACE("drift", drift, 3),    NOISE_PLACE("change", change, 1),
+    NOISE_PLACE("cells", desc.frequency, 3),   NOISE_PLACE("gain", desc.gain, 1),
+    NOISE_PLACE("coverage", desc.coverage, 1), NOISE_PLACE("edge", desc.falloff, 3),
+    NOISE_PLACE("drift", velocity, 3),         NOISE_PLACE("change", evolution, 1),
 };
 
 void nb_save_noise(nb_edit *edit, const nb_json *json, const nb_edit_object *object, const nebel_scene_noise *was,
@@ -195,10 +196,10 @@ static nebel_result make_noise(const nebel_scene *scene, const char *words, nebe
     noise.desc.allocator = scene->allocator;
     noise.desc.log = scene->log;
     noise.desc.name = words;
-    return nebel_create_noise(&noise.desc, grid);
+    return nebel_create_noise_grid(&noise.desc, grid);
 }
 
-nebel_result nebel_change_scene_noise(const nebel_scene *scene, const nebel_grid *grid, const nebel_scene_noise *noise,
+nebel_result nebel_update_scene_noise(const nebel_scene *scene, const nebel_grid *grid, const nebel_scene_noise *noise,
                                       nebel_grid **changed)
 {
     nebel_scene_noise was, wanted;
@@ -211,7 +212,7 @@ nebel_result nebel_change_scene_noise(const nebel_scene *scene, const nebel_grid
     if (result == NEBEL_OK && !is_noise) return NEBEL_ERROR_ARGUMENT;
     wanted = *noise;
     nb_space_restore_noise(&scene->space, &wanted);
-    if (result == NEBEL_OK) result = nb_noise_words(scene, nebel_grid_name(grid), &wanted, &words);
+    if (result == NEBEL_OK) result = nb_noise_words(scene, nebel_get_grid_name(grid), &wanted, &words);
     if (result == NEBEL_OK) result = make_noise(scene, (const char *)words.data, changed);
     nb_release(&scene->allocator, words.data);
     return result;

@@ -146,7 +146,7 @@ static nebel_result write_light(const nb_codec *codec, const nebel_photograph *p
 
 static nebel_result write_as(const nb_codec *codec, const nebel_photograph *photograph, const char *record)
 {
-    const nebel_image_format format = nebel_find_image_format(codec->name);
+    const nebel_image_format format = nebel_get_image_format(codec->name);
     nb_stored stored = {.width = photograph->width, .height = photograph->height, .pixels = photograph->pixels};
     if (format == NEBEL_IMAGE_PNG && is_stored(photograph->type, &stored)) return write_stored(codec, &stored, record);
     if (format == NEBEL_IMAGE_EXR && is_float(photograph->type)) return write_light(codec, photograph, record);
@@ -201,7 +201,7 @@ nebel_result nebel_write_gray(const char *path, const nebel_scene_desc *desc, ui
     if (path == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = nb_codec_prepare(desc, path, &codec);
     if (result == NEBEL_OK) result = check(&codec, width, height, values, record);
-    if (result == NEBEL_OK && nebel_find_image_format(path) != NEBEL_IMAGE_PNG)
+    if (result == NEBEL_OK && nebel_get_image_format(path) != NEBEL_IMAGE_PNG)
         result = nb_fail(&codec.log, NEBEL_ERROR_FORMAT, "%s: gray is written as .png; name it so", path);
     return result == NEBEL_OK ? write_gray_png(&codec, width, height, values, record) : result;
 }

@@ -31,18 +31,18 @@ static void aim(int row, nb_sky_row *looks)
     }
 }
 
-static void look(const nebel_air_view *view, nb_sky_row *looks)
+static void look(const nebel_sky_view *view, nb_sky_row *looks)
 {
     const double *const direction[3] = {looks->direction[0], looks->direction[1], looks->direction[2]};
-    const nebel_transfer_planes lights = {
+    const nebel_transfer_planes transfers = {
         .transmittance = {looks->transmittance[0], looks->transmittance[1], looks->transmittance[2]},
         .in_scattering = {looks->light[0], looks->light[1], looks->light[2]}};
     const nebel_ground_planes ground = {.distance = looks->distance,
                                         .normal = {looks->normal[0], looks->normal[1], looks->normal[2]},
                                         .sun = {looks->sun[0], looks->sun[1], looks->sun[2]},
                                         .sky = {looks->sky[0], looks->sky[1], looks->sky[2]}};
-    nebel_trace_air_view(view, LOOKS, direction, NULL, &lights);
-    nebel_find_ground(view, LOOKS, direction, &ground);
+    nebel_trace_sky_view(view, LOOKS, direction, NULL, &transfers);
+    nebel_trace_ground(view, LOOKS, direction, &ground);
 }
 
 /* Radiance of a look, with Lambert's ground behind the air. */
@@ -53,10 +53,10 @@ static double radiance(const nb_sky_row *looks, const nebel_planet *planet, cons
     double cosine = 0;
     for (int k = 0; k < 3; k++) cosine += sun[k] * (double)looks->normal[k][i];
     const double arrives = fmax(0, cosine) * (double)looks->sun[c][i] + (double)looks->sky[c][i];
-    return light + (double)looks->transmittance[c][i] * planet->air.ground_albedo[c] / pi * arrives;
+    return light + (double)looks->transmittance[c][i] * planet->atmosphere_desc.ground_albedo[c] / pi * arrives;
 }
 
-static nebel_result make_map(nebel_scene *scene, const nebel_planet *planet, const nebel_air_view *view,
+static nebel_result make_map(nebel_scene *scene, const nebel_planet *planet, const nebel_sky_view *view,
                              nebel_environment_map **map)
 {
     nebel_result result = NEBEL_ERROR_MEMORY;
@@ -81,18 +81,18 @@ static nebel_result make_map(nebel_scene *scene, const nebel_planet *planet, con
 /* The sky becomes ambient light where the file has none of its own. */
 static nebel_result set_environment(nebel_scene *scene, const nebel_planet *planet, const nebel_sun *sun)
 {
-    nebel_air_view *view;
-    const nebel_air_view_desc desc = {.atmosphere = planet->atmosphere,
+    nebel_sky_view *view;
+    const nebel_sky_view_desc desc = {.atmosphere = planet->atmosphere,
                                       .sun = *sun,
                                       .run = scene->run,
                                       .run_user = scene->run_user,
                                       .allocator = scene->allocator,
                                       .log = scene->log};
-    nebel_result result = nebel_create_air_view(&desc, &view);
+    nebel_result result = nebel_create_sky_view(&desc, &view);
     if (result != NEBEL_OK) return result;
     nebel_environment_map *map = NULL;
     result = make_map(scene, planet, view, &map);
-    nebel_destroy_air_view(view);
+    nebel_destroy_sky_view(view);
     if (result != NEBEL_OK) return result;
     nebel_release_environment_map(scene->environment_map);
     scene->environment_map = map;
@@ -104,12 +104,12 @@ static nebel_result set_environment(nebel_scene *scene, const nebel_planet *plan
 static double uneclipsed(const nebel_scene_data *data, const double to_sun[3])
 {
     static const double origin[3] = {0, 0, 0};
-    const double sun = 0.5 * data->planets[0].sun_diameter * (pi / 180);
+    const double sun = 0.5 * data->planets[0].sun_angular_diameter * (pi / 180);
     double left = 1;
     for (size_t i = 1; i < data->planet_count; i++) {
-        const nebel_atmosphere_desc *air = &data->planets[i].air;
+        const nebel_atmosphere_desc *air = &data->planets[i].atmosphere_desc;
         double center[3];
-        nb_vector_ball_middle(air->ground, air->radius, center);
+        nb_vector_ball_middle(air->ground_point, air->radius, center);
         left *= nb_eclipse_left(origin, center, air->radius, to_sun, sun);
     }
     return left;
@@ -122,8 +122,8 @@ nebel_result nb_planet_light(nebel_scene *scene)
     if (planet == NULL || planet->atmosphere == NULL) return NEBEL_OK;
     const nebel_sun sun = nb_scene_sun(&scene->data),
                     white = {{sun.direction[0], sun.direction[1], sun.direction[2]}, {1, 1, 1}};
-    nebel_air_light light;
-    nebel_result result = nebel_light_air(planet->atmosphere, &white, 1, origin, 0, &light, 0);
+    nebel_irradiance light;
+    nebel_result result = nebel_compute_atmosphere_irradiance(planet->atmosphere, &white, 1, origin, 0, &light, 0);
     if (result == NEBEL_OK && !scene->has_ambient) result = set_environment(scene, planet, &sun);
     const double seen = uneclipsed(&scene->data, white.direction);
     for (int c = 0; c < 3 && result == NEBEL_OK; c++) planet->sun_left[c] = seen * light.sun[c];
@@ -133,7 +133,7 @@ nebel_result nb_planet_light(nebel_scene *scene)
 static nebel_result set_air(nebel_scene *scene, size_t number)
 {
     nebel_planet *planet = &scene->planets[number];
-    nebel_atmosphere_desc desc = planet->air;
+    nebel_atmosphere_desc desc = planet->atmosphere_desc;
     desc.run = scene->run;
     desc.run_user = scene->run_user;
     desc.allocator = scene->allocator;
@@ -161,19 +161,21 @@ static nebel_result set_clouds(nebel_scene *scene)
 static nebel_result shade_origin(const nebel_scene *scene, double frame, float *sun, float *sky)
 {
     static const double origin[1][3] = {{0, 0, 0}};
-    const nebel_cloud_view_desc desc = {.clouds = scene->clouds,
-                                        .sun = nb_scene_sun(&scene->data),
-                                        .time = frame,
-                                        .allocator = scene->allocator,
-                                        .log = scene->log};
-    nebel_cloud_view *view;
+    const nebel_cloud_lighting_desc desc = {.clouds = scene->clouds,
+                                            .sun = nb_scene_sun(&scene->data),
+                                            .time = frame,
+                                            .allocator = scene->allocator,
+                                            .log = scene->log};
+    nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace = NULL;
-    nebel_result result = nebel_create_cloud_view(&desc, &view);
+    nebel_result result = nebel_create_cloud_lighting(&desc, &view);
     if (result == NEBEL_OK) result = nebel_create_cloud_workspace(view, &workspace);
-    if (result == NEBEL_OK) result = nebel_shade_clouds(workspace, NB_FOG_SHADE_ORIGIN, 1, origin, 0, sun);
-    if (result == NEBEL_OK) result = nebel_shade_sky(workspace, NB_FOG_SHADE_ORIGIN, 1, origin, 0, sky);
+    if (result == NEBEL_OK)
+        result = nebel_compute_cloud_sun_transmittance(workspace, NB_FOG_SHADE_ORIGIN, 1, origin, 0, sun);
+    if (result == NEBEL_OK)
+        result = nebel_compute_cloud_sky_transmittance(workspace, NB_FOG_SHADE_ORIGIN, 1, origin, 0, sky);
     nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_lighting(view);
     return result;
 }
 
@@ -201,12 +203,12 @@ nebel_result nebel_find_scene_sunlight(const nebel_scene *scene, double frame, n
 
 static nebel_result load_layers(nebel_scene *scene)
 {
-    nebel_layers_desc desc = scene->planets->shells;
+    nebel_textured_planet_desc desc = scene->planets->textured_desc;
     desc.allocator = scene->allocator;
     desc.log = scene->log;
     if (scene->layers != NULL) return NEBEL_OK;
-    const nebel_result result = nebel_create_layers(&desc, &scene->layers);
-    scene->planets->layers = scene->layers;
+    const nebel_result result = nebel_create_textured_planet(&desc, &scene->layers);
+    scene->planets->textured = scene->layers;
     return result;
 }
 
@@ -233,10 +235,10 @@ static nebel_result load_air(nebel_scene *scene)
     return result;
 }
 
-nebel_result nebel_load_scene_planet(nebel_scene *scene)
+nebel_result nebel_load_scene_planets(nebel_scene *scene)
 {
     if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (scene->planets != NULL && scene->planets->model == NEBEL_PLANET_LAYERS) return load_layers(scene);
+    if (scene->planets != NULL && scene->planets->model == NEBEL_PLANET_TEXTURED) return load_layers(scene);
     if (scene->planets == NULL || scene->planets->atmosphere != NULL) return NEBEL_OK;
     const nebel_result result = load_air(scene);
     if (result == NEBEL_OK) return NEBEL_OK;
@@ -245,12 +247,12 @@ nebel_result nebel_load_scene_planet(nebel_scene *scene)
 
 /* ---- other numbers --------------------------------------------------------------------------- */
 
-/* What nebel_load_scene_planet makes, and what it is made of. */
+/* What nebel_load_scene_planets makes, and what it is made of. */
 typedef struct nb_made_planets {
     nebel_planet planets[NEBEL_MAX_PLANETS];
     nebel_atmosphere *atmospheres[NEBEL_MAX_PLANETS];
     nebel_clouds *clouds;
-    nebel_layers *layers;
+    nebel_textured_planet *layers;
 } nb_made_planets;
 
 static void keep_made(const nebel_scene *scene, nb_made_planets *kept)
@@ -272,7 +274,7 @@ static void put_made_back(nebel_scene *scene, const nb_made_planets *kept)
 static void destroy_made(const nb_made_planets *kept)
 {
     nebel_destroy_clouds(kept->clouds);
-    nebel_destroy_layers(kept->layers);
+    nebel_destroy_textured_planet(kept->layers);
     for (int i = 0; i < NEBEL_MAX_PLANETS; i++) nebel_destroy_atmosphere(kept->atmospheres[i]);
 }
 
@@ -283,7 +285,7 @@ static void detach_made(nebel_scene *scene)
         scene->atmospheres[i] = NULL;
         scene->planets[i].atmosphere = NULL;
         scene->planets[i].clouds = NULL;
-        scene->planets[i].layers = NULL;
+        scene->planets[i].textured = NULL;
     }
     scene->clouds = NULL;
     scene->layers = NULL;
@@ -291,13 +293,14 @@ static void detach_made(nebel_scene *scene)
 
 static void take_airs(const nebel_planet *from, nebel_planet *to)
 {
-    for (uint32_t i = 0; i < to->air.air_count; i++) {
-        const nebel_air_profile profile = to->air.airs[i].profile;
-        to->air.airs[i] = from->air.airs[i];
-        to->air.airs[i].profile = profile;
+    for (uint32_t i = 0; i < to->atmosphere_desc.component_count; i++) {
+        const nebel_component_profile profile = to->atmosphere_desc.components[i].profile;
+        to->atmosphere_desc.components[i] = from->atmosphere_desc.components[i];
+        to->atmosphere_desc.components[i].profile = profile;
     }
-    memcpy(to->air.ground_albedo, from->air.ground_albedo, sizeof to->air.ground_albedo);
-    to->sun_diameter = from->sun_diameter;
+    memcpy(to->atmosphere_desc.ground_albedo, from->atmosphere_desc.ground_albedo,
+           sizeof to->atmosphere_desc.ground_albedo);
+    to->sun_angular_diameter = from->sun_angular_diameter;
 }
 
 static void take_clouds(const nebel_planet *from, nebel_planet *to)
@@ -306,33 +309,33 @@ static void take_clouds(const nebel_planet *from, nebel_planet *to)
         const nebel_cloud_layer own = to->cloud_layers[i];
         nebel_cloud_layer *layer = &to->cloud_layers[i];
         *layer = from->cloud_layers[i];
-        layer->kind = own.kind;
+        layer->type = own.type;
         layer->seed = own.seed;
-        layer->weather = own.weather;
+        layer->weather_map = own.weather_map;
     }
 }
 
-static void take_shells(const nebel_layers_desc *from, nebel_layers_desc *to)
+static void take_shells(const nebel_textured_planet_desc *from, nebel_textured_planet_desc *to)
 {
-    to->day = from->day;
-    to->coverage = from->coverage;
-    to->air = from->air;
-    for (uint32_t i = 0; i < to->cloud_count; i++) {
-        const nebel_cloud_shell own = to->clouds[i];
-        nebel_cloud_shell *shell = &to->clouds[i];
-        *shell = from->clouds[i];
-        shell->map = own.map;
-        shell->detail = own.detail;
+    to->rotation_period = from->rotation_period;
+    to->land_coverage = from->land_coverage;
+    to->atmosphere = from->atmosphere;
+    for (uint32_t i = 0; i < to->cloud_shell_count; i++) {
+        const nebel_cloud_shell own = to->cloud_shells[i];
+        nebel_cloud_shell *shell = &to->cloud_shells[i];
+        *shell = from->cloud_shells[i];
+        shell->coverage_map = own.coverage_map;
+        shell->detail_map = own.detail_map;
         shell->seed = own.seed;
     }
 }
 
 static bool has_good_sun(const nebel_planet *planet)
 {
-    return planet->sun_diameter >= 0 && planet->sun_diameter <= 10;
+    return planet->sun_angular_diameter >= 0 && planet->sun_angular_diameter <= 10;
 }
 
-nebel_result nebel_change_scene_planets(nebel_scene *scene, const nebel_planet *planets)
+nebel_result nebel_update_scene_planets(nebel_scene *scene, const nebel_planet *planets)
 {
     if (scene == NULL || planets == NULL || (scene->atmospheres[0] == NULL && scene->layers == NULL))
         return NEBEL_ERROR_ARGUMENT;
@@ -345,7 +348,7 @@ nebel_result nebel_change_scene_planets(nebel_scene *scene, const nebel_planet *
     for (size_t i = 0; i < scene->data.planet_count; i++) {
         take_airs(&planets[i], &scene->planets[i]);
         take_clouds(&planets[i], &scene->planets[i]);
-        take_shells(&planets[i].shells, &scene->planets[i].shells);
+        take_shells(&planets[i].textured_desc, &scene->planets[i].textured_desc);
     }
     const nebel_result result = kept.layers != NULL ? load_layers(scene) : load_air(scene);
     if (result == NEBEL_OK)

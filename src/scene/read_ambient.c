@@ -96,13 +96,13 @@ static bool read_file(nb_scene_reader *in, const nb_json_node *node, nebel_envir
     nb_note note = {""};
     const nebel_log log = nb_note_log(&note);
     if (!nb_value_text(in->json, node, &scene->arena, &path)) return false;
-    if (nebel_find_image_format(path) != NEBEL_IMAGE_EXR)
+    if (nebel_get_image_format(path) != NEBEL_IMAGE_EXR)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
                             "is \"%s\"; must be the path of an OpenEXR picture, .exr", path);
     const char *file = nb_path_join(&scene->arena, scene->folder, path);
     if (file == NULL || !nb_scene_keep_file(scene, file))
         return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
-    scene->data.environment_file = file;
+    scene->data.environment_path = file;
     double bytes = 0;
     const nebel_result result = load_map(scene, &log, file, &scene->environment_map, &bytes);
     environment->map = scene->environment_map;
@@ -115,8 +115,9 @@ static bool read_map(nb_scene_reader *in, const nb_json_node *node, nebel_enviro
     enum { TYPE, FILE_KEY, ROTATION, INTENSITY, COUNT };
     static const char *const names[] = {"type", "file", "rotation", "intensity"};
     static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(TYPE) | NB_BIT(FILE_KEY), "an environment"};
-    static const nb_range rotation_range = {
-        .low = -NEBEL_MAX_ROTATION, .high = NEBEL_MAX_ROTATION, .text = "a number of degrees from -1e6 to 1e6"};
+    static const nb_range rotation_range = {.low = -NEBEL_MAX_ENVIRONMENT_ROTATION,
+                                            .high = NEBEL_MAX_ENVIRONMENT_ROTATION,
+                                            .text = "a number of degrees from -1e6 to 1e6"};
     static const nb_range intensity_range = {
         .low = 0, .high = NEBEL_MAX_AMOUNT, .open = true, .text = "a number > 0 and < " NB_TEXT(NEBEL_MAX_AMOUNT)};
     const nb_json_node *found[COUNT];

@@ -24,24 +24,24 @@ static bool read_numbers(nb_scene_reader *in, const nb_json_node *const *found, 
         .low = 1e-15, .high = 1e12, .dimension = NB_LENGTH, .text = "a height above the ground"};
     static const nb_range size_range = {.low = 1e-3, .high = 1e9, .dimension = NB_LENGTH, .text = "a length"};
     static const nb_range amount_range = {
-        .low = 1e-12, .high = NEBEL_MAX_AIR_EXTINCTION, .dimension = NB_PER_LENGTH, .text = "an amount"};
+        .low = 1e-12, .high = NEBEL_MAX_COMPONENT_EXTINCTION, .dimension = NB_PER_LENGTH, .text = "an amount"};
     static const nb_range diameter_range = {
-        .low = 4, .high = NEBEL_MAX_DROPLET, .text = "a number of micrometres from 4 to 50"};
+        .low = 4, .high = NEBEL_MAX_DROPLET_DIAMETER, .text = "a number of micrometres from 4 to 50"};
     static const nb_range wind_range = {.low = -1e12, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
     nb_json *json = in->json;
     if (!nb_value_number(json, found[BASE], &height_range, &layer->base) ||
         !nb_value_number(json, found[TOP], &height_range, &layer->top) ||
         !nb_value_number(json, found[COVERAGE], &nb_range_fraction, &layer->coverage) ||
         !nb_value_number(json, found[EXTINCTION], &amount_range, &layer->extinction) ||
-        !nb_value_number(json, found[SIZE], &size_range, &layer->size) ||
-        !read_part(json, found[DETAIL], &layer->detail) || !read_part(json, found[VARIATION], &layer->variation) ||
-        !nb_value_number(json, found[DIAMETER], &diameter_range, &layer->diameter) ||
+        !nb_value_number(json, found[SIZE], &size_range, &layer->cell_size) ||
+        !read_part(json, found[DETAIL], &layer->erosion) || !read_part(json, found[VARIATION], &layer->patchiness) ||
+        !nb_value_number(json, found[DIAMETER], &diameter_range, &layer->droplet_diameter) ||
         !nb_value_numbers(json, found[WIND], &wind_range, 2, layer->wind))
         return false;
     const double unit = in->space.unit;
     layer->base *= unit;
     layer->top *= unit;
-    layer->size *= unit;
+    layer->cell_size *= unit;
     layer->extinction /= unit;
     /* Level axes of the file: x and z, or x and y where z is up. */
     for (int i = 0; i < 2; i++) layer->wind[i] *= i == 1 && in->space.z_up ? -unit : unit;
@@ -67,7 +67,7 @@ static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const neb
     for (uint32_t i = 0; i < planet->cloud_layer_count; i++) {
         nebel_cloud_layer other;
         char note[NB_UNIT_NOTE];
-        (void)nebel_resolve_cloud_layer(planet->air.thickness, &planet->cloud_layers[i], NULL, &other);
+        (void)nebel_resolve_cloud_layer(planet->atmosphere_desc.thickness, &planet->cloud_layers[i], NULL, &other);
         if (layer->base >= other.top || other.base >= layer->top) continue;
         return nb_json_fail(
             in->json, NEBEL_ERROR_FORMAT, node,
@@ -79,10 +79,10 @@ static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const neb
 
 static bool check_size(nb_json *json, const nb_json_node *node, const nebel_planet *planet, bool is_given, double size)
 {
-    const double most = NEBEL_MAX_CLOUD_RADII * planet->air.radius;
+    const double most = NEBEL_MAX_CLOUD_CELL_RADII * planet->atmosphere_desc.radius;
     char message[140];
     snprintf(message, sizeof message, "size: is %g m%s; must be at most %g m, which is %g times the radius", size,
-             is_given ? "" : ", as none is given", most, NEBEL_MAX_CLOUD_RADII);
+             is_given ? "" : ", as none is given", most, NEBEL_MAX_CLOUD_CELL_RADII);
     return size <= most || nb_value_fail_within(json, node, message, "");
 }
 
@@ -96,27 +96,27 @@ static bool read_layer(nb_scene_reader *in, const nb_json_node *node, nebel_plan
     *layer = (nebel_cloud_layer){.seed = 1 + planet->cloud_layer_count};
     if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {...}") || !nb_value_members(json, node, &keys, found))
         return false;
-    const int kind = found[KIND] != NULL ? nb_value_choice(json, found[KIND], kind_names, NEBEL_CLOUD_KIND_COUNT) : 0;
+    const int kind = found[KIND] != NULL ? nb_value_choice(json, found[KIND], kind_names, NEBEL_CLOUD_TYPE_COUNT) : 0;
     if (kind < 0 || !read_numbers(in, found, layer) || !nb_read_seed(in, found[SEED], &layer->seed) ||
-        !nb_read_map(in, found[WEATHER], 1, &layer->weather))
+        !nb_read_map(in, found[WEATHER], 1, &layer->weather_map))
         return false;
-    layer->kind = (nebel_cloud_kind)kind;
+    layer->type = (nebel_cloud_type)kind;
     nebel_cloud_layer resolved;
-    if (!try_layer(in, node, planet->air.thickness, layer, &resolved)) return false;
+    if (!try_layer(in, node, planet->atmosphere_desc.thickness, layer, &resolved)) return false;
     if (found[COVERAGE] != NULL && layer->coverage == 0) return true;
-    if (!check_size(json, node, planet, found[SIZE] != NULL, resolved.size) ||
+    if (!check_size(json, node, planet, found[SIZE] != NULL, resolved.cell_size) ||
         !check_apart(in, node, planet, &resolved))
         return false;
     planet->cloud_layer_count++;
-    in->scene->data.moves_on |= layer->wind[0] != 0 || layer->wind[1] != 0;
+    in->scene->data.has_endless_motion |= layer->wind[0] != 0 || layer->wind[1] != 0;
     return true;
 }
 
 static bool has_air(const nebel_atmosphere_desc *desc)
 {
-    for (uint32_t i = 0; i < desc->air_count; i++)
+    for (uint32_t i = 0; i < desc->component_count; i++)
         for (int c = 0; c < 3; c++)
-            if (desc->airs[i].scattering[c] > 0 || desc->airs[i].absorption[c] > 0) return true;
+            if (desc->components[i].scattering[c] > 0 || desc->components[i].absorption[c] > 0) return true;
     return false;
 }
 
@@ -128,7 +128,7 @@ bool nb_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet 
         return false;
     for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_layer(in, one, planet)) return false;
-    return planet->cloud_layer_count == 0 || has_air(&planet->air) ||
+    return planet->cloud_layer_count == 0 || has_air(&planet->atmosphere_desc) ||
            nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
                         "need air, and the planet has none; leave them out, or give it another \"preset\" or \"airs\"");
 }

@@ -83,7 +83,7 @@ static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_
            nb_value_integer(json, found[POWER], 1, 3, &density->power) &&
            nb_value_place(json, found[CENTER], density->center) &&
            nb_value_number(json, found[SIGMA], &nb_range_extent, &density->sigma) &&
-           nb_value_number(json, found[DISTANCE], &nb_range_extent, &density->distance) &&
+           nb_value_number(json, found[DISTANCE], &nb_range_extent, &density->edge_width) &&
            nb_value_number(json, found[RADIUS], &nb_range_extent, &density->radius);
 }
 
@@ -99,10 +99,10 @@ static bool read_altitude(nb_scene_reader *in, const nb_json_node *const *found,
         density->center[1] = -density->radius * in->space.unit;
         nb_space_restore_place(&in->space, density->center);
     }
-    if (density->radius + density->base >= NEBEL_MIN_CURVATURE * density->scale_height) return true;
+    if (density->radius + density->base >= NEBEL_MIN_ALTITUDE_RATIO * density->scale_height) return true;
     return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, found[SCALE_HEIGHT],
                         "is %g; must be at most a %dth of the distance of the base from the center, %g",
-                        density->scale_height, NEBEL_MIN_CURVATURE, density->radius + density->base);
+                        density->scale_height, NEBEL_MIN_ALTITUDE_RATIO, density->radius + density->base);
 }
 
 bool nb_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
@@ -165,7 +165,7 @@ bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *p
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(DIAMETER), NB_BIT(DIAMETER), "a droplets phase function"}};
     static const nb_range alpha_range = {.low = 0, .high = NEBEL_MAX_ALPHA, .text = "a number from 0 to 1e9"};
     static const nb_range diameter_range = {
-        .low = 1e-6, .high = NEBEL_MAX_DROPLET, .text = "a diameter within 1e-6 and 50 micrometres"};
+        .low = 1e-6, .high = NEBEL_MAX_DROPLET_DIAMETER, .text = "a diameter within 1e-6 and 50 micrometres"};
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
     const int type = nb_value_type(in->json, node, phase_names, (int)(sizeof types / sizeof *types));

@@ -37,7 +37,7 @@ bool nb_read_multiple_scattering(nb_scene_reader *in, const nb_json_node *node)
          !nb_value_integer(json, found[CELLS], NEBEL_MIN_DIFFUSION_CELLS, NEBEL_MAX_DIFFUSION_CELLS, &cells)) ||
         !read_ground(in, found[GROUND], desc))
         return false;
-    desc->cells = (uint32_t)cells;
+    desc->max_cells = (uint32_t)cells;
     const double lattice = nb_diffusion_cells(desc);
     if (!nb_scene_charge(in, node, lattice * NB_CELL_BYTES, lattice * NB_CELL_SECONDS)) return false;
     in->scene->budget.lattice = lattice;

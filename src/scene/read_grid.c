@@ -43,7 +43,7 @@ static bool read_choices(nb_json *json, const nb_json_node *const *found, nebel_
     int filter = 0, type = 0;
     if (found[FILTER] != NULL) filter = nb_value_choice(json, found[FILTER], filter_names, 2);
     if (found[VOXELS] != NULL) type = nb_value_choice(json, found[VOXELS], voxel_names, 3);
-    file->filter = (nebel_filter)filter;
+    file->filter = (nebel_grid_filter)filter;
     file->type = (nebel_voxel_type)type;
     return filter >= 0 && type >= 0;
 }
@@ -70,15 +70,15 @@ static bool read_file(nb_scene_reader *in, const nb_json_node *const *found, neb
     const char *path = "";
     int slices = 0;
     if (!nb_value_text(in->json, found[FILE_KEY], arena, &path) ||
-        (found[GRID] != NULL && !nb_value_text(in->json, found[GRID], arena, &file->grid)) ||
+        (found[GRID] != NULL && !nb_value_text(in->json, found[GRID], arena, &file->grid_name)) ||
         !nb_value_integer(in->json, found[SLICES], 1, NEBEL_MAX_GRID_SIZE, &slices) ||
         !nb_read_grid_size(in->json, found[SIZE], file->size) || !read_choices(in->json, found, file))
         return false;
     if (path[0] == '\0')
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, found[FILE_KEY], "is empty; must be the path of a file");
-    file->slices = (size_t)slices;
-    file->file = nb_path_join(arena, in->scene->folder, path);
-    return file->file != NULL || nb_json_fail(in->json, NEBEL_ERROR_MEMORY, found[FILE_KEY], "out of memory");
+    file->slice_count = (size_t)slices;
+    file->path = nb_path_join(arena, in->scene->folder, path);
+    return file->path != NULL || nb_json_fail(in->json, NEBEL_ERROR_MEMORY, found[FILE_KEY], "out of memory");
 }
 
 bool nb_scene_keep_grid(nb_scene_reader *in, const nb_json_node *node, nebel_grid *grid)
@@ -97,7 +97,7 @@ bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *
 {
     const nb_json_node *found[GRID_KEY_COUNT];
     nb_json *json = in->json;
-    nebel_grid_file file = {.filter = NEBEL_FILTER_LINEAR};
+    nebel_grid_file file = {.filter = NEBEL_GRID_FILTER_LINEAR};
     nb_note note = {""};
     const nebel_scene_desc desc = {
         .allocator = in->scene->allocator, .log = nb_note_log(&note), .memory = nb_scene_room(in->scene)};
@@ -105,7 +105,7 @@ bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *
         !read_file(in, found, &file))
         return false;
     file.name = nb_arena_copy_text(&in->scene->arena, json->desc.text + node->offset, node->end - node->offset);
-    if (file.name == NULL || !nb_scene_keep_file(in->scene, file.file))
+    if (file.name == NULL || !nb_scene_keep_file(in->scene, file.path))
         return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     *density = (nebel_density){.type = NEBEL_DENSITY_GRID};
     uint64_t bytes = 0;

@@ -38,14 +38,14 @@ static bool make_room(const nb_codec *codec, size_t count, int channels, const n
     return *texels != NULL;
 }
 
-static nebel_result set_map(const nb_codec *codec, nebel_image *image, int channels, nebel_map *map)
+static nebel_result set_map(const nb_codec *codec, nebel_image *image, int channels, nebel_planet_map *map)
 {
     static const char *const colors[3] = {"R", "G", "B"};
     int first[3];
     float *texels;
-    if (image->width > NEBEL_MAX_MAP_SIZE || image->height > NEBEL_MAX_MAP_SIZE)
+    if (image->width > NEBEL_MAX_PLANET_MAP_SIZE || image->height > NEBEL_MAX_PLANET_MAP_SIZE)
         return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: has %u x %u pixels; a map has at most %d on each side",
-                       codec->name, (unsigned)image->width, (unsigned)image->height, NEBEL_MAX_MAP_SIZE);
+                       codec->name, (unsigned)image->width, (unsigned)image->height, NEBEL_MAX_PLANET_MAP_SIZE);
     for (int c = 0; c < 3; c++) {
         first[c] = nb_image_channel(image, colors[c]);
         if (first[c] < 0) first[c] = nb_image_channel(image, "Y");
@@ -55,10 +55,10 @@ static nebel_result set_map(const nb_codec *codec, nebel_image *image, int chann
     const size_t count = (size_t)image->width * image->height * (size_t)channels;
     if (!make_room(codec, count, channels, image, &texels))
         return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", codec->name);
-    keep_channels(image, first, channels, nebel_find_image_format(codec->name) == NEBEL_IMAGE_EXR, texels);
+    keep_channels(image, first, channels, nebel_get_image_format(codec->name) == NEBEL_IMAGE_EXR, texels);
     if (texels != image->samples) nb_release(&codec->allocator, image->samples);
     image->samples = texels;
-    *map = (nebel_map){image->width, image->height, channels, texels};
+    *map = (nebel_planet_map){image->width, image->height, channels, texels};
     for (size_t i = 0; i < count; i++)
         if (!(image->samples[i] >= 0 && image->samples[i] <= 1))
             return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: holds %g; a map holds numbers from 0 to 1",
@@ -66,14 +66,14 @@ static nebel_result set_map(const nb_codec *codec, nebel_image *image, int chann
     return NEBEL_OK;
 }
 
-bool nb_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, nebel_map *map)
+bool nb_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, nebel_planet_map *map)
 {
     nebel_scene *scene = in->scene;
     const char *path = "";
     nb_note note = {""};
     if (node == NULL) return true;
     if (!nb_value_text(in->json, node, &scene->arena, &path)) return false;
-    if (nebel_find_image_format(path) == NEBEL_IMAGE_NONE)
+    if (nebel_get_image_format(path) == NEBEL_IMAGE_NONE)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
                             "is \"%s\"; must be the path of a picture, .png or .exr", path);
     const char *file = nb_path_join(&scene->arena, scene->folder, path);
@@ -114,10 +114,11 @@ static bool read_cloud(nb_scene_reader *in, const nb_json_node *node, nebel_clou
     nb_json *json = in->json;
     if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {...}") || !nb_value_members(json, node, &keys, found) ||
         !nb_value_number(json, found[HEIGHT], &height_range, &shell->height) ||
-        !nb_value_number(json, found[DAY], &day_range, &shell->day) ||
+        !nb_value_number(json, found[DAY], &day_range, &shell->rotation_period) ||
         !nb_value_color(json, found[COLOR], &nb_range_fraction, shell->color) ||
-        !nb_read_map(in, found[MAP], 1, &shell->map) || !nb_read_map(in, found[DETAIL], 1, &shell->detail) ||
-        !nb_value_numbers(json, found[WRAP], &wrap_range, 3, shell->wrap) ||
+        !nb_read_map(in, found[MAP], 1, &shell->coverage_map) ||
+        !nb_read_map(in, found[DETAIL], 1, &shell->detail_map) ||
+        !nb_value_numbers(json, found[WRAP], &wrap_range, 3, shell->uv_tiling) ||
         !nb_value_number(json, found[GAIN], &gain_range, &shell->gain) ||
         !nb_value_number(json, found[COVERAGE], &part_range, &shell->coverage) ||
         !nb_read_seed(in, found[SEED], &shell->seed))
@@ -126,29 +127,29 @@ static bool read_cloud(nb_scene_reader *in, const nb_json_node *node, nebel_clou
     return true;
 }
 
-static bool read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_layers_desc *desc)
+static bool read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_textured_planet_desc *desc)
 {
     if (node == NULL) return true;
     if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of shells of clouds") ||
         !nb_value_at_most(in->json, node, NEBEL_MAX_CLOUD_SHELLS, "a planet", "shells of clouds"))
         return false;
     for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
-        if (!read_cloud(in, one, &desc->clouds[desc->cloud_count++])) return false;
+        if (!read_cloud(in, one, &desc->cloud_shells[desc->cloud_shell_count++])) return false;
     return true;
 }
 
-static bool read_ramp(nb_json *json, const nb_json_node *node, nebel_air_shell *air)
+static bool read_ramp(nb_json *json, const nb_json_node *node, nebel_atmosphere_shell *air)
 {
     if (node == NULL) return true;
     if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of colours") ||
-        !nb_value_at_most(json, node, NEBEL_MAX_RAMP, "a ramp", "colours"))
+        !nb_value_at_most(json, node, NEBEL_MAX_RAMP_COLORS, "a ramp", "colours"))
         return false;
     for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one))
         if (!nb_value_color(json, one, &nb_range_fraction, air->ramp[air->ramp_count++])) return false;
     return air->ramp_count > 0 || nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is empty; leave it out for a blue one");
 }
 
-static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_air_shell *air)
+static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_atmosphere_shell *air)
 {
     enum { HEIGHT, BRIGHTNESS, RAMP, COUNT };
     static const char *const names[] = {"height", "brightness", "ramp"};
@@ -163,20 +164,21 @@ static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_air_sh
         !read_ramp(json, found[RAMP], air))
         return false;
     air->height *= in->space.unit;
-    air->is_absent = found[BRIGHTNESS] != NULL && air->brightness == 0;
+    air->is_disabled = found[BRIGHTNESS] != NULL && air->brightness == 0;
     return true;
 }
 
 /* ---- planets --------------------------------------------------------------------------------- */
 
-static bool turns(const nebel_layers_desc *planet)
+static bool turns(const nebel_textured_planet_desc *planet)
 {
-    bool does = planet->day != 0;
-    for (uint32_t i = 0; i < planet->cloud_count; i++) does = does || planet->clouds[i].day != 0;
+    bool does = planet->rotation_period != 0;
+    for (uint32_t i = 0; i < planet->cloud_shell_count; i++)
+        does = does || planet->cloud_shells[i].rotation_period != 0;
     return does;
 }
 
-bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_layers_desc *desc)
+bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_textured_planet_desc *desc)
 {
     enum { MODEL, CENTER, RADIUS, ROTATION, DAY, MAP, COVERAGE, SEED, CLOUDS, AIR, COUNT };
     static const char *const names[] = {"model", "center",   "radius", "rotation", "day",
@@ -185,18 +187,19 @@ bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_layers_
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     double radius = 6.36e6 / in->space.unit, scale[3] = {1, 1, 1};
-    *desc = (nebel_layers_desc){.rotation = {0, 0, 0, 1}};
+    *desc = (nebel_textured_planet_desc){.rotation = {0, 0, 0, 1}};
     if (!nb_value_members(json, node, &keys, found) || !nb_value_number(json, found[RADIUS], &radius_range, &radius) ||
         !nb_value_place(json, found[CENTER], desc->center) ||
         !nb_value_rotation(json, found[ROTATION], desc->rotation) ||
-        !nb_value_number(json, found[DAY], &day_range, &desc->day) || !nb_read_map(in, found[MAP], 3, &desc->ground) ||
-        !nb_value_number(json, found[COVERAGE], &part_range, &desc->coverage) ||
+        !nb_value_number(json, found[DAY], &day_range, &desc->rotation_period) ||
+        !nb_read_map(in, found[MAP], 3, &desc->color_map) ||
+        !nb_value_number(json, found[COVERAGE], &part_range, &desc->land_coverage) ||
         !nb_read_seed(in, found[SEED], &desc->seed) || !read_clouds(in, found[CLOUDS], desc) ||
-        !read_air(in, found[AIR], &desc->air))
+        !read_air(in, found[AIR], &desc->atmosphere))
         return false;
     desc->radius = radius * in->space.unit;
     nb_space_convert_placement(&in->space, desc->center, desc->rotation, scale);
     if (found[CENTER] == NULL) desc->center[1] = -desc->radius;
-    in->scene->data.moves_on |= turns(desc);
+    in->scene->data.has_endless_motion |= turns(desc);
     return true;
 }

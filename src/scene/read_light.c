@@ -81,7 +81,7 @@ static const nb_keys light_keys[] = {
     {light_names, LIGHT_KEY_COUNT, POINT_KEYS, POINT_REQUIRED, "a point light"},
     {light_names, LIGHT_KEY_COUNT, SPOT_REQUIRED | POINT_KEYS | NB_BIT(INNER_ANGLE), SPOT_REQUIRED, "a spot light"}};
 
-static bool read_cone(nb_json *json, const nb_json_node *const *found, nebel_lamp *lamp)
+static bool read_cone(nb_json *json, const nb_json_node *const *found, nebel_light *lamp)
 {
     static const nb_range outer_range = {
         .low = DBL_TRUE_MIN, .high = 180, .text = "a number of degrees from the axis, > 0 and <= 180"};
@@ -96,10 +96,10 @@ static bool read_cone(nb_json *json, const nb_json_node *const *found, nebel_lam
                         inner_range.text);
 }
 
-static bool keep_lamp(nb_scene_reader *in, const nb_json_node *node, const nebel_lamp *lamp, const char *name)
+static bool keep_lamp(nb_scene_reader *in, const nb_json_node *node, const nebel_light *lamp, const char *name)
 {
     nebel_scene *scene = in->scene;
-    const size_t count = scene->data.lamp_count;
+    const size_t count = scene->data.light_count;
     void *lamps = scene->lamps, *names = (void *)scene->lamp_names;
     const bool room = nb_grow(&scene->allocator, &lamps, sizeof *lamp, count, &scene->lamp_capacity, count + 1);
     scene->lamps = lamps;
@@ -109,7 +109,7 @@ static bool keep_lamp(nb_scene_reader *in, const nb_json_node *node, const nebel
     if (!room || !name_room) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
     scene->lamps[count] = *lamp;
     scene->lamp_names[count] = name;
-    scene->data.lamp_count = count + 1;
+    scene->data.light_count = count + 1;
     return true;
 }
 
@@ -131,7 +131,7 @@ bool nb_read_light(nb_scene_reader *in, const nb_json_node *node)
     static const nb_range radius_range = {.low = 1e-3, .high = 1e6, .dimension = NB_LENGTH, .text = "a length"};
     const nb_json_node *found[LIGHT_KEY_COUNT];
     const char *name = "";
-    nebel_lamp lamp = {0};
+    nebel_light lamp = {0};
     const nb_json_node *sphere = find_sphere(in->json, node);
     if (sphere != NULL)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, sphere,
@@ -143,7 +143,7 @@ bool nb_read_light(nb_scene_reader *in, const nb_json_node *node)
         !nb_value_color(in->json, found[INTENSITY], &nb_range_light, lamp.intensity) ||
         !nb_value_number(in->json, found[RADIUS], &radius_range, &lamp.radius) || !read_cone(in->json, found, &lamp))
         return false;
-    lamp.type = (nebel_lamp_type)type;
+    lamp.type = (nebel_light_type)type;
     lamp.radius *= in->space.unit;
     nb_space_convert_place(&in->space, lamp.position);
     nb_space_convert_direction(&in->space, lamp.direction);

@@ -111,14 +111,14 @@ static bool read_placement(nb_json *json, const nb_json_node *const *found, nb_m
 }
 
 /* What the public face says of a model. */
-static nebel_model describe_model(const nb_model_source *source, size_t index)
+static nebel_scene_model describe_model(const nb_model_source *source, size_t index)
 {
-    nebel_model model = {.source = index,
-                         .file = source->file,
-                         .is_heightfield = source->is_heightfield,
-                         .has_fog = source->has_fog,
-                         .height = source->height,
-                         .has_color = source->has_color};
+    nebel_scene_model model = {.model_index = index,
+                               .path = source->file,
+                               .is_heightfield = source->is_heightfield,
+                               .has_fog = source->has_fog,
+                               .height = source->height,
+                               .has_color = source->has_color};
     memcpy(model.position, source->position, sizeof model.position);
     memcpy(model.rotation, source->rotation, sizeof model.rotation);
     memcpy(model.scale, source->scale, sizeof model.scale);

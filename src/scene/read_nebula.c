@@ -1,4 +1,4 @@
-/* One entry of the section "nebula". Particles are strewn later, by nebel_make_scene_particles. */
+/* One entry of the section "nebula". Particles are strewn later, by nebel_generate_scene_particles. */
 #include "scene/save_places.h"
 #include "scene/scene_internal.h"
 
@@ -35,7 +35,7 @@ static bool read_counts(nb_json *json, const nb_json_node *const *found, nebel_n
 {
     int count = 10000, seed = 0;
     if (!nb_value_integer(json, found[COUNT], 1, MOST_PARTICLES, &count) ||
-        !nb_value_number(json, found[FADE], &nb_range_fraction, &nebula->fade) ||
+        !nb_value_number(json, found[FADE], &nb_range_fraction, &nebula->dimming) ||
         !nb_value_integer(json, found[SEED], 0, INT32_MAX, &seed))
         return false;
     nebula->count = (size_t)count;
@@ -48,7 +48,7 @@ static bool read_profile(nb_json *json, const nb_json_node *node, nebel_particle
 {
     static const char *const names[] = {"soft", "gaussian", "ball"};
     if (node == NULL) return true;
-    const int choice = nb_value_choice(json, node, names, NEBEL_PARTICLE_COUNT);
+    const int choice = nb_value_choice(json, node, names, NEBEL_PARTICLE_PROFILE_COUNT);
     if (choice >= 0) *profile = (nebel_particle_profile)choice;
     return choice >= 0;
 }
@@ -57,11 +57,11 @@ static bool read_sizes(nb_json *json, const nb_json_node *const *found, nebel_ne
 {
     nb_range radius = nb_range_extent;
     if (nebula->profile == NEBEL_PARTICLE_GAUSSIAN) radius.low *= 3; /* its sigma is a third of the radius */
-    if (!nb_value_numbers(json, found[SIZE], &radius, 2, nebula->size) ||
+    if (!nb_value_numbers(json, found[SIZE], &radius, 2, nebula->radius_range) ||
         !nb_value_number(json, found[TURBULENCE], &nb_range_distance, &nebula->turbulence) ||
-        !nb_value_number(json, found[TURBULENCE_SIZE], &nb_range_extent, &nebula->turbulence_size))
+        !nb_value_number(json, found[TURBULENCE_SIZE], &nb_range_extent, &nebula->turbulence_scale))
         return false;
-    if (nebula->size[0] <= nebula->size[1]) return true;
+    if (nebula->radius_range[0] <= nebula->radius_range[1]) return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[SIZE], "is larger first; must be [smallest, largest] radius");
 }
 
@@ -152,7 +152,7 @@ static bool try_nebula(nb_scene_reader *in, const nb_json_node *node, const nebe
     empty.allocator = in->scene->allocator;
     empty.log = (nebel_log){nb_read_keep_message, in};
     in->core_message[0] = '\0';
-    const nebel_result result = nebel_scatter_nebula(&empty, NULL);
+    const nebel_result result = nebel_generate_nebula(&empty, NULL);
     if (result == NEBEL_OK) return true;
     const char *text = in->core_message;
     if (strncmp(text, subject, strlen(subject)) == 0) text += strlen(subject);
@@ -183,7 +183,7 @@ bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
     const nb_json_node *found[NEBULA_KEY_COUNT];
     nb_json *json = in->json;
     /* The defaults of the core, in the numbers of the file. */
-    nebel_nebula_desc nebula = {.size = {0.05 / in->space.unit, 0.2 / in->space.unit}};
+    nebel_nebula_desc nebula = {.radius_range = {0.05 / in->space.unit, 0.2 / in->space.unit}};
     nebel_transform place = nb_plain_transform;
     const char *name = "";
     return nb_value_is(json, node, NB_JSON_OBJECT, "a nebula {\"shape\": ...}") &&

@@ -24,13 +24,13 @@ static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_
     nebel_noise_desc *desc = &noise->desc;
     int seed = 0;
     if (!nb_read_grid_size(json, found[SIZE], desc->size) ||
-        !nb_value_numbers(json, found[CELLS], &cells, 3, desc->cells) ||
+        !nb_value_numbers(json, found[CELLS], &cells, 3, desc->frequency) ||
         !nb_value_integer(json, found[OCTAVES], 1, 16, &desc->octaves) ||
         !nb_value_number(json, found[GAIN], &part, &desc->gain) ||
         !nb_value_number(json, found[COVERAGE], &part, &desc->coverage) ||
-        !nb_value_numbers(json, found[EDGE], &half, 3, desc->edge) ||
-        !nb_value_numbers(json, found[DRIFT], &motion, 3, noise->drift) ||
-        !nb_value_number(json, found[CHANGE], &motion, &noise->change) ||
+        !nb_value_numbers(json, found[EDGE], &half, 3, desc->falloff) ||
+        !nb_value_numbers(json, found[DRIFT], &motion, 3, noise->velocity) ||
+        !nb_value_number(json, found[CHANGE], &motion, &noise->evolution) ||
         !nb_value_integer(json, found[SEED], 0, INT_MAX, &seed))
         return false;
     desc->seed = (uint32_t)seed;
@@ -48,7 +48,7 @@ bool nb_read_noise_numbers(nb_json *json, const nb_json_node *node, nebel_scene_
 
 bool nb_noise_moves(const nebel_scene_noise *noise)
 {
-    return noise->change != 0 || noise->drift[0] != 0 || noise->drift[1] != 0 || noise->drift[2] != 0;
+    return noise->evolution != 0 || noise->velocity[0] != 0 || noise->velocity[1] != 0 || noise->velocity[2] != 0;
 }
 
 /* The words are the scene file's, whatever file they come from: those of a model's node are y up. NULL: out of memory. */
@@ -78,12 +78,12 @@ bool nb_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_density 
     if (noise.desc.name == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     nb_space_convert_noise(&in->space, &noise);
     *density = (nebel_density){.type = NEBEL_DENSITY_GRID};
-    const nebel_result result = nebel_create_noise(&noise.desc, &density->grid);
+    const nebel_result result = nebel_create_noise_grid(&noise.desc, &density->grid);
     if (result != NEBEL_OK)
         return nb_json_fail(json, result == NEBEL_ERROR_VALUE ? NEBEL_ERROR_FORMAT : result, node, "%s", note.text);
     if (nb_noise_moves(&noise)) {
-        in->scene->data.moving_volume_count++;
-        in->scene->data.moves_on = 1;
+        in->scene->data.animated_volume_count++;
+        in->scene->data.has_endless_motion = 1;
     }
     return nb_scene_keep_grid(in, node, density->grid);
 }

@@ -17,37 +17,37 @@ static const char *const air_names[] = {"type", "scattering", "absorption", "pha
 
 #define AIR_KEYS (NB_BIT(TYPE) | NB_BIT(SCATTERING) | NB_BIT(ABSORPTION) | NB_BIT(PHASE))
 
-static const nb_keys air_keys[NEBEL_AIR_PROFILE_COUNT] = {
-    [NEBEL_AIR_EXPONENTIAL] = {air_names, AIR_KEY_COUNT, AIR_KEYS | NB_BIT(SCALE_HEIGHT),
-                               NB_BIT(TYPE) | NB_BIT(SCALE_HEIGHT), "air that thins out"},
-    [NEBEL_AIR_LAYER] = {air_names, AIR_KEY_COUNT, AIR_KEYS | NB_BIT(MIDDLE) | NB_BIT(WIDTH),
-                         NB_BIT(TYPE) | NB_BIT(MIDDLE) | NB_BIT(WIDTH), "a layer of air"}};
+static const nb_keys air_keys[NEBEL_COMPONENT_PROFILE_COUNT] = {
+    [NEBEL_COMPONENT_EXPONENTIAL] = {air_names, AIR_KEY_COUNT, AIR_KEYS | NB_BIT(SCALE_HEIGHT),
+                                     NB_BIT(TYPE) | NB_BIT(SCALE_HEIGHT), "air that thins out"},
+    [NEBEL_COMPONENT_TENT] = {air_names, AIR_KEY_COUNT, AIR_KEYS | NB_BIT(MIDDLE) | NB_BIT(WIDTH),
+                              NB_BIT(TYPE) | NB_BIT(MIDDLE) | NB_BIT(WIDTH), "a layer of air"}};
 
-static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_air *air)
+static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_atmosphere_component *air)
 {
     static const nb_range amount_range = {
-        .low = 0, .high = NEBEL_MAX_AIR_EXTINCTION, .dimension = NB_PER_LENGTH, .text = "an amount"};
+        .low = 0, .high = NEBEL_MAX_COMPONENT_EXTINCTION, .dimension = NB_PER_LENGTH, .text = "an amount"};
     static const nb_range middle_range = {.low = 0, .high = 1e12, .dimension = NB_LENGTH, .text = "a height"};
     const nb_json_node *found[AIR_KEY_COUNT];
     nb_json *json = in->json;
-    *air = (nebel_air){.scale_height = 0};
-    const int type = nb_value_type(json, node, nb_air_profile_names, NEBEL_AIR_PROFILE_COUNT);
+    *air = (nebel_atmosphere_component){.scale_height = 0};
+    const int type = nb_value_type(json, node, nb_air_profile_names, NEBEL_COMPONENT_PROFILE_COUNT);
     if (type < 0 || !nb_value_members(json, node, &air_keys[type], found) ||
         !nb_value_amount(json, found[SCATTERING], &amount_range, air->scattering) ||
         !nb_value_amount(json, found[ABSORPTION], &amount_range, air->absorption) ||
         !nb_read_phase(in, found[PHASE], &air->phase) ||
         !nb_value_number(json, found[SCALE_HEIGHT], &length_range, &air->scale_height) ||
-        !nb_value_number(json, found[MIDDLE], &middle_range, &air->middle) ||
-        !nb_value_number(json, found[WIDTH], &length_range, &air->width))
+        !nb_value_number(json, found[MIDDLE], &middle_range, &air->center_height) ||
+        !nb_value_number(json, found[WIDTH], &length_range, &air->half_width))
         return false;
-    air->profile = (nebel_air_profile)type;
+    air->profile = (nebel_component_profile)type;
     for (int c = 0; c < 3; c++) {
         air->scattering[c] /= in->space.unit;
         air->absorption[c] /= in->space.unit;
     }
     air->scale_height *= in->space.unit;
-    air->middle *= in->space.unit;
-    air->width *= in->space.unit;
+    air->center_height *= in->space.unit;
+    air->half_width *= in->space.unit;
     return true;
 }
 
@@ -56,13 +56,13 @@ static bool read_airs(nb_scene_reader *in, const nb_json_node *node, nebel_atmos
     uint32_t count = 0;
     if (node == NULL) return true;
     if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of kinds of air") ||
-        !nb_value_at_most(in->json, node, NEBEL_MAX_AIRS, "a planet", "kinds of air"))
+        !nb_value_at_most(in->json, node, NEBEL_MAX_COMPONENTS, "a planet", "kinds of air"))
         return false;
     for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
-        if (!read_air(in, one, &desc->airs[count++])) return false;
+        if (!read_air(in, one, &desc->components[count++])) return false;
     /* None is one that does nothing to light. */
-    if (count == 0) desc->airs[count++] = (nebel_air){.scale_height = desc->thickness};
-    desc->air_count = count;
+    if (count == 0) desc->components[count++] = (nebel_atmosphere_component){.scale_height = desc->thickness};
+    desc->component_count = count;
     return true;
 }
 
@@ -99,10 +99,10 @@ static const struct {
 static void stretch(nebel_atmosphere_desc *desc, double times)
 {
     desc->thickness *= times;
-    for (uint32_t i = 0; i < desc->air_count; i++) {
-        desc->airs[i].scale_height *= times;
-        desc->airs[i].middle *= times;
-        desc->airs[i].width *= times;
+    for (uint32_t i = 0; i < desc->component_count; i++) {
+        desc->components[i].scale_height *= times;
+        desc->components[i].center_height *= times;
+        desc->components[i].half_width *= times;
     }
 }
 
@@ -114,9 +114,9 @@ static bool read_preset(nb_json *json, const nb_json_node *const *found, nebel_p
     if (preset < 0) return false;
     double gravity = presets[preset].gravity;
     if (!nb_value_number(json, found[GRAVITY], &gravity_range, &gravity)) return false;
-    planet->air = *nebel_find_atmosphere(presets[preset].name);
-    planet->sun_diameter = presets[preset].sun_diameter;
-    if (found[GRAVITY] != NULL) stretch(&planet->air, presets[preset].gravity / gravity);
+    planet->atmosphere_desc = *nebel_lookup_atmosphere(presets[preset].name);
+    planet->sun_angular_diameter = presets[preset].sun_diameter;
+    if (found[GRAVITY] != NULL) stretch(&planet->atmosphere_desc, presets[preset].gravity / gravity);
     return true;
 }
 
@@ -124,11 +124,11 @@ static bool read_sizes(nb_scene_reader *in, const nb_json_node *const *found, ne
 {
     static const nb_range radius_range = {.low = 1, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
     static const nb_range diameter_range = {.low = 0, .high = 10, .text = "a number of degrees from 0 to 10"};
-    nebel_atmosphere_desc *desc = &planet->air;
+    nebel_atmosphere_desc *desc = &planet->atmosphere_desc;
     double radius = desc->radius / in->space.unit, thickness = desc->thickness / in->space.unit, center[3];
     if (!nb_value_number(in->json, found[RADIUS], &radius_range, &radius) ||
         !nb_value_place(in->json, found[CENTER], center) ||
-        !nb_value_number(in->json, found[SUN_DIAMETER], &diameter_range, &planet->sun_diameter))
+        !nb_value_number(in->json, found[SUN_DIAMETER], &diameter_range, &planet->sun_angular_diameter))
         return false;
     if (found[RADIUS] != NULL) desc->radius = radius * in->space.unit;
     const nb_range thickness_range = {
@@ -137,9 +137,9 @@ static bool read_sizes(nb_scene_reader *in, const nb_json_node *const *found, ne
     if (found[THICKNESS] != NULL) desc->thickness = thickness * in->space.unit;
     if (found[CENTER] == NULL) return true;
     nb_space_convert_place(&in->space, center);
-    memcpy(desc->ground, center, sizeof center);
-    desc->ground[1] += desc->radius;
-    return desc->ground[1] <= NEBEL_MAX_LENGTH ||
+    memcpy(desc->ground_point, center, sizeof center);
+    desc->ground_point[1] += desc->radius;
+    return desc->ground_point[1] <= NEBEL_MAX_LENGTH ||
            nb_json_fail(in->json, NEBEL_ERROR_FORMAT, found[CENTER],
                         "lies so high that the ground above it is more than 1e15 m from the origin");
 }
@@ -160,13 +160,13 @@ static void find_center(const nb_json *json, const nb_json_node *node, nb_ball *
 
 nb_ball nb_find_ball(const nb_json *json, const nb_json_node *planet)
 {
-    nb_ball ball = {.preset_radius = nebel_find_atmosphere(presets[0].name)->radius};
+    nb_ball ball = {.preset_radius = nebel_lookup_atmosphere(presets[0].name)->radius};
     const nb_json_node *const first =
         planet != NULL && planet->type == NB_JSON_ARRAY ? nb_json_first(json, planet) : planet;
     if (first == NULL || first->type != NB_JSON_OBJECT) return ball;
     for (const nb_json_node *one = nb_json_first(json, first); one != NULL; one = nb_json_next(json, one)) {
         for (size_t i = 0; i < sizeof presets / sizeof *presets && nb_value_is_key(one, "", "preset"); i++)
-            if (is_text(one, presets[i].name)) ball.preset_radius = nebel_find_atmosphere(presets[i].name)->radius;
+            if (is_text(one, presets[i].name)) ball.preset_radius = nebel_lookup_atmosphere(presets[i].name)->radius;
         if (nb_value_is_key(one, "", "radius") && one->type == NB_JSON_NUMBER) ball.radius = one->number;
         if (nb_value_is_key(one, "", "center")) find_center(json, one, &ball);
     }
@@ -178,9 +178,9 @@ static bool try_planet(nb_scene_reader *in, const nb_json_node *node, bool has_a
 {
     static const char subject[] = "atmosphere: ",
                       advice[] = "; these airs are the preset's: give \"airs\" that go with the other keys";
-    planet->air.log = (nebel_log){nb_read_keep_message, in};
-    const nebel_result result = nebel_resolve_atmosphere(&planet->air, &planet->air);
-    planet->air.log = (nebel_log){NULL, NULL};
+    planet->atmosphere_desc.log = (nebel_log){nb_read_keep_message, in};
+    const nebel_result result = nebel_resolve_atmosphere(&planet->atmosphere_desc, &planet->atmosphere_desc);
+    planet->atmosphere_desc.log = (nebel_log){NULL, NULL};
     if (result == NEBEL_OK) return true;
     const char *message = in->core_message;
     if (strncmp(message, subject, sizeof subject - 1) == 0) message += sizeof subject - 1;
@@ -190,7 +190,8 @@ static bool try_planet(nb_scene_reader *in, const nb_json_node *node, bool has_a
 
 static bool charge(nb_scene_reader *in, const nb_json_node *node, const nebel_planet *planet)
 {
-    const bool is_precise = planet->air.quality == NEBEL_AIR_PRECISE, has_clouds = planet->cloud_layer_count > 0;
+    const bool is_precise = planet->atmosphere_desc.quality == NEBEL_ATMOSPHERE_PRECISE,
+               has_clouds = planet->cloud_layer_count > 0;
     return nb_scene_charge(in, node, NB_PLANET_BYTES + (has_clouds ? NB_CLOUDS_BYTES : 0),
                            (is_precise ? NB_PRECISE_PLANET_SECONDS : NB_PLANET_SECONDS) +
                                (has_clouds ? NB_CLOUDS_SECONDS : 0));
@@ -202,12 +203,12 @@ static bool read_physical(nb_scene_reader *in, const nb_json_node *node, nebel_p
     const nb_json_node *found[PLANET_KEY_COUNT];
     nb_json *json = in->json;
     if (!nb_value_members(json, node, &planet_keys, found) || !read_preset(json, found, planet) ||
-        !read_sizes(in, found, planet) || !read_airs(in, found[AIRS], &planet->air) ||
-        !nb_value_color(json, found[GROUND_ALBEDO], &nb_range_fraction, planet->air.ground_albedo))
+        !read_sizes(in, found, planet) || !read_airs(in, found[AIRS], &planet->atmosphere_desc) ||
+        !nb_value_color(json, found[GROUND_ALBEDO], &nb_range_fraction, planet->atmosphere_desc.ground_albedo))
         return false;
     const int quality = found[QUALITY] != NULL ? nb_value_choice(json, found[QUALITY], quality_names, 2) : 0;
     if (quality < 0) return false;
-    planet->air.quality = (nebel_air_quality)quality;
+    planet->atmosphere_desc.quality = (nebel_atmosphere_quality)quality;
     return try_planet(in, node, found[AIRS] != NULL, planet) && nb_read_clouds(in, found[CLOUDS], planet) &&
            charge(in, node, planet);
 }
@@ -230,19 +231,20 @@ static bool read_planet(nb_scene_reader *in, const nb_json_node *node, nebel_pla
     if (model < 0) return false;
     planet->model = (nebel_planet_model)model;
     for (int c = 0; c < 3; c++) planet->sun_left[c] = 1;
-    return model == NEBEL_PLANET_LAYERS ? nb_read_layers(in, node, &planet->shells) : read_physical(in, node, planet);
+    return model == NEBEL_PLANET_TEXTURED ? nb_read_layers(in, node, &planet->textured_desc)
+                                          : read_physical(in, node, planet);
 }
 
 /* Planets that overlap would need air of air. */
 static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const nebel_planet *planets, size_t number)
 {
-    const nebel_atmosphere_desc *air = &planets[number].air;
+    const nebel_atmosphere_desc *air = &planets[number].atmosphere_desc;
     double middle[3];
-    nb_vector_ball_middle(air->ground, air->radius, middle);
+    nb_vector_ball_middle(air->ground_point, air->radius, middle);
     for (size_t i = 0; i < number; i++) {
-        const nebel_atmosphere_desc *other = &planets[i].air;
+        const nebel_atmosphere_desc *other = &planets[i].atmosphere_desc;
         double between[3];
-        nb_vector_ball_middle(other->ground, other->radius, between);
+        nb_vector_ball_middle(other->ground_point, other->radius, between);
         for (int c = 0; c < 3; c++) between[c] = middle[c] - between[c];
         if (nb_vector_length(between) > air->radius + air->thickness + other->radius + other->thickness) continue;
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,

@@ -124,7 +124,7 @@ static bool read_plane(nb_json *json, const nb_json_node *node, nebel_plane *pla
 /* In metres, as the core will have them. */
 static bool try_planes(nb_scene_reader *in, const nb_json_node *node, const nebel_shape *shape)
 {
-    nebel_plane planes[NEBEL_MAX_PLANES];
+    nebel_plane planes[NEBEL_MAX_SHAPE_PLANES];
     nebel_volume_desc body = {.operation = NEBEL_OPERATION_EXCLUDE, .shape = *shape};
     for (size_t i = 0; i < shape->plane_count; i++) {
         planes[i] = shape->planes[i];
@@ -139,9 +139,9 @@ static bool read_planes(nb_scene_reader *in, const nb_json_node *node, nebel_sha
 {
     nb_json *json = in->json;
     if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of planes [nx, ny, nz, d]")) return false;
-    if (node->count < 1 || node->count > NEBEL_MAX_PLANES)
+    if (node->count < 1 || node->count > NEBEL_MAX_SHAPE_PLANES)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "holds %lu planes; must hold 1 to %d",
-                            (unsigned long)node->count, NEBEL_MAX_PLANES);
+                            (unsigned long)node->count, NEBEL_MAX_SHAPE_PLANES);
     nebel_plane *planes = nb_arena_allocate(&in->scene->arena, node->count, sizeof *planes);
     if (planes == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     size_t i = 0;
@@ -165,9 +165,9 @@ static bool read_parts(nb_scene_reader *in, const nb_json_node *node, nebel_shap
 {
     nb_json *json = in->json;
     if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of shapes")) return false;
-    if (node->count < 1 || node->count > NEBEL_MAX_LEAVES)
+    if (node->count < 1 || node->count > NEBEL_MAX_SHAPE_LEAVES)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "holds %lu shapes; must hold 1 to %d",
-                            (unsigned long)node->count, NEBEL_MAX_LEAVES);
+                            (unsigned long)node->count, NEBEL_MAX_SHAPE_LEAVES);
     nebel_shape *parts = nb_arena_allocate(&in->scene->arena, node->count, sizeof *parts);
     if (parts == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     size_t i = 0;
@@ -182,12 +182,12 @@ static bool read_parts(nb_scene_reader *in, const nb_json_node *node, nebel_shap
 
 static bool check_nesting(nb_json *json, const nb_json_node *node, const nesting *where)
 {
-    if (where->depth > NEBEL_MAX_DEPTH)
+    if (where->depth > NEBEL_MAX_SHAPE_NESTING)
         return nb_json_fail(json, NEBEL_ERROR_LIMIT, node, "is nested too deeply; at most %d shapes may be around it",
-                            NEBEL_MAX_DEPTH);
-    if (where->leaf_count <= NEBEL_MAX_LEAVES) return true;
+                            NEBEL_MAX_SHAPE_NESTING);
+    if (where->leaf_count <= NEBEL_MAX_SHAPE_LEAVES) return true;
     return nb_json_fail(json, NEBEL_ERROR_LIMIT, node, "one volume is made of too many shapes; at most %d",
-                        NEBEL_MAX_LEAVES);
+                        NEBEL_MAX_SHAPE_LEAVES);
 }
 
 static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_shape *shape)

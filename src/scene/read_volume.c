@@ -117,13 +117,13 @@ static bool read_preset(nb_json *json, const nb_json_node *const *found, nebel_v
     enum { MOST_PRESETS = 16 };
     const char *names[MOST_PRESETS];
     size_t count;
-    const nebel_preset *const presets = nebel_list_presets(&count);
+    const nebel_fog_preset *const presets = nebel_list_fog_presets(&count);
     if (found[PRESET] == NULL) return true;
     if (count > MOST_PRESETS) count = MOST_PRESETS;
     for (size_t i = 0; i < count; i++) names[i] = presets[i].name;
     const int choice = nb_value_choice(json, found[PRESET], names, (int)count);
     if (choice < 0) return false;
-    const nebel_preset *const preset = &presets[choice];
+    const nebel_fog_preset *const preset = &presets[choice];
     for (int i = 0; i < 3; i++) volume->extinction[i] = preset->extinction[i] * json->unit;
     if (found[SOURCE] != NULL) return true;
     memcpy(volume->albedo, preset->albedo, sizeof volume->albedo);
@@ -171,13 +171,13 @@ bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subj
     return nb_json_fail(in->json, kept ? result : NEBEL_ERROR_FORMAT, node, "%s", text);
 }
 
-nebel_volume_entry nb_volume_entry_default(void)
+nebel_volume_track nb_volume_entry_default(void)
 {
-    return (nebel_volume_entry){.contrast = 0.05};
+    return (nebel_volume_track){.contrast = 0.05};
 }
 
 static bool keep_volume(nb_scene_reader *in, const nb_json_node *node, const nebel_volume_desc *volume,
-                        const nebel_volume_entry *entry, const char *name, nebel_volume_origin origin)
+                        const nebel_volume_track *entry, const char *name, nebel_volume_origin origin)
 {
     if (!nb_scene_charge(in, node, NB_VOLUME_BYTES, NB_VOLUME_SECONDS)) return false;
     nebel_scene *scene = in->scene;
@@ -203,7 +203,7 @@ static bool keep_volume(nb_scene_reader *in, const nb_json_node *node, const neb
     scene->volume_origins[count] = origin;
     scene->volume_entries[count] = *entry;
     scene->data.volume_count = count + 1;
-    scene->data.moving_volume_count += entry->key_count > 0;
+    scene->data.animated_volume_count += entry->key_count > 0;
     return true;
 }
 
@@ -275,7 +275,7 @@ static bool read_key_list(nb_scene_reader *in, const nb_json_node *list, const n
 
 /* `volume` is still in the file's numbers. */
 static bool read_keys(nb_scene_reader *in, const nb_json_node *list, const nb_json_node *const *found,
-                      const nebel_volume_desc *volume, nebel_volume_entry *entry)
+                      const nebel_volume_desc *volume, nebel_volume_track *entry)
 {
     if (list == NULL) return true;
     if (!nb_value_is(in->json, list, NB_JSON_ARRAY, "an array of keys {\"frame\": ...}")) return false;
@@ -289,7 +289,7 @@ static bool read_keys(nb_scene_reader *in, const nb_json_node *list, const nb_js
     return true;
 }
 
-static bool try_keys(nb_scene_reader *in, const nb_json_node *list, const nebel_volume_entry *entry)
+static bool try_keys(nb_scene_reader *in, const nb_json_node *list, const nebel_volume_track *entry)
 {
     const nb_json_node *node = list != NULL ? nb_json_first(in->json, list) : NULL;
     for (size_t i = 0; i < entry->key_count; i++, node = nb_json_next(in->json, node))
@@ -299,21 +299,21 @@ static bool try_keys(nb_scene_reader *in, const nb_json_node *list, const nebel_
 
 /* The volume itself goes into the entry; in its place comes what it is at frame 0. */
 static bool start_moving(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume,
-                         nebel_volume_entry *entry)
+                         nebel_volume_track *entry)
 {
     if (entry->key_count == 0) return true;
     nebel_volume_desc *own = nb_arena_allocate(&in->scene->arena, 1, sizeof *own);
     if (own == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
     *own = *volume;
-    entry->own = own;
-    *volume = nebel_volume_between_keys(entry->keys, entry->key_count, 0);
+    entry->base = own;
+    *volume = nebel_interpolate_volume(entry->keys, entry->key_count, 0);
     return true;
 }
 
 /* ---- volume ---------------------------------------------------------------------------------- */
 
 static bool finish_volume(nb_scene_reader *in, const nb_json_node *node, const nb_json_node *const *found,
-                          nebel_volume_desc *volume, nebel_volume_entry *entry, const char *name)
+                          nebel_volume_desc *volume, nebel_volume_track *entry, const char *name)
 {
     if (!read_keys(in, found[KEYS], found, volume, entry)) return false;
     nb_space_convert_volume(&in->space, volume);
@@ -321,8 +321,8 @@ static bool finish_volume(nb_scene_reader *in, const nb_json_node *node, const n
     if (!nb_read_try(in, node, "", volume) || !try_keys(in, found[KEYS], entry) ||
         !start_moving(in, node, volume, entry))
         return false;
-    nebel_volume_origin origin = in->node != NULL ? NEBEL_VOLUME_OF_NODE : NEBEL_VOLUME_WRITTEN;
-    if (entry->key_count > 0) origin = NEBEL_VOLUME_MOVING;
+    nebel_volume_origin origin = in->node != NULL ? NEBEL_VOLUME_FROM_NODE : NEBEL_VOLUME_STATIC;
+    if (entry->key_count > 0) origin = NEBEL_VOLUME_ANIMATED;
     return keep_volume(in, node, volume, entry, name, origin);
 }
 
@@ -358,7 +358,7 @@ static bool keep_imported(nb_scene_reader *in, const nb_json_node *const found[3
                           const char *name)
 {
     static const double black[3] = {0};
-    const nebel_volume_entry entry = nb_volume_entry_default();
+    const nebel_volume_track entry = nb_volume_entry_default();
     if (found[2] != NULL) memcpy(volume->albedo, black, sizeof black);
     if (!nb_value_color(in->json, found[2], &nb_range_light, volume->source)) return false;
     return nb_read_try(in, found[1], "", volume) &&
@@ -417,7 +417,7 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
     const nb_json_node *found[VOLUME_KEY_COUNT];
     nb_json *json = in->json;
     nebel_volume_desc volume = {.operation = NEBEL_OPERATION_ADD};
-    nebel_volume_entry entry = nb_volume_entry_default();
+    nebel_volume_track entry = nb_volume_entry_default();
     const char *name = "";
     if (!read_members(in, node, &volume, found) || !read_place(json, found, &volume)) return false;
     if (!read_name(in, found[NAME], &name)) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");

@@ -115,7 +115,7 @@ bool nb_save_check_removed(const nb_save *save, const nb_scene_reader *in, const
 /* A volume to be written: in metres, with its entry, whose `own` is not read. */
 typedef struct nb_written_volume {
     nebel_volume_desc volume;
-    nebel_volume_entry entry;
+    nebel_volume_track entry;
     const char *name;
 } nb_written_volume;
 
@@ -132,6 +132,6 @@ bool nb_save_write_keys(const nebel_allocator *allocator, const nb_space *space,
 void nb_save_write_phase(const nebel_phase *phase, char text[NB_EDIT_NUMBERS]);
 
 /* Whether some key gives the volume an albedo. */
-bool nb_save_has_lit_key(const nebel_volume_entry *entry);
+bool nb_save_has_lit_key(const nebel_volume_track *entry);
 
 #endif

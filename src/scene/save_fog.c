@@ -256,10 +256,10 @@ static void save_fog(nb_save *save, const nb_json *json, const nb_edit_object *v
 static nb_written_volume find_written(const nebel_scene_data *scene, size_t index)
 {
     nb_written_volume found = {scene->volumes[index], nb_volume_entry_default(), scene->volume_names[index]};
-    if (scene->volume_entries == NULL) return found;
-    found.entry = scene->volume_entries[index];
+    if (scene->volume_tracks == NULL) return found;
+    found.entry = scene->volume_tracks[index];
     if (found.entry.key_count == 0) return found;
-    found.volume = *found.entry.own;
+    found.volume = *found.entry.base;
     return found;
 }
 
@@ -267,7 +267,7 @@ static nb_written_volume find_written(const nebel_scene_data *scene, size_t inde
 static nb_written_volume find_wanted(const nb_save *save, size_t index, size_t target)
 {
     nb_written_volume wanted = find_written(save->changed, target);
-    if (save->changed->volume_entries != NULL) return wanted;
+    if (save->changed->volume_tracks != NULL) return wanted;
     const nb_written_volume was = find_written(save->before, index);
     wanted.entry = was.entry;
     if (was.entry.key_count > 0) wanted.volume = was.volume;
@@ -311,7 +311,7 @@ static bool save_entry(nb_save *save, nb_scene_reader *in, const nb_json_node *n
     const size_t target = save->targets[index];
     const nebel_volume_origin origin = in->scene->volume_origins[index];
     const bool goes = target == NEBEL_NEW_VOLUME;
-    if (!goes && (origin == NEBEL_VOLUME_WRITTEN || origin == NEBEL_VOLUME_MOVING)) {
+    if (!goes && (origin == NEBEL_VOLUME_STATIC || origin == NEBEL_VOLUME_ANIMATED)) {
         const nb_written_volume was = find_written(save->before, index), now = find_wanted(save, index, target);
         if (is_same_kind(&was.volume, &now.volume))
             change_volume(save, in, node, &was, &now);
@@ -335,7 +335,7 @@ bool nb_save_check_removed(const nb_save *save, const nb_scene_reader *in, const
 {
     for (size_t i = 0; i < in->scene->data.volume_count; i++) {
         const nebel_volume_origin origin = in->scene->volume_origins[i];
-        if (save->targets[i] != NEBEL_NEW_VOLUME || origin == NEBEL_VOLUME_WRITTEN || origin == NEBEL_VOLUME_MOVING)
+        if (save->targets[i] != NEBEL_NEW_VOLUME || origin == NEBEL_VOLUME_STATIC || origin == NEBEL_VOLUME_ANIMATED)
             continue;
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                             "the volume \"%s\" comes from a model or another program; it cannot be removed",

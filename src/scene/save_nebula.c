@@ -67,14 +67,14 @@ static void change_nebula(nb_save *save, const nb_scene_reader *in, const nb_jso
     const nb_json *json = in->json;
     nebel_nebula_desc was = save->before->nebulae[index], now = save->changed->nebulae[index];
     const nb_edit_object nebula = nb_edit_find(json, node);
-    const bool loses_size = now.turbulence_size == 0;
+    const bool loses_size = now.turbulence_scale == 0;
     nb_lost_keys lost = {{NULL}};
     if (loses_size) nb_save_lose(&lost, "turbulence_size");
     if (now.color_count == 0) nb_save_lose(&lost, "colors");
     nb_save_shape(save, in, nb_edit_member(json, node, "shape"), &was.shape, &now.shape);
     nb_space_restore_nebula(&in->space, &was);
     nb_space_restore_nebula(&in->space, &now);
-    if (loses_size) was.turbulence_size = 0;
+    if (loses_size) was.turbulence_scale = 0;
     nb_save_density(save, json, node, &was.density, &now.density);
     nb_save_places(save, json, &nebula, nb_nebula_places, NB_ALL_PLACES, &was, &now);
     if (now.points == NULL) {
@@ -86,7 +86,7 @@ static void change_nebula(nb_save *save, const nb_scene_reader *in, const nb_jso
         nb_edit_word(&save->edit, json, &nebula, "name", save->changed->nebula_names[index]);
     if (was.profile != now.profile) nb_edit_word(&save->edit, json, &nebula, "profile", nb_profile_names[now.profile]);
     save_colors(save, json, &nebula, &was, &now);
-    save_points(save, in, node, save->before->nebula_places[index], save->changed->nebula_places[index]);
+    save_points(save, in, node, save->before->nebula_transforms[index], save->changed->nebula_transforms[index]);
     nb_edit_remove_members(&save->edit, json, node, lost.names);
 }
 

@@ -2,10 +2,11 @@
 
 #include <string.h>
 
-#define PLACE(type, member, count, style)                                                                              \
+#define NAMED(type, key, member, count, style)                                                                         \
     {                                                                                                                  \
-#member, offsetof(type, member), count, style                                                                  \
+        key, offsetof(type, member), count, style                                                                      \
     }
+#define PLACE(type, member, count, style) NAMED(type, #member, member, count, style)
 #define END                                                                                                            \
     {                                                                                                                  \
         NULL, 0, 0, NB_EDIT_EACH                                                                                       \
@@ -55,7 +56,7 @@ const nb_place nb_density_places[] = {
     PLACE(nebel_density, to, 3, NB_EDIT_EACH),
     PLACE(nebel_density, center, 3, NB_EDIT_EACH),
     PLACE(nebel_density, sigma, 1, NB_EDIT_EACH),
-    PLACE(nebel_density, distance, 1, NB_EDIT_EACH),
+    NAMED(nebel_density, "distance", edge_width, 1, NB_EDIT_EACH),
     PLACE(nebel_density, radius, 1, NB_EDIT_EACH),
     END,
 };
@@ -69,16 +70,16 @@ const unsigned nb_density_masks[NEBEL_DENSITY_COUNT] = {
 };
 
 const nb_place nb_nebula_places[] = {
-    PLACE(nebel_nebula_desc, size, 2, NB_EDIT_EACH),
+    NAMED(nebel_nebula_desc, "size", radius_range, 2, NB_EDIT_EACH),
     PLACE(nebel_nebula_desc, absorption, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_nebula_desc, emission, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_nebula_desc, turbulence, 1, NB_EDIT_EACH),
-    PLACE(nebel_nebula_desc, turbulence_size, 1, NB_EDIT_EACH),
+    NAMED(nebel_nebula_desc, "turbulence_size", turbulence_scale, 1, NB_EDIT_EACH),
     END,
 };
 
 const nb_place nb_strewn_places[] = {
-    PLACE(nebel_nebula_desc, fade, 1, NB_EDIT_EACH),
+    NAMED(nebel_nebula_desc, "fade", dimming, 1, NB_EDIT_EACH),
     END,
 };
 
@@ -90,25 +91,25 @@ const nb_place nb_cell_places[] = {
 
 /* Of models from files; height fields have the first one. */
 const nb_place nb_model_places[] = {
-    PLACE(nebel_model, position, 3, NB_EDIT_EACH),
-    PLACE(nebel_model, rotation, 4, NB_EDIT_WHOLE),
-    PLACE(nebel_model, scale, 3, NB_EDIT_AMOUNT),
+    PLACE(nebel_scene_model, position, 3, NB_EDIT_EACH),
+    PLACE(nebel_scene_model, rotation, 4, NB_EDIT_WHOLE),
+    PLACE(nebel_scene_model, scale, 3, NB_EDIT_AMOUNT),
     END,
 };
 
 const nb_place nb_lamp_places[] = {
-    PLACE(nebel_lamp, position, 3, NB_EDIT_EACH),
-    PLACE(nebel_lamp, intensity, 3, NB_EDIT_AMOUNT),
-    PLACE(nebel_lamp, radius, 1, NB_EDIT_EACH),
-    PLACE(nebel_lamp, direction, 3, NB_EDIT_WHOLE),
-    PLACE(nebel_lamp, inner_angle, 1, NB_EDIT_EACH),
-    PLACE(nebel_lamp, outer_angle, 1, NB_EDIT_EACH),
+    PLACE(nebel_light, position, 3, NB_EDIT_EACH),
+    PLACE(nebel_light, intensity, 3, NB_EDIT_AMOUNT),
+    PLACE(nebel_light, radius, 1, NB_EDIT_EACH),
+    PLACE(nebel_light, direction, 3, NB_EDIT_WHOLE),
+    PLACE(nebel_light, inner_angle, 1, NB_EDIT_EACH),
+    PLACE(nebel_light, outer_angle, 1, NB_EDIT_EACH),
     END,
 };
 
 const nb_place nb_height_field_places[] = {
-    PLACE(nebel_model, size, 2, NB_EDIT_EACH),
-    PLACE(nebel_model, height, 1, NB_EDIT_EACH),
+    PLACE(nebel_scene_model, size, 2, NB_EDIT_EACH),
+    PLACE(nebel_scene_model, height, 1, NB_EDIT_EACH),
     END,
 };
 
@@ -119,8 +120,8 @@ const char *const nb_density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",
                                                            "gaussian", "soft_edge", "grid",   "altitude"};
 const char *const nb_operation_names[NEBEL_OPERATION_COUNT] = {"add", "exclude", "replace"};
 const char *const nb_below_names[2] = {"grow", "constant"};
-const char *const nb_profile_names[NEBEL_PARTICLE_COUNT] = {"soft", "gaussian", "ball"};
-const char *const nb_air_profile_names[NEBEL_AIR_PROFILE_COUNT] = {"exponential", "layer"};
+const char *const nb_profile_names[NEBEL_PARTICLE_PROFILE_COUNT] = {"soft", "gaussian", "ball"};
+const char *const nb_air_profile_names[NEBEL_COMPONENT_PROFILE_COUNT] = {"exponential", "layer"};
 /* By nebel_phase_type. */
 const char *const nb_phase_names[NEBEL_PHASE_COUNT] = {"isotropic",       "rayleigh", "henyey_greenstein",
                                                        "cornette_shanks", "draine",   "droplets"};

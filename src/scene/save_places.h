@@ -20,8 +20,8 @@ extern const unsigned nb_shape_masks[NEBEL_SHAPE_COUNT], nb_density_masks[NEBEL_
 extern const char *const nb_shape_names[NEBEL_SHAPE_COUNT],
     *const nb_density_names[NEBEL_DENSITY_COUNT],
         *const nb_operation_names[NEBEL_OPERATION_COUNT],
-            *const nb_below_names[2], *const nb_air_profile_names[NEBEL_AIR_PROFILE_COUNT],
-                                          *const nb_profile_names[NEBEL_PARTICLE_COUNT],
+            *const nb_below_names[2], *const nb_air_profile_names[NEBEL_COMPONENT_PROFILE_COUNT],
+                                          *const nb_profile_names[NEBEL_PARTICLE_PROFILE_COUNT],
                                               *const nb_phase_names[NEBEL_PHASE_COUNT],
                                                   *const nb_cell_model_names[NEBEL_CELL_MODEL_COUNT],
                                                       *const nb_cell_span_names[NEBEL_SPAN_COUNT];

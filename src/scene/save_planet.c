@@ -14,23 +14,23 @@
     }
 
 static const nb_place physical_places[] = {
-    PLACE(nebel_planet, "ground_albedo", air.ground_albedo, 3, NB_EDIT_AMOUNT),
-    NUMBER(nebel_planet, sun_diameter),
+    PLACE(nebel_planet, "ground_albedo", atmosphere_desc.ground_albedo, 3, NB_EDIT_AMOUNT),
+    PLACE(nebel_planet, "sun_diameter", sun_angular_diameter, 1, NB_EDIT_EACH),
     END,
 };
 
 static const nb_place air_places[] = {
-    PLACE(nebel_air, "scattering", scattering, 3, NB_EDIT_AMOUNT),
-    PLACE(nebel_air, "absorption", absorption, 3, NB_EDIT_AMOUNT),
-    NUMBER(nebel_air, scale_height),
-    PLACE(nebel_air, "middle", middle, 1, NB_EDIT_EACH),
-    NUMBER(nebel_air, width),
+    PLACE(nebel_atmosphere_component, "scattering", scattering, 3, NB_EDIT_AMOUNT),
+    PLACE(nebel_atmosphere_component, "absorption", absorption, 3, NB_EDIT_AMOUNT),
+    NUMBER(nebel_atmosphere_component, scale_height),
+    PLACE(nebel_atmosphere_component, "middle", center_height, 1, NB_EDIT_EACH),
+    PLACE(nebel_atmosphere_component, "width", half_width, 1, NB_EDIT_EACH),
     END,
 };
 
-static const unsigned air_masks[NEBEL_AIR_PROFILE_COUNT] = {
-    [NEBEL_AIR_EXPONENTIAL] = 1 | 2 | 4,
-    [NEBEL_AIR_LAYER] = 1 | 2 | 8 | 16,
+static const unsigned air_masks[NEBEL_COMPONENT_PROFILE_COUNT] = {
+    [NEBEL_COMPONENT_EXPONENTIAL] = 1 | 2 | 4,
+    [NEBEL_COMPONENT_TENT] = 1 | 2 | 8 | 16,
 };
 
 static const nb_place cloud_places[] = {
@@ -38,47 +38,47 @@ static const nb_place cloud_places[] = {
     NUMBER(nebel_cloud_layer, top),
     NUMBER(nebel_cloud_layer, coverage),
     NUMBER(nebel_cloud_layer, extinction),
-    NUMBER(nebel_cloud_layer, size),
-    NUMBER(nebel_cloud_layer, detail),
-    NUMBER(nebel_cloud_layer, variation),
-    NUMBER(nebel_cloud_layer, diameter),
+    PLACE(nebel_cloud_layer, "size", cell_size, 1, NB_EDIT_EACH),
+    PLACE(nebel_cloud_layer, "detail", erosion, 1, NB_EDIT_EACH),
+    PLACE(nebel_cloud_layer, "variation", patchiness, 1, NB_EDIT_EACH),
+    PLACE(nebel_cloud_layer, "diameter", droplet_diameter, 1, NB_EDIT_EACH),
     PLACE(nebel_cloud_layer, "wind", wind, 2, NB_EDIT_EACH),
     END,
 };
 
 static const nb_place layers_places[] = {
-    NUMBER(nebel_layers_desc, day),
-    NUMBER(nebel_layers_desc, coverage),
+    PLACE(nebel_textured_planet_desc, "day", rotation_period, 1, NB_EDIT_EACH),
+    PLACE(nebel_textured_planet_desc, "coverage", land_coverage, 1, NB_EDIT_EACH),
     END,
 };
 
 static const nb_place shell_places[] = {
     NUMBER(nebel_cloud_shell, height),
-    NUMBER(nebel_cloud_shell, day),
+    PLACE(nebel_cloud_shell, "day", rotation_period, 1, NB_EDIT_EACH),
     PLACE(nebel_cloud_shell, "color", color, 3, NB_EDIT_AMOUNT),
-    PLACE(nebel_cloud_shell, "wrap", wrap, 3, NB_EDIT_EACH),
+    PLACE(nebel_cloud_shell, "wrap", uv_tiling, 3, NB_EDIT_EACH),
     NUMBER(nebel_cloud_shell, gain),
     NUMBER(nebel_cloud_shell, coverage),
     END,
 };
 
 static const nb_place air_shell_places[] = {
-    NUMBER(nebel_air_shell, height),
-    NUMBER(nebel_air_shell, brightness),
+    NUMBER(nebel_atmosphere_shell, height),
+    NUMBER(nebel_atmosphere_shell, brightness),
     END,
 };
 
 /* ---- in the file's numbers ------------------------------------------------------------------- */
 
-static void restore_air(const nb_space *space, nebel_air *air)
+static void restore_air(const nb_space *space, nebel_atmosphere_component *air)
 {
     for (int c = 0; c < 3; c++) {
         air->scattering[c] *= space->unit;
         air->absorption[c] *= space->unit;
     }
     air->scale_height /= space->unit;
-    air->middle /= space->unit;
-    air->width /= space->unit;
+    air->center_height /= space->unit;
+    air->half_width /= space->unit;
 }
 
 /* With the numbers of its kind in the place of zeros, which mean others in the file. */
@@ -87,19 +87,19 @@ static void restore_cloud(const nb_space *space, double thickness, nebel_cloud_l
     (void)nebel_resolve_cloud_layer(thickness, layer, NULL, layer);
     layer->base /= space->unit;
     layer->top /= space->unit;
-    layer->size /= space->unit;
+    layer->cell_size /= space->unit;
     layer->extinction *= space->unit;
-    if (layer->detail == NEBEL_CLOUD_NONE) layer->detail = 0;
-    if (layer->variation == NEBEL_CLOUD_NONE) layer->variation = 0;
+    if (layer->erosion == NEBEL_CLOUD_NONE) layer->erosion = 0;
+    if (layer->patchiness == NEBEL_CLOUD_NONE) layer->patchiness = 0;
     for (int i = 0; i < 2; i++) layer->wind[i] /= i == 1 && space->z_up ? -space->unit : space->unit;
 }
 
-static void restore_layers(const nb_space *space, nebel_layers_desc *desc)
+static void restore_layers(const nb_space *space, nebel_textured_planet_desc *desc)
 {
-    nebel_air_shell *air = &desc->air;
-    for (uint32_t i = 0; i < desc->cloud_count; i++) desc->clouds[i].height /= space->unit;
+    nebel_atmosphere_shell *air = &desc->atmosphere;
+    for (uint32_t i = 0; i < desc->cloud_shell_count; i++) desc->cloud_shells[i].height /= space->unit;
     air->height /= space->unit;
-    if (air->is_absent)
+    if (air->is_disabled)
         air->brightness = 0;
     else if (air->brightness == 0)
         air->brightness = 1;
@@ -108,12 +108,14 @@ static void restore_layers(const nb_space *space, nebel_layers_desc *desc)
 static nebel_planet restore(const nb_space *space, const nebel_planet *planet)
 {
     nebel_planet own = *planet;
-    if (own.model == NEBEL_PLANET_LAYERS) {
-        restore_layers(space, &own.shells);
+    if (own.model == NEBEL_PLANET_TEXTURED) {
+        restore_layers(space, &own.textured_desc);
         return own;
     }
-    for (uint32_t i = 0; i < own.air.air_count; i++) restore_air(space, &own.air.airs[i]);
-    for (uint32_t i = 0; i < own.cloud_layer_count; i++) restore_cloud(space, own.air.thickness, &own.cloud_layers[i]);
+    for (uint32_t i = 0; i < own.atmosphere_desc.component_count; i++)
+        restore_air(space, &own.atmosphere_desc.components[i]);
+    for (uint32_t i = 0; i < own.cloud_layer_count; i++)
+        restore_cloud(space, own.atmosphere_desc.thickness, &own.cloud_layers[i]);
     return own;
 }
 
@@ -126,16 +128,16 @@ static bool is_same_phase(const nebel_phase *a, const nebel_phase *b)
 
 static bool are_same_airs(const nebel_atmosphere_desc *a, const nebel_atmosphere_desc *b)
 {
-    for (uint32_t i = 0; i < a->air_count; i++) {
-        if (!is_same_phase(&a->airs[i].phase, &b->airs[i].phase)) return false;
+    for (uint32_t i = 0; i < a->component_count; i++) {
+        if (!is_same_phase(&a->components[i].phase, &b->components[i].phase)) return false;
         for (size_t k = 0; air_places[k].key != NULL; k++)
-            if (nb_place_differs(&a->airs[i], &b->airs[i], &air_places[k])) return false;
+            if (nb_place_differs(&a->components[i], &b->components[i], &air_places[k])) return false;
     }
     return true;
 }
 
-static void change_air(nb_save *save, const nb_json *json, const nb_json_node *node, const nebel_air *was,
-                       const nebel_air *now)
+static void change_air(nb_save *save, const nb_json *json, const nb_json_node *node,
+                       const nebel_atmosphere_component *was, const nebel_atmosphere_component *now)
 {
     const nb_edit_object air = nb_edit_find(json, node);
     const nb_json_node *phase = nb_edit_member(json, node, "phase");
@@ -149,7 +151,7 @@ static void change_air(nb_save *save, const nb_json *json, const nb_json_node *n
         nb_edit_add(&save->edit, &air, "phase", text);
 }
 
-static void put_air(nb_words *out, const nebel_air *air)
+static void put_air(nb_words *out, const nebel_atmosphere_component *air)
 {
     char phase[NB_EDIT_NUMBERS];
     nb_save_write_phase(&air->phase, phase);
@@ -173,9 +175,9 @@ static void write_airs(nb_save *save, const nb_edit_object *planet, const nb_jso
 {
     nb_words out = {.save = save};
     nb_words_put(&out, "[");
-    for (uint32_t i = 0; i < now->air_count; i++) {
+    for (uint32_t i = 0; i < now->component_count; i++) {
         if (i > 0) nb_words_put(&out, ", ");
-        put_air(&out, &now->airs[i]);
+        put_air(&out, &now->components[i]);
     }
     nb_words_put(&out, "]");
     const char *words = nb_words_end(&out);
@@ -191,13 +193,13 @@ static void save_airs(nb_save *save, const nb_json *json, const nb_edit_object *
 {
     const nb_json_node *array = nb_edit_member(json, planet->node, "airs");
     if (are_same_airs(was, now)) return;
-    if (array == NULL || array->count != now->air_count) {
+    if (array == NULL || array->count != now->component_count) {
         write_airs(save, planet, array, now);
         return;
     }
     const nb_json_node *node = nb_json_first(json, array);
-    for (uint32_t i = 0; i < now->air_count; i++, node = nb_json_next(json, node))
-        change_air(save, json, node, &was->airs[i], &now->airs[i]);
+    for (uint32_t i = 0; i < now->component_count; i++, node = nb_json_next(json, node))
+        change_air(save, json, node, &was->components[i], &now->components[i]);
 }
 
 /* ---- clouds and shells ----------------------------------------------------------------------- */
@@ -223,26 +225,27 @@ static void save_clouds(nb_save *save, const nb_json *json, const nb_json_node *
     }
 }
 
-static void save_shells(nb_save *save, const nb_json *json, const nb_edit_object *planet, const nebel_layers_desc *was,
-                        const nebel_layers_desc *now)
+static void save_shells(nb_save *save, const nb_json *json, const nb_edit_object *planet,
+                        const nebel_textured_planet_desc *was, const nebel_textured_planet_desc *now)
 {
     nb_save_places(save, json, planet, layers_places, NB_ALL_PLACES, was, now);
-    nb_save_object(save, json, planet, "air", air_shell_places, &was->air, &now->air);
-    if (now->cloud_count == 0) return;
+    nb_save_object(save, json, planet, "air", air_shell_places, &was->atmosphere, &now->atmosphere);
+    if (now->cloud_shell_count == 0) return;
     const nb_json_node *node = nb_json_first(json, nb_edit_member(json, planet->node, "clouds"));
-    for (uint32_t i = 0; i < now->cloud_count; i++, node = nb_json_next(json, node))
-        nb_save_entry(save, json, node, shell_places, &was->clouds[i], &now->clouds[i]);
+    for (uint32_t i = 0; i < now->cloud_shell_count; i++, node = nb_json_next(json, node))
+        nb_save_entry(save, json, node, shell_places, &was->cloud_shells[i], &now->cloud_shells[i]);
 }
 
 /* ---- planets --------------------------------------------------------------------------------- */
 
 static bool is_same_form(const nebel_planet *a, const nebel_planet *b)
 {
-    if (a->model != b->model || a->air.air_count != b->air.air_count || a->cloud_layer_count != b->cloud_layer_count ||
-        a->shells.cloud_count != b->shells.cloud_count)
+    if (a->model != b->model || a->atmosphere_desc.component_count != b->atmosphere_desc.component_count ||
+        a->cloud_layer_count != b->cloud_layer_count ||
+        a->textured_desc.cloud_shell_count != b->textured_desc.cloud_shell_count)
         return false;
-    for (uint32_t i = 0; i < a->air.air_count; i++)
-        if (a->air.airs[i].profile != b->air.airs[i].profile) return false;
+    for (uint32_t i = 0; i < a->atmosphere_desc.component_count; i++)
+        if (a->atmosphere_desc.components[i].profile != b->atmosphere_desc.components[i].profile) return false;
     return true;
 }
 
@@ -259,12 +262,12 @@ static void save_planet(nb_save *save, const nb_scene_reader *in, const nb_json_
     const nb_edit_object planet = nb_edit_find(in->json, node);
     const nebel_planet was = restore(&in->space, &save->before->planets[index]),
                        now = restore(&in->space, &save->changed->planets[index]);
-    if (now.model == NEBEL_PLANET_LAYERS) {
-        save_shells(save, in->json, &planet, &was.shells, &now.shells);
+    if (now.model == NEBEL_PLANET_TEXTURED) {
+        save_shells(save, in->json, &planet, &was.textured_desc, &now.textured_desc);
         return;
     }
     nb_save_places(save, in->json, &planet, physical_places, NB_ALL_PLACES, &was, &now);
-    save_airs(save, in->json, &planet, &was.air, &now.air);
+    save_airs(save, in->json, &planet, &was.atmosphere_desc, &now.atmosphere_desc);
     save_clouds(save, in->json, node, &was, &now);
 }
 

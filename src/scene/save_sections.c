@@ -38,15 +38,15 @@ static void add_sun(nb_save *save, const nb_space *space)
 
 /* ---- lamps ----------------------------------------------------------------------------------- */
 
-static void restore_lamp(const nb_space *space, nebel_lamp *lamp)
+static void restore_lamp(const nb_space *space, nebel_light *lamp)
 {
     nb_space_restore_place(space, lamp->position);
     nb_space_restore_direction(space, lamp->direction);
     lamp->radius /= space->unit;
 }
 
-static void change_lamp(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, nebel_lamp was,
-                        nebel_lamp now)
+static void change_lamp(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, nebel_light was,
+                        nebel_light now)
 {
     const nb_edit_object object = nb_edit_find(in->json, node);
     restore_lamp(&in->space, &was);
@@ -57,31 +57,31 @@ static void change_lamp(nb_save *save, const nb_scene_reader *in, const nb_json_
 bool nb_save_lamp(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
     const nebel_scene_data *before = save->before;
-    if (index >= before->lamp_count || in->scene->lamps[index].type != before->lamps[index].type)
+    if (index >= before->light_count || in->scene->lamps[index].type != before->lights[index].type)
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, node,
                             "is another lamp than the one to be written; the file has changed, load it again");
-    change_lamp(save, in, node, before->lamps[index], save->changed->lamps[index]);
+    change_lamp(save, in, node, before->lights[index], save->changed->lights[index]);
     return true;
 }
 
 /* ---- models ---------------------------------------------------------------------------------- */
 
-static const nebel_model *find_model(const nebel_scene_data *scene, size_t source)
+static const nebel_scene_model *find_model(const nebel_scene_data *scene, size_t source)
 {
     for (size_t i = 0; i < scene->model_count; i++)
-        if (scene->models[i].source == source) return &scene->models[i];
+        if (scene->models[i].model_index == source) return &scene->models[i];
     return NULL;
 }
 
-static void restore_model(const nb_space *space, nebel_model *model)
+static void restore_model(const nb_space *space, nebel_scene_model *model)
 {
     nb_space_restore_placement(space, model->position, model->rotation, model->scale);
     for (int i = 0; i < 2; i++) model->size[i] /= space->unit;
     model->height /= space->unit;
 }
 
-static void save_model_color(nb_save *save, const nb_json *json, const nb_edit_object *object, const nebel_model *was,
-                             const nebel_model *now)
+static void save_model_color(nb_save *save, const nb_json *json, const nb_edit_object *object,
+                             const nebel_scene_model *was, const nebel_scene_model *now)
 {
     double from[3];
     memcpy(from, was->color, sizeof from);
@@ -91,8 +91,8 @@ static void save_model_color(nb_save *save, const nb_json *json, const nb_edit_o
         nb_edit_remove_members(&save->edit, json, object->node, (const char *const[]){"color", NULL});
 }
 
-static void change_model(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, nebel_model was,
-                         nebel_model now)
+static void change_model(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, nebel_scene_model was,
+                         nebel_scene_model now)
 {
     const nb_edit_object object = nb_edit_find(in->json, node);
     const nb_edit_object field = nb_edit_find(in->json, nb_edit_member(in->json, node, "heightfield"));
@@ -106,10 +106,10 @@ static void change_model(nb_save *save, const nb_scene_reader *in, const nb_json
 bool nb_save_model(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
     const nebel_scene_data *before = save->before;
-    if (index >= before->model_count || strcmp(in->scene->models[index].file, before->models[index].file) != 0)
+    if (index >= before->model_count || strcmp(in->scene->models[index].file, before->models[index].path) != 0)
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, node,
                             "is another model than the one to be written; the file has changed, load it again");
-    const nebel_model *now = find_model(save->changed, index);
+    const nebel_scene_model *now = find_model(save->changed, index);
     if (now != NULL) change_model(save, in, node, before->models[index], *now);
     return nb_save_keep_span(save, in, &save->models, node, now == NULL);
 }
@@ -203,12 +203,12 @@ static bool check_counts(const nb_scene_reader *in, const nb_save *save, const n
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                             "has %zu models where %zu were; the file has changed, load it again",
                             in->scene->model_count, before->model_count);
-    if (now->lamp_count != before->lamp_count)
+    if (now->light_count != before->light_count)
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
-                            "has %zu lamps where %zu were; the file has changed, load it again", now->lamp_count,
-                            before->lamp_count);
+                            "has %zu lamps where %zu were; the file has changed, load it again", now->light_count,
+                            before->light_count);
     /* The sky of a planet is in no file. */
-    const bool is_sky = before->environment.type == NEBEL_ENVIRONMENT_MAP && before->environment_file == NULL;
+    const bool is_sky = before->environment.type == NEBEL_ENVIRONMENT_MAP && before->environment_path == NULL;
     if (now->environment.type != before->environment.type && !is_sky)
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                             "has not the ambient light that it had; the file has changed, load it again");

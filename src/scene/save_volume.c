@@ -130,7 +130,8 @@ static void put_density(writer *out, const nebel_density *density)
     if (density->type == NEBEL_DENSITY_CONSTANT) return;
     if (density->type == NEBEL_DENSITY_GRID) { /* its name is what the file said of it */
         put_key(out, "density");
-        put(out, nebel_grid_name(density->grid)[0] != '\0' ? nebel_grid_name(density->grid) : "{ \"file\": \"\" }");
+        put(out,
+            nebel_get_grid_name(density->grid)[0] != '\0' ? nebel_get_grid_name(density->grid) : "{ \"file\": \"\" }");
         return;
     }
     open_object(out, "density");
@@ -163,7 +164,7 @@ static bool is_zero(const double rgb[3])
     return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
 }
 
-bool nb_save_has_lit_key(const nebel_volume_entry *entry)
+bool nb_save_has_lit_key(const nebel_volume_track *entry)
 {
     for (size_t i = 0; i < entry->key_count; i++)
         if (!is_zero(entry->keys[i].volume.albedo)) return true;

@@ -112,7 +112,7 @@ static bool read_model(nb_scene_reader *in, const nb_json_node *node)
 
 static bool read_light(nb_scene_reader *in, const nb_json_node *node)
 {
-    const size_t index = in->scene->data.lamp_count;
+    const size_t index = in->scene->data.light_count;
     return nb_read_light(in, node) && (in->save == NULL || nb_save_lamp(in->save, in, node, index));
 }
 
@@ -207,15 +207,15 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
     nebel_destroy_fog(in.trial);
     scene->data.volumes = scene->volumes;
     scene->data.volume_names = scene->volume_names;
-    scene->data.volume_entries = scene->volume_entries;
-    scene->data.lamps = scene->lamps;
-    scene->data.lamp_names = scene->lamp_names;
+    scene->data.volume_tracks = scene->volume_entries;
+    scene->data.lights = scene->lamps;
+    scene->data.light_names = scene->lamp_names;
     scene->data.nebulae = scene->nebulae;
     scene->data.nebula_names = scene->nebula_names;
-    scene->data.nebula_places = scene->nebula_places;
+    scene->data.nebula_transforms = scene->nebula_places;
     scene->data.models = scene->placements;
     scene->data.model_count = scene->model_count;
-    scene->data.files = scene->files;
+    scene->data.paths = scene->files;
     return result;
 }
 
@@ -292,15 +292,15 @@ nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, ne
 
 /* ---- the scene ------------------------------------------------------------------------------- */
 
-const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene)
+const nebel_scene_data *nebel_get_scene_data(const nebel_scene *scene)
 {
     if (scene == NULL) return NULL;
     return &scene->data;
 }
 
-nebel_volume_origin nebel_scene_volume_origin(const nebel_scene *scene, size_t index)
+nebel_volume_origin nebel_get_volume_origin(const nebel_scene *scene, size_t index)
 {
-    if (scene == NULL || index >= scene->data.volume_count) return NEBEL_VOLUME_WRITTEN;
+    if (scene == NULL || index >= scene->data.volume_count) return NEBEL_VOLUME_STATIC;
     return scene->volume_origins[index];
 }
 
@@ -311,13 +311,13 @@ static nebel_result strew(const nebel_scene *scene, nebel_particle *particles)
         nebel_nebula_desc desc = scene->nebulae[i];
         desc.allocator = scene->allocator;
         desc.log = scene->log;
-        result = nebel_scatter_nebula(&desc, particles);
+        result = nebel_generate_nebula(&desc, particles);
         particles += desc.count;
     }
     return result;
 }
 
-nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle **particles)
+nebel_result nebel_generate_scene_particles(const nebel_scene *scene, nebel_particle **particles)
 {
     if (particles != NULL) *particles = NULL;
     if (scene == NULL || particles == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -342,9 +342,9 @@ static nebel_result add_particles(nebel_fog *fog, const nebel_scene *scene)
 {
     nebel_particle *particles = NULL;
     if (scene->data.particle_count == 0) return NEBEL_OK;
-    nebel_result result = nebel_make_scene_particles(scene, &particles);
+    nebel_result result = nebel_generate_scene_particles(scene, &particles);
     for (size_t i = 0; i < scene->data.particle_count && result == NEBEL_OK; i++) {
-        const nebel_volume_desc volume = nebel_particle_volume(&particles[i]);
+        const nebel_volume_desc volume = nebel_volume_from_particle(&particles[i]);
         result = nebel_add_volume(fog, &volume, NULL);
     }
     nebel_free_scene_particles(scene, particles);
@@ -357,12 +357,12 @@ static nebel_result find_grid(const nebel_scene *scene, nebel_grid *grid, double
 {
     nebel_scene_noise noise;
     nebel_grid *changed = NULL;
-    if (seed == NULL || grid == NULL || !nebel_find_scene_noise(scene, grid, &noise))
-        return nebel_scene_grid(scene, grid, frame, at);
+    if (seed == NULL || grid == NULL || !nebel_get_scene_noise(scene, grid, &noise))
+        return nebel_get_scene_grid(scene, grid, frame, at);
     *at = NULL;
     noise.desc.seed = nb_mix_bits(noise.desc.seed ^ nb_mix_bits(*seed)) >> 1; /* scene files take 31 bits */
-    nebel_result result = nebel_change_scene_noise(scene, grid, &noise, &changed);
-    if (result == NEBEL_OK) result = nebel_scene_grid(scene, changed, frame, at);
+    nebel_result result = nebel_update_scene_noise(scene, grid, &noise, &changed);
+    if (result == NEBEL_OK) result = nebel_get_scene_grid(scene, changed, frame, at);
     nebel_release_grid(changed);
     return result;
 }
@@ -372,7 +372,7 @@ static nebel_result add_volumes(nebel_fog *fog, const nebel_scene *scene, double
     const nebel_scene_data *data = &scene->data;
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < data->volume_count && result == NEBEL_OK; i++) {
-        nebel_volume_desc volume = nebel_scene_volume(scene, i, frame);
+        nebel_volume_desc volume = nebel_get_scene_volume(scene, i, frame);
         result = find_grid(scene, volume.density.grid, frame, seed, &volume.density.grid);
         if (result == NEBEL_OK) result = nebel_add_volume(fog, &volume, NULL);
         nebel_release_grid(volume.density.grid);
@@ -384,7 +384,7 @@ static nebel_result add_cells(nebel_fog *fog, const nebel_cells_desc *cells)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; cells != NULL && i < cells->cell_count && result == NEBEL_OK; i++) {
-        const nebel_volume_desc volume = nebel_cell_volume(&cells->cells[i]);
+        const nebel_volume_desc volume = nebel_volume_from_cell(&cells->cells[i]);
         if (cells->cells[i].density > 0) result = nebel_add_volume(fog, &volume, NULL);
     }
     return result;
@@ -412,7 +412,7 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
     if (result != NEBEL_OK) return result;
     result = nebel_create_fog(&desc, &fog);
     if (result == NEBEL_OK && ambient.type != NEBEL_ENVIRONMENT_CONSTANT) result = nebel_set_environment(fog, &ambient);
-    if (result == NEBEL_OK) result = nebel_set_lamps(fog, scene->data.lamp_count, scene->data.lamps);
+    if (result == NEBEL_OK) result = nebel_set_lamps(fog, scene->data.light_count, scene->data.lights);
     if (result == NEBEL_OK) result = nebel_set_diffusion(fog, scene->data.diffusion);
     if (result == NEBEL_OK) result = add_volumes(fog, scene, frame, seed);
     if (result == NEBEL_OK) result = add_cells(fog, scene->data.cells);
@@ -464,7 +464,7 @@ void nebel_destroy_scene(nebel_scene *scene)
     nebel_release_environment_map(scene->environment_map);
     nebel_destroy_clouds(scene->clouds);
     for (int i = 0; i < NEBEL_MAX_PLANETS; i++) nebel_destroy_atmosphere(scene->atmospheres[i]);
-    nebel_destroy_layers(scene->layers);
+    nebel_destroy_textured_planet(scene->layers);
     for (size_t i = 0; i < scene->map_count; i++) nb_image_release(&allocator, &scene->maps[i]);
     for (size_t i = 0; i < scene->grid_count; i++) nebel_release_grid(scene->grids[i]);
     nb_release(&allocator, (void *)scene->grids);

@@ -54,7 +54,7 @@ struct nebel_scene {
     nebel_log log;
     nb_scene_budget budget;
     nb_model_reader reader;
-    nebel_air_run_fn run; /* NULL: none */
+    nebel_parallel_for_fn run; /* NULL: none */
     void *run_user;
     nb_arena arena;
     const char *folder; /* of the file, ending in a slash; "" is the current one */
@@ -65,7 +65,7 @@ struct nebel_scene {
     nebel_volume_desc *volumes;
     const char **volume_names;
     nebel_volume_origin *volume_origins;
-    nebel_volume_entry *volume_entries;
+    nebel_volume_track *volume_entries;
     size_t volume_capacity, name_capacity, origin_capacity, entry_capacity;
 
     nebel_nebula_desc *nebulae;
@@ -73,7 +73,7 @@ struct nebel_scene {
     nebel_transform *nebula_places;
     size_t nebula_capacity, nebula_name_capacity, nebula_place_capacity;
 
-    nebel_lamp *lamps;
+    nebel_light *lamps;
     const char **lamp_names;
     size_t lamp_capacity, lamp_name_capacity;
 
@@ -85,7 +85,7 @@ struct nebel_scene {
 
     nebel_planet *planets; /* those of the contents; NULL: none */
     nebel_atmosphere *atmospheres[NEBEL_MAX_PLANETS];
-    nebel_layers *layers;
+    nebel_textured_planet *layers;
     nebel_clouds *clouds;
     nebel_image maps[NB_MOST_MAPS]; /* that the planet's layers were read from */
     size_t map_count;
@@ -94,7 +94,7 @@ struct nebel_scene {
     size_t grid_count, grid_capacity;
 
     nb_model_source *models;
-    nebel_model *placements; /* of the models, in the words of the public face */
+    nebel_scene_model *placements; /* of the models, in the words of the public face */
     size_t model_count, model_capacity, placement_capacity;
     nb_model_set loaded;
     bool models_loaded;
@@ -202,11 +202,11 @@ double nb_device_unit(const nebel_scene_data *scene, const nebel_d3d9_fog *fog, 
 /* When camera and classic fog are read: numbers in device depth were taken for lengths. */
 void nb_finish_classic(nb_scene_reader *in);
 bool nb_read_planet(nb_scene_reader *in, const nb_json_node *node);
-bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_layers_desc *desc);
+bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_textured_planet_desc *desc);
 bool nb_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet);
 
 /* A picture as a map of 1 or 3 channels, which the scene owns; and the seed of noise. */
-bool nb_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, nebel_map *map);
+bool nb_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, nebel_planet_map *map);
 bool nb_read_seed(nb_scene_reader *in, const nb_json_node *node, uint32_t *seed);
 bool nb_read_multiple_scattering(nb_scene_reader *in, const nb_json_node *node);
 /* Points, their number and their place, from a model file. NULL: none. */
@@ -272,7 +272,7 @@ extern const char *const nb_projection_names[3], *const nb_coordinate_names[NEBE
                                                              *const nb_d3d9_mode_names[4];
 
 /* What an entry says that says nothing. */
-nebel_volume_entry nb_volume_entry_default(void);
+nebel_volume_track nb_volume_entry_default(void);
 
 nebel_camera nb_camera_default(void);
 

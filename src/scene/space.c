@@ -90,7 +90,7 @@ static void convert_density(const nb_space *space, nebel_density *density)
     density->base *= space->unit;
     density->scale_height *= space->unit;
     density->sigma *= space->unit;
-    density->distance *= space->unit;
+    density->edge_width *= space->unit;
     density->radius *= space->unit;
 }
 
@@ -110,9 +110,9 @@ void nb_space_convert_nebula(const nb_space *space, nebel_nebula_desc *nebula)
     convert_density(space, &nebula->density);
     convert_inverse_lengths(space, nebula->absorption);
     convert_inverse_lengths(space, nebula->emission);
-    scale_all(space->unit, nebula->size, 2);
+    scale_all(space->unit, nebula->radius_range, 2);
     nebula->turbulence *= space->unit;
-    nebula->turbulence_size *= space->unit;
+    nebula->turbulence_scale *= space->unit;
 }
 
 void nb_space_convert_cell(const nb_space *space, nebel_cell *cell)
@@ -128,14 +128,14 @@ static void exchange_axes(const nb_space *space, nebel_noise_desc *noise)
     if (!space->z_up) return;
     noise->size[1] = noise->size[2];
     noise->size[2] = size;
-    swap_y_and_z(noise->cells);
-    swap_y_and_z(noise->edge);
+    swap_y_and_z(noise->frequency);
+    swap_y_and_z(noise->falloff);
 }
 
 void nb_space_convert_noise(const nb_space *space, nebel_scene_noise *noise)
 {
     exchange_axes(space, &noise->desc);
-    nb_space_convert_direction(space, noise->drift);
+    nb_space_convert_direction(space, noise->velocity);
 }
 
 /* ---- camera ---------------------------------------------------------------------------------- */
@@ -211,7 +211,7 @@ static void restore_density(const nb_space *space, nebel_density *density)
     density->base *= back;
     density->scale_height *= back;
     density->sigma *= back;
-    density->distance *= back;
+    density->edge_width *= back;
     density->radius *= back;
 }
 
@@ -231,15 +231,15 @@ void nb_space_restore_nebula(const nb_space *space, nebel_nebula_desc *nebula)
     restore_density(space, &nebula->density);
     scale_all(space->unit, nebula->absorption, 3);
     scale_all(space->unit, nebula->emission, 3);
-    scale_all(1 / space->unit, nebula->size, 2);
+    scale_all(1 / space->unit, nebula->radius_range, 2);
     nebula->turbulence /= space->unit;
-    nebula->turbulence_size /= space->unit;
+    nebula->turbulence_scale /= space->unit;
 }
 
 void nb_space_restore_noise(const nb_space *space, nebel_scene_noise *noise)
 {
     exchange_axes(space, &noise->desc);
-    nb_space_restore_direction(space, noise->drift);
+    nb_space_restore_direction(space, noise->velocity);
 }
 
 void nb_space_restore_cell(const nb_space *space, nebel_cell *cell)

@@ -8,7 +8,7 @@
 #include <string.h>
 
 /* Opposite keys leave no direction halfway: there the nearer key's holds. */
-nebel_sun nebel_sun_between_keys(const nebel_sun_key *keys, size_t count, double frame)
+nebel_sun nebel_interpolate_sun(const nebel_sun_key *keys, size_t count, double frame)
 {
     if (keys == NULL || count == 0) return (nebel_sun){.direction = {0, 1, 0}};
     nb_keyframes around;
@@ -31,11 +31,11 @@ nebel_sun nebel_sun_between_keys(const nebel_sun_key *keys, size_t count, double
     return sun;
 }
 
-nebel_sun nebel_scene_sun(const nebel_scene *scene, double frame)
+nebel_sun nebel_get_scene_sun(const nebel_scene *scene, double frame)
 {
     if (scene == NULL) return (nebel_sun){.direction = {0, 1, 0}};
     const nebel_scene_data *data = &scene->data;
-    if (data->sun_key_count > 0) return nebel_sun_between_keys(data->sun_keys, data->sun_key_count, frame);
+    if (data->sun_key_count > 0) return nebel_interpolate_sun(data->sun_keys, data->sun_key_count, frame);
     nebel_sun sun = {.direction = {0, 1, 0}};
     if (!data->has_sun) return sun;
     memcpy(sun.direction, data->sun_direction, sizeof sun.direction);
@@ -51,7 +51,7 @@ static bool is_sun(const nebel_sun *sun)
     return good;
 }
 
-nebel_result nebel_light_scene_by(nebel_scene *scene, const nebel_sun *sun)
+nebel_result nebel_set_scene_sun(nebel_scene *scene, const nebel_sun *sun)
 {
     if (scene == NULL || (sun != NULL && !is_sun(sun))) return NEBEL_ERROR_ARGUMENT;
     scene->data.has_sun = sun != NULL;
@@ -63,11 +63,11 @@ nebel_result nebel_light_scene_by(nebel_scene *scene, const nebel_sun *sun)
     return nb_planet_light(scene);
 }
 
-nebel_result nebel_light_scene_at(nebel_scene *scene, double frame)
+nebel_result nebel_set_scene_frame(nebel_scene *scene, double frame)
 {
     if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
     if (!nb_scene_is_frame(scene, frame)) return NEBEL_ERROR_VALUE;
     if (scene->data.sun_key_count == 0) return NEBEL_OK;
-    const nebel_sun sun = nebel_scene_sun(scene, frame);
-    return nebel_light_scene_by(scene, &sun);
+    const nebel_sun sun = nebel_get_scene_sun(scene, frame);
+    return nebel_set_scene_sun(scene, &sun);
 }

@@ -38,7 +38,7 @@ static const moving numbers[] = {
     MOVING(density.to, 3, false),
     MOVING(density.center, 3, false),
     MOVING(density.sigma, 1, true),
-    MOVING(density.distance, 1, true),
+    MOVING(density.edge_width, 1, true),
     MOVING(density.radius, 1, true),
     MOVING(extinction, 3, true),
     MOVING(source, 3, true),
@@ -132,7 +132,7 @@ static bool is_sound(const nebel_volume_desc *volume)
         if (is_box && !(shape->min[i] < shape->max[i])) return false;
     if (has_axis && axis < NEBEL_MIN_LENGTH && !(is_capsule && axis == 0)) return false;
     if (density->type == NEBEL_DENSITY_ALTITUDE)
-        return density->radius + density->base >= NEBEL_MIN_CURVATURE * density->scale_height;
+        return density->radius + density->base >= NEBEL_MIN_ALTITUDE_RATIO * density->scale_height;
     return density->type != NEBEL_DENSITY_LINEAR || distance(density->from, density->to) >= NEBEL_MIN_LENGTH;
 }
 
@@ -167,7 +167,7 @@ static nebel_volume_desc volume_between(const nebel_volume_key *keys, const nb_k
     return is_sound(&volume) ? volume : *nearer;
 }
 
-nebel_volume_desc nebel_volume_between_keys(const nebel_volume_key *keys, size_t count, double frame)
+nebel_volume_desc nebel_interpolate_volume(const nebel_volume_key *keys, size_t count, double frame)
 {
     if (keys == NULL || count == 0) return (nebel_volume_desc){.priority = 0};
     nb_keyframes around;
@@ -175,10 +175,10 @@ nebel_volume_desc nebel_volume_between_keys(const nebel_volume_key *keys, size_t
     return volume_between(keys, &around);
 }
 
-nebel_volume_desc nebel_scene_volume(const nebel_scene *scene, size_t index, double frame)
+nebel_volume_desc nebel_get_scene_volume(const nebel_scene *scene, size_t index, double frame)
 {
     if (scene == NULL || index >= scene->data.volume_count) return (nebel_volume_desc){.priority = 0};
-    const nebel_volume_entry *entry = &scene->volume_entries[index];
-    return entry->key_count > 0 ? nebel_volume_between_keys(entry->keys, entry->key_count, frame)
+    const nebel_volume_track *entry = &scene->volume_entries[index];
+    return entry->key_count > 0 ? nebel_interpolate_volume(entry->keys, entry->key_count, frame)
                                 : scene->volumes[index];
 }

@@ -70,7 +70,7 @@ static nebel_result read_numbers(const nb_codec *codec, const nebel_grid_file *f
     memcpy(voxels->size, file->size, sizeof voxels->size);
     size_t count = 0;
     nebel_result result = count_voxels(codec, voxels, &count);
-    if (result == NEBEL_OK) result = read_file(codec, file->file, &bytes);
+    if (result == NEBEL_OK) result = read_file(codec, file->path, &bytes);
     if (result != NEBEL_OK) return result;
     result = take_numbers(codec, &bytes, voxels);
     nb_release(&codec->allocator, bytes.data);
@@ -80,9 +80,9 @@ static nebel_result read_numbers(const nb_codec *codec, const nebel_grid_file *f
 static nebel_result read_nanovdb(const nb_codec *codec, const nebel_grid_file *file, nb_voxels *voxels)
 {
     nb_bytes bytes;
-    nebel_result result = read_file(codec, file->file, &bytes);
+    nebel_result result = read_file(codec, file->path, &bytes);
     if (result != NEBEL_OK) return result;
-    result = nb_nanovdb_read(codec, &bytes, file->grid, voxels);
+    result = nb_nanovdb_read(codec, &bytes, file->grid_name, voxels);
     nb_release(&codec->allocator, bytes.data);
     return result;
 }
@@ -161,12 +161,12 @@ static nebel_result read_slices(const nb_codec *codec, const nebel_grid_file *fi
     char path[PATH_SIZE];
     const nb_codec of_slice = {.allocator = codec->allocator, .log = codec->log, .name = path, .room = codec->room};
     nebel_result result = NEBEL_OK;
-    if (file->slices < 1 || file->slices > NEBEL_MAX_GRID_SIZE)
-        return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: %zu slices; must be 1 to %d", codec->name, file->slices,
-                       NEBEL_MAX_GRID_SIZE);
-    voxels->size[2] = file->slices;
-    for (size_t i = 0; i < file->slices && result == NEBEL_OK; i++) {
-        if (!name_slice(file->file, i, path))
+    if (file->slice_count < 1 || file->slice_count > NEBEL_MAX_GRID_SIZE)
+        return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: %zu slices; must be 1 to %d", codec->name,
+                       file->slice_count, NEBEL_MAX_GRID_SIZE);
+    voxels->size[2] = file->slice_count;
+    for (size_t i = 0; i < file->slice_count && result == NEBEL_OK; i++) {
+        if (!name_slice(file->path, i, path))
             return nb_fail(&codec->log, NEBEL_ERROR_FORMAT,
                            "%s: the name of slices needs a run of 1 to %d #, for their numbers", codec->name,
                            MOST_DIGITS);
@@ -211,11 +211,11 @@ nb_voxel_file nb_voxel_file_kind(const char *path, size_t size)
 
 static nebel_result read_voxels(const nb_codec *codec, const nebel_grid_file *file, nb_voxels *voxels)
 {
-    switch (nb_voxel_file_kind(file->file, strlen(file->file))) {
+    switch (nb_voxel_file_kind(file->path, strlen(file->path))) {
     case NB_VOXELS_NANOVDB:
         return read_nanovdb(codec, file, voxels);
     case NB_VOXELS_OPENVDB:
-        return nb_vdb_read(codec, file->grid, voxels);
+        return nb_vdb_read(codec, file->grid_name, voxels);
     case NB_VOXELS_SLICES:
         return read_slices(codec, file, voxels);
     default:
@@ -253,12 +253,12 @@ nebel_result nb_voxels_load(const nebel_grid_file *file, const nebel_scene_desc 
 {
     *bytes = 0;
     if (grid != NULL) *grid = NULL;
-    if (file == NULL || desc == NULL || grid == NULL || file->file == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (file == NULL || desc == NULL || grid == NULL || file->path == NULL) return NEBEL_ERROR_ARGUMENT;
     if (!nb_allocator_is_valid(&desc->allocator))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
     const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator),
                             .log = desc->log,
-                            .name = file->file,
+                            .name = file->path,
                             .room = desc->memory};
     nb_voxels voxels = {.data = NULL};
     nebel_result result = read_voxels(&codec, file, &voxels);

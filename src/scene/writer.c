@@ -71,7 +71,7 @@ nebel_result nebel_create_image_writer(const char *path, const nebel_image_desc 
     const nb_picture_plan plan = {desc->width, desc->height, desc->channel_count, desc->channel_names, desc->record};
     result = check_plan(&codec, &plan);
     if (result != NEBEL_OK) return result;
-    const nebel_image_format format = nebel_find_image_format(path);
+    const nebel_image_format format = nebel_get_image_format(path);
     if (format == NEBEL_IMAGE_NONE) return fail_ending(&codec);
     nebel_image_writer *made = nb_allocate_zero(&codec.allocator, 1, sizeof *made + strlen(path) + 1);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);

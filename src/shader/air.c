@@ -10,7 +10,7 @@
 #define MOST_WORDS ((size_t)1 << 24) /* indices are exact floats */
 
 _Static_assert((int)NB_AIR_FALLING == NB_VIEW_FALLING && (int)NB_AIR_RISING == NB_VIEW_RISING &&
-                   (int)NB_AIR_SUNS == NB_VIEW_SUNS && NB_MOST_LOBES == 2 && NEBEL_MAX_AIRS == 4,
+                   (int)NB_AIR_SUNS == NB_VIEW_SUNS && NB_MOST_LOBES == 2 && NEBEL_MAX_COMPONENTS == 4,
                "what layout.h says");
 
 /* Where the parts begin, and how many words there are. */
@@ -18,7 +18,7 @@ typedef struct nb_air_parts {
     size_t entries, extinction, suns, skies, count;
 } nb_air_parts;
 
-static nb_air_parts find_parts(const nebel_air_view *view)
+static nb_air_parts find_parts(const nebel_sky_view *view)
 {
     const size_t levels = (size_t)NB_VIEW_ROWS * ((size_t)view->levels + 1);
     nb_air_parts parts = {.entries = NB_AIR_WORDS};
@@ -29,17 +29,17 @@ static nb_air_parts find_parts(const nebel_air_view *view)
     return parts;
 }
 
-static nebel_word word_of(const double v[3])
+static nebel_texel_f32 word_of(const double v[3])
 {
-    return (nebel_word){{(float)v[0], (float)v[1], (float)v[2], 0}};
+    return (nebel_texel_f32){{(float)v[0], (float)v[1], (float)v[2], 0}};
 }
 
-static nebel_word word_of_four(double a, double b, double c, double d)
+static nebel_texel_f32 word_of_four(double a, double b, double c, double d)
 {
-    return (nebel_word){{(float)a, (float)b, (float)c, (float)d}};
+    return (nebel_texel_f32){{(float)a, (float)b, (float)c, (float)d}};
 }
 
-static void pack_lobes(const nebel_air_view *view, nebel_word *words)
+static void pack_lobes(const nebel_sky_view *view, nebel_texel_f32 *words)
 {
     for (int i = 0; i < view->scatterer_count; i++) {
         const nb_phase *phase = &view->atmosphere->airs.airs[view->scatterers[i]].phase;
@@ -50,7 +50,7 @@ static void pack_lobes(const nebel_air_view *view, nebel_word *words)
     }
 }
 
-static void pack_head(const nebel_air_view *view, const nb_air_parts *parts, nebel_word *words)
+static void pack_head(const nebel_sky_view *view, const nb_air_parts *parts, nebel_texel_f32 *words)
 {
     const nb_outlook *o = &view->outlook;
     const nb_scatter *scatter = &view->atmosphere->scatter;
@@ -72,17 +72,17 @@ static void pack_head(const nebel_air_view *view, const nb_air_parts *parts, neb
     pack_lobes(view, words + NB_AIR_LOBES);
 }
 
-static void pack_entries(const nebel_air_view *view, nebel_word *word)
+static void pack_entries(const nebel_sky_view *view, nebel_texel_f32 *word)
 {
     const size_t count = (size_t)NB_VIEW_ROWS * (size_t)view->columns * ((size_t)view->levels + 1);
     for (size_t i = 0; i < count; i++) {
         const float *entry = view->entries + i * (size_t)view->size;
         for (int k = 0; k <= view->scatterer_count; k++, entry += 3)
-            *word++ = (nebel_word){{entry[0], entry[1], entry[2], 0}};
+            *word++ = (nebel_texel_f32){{entry[0], entry[1], entry[2], 0}};
     }
 }
 
-static void pack_words(const nebel_air_view *view, const nb_air_parts *parts, nebel_word *words)
+static void pack_words(const nebel_sky_view *view, const nb_air_parts *parts, nebel_texel_f32 *words)
 {
     const nb_scatter *scatter = &view->atmosphere->scatter;
     pack_head(view, parts, words);
@@ -93,7 +93,7 @@ static void pack_words(const nebel_air_view *view, const nb_air_parts *parts, ne
     for (int i = 0; i < scatter->suns; i++) words[parts->skies + (size_t)i] = word_of(scatter->ground[i]);
 }
 
-nebel_result nebel_pack_air_view(const nebel_air_view *view, nebel_word *words, size_t capacity, size_t *count)
+nebel_result nebel_pack_sky_view(const nebel_sky_view *view, nebel_texel_f32 *words, size_t capacity, size_t *count)
 {
     if (view == NULL || count == NULL || (words == NULL && capacity > 0)) return NEBEL_ERROR_ARGUMENT;
     const nb_air_parts parts = find_parts(view);

@@ -1,13 +1,13 @@
-/* The air of a planet from the words of nebel_pack_air_view: what src/planet/look.c says of it, in float. Part of the shader
- * text where NEBEL_AIR_WORD is defined. */
-#ifdef NEBEL_AIR_WORD
+/* The air of a planet from the words of nebel_pack_sky_view: what src/planet/look.c says of it, in float. Part of the shader
+ * text where NEBEL_SKY_VIEW_TEXEL is defined. */
+#ifdef NEBEL_SKY_VIEW_TEXEL
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
 nb_outlook nb_air_outlook()
 {
-    nb_vec4 a = NEBEL_AIR_WORD(NB_AIR_OUTLOOK);
-    nb_vec4 b = NEBEL_AIR_WORD(NB_AIR_OUTLOOK + 1);
+    nb_vec4 a = NEBEL_SKY_VIEW_TEXEL(NB_AIR_OUTLOOK);
+    nb_vec4 b = NEBEL_SKY_VIEW_TEXEL(NB_AIR_OUTLOOK + 1);
     nb_outlook outlook;
     outlook.radius = a.x;
     outlook.ground = a.y;
@@ -23,8 +23,8 @@ nb_outlook nb_air_outlook()
 /* Up, level towards the sun, level aside. */
 nb_vec3 nb_air_bearing(nb_vec3 direction)
 {
-    return nb_vec3(dot(direction, NEBEL_AIR_WORD(NB_AIR_AXES).xyz), dot(direction, NEBEL_AIR_WORD(NB_AIR_AXES + 1).xyz),
-                   dot(direction, NEBEL_AIR_WORD(NB_AIR_AXES + 2).xyz));
+    return nb_vec3(dot(direction, NEBEL_SKY_VIEW_TEXEL(NB_AIR_AXES).xyz), dot(direction, NEBEL_SKY_VIEW_TEXEL(NB_AIR_AXES + 1).xyz),
+                   dot(direction, NEBEL_SKY_VIEW_TEXEL(NB_AIR_AXES + 2).xyz));
 }
 
 nb_reach nb_air_reach(nb_vec3 bearing)
@@ -60,16 +60,16 @@ struct nb_air_ray {
 /* 1/sr, of one kind of air. */
 float nb_air_phase(int number, nb_turn turn)
 {
-    nb_vec4 a = NEBEL_AIR_WORD(NB_AIR_LOBES + 2 * number);
-    nb_vec4 b = NEBEL_AIR_WORD(NB_AIR_LOBES + 2 * number + 1);
+    nb_vec4 a = NEBEL_SKY_VIEW_TEXEL(NB_AIR_LOBES + 2 * number);
+    nb_vec4 b = NEBEL_SKY_VIEW_TEXEL(NB_AIR_LOBES + 2 * number + 1);
     return nb_phase_lobe(a.x, a.y, a.z, a.w, turn) + nb_phase_lobe(b.x, b.y, b.z, b.w, turn);
 }
 
 nb_air_ray nb_find_air(nb_vec3 direction)
 {
     nb_air_ray ray;
-    nb_vec4 sizes = NEBEL_AIR_WORD(NB_AIR_SIZES);
-    nb_vec4 parts = NEBEL_AIR_WORD(NB_AIR_PARTS);
+    nb_vec4 sizes = NEBEL_SKY_VIEW_TEXEL(NB_AIR_SIZES);
+    nb_vec4 parts = NEBEL_SKY_VIEW_TEXEL(NB_AIR_PARTS);
     nb_vec3 bearing = nb_air_bearing(direction);
     nb_reach reach = nb_air_reach(bearing);
     float level = sqrt(bearing.y * bearing.y + bearing.z * bearing.z);
@@ -87,7 +87,7 @@ nb_air_ray nb_find_air(nb_vec3 direction)
     ray.extinction = int(parts.y) + at * levels;
     ray.row = row.y;
     ray.weights = nb_vec4((1.0 - row.y) * (1.0 - column.y), (1.0 - row.y) * column.y, row.y * (1.0 - column.y), row.y * column.y);
-    nb_turn turn = nb_turn_between(direction, NEBEL_AIR_WORD(NB_AIR_SUN).xyz);
+    nb_turn turn = nb_turn_between(direction, NEBEL_SKY_VIEW_TEXEL(NB_AIR_SUN).xyz);
     ray.phases = nb_vec4(nb_air_phase(0, turn), nb_air_phase(1, turn), nb_air_phase(2, turn), nb_air_phase(3, turn));
     return ray;
 }
@@ -97,8 +97,8 @@ nb_air_ray nb_find_air(nb_vec3 direction)
 /* The mean over the way of one kind of light. */
 nb_vec3 nb_air_mean(nb_air_ray ray, int at, int across, int down)
 {
-    return NEBEL_AIR_WORD(at).xyz * ray.weights.x + NEBEL_AIR_WORD(at + across).xyz * ray.weights.y +
-           NEBEL_AIR_WORD(at + down).xyz * ray.weights.z + NEBEL_AIR_WORD(at + down + across).xyz * ray.weights.w;
+    return NEBEL_SKY_VIEW_TEXEL(at).xyz * ray.weights.x + NEBEL_SKY_VIEW_TEXEL(at + across).xyz * ray.weights.y +
+           NEBEL_SKY_VIEW_TEXEL(at + down).xyz * ray.weights.z + NEBEL_SKY_VIEW_TEXEL(at + down + across).xyz * ray.weights.w;
 }
 
 nebel_transfer nb_air_light(nb_air_ray ray, float t_max)
@@ -109,7 +109,7 @@ nebel_transfer nb_air_light(nb_air_ray ray, float t_max)
     float along = t_max - ray.begin;
     if (along > ray.span - 2.4e-7 * t_max) along = ray.span; /* float does not tell it from the end */
     if (along > 0.0) {
-        nb_vec4 sizes = NEBEL_AIR_WORD(NB_AIR_SIZES);
+        nb_vec4 sizes = NEBEL_SKY_VIEW_TEXEL(NB_AIR_SIZES);
         int scatterers = int(sizes.z);
         int size = scatterers + 1;
         int across = (int(sizes.y) + 1) * size;
@@ -120,8 +120,8 @@ nebel_transfer nb_air_light(nb_air_ray ray, float t_max)
         /* Near the eye means are linear. */
         if (place.x == 0.0 && sizes.y > 1.0) level = min(1.0, share / nb_level_end(ray.dense, ray.soft, 1.0 / sizes.y));
         int row = ray.extinction + int(place.x);
-        nb_vec3 near = nb_toward(NEBEL_AIR_WORD(row).xyz, NEBEL_AIR_WORD(row + int(sizes.y) + 1).xyz, ray.row);
-        nb_vec3 far = nb_toward(NEBEL_AIR_WORD(row + 1).xyz, NEBEL_AIR_WORD(row + int(sizes.y) + 2).xyz, ray.row);
+        nb_vec3 near = nb_toward(NEBEL_SKY_VIEW_TEXEL(row).xyz, NEBEL_SKY_VIEW_TEXEL(row + int(sizes.y) + 1).xyz, ray.row);
+        nb_vec3 far = nb_toward(NEBEL_SKY_VIEW_TEXEL(row + 1).xyz, NEBEL_SKY_VIEW_TEXEL(row + int(sizes.y) + 2).xyz, ray.row);
         nb_vec3 depth = along * nb_toward(near, far, level);
         nb_vec3 mean = nb_splat3(0.0);
         for (int i = 0; i <= scatterers; i++) {
@@ -129,13 +129,13 @@ nebel_transfer nb_air_light(nb_air_ray ray, float t_max)
             float phase = i < scatterers ? nb_component(ray.phases, i) : 1.0;
             mean += phase * nb_toward(nb_air_mean(ray, at, across, down), nb_air_mean(ray, at + size, across, down), level);
         }
-        light.transmittance = nb_vec3(nb_exp(-depth.x), nb_exp(-depth.y), nb_exp(-depth.z));
-        light.in_scattering = along * NEBEL_AIR_WORD(NB_AIR_IRRADIANCE).xyz * mean;
+        transfer.transmittance = nb_vec3(nb_exp(-depth.x), nb_exp(-depth.y), nb_exp(-depth.z));
+        transfer.in_scattering = along * NEBEL_SKY_VIEW_TEXEL(NB_AIR_IRRADIANCE).xyz * mean;
     }
-    return light;
+    return transfer;
 }
 
-nebel_transfer nebel_trace_air(nb_vec3 direction, float t_max)
+nebel_transfer nebel_trace_atmosphere(nb_vec3 direction, float t_max)
 {
     return nb_air_light(nb_find_air(direction), t_max);
 }
@@ -149,27 +149,27 @@ struct nebel_ground {
     nb_vec3 sky;
 };
 
-nebel_ground nebel_find_ground(nb_vec3 direction)
+nebel_ground nebel_trace_ground(nb_vec3 direction)
 {
     nebel_ground ground;
     nb_reach reach = nb_air_reach(nb_air_bearing(direction));
     nb_outlook outlook = nb_air_outlook();
-    nb_vec4 parts = NEBEL_AIR_WORD(NB_AIR_PARTS);
-    nb_vec4 skies = NEBEL_AIR_WORD(NB_AIR_SKIES);
-    nb_vec3 irradiance = NEBEL_AIR_WORD(NB_AIR_IRRADIANCE).xyz;
+    nb_vec4 parts = NEBEL_SKY_VIEW_TEXEL(NB_AIR_PARTS);
+    nb_vec4 skies = NEBEL_SKY_VIEW_TEXEL(NB_AIR_SKIES);
+    nb_vec3 irradiance = NEBEL_SKY_VIEW_TEXEL(NB_AIR_IRRADIANCE).xyz;
     float way = reach.begin + reach.span;
     ground.distance = reach.falls ? way : 1e18;
-    ground.normal = normalize(outlook.radius * NEBEL_AIR_WORD(NB_AIR_AXES).xyz + way * direction);
-    float cosine = clamp(dot(ground.normal, NEBEL_AIR_WORD(NB_AIR_SUN).xyz), -1.0, 1.0);
+    ground.normal = normalize(outlook.radius * NEBEL_SKY_VIEW_TEXEL(NB_AIR_AXES).xyz + way * direction);
+    float cosine = clamp(dot(ground.normal, NEBEL_SKY_VIEW_TEXEL(NB_AIR_SUN).xyz), -1.0, 1.0);
     nb_vec2 place = nb_air_place(sqrt(max(cosine, 0.0)) * (NB_AIR_SUNS - 1.0), NB_AIR_SUNS);
     int at = int(parts.z) + int(place.x);
-    ground.sun = irradiance * nb_toward(NEBEL_AIR_WORD(at).xyz, NEBEL_AIR_WORD(at + 1).xyz, place.y);
+    ground.sun = irradiance * nb_toward(NEBEL_SKY_VIEW_TEXEL(at).xyz, NEBEL_SKY_VIEW_TEXEL(at + 1).xyz, place.y);
     if (!(cosine > 0.0)) ground.sun = nb_splat3(0.0);
     float angle = 2.0 * abs(cosine) / (1.0 + sqrt(max(0.0, 1.0 - abs(cosine))));
     float spread = nb_copy_sign(nb_log(1.0 + angle * skies.x), cosine);
     place = nb_air_place(clamp((spread - skies.y) * skies.z, 0.0, skies.w - 1.0), skies.w);
     at = int(parts.w) + int(place.x);
-    nb_vec3 power = nb_toward(NEBEL_AIR_WORD(at).xyz, NEBEL_AIR_WORD(at + 1).xyz, place.y);
+    nb_vec3 power = nb_toward(NEBEL_SKY_VIEW_TEXEL(at).xyz, NEBEL_SKY_VIEW_TEXEL(at + 1).xyz, place.y);
     ground.sky = irradiance * nb_vec3(nb_exp(power.x), nb_exp(power.y), nb_exp(power.z));
     return ground;
 }

@@ -1,7 +1,7 @@
 /* Light that fog scatters more than once, as src/march/diffusion_light.c gathers it along a ray: the source radiance of the lattice's
  * nodes, which layout.h describes, between places a cell apart; in each such piece the exact transmittance. */
-#ifndef NEBEL_NODE
-#define NEBEL_NODE(i) nb_vec4(0.0, 0.0, 0.0, 0.0)
+#ifndef NEBEL_DIFFUSION_TEXEL
+#define NEBEL_DIFFUSION_TEXEL(i) nb_vec4(0.0, 0.0, 0.0, 0.0)
 #endif
 
 #if NB_DECLARES(NB_HAS_DIFFUSION)
@@ -28,11 +28,11 @@ struct nb_two_depths {
 void nb_add_two_depths(inout nb_two_depths sum, int at, nb_ray ray, nb_stretch s)
 {
     nb_vec3 depth = nb_depth_within(at, ray, s);
-    int scattering = int(NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w);
+    int scattering = int(NEBEL_FOG_TEXEL(at + NB_MEDIUM_SCATTERING).w);
     nb_vec3 albedo = nb_splat3(0.0);
-    if (scattering > 0) albedo = NEBEL_WORD(scattering).xyz;
+    if (scattering > 0) albedo = NEBEL_FOG_TEXEL(scattering).xyz;
     sum.whole += depth;
-    sum.scaled += depth * (nb_splat3(1.0) - albedo * NEBEL_WORD(at + NB_MEDIUM_AHEAD).w);
+    sum.scaled += depth * (nb_splat3(1.0) - albedo * NEBEL_FOG_TEXEL(at + NB_MEDIUM_AHEAD).w);
 }
 
 /* From `from` to the end of the ray, of what ranks from `floor` on. */
@@ -40,9 +40,9 @@ void nb_add_depths_between(inout nb_two_depths sum, nb_ray ray, nb_media media, 
 {
     for (int i = 0; i < media.count; i++) {
         int at = nb_medium_at(media.first + i, media.listed);
-        int leaves = int(NEBEL_WORD(at + 2).w);
+        int leaves = int(NEBEL_FOG_TEXEL(at + 2).w);
         float t = from;
-        if (NB_HAS(NB_HAS_COVER) && (nb_is_covered(at, floor) || int(NEBEL_WORD(at).w) == NB_KIND_EXCLUDE)) {
+        if (NB_HAS(NB_HAS_COVER) && (nb_is_covered(at, floor) || int(NEBEL_FOG_TEXEL(at).w) == NB_KIND_EXCLUDE)) {
             turns++;
             continue;
         }
@@ -92,9 +92,9 @@ struct nb_lattice {
 
 nb_lattice nb_lattice_of(int word)
 {
-    nb_vec4 low = NEBEL_WORD(word);
-    nb_vec4 spacing = NEBEL_WORD(word + 1);
-    nb_vec4 cells = NEBEL_WORD(word + 2);
+    nb_vec4 low = NEBEL_FOG_TEXEL(word);
+    nb_vec4 spacing = NEBEL_FOG_TEXEL(word + 1);
+    nb_vec4 cells = NEBEL_FOG_TEXEL(word + 2);
     nb_lattice l;
     l.low = low.xyz;
     l.spacing = spacing.xyz;
@@ -195,8 +195,8 @@ float nb_diffuse_source(nb_vec4 numbers, float most, nb_vec3 direction)
 nb_vec3 nb_lattice_gain(nb_lattice l, nb_vec3 d)
 {
     int word = l.word + 3;
-    return d.x * d.x * NEBEL_WORD(word + (d.x < 0.0 ? 1 : 0)).xyz + d.y * d.y * NEBEL_WORD(word + (d.y < 0.0 ? 3 : 2)).xyz +
-           d.z * d.z * NEBEL_WORD(word + (d.z < 0.0 ? 5 : 4)).xyz;
+    return d.x * d.x * NEBEL_FOG_TEXEL(word + (d.x < 0.0 ? 1 : 0)).xyz + d.y * d.y * NEBEL_FOG_TEXEL(word + (d.y < 0.0 ? 3 : 2)).xyz +
+           d.z * d.z * NEBEL_FOG_TEXEL(word + (d.z < 0.0 ? 5 : 4)).xyz;
 }
 
 /* Of opaque fog after scaling, and what of it exact light of one scattering has already, of fog as it is; what ambient light lacks
@@ -236,7 +236,7 @@ nb_nodes nb_nodes_around(nb_lattice l, nb_vec3 place)
 
 nb_vec4 nb_mix_row(nb_nodes n, int texel)
 {
-    return NEBEL_NODE(texel) * (1.0 - n.share.x) + NEBEL_NODE(texel + n.right) * n.share.x;
+    return NEBEL_DIFFUSION_TEXEL(texel) * (1.0 - n.share.x) + NEBEL_DIFFUSION_TEXEL(texel + n.right) * n.share.x;
 }
 
 /* The texel with this number in each node. */
@@ -335,9 +335,9 @@ nb_vec3 nb_gather_in_lattice(nb_lattice l, nb_ray ray, nb_media media, inout int
         here = there;
         t = end;
     }
-    nb_vec3 unit = NEBEL_WORD(l.word + 9).xyz;
+    nb_vec3 unit = NEBEL_FOG_TEXEL(l.word + 9).xyz;
     if (nb_is_own(l)) return max(light, nb_splat3(0.0)) * unit;
-    return max(light, nb_splat3(0.0)) * NEBEL_WORD(NB_HEADER_SUN + 1).xyz - dimmed * unit;
+    return max(light, nb_splat3(0.0)) * NEBEL_FOG_TEXEL(NB_HEADER_SUN + 1).xyz - dimmed * unit;
 }
 
 /* Of the sun and the sky, and own light. */
@@ -346,7 +346,7 @@ nb_vec3 nb_gather_diffuse(nb_ray ray, nb_media media)
     nb_vec3 light = nb_splat3(0.0);
     int turns = 0;
     for (int i = 0; i < 2; i++) {
-        float word = i == 0 ? NEBEL_WORD(NB_HEADER_LATTICE).x : NEBEL_WORD(NB_HEADER_LATTICE).y;
+        float word = i == 0 ? NEBEL_FOG_TEXEL(NB_HEADER_LATTICE).x : NEBEL_FOG_TEXEL(NB_HEADER_LATTICE).y;
         if (word > 0.0) light += nb_gather_in_lattice(nb_lattice_of(int(word)), ray, media, turns);
     }
     return light;

@@ -357,7 +357,7 @@ nebel_result nebel_find_view_error(const nebel_snapshot *snapshot, const nebel_v
     sight s;
     sum total = {.error = 0};
     if (snapshot == NULL || view == NULL || error == NULL) return NEBEL_ERROR_ARGUMENT;
-    const nebel_result result = nebel_view_rays(view, NULL, &rays);
+    const nebel_result result = nebel_compute_view_rays(view, NULL, &rays);
     if (result != NEBEL_OK) return result;
     set_sight(&s, view, rays.eye);
     double clear = s.parallel ? HUGE_VAL : 0;

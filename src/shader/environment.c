@@ -68,7 +68,7 @@ nebel_result nb_check_environment(const nebel_snapshot *snapshot)
     return check_count(snapshot, count_words(snapshot, 0));
 }
 
-void nb_place_filters(const nebel_snapshot *snapshot, nebel_word *words)
+void nb_place_filters(const nebel_snapshot *snapshot, nebel_texel_f32 *words)
 {
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_skylight *sky = snapshot->media[i].sky;
@@ -80,12 +80,12 @@ void nb_place_filters(const nebel_snapshot *snapshot, nebel_word *words)
 
 /* ---- words ----------------------------------------------------------------------------------- */
 
-static nebel_word color_word(const double color[3])
+static nebel_texel_f32 color_word(const double color[3])
 {
-    return (nebel_word){{(float)color[0], (float)color[1], (float)color[2], 0}};
+    return (nebel_texel_f32){{(float)color[0], (float)color[1], (float)color[2], 0}};
 }
 
-static void pack_head(const nebel_environment *sky, size_t surfaces, nebel_word *words)
+static void pack_head(const nebel_environment *sky, size_t surfaces, nebel_texel_f32 *words)
 {
     const nb_skylight light = nb_skylight_of(sky, NULL);
     memset(words, 0, NB_ENVIRONMENT_WORDS * sizeof *words);
@@ -110,32 +110,32 @@ static void pack_head(const nebel_environment *sky, size_t surfaces, nebel_word 
 }
 
 /* Returns the word behind it. */
-static nebel_word *pack_rgb(const float *rgb, size_t columns, size_t rows, nebel_word *word)
+static nebel_texel_f32 *pack_rgb(const float *rgb, size_t columns, size_t rows, nebel_texel_f32 *word)
 {
-    *word++ = (nebel_word){{(float)columns, (float)rows, 0, 0}};
-    for (size_t i = 0; i < columns * rows; i++, rgb += 3) *word++ = (nebel_word){{rgb[0], rgb[1], rgb[2], 0}};
+    *word++ = (nebel_texel_f32){{(float)columns, (float)rows, 0, 0}};
+    for (size_t i = 0; i < columns * rows; i++, rgb += 3) *word++ = (nebel_texel_f32){{rgb[0], rgb[1], rgb[2], 0}};
     return word;
 }
 
-static void pack_gradient_filter(const nb_sky_filter *filter, nebel_word *word)
+static void pack_gradient_filter(const nb_sky_filter *filter, nebel_texel_f32 *word)
 {
     const double steps = (NB_SKY_KNOTS - 1) / log1p(1 / filter->width);
-    *word++ = (nebel_word){{(float)filter->mean_cosine, (float)(1 / filter->width), (float)steps, 0}};
+    *word++ = (nebel_texel_f32){{(float)filter->mean_cosine, (float)(1 / filter->width), (float)steps, 0}};
     for (int i = 0; i < NB_FILTER_PIECES; i++)
         for (int k = 0; k < 4; k++) word[i].v[k] = (float)filter->rectified[i + k];
 }
 
-static void pack_filter(const nebel_snapshot *snapshot, size_t number, nebel_word *words)
+static void pack_filter(const nebel_snapshot *snapshot, size_t number, nebel_texel_f32 *words)
 {
     const nb_sky_filter *filter = snapshot->skylights[number].filter;
-    nebel_word *word = &words[filter_place(snapshot, number)];
+    nebel_texel_f32 *word = &words[filter_place(snapshot, number)];
     if (snapshot->sky.type == NEBEL_ENVIRONMENT_MAP)
         (void)pack_rgb(filter->table.coefficients, filter->table.columns, filter->table.rows, word);
     else
         pack_gradient_filter(filter, word);
 }
 
-static void pack_surfaces(const nebel_environment_map *map, nebel_word *word)
+static void pack_surfaces(const nebel_environment_map *map, nebel_texel_f32 *word)
 {
     size_t width, height;
     const nb_sky_table *table = nb_sky_map_reflection(map);
@@ -143,8 +143,8 @@ static void pack_surfaces(const nebel_environment_map *map, nebel_word *word)
     (void)pack_rgb(pixels, width, height, pack_rgb(table->coefficients, table->columns, table->rows, word));
 }
 
-nebel_result nebel_pack_environment(const nebel_snapshot *snapshot, int surfaces, nebel_word *words, size_t capacity,
-                                    size_t *count)
+nebel_result nebel_pack_environment(const nebel_snapshot *snapshot, int surfaces, nebel_texel_f32 *words,
+                                    size_t capacity, size_t *count)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (count == NULL || (words == NULL && capacity > 0))
@@ -186,7 +186,7 @@ static int is_same_sky(const nebel_environment *a, const nebel_environment *b)
     }
 }
 
-int nebel_same_environment(const nebel_snapshot *a, const nebel_snapshot *b)
+int nebel_is_same_environment(const nebel_snapshot *a, const nebel_snapshot *b)
 {
     if (a == NULL || b == NULL) return a == b;
     int same = a->skylight_count == b->skylight_count && is_same_sky(&a->sky, &b->sky);

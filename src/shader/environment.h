@@ -8,6 +8,6 @@
 nebel_result nb_check_environment(const nebel_snapshot *snapshot);
 
 /* Tells each packed medium where the filter of its phase function is. */
-void nb_place_filters(const nebel_snapshot *snapshot, nebel_word *words);
+void nb_place_filters(const nebel_snapshot *snapshot, nebel_texel_f32 *words);
 
 #endif

@@ -38,9 +38,9 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
     for (int i = 0; i < most; i++) {
         if (i >= count) break;
         int at = nb_medium_at(first + i, listed);
-        nb_vec4 extinction = NEBEL_WORD(at);
+        nb_vec4 extinction = NEBEL_FOG_TEXEL(at);
         int kind = int(extinction.w);
-        int leaves = int(NEBEL_WORD(at + 2).w);
+        int leaves = int(NEBEL_FOG_TEXEL(at + 2).w);
         float length = 0.0;
         float from = 0.0;
         for (int part = 0; part < (NB_HAS(NB_HAS_GROUP) ? leaves : 1); part++) {
@@ -51,7 +51,7 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
         }
         if (from < ray.t_max) sum.last = max(sum.last, from);
         if (!(from > 0.0)) continue;
-        int flags = int(NEBEL_WORD(at + 1).w);
+        int flags = int(NEBEL_FOG_TEXEL(at + 1).w);
         if (NB_HAS(NB_HAS_COVER)) { /* without density, too */
             sum.covers = sum.covers || (any && (covering || (flags & NB_LIGHT_COVERS) != 0));
             covering = covering || (flags & NB_LIGHT_COVERS) != 0;
@@ -64,7 +64,7 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
             sum.mixed = sum.mixed || (sum.met && (other || emits || sum.emits));
             sum.emits = sum.emits || emits;
             sum.met = true;
-            if (NB_HAS(NB_HAS_SUN | NB_HAS_LAMPS)) sum.scatters = sum.scatters || NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w > 0.0;
+            if (NB_HAS(NB_HAS_SUN | NB_HAS_LAMPS)) sum.scatters = sum.scatters || NEBEL_FOG_TEXEL(at + NB_MEDIUM_SCATTERING).w > 0.0;
             sum.radiance = radiance;
             sum.depth += extinction.xyz * length;
             sum.light += nb_light_per_metre(at, radiance) * length;
@@ -242,7 +242,7 @@ nb_piece nb_cover_piece(nb_piece piece, int used)
     int floor = piece.floor;
     for (int k = 0; k < used; k++) {
         nb_vec3 slot = nb_slot(k);
-        int flags = int(NEBEL_WORD(int(slot.z) + 1).w);
+        int flags = int(NEBEL_FOG_TEXEL(int(slot.z) + 1).w);
         if ((flags & NB_LIGHT_COVERS) != 0 && nb_is_inside(slot, piece.start)) floor = max(floor, flags / NB_LIGHT_RANK);
     }
     if (floor > piece.floor) {
@@ -261,15 +261,15 @@ nb_piece nb_note_slot(nb_piece piece, int k, nb_ray ray, bool by_cells)
     if (slot.y > piece.start) piece.end = min(piece.end, slot.y);
     if (nb_is_there(slot, piece)) {
         int at = int(slot.z);
-        nb_vec4 extinction = NEBEL_WORD(at);
+        nb_vec4 extinction = NEBEL_FOG_TEXEL(at);
         nb_vec3 radiance = nb_slot_radiance(k, at);
         int kind = int(extinction.w);
         if (!NB_HAS(NB_HAS_COVER) || kind != NB_KIND_EXCLUDE) {
             piece.present++;
-            piece.emits = piece.emits || (int(NEBEL_WORD(at + 1).w) & NB_LIGHT_EMITS) != 0;
+            piece.emits = piece.emits || (int(NEBEL_FOG_TEXEL(at + 1).w) & NB_LIGHT_EMITS) != 0;
             piece.least = min(piece.least, radiance);
             piece.most = max(piece.most, radiance);
-            if (NB_HAS(NB_HAS_SUN)) piece.sunlit = piece.sunlit || NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w > 0.0;
+            if (NB_HAS(NB_HAS_SUN)) piece.sunlit = piece.sunlit || NEBEL_FOG_TEXEL(at + NB_MEDIUM_SCATTERING).w > 0.0;
             if (NB_HAS(NB_HAS_GRID) && by_cells && piece.voxels == 0 && kind == NB_KIND_GRID) {
                 piece.voxels = at;
             } else if (NB_HAS(NB_HAS_PROFILE) && kind != NB_KIND_CONSTANT) {
@@ -372,7 +372,7 @@ void nb_add_grid(inout nb_leg leg, nb_profile profile, nb_vec3 extinction, nb_ve
 void nb_add_slot(inout nb_leg leg, nb_piece piece, int k, nb_ray ray)
 {
     int at = int(nb_slot(k).z);
-    nb_vec4 extinction = NEBEL_WORD(at);
+    nb_vec4 extinction = NEBEL_FOG_TEXEL(at);
     nb_vec3 light = nb_light_per_metre(at, nb_slot_radiance(k, at));
     nb_vec3 glow = nb_splat3(0.0);
     if (nb_is_sunlit(leg)) glow = nb_sunlit_radiance(at, ray.direction) * extinction.xyz;
@@ -484,7 +484,7 @@ nb_sun_sum nb_light_of_sun(nb_leg leg, nb_piece piece, nb_ray ray, nb_vec3 befor
     sum.light = nb_splat3(0.0);
     sum.strain = 0.0;
     bool closed = nb_sun_is_closed();
-    nb_vec4 to_sun = NEBEL_WORD(NB_HEADER_SUN);
+    nb_vec4 to_sun = NEBEL_FOG_TEXEL(NB_HEADER_SUN);
     bool height = int(to_sun.w) == NB_SUN_HEIGHT;
     /* Flat fog is asked beside the ends, as at a face itself the way to the sun may run along it, and only as far as light comes:
      * ways from deeper in endless fog end too early. */
@@ -561,9 +561,9 @@ void nb_plan_leg(inout nb_leg leg, nb_piece piece, nb_ray ray, inout nb_vec2 lit
     float near = nb_nearest(t);
     if (leg.number > 0 && leg.from < leg.stop - near) return;
     if (lit.y <= t + near) {
-        turns -= NEBEL_SUN_LIT_TURNS;
-        lit = NEBEL_SUN_LIT(ray.origin, ray.direction, t + near, ray.t_max);
-        turns += NEBEL_SUN_LIT_TURNS;
+        turns -= NEBEL_SUN_VISIBILITY_ITERATIONS;
+        lit = NEBEL_SUN_VISIBILITY(ray.origin, ray.direction, t + near, ray.t_max);
+        turns += NEBEL_SUN_VISIBILITY_ITERATIONS;
         lit.y = max(lit.y, t + 2.0 * near);
     }
     leg.sunlight = lit.x;
@@ -622,7 +622,7 @@ float nb_end_leg(inout nb_gathered g, inout nb_leg leg, nb_piece piece, nb_ray r
 /* About how many turns of loops a leg in sunlight takes, besides those of the slots. */
 int nb_turns_to_sun()
 {
-    int media = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_WORD(0).x) : 1;
+    int media = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_FOG_TEXEL(0).x) : 1;
     int way = 2 + (NB_HAS(NB_HAS_GROUP) ? 16 : 0) + (NB_HAS(NB_HAS_PLANES) ? 12 : 0) + (NB_HAS(NB_HAS_SOFT) ? 8 : 0);
     int search = NB_MOST_PASSED + (NB_HAS(NB_HAS_PLANES) ? 32 : 0);
     return media * (search + (nb_sun_is_closed() ? 2 : NB_NODES - 1) * way);

@@ -1,7 +1,7 @@
 /* What a ray meets in voxels, from the texels of layout.h, as src/media/grid_walk.c has it: bricks, and the cells of those that are
- * not even. Without NEBEL_VOXEL there are none. */
-#ifndef NEBEL_VOXEL
-#define NEBEL_VOXEL(i) nb_uvec4(0u, 0u, 0u, 0u)
+ * not even. Without NEBEL_VOXEL_TEXEL there are none. */
+#ifndef NEBEL_VOXEL_TEXEL
+#define NEBEL_VOXEL_TEXEL(i) nb_uvec4(0u, 0u, 0u, 0u)
 #endif
 
 #define NB_BRICK 8.0
@@ -100,7 +100,7 @@ float nb_grid_brick_sum(nb_grid_ray ray, int first, nb_vec3 brick, float t, floa
         nb_vec3 next = nb_grid_crossings(cell, last, from, ray.inverse, 1.0);
         float until = max(min(min(next.x, min(next.y, next.z)), end), t);
         nb_grid_turns++;
-        nb_grid_cell corners = nb_grid_cell_of(NEBEL_VOXEL(first + nb_grid_index(cell, size)));
+        nb_grid_cell corners = nb_grid_cell_of(NEBEL_VOXEL_TEXEL(first + nb_grid_index(cell, size)));
         sum += (until - t) * nb_grid_mean(corners, nb_grid_share(from + ray.slope * t, cell),
                                           nb_grid_share(from + ray.slope * until, cell));
         if (until >= end) break;
@@ -112,7 +112,7 @@ float nb_grid_brick_sum(nb_grid_ray ray, int first, nb_vec3 brick, float t, floa
 
 nb_vec3 nb_grid_bricks(int grid)
 {
-    nb_uvec4 head = NEBEL_VOXEL(grid);
+    nb_uvec4 head = NEBEL_VOXEL_TEXEL(grid);
     return nb_vec3(float(head.x), float(head.y), float(head.z));
 }
 
@@ -132,7 +132,7 @@ float nb_grid_integral(nb_vec3 from, nb_vec3 slope, int grid, float h, float eno
         nb_vec3 next = nb_grid_crossings(brick, last, from, ray.inverse, NB_BRICK);
         float until = max(min(min(next.x, min(next.y, next.z)), h), t);
         nb_grid_turns++;
-        nb_uvec4 texel = NEBEL_VOXEL(grid + 1 + nb_grid_index(brick, size));
+        nb_uvec4 texel = NEBEL_VOXEL_TEXEL(grid + 1 + nb_grid_index(brick, size));
         sum += nb_from_bits(int(texel.x)) * (until - t);
         if (texel.z != 0u) sum += nb_from_bits(int(texel.y)) * nb_grid_brick_sum(ray, int(texel.z), brick, t, until);
         if (until >= h || sum >= enough) break;
@@ -154,13 +154,13 @@ nb_grid_spot nb_grid_spot_at(int grid, nb_vec3 place)
     nb_vec3 size = nb_grid_bricks(grid);
     nb_vec3 brick = nb_grid_brick_at(place, size - nb_splat3(1.0));
     nb_vec3 within = clamp(floor(place - brick * NB_BRICK), nb_splat3(0.0), nb_splat3(NB_BRICK - 1.0));
-    nb_uvec4 texel = NEBEL_VOXEL(grid + 1 + nb_grid_index(brick, size));
+    nb_uvec4 texel = NEBEL_VOXEL_TEXEL(grid + 1 + nb_grid_index(brick, size));
     float least = nb_from_bits(int(texel.x));
     float step = nb_from_bits(int(texel.y));
     nb_grid_spot spot;
     spot.even = texel.z == 0u;
     spot.cell = brick * NB_BRICK + within;
-    nb_uvec4 cell = NEBEL_VOXEL(spot.even ? grid : int(texel.z) + nb_grid_index(within, nb_splat3(NB_BRICK)));
+    nb_uvec4 cell = NEBEL_VOXEL_TEXEL(spot.even ? grid : int(texel.z) + nb_grid_index(within, nb_splat3(NB_BRICK)));
     spot.corners = nb_grid_cell_of(cell);
     if (spot.even) step = 0.0;
     spot.corners.low = max(nb_vec4(least, least, least, least) + spot.corners.low * step, nb_vec4(0.0, 0.0, 0.0, 0.0));

@@ -3,12 +3,12 @@
  *
  * What surfaces keep away is the host's to say, by a function that it defines before this text:
  *
- *     #define NEBEL_LAMP_LIT(lamp, origin, direction, t, end)
+ *     #define NEBEL_LIGHT_VISIBILITY(lamp, origin, direction, t, end)
  *
  * is a vec2: the share of the light of lamp number `lamp` that reaches the ray from t on, and up to where along the ray that holds, at
  * most `end`. */
-#ifndef NEBEL_LAMP_LIT
-#define NEBEL_LAMP_LIT(lamp, origin, direction, t, end) nb_vec2(1.0, end)
+#ifndef NEBEL_LIGHT_VISIBILITY
+#define NEBEL_LIGHT_VISIBILITY(lamp, origin, direction, t, end) nb_vec2(1.0, end)
 #endif
 
 /* How far along a ray light of lamps has been found. */
@@ -44,11 +44,11 @@ struct nb_lamp_pass {
 
 nb_lamp_pass nb_pass_lamp(nb_ray ray, int number)
 {
-    int at = int(NEBEL_WORD(NB_HEADER_LAMPS).w) + NB_LAMP_WORDS * number;
-    nb_vec4 place = NEBEL_WORD(at);
-    nb_vec4 intensity = NEBEL_WORD(at + 1);
-    nb_vec4 axis = NEBEL_WORD(at + 2);
-    nb_vec4 cone = NEBEL_WORD(at + 3);
+    int at = int(NEBEL_FOG_TEXEL(NB_HEADER_LAMPS).w) + NB_LAMP_WORDS * number;
+    nb_vec4 place = NEBEL_FOG_TEXEL(at);
+    nb_vec4 intensity = NEBEL_FOG_TEXEL(at + 1);
+    nb_vec4 axis = NEBEL_FOG_TEXEL(at + 2);
+    nb_vec4 cone = NEBEL_FOG_TEXEL(at + 3);
     nb_vec3 apart = ray.origin - place.xyz;
     nb_lamp_pass by;
     by.number = number;
@@ -122,10 +122,10 @@ struct nb_lamp_piece {
 /* Of all lobes at their peaks, of either side. */
 float nb_most_scattered(int scattering)
 {
-    nb_vec4 albedo = NEBEL_WORD(scattering);
+    nb_vec4 albedo = NEBEL_FOG_TEXEL(scattering);
     float most = 0.0;
     for (int i = 1; i <= int(albedo.w); i++) {
-        nb_vec4 lobe = NEBEL_WORD(scattering + i);
+        nb_vec4 lobe = NEBEL_FOG_TEXEL(scattering + i);
         most += lobe.x * (1.0 + lobe.y) / (lobe.z * sqrt(lobe.z));
     }
     return most * nb_largest(albedo.xyz);
@@ -135,9 +135,9 @@ float nb_most_scattered(int scattering)
  * up to u = width it hardly falls. */
 void nb_narrow_peaks(int scattering, inout nb_lamp_piece piece)
 {
-    int lobes = int(NEBEL_WORD(scattering).w);
+    int lobes = int(NEBEL_FOG_TEXEL(scattering).w);
     for (int i = 1; i <= lobes; i++) {
-        nb_vec4 lobe = NEBEL_WORD(scattering + i);
+        nb_vec4 lobe = NEBEL_FOG_TEXEL(scattering + i);
         float width = sqrt(lobe.z / (lobe.z + 2.0 * abs(lobe.w)));
         if (lobe.w > 0.0) piece.ahead = min(piece.ahead, width);
         if (lobe.w < 0.0) piece.back = min(piece.back, width);
@@ -152,11 +152,11 @@ int nb_lamp_medium(nb_ray ray, int first, bool listed, nb_lamp_piece piece, int 
         at = int(nb_slot(i).z);
     } else {
         int asked = nb_medium_at(first + i, listed);
-        int leaves = int(NEBEL_WORD(asked + 2).w);
+        int leaves = int(NEBEL_FOG_TEXEL(asked + 2).w);
         nb_stretch s = nb_next_stretch(asked, leaves, ray, piece.start);
         turns += nb_stretch_turns(leaves, s);
         if (s.enter <= piece.start && s.leave > piece.start) at = asked;
-        if (int(NEBEL_WORD(asked).w) == NB_KIND_EXCLUDE || nb_is_covered(asked, piece.floor)) at = 0;
+        if (int(NEBEL_FOG_TEXEL(asked).w) == NB_KIND_EXCLUDE || nb_is_covered(asked, piece.floor)) at = 0;
     }
     return at;
 }
@@ -168,7 +168,7 @@ int nb_drop_covered(int used, int floor)
     for (int i = 0; i < used; i++) {
         nb_vec3 slot = nb_slot(i);
         int at = int(slot.z);
-        if (nb_is_covered(at, floor) || int(NEBEL_WORD(at).w) == NB_KIND_EXCLUDE) continue;
+        if (nb_is_covered(at, floor) || int(NEBEL_FOG_TEXEL(at).w) == NB_KIND_EXCLUDE) continue;
         nb_set_slot(kept, at, nb_stretch_of(slot.x, slot.y));
         kept++;
     }
@@ -179,7 +179,7 @@ int nb_drop_covered(int used, int floor)
  * of a piece are sums over a few cells then. */
 float nb_smooth_length(nb_ray ray, int medium, float t)
 {
-    int kind = int(NEBEL_WORD(medium).w);
+    int kind = int(NEBEL_FOG_TEXEL(medium).w);
     nb_profile profile = nb_profile_of(medium, kind, ray, t);
     float length = NB_FAR;
 #if NB_DECLARES(NB_HAS_GRID)
@@ -207,27 +207,27 @@ nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float
     piece.back = 1.0;
     for (int i = 0; i < count; i++) {
         int at = nb_medium_at(first + i, listed);
-        int leaves = int(NEBEL_WORD(at + 2).w);
+        int leaves = int(NEBEL_FOG_TEXEL(at + 2).w);
         nb_stretch s = nb_next_stretch(at, leaves, ray, t);
         turns += nb_stretch_turns(leaves, s);
         if (!(s.enter < s.leave)) continue;
         piece.end = min(piece.end, s.enter > t ? s.enter : s.leave);
         if (s.enter > t) continue;
         piece.end = min(piece.end, t + nb_smooth_length(ray, at, t));
-        int flags = int(NEBEL_WORD(at + 1).w);
+        int flags = int(NEBEL_FOG_TEXEL(at + 1).w);
         if (NB_HAS(NB_HAS_COVER) && (flags & NB_LIGHT_COVERS) != 0) piece.floor = max(piece.floor, flags / NB_LIGHT_RANK);
-        if (piece.media < NEBEL_SLOTS) nb_set_slot(piece.media, at, s);
+        if (piece.media < NEBEL_MEDIUM_SLOTS) nb_set_slot(piece.media, at, s);
         piece.media++;
     }
-    piece.crowd = piece.media > NEBEL_SLOTS;
+    piece.crowd = piece.media > NEBEL_MEDIUM_SLOTS;
     if (NB_HAS(NB_HAS_COVER) && !piece.crowd) piece.media = nb_drop_covered(piece.media, piece.floor);
     if (piece.crowd) piece.media = count;
     for (int i = 0; i < piece.media; i++) {
         int at = nb_lamp_medium(ray, first, listed, piece, i, turns);
         turns += 1;
         if (at == 0) continue;
-        nb_vec4 extinction = NEBEL_WORD(at);
-        int scattering = int(NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w);
+        nb_vec4 extinction = NEBEL_FOG_TEXEL(at);
+        int scattering = int(NEBEL_FOG_TEXEL(at + NB_MEDIUM_SCATTERING).w);
         piece.depth += extinction.xyz * nb_integral(nb_profile_of(at, int(extinction.w), ray, t), piece.end - t);
         if (scattering > 0) {
             piece.scatters = true;
@@ -256,13 +256,13 @@ nb_lamp_place nb_place_in_piece(nb_ray ray, int first, bool listed, nb_lamp_piec
         int at = nb_lamp_medium(ray, first, listed, piece, i, turns);
         turns += 1;
         if (at == 0) continue;
-        nb_vec4 extinction = NEBEL_WORD(at);
+        nb_vec4 extinction = NEBEL_FOG_TEXEL(at);
         nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start);
-        int scattering = int(NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w);
+        int scattering = int(NEBEL_FOG_TEXEL(at + NB_MEDIUM_SCATTERING).w);
         nb_vec3 here = extinction.xyz * nb_density_beside(profile, from);
         place.depth += extinction.xyz * nb_integral(profile, from);
         place.extinction += here;
-        if (scattering > 0) place.glow += here * NEBEL_WORD(scattering).xyz * nb_scattered(scattering, ray.direction, towards);
+        if (scattering > 0) place.glow += here * NEBEL_FOG_TEXEL(scattering).xyz * nb_scattered(scattering, ray.direction, towards);
     }
     return place;
 }
@@ -414,7 +414,7 @@ float nb_first_swing(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb
 float nb_smooth_end(nb_lamp_pass by, nb_lamp_piece piece, float t, float end)
 {
     float from = t - by.closest;
-    float side = max(sqrt(by.aside2), 1e-6 * NEBEL_WORD(NB_HEADER_LATTICE).z);
+    float side = max(sqrt(by.aside2), 1e-6 * NEBEL_FOG_TEXEL(NB_HEADER_LATTICE).z);
     float distance = sqrt(side * side + from * from);
     float ahead = from < 0.0 ? side / (distance - from) : (distance + from) / side;
     float next = 2.5 * ahead + 1.5 * piece.ahead;
@@ -443,7 +443,7 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
         float t = piece.start + start.from;
         if (!(start.from < far - piece.start) || nb_is_tired(turns + nb_grid_turns)) break;
         if (lit.y <= t) {
-            lit = NEBEL_LAMP_LIT(by.number, ray.origin, ray.direction, t, far);
+            lit = NEBEL_LIGHT_VISIBILITY(by.number, ray.origin, ray.direction, t, far);
             lit.y = min(max(lit.y, t + nb_nearest(t)), far);
         }
         bool last = i + 1 == NB_MOST_LAMP_STEPS;
@@ -486,8 +486,8 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
 /* Adds a piece. */
 void nb_light_piece(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns)
 {
-    float tolerance = NEBEL_WORD(0).y * NB_LAMP_TOLERANCE;
-    int lamps = int(NEBEL_WORD(0).w);
+    float tolerance = NEBEL_FOG_TEXEL(0).y * NB_LAMP_TOLERANCE;
+    int lamps = int(NEBEL_FOG_TEXEL(0).w);
     float end = l.most > 0.0 ? min(ray.t_max, l.reached + l.most) : ray.t_max;
     nb_lamp_piece piece = nb_next_piece(ray, first, count, listed, l.reached, end, turns);
     nb_vec3 drop = nb_exp3(-l.before) - nb_exp3(-(l.before + piece.depth));

@@ -65,7 +65,7 @@ static int flags_of(const nb_diffusion *d)
     return flags;
 }
 
-static void pack_lattice(const nb_diffusion *d, const long double eye[3], size_t first, nebel_word *word)
+static void pack_lattice(const nb_diffusion *d, const long double eye[3], size_t first, nebel_texel_f32 *word)
 {
     const nb_lattice *l = &d->lattice;
     for (int a = 0; a < 3; a++) {
@@ -77,11 +77,11 @@ static void pack_lattice(const nb_diffusion *d, const long double eye[3], size_t
     word[1].v[3] = (float)d->channel_count;
     word[2].v[3] = (float)flags_of(d);
     for (int i = 0; i < 6; i++) {
-        word[3 + i] = (nebel_word){{0}};
+        word[3 + i] = (nebel_texel_f32){{0}};
         for (int c = 0; c < 3; c++) word[3 + i].v[c] = (float)d->gain[d->channel_count == 1 ? 0 : c][i / 2][i % 2];
     }
     const double *light = d->is_own ? d->irradiance : d->skylight;
-    word[9] = (nebel_word){{(float)light[0], (float)light[1], (float)light[2]}};
+    word[9] = (nebel_texel_f32){{(float)light[0], (float)light[1], (float)light[2]}};
 }
 
 size_t nb_own_lattice_word(const nebel_snapshot *snapshot)
@@ -89,7 +89,7 @@ size_t nb_own_lattice_word(const nebel_snapshot *snapshot)
     return snapshot->own_diffusion != NULL ? nb_count_lattice_words(snapshot) - NB_LATTICE_WORDS : 0;
 }
 
-void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye[3], nebel_word *words)
+void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye[3], nebel_texel_f32 *words)
 {
     const nb_diffusion *all[MOST_LATTICES];
     const size_t lattices = list_lattices(snapshot, all);
@@ -108,27 +108,28 @@ _Static_assert(NB_NODE_DIFFUSE == 0 && NB_NODE_FLUX == 1 && NB_NODE_TURNED == 4 
                    NB_NODE_OWN_NUMBERS == 12,
                "what layout.h says");
 
-static nebel_word *pack_numbers(const float *numbers, size_t texels, nebel_word *word)
+static nebel_texel_f32 *pack_numbers(const float *numbers, size_t texels, nebel_texel_f32 *word)
 {
     for (size_t k = 0; k < texels; k++, numbers += 4)
-        *word++ = (nebel_word){{numbers[0], numbers[1], numbers[2], numbers[3]}};
+        *word++ = (nebel_texel_f32){{numbers[0], numbers[1], numbers[2], numbers[3]}};
     return word;
 }
 
 /* Numbers of the march lie as texels do, but for the one of all channels. Returns the word behind the last. */
-static nebel_word *pack_nodes(const nb_diffusion *d, nebel_word *word)
+static nebel_texel_f32 *pack_nodes(const nb_diffusion *d, nebel_texel_f32 *word)
 {
     const size_t nodes = nb_lattice_nodes(&d->lattice), texels = 2 * (size_t)d->channel_count;
     for (size_t i = 0; i < nodes; i++) {
         const float *numbers = &d->nodes[i * d->node_numbers];
         word = pack_numbers(numbers, texels, word);
-        *word++ = (nebel_word){{numbers[4 * texels]}};
+        *word++ = (nebel_texel_f32){{numbers[4 * texels]}};
         word = pack_numbers(&numbers[4 * texels + 1], second_texels(d), word);
     }
     return word;
 }
 
-nebel_result nebel_pack_diffusion(const nebel_snapshot *snapshot, nebel_word *words, size_t capacity, size_t *count)
+nebel_result nebel_pack_diffusion(const nebel_snapshot *snapshot, nebel_texel_f32 *words, size_t capacity,
+                                  size_t *count)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (count == NULL || (words == NULL && capacity > 0))

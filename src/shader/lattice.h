@@ -14,6 +14,6 @@ size_t nb_own_lattice_word(const nebel_snapshot *snapshot);
 nebel_result nb_check_lattices(const nebel_snapshot *snapshot);
 
 /* As layout.h has them, relative to the eye. */
-void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye[3], nebel_word *words);
+void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye[3], nebel_texel_f32 *words);
 
 #endif

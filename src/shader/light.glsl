@@ -5,9 +5,9 @@ float nb_scattered(int scattering, nb_vec3 direction, nb_vec3 towards)
 {
     nb_turn turn = nb_turn_between(direction, towards);
     float value = 0.0;
-    int lobes = int(NEBEL_WORD(scattering).w);
+    int lobes = int(NEBEL_FOG_TEXEL(scattering).w);
     for (int i = 1; i <= lobes; i++) {
-        nb_vec4 lobe = NEBEL_WORD(scattering + i);
+        nb_vec4 lobe = NEBEL_FOG_TEXEL(scattering + i);
         value += nb_phase_lobe(lobe.x, lobe.y, lobe.z, lobe.w, turn);
     }
     return value;
@@ -20,14 +20,14 @@ int nb_stretch_turns(int leaves, nb_stretch s) { return NB_HAS(NB_HAS_GROUP) && 
 
 nb_vec3 nb_depth_within(int at, nb_ray ray, nb_stretch s)
 {
-    nb_vec4 extinction = NEBEL_WORD(at);
+    nb_vec4 extinction = NEBEL_FOG_TEXEL(at);
     return extinction.xyz * min(nb_integral(nb_profile_of(at, int(extinction.w), ray, s.enter), s.leave - s.enter), NB_FAR);
 }
 
 /* Voxels on the way to the sun are not walked through. */
 nb_vec3 nb_depth_to_light_within(int at, nb_ray ray, nb_stretch s, bool to_sun)
 {
-    nb_vec4 extinction = NEBEL_WORD(at);
+    nb_vec4 extinction = NEBEL_FOG_TEXEL(at);
     nb_vec3 depth = nb_splat3(0.0);
     bool walked = true;
 #if NB_DECLARES(NB_HAS_GRID) && NB_DECLARES(NB_HAS_SUN)
@@ -70,8 +70,8 @@ nb_vec3 nb_spot_heights(nb_spot spot, nb_vec3 there, nb_vec3 rate, float near)
 float nb_box_way(int leaf, nb_spot spot, nb_ray local, nb_vec3 v, float near)
 {
     nb_vec3 inverse = nb_vec3(nb_rcp_bounded(v.x), nb_rcp_bounded(v.y), nb_rcp_bounded(v.z));
-    nb_vec3 low = nb_spot_heights(spot, NEBEL_WORD(leaf + 1).xyz - local.origin, -local.direction, near);
-    nb_vec3 high = nb_spot_heights(spot, NEBEL_WORD(leaf + 2).xyz - local.origin, -local.direction, near);
+    nb_vec3 low = nb_spot_heights(spot, NEBEL_FOG_TEXEL(leaf + 1).xyz - local.origin, -local.direction, near);
+    nb_vec3 high = nb_spot_heights(spot, NEBEL_FOG_TEXEL(leaf + 2).xyz - local.origin, -local.direction, near);
     return nb_largest(max(low, -high)) > 0.0 ? -1.0 : nb_smallest(max(low * inverse, high * inverse));
 }
 #endif
@@ -81,7 +81,7 @@ float nb_planes_way_out(int first, int count, nb_spot spot, nb_vec3 v, float nea
 {
     float way = NB_FAR;
     for (int i = 0; i < count; i++) {
-        nb_vec4 face = NEBEL_WORD(first + i);
+        nb_vec4 face = NEBEL_FOG_TEXEL(first + i);
         float there = face.w - dot(face.xyz, spot.ray.origin);
         float noise = near * dot(abs(face.xyz), nb_splat3(1.0));
         float height = nb_spot_heights(spot, nb_splat3(there), nb_splat3(-dot(face.xyz, spot.ray.direction)), noise).x;
@@ -120,13 +120,13 @@ nb_vec2 nb_round_way(nb_spot spot, nb_vec4 p, nb_vec4 d, nb_vec4 v, float ball, 
 
 float nb_round_way_out(int leaf, int type, nb_spot spot, nb_ray local, nb_vec3 v, float near)
 {
-    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     float ball = type == NB_TYPE_BALL ? 1.0 : 0.0;
     float radius = type == NB_TYPE_BALL || type == NB_TYPE_CONE ? head.y : 1.0;
     float slope = type == NB_TYPE_CONE ? head.z : 0.0;
     near += 8.0 * NB_EPSILON * radius;
     nb_vec3 d = local.direction;
-    nb_vec3 origin = local.origin + NEBEL_WORD(leaf + 1).xyz;
+    nb_vec3 origin = local.origin + NEBEL_FOG_TEXEL(leaf + 1).xyz;
     nb_vec4 p = nb_vec4(origin + d * spot.start, 0.0);
     p.w = radius + slope * p.z;
     nb_vec4 along = nb_vec4(d, slope * d.z);
@@ -160,7 +160,7 @@ float nb_round_way_out(int leaf, int type, nb_spot spot, nb_ray local, nb_vec3 v
 
 float nb_way_out(int leaf, nb_spot spot, nb_vec3 v)
 {
-    int type = int(NEBEL_WORD(leaf).x);
+    int type = int(NEBEL_FOG_TEXEL(leaf).x);
     bool turned = type >= NB_TYPE_TURNED;
     if (turned) type -= NB_TYPE_TURNED;
     nb_ray to = spot.ray;
@@ -176,7 +176,7 @@ float nb_way_out(int leaf, nb_spot spot, nb_vec3 v)
     if (NB_HAS(NB_HAS_BOX) && type == NB_TYPE_BOX) way = nb_box_way(leaf, spot, local, to.direction, near);
 #endif
 #if NB_DECLARES(NB_HAS_PLANES)
-    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     if (NB_HAS(NB_HAS_PLANES) && type == NB_TYPE_PLANES) way = nb_planes_way_out(int(head.z), int(head.y), spot, v, near);
 #endif
     return way;
@@ -207,9 +207,9 @@ nb_vec3 nb_added_depth(nb_ray ray, nb_media media, float from, int floor, inout 
     nb_vec3 depth = nb_splat3(0.0);
     for (int i = 0; i < media.count; i++) {
         int at = nb_medium_at(media.first + i, media.listed);
-        int leaves = int(NEBEL_WORD(at + 2).w);
+        int leaves = int(NEBEL_FOG_TEXEL(at + 2).w);
         float t = from;
-        if (NB_HAS(NB_HAS_COVER) && (nb_is_covered(at, floor) || int(NEBEL_WORD(at).w) == NB_KIND_EXCLUDE)) {
+        if (NB_HAS(NB_HAS_COVER) && (nb_is_covered(at, floor) || int(NEBEL_FOG_TEXEL(at).w) == NB_KIND_EXCLUDE)) {
             turns++;
             continue;
         }
@@ -237,10 +237,10 @@ nb_cover nb_cover_at(nb_ray ray, nb_media media, float t, inout int turns)
     cover.end = ray.t_max;
     for (int i = 0; i < media.count; i++) {
         int at = nb_medium_at(media.first + i, media.listed);
-        int flags = int(NEBEL_WORD(at + 1).w);
+        int flags = int(NEBEL_FOG_TEXEL(at + 1).w);
         turns++;
         if ((flags & NB_LIGHT_COVERS) == 0) continue;
-        int leaves = int(NEBEL_WORD(at + 2).w);
+        int leaves = int(NEBEL_FOG_TEXEL(at + 2).w);
         nb_stretch s = nb_next_stretch(at, leaves, ray, t);
         turns += nb_stretch_turns(leaves, s);
         if (!(s.enter < s.leave)) continue;
@@ -257,7 +257,7 @@ nb_vec3 nb_depth_of(nb_ray ray, nb_media media, inout int turns)
 #if NB_DECLARES(NB_HAS_COVER)
     float t = 0.0;
     nb_ray part = ray;
-#ifndef NEBEL_PLAIN_FEATURES
+#ifndef NEBEL_FEATURES_LITERAL
     if (!NB_HAS(NB_HAS_COVER)) return nb_added_depth(ray, media, 0.0, 0, turns);
 #endif
     while (t < ray.t_max) {
@@ -283,7 +283,7 @@ nb_vec3 nb_depth_to_light(nb_spot spot, nb_vec3 direction, float reach, bool to_
     ray.from_eye = false;
     nb_media media;
     media.first = 0;
-    media.count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_WORD(0).x) : 1;
+    media.count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_FOG_TEXEL(0).x) : 1;
     media.listed = false;
     media.to_sun = to_sun;
     media.is_way = true;

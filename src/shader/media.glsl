@@ -5,14 +5,14 @@
 #endif
 /* Compilers put functions into each other before they leave out what no condition lets through: that takes most of the time and memory of a
  * small program. What is large stands between #if NB_DECLARES(...) as well; but not every preprocessor can reckon with 123u. */
-#ifdef NEBEL_PLAIN_FEATURES
+#ifdef NEBEL_FEATURES_LITERAL
 #define NB_DECLARED NEBEL_FEATURES
 #else
 #define NB_DECLARED NB_HAS_ALL
 #endif
 #define NB_DECLARES(features) ((NB_DECLARED & (features)) != 0)
-#ifndef NEBEL_MOST_LIGHT
-#define NEBEL_MOST_LIGHT 65504.0
+#ifndef NEBEL_MAX_RADIANCE
+#define NEBEL_MAX_RADIANCE 65504.0
 #endif
 #define NB_HAS(feature) ((int(NEBEL_FEATURES) & (feature)) != 0) /* a host may write 123 or 123u */
 
@@ -71,7 +71,7 @@ nb_attenuation nb_attenuate(nb_vec3 depth)
 }
 
 /* How far behind a place on a ray the next one is that floats tell from it. */
-float nb_nearest(float t) { return max(abs(t) * (8.0 * NB_EPSILON), NEBEL_WORD(NB_HEADER_LATTICE).z); }
+float nb_nearest(float t) { return max(abs(t) * (8.0 * NB_EPSILON), NEBEL_FOG_TEXEL(NB_HEADER_LATTICE).z); }
 
 /* ---- shapes ---------------------------------------------------------------------------------- */
 
@@ -80,9 +80,9 @@ nb_ray nb_turned_ray(int leaf, bool turned, nb_ray ray)
 {
     nb_ray local = ray;
     if (NB_HAS(NB_HAS_TURNED) && turned) {
-        nb_vec3 x = NEBEL_WORD(leaf + 3).xyz;
-        nb_vec3 y = NEBEL_WORD(leaf + 4).xyz;
-        nb_vec3 z = NEBEL_WORD(leaf + 5).xyz;
+        nb_vec3 x = NEBEL_FOG_TEXEL(leaf + 3).xyz;
+        nb_vec3 y = NEBEL_FOG_TEXEL(leaf + 4).xyz;
+        nb_vec3 z = NEBEL_FOG_TEXEL(leaf + 5).xyz;
         local.origin = nb_vec3(dot(x, ray.origin), dot(y, ray.origin), dot(z, ray.origin));
         local.direction = nb_vec3(dot(x, ray.direction), dot(y, ray.direction), dot(z, ray.direction));
     }
@@ -99,7 +99,7 @@ nb_interval nb_planes_interval(int first, int count, nb_ray ray)
 {
     nb_interval span = nb_interval_all();
     for (int i = 0; i < count; i++) {
-        nb_vec4 face = NEBEL_WORD(first + i);
+        nb_vec4 face = NEBEL_FOG_TEXEL(first + i);
         float lean = 2.0 * NB_EPSILON * dot(abs(face.xyz), abs(ray.direction));
         span = nb_interval_meet(span, nb_interval_half_space(ray.origin, ray.direction, face.xyz, face.w,
                                                              nb_face_tie(face.xyz), 0.0, lean, 0.0));
@@ -112,7 +112,7 @@ nb_interval nb_planes_interval(int first, int count, nb_ray ray)
 
 nb_interval nb_leaf_interval(int leaf, nb_ray ray)
 {
-    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     int type = int(head.x);
     bool turned = type >= NB_TYPE_TURNED;
     if (turned) type -= NB_TYPE_TURNED;
@@ -122,10 +122,10 @@ nb_interval nb_leaf_interval(int leaf, nb_ray ray)
     } else if (type != NB_TYPE_WORLD) {
         nb_ray local = nb_turned_ray(leaf, turned, ray);
         nb_vec3 d = local.direction;
-        nb_vec3 place = NEBEL_WORD(leaf + 1).xyz;
+        nb_vec3 place = NEBEL_FOG_TEXEL(leaf + 1).xyz;
         nb_vec3 p = local.origin + place;
         if (NB_HAS(NB_HAS_BOX) && type == NB_TYPE_BOX)
-            span = nb_interval_box(local.origin, d, place, NEBEL_WORD(leaf + 2).xyz, 0.0);
+            span = nb_interval_box(local.origin, d, place, NEBEL_FOG_TEXEL(leaf + 2).xyz, 0.0);
 #if NB_DECLARES(NB_HAS_BALL)
         else if (NB_HAS(NB_HAS_BALL) && type == NB_TYPE_BALL)
             span = nb_interval_ball(p, d, head.y, NB_NO_REACH * head.y);
@@ -176,7 +176,7 @@ nb_stretch nb_group_stretch(int leaf, int count, nb_ray ray, float from)
             if (some && span.enter > t) next = min(next, span.enter);
             if (some && span.leave > t) next = min(next, span.leave);
             stack = (stack << 1) | (span.enter <= t && span.leave > t ? 1 : 0);
-            for (int folds = int(NEBEL_WORD(at).w); folds > 1; folds >>= 1) {
+            for (int folds = int(NEBEL_FOG_TEXEL(at).w); folds > 1; folds >>= 1) {
                 int top = stack & 1;
                 stack >>= 1;
                 stack = (folds & 1) != 0 ? stack & (top | ~1) : stack | top;
@@ -196,14 +196,14 @@ nb_stretch nb_next_stretch(int medium, int leaves, nb_ray ray, float from)
 {
     int at = medium + NB_MEDIUM_LEAF;
     if (NB_HAS(NB_HAS_DISTANCES) && ray.from_eye) {
-        from = max(from, NEBEL_WORD(medium + NB_MEDIUM_START).w);
-        ray.t_max = min(ray.t_max, NEBEL_WORD(medium + NB_MEDIUM_CUTOFF).w);
+        from = max(from, NEBEL_FOG_TEXEL(medium + NB_MEDIUM_START).w);
+        ray.t_max = min(ray.t_max, NEBEL_FOG_TEXEL(medium + NB_MEDIUM_CUTOFF).w);
     }
     nb_stretch s = nb_stretch_of(from, from);
 #if NB_DECLARES(NB_HAS_GROUP)
     if (NB_HAS(NB_HAS_GROUP) && leaves > 1) {
-        nb_vec4 low = NEBEL_WORD(at);
-        nb_interval bounds = nb_interval_box(ray.origin, ray.direction, low.xyz, NEBEL_WORD(at + 1).xyz, 0.0);
+        nb_vec4 low = NEBEL_FOG_TEXEL(at);
+        nb_interval bounds = nb_interval_box(ray.origin, ray.direction, low.xyz, NEBEL_FOG_TEXEL(at + 1).xyz, 0.0);
         if (max(bounds.enter, from) < min(bounds.leave, ray.t_max)) s = nb_group_stretch(int(low.w), leaves, ray, from);
     } else
 #endif
@@ -243,7 +243,7 @@ nb_profile nb_round_profile(nb_profile profile, nb_vec3 p, nb_vec3 d, float scal
 
 nb_profile nb_planes_profile(nb_profile profile, int leaf, nb_ray ray, float start)
 {
-    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     profile.count = int(head.y);
     profile.first = int(head.z);
     profile.offset = ray.origin + ray.direction * start;
@@ -253,7 +253,7 @@ nb_profile nb_planes_profile(nb_profile profile, int leaf, nb_ray ray, float sta
 
 nb_profile nb_round_body_profile(nb_profile profile, int leaf, nb_vec4 word, nb_ray ray, float start)
 {
-    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     int type = int(head.x);
     nb_ray local = nb_turned_ray(leaf, type >= NB_TYPE_TURNED, ray);
     if (type >= NB_TYPE_TURNED) type -= NB_TYPE_TURNED;
@@ -262,7 +262,7 @@ nb_profile nb_round_body_profile(nb_profile profile, int leaf, nb_vec4 word, nb_
     float slope = type == NB_TYPE_CONE ? head.z : 0.0;
     float extent = type == NB_TYPE_CAPSULE ? head.y : 1.0;
     profile.form = type == NB_TYPE_BALL ? NB_EDGE_BALL : type == NB_TYPE_CAPSULE ? NB_EDGE_CAPSULE : NB_EDGE_CAPPED;
-    nb_vec3 p = (local.origin + NEBEL_WORD(leaf + 1).xyz + local.direction * start) * unit;
+    nb_vec3 p = (local.origin + NEBEL_FOG_TEXEL(leaf + 1).xyz + local.direction * start) * unit;
     nb_round_edge edge = nb_round_edge_of(p, local.direction * unit, radius, slope, extent, word.x, word.y, word.z, profile.form);
     profile.side = edge.side;
     profile.offset = edge.q;
@@ -274,25 +274,25 @@ nb_profile nb_round_body_profile(nb_profile profile, int leaf, nb_vec4 word, nb_
 /* In cells. */
 nb_profile nb_grid_profile(nb_profile profile, int leaf, nb_vec4 word, nb_ray ray, float start)
 {
-    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     nb_ray local = nb_turned_ray(leaf, int(head.x) >= NB_TYPE_TURNED, ray);
     profile.first = int(word.w);
-    profile.offset = (local.origin + local.direction * start - NEBEL_WORD(leaf + 1).xyz) * word.xyz +
-                     nb_splat3(0.5 * float(NEBEL_VOXEL(profile.first).w));
+    profile.offset = (local.origin + local.direction * start - NEBEL_FOG_TEXEL(leaf + 1).xyz) * word.xyz +
+                     nb_splat3(0.5 * float(NEBEL_VOXEL_TEXEL(profile.first).w));
     profile.slope = local.direction * word.xyz;
     return profile;
 }
 
 nb_profile nb_leaf_profile(nb_profile profile, int leaf, float width, nb_ray ray, float start)
 {
-    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     nb_ray local = nb_turned_ray(leaf, int(head.x) >= NB_TYPE_TURNED, ray);
-    nb_vec3 place = NEBEL_WORD(leaf + 1).xyz;
+    nb_vec3 place = NEBEL_FOG_TEXEL(leaf + 1).xyz;
     if (NB_HAS(NB_HAS_RADIAL) && profile.kind >= NB_KIND_RADIAL) {
         profile = nb_round_profile(profile, local.origin + place, local.direction, 1.0 / head.y, start);
         profile.level = 1.0 - profile.level;
     } else if (NB_HAS(NB_HAS_SOFT_EDGE)) {
-        nb_vec3 high = NEBEL_WORD(leaf + 2).xyz;
+        nb_vec3 high = NEBEL_FOG_TEXEL(leaf + 2).xyz;
         profile.offset = (local.origin + local.direction * start - (place + high) * 0.5) * width;
         profile.slope = local.direction * width;
         profile.size = (high - place) * (0.5 * width);
@@ -305,7 +305,7 @@ nb_profile nb_leaf_profile(nb_profile profile, int leaf, float width, nb_ray ray
 nb_profile nb_altitude_profile(nb_profile profile, nb_vec4 word, nb_ray ray, float start)
 {
     nb_vec3 place = ray.origin + ray.direction * start;
-    nb_vec4 more = NEBEL_WORD(int(word.w));
+    nb_vec4 more = NEBEL_FOG_TEXEL(int(word.w));
     nb_arc way;
     way.height = more.w;
     way.radius = sqrt(dot(word.xyz, word.xyz));
@@ -342,7 +342,7 @@ nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
     profile.first = 0;
     profile.count = 0;
     if (NB_HAS(NB_HAS_PROFILE) && kind != NB_KIND_CONSTANT && kind != NB_KIND_EXCLUDE) {
-        nb_vec4 word = NEBEL_WORD(medium + 3);
+        nb_vec4 word = NEBEL_FOG_TEXEL(medium + 3);
         if (NB_HAS(NB_HAS_SLOPE) && kind <= NB_KIND_LINEAR) {
             profile.slope.x = dot(word.xyz, ray.direction);
             profile.offset.x = word.w + dot(word.xyz, ray.origin) + profile.slope.x * start;
@@ -361,7 +361,7 @@ nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
 #if NB_DECLARES(NB_HAS_GRID)
         } else if (NB_HAS(NB_HAS_GRID) && kind == NB_KIND_GRID) {
             profile = nb_grid_profile(profile, medium + NB_MEDIUM_LEAF, word, ray, start);
-            profile.level = NB_ENOUGH / max(nb_smallest(NEBEL_WORD(medium).xyz), NB_TINY);
+            profile.level = NB_ENOUGH / max(nb_smallest(NEBEL_FOG_TEXEL(medium).xyz), NB_TINY);
 #endif
         } else {
             profile = nb_leaf_profile(profile, medium + NB_MEDIUM_LEAF, word.w, ray, start);
@@ -375,7 +375,7 @@ float nb_planes_least(nb_profile profile, nb_vec3 place)
 {
     float least = 1.0;
     for (int i = 0; i < profile.count; i++) {
-        nb_vec4 face = NEBEL_WORD(profile.first + i);
+        nb_vec4 face = NEBEL_FOG_TEXEL(profile.first + i);
         least = min(least, face.w - dot(face.xyz, place));
     }
     return least;
@@ -395,16 +395,16 @@ float nb_planes_kink(nb_profile profile, float s)
     float least = nb_planes_least(profile, place);
     float lowest = least + NB_EDGE_NOISE >= 1.0 ? 0.0 : NB_FAR;
     for (int i = 0; i < profile.count; i++) {
-        nb_vec4 face = NEBEL_WORD(profile.first + i);
+        nb_vec4 face = NEBEL_FOG_TEXEL(profile.first + i);
         if (face.w - dot(face.xyz, place) <= least + NB_EDGE_NOISE) lowest = min(lowest, -dot(face.xyz, profile.slope));
     }
     float way = lowest > 0.0 ? (1.0 - least) / lowest : NB_FAR;
     for (int i = 0; i < profile.count; i++) {
-        nb_vec4 face = NEBEL_WORD(profile.first + i);
+        nb_vec4 face = NEBEL_FOG_TEXEL(profile.first + i);
         float slope = -dot(face.xyz, profile.slope);
         if (slope < lowest) way = min(way, max(face.w - dot(face.xyz, place) - least, 0.0) / (lowest - slope));
     }
-    return s + max(way, abs(s) * (4.0 * NB_EPSILON) + 1e-3 * NEBEL_WORD(NB_HEADER_LATTICE).z);
+    return s + max(way, abs(s) * (4.0 * NB_EPSILON) + 1e-3 * NEBEL_FOG_TEXEL(NB_HEADER_LATTICE).z);
 }
 
 float nb_planes_integral(nb_profile profile, float h)

@@ -16,7 +16,7 @@
 
 #define MOST_WORDS ((size_t)1 << 24) /* indices are exact floats */
 
-_Static_assert(NEBEL_MOST_PACKED_VOLUMES == (MOST_WORDS - NB_HEADER_WORDS) / NB_MEDIUM_WORDS,
+_Static_assert(NEBEL_MAX_PACKED_VOLUMES == (MOST_WORDS - NB_HEADER_WORDS) / NB_MEDIUM_WORDS,
                "what the public header says");
 
 /* Beyond this a float's square is none. */
@@ -28,7 +28,7 @@ _Static_assert(NEBEL_MOST_PACKED_VOLUMES == (MOST_WORDS - NB_HEADER_WORDS) / NB_
 
 typedef struct packer {
     const nebel_snapshot *snapshot;
-    nebel_word *words;
+    nebel_texel_f32 *words;
     size_t used; /* words behind those of the media that are taken */
     size_t rank; /* of the medium, counted from 0 */
     long double eye[3];
@@ -39,21 +39,21 @@ static float narrow(long double x)
     return (float)fminl(fmaxl(x, -FARTHEST), FARTHEST);
 }
 
-static void set_word(nebel_word *word, const long double v[3], double last)
+static void set_word(nebel_texel_f32 *word, const long double v[3], double last)
 {
     for (int i = 0; i < 3; i++) word->v[i] = narrow(v[i]);
     word->v[3] = (float)last;
 }
 
-static void set_color(nebel_word *word, const double v[3], double last)
+static void set_color(nebel_texel_f32 *word, const double v[3], double last)
 {
     for (int i = 0; i < 3; i++) word->v[i] = (float)v[i];
     word->v[3] = (float)last;
 }
 
 _Static_assert(NEBEL_FEATURE_MIXED == NB_HAS_MIXED && NEBEL_FEATURE_GRID == NB_HAS_GRID &&
-                   NEBEL_FEATURE_LAMPS == NB_HAS_LAMPS && NEBEL_FEATURE_DIFFUSION == NB_HAS_DIFFUSION &&
-                   NEBEL_FEATURE_ENVIRONMENT == NB_HAS_ENVIRONMENT && NEBEL_FEATURE_COVER == NB_HAS_COVER &&
+                   NEBEL_FEATURE_LIGHTS == NB_HAS_LAMPS && NEBEL_FEATURE_DIFFUSION == NB_HAS_DIFFUSION &&
+                   NEBEL_FEATURE_ENVIRONMENT == NB_HAS_ENVIRONMENT && NEBEL_FEATURE_OVERRIDE == NB_HAS_COVER &&
                    NEBEL_FEATURE_GROUP == NB_HAS_GROUP && NEBEL_FEATURE_SUN == NB_HAS_SUN,
                "the public names of features");
 
@@ -91,7 +91,8 @@ static void way_to_eye(const packer *p, const nb_leaf *leaf, long double way[3])
 
 /* In the world's axes around the eye; the power of two keeps the largest component near 1 and changes no digit. A soft
  * edge has units of its own: `edge` is how deep it is, 0 where there is none. */
-static void pack_face(const nb_leaf *leaf, const nb_face *face, const long double way[3], double edge, nebel_word *word)
+static void pack_face(const nb_leaf *leaf, const nb_face *face, const long double way[3], double edge,
+                      nebel_texel_f32 *word)
 {
     long double normal[3], largest = 0, distance = (long double)face->distance;
     for (int i = 0; i < 3; i++) {
@@ -107,10 +108,10 @@ static void pack_face(const nb_leaf *leaf, const nb_face *face, const long doubl
     word->v[3] = narrow(distance * scale);
 }
 
-static void pack_faces(packer *p, const nb_volume *body, const nb_leaf *leaf, nebel_word *word)
+static void pack_faces(packer *p, const nb_volume *body, const nb_leaf *leaf, nebel_texel_f32 *word)
 {
     long double way[3];
-    const double edge = body->density.type == NEBEL_DENSITY_SOFT_EDGE ? body->density.distance : 0;
+    const double edge = body->density.type == NEBEL_DENSITY_SOFT_EDGE ? body->density.edge_width : 0;
     way_to_eye(p, leaf, way);
     word->v[1] = (float)leaf->face_count;
     word->v[2] = (float)p->used;
@@ -118,7 +119,7 @@ static void pack_faces(packer *p, const nb_volume *body, const nb_leaf *leaf, ne
         pack_face(leaf, &body->faces[leaf->first_face + i], way, edge, &p->words[p->used++]);
 }
 
-static void pack_frame(const packer *p, const nb_leaf *leaf, nebel_word *word)
+static void pack_frame(const packer *p, const nb_leaf *leaf, nebel_texel_f32 *word)
 {
     long double way[3], place[3], low[3], high[3];
     way_to_eye(p, leaf, way);
@@ -133,7 +134,7 @@ static void pack_frame(const packer *p, const nb_leaf *leaf, nebel_word *word)
     for (int i = 0; i < 3; i++) set_word(&word[3 + i], &leaf->exact_matrix[3 * i], 0);
 }
 
-static void pack_leaf(packer *p, const nb_volume *body, const nb_leaf *leaf, unsigned folds, nebel_word *word)
+static void pack_leaf(packer *p, const nb_volume *body, const nb_leaf *leaf, unsigned folds, nebel_texel_f32 *word)
 {
     memset(word, 0, NB_LEAF_WORDS * sizeof *word);
     const int framed = leaf->type != NB_LEAF_WORLD && leaf->type != NB_LEAF_PLANES;
@@ -154,7 +155,7 @@ static unsigned folds_behind(const nb_volume *body, size_t *step)
     return folds | above;
 }
 
-static void pack_group(packer *p, const nb_volume *body, nebel_word *word)
+static void pack_group(packer *p, const nb_volume *body, nebel_texel_f32 *word)
 {
     long double low[3], high[3];
     for (int i = 0; i < 3; i++) {
@@ -164,7 +165,7 @@ static void pack_group(packer *p, const nb_volume *body, nebel_word *word)
         high[i] = (long double)body->high[i] - p->eye[i] + (isfinite(margin) ? margin : 0);
     }
     memset(word, 0, NB_LEAF_WORDS * sizeof *word);
-    nebel_word *leaves = &p->words[p->used];
+    nebel_texel_f32 *leaves = &p->words[p->used];
     set_word(&word[0], low, (double)p->used);
     set_word(&word[1], high, 0);
     p->used += body->leaf_count * NB_LEAF_WORDS;
@@ -201,7 +202,7 @@ static int kind_of(const nb_volume *body)
 }
 
 /* gradient . x + value = 0 at `from`, 1 at `to` */
-static void pack_linear(const packer *p, const nebel_density *density, nebel_word *word)
+static void pack_linear(const packer *p, const nebel_density *density, nebel_texel_f32 *word)
 {
     long double axis[3], square = 0, value = 0;
     for (int i = 0; i < 3; i++) {
@@ -213,7 +214,7 @@ static void pack_linear(const packer *p, const nebel_density *density, nebel_wor
     word->v[3] = narrow(value / square);
 }
 
-static void pack_grid(const nb_volume *body, nebel_word *word)
+static void pack_grid(const nb_volume *body, nebel_texel_f32 *word)
 {
     double rate[3];
     nb_grid_rate(body->density.grid, body->leaves[0].low, body->leaves[0].high, rate);
@@ -221,7 +222,7 @@ static void pack_grid(const nb_volume *body, nebel_word *word)
 }
 
 /* The height in all its digits: the shader's have none left of a planet's radius. */
-static void pack_altitude(packer *p, const nebel_density *density, nebel_word *word)
+static void pack_altitude(packer *p, const nebel_density *density, nebel_texel_f32 *word)
 {
     const long double scale = (long double)density->scale_height;
     long double way[3], square = 0;
@@ -233,11 +234,11 @@ static void pack_altitude(packer *p, const nebel_density *density, nebel_word *w
     const int grows = density->below == NEBEL_BELOW_GROW;
     const long double height = sqrtl(square) - (long double)density->radius - (long double)density->base;
     word->v[3] = (float)p->used;
-    p->words[p->used++] = (nebel_word){
+    p->words[p->used++] = (nebel_texel_f32){
         {narrow(scale), grows ? narrow(scale * (long double)NB_GROWTH_DEPTH) : 0, grows ? 1e18f : 1, narrow(height)}};
 }
 
-static void pack_density(packer *p, const nb_volume *body, nebel_word *word)
+static void pack_density(packer *p, const nb_volume *body, nebel_texel_f32 *word)
 {
     const nebel_density *density = &body->density;
     const long double height = density->type == NEBEL_DENSITY_HEIGHT ? (long double)density->scale_height : 1;
@@ -258,7 +259,7 @@ static void pack_density(packer *p, const nb_volume *body, nebel_word *word)
         word->v[0] = (float)body->edge.gain;
         word->v[1] = (float)body->edge.steepness;
         word->v[2] = (float)body->edge.inner;
-        word->v[3] = narrow(1 / (long double)density->distance);
+        word->v[3] = narrow(1 / (long double)density->edge_width);
         break;
     case NEBEL_DENSITY_GRID:
         pack_grid(body, word);
@@ -281,10 +282,10 @@ static int scatters(const nebel_snapshot *snapshot, const nb_medium *medium)
     return medium->is_sunlit || medium->is_lamplit || is_diffuse;
 }
 
-static void pack_scattering(packer *p, const nb_medium *medium, nebel_word *word)
+static void pack_scattering(packer *p, const nb_medium *medium, nebel_texel_f32 *word)
 {
     const nb_phase *phase = &medium->body.phase;
-    nebel_word *scattering = &p->words[p->used];
+    nebel_texel_f32 *scattering = &p->words[p->used];
     if (!scatters(p->snapshot, medium)) return;
     word[NB_MEDIUM_SCATTERING].v[3] = (float)p->used;
     word[NB_MEDIUM_AHEAD].v[3] = (float)medium->ahead;
@@ -294,11 +295,11 @@ static void pack_scattering(packer *p, const nb_medium *medium, nebel_word *word
     for (int i = 0; i < phase->lobe_count; i++) {
         const nb_lobe *lobe = &phase->lobes[i];
         scattering[1 + i] =
-            (nebel_word){{(float)lobe->factor, (float)lobe->alpha, (float)lobe->peak, (float)lobe->slope}};
+            (nebel_texel_f32){{(float)lobe->factor, (float)lobe->alpha, (float)lobe->peak, (float)lobe->slope}};
     }
 }
 
-static void pack_sun(const nebel_snapshot *snapshot, nebel_word word[2])
+static void pack_sun(const nebel_snapshot *snapshot, nebel_texel_f32 word[2])
 {
     memset(word, 0, 2 * sizeof *word);
     if (!snapshot->is_sunlit) return;
@@ -308,7 +309,7 @@ static void pack_sun(const nebel_snapshot *snapshot, nebel_word word[2])
     set_color(&word[1], snapshot->irradiance, 0);
 }
 
-static void pack_lamp(const packer *p, const nb_lamp *lamp, nebel_word word[NB_LAMP_WORDS])
+static void pack_lamp(const packer *p, const nb_lamp *lamp, nebel_texel_f32 word[NB_LAMP_WORDS])
 {
     long double place[3];
     for (int i = 0; i < 3; i++) place[i] = (long double)lamp->place[i] - p->eye[i];
@@ -374,7 +375,7 @@ static double light_flags(const nb_medium *medium, size_t rank)
            NB_LIGHT_RANK * (double)rank;
 }
 
-static void pack_medium(packer *p, const nb_medium *medium, nebel_word *word)
+static void pack_medium(packer *p, const nb_medium *medium, nebel_texel_f32 *word)
 {
     const nb_volume *body = &medium->body;
     const int by_direction = medium->sky != NULL;
@@ -404,8 +405,8 @@ static size_t count_words(const nebel_snapshot *snapshot)
     return count + nb_count_lattice_words(snapshot);
 }
 
-nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
-                            size_t *count)
+nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_texel_f32 *words,
+                            size_t capacity, size_t *count)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (eye == NULL || count == NULL || (words == NULL && capacity > 0))
@@ -434,10 +435,10 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
                 0,
                 {(long double)eye[0], (long double)eye[1], (long double)eye[2]}};
     words[0] =
-        (nebel_word){{(float)snapshot->medium_count, (float)(STEP_TOLERANCE * fmax(1, snapshot->largest_radiance)),
-                      (float)snapshot->max_opacity, 0}};
+        (nebel_texel_f32){{(float)snapshot->medium_count, (float)(STEP_TOLERANCE * fmax(1, snapshot->largest_radiance)),
+                           (float)snapshot->max_opacity, 0}};
     pack_sun(snapshot, &words[NB_HEADER_SUN]);
-    words[NB_HEADER_LATTICE] = (nebel_word){{0, 0, nearest_of(snapshot), 0}};
+    words[NB_HEADER_LATTICE] = (nebel_texel_f32){{0, 0, nearest_of(snapshot), 0}};
     const unsigned precision = nb_full_precision();
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         if (i > 0 && snapshot->media[i].body.rank > snapshot->media[i - 1].body.rank) p.rank++;

@@ -3,39 +3,39 @@
  *
  * What surfaces keep away is the host's to say, by a function that it defines before this text:
  *
- *     #define NEBEL_SUN_LIT(origin, direction, t, end)
+ *     #define NEBEL_SUN_VISIBILITY(origin, direction, t, end)
  *
  * is a vec2: the share of sunlight that reaches the ray from t on, and up to where along the ray that holds, at most `end`. */
-#ifndef NEBEL_SUN_LIT
-#define NEBEL_SUN_LIT(origin, direction, t, end) nb_vec2(1.0, end)
+#ifndef NEBEL_SUN_VISIBILITY
+#define NEBEL_SUN_VISIBILITY(origin, direction, t, end) nb_vec2(1.0, end)
 #endif
 
-/* Where that has loops: how many turns of them it has taken in this shader so far, for NEBEL_MOST_TURNS. */
-#ifndef NEBEL_SUN_LIT_TURNS
-#define NEBEL_SUN_LIT_TURNS 0
+/* Where that has loops: how many turns of them it has taken in this shader so far, for NEBEL_MAX_ITERATIONS. */
+#ifndef NEBEL_SUN_VISIBILITY_ITERATIONS
+#define NEBEL_SUN_VISIBILITY_ITERATIONS 0
 #endif
 
-/* As many times as bright is the sun; it is the same all along the ray that is asked. environment.glsl has NEBEL_SKY_PART. */
-#ifndef NEBEL_SUN_PART
-#define NEBEL_SUN_PART nb_splat3(1.0)
+/* As many times as bright is the sun; it is the same all along the ray that is asked. environment.glsl has NEBEL_ENVIRONMENT_SCALE. */
+#ifndef NEBEL_SUN_SCALE
+#define NEBEL_SUN_SCALE nb_splat3(1.0)
 #endif
 
-nb_vec3 nb_to_sun() { return NEBEL_WORD(NB_HEADER_SUN).xyz; }
+nb_vec3 nb_to_sun() { return NEBEL_FOG_TEXEL(NB_HEADER_SUN).xyz; }
 
 /* Whether the sun lights any fog. */
 bool nb_is_day() { return NB_HAS(NB_HAS_SUN) && nb_largest(abs(nb_to_sun())) > 0.0; }
 
 /* Whether light along a ray has a closed form between turns: the whole depth is linear in that along the ray. */
-bool nb_sun_is_closed() { return NEBEL_WORD(NB_HEADER_SUN).w > 0.0; }
+bool nb_sun_is_closed() { return NEBEL_FOG_TEXEL(NB_HEADER_SUN).w > 0.0; }
 
 /* Radiance of opaque fog of this medium in full sunlight; 0 where it scatters none. */
 nb_vec3 nb_sunlit_radiance(int medium, nb_vec3 direction)
 {
-    int scattering = int(NEBEL_WORD(medium + NB_MEDIUM_SCATTERING).w);
+    int scattering = int(NEBEL_FOG_TEXEL(medium + NB_MEDIUM_SCATTERING).w);
     nb_vec3 radiance = nb_splat3(0.0);
     if (scattering > 0) {
         float phase = nb_scattered(scattering, direction, nb_to_sun());
-        radiance = NEBEL_WORD(scattering).xyz * NEBEL_WORD(NB_HEADER_SUN + 1).xyz * NEBEL_SUN_PART * phase;
+        radiance = NEBEL_FOG_TEXEL(scattering).xyz * NEBEL_FOG_TEXEL(NB_HEADER_SUN + 1).xyz * NEBEL_SUN_SCALE * phase;
     }
     return radiance;
 }
@@ -113,7 +113,7 @@ void nb_note_rim(inout nb_turning turning, nb_vec3 p, nb_vec3 d, nb_vec3 v, floa
 
 void nb_note_round(inout nb_turning turning, int leaf, int type, nb_vec3 p, nb_vec3 d, nb_vec3 v)
 {
-    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     if (NB_HAS(NB_HAS_BALL) && type == NB_TYPE_BALL) {
         nb_note_ball(turning, p, d, v, head.y);
     } else if (NB_HAS(NB_HAS_CAPSULE) && type == NB_TYPE_CAPSULE) {
@@ -183,7 +183,7 @@ nb_way_through nb_planes_way(int first, int count, nb_vec3 place, nb_vec3 d, nb_
 {
     nb_way_through way = nb_open_way();
     for (int i = 0; i < count; i++) {
-        nb_vec3 to = nb_way_to_face(NEBEL_WORD(first + i), place, d, v);
+        nb_vec3 to = nb_way_to_face(NEBEL_FOG_TEXEL(first + i), place, d, v);
         if (to.z > 0.0)
             way.enter = nb_greater(way.enter, to.xy);
         else
@@ -196,7 +196,7 @@ float nb_planes_takeover(nb_way_through way, int first, int count, nb_vec3 place
 {
     float next = nb_takeover(way.enter, nb_vec2(0.0, 0.0));
     for (int i = 0; i < count; i++) {
-        nb_vec3 to = nb_way_to_face(NEBEL_WORD(first + i), place, d, v);
+        nb_vec3 to = nb_way_to_face(NEBEL_FOG_TEXEL(first + i), place, d, v);
         if (to.z > 0.0)
             next = min(next, nb_takeover(way.enter, to.xy));
         else
@@ -210,7 +210,7 @@ float nb_planes_takeover(nb_way_through way, int first, int count, nb_vec3 place
 
 void nb_note_faces(inout nb_turning turning, int leaf, bool box, nb_vec3 p, nb_vec3 d, nb_vec3 v)
 {
-    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     nb_vec3 inverse = nb_vec3(nb_rcp_bounded(v.x), nb_rcp_bounded(v.y), nb_rcp_bounded(v.z));
     float t = turning.t;
     for (int i = 0; i < NB_MOST_PASSED; i++) {
@@ -218,8 +218,8 @@ void nb_note_faces(inout nb_turning turning, int leaf, bool box, nb_vec3 p, nb_v
         nb_way_through way;
         float next = NB_FAR;
         if (NB_HAS(NB_HAS_BOX) && box) {
-            nb_vec3 low = (NEBEL_WORD(leaf + 1).xyz - place) * inverse;
-            nb_vec3 high = (NEBEL_WORD(leaf + 2).xyz - place) * inverse;
+            nb_vec3 low = (NEBEL_FOG_TEXEL(leaf + 1).xyz - place) * inverse;
+            nb_vec3 high = (NEBEL_FOG_TEXEL(leaf + 2).xyz - place) * inverse;
             way = nb_box_way(min(low, high), max(low, high), -d * inverse);
             next = nb_box_takeover(way, min(low, high), max(low, high), -d * inverse);
         } else {
@@ -242,7 +242,7 @@ void nb_note_faces(inout nb_turning turning, int leaf, bool box, nb_vec3 p, nb_v
 
 void nb_note_leaf(inout nb_turning turning, int leaf, nb_ray ray, nb_vec3 sun)
 {
-    int type = int(NEBEL_WORD(leaf).x);
+    int type = int(NEBEL_FOG_TEXEL(leaf).x);
     bool turned = type >= NB_TYPE_TURNED;
     if (turned) type -= NB_TYPE_TURNED;
     if (type == NB_TYPE_WORLD) return;
@@ -254,7 +254,7 @@ void nb_note_leaf(inout nb_turning turning, int leaf, nb_ray ray, nb_vec3 sun)
     if (flat_sided)
         nb_note_faces(turning, leaf, type == NB_TYPE_BOX, local.origin, local.direction, v);
     else
-        nb_note_round(turning, leaf, type, local.origin + NEBEL_WORD(leaf + 1).xyz, local.direction, v);
+        nb_note_round(turning, leaf, type, local.origin + NEBEL_FOG_TEXEL(leaf + 1).xyz, local.direction, v);
 }
 
 /* The first turn of all media behind t and before `end`, or `end`. */
@@ -265,16 +265,16 @@ nb_turning nb_find_turn(nb_ray ray, float t, float end)
     turning.next = end;
     turning.curved = false;
     nb_vec3 sun = nb_to_sun();
-    int count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_WORD(0).x) : 1;
+    int count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_FOG_TEXEL(0).x) : 1;
     for (int i = 0; i < count; i++) {
         int at = NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
-        int leaves = int(NEBEL_WORD(at + 2).w);
+        int leaves = int(NEBEL_FOG_TEXEL(at + 2).w);
         bool several = NB_HAS(NB_HAS_GROUP) && leaves > 1;
         int leaf = at + NB_MEDIUM_LEAF;
-        if (several) leaf = int(NEBEL_WORD(leaf).w);
+        if (several) leaf = int(NEBEL_FOG_TEXEL(leaf).w);
         for (int k = 0; k < (several ? leaves : 1); k++) nb_note_leaf(turning, leaf + NB_LEAF_WORDS * k, ray, sun);
-        if (NB_HAS(NB_HAS_GAUSSIAN) && int(NEBEL_WORD(at).w) == NB_KIND_GAUSSIAN) {
-            nb_vec4 word = NEBEL_WORD(at + 3);
+        if (NB_HAS(NB_HAS_GAUSSIAN) && int(NEBEL_FOG_TEXEL(at).w) == NB_KIND_GAUSSIAN) {
+            nb_vec4 word = NEBEL_FOG_TEXEL(at + 3);
             float sigma = 0.70710678118654752440 / word.w;
             nb_note_ball(turning, ray.origin + word.xyz, ray.direction, sun, sigma);
             nb_note_ball(turning, ray.origin + word.xyz, ray.direction, sun, 4.0 * sigma);
@@ -303,14 +303,14 @@ float nb_most_in_shadow(nb_ray ray, float t)
     way.direction = nb_to_sun();
     way.t_max = NB_FAR;
     way.from_eye = false;
-    int count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_WORD(0).x) : 1;
+    int count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_FOG_TEXEL(0).x) : 1;
     for (int i = 0; i < count; i++) {
         int at = NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
-        if (int(NEBEL_WORD(at).w) != NB_KIND_GRID) continue;
+        if (int(NEBEL_FOG_TEXEL(at).w) != NB_KIND_GRID) continue;
         nb_stretch s = nb_next_stretch(at, 1, way, 0.0);
         if (!(s.enter < s.leave)) continue;
         nb_profile profile = nb_profile_of(at, NB_KIND_GRID, ray, 0.0);
-        most = min(most, nb_columns_by(nb_sun_lattice_ray_of(int(NEBEL_WORD(at + NB_MEDIUM_LEAF).y), profile.offset, profile.slope)));
+        most = min(most, nb_columns_by(nb_sun_lattice_ray_of(int(NEBEL_FOG_TEXEL(at + NB_MEDIUM_LEAF).y), profile.offset, profile.slope)));
     }
     return most;
 }

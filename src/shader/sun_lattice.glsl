@@ -28,15 +28,15 @@ float nb_float_of(uint bits) { return nb_from_bits(int(bits)); }
 /* `from` and `slope` are in cells of the grid. */
 nb_sun_lattice_ray nb_sun_lattice_ray_of(int lattice, nb_vec3 from, nb_vec3 slope)
 {
-    nb_uvec4 head = NEBEL_VOXEL(lattice);
-    nb_uvec4 lean = NEBEL_VOXEL(lattice + 1);
-    nb_uvec4 last = NEBEL_VOXEL(lattice + 2);
+    nb_uvec4 head = NEBEL_VOXEL_TEXEL(lattice);
+    nb_uvec4 lean = NEBEL_VOXEL_TEXEL(lattice + 1);
+    nb_uvec4 last = NEBEL_VOXEL_TEXEL(lattice + 2);
     nb_vec3 place = nb_sun_lattice_axes(from, int(head.w));
     nb_vec3 rate = nb_sun_lattice_axes(slope, int(head.w));
     nb_vec2 leans = nb_vec2(nb_float_of(lean.x), nb_float_of(lean.y));
     float per_cell = nb_float_of(last.x);
     float per_layer = nb_float_of(last.w);
-    nb_uvec4 end = NEBEL_VOXEL(lattice + 3);
+    nb_uvec4 end = NEBEL_VOXEL_TEXEL(lattice + 3);
     nb_vec2 aside = place.xy - leans * place.z;
     nb_vec2 drift = rate.xy - leans * rate.z;
     nb_vec2 sides = aside * per_cell - nb_vec2(nb_float_of(lean.z), nb_float_of(lean.w));
@@ -64,7 +64,7 @@ float nb_sun_lattice_value(nb_sun_lattice_ray ray, nb_vec3 at)
 {
     nb_vec3 place = clamp(at, nb_splat3(0.0), ray.size);
     nb_vec3 cell = min(floor(place), ray.size - nb_splat3(1.0));
-    nb_uvec4 texel = NEBEL_VOXEL(ray.first + nb_grid_index(cell, ray.size));
+    nb_uvec4 texel = NEBEL_VOXEL_TEXEL(ray.first + nb_grid_index(cell, ray.size));
     bool flawed = (texel.x & texel.y & texel.z & texel.w) == 0xffffffffu;
     return flawed ? -NB_HUGE : ray.step * nb_grid_value(nb_grid_cell_of(texel), place - cell);
 }
@@ -95,7 +95,7 @@ float nb_amount_to_sun(int medium, nb_ray ray, nb_stretch s)
 {
     nb_profile profile = nb_profile_of(medium, NB_KIND_GRID, ray, s.enter);
     nb_sun_lattice_ray to_sun =
-        nb_sun_lattice_ray_of(int(NEBEL_WORD(medium + NB_MEDIUM_LEAF).y), profile.offset, profile.slope);
+        nb_sun_lattice_ray_of(int(NEBEL_FOG_TEXEL(medium + NB_MEDIUM_LEAF).y), profile.offset, profile.slope);
     float length = s.leave - s.enter;
     float behind = 0.0;
     if (NB_HAS(NB_HAS_COVER)) behind = nb_sun_lattice_amount(to_sun, length);
@@ -103,7 +103,7 @@ float nb_amount_to_sun(int medium, nb_ray ray, nb_stretch s)
     float sum = 0.0;
     bool ends = false;
     if (rest < 0.0 || behind < 0.0) { /* for drivers that count the turns of loops */
-        float enough = NB_SUN_IS_GONE / max(nb_smallest(NEBEL_WORD(medium).xyz), NB_TINY);
+        float enough = NB_SUN_IS_GONE / max(nb_smallest(NEBEL_FOG_TEXEL(medium).xyz), NB_TINY);
         float cell = 1.0 / max(nb_largest(abs(profile.slope)), NB_TINY);
         float step = NB_FIRST_CELLS * cell;
         float t = 0.0;

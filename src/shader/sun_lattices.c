@@ -126,11 +126,11 @@ size_t nb_count_sun_lattice_texels(const nebel_snapshot *snapshot, size_t room)
     return count;
 }
 
-void nb_place_sun_lattices(const nebel_snapshot *snapshot, size_t room, size_t first, nebel_word *words)
+void nb_place_sun_lattices(const nebel_snapshot *snapshot, size_t room, size_t first, nebel_texel_f32 *words)
 {
     for (size_t i = 0; i < snapshot->medium_count && snapshot->is_sunlit; i++) {
         if (grid_of(snapshot, i) == NULL) continue;
-        nebel_word *word = &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS + NB_MEDIUM_LEAF];
+        nebel_texel_f32 *word = &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS + NB_MEDIUM_LEAF];
         const size_t before = first_of(snapshot, i);
         word->v[1] =
             before < i ? words[NB_HEADER_WORDS + before * NB_MEDIUM_WORDS + NB_MEDIUM_LEAF].v[1] : (float)first;
@@ -158,7 +158,7 @@ static uint32_t bits_of(double x)
     return bits;
 }
 
-static void pack_head(const nb_grid_lattice *l, nebel_texel *head)
+static void pack_head(const nb_grid_lattice *l, nebel_texel_u32 *head)
 {
     for (int i = 0; i < 3; i++) head[0].v[i] = (uint32_t)cells_of(l, i);
     head[0].v[3] = (uint32_t)l->axis;
@@ -166,15 +166,16 @@ static void pack_head(const nb_grid_lattice *l, nebel_texel *head)
         head[1].v[s] = bits_of(l->lean[s]);
         head[1].v[2 + s] = bits_of(l->first[s]);
     }
-    head[2] = (nebel_texel){{bits_of(l->per_cell), bits_of(l->step), (uint32_t)l->ends_in_fog, bits_of(l->per_layer)}};
-    head[3] = (nebel_texel){{bits_of(l->end[0]), bits_of(l->end[1]), bits_of(l->end[2]), bits_of(l->up ? 1 : -1)}};
+    head[2] =
+        (nebel_texel_u32){{bits_of(l->per_cell), bits_of(l->step), (uint32_t)l->ends_in_fog, bits_of(l->per_layer)}};
+    head[3] = (nebel_texel_u32){{bits_of(l->end[0]), bits_of(l->end[1]), bits_of(l->end[2]), bits_of(l->up ? 1 : -1)}};
 }
 
 /* A cell that shaders walk through. No eight nodes are as far from the sun as can be. */
-static const nebel_texel flaw = {{UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX}};
+static const nebel_texel_u32 flaw = {{UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX}};
 
 static nebel_result mark_flaws(const nebel_snapshot *snapshot, size_t medium, const nb_grid_lattice *l,
-                               nebel_texel *texel)
+                               nebel_texel_u32 *texel)
 {
     const size_t count = cells_of(l, 0) * cells_of(l, 1) * cells_of(l, 2);
     const nb_lattice_demand demand = {extinction_of(snapshot, medium), PLACE_TOLERANCE};
@@ -188,7 +189,7 @@ static nebel_result mark_flaws(const nebel_snapshot *snapshot, size_t medium, co
 }
 
 /* Returns the texel behind the last. */
-static nebel_texel *pack_lattice(const nb_grid_lattice *l, nebel_texel *texel)
+static nebel_texel_u32 *pack_lattice(const nb_grid_lattice *l, nebel_texel_u32 *texel)
 {
     const size_t row = (size_t)l->count[0], layer = row * (size_t)l->count[1];
     pack_head(l, texel);
@@ -203,7 +204,7 @@ static nebel_texel *pack_lattice(const nb_grid_lattice *l, nebel_texel *texel)
     return texel;
 }
 
-nebel_result nb_pack_sun_lattices(const nebel_snapshot *snapshot, size_t room, nebel_texel *texels)
+nebel_result nb_pack_sun_lattices(const nebel_snapshot *snapshot, size_t room, nebel_texel_u32 *texels)
 {
     for (size_t i = next_lattice(snapshot, 0); i < snapshot->medium_count; i = next_lattice(snapshot, i + 1)) {
         double way[3];
@@ -212,7 +213,7 @@ nebel_result nb_pack_sun_lattices(const nebel_snapshot *snapshot, size_t room, n
             nb_grid_lattice_make(grid_of(snapshot, i), &snapshot->allocator, way, limit_of(snapshot, i, room));
         nebel_result result = lattice != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
         if (result == NEBEL_OK) {
-            nebel_texel *const cells = texels + NB_SUN_LATTICE_TEXELS;
+            nebel_texel_u32 *const cells = texels + NB_SUN_LATTICE_TEXELS;
             texels = pack_lattice(lattice, texels);
             result = mark_flaws(snapshot, i, lattice, cells);
         }

@@ -2,7 +2,7 @@
 
 #include <nebel/shader.h>
 
-const char *nebel_shader_text(nebel_dialect dialect)
+const char *nebel_get_shader_source(nebel_shader_dialect dialect)
 {
     switch (dialect) {
     case NEBEL_DIALECT_GLSL_330:

@@ -346,8 +346,8 @@ static nebel_result list_tiles(tiler *t, uint32_t *entries, size_t capacity, siz
     return NEBEL_OK;
 }
 
-nebel_result nebel_tile_volumes(const nebel_snapshot *snapshot, const nebel_view *view, uint32_t tile_size,
-                                uint32_t *entries, size_t capacity, size_t *count)
+nebel_result nebel_bin_volumes(const nebel_snapshot *snapshot, const nebel_view *view, uint32_t tile_size,
+                               uint32_t *entries, size_t capacity, size_t *count)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_log *log = &snapshot->log;

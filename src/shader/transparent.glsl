@@ -63,7 +63,7 @@ nebel_blend nebel_blend_medium(nebel_transfer medium, nebel_transfer fog)
                          nb_blend_premultiplied(c.z, a.z, t.z, s.z));
 }
 
-nb_vec4 nebel_blend_grey(nebel_blend blend)
+nb_vec4 nebel_blend_gray(nebel_blend blend)
 {
     return nb_vec4(blend.source.x, blend.source.y, blend.source.z, dot(blend.factor, nb_splat3(1.0 / 3.0)));
 }
@@ -108,7 +108,7 @@ float nb_ball_piece(nb_approach a, float radius, int power)
     return h > 0.0 ? (power > 0 ? uneven : h) : 0.0;
 }
 
-float nebel_ball_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_vec3 center, float radius, int power)
+float nebel_sphere_path_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_vec3 center, float radius, int power)
 {
     return nb_ball_piece(nb_approach_of(origin - center, direction, t_max, radius), radius, power);
 }
@@ -123,23 +123,23 @@ float nb_gaussian_piece(nb_approach a, float sigma)
     return a.leave > a.enter ? nb_gaussian_integral(m, from, to, k).value : 0.0;
 }
 
-float nebel_gaussian_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_vec3 center, float radius, float sigma)
+float nebel_gaussian_path_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_vec3 center, float radius, float sigma)
 {
     return nb_gaussian_piece(nb_approach_of(origin - center, direction, t_max, min(radius, NB_FAR)), sigma);
 }
 
-nebel_transfer nebel_medium_light(float length, nb_vec3 extinction, nb_vec3 light)
+nebel_transfer nebel_medium_transfer(float length, nb_vec3 extinction, nb_vec3 light)
 {
     nb_attenuation attenuation = nb_attenuate(extinction * length);
     nebel_transfer medium;
     medium.transmittance = attenuation.left;
-    medium.in_scattering = min(light * length * attenuation.mean, nb_splat3(NEBEL_MOST_LIGHT));
+    medium.in_scattering = min(light * length * attenuation.mean, nb_splat3(NEBEL_MAX_RADIANCE));
     return medium;
 }
 
 /* ---- the comparison of depth at five places -------------------------------------------------- */
 
-struct nebel_tap_constants {
+struct nebel_depth_taps {
     float offset;
     float nothing;
     float edge;
@@ -147,9 +147,9 @@ struct nebel_tap_constants {
     float brightness;
 };
 
-nebel_tap_constants nebel_default_taps()
+nebel_depth_taps nebel_default_taps()
 {
-    nebel_tap_constants taps;
+    nebel_depth_taps taps;
     taps.offset = 0.0005;
     taps.nothing = 100000.0;
     taps.edge = 0.5;
@@ -158,17 +158,17 @@ nebel_tap_constants nebel_default_taps()
     return taps;
 }
 
-nb_vec2 nebel_screen_place(nb_vec4 clip)
+nb_vec2 nebel_screen_uv(nb_vec4 clip)
 {
     return nb_vec2(0.5 + 0.5 * clip.x / clip.w, 0.5 + 0.5 * clip.y / clip.w);
 }
 
-float nb_tap_depth(float depth, nebel_tap_constants taps)
+float nb_tap_depth(float depth, nebel_depth_taps taps)
 {
     return depth < 0.0 ? taps.nothing : depth;
 }
 
-float nebel_compare_taps(float depth, float center, nb_vec4 corners, nebel_tap_constants taps)
+float nebel_compare_taps(float depth, float center, nb_vec4 corners, nebel_depth_taps taps)
 {
     float a = nb_tap_depth(center, taps);
     float b = nb_tap_depth(corners.x, taps);
@@ -185,7 +185,7 @@ float nebel_compare_taps(float depth, float center, nb_vec4 corners, nebel_tap_c
 /* Alone with a name of its own: the host's macro may use any other. */
 float nb_opaque_depth(nb_vec2 nb_place) { return NEBEL_OPAQUE_DEPTH(nb_place); }
 
-float nebel_five_taps(nb_vec2 place, float depth, nebel_tap_constants taps)
+float nebel_five_taps(nb_vec2 place, float depth, nebel_depth_taps taps)
 {
     float o = taps.offset;
     nb_vec4 corners = nb_vec4(nb_opaque_depth(place + nb_vec2(-o, -o)), nb_opaque_depth(place + nb_vec2(o, -o)),

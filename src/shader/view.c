@@ -175,14 +175,14 @@ static void turn_vector(double columns[3][3], linear_vector *v)
 /* ---- words ----------------------------------------------------------------------------------- */
 
 /* In pixels from the lower left corner instead of halves of the picture from its middle. */
-static void put_number(const nebel_view *view, linear a, nebel_word *word)
+static void put_number(const nebel_view *view, linear a, nebel_texel_f32 *word)
 {
     word->v[0] = (float)(a.middle - a.x - a.y);
     word->v[1] = (float)(2 * a.x / view->width);
     word->v[2] = (float)(2 * a.y / view->height);
 }
 
-static void put_vector(const nebel_view *view, const linear_vector *v, nebel_word words[3])
+static void put_vector(const nebel_view *view, const linear_vector *v, nebel_texel_f32 words[3])
 {
     for (int i = 0; i < 3; i++) {
         words[0].v[i] = (float)(v->middle[i] - v->x[i] - v->y[i]);
@@ -198,7 +198,7 @@ typedef struct fraction {
     double above_growth, below_growth;
 } fraction;
 
-static void put_fraction(const nebel_view *view, const fraction *f, nebel_word above[1], nebel_word below[1])
+static void put_fraction(const nebel_view *view, const fraction *f, nebel_texel_f32 above[1], nebel_texel_f32 below[1])
 {
     const double largest =
         fmax(fmax(fabs(f->above.middle), fabs(f->below.middle)), fmax(fabs(f->above_growth), fabs(f->below_growth)));
@@ -246,10 +246,10 @@ static fraction axis_fraction(const bundle *rays)
 
 static fraction surface_fraction(const bundle *rays, const nebel_depth_desc *depth, const ends *e)
 {
-    switch (depth->kind) {
-    case NEBEL_DEPTH_KIND_LOGARITHM:
+    switch (depth->encoding) {
+    case NEBEL_DEPTH_ENCODING_LOGARITHMIC:
         return (fraction){.below = {rays->w1, 0, 0}, .above_growth = 1};
-    case NEBEL_DEPTH_KIND_AXIS:
+    case NEBEL_DEPTH_ENCODING_AXIAL:
         return axis_fraction(rays);
     default:
         return plane_fraction(rays, e->rising, e->far, (e->near - e->far) / (e->stored_far - e->stored_near));
@@ -258,32 +258,38 @@ static fraction surface_fraction(const bundle *rays, const nebel_depth_desc *dep
 
 static fraction start_fraction(const bundle *rays, const nebel_depth_desc *depth, const ends *e)
 {
-    if (depth->start == NEBEL_START_NEAR) return plane_fraction(rays, e->rising, e->near, 0);
+    if (depth->ray_start == NEBEL_RAY_START_NEAR) return plane_fraction(rays, e->rising, e->near, 0);
     return (fraction){.below = {1, 0, 0}};
 }
 
 /* The last components of the words: what the kind of depth needs, and how sky is told. */
-static void put_kind(const nebel_depth_desc *depth, const ends *e, nebel_word *words)
+static void put_kind(const nebel_depth_desc *depth, const ends *e, nebel_texel_f32 *words)
 {
-    const int window = depth->kind == NEBEL_DEPTH_KIND_WINDOW, logarithm = depth->kind == NEBEL_DEPTH_KIND_LOGARITHM;
+    const int window = depth->encoding == NEBEL_DEPTH_ENCODING_WINDOW,
+              logarithm = depth->encoding == NEBEL_DEPTH_ENCODING_LOGARITHMIC;
     const double by = depth->log_scale != 0 ? depth->log_scale : 1;
-    words[0].v[3] = (float)depth->kind;
+    words[0].v[3] = (float)depth->encoding;
     words[1].v[3] = (float)(window ? e->stored_far : logarithm ? log1p(by * depth->log_far) : 0);
     words[2].v[3] = (float)(logarithm ? 1 / by : 0);
     words[3].v[3] = words[4].v[3] = words[5].v[3] = 0;
-    const int by_value = depth->sky == NEBEL_SKY_VALUE || (depth->sky == NEBEL_SKY_FAR && (window || logarithm));
-    words[8].v[3] = (float)(depth->sky == NEBEL_SKY_VALUE ? depth->sky_depth : window ? e->stored_far : 1);
-    words[9].v[3] = depth->sky == NEBEL_SKY_NONE ? 2 : (float)by_value;
+    const int by_value = depth->background == NEBEL_BACKGROUND_DEPTH_VALUE ||
+                         (depth->background == NEBEL_BACKGROUND_DEPTH_FAR && (window || logarithm));
+    words[8].v[3] = (float)(depth->background == NEBEL_BACKGROUND_DEPTH_VALUE ? depth->background_depth
+                            : window                                          ? e->stored_far
+                                                                              : 1);
+    words[9].v[3] = depth->background == NEBEL_BACKGROUND_DEPTH_NONE ? 2 : (float)by_value;
 }
 
 static int is_convention(const nebel_depth_desc *depth, const bundle *rays)
 {
     const double numbers[] = {depth->range[0], depth->range[1]};
     if (!all_finite(numbers, 2) || (numbers[0] == numbers[1] && numbers[0] != 0)) return 0;
-    if ((unsigned)depth->kind >= NEBEL_DEPTH_KIND_COUNT || (unsigned)depth->sky > NEBEL_SKY_NONE) return 0;
-    if ((unsigned)depth->start > NEBEL_START_NEAR) return 0;
-    if (depth->kind == NEBEL_DEPTH_KIND_AXIS) return rays->d.middle[2] != 0;
-    if (depth->kind != NEBEL_DEPTH_KIND_LOGARITHM) return 1;
+    if ((unsigned)depth->encoding >= NEBEL_DEPTH_ENCODING_COUNT ||
+        (unsigned)depth->background > NEBEL_BACKGROUND_DEPTH_NONE)
+        return 0;
+    if ((unsigned)depth->ray_start > NEBEL_RAY_START_NEAR) return 0;
+    if (depth->encoding == NEBEL_DEPTH_ENCODING_AXIAL) return rays->d.middle[2] != 0;
+    if (depth->encoding != NEBEL_DEPTH_ENCODING_LOGARITHMIC) return 1;
     return !rays->parallel && depth->log_scale >= 0 && isfinite(depth->log_scale) && depth->log_far > 0 &&
            isfinite(depth->log_far);
 }
@@ -301,7 +307,7 @@ int nb_view_is_valid(const nebel_view *view)
     return is_view(view) && set_bundle(view->clip_from_eye, &rays) && invert(view->eye_from_world, world);
 }
 
-nebel_result nebel_view_rays(const nebel_view *view, const nebel_depth_desc *depth, nebel_rays *rays)
+nebel_result nebel_compute_view_rays(const nebel_view *view, const nebel_depth_desc *depth, nebel_rays *rays)
 {
     const nebel_depth_desc standard = {0};
     bundle b;
@@ -315,19 +321,19 @@ nebel_result nebel_view_rays(const nebel_view *view, const nebel_depth_desc *dep
     scale_bundle(&b, 1 / nb_vector_length(b.d.middle));
     const ends e = find_ends(&b, depth);
     const fraction surface = surface_fraction(&b, depth, &e), start = start_fraction(&b, depth, &e);
-    put_fraction(view, &surface, &rays->words[6], &rays->words[7]);
-    put_fraction(view, &start, &rays->words[8], &rays->words[9]);
-    put_kind(depth, &e, rays->words);
+    put_fraction(view, &surface, &rays->texels[6], &rays->texels[7]);
+    put_fraction(view, &start, &rays->texels[8], &rays->texels[9]);
+    put_kind(depth, &e, rays->texels);
 
     for (int i = 0; i < 3; i++) {
         rays->eye[i] = (b.parallel ? 0 : b.o.middle[i]) - view->eye_from_world[12 + i];
         if (!b.parallel) b.o.middle[i] = 0;
     }
-    rays->from_eye = !b.parallel && depth->start == NEBEL_START_EYE;
+    rays->from_eye = !b.parallel && depth->ray_start == NEBEL_RAY_START_EYE;
     turn(world, rays->eye);
     turn_vector(world, &b.o);
     turn_vector(world, &b.d);
-    put_vector(view, &b.o, &rays->words[0]);
-    put_vector(view, &b.d, &rays->words[3]);
+    put_vector(view, &b.o, &rays->texels[0]);
+    put_vector(view, &b.d, &rays->texels[3]);
     return NEBEL_OK;
 }

@@ -1,7 +1,7 @@
-/* Rays of pixels and lengths of depths, from the words of nebel_view_rays; see src/shader/view.c for what they are.
+/* Rays of pixels and lengths of depths, from the words of nebel_compute_view_rays; see src/shader/view.c for what they are.
  * Part of the shader text where NEBEL_VIEW is defined. */
 #ifdef NEBEL_VIEW
-struct nebel_sight {
+struct nebel_view_ray {
     nb_vec3 origin;
     nb_vec3 direction;
     float t_max;
@@ -43,12 +43,12 @@ float nb_view_steps(float kind, float depth, nb_vec2 pixel)
     return nb_view_divide(above + value * NEBEL_RAY(6).w, below + value * NEBEL_RAY(7).w, 1e18);
 }
 
-/* NEBEL_DEPTH_KIND and NEBEL_FROM_EYE leave out what a host knows that it does not need. */
-nebel_sight nebel_see(nb_vec2 pixel, float depth)
+/* NEBEL_DEPTH_ENCODING and NEBEL_FROM_EYE leave out what a host knows that it does not need. */
+nebel_view_ray nebel_make_view_ray(nb_vec2 pixel, float depth)
 {
-    nebel_sight sight;
-#ifdef NEBEL_DEPTH_KIND
-    float kind = float(NEBEL_DEPTH_KIND);
+    nebel_view_ray sight;
+#ifdef NEBEL_DEPTH_ENCODING
+    float kind = float(NEBEL_DEPTH_ENCODING);
 #else
     float kind = NEBEL_RAY(0).w;
 #endif

@@ -82,13 +82,13 @@ nebel_result nb_check_voxels(const nebel_snapshot *snapshot)
                    count, NB_MOST_TEXELS);
 }
 
-void nb_place_voxels(const nebel_snapshot *snapshot, nebel_word *words)
+void nb_place_voxels(const nebel_snapshot *snapshot, nebel_texel_f32 *words)
 {
     size_t next = 0;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nebel_grid *grid = grid_of(snapshot, i);
         if (grid == NULL) continue;
-        nebel_word *word = &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS + 3];
+        nebel_texel_f32 *word = &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS + 3];
         const size_t first = first_of(snapshot, i);
         word->v[3] = first < i ? words[NB_HEADER_WORDS + first * NB_MEDIUM_WORDS + 3].v[3] : (float)next;
         if (first == i) next += count_texels(grid);
@@ -96,7 +96,7 @@ void nb_place_voxels(const nebel_snapshot *snapshot, nebel_word *words)
     nb_place_sun_lattices(snapshot, room_beside(next), next, words);
 }
 
-int nebel_same_voxels(const nebel_snapshot *a, const nebel_snapshot *b)
+int nebel_is_same_voxels(const nebel_snapshot *a, const nebel_snapshot *b)
 {
     if (a == NULL || b == NULL) return a == b;
     size_t i = next_grid(a, 0), k = next_grid(b, 0);
@@ -120,7 +120,7 @@ static uint32_t bits_of(double x)
 /* The voxel that corner i of a brick is, along an axis. */
 static size_t voxel_at(const nebel_grid *grid, int axis, int block, int i)
 {
-    const int wanted = block * BRICK + i - (grid->filter == NEBEL_FILTER_LINEAR), end = grid->size[axis] - 1;
+    const int wanted = block * BRICK + i - (grid->filter == NEBEL_GRID_FILTER_LINEAR), end = grid->size[axis] - 1;
     return (size_t)(wanted < 0 ? 0 : wanted < end ? wanted : end);
 }
 
@@ -140,10 +140,10 @@ static void measure_corners(const nebel_grid *grid, const brick *b, const int bl
 }
 
 /* Cells of nearest voxels have one corner eight times. */
-static void pack_cells(const nebel_grid *grid, const brick *b, const int block[3], nebel_texel *texel)
+static void pack_cells(const nebel_grid *grid, const brick *b, const int block[3], nebel_texel_u32 *texel)
 {
     uint16_t steps[CORNERS][CORNERS][CORNERS];
-    const int far = grid->filter == NEBEL_FILTER_LINEAR;
+    const int far = grid->filter == NEBEL_GRID_FILTER_LINEAR;
     measure_corners(grid, b, block, steps);
     for (int z = 0; z < BRICK; z++)
         for (int y = 0; y < BRICK; y++)
@@ -155,18 +155,18 @@ static void pack_cells(const nebel_grid *grid, const brick *b, const int block[3
 }
 
 /* Returns the texel behind the last. `first`: how many texels come before the grid. */
-static size_t pack_grid(const nebel_grid *grid, size_t first, nebel_texel *texels)
+static size_t pack_grid(const nebel_grid *grid, size_t first, nebel_texel_u32 *texels)
 {
     const brick *b = grid->brick;
-    nebel_texel *head = &texels[first];
+    nebel_texel_u32 *head = &texels[first];
     size_t cells = first + 1 + count_bricks(grid);
-    *head++ = (nebel_texel){{(uint32_t)grid->bricks[0], (uint32_t)grid->bricks[1], (uint32_t)grid->bricks[2],
-                             grid->filter == NEBEL_FILTER_LINEAR}};
+    *head++ = (nebel_texel_u32){{(uint32_t)grid->bricks[0], (uint32_t)grid->bricks[1], (uint32_t)grid->bricks[2],
+                                 grid->filter == NEBEL_GRID_FILTER_LINEAR}};
     for (int z = 0; z < grid->bricks[2]; z++)
         for (int y = 0; y < grid->bricks[1]; y++)
             for (int x = 0; x < grid->bricks[0]; x++, b++) {
                 const double step = grid->scale * ((b->most - b->least) / MOST_STEPS);
-                *head++ = (nebel_texel){
+                *head++ = (nebel_texel_u32){
                     {bits_of(density_of(grid, b->least)), bits_of(step), is_even(b) ? 0 : (uint32_t)cells, 0}};
                 if (is_even(b)) continue;
                 pack_cells(grid, b, (int[]){x, y, z}, &texels[cells]);
@@ -175,7 +175,7 @@ static size_t pack_grid(const nebel_grid *grid, size_t first, nebel_texel *texel
     return cells;
 }
 
-nebel_result nebel_pack_voxels(const nebel_snapshot *snapshot, nebel_texel *texels, size_t capacity, size_t *count)
+nebel_result nebel_pack_voxels(const nebel_snapshot *snapshot, nebel_texel_u32 *texels, size_t capacity, size_t *count)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (count == NULL || (texels == NULL && capacity > 0))

@@ -12,7 +12,7 @@ struct nb_cell_walk {
 
 nb_cell_walk nb_enter_brick(int grid, nb_vec3 size, nb_vec3 brick, nb_vec3 place)
 {
-    nb_uvec4 texel = NEBEL_VOXEL(grid + 1 + nb_grid_index(brick, size));
+    nb_uvec4 texel = NEBEL_VOXEL_TEXEL(grid + 1 + nb_grid_index(brick, size));
     nb_cell_walk w;
     w.brick = brick;
     w.cell = clamp(floor(place - brick * NB_BRICK), nb_splat3(0.0), nb_splat3(NB_BRICK - 1.0));
@@ -26,7 +26,7 @@ nb_cell_walk nb_enter_brick(int grid, nb_vec3 size, nb_vec3 brick, nb_vec3 place
 nb_vec2 nb_densities_in_cell(nb_cell_walk w, int grid, nb_vec3 first, nb_vec3 second)
 {
     bool even = w.cells == 0;
-    nb_grid_cell corners = nb_grid_cell_of(NEBEL_VOXEL(even ? grid : w.cells + nb_grid_index(w.cell, nb_splat3(NB_BRICK))));
+    nb_grid_cell corners = nb_grid_cell_of(NEBEL_VOXEL_TEXEL(even ? grid : w.cells + nb_grid_index(w.cell, nb_splat3(NB_BRICK))));
     float step = even ? 0.0 : w.step;
     return nb_vec2(max(w.least + step * nb_grid_value(corners, nb_grid_share(first, w.cell)), 0.0),
                    max(w.least + step * nb_grid_value(corners, nb_grid_share(second, w.cell)), 0.0));
@@ -42,7 +42,7 @@ struct nb_two_points {
 /* `radiance`: of its opaque fog. */
 void nb_add_at_points(inout nb_two_points sum, int medium, nb_vec3 direction, nb_vec3 radiance, nb_vec2 densities)
 {
-    nb_vec3 extinction = NEBEL_WORD(medium).xyz;
+    nb_vec3 extinction = NEBEL_FOG_TEXEL(medium).xyz;
     nb_vec3 light = nb_light_per_metre(medium, radiance);
     nb_vec3 glow = nb_sunlit_radiance(medium, direction) * extinction;
     sum.extinction[0] += extinction * densities.x;
@@ -72,7 +72,7 @@ void nb_add_others_at_points(inout nb_two_points sum, nb_piece piece, nb_ray ray
     for (int k = 0; k < used; k++) {
         nb_vec3 slot = nb_slot(k);
         int at = int(slot.z);
-        int kind = int(NEBEL_WORD(at).w);
+        int kind = int(NEBEL_FOG_TEXEL(at).w);
         if (at == piece.voxels || kind == NB_KIND_EXCLUDE || !nb_is_there(slot, piece)) continue;
         nb_profile profile = nb_profile_of(at, kind, ray, piece.start);
         nb_add_at_points(sum, at, ray.direction, nb_slot_radiance(k, at), nb_vec2(nb_density_beside(profile, first), nb_density_beside(profile, second)));
@@ -86,9 +86,9 @@ nb_vec2 nb_sunlight_from(nb_piece piece, nb_ray ray, float t, bool of_fog, inout
     float from = piece.start + t;
     float near = nb_nearest(from);
     if (lit.y <= from + near) {
-        turns -= NEBEL_SUN_LIT_TURNS;
-        lit = NEBEL_SUN_LIT(ray.origin, ray.direction, from + near, ray.t_max);
-        turns += NEBEL_SUN_LIT_TURNS;
+        turns -= NEBEL_SUN_VISIBILITY_ITERATIONS;
+        lit = NEBEL_SUN_VISIBILITY(ray.origin, ray.direction, from + near, ray.t_max);
+        turns += NEBEL_SUN_VISIBILITY_ITERATIONS;
         lit.y = max(lit.y, from + 2.0 * near);
     }
     float stop = min(piece.end, lit.y);
@@ -108,10 +108,10 @@ int nb_walk_voxels(inout nb_gathered g, inout nb_piece piece, nb_ray ray, int us
     int at = piece.voxels;
     nb_profile profile = nb_profile_of(at, NB_KIND_GRID, ray, piece.start);
     nb_grid_ray path = nb_grid_ray_of(profile.offset, profile.slope);
-    nb_sun_lattice_ray to_sun = nb_sun_lattice_ray_of(int(NEBEL_WORD(at + NB_MEDIUM_LEAF).y), profile.offset, profile.slope);
+    nb_sun_lattice_ray to_sun = nb_sun_lattice_ray_of(int(NEBEL_FOG_TEXEL(at + NB_MEDIUM_LEAF).y), profile.offset, profile.slope);
     nb_vec3 size = nb_grid_bricks(profile.first);
     nb_vec3 last = size - nb_splat3(1.0);
-    nb_vec3 extinction = NEBEL_WORD(at).xyz;
+    nb_vec3 extinction = NEBEL_FOG_TEXEL(at).xyz;
     float length = piece.end - piece.start;
     float most = min(nb_columns_by(to_sun), NB_CELLS_AT_ONCE / max(nb_largest(abs(path.slope)), NB_TINY));
     if (piece.rate > 0.0) most = min(most, 0.5 / piece.rate);

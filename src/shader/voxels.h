@@ -11,6 +11,6 @@
 nebel_result nb_check_voxels(const nebel_snapshot *snapshot);
 
 /* Writes the first texel of each grid, and of its lattice, into the words of the media. */
-void nb_place_voxels(const nebel_snapshot *snapshot, nebel_word *words);
+void nb_place_voxels(const nebel_snapshot *snapshot, nebel_texel_f32 *words);
 
 #endif

@@ -85,7 +85,7 @@ nb_gathered nb_pass_rest(nb_gathered g, nb_media_sum all, nb_ray ray, int first,
  * from what `g` has reached. */
 void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed, bool lit, inout int turns)
 {
-    float tolerance = NEBEL_WORD(0).y;
+    float tolerance = NEBEL_FOG_TEXEL(0).y;
     float t = g.reached;
     bool crowd = false;
     bool stepping = false;
@@ -183,9 +183,9 @@ nb_progress nb_open_progress()
     return p;
 }
 
-#ifdef NEBEL_RESUMES
+#ifdef NEBEL_RESUMABLE
 /* A stage that may take many turns begins where most are left. */
-bool nb_is_fresh(int turns) { return turns < NEBEL_MOST_TURNS / 4; }
+bool nb_is_fresh(int turns) { return turns < NEBEL_MAX_ITERATIONS / 4; }
 #else
 bool nb_is_fresh(int turns) { return true; }
 #endif
@@ -236,28 +236,28 @@ nebel_transfer nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media,
         p.walked.is_cut = false;
     }
 #endif
-    if (walks) light.in_scattering = p.walked.radiance;
-    if (walks && covers) light.transmittance = nb_exp3(-p.walked.depth);
+    if (walks) transfer.in_scattering = p.walked.radiance;
+    if (walks && covers) transfer.transmittance = nb_exp3(-p.walked.depth);
     if (p.stage == NB_STAGE_WALK && !(NB_MAY_TIRE && p.walked.is_cut)) p.stage = NB_STAGE_LAMPS;
     if (NB_HAS(NB_HAS_LAMPS) && lit && sum.scatters) {
         int lamp_turns = NB_RESUMES ? turns : before;
         if (p.stage == NB_STAGE_LAMPS && nb_is_fresh(turns) && nb_has_loops(count)) nb_lamplight(p.lamps, ray, first, count, listed, lamp_turns);
         turns = NB_RESUMES ? lamp_turns : turns + lamp_turns - before;
-        light.in_scattering += p.lamps.light;
+        transfer.in_scattering += p.lamps.light;
         bool is_lit = !(p.lamps.reached < ray.t_max && nb_smallest(p.lamps.before) < NB_OPAQUE);
         if (p.stage == NB_STAGE_LAMPS && (last || is_lit)) p.stage = NB_STAGE_DIFFUSION;
     } else if (p.stage == NB_STAGE_LAMPS) {
         p.stage = NB_STAGE_DIFFUSION;
     }
     if (p.stage == NB_STAGE_DIFFUSION && (last || nb_is_fresh(turns))) {
-        if (NB_HAS(NB_HAS_DIFFUSION) && lit && sum.met && NEBEL_WORD(NB_HEADER_LATTICE).x + NEBEL_WORD(NB_HEADER_LATTICE).y > 0.0)
-            light.in_scattering = max(light.in_scattering + nb_gather_diffuse(ray, media), nb_splat3(0.0));
+        if (NB_HAS(NB_HAS_DIFFUSION) && lit && sum.met && NEBEL_FOG_TEXEL(NB_HEADER_LATTICE).x + NEBEL_FOG_TEXEL(NB_HEADER_LATTICE).y > 0.0)
+            transfer.in_scattering = max(transfer.in_scattering + nb_gather_diffuse(ray, media), nb_splat3(0.0));
         if (last || nb_has_loops(count)) p.stage = NB_STAGE_DONE;
     }
     p.turns = turns;
-    if (NB_HAS(NB_HAS_MAX_OPACITY)) light = nb_limit_opacity(light, NEBEL_WORD(0).z);
-    light.in_scattering = min(light.in_scattering, nb_splat3(NEBEL_MOST_LIGHT));
-    return light;
+    if (NB_HAS(NB_HAS_MAX_OPACITY)) transfer = nb_limit_opacity(transfer, NEBEL_FOG_TEXEL(0).z);
+    transfer.in_scattering = min(transfer.in_scattering, nb_splat3(NEBEL_MAX_RADIANCE));
+    return transfer;
 }
 
 nb_ray nb_ray_up_to(nb_vec3 origin, nb_vec3 direction, float t_max, bool from_eye)
@@ -296,7 +296,7 @@ nebel_transfer nb_clear()
     return transfer;
 }
 
-#ifndef NEBEL_RESUMES
+#ifndef NEBEL_RESUMABLE
 /* `lit`: in-scattering is asked for, too. `from_eye`: distances along the ray count. */
 nebel_transfer nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count, bool listed, bool lit,
                            bool from_eye)
@@ -307,11 +307,11 @@ nebel_transfer nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, in
         nb_ray ray = nb_ray_up_to(origin, direction, t_max, from_eye);
         transfer = nb_trace_further(progress, ray, nb_media_of(first, count, listed), lit, true);
     }
-    return light;
+    return transfer;
 }
 #endif
 
-#ifdef NEBEL_RESUMES
+#ifdef NEBEL_RESUMABLE
 /* How far a ray has come, in words from pass to pass; all 0 at first. First of them: light or what there is of it, and up to where;
  * second: transmittance or depth, and the stage. */
 #define NB_PROGRESS_WORDS 4
@@ -377,12 +377,12 @@ nb_progress_words nb_resume(nb_progress_words words, nb_vec3 origin, nb_vec3 dir
 #endif
 
 /* No functions: of each that a program does not call it would hold another copy of the whole walk until its compiler finds that out. */
-#define nb_trace_all(origin, direction, t_max, lit, from_eye) nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, lit, from_eye)
+#define nb_trace_all(origin, direction, t_max, lit, from_eye) nb_trace_media(origin, direction, t_max, 0, int(NEBEL_FOG_TEXEL(0).x), false, lit, from_eye)
 #define nebel_trace(origin, direction, t_max) nb_trace_all(origin, direction, t_max, true, true)
 #define nebel_transmit(origin, direction, t_max) nb_trace_all(origin, direction, t_max, false, true).transmittance
-#define nebel_transmit_light(origin, direction, t_max) nb_trace_all(origin, direction, t_max, false, false).transmittance
-#ifdef NEBEL_INDEX
+#define nebel_transmit_shadow(origin, direction, t_max) nb_trace_all(origin, direction, t_max, false, false).transmittance
+#ifdef NEBEL_TILE_ENTRY
 #define nebel_trace_list(origin, direction, t_max, first, count) nb_trace_media(origin, direction, t_max, first, count, true, true, true)
 #define nebel_transmit_list(origin, direction, t_max, first, count) nb_trace_media(origin, direction, t_max, first, count, true, false, true).transmittance
-#define nebel_transmit_light_list(origin, direction, t_max, first, count) nb_trace_media(origin, direction, t_max, first, count, true, false, false).transmittance
+#define nebel_transmit_shadow_list(origin, direction, t_max, first, count) nb_trace_media(origin, direction, t_max, first, count, true, false, false).transmittance
 #endif

@@ -1,32 +1,32 @@
 /* Where OpenGL's dialects read words and indices from, unless the host says. */
-#ifndef NEBEL_WORD
-#ifdef NEBEL_TEXTURE
+#ifndef NEBEL_FOG_TEXEL
+#ifdef NEBEL_FOG_TEXTURE
 uniform highp sampler2D nebel_fog_texture;
-#define NEBEL_WORD(i) texelFetch(nebel_fog_texture, ivec2((i) & 1023, (i) >> 10), 0)
+#define NEBEL_FOG_TEXEL(i) texelFetch(nebel_fog_texture, ivec2((i) & 1023, (i) >> 10), 0)
 #else
-layout(std140) uniform nebel_fog_block { vec4 nebel_words[1024]; };
-#define NEBEL_WORD(i) nebel_words[i]
+layout(std140) uniform nebel_fog_block { vec4 nebel_texels[1024]; };
+#define NEBEL_FOG_TEXEL(i) nebel_texels[i]
 #endif
 #endif
-#if defined(NEBEL_TILES) && !defined(NEBEL_INDEX)
+#if defined(NEBEL_TILES) && !defined(NEBEL_TILE_ENTRY)
 uniform highp usampler2D nebel_tile_texture;
-#define NEBEL_INDEX(i) int(texelFetch(nebel_tile_texture, ivec2((i) & 1023, (i) >> 10), 0).x)
+#define NEBEL_TILE_ENTRY(i) int(texelFetch(nebel_tile_texture, ivec2((i) & 1023, (i) >> 10), 0).x)
 #endif
-#if defined(NEBEL_VOXELS) && !defined(NEBEL_VOXEL)
+#if defined(NEBEL_VOXELS) && !defined(NEBEL_VOXEL_TEXEL)
 uniform highp usampler2D nebel_voxel_texture;
-#define NEBEL_VOXEL(i) texelFetch(nebel_voxel_texture, ivec2((i) & 1023, (i) >> 10), 0)
+#define NEBEL_VOXEL_TEXEL(i) texelFetch(nebel_voxel_texture, ivec2((i) & 1023, (i) >> 10), 0)
 #endif
-#if defined(NEBEL_DIFFUSION) && !defined(NEBEL_NODE)
-uniform highp sampler2D nebel_node_texture;
-#define NEBEL_NODE(i) texelFetch(nebel_node_texture, ivec2((i) & 1023, (i) >> 10), 0)
+#if defined(NEBEL_DIFFUSION) && !defined(NEBEL_DIFFUSION_TEXEL)
+uniform highp sampler2D nebel_diffusion_texture;
+#define NEBEL_DIFFUSION_TEXEL(i) texelFetch(nebel_diffusion_texture, ivec2((i) & 1023, (i) >> 10), 0)
 #endif
-#if defined(NEBEL_ENVIRONMENT) && !defined(NEBEL_ENVIRONMENT_WORD)
+#if defined(NEBEL_ENVIRONMENT) && !defined(NEBEL_ENVIRONMENT_TEXEL)
 uniform highp sampler2D nebel_environment_texture;
-#define NEBEL_ENVIRONMENT_WORD(i) texelFetch(nebel_environment_texture, ivec2((i) & 1023, (i) >> 10), 0)
+#define NEBEL_ENVIRONMENT_TEXEL(i) texelFetch(nebel_environment_texture, ivec2((i) & 1023, (i) >> 10), 0)
 #endif
-#if defined(NEBEL_AIR) && !defined(NEBEL_AIR_WORD)
-uniform highp sampler2D nebel_air_texture;
-#define NEBEL_AIR_WORD(i) texelFetch(nebel_air_texture, ivec2((i) & 1023, (i) >> 10), 0)
+#if defined(NEBEL_SKY_VIEW) && !defined(NEBEL_SKY_VIEW_TEXEL)
+uniform highp sampler2D nebel_sky_view_texture;
+#define NEBEL_SKY_VIEW_TEXEL(i) texelFetch(nebel_sky_view_texture, ivec2((i) & 1023, (i) >> 10), 0)
 #endif
 #if defined(NEBEL_VIEW) && !defined(NEBEL_RAY)
 uniform vec4 nebel_rays[10];

@@ -118,7 +118,7 @@ static inline void d3d9_set_fog(const d3d9_device *d, const nebel_d3d9_fog *fog)
                                       NEBEL_D3DRS_RANGEFOGENABLE, NEBEL_D3DRS_FOGVERTEXMODE};
     for (size_t i = 0; i < sizeof states / sizeof *states; i++) {
         uint32_t value;
-        assert_int_equal(nebel_get_d3d9_fog(fog, states[i], &value), NEBEL_OK);
+        assert_int_equal(nebel_get_d3d9_state(fog, states[i], &value), NEBEL_OK);
         D3D9_REQUIRE(IDirect3DDevice9_SetRenderState(d->device, (D3DRENDERSTATETYPE)states[i], value));
     }
 }

@@ -344,7 +344,7 @@ static void draw_wall(const d3d9_device *d, const d3d9_pixel_vertex *vertices)
     d3d9_draw(d, D3D9_PIXEL_VERTEX, sizeof *strip, strip, count);
 }
 
-/* nebel_fog_vertices writes alpha; the device draws at each vertex what nebel_trace says in double. */
+/* nebel_compute_vertex_fog writes alpha; the device draws at each vertex what nebel_trace says in double. */
 static void test_fog_volumes_arrive_through_specular_alpha(void **state)
 {
     (void)state;
@@ -354,7 +354,7 @@ static void test_fog_volumes_arrive_through_specular_alpha(void **state)
     make_wall(places, vertices);
     const nebel_vertices points = {.positions = places};
     const nebel_vertex_output alpha = {NEBEL_VERTEX_SPECULAR_ALPHA, &vertices[0].specular, sizeof *vertices};
-    assert_int_equal(nebel_fog_vertices(fog, NULL, GRID * GRID, &points, &alpha, 1), NEBEL_OK);
+    assert_int_equal(nebel_compute_vertex_fog(fog, NULL, GRID * GRID, &points, &alpha, 1), NEBEL_OK);
     d3d9_picture picture;
     d3d9_set_fog(&floats, &(nebel_d3d9_fog){.fog_enable = 1, .fog_color = BLUE});
     draw_wall(&floats, vertices);

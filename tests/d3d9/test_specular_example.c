@@ -105,7 +105,7 @@ static void test_the_picture_shows_the_fog_of_nebel(void **state)
     read_picture();
     engine_make_landscape(&scene);
     engine_turn(&scene, FIRST_ANGLE);
-    assert_int_equal(nebel_find_eye(scene.view, eye), NEBEL_OK);
+    assert_int_equal(nebel_compute_object_eye(scene.view, eye), NEBEL_OK);
     const int foggy = predict_colors();
     int compared = 0;
     double worst = 0;

@@ -26,7 +26,7 @@ static nebel_result fail_memory(const nb_draft *draft)
 /* The sky, as light_scene has made it. */
 static const nebel_scene_data *find_light(const nb_draft *draft)
 {
-    return nebel_scene_contents(draft->scene);
+    return nebel_get_scene_data(draft->scene);
 }
 
 /* Keys are the file's alone. */
@@ -35,7 +35,7 @@ static nebel_sun find_sun(const nb_draft *draft, const nb_edition *edition)
     const nebel_scene_data *const data = &draft->data;
     nebel_sun sun = {{0}, {0}};
     if (!edition->has_sun) return sun;
-    if (data->sun_key_count > 0) return nebel_sun_between_keys(data->sun_keys, data->sun_key_count, draft->frame);
+    if (data->sun_key_count > 0) return nebel_interpolate_sun(data->sun_keys, data->sun_key_count, draft->frame);
     memcpy(sun.direction, edition->sun_direction, sizeof sun.direction);
     memcpy(sun.irradiance, edition->sun_irradiance, sizeof sun.irradiance);
     return sun;
@@ -55,15 +55,16 @@ static nebel_result light_scene(nb_draft *draft, const nb_edition *edition)
 {
     const nebel_sun sun = find_sun(draft, edition);
     if (is_lit_by(find_light(draft), edition->has_sun, &sun)) return NEBEL_OK;
-    const nebel_result result = nebel_light_scene_by(draft->scene, edition->has_sun ? &sun : NULL);
-    draft->data.environment.map = nebel_scene_contents(draft->scene)->environment.map;
+    const nebel_result result = nebel_set_scene_sun(draft->scene, edition->has_sun ? &sun : NULL);
+    draft->data.environment.map = nebel_get_scene_data(draft->scene)->environment.map;
     return result;
 }
 
 static int does_planet_move(const nebel_planet *planet)
 {
-    int result = planet->model == NEBEL_PLANET_LAYERS && planet->shells.day != 0;
-    for (uint32_t i = 0; i < planet->shells.cloud_count; i++) result |= planet->shells.clouds[i].day != 0;
+    int result = planet->model == NEBEL_PLANET_TEXTURED && planet->textured_desc.rotation_period != 0;
+    for (uint32_t i = 0; i < planet->textured_desc.cloud_shell_count; i++)
+        result |= planet->textured_desc.cloud_shells[i].rotation_period != 0;
     for (uint32_t i = 0; i < planet->cloud_layer_count; i++)
         result |= planet->cloud_layers[i].wind[0] != 0 || planet->cloud_layers[i].wind[1] != 0;
     return result;
@@ -72,12 +73,12 @@ static int does_planet_move(const nebel_planet *planet)
 /* What the file has that moves without end, or noise and planets that do so now. */
 static int moves_on(const nb_draft *draft)
 {
-    int result = nebel_scene_contents(draft->file)->moves_on;
+    int result = nebel_get_scene_data(draft->file)->has_endless_motion;
     for (size_t i = 0; i < draft->now.planet_count; i++) result |= does_planet_move(&draft->now.planets[i]);
     for (size_t i = 0; i < draft->now.count && !result; i++) {
         nebel_scene_noise noise;
-        if (nebel_find_scene_noise(draft->scene, draft->now.volumes[i].density.grid, &noise))
-            result = noise.change != 0 || noise.drift[0] != 0 || noise.drift[1] != 0 || noise.drift[2] != 0;
+        if (nebel_get_scene_noise(draft->scene, draft->now.volumes[i].density.grid, &noise))
+            result = noise.evolution != 0 || noise.velocity[0] != 0 || noise.velocity[1] != 0 || noise.velocity[2] != 0;
     }
     return result;
 }
@@ -87,7 +88,7 @@ void nb_draft_show(nb_draft *draft)
     nebel_scene_data *const data = &draft->data;
     nb_edition_show(&draft->now, data);
     data->planets = find_light(draft)->planets;
-    data->moves_on = moves_on(draft);
+    data->has_endless_motion = moves_on(draft);
     if (!data->has_sun) return;
     const nebel_sun sun = find_sun(draft, &draft->now);
     memcpy(data->sun_direction, sun.direction, sizeof sun.direction);
@@ -101,7 +102,7 @@ static nebel_result find_fog_light(const nb_draft *draft, const nb_edition *edit
     nebel_environment sky;
     *ambient = nb_edition_environment(edition, find_light(draft)->environment.map);
     const nebel_result result = nebel_find_scene_light(draft->scene, draft->frame, sun, &sky);
-    if (result == NEBEL_OK && ambient->type == NEBEL_ENVIRONMENT_MAP && find_light(draft)->environment_file == NULL)
+    if (result == NEBEL_OK && ambient->type == NEBEL_ENVIRONMENT_MAP && find_light(draft)->environment_path == NULL)
         ambient->intensity = sky.intensity;
     return result;
 }
@@ -110,7 +111,7 @@ static nebel_result find_fog_light(const nb_draft *draft, const nb_edition *edit
 static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition, nebel_fog **fog)
 {
     nebel_fog_desc desc = {.log = draft->log, .max_opacity = edition->max_opacity};
-    const nebel_scene_data *const file = nebel_scene_contents(draft->file);
+    const nebel_scene_data *const file = nebel_get_scene_data(draft->file);
     nebel_environment environment;
     nebel_result result = find_fog_light(draft, edition, &desc.sun, &environment);
     if (result == NEBEL_OK) result = nebel_create_fog(&desc, fog);
@@ -126,7 +127,7 @@ static nebel_result find_volume(const nb_draft *draft, const nb_edition *edition
 {
     *volume = edition->volumes[index];
     nebel_grid *const grid = volume->density.type == NEBEL_DENSITY_GRID ? volume->density.grid : NULL;
-    return nebel_scene_grid(draft->scene, grid, draft->frame, &volume->density.grid);
+    return nebel_get_scene_grid(draft->scene, grid, draft->frame, &volume->density.grid);
 }
 
 static nebel_result add_volume(const nb_draft *draft, const nb_edition *edition, size_t index, nebel_fog *fog,
@@ -143,7 +144,7 @@ static nebel_result change_volume(const nb_draft *draft, const nb_edition *editi
 {
     nebel_volume_desc volume;
     nebel_result result = find_volume(draft, edition, index, &volume);
-    if (result == NEBEL_OK) result = nebel_change_volume(draft->fog, draft->ids[index], &volume);
+    if (result == NEBEL_OK) result = nebel_update_volume(draft->fog, draft->ids[index], &volume);
     nebel_release_grid(volume.density.grid);
     return result;
 }
@@ -166,7 +167,7 @@ static nebel_result add_cells(nebel_fog *fog, const nb_edition *edition)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < edition->cells_desc.cell_count && result == NEBEL_OK; i++) {
-        const nebel_volume_desc volume = nebel_cell_volume(&edition->cells[i]);
+        const nebel_volume_desc volume = nebel_volume_from_cell(&edition->cells[i]);
         if (edition->cells[i].density > 0) result = nebel_add_volume(fog, &volume, NULL);
     }
     return result;
@@ -210,7 +211,7 @@ static nebel_result fill_fog(nb_draft *draft, const nb_edition *edition)
 
 static int has_changed(const nb_draft *draft, const nebel_volume_desc *was, const nebel_volume_desc *now)
 {
-    const int may_move = draft->data.moves_on && now->density.type == NEBEL_DENSITY_GRID;
+    const int may_move = draft->data.has_endless_motion && now->density.type == NEBEL_DENSITY_GRID;
     return !nb_edition_is_same_volume(now, was) || (may_move && draft->frame != draft->fog_frame);
 }
 
@@ -259,7 +260,7 @@ static void move_point(const nebel_transform *from, const nebel_transform *to, d
 static double (*place_points(const nb_draft *draft, const nb_edition *edition, size_t index))[3]
 {
     const nebel_nebula_desc *const nebula = &edition->nebulae[index];
-    const nebel_transform *const from = &nebel_scene_contents(draft->scene)->nebula_places[index];
+    const nebel_transform *const from = &nebel_get_scene_data(draft->scene)->nebula_transforms[index];
     double(*const points)[3] = malloc((nebula->count + 1) * sizeof *points);
     for (size_t i = 0; i < nebula->count && points != NULL; i++) {
         memcpy(points[i], nebula->points[i], sizeof *points);
@@ -273,13 +274,13 @@ static nebel_result scatter_nebula(const nb_draft *draft, const nb_edition *edit
 {
     nebel_nebula_desc desc = edition->nebulae[index];
     desc.log = draft->log;
-    const nebel_transform *const from = &nebel_scene_contents(draft->scene)->nebula_places[index];
+    const nebel_transform *const from = &nebel_get_scene_data(draft->scene)->nebula_transforms[index];
     if (desc.points == NULL || memcmp(from, &edition->nebula_places[index], sizeof *from) == 0)
-        return nebel_scatter_nebula(&desc, particles);
+        return nebel_generate_nebula(&desc, particles);
     double(*const points)[3] = place_points(draft, edition, index);
     if (points == NULL) return fail_memory(draft);
     desc.points = (const double(*)[3])points;
-    const nebel_result result = nebel_scatter_nebula(&desc, particles);
+    const nebel_result result = nebel_generate_nebula(&desc, particles);
     free(points);
     return result;
 }
@@ -321,7 +322,7 @@ static nebel_result add_all(const nb_draft *draft, nebel_fog *fog)
         result = add_volume(draft, &draft->good, i, fog, NULL);
     if (result == NEBEL_OK) result = add_cells(fog, &draft->good);
     for (size_t i = 0; i < draft->particle_count && result == NEBEL_OK; i++) {
-        const nebel_volume_desc volume = nebel_particle_volume(&draft->particles[i]);
+        const nebel_volume_desc volume = nebel_volume_from_particle(&draft->particles[i]);
         result = nebel_add_volume(fog, &volume, NULL);
     }
     return result;
@@ -350,17 +351,17 @@ nebel_result nb_draft_whole(nb_draft *draft, nebel_snapshot **whole)
 nebel_volume_origin nb_draft_origin(const nb_draft *draft, size_t volume)
 {
     const size_t source = draft->now.sources[volume];
-    if (draft->now.entries[volume].key_count > 0) return NEBEL_VOLUME_MOVING;
+    if (draft->now.entries[volume].key_count > 0) return NEBEL_VOLUME_ANIMATED;
     const nebel_volume_origin origin =
-        source == NEBEL_NEW_VOLUME ? NEBEL_VOLUME_WRITTEN : nebel_scene_volume_origin(draft->file, source);
-    return origin == NEBEL_VOLUME_MOVING ? NEBEL_VOLUME_WRITTEN : origin;
+        source == NEBEL_NEW_VOLUME ? NEBEL_VOLUME_STATIC : nebel_get_volume_origin(draft->file, source);
+    return origin == NEBEL_VOLUME_ANIMATED ? NEBEL_VOLUME_STATIC : origin;
 }
 
 /* Whether the file could hold its changes. */
 static int is_saved(const nb_draft *draft, size_t volume)
 {
     const nebel_volume_origin origin = nb_draft_origin(draft, volume);
-    return origin == NEBEL_VOLUME_WRITTEN || origin == NEBEL_VOLUME_MOVING;
+    return origin == NEBEL_VOLUME_STATIC || origin == NEBEL_VOLUME_ANIMATED;
 }
 
 /* Ten seconds at 24 a second, of what moves on without end. */
@@ -381,7 +382,7 @@ int nb_draft_find_frames(const nb_draft *draft, double range[2])
     int has_range = nb_keys_find_range(&draft->now, range);
     if (suns > 0) has_range = widen(range, has_range, data->sun_keys[0].frame, data->sun_keys[suns - 1].frame);
     if (data->turntable_frames > 0) return widen(range, has_range, 0, data->turntable_frames);
-    return data->moves_on && !has_range ? widen(range, 0, 0, usual_frames) : has_range;
+    return data->has_endless_motion && !has_range ? widen(range, 0, 0, usual_frames) : has_range;
 }
 
 /* What the file says stands at the same frame, to be compared. */
@@ -395,9 +396,9 @@ static void place_camera(nb_draft *draft)
 {
     const nb_edition *const now = &draft->now;
     if (now->camera_key_count > 0)
-        draft->data.camera = nebel_camera_between_keys(now->camera_keys, now->camera_key_count, draft->frame);
+        draft->data.camera = nebel_interpolate_camera(now->camera_keys, now->camera_key_count, draft->frame);
     else if (draft->data.turntable_frames > 0)
-        draft->data.camera = nebel_scene_camera(draft->file, draft->frame);
+        draft->data.camera = nebel_get_scene_camera(draft->file, draft->frame);
 }
 
 /* ---- open and close
@@ -406,7 +407,7 @@ static void place_camera(nb_draft *draft)
 
 static nebel_result make_editions(nb_draft *draft)
 {
-    const nebel_scene_data *const scene = nebel_scene_contents(draft->scene);
+    const nebel_scene_data *const scene = nebel_get_scene_data(draft->scene);
     if (nb_edition_make(scene, &draft->written) != 0 || nb_edition_make(scene, &draft->now) != 0)
         return fail_memory(draft);
     place_volumes(draft);
@@ -429,14 +430,14 @@ static nebel_result load(const char *path, const nebel_scene_desc *desc, nebel_s
 nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log, nb_draft *draft)
 {
     const nebel_scene_desc desc = {
-        .log = *log, .run = nebel_run_parts, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
+        .log = *log, .run = nebel_parallel_for_openmp, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
     *draft = (nb_draft){.log = *log, .frame = frame};
     nebel_result result = load(path, &desc, &draft->scene);
     if (result == NEBEL_OK) result = nebel_load_scene_models(draft->scene);
-    if (result == NEBEL_OK) result = nebel_load_scene_planet(draft->scene);
+    if (result == NEBEL_OK) result = nebel_load_scene_planets(draft->scene);
     if (result == NEBEL_OK) {
         draft->file = draft->scene;
-        draft->data = *nebel_scene_contents(draft->scene);
+        draft->data = *nebel_get_scene_data(draft->scene);
         result = make_editions(draft);
     }
     if (result == NEBEL_OK) result = light_scene(draft, &draft->good);
@@ -472,7 +473,7 @@ void nb_draft_close(nb_draft *draft)
 /* Nobody may render the scene meanwhile. */
 static nebel_result make_planets(nb_draft *draft, const nb_edition *edition)
 {
-    const nebel_result result = nebel_change_scene_planets(draft->scene, edition->planets);
+    const nebel_result result = nebel_update_scene_planets(draft->scene, edition->planets);
     if (result != NEBEL_OK) return result;
     draft->planets_are_new = 1;
     draft->data.environment.map = find_light(draft)->environment.map;
@@ -527,8 +528,8 @@ static nebel_result settle(nb_draft *draft, int is_step)
 
 nebel_result nb_draft_place_models(nb_draft *draft)
 {
-    const nebel_result result = nebel_load_models_anew(draft->scene, draft->good.models, draft->good.model_count);
-    const nebel_scene_data *const scene = nebel_scene_contents(draft->scene);
+    const nebel_result result = nebel_reload_scene_models(draft->scene, draft->good.models, draft->good.model_count);
+    const nebel_scene_data *const scene = nebel_get_scene_data(draft->scene);
     draft->models_are_stale = 0;
     draft->data.meshes = scene->meshes;
     draft->data.mesh_count = scene->mesh_count;
@@ -591,10 +592,10 @@ int nb_draft_is_changed(const nb_draft *draft)
 
 int nb_draft_must_be_read(const nb_draft *draft)
 {
-    const nebel_scene_data *const scene = nebel_scene_contents(draft->scene);
+    const nebel_scene_data *const scene = nebel_get_scene_data(draft->scene);
     const nb_edition *const now = &draft->now;
     int brings_fog = 0;
-    for (size_t i = 0; i < now->model_count; i++) brings_fog |= scene->models[now->models[i].source].has_fog;
+    for (size_t i = 0; i < now->model_count; i++) brings_fog |= scene->models[now->models[i].model_index].has_fog;
     return now->model_count != scene->model_count || (brings_fog && !nb_edition_has_same_models(now, &draft->written));
 }
 
@@ -606,10 +607,10 @@ int nb_draft_can_save_camera(const nb_draft *draft)
 /* That of the scene that stays; by its name, which is what the file says of it. */
 static nebel_grid *find_grid(const nb_draft *draft, nebel_grid *grid)
 {
-    const nebel_scene_data *const scene = nebel_scene_contents(draft->scene);
+    const nebel_scene_data *const scene = nebel_get_scene_data(draft->scene);
     for (size_t i = 0; i < scene->volume_count && grid != NULL; i++) {
         nebel_grid *const own = scene->volumes[i].density.grid;
-        if (own != NULL && strcmp(nebel_grid_name(own), nebel_grid_name(grid)) == 0) return own;
+        if (own != NULL && strcmp(nebel_get_grid_name(own), nebel_get_grid_name(grid)) == 0) return own;
     }
     return grid;
 }
@@ -618,18 +619,18 @@ static nebel_grid *find_grid(const nb_draft *draft, nebel_grid *grid)
 static void adopt_grid(const nb_draft *draft, nb_edition *edition, size_t index)
 {
     nebel_grid *const fresh = edition->volumes[index].density.grid, *const own = find_grid(draft, fresh);
-    const nebel_volume_entry *const entry = &edition->entries[index];
+    const nebel_volume_track *const entry = &edition->entries[index];
     if (own == fresh) return;
     edition->volumes[index].density.grid = nebel_retain_grid(own);
     for (size_t i = 0; i < entry->key_count; i++) ((nebel_volume_key *)entry->keys)[i].volume.density.grid = own;
-    if (entry->own != NULL) ((nebel_volume_desc *)entry->own)->density.grid = own;
+    if (entry->base != NULL) ((nebel_volume_desc *)entry->base)->density.grid = own;
     nebel_release_grid(fresh);
 }
 
 /* Points, portals and grids are those of the scene that stays. */
 static void adopt_arrays(const nb_draft *draft, nb_edition *edition)
 {
-    const nebel_nebula_desc *const own = nebel_scene_contents(draft->scene)->nebulae;
+    const nebel_nebula_desc *const own = nebel_get_scene_data(draft->scene)->nebulae;
     for (size_t i = 0; i < edition->nebula_count; i++) {
         edition->nebulae[i].points = own[i].points;
         if (own[i].points != NULL) edition->nebulae[i].count = own[i].count;
@@ -668,8 +669,8 @@ static nebel_result read_back(nb_draft *draft, const char *path)
     nebel_scene *fresh = NULL;
     nb_edition written;
     nebel_result result = load(path, &desc, &fresh);
-    if (result == NEBEL_OK) result = nebel_load_scene_planet(fresh);
-    if (result == NEBEL_OK && nb_edition_make(nebel_scene_contents(fresh), &written) != 0) result = fail_memory(draft);
+    if (result == NEBEL_OK) result = nebel_load_scene_planets(fresh);
+    if (result == NEBEL_OK && nb_edition_make(nebel_get_scene_data(fresh), &written) != 0) result = fail_memory(draft);
     if (result != NEBEL_OK) {
         nebel_destroy_scene(fresh);
         return result;
@@ -694,7 +695,7 @@ nebel_result nb_draft_try_file(const char *path, const nebel_log *log)
 nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera)
 {
     const nebel_scene_desc desc = {.log = draft->log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
-    nebel_scene_data before = *nebel_scene_contents(draft->file);
+    nebel_scene_data before = *nebel_get_scene_data(draft->file);
     /* Those of the contents are as the scene is now. */
     before.planets = draft->written.planets;
     before.has_sun = draft->written.has_sun;

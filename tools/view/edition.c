@@ -49,9 +49,9 @@ static int make_room(nb_edition *edition)
  * ---------------------------------------------------------------------------------------------------------
  */
 
-nebel_volume_entry nb_edition_plain_entry(void)
+nebel_volume_track nb_edition_plain_entry(void)
 {
-    return (nebel_volume_entry){.contrast = 0.05};
+    return (nebel_volume_track){.contrast = 0.05};
 }
 
 /* Parts and planes are those of the volume, at every frame. */
@@ -62,23 +62,23 @@ static void strip(nebel_shape *shape)
     shape->part_count = shape->plane_count = 0;
 }
 
-static void free_entry(nebel_volume_entry *entry)
+static void free_entry(nebel_volume_track *entry)
 {
     free((void *)entry->keys);
-    free((void *)entry->own);
+    free((void *)entry->base);
     *entry = nb_edition_plain_entry();
 }
 
-static int own_entry(nebel_volume_entry *entry)
+static int own_entry(nebel_volume_track *entry)
 {
-    const nebel_volume_entry given = *entry;
+    const nebel_volume_track given = *entry;
     entry->keys = NULL;
-    entry->own = NULL;
+    entry->base = NULL;
     if (given.key_count == 0) return 0;
     nebel_volume_key *const keys = copy_array(given.keys, given.key_count, sizeof *keys);
-    nebel_volume_desc *const own = copy_array(given.own, 1, sizeof *own);
+    nebel_volume_desc *const own = copy_array(given.base, 1, sizeof *own);
     entry->keys = keys;
-    entry->own = own;
+    entry->base = own;
     if (keys == NULL || own == NULL) {
         free_entry(entry);
         return -1;
@@ -92,12 +92,12 @@ static int own_entry(nebel_volume_entry *entry)
  * ---------------------------------------------------------------------------------------------------------
  */
 
-static int add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_entry *entry, const char *name,
+static int add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_track *entry, const char *name,
                size_t source)
 {
     if (make_room(edition) != 0) return -1;
     nebel_volume_desc own = *volume;
-    nebel_volume_entry own_keys = *entry;
+    nebel_volume_track own_keys = *entry;
     char *const own_name = copy_text(name);
     const int shape_failed = nb_shape_own(&own.shape), entry_failed = own_entry(&own_keys);
     if (shape_failed || entry_failed || own_name == NULL) {
@@ -114,7 +114,7 @@ static int add(nb_edition *edition, const nebel_volume_desc *volume, const nebel
     return 0;
 }
 
-int nb_edition_add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_entry *entry,
+int nb_edition_add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_track *entry,
                    const char *name)
 {
     return add(edition, volume, entry, name, NEBEL_NEW_VOLUME);
@@ -185,14 +185,14 @@ int nb_edition_set_colors(nebel_nebula_desc *nebula, size_t count)
     return 0;
 }
 
-static int add_models(nb_edition *edition, const nebel_model *models, size_t count)
+static int add_models(nb_edition *edition, const nebel_scene_model *models, size_t count)
 {
     edition->models = copy_array(models, count, sizeof *models);
     edition->model_count = edition->models != NULL ? count : 0;
     return edition->models != NULL ? 0 : -1;
 }
 
-static int add_lamps(nb_edition *edition, const nebel_lamp *lamps, size_t count)
+static int add_lamps(nb_edition *edition, const nebel_light *lamps, size_t count)
 {
     edition->lamps = copy_array(lamps, count, sizeof *lamps);
     edition->lamp_count = edition->lamps != NULL ? count : 0;
@@ -207,7 +207,7 @@ static int add_planets(nb_edition *edition, const nebel_planet *planets, size_t 
     for (size_t i = 0; i < edition->planet_count; i++) {
         edition->planets[i].atmosphere = NULL;
         edition->planets[i].clouds = NULL;
-        edition->planets[i].layers = NULL;
+        edition->planets[i].textured = NULL;
     }
     return edition->planets != NULL ? 0 : -1;
 }
@@ -249,14 +249,14 @@ int nb_edition_make(const nebel_scene_data *scene, nb_edition *edition)
     made.shows_ambient = scene->shows_ambient;
     memcpy(made.sun_direction, scene->sun_direction, sizeof made.sun_direction);
     memcpy(made.sun_irradiance, scene->sun_irradiance, sizeof made.sun_irradiance);
-    int result = add_nebulae(&made, scene->nebulae, scene->nebula_places, scene->nebula_count);
+    int result = add_nebulae(&made, scene->nebulae, scene->nebula_transforms, scene->nebula_count);
     if (result == 0) result = add_models(&made, scene->models, scene->model_count);
-    if (result == 0) result = add_lamps(&made, scene->lamps, scene->lamp_count);
+    if (result == 0) result = add_lamps(&made, scene->lights, scene->light_count);
     if (result == 0) result = add_camera_keys(&made, scene->camera_keys, scene->camera_key_count);
     if (result == 0) result = add_planets(&made, scene->planets, scene->planet_count);
     if (result == 0) result = add_cells(&made, scene->cells);
     for (size_t i = 0; i < scene->volume_count && result == 0; i++)
-        result = add(&made, &scene->volumes[i], &scene->volume_entries[i], scene->volume_names[i], i);
+        result = add(&made, &scene->volumes[i], &scene->volume_tracks[i], scene->volume_names[i], i);
     if (result != 0) nb_edition_free(&made);
     *edition = made;
     return result;
@@ -325,7 +325,7 @@ static void lend_pieces(nb_edition *edition)
 {
     for (size_t i = 0; i < edition->count; i++) {
         const nebel_shape *const from = &edition->volumes[i].shape;
-        nebel_volume_desc *const own = (nebel_volume_desc *)edition->entries[i].own;
+        nebel_volume_desc *const own = (nebel_volume_desc *)edition->entries[i].base;
         if (own == NULL) continue;
         own->shape.parts = from->parts;
         own->shape.planes = from->planes;
@@ -338,15 +338,15 @@ void nb_edition_show(nb_edition *edition, nebel_scene_data *scene)
 {
     lend_pieces(edition);
     scene->volumes = edition->volumes;
-    scene->volume_entries = edition->entries;
+    scene->volume_tracks = edition->entries;
     scene->volume_names = (const char *const *)edition->names;
     scene->volume_count = edition->count;
     scene->nebulae = edition->nebulae;
-    scene->nebula_places = edition->nebula_places;
+    scene->nebula_transforms = edition->nebula_places;
     scene->models = edition->models;
     scene->model_count = edition->model_count;
-    scene->lamps = edition->lamps;
-    scene->lamp_count = edition->lamp_count;
+    scene->lights = edition->lamps;
+    scene->light_count = edition->lamp_count;
     scene->camera_keys = edition->camera_keys;
     scene->camera_key_count = edition->camera_key_count;
     scene->planets = edition->planets;
@@ -392,15 +392,15 @@ size_t nb_edition_size(const nb_edition *edition)
 static int is_same_grid(const nebel_grid *a, const nebel_grid *b)
 {
     if (a == b) return 1;
-    return a != NULL && b != NULL && nebel_grid_name(a)[0] != '\0' &&
-           strcmp(nebel_grid_name(a), nebel_grid_name(b)) == 0;
+    return a != NULL && b != NULL && nebel_get_grid_name(a)[0] != '\0' &&
+           strcmp(nebel_get_grid_name(a), nebel_get_grid_name(b)) == 0;
 }
 
 static int is_same_density(const nebel_density *a, const nebel_density *b)
 {
     return a->type == b->type && a->below == b->below && a->power == b->power &&
-           HAS_SAME(a, b, nebel_density, base, power) && HAS_SAME(a, b, nebel_density, center, distance) &&
-           a->distance == b->distance && is_same_grid(a->grid, b->grid);
+           HAS_SAME(a, b, nebel_density, base, power) && HAS_SAME(a, b, nebel_density, center, edge_width) &&
+           a->edge_width == b->edge_width && is_same_grid(a->grid, b->grid);
 }
 
 static int is_same_phase(const nebel_phase *a, const nebel_phase *b)
@@ -424,12 +424,12 @@ static int is_same_still(const nebel_volume_desc *a, const nebel_volume_desc *b)
     return nb_edition_is_same_volume(&bare_a, &bare_b);
 }
 
-int nb_edition_is_same_entry(const nebel_volume_entry *a, const nebel_volume_entry *b)
+int nb_edition_is_same_entry(const nebel_volume_track *a, const nebel_volume_track *b)
 {
     if (a->contrast != b->contrast || a->key_count != b->key_count) return 0;
     for (size_t i = 0; i < a->key_count; i++)
         if (a->keys[i].frame != b->keys[i].frame || !is_same_still(&a->keys[i].volume, &b->keys[i].volume)) return 0;
-    return a->key_count == 0 || is_same_still(a->own, b->own);
+    return a->key_count == 0 || is_same_still(a->base, b->base);
 }
 
 static int has_same_colors(const nebel_nebula_desc *a, const nebel_nebula_desc *b)
@@ -441,9 +441,9 @@ static int has_same_colors(const nebel_nebula_desc *a, const nebel_nebula_desc *
 static int is_same_nebula(const nebel_nebula_desc *a, const nebel_nebula_desc *b)
 {
     return nb_shape_is_same(&a->shape, &b->shape) && is_same_density(&a->density, &b->density) &&
-           a->count == b->count && a->fade == b->fade && a->seed == b->seed && a->profile == b->profile &&
-           HAS_SAME(a, b, nebel_nebula_desc, size, colors) && has_same_colors(a, b) && a->turbulence == b->turbulence &&
-           a->turbulence_size == b->turbulence_size;
+           a->count == b->count && a->dimming == b->dimming && a->seed == b->seed && a->profile == b->profile &&
+           HAS_SAME(a, b, nebel_nebula_desc, radius_range, colors) && has_same_colors(a, b) &&
+           a->turbulence == b->turbulence && a->turbulence_scale == b->turbulence_scale;
 }
 
 int nb_edition_has_same_nebulae(const nb_edition *a, const nb_edition *b)
@@ -473,10 +473,10 @@ int nb_edition_has_same_cells(const nb_edition *a, const nb_edition *b)
     return 1;
 }
 
-static int is_same_model(const nebel_model *a, const nebel_model *b)
+static int is_same_model(const nebel_scene_model *a, const nebel_scene_model *b)
 {
-    return a->source == b->source && a->has_color == b->has_color && HAS_SAME(a, b, nebel_model, position, has_color) &&
-           memcmp(a->color, b->color, sizeof a->color) == 0;
+    return a->model_index == b->model_index && a->has_color == b->has_color &&
+           HAS_SAME(a, b, nebel_scene_model, position, has_color) && memcmp(a->color, b->color, sizeof a->color) == 0;
 }
 
 int nb_edition_has_same_models(const nb_edition *a, const nb_edition *b)
@@ -487,9 +487,9 @@ int nb_edition_has_same_models(const nb_edition *a, const nb_edition *b)
     return 1;
 }
 
-static int is_same_lamp(const nebel_lamp *a, const nebel_lamp *b)
+static int is_same_lamp(const nebel_light *a, const nebel_light *b)
 {
-    return a->type == b->type && HAS_SAME(a, b, nebel_lamp, position, outer_angle) && a->outer_angle == b->outer_angle;
+    return a->type == b->type && HAS_SAME(a, b, nebel_light, position, outer_angle) && a->outer_angle == b->outer_angle;
 }
 
 int nb_edition_has_same_lamps(const nb_edition *a, const nb_edition *b)
@@ -502,12 +502,14 @@ int nb_edition_has_same_lamps(const nb_edition *a, const nb_edition *b)
 
 static int are_same_airs(const nebel_atmosphere_desc *a, const nebel_atmosphere_desc *b)
 {
-    if (a->air_count != b->air_count || memcmp(a->ground_albedo, b->ground_albedo, sizeof a->ground_albedo) != 0)
+    if (a->component_count != b->component_count ||
+        memcmp(a->ground_albedo, b->ground_albedo, sizeof a->ground_albedo) != 0)
         return 0;
-    for (uint32_t i = 0; i < a->air_count; i++) {
-        const nebel_air *const from = &a->airs[i], *const to = &b->airs[i];
-        if (!HAS_SAME(from, to, nebel_air, scattering, phase) || !is_same_phase(&from->phase, &to->phase) ||
-            from->scale_height != to->scale_height || from->middle != to->middle || from->width != to->width)
+    for (uint32_t i = 0; i < a->component_count; i++) {
+        const nebel_atmosphere_component *const from = &a->components[i], *const to = &b->components[i];
+        if (!HAS_SAME(from, to, nebel_atmosphere_component, scattering, phase) ||
+            !is_same_phase(&from->phase, &to->phase) || from->scale_height != to->scale_height ||
+            from->center_height != to->center_height || from->half_width != to->half_width)
             return 0;
     }
     return 1;
@@ -524,14 +526,16 @@ static int are_same_clouds(const nebel_planet *a, const nebel_planet *b)
     return 1;
 }
 
-static int are_same_shells(const nebel_layers_desc *a, const nebel_layers_desc *b)
+static int are_same_shells(const nebel_textured_planet_desc *a, const nebel_textured_planet_desc *b)
 {
-    if (a->day != b->day || a->coverage != b->coverage || a->cloud_count != b->cloud_count ||
-        a->air.is_absent != b->air.is_absent || !HAS_SAME(&a->air, &b->air, nebel_air_shell, height, ramp_count))
+    if (a->rotation_period != b->rotation_period || a->land_coverage != b->land_coverage ||
+        a->cloud_shell_count != b->cloud_shell_count || a->atmosphere.is_disabled != b->atmosphere.is_disabled ||
+        !HAS_SAME(&a->atmosphere, &b->atmosphere, nebel_atmosphere_shell, height, ramp_count))
         return 0;
-    for (uint32_t i = 0; i < a->cloud_count; i++) {
-        const nebel_cloud_shell *const from = &a->clouds[i], *const to = &b->clouds[i];
-        if (!HAS_SAME(from, to, nebel_cloud_shell, height, map) || !HAS_SAME(from, to, nebel_cloud_shell, wrap, seed))
+    for (uint32_t i = 0; i < a->cloud_shell_count; i++) {
+        const nebel_cloud_shell *const from = &a->cloud_shells[i], *const to = &b->cloud_shells[i];
+        if (!HAS_SAME(from, to, nebel_cloud_shell, height, coverage_map) ||
+            !HAS_SAME(from, to, nebel_cloud_shell, uv_tiling, seed))
             return 0;
     }
     return 1;
@@ -542,8 +546,9 @@ int nb_edition_has_same_planets(const nb_edition *a, const nb_edition *b)
     if (a->planet_count != b->planet_count) return 0;
     for (size_t i = 0; i < a->planet_count; i++) {
         const nebel_planet *const from = &a->planets[i], *const to = &b->planets[i];
-        if (from->sun_diameter != to->sun_diameter || !are_same_airs(&from->air, &to->air) ||
-            !are_same_clouds(from, to) || !are_same_shells(&from->shells, &to->shells))
+        if (from->sun_angular_diameter != to->sun_angular_diameter ||
+            !are_same_airs(&from->atmosphere_desc, &to->atmosphere_desc) || !are_same_clouds(from, to) ||
+            !are_same_shells(&from->textured_desc, &to->textured_desc))
             return 0;
     }
     return 1;

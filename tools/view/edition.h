@@ -13,15 +13,15 @@ typedef struct nb_edition {
     nebel_volume_desc *volumes; /* their parts and planes are the edition's, too, and may be written to */
     char **names;
     size_t *sources; /* which volume of the file each one is; NEBEL_NEW_VOLUME */
-    nebel_volume_entry
+    nebel_volume_track
         *entries; /* their keys are the edition's, too; shapes of keys and `own` have no parts or planes */
     size_t count, capacity;
     nebel_nebula_desc *nebulae;     /* their points are the scene's */
     nebel_transform *nebula_places; /* of the points */
     size_t nebula_count;
-    nebel_model *models; /* their file names are those of the file that was read: not to be used */
+    nebel_scene_model *models; /* their file names are those of the file that was read: not to be used */
     size_t model_count;
-    nebel_lamp *lamps; /* as many as the file has */
+    nebel_light *lamps; /* as many as the file has */
     size_t lamp_count;
     nebel_planet *planets; /* their maps, and what is made of them, are the scene's: not to be used */
     size_t planet_count;
@@ -39,12 +39,12 @@ typedef struct nb_edition {
 /* All return 0, or -1 where memory is out and nothing has changed. */
 int nb_edition_make(const nebel_scene_data *scene, nb_edition *edition);
 int nb_edition_copy(const nb_edition *from, nb_edition *to);
-int nb_edition_add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_entry *entry,
+int nb_edition_add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_track *entry,
                    const char *name);
 /* All its ambient light, with the map of the file, NULL where that has none. */
 nebel_environment nb_edition_environment(const nb_edition *edition, nebel_environment_map *map);
 /* An entry of a volume without keys, contrast or phase of its own. */
-nebel_volume_entry nb_edition_plain_entry(void);
+nebel_volume_track nb_edition_plain_entry(void);
 
 /* As many as wanted; those that come are copies of the last one, or 1. */
 int nb_edition_set_colors(nebel_nebula_desc *nebula, size_t count);
@@ -58,7 +58,7 @@ void nb_edition_free(nb_edition *edition);
 
 int nb_edition_is_same(const nb_edition *a, const nb_edition *b);
 int nb_edition_is_same_volume(const nebel_volume_desc *a, const nebel_volume_desc *b);
-int nb_edition_is_same_entry(const nebel_volume_entry *a, const nebel_volume_entry *b);
+int nb_edition_is_same_entry(const nebel_volume_track *a, const nebel_volume_track *b);
 
 /* Whether both have the same nebulae, cells, volumes of the same sources. */
 int nb_edition_has_same_nebulae(const nb_edition *a, const nb_edition *b);

@@ -44,7 +44,7 @@ bool draw_visibility(double extinction[3], double contrast)
 }
 
 // The visibility stays. A volume with keys has one contrast at each, which the file keeps.
-bool draw_contrast(double extinction[3], nebel_volume_entry *entry)
+bool draw_contrast(double extinction[3], nebel_volume_track *entry)
 {
     double contrast = entry->contrast;
     if (!slide("contrast", &contrast, 0.001, 0.9, "%.3g", true,
@@ -56,7 +56,7 @@ bool draw_contrast(double extinction[3], nebel_volume_entry *entry)
     return true;
 }
 
-bool draw_amount(double extinction[3], nebel_volume_entry *entry)
+bool draw_amount(double extinction[3], nebel_volume_track *entry)
 {
     bool changed = draw_visibility(extinction, entry->contrast);
     if (entry->key_count == 0) changed |= draw_contrast(extinction, entry);
@@ -88,13 +88,14 @@ bool draw_phase(nebel_phase *phase)
                          "0: Henyey-Greenstein, 1: Cornette-Shanks; much: light is sent on and back, not aside.");
     if (phase->type != NEBEL_PHASE_DROPLETS) return changed;
     if (!(phase->diameter > 0)) phase->diameter = 10;
-    return slide("diameter", &phase->diameter, 0.1, NEBEL_MAX_DROPLET, "%.3g um", true, "Of a droplet.") || changed;
+    return slide("diameter", &phase->diameter, 0.1, NEBEL_MAX_DROPLET_DIAMETER, "%.3g um", true, "Of a droplet.") ||
+           changed;
 }
 
 // A volume is lit in one way at all its keys.
-bool draw_light(nebel_volume_desc *volume, const nebel_volume_entry *entry)
+bool draw_light(nebel_volume_desc *volume, const nebel_volume_track *entry)
 {
-    const bool is_lit = !is_zero(volume->albedo) || (entry->own != nullptr && !is_zero(entry->own->albedo));
+    const bool is_lit = !is_zero(volume->albedo) || (entry->base != nullptr && !is_zero(entry->base->albedo));
     bool changed = false;
     if (!is_lit)
         changed |= pick("source", volume->source, false, "What thick fog looks like: the radiance of opaque fog.");
@@ -108,7 +109,7 @@ bool draw_light(nebel_volume_desc *volume, const nebel_volume_entry *entry)
 }
 
 // The unit of a file costs a few last digits.
-bool is_of(const nebel_volume_desc *volume, const nebel_preset *preset)
+bool is_of(const nebel_volume_desc *volume, const nebel_fog_preset *preset)
 {
     for (int c = 0; c < 3; c++)
         if (!(fabs(volume->extinction[c] / preset->extinction[c] - 1) < 1e-12) ||
@@ -123,7 +124,7 @@ bool draw_preset(nebel_volume_desc *volume)
 {
     enum { MOST = 16 };
     size_t count;
-    const nebel_preset *presets = nebel_list_presets(&count);
+    const nebel_fog_preset *presets = nebel_list_fog_presets(&count);
     const char *names[1 + MOST] = {"its own"};
     int chosen = 0;
     if (count > MOST) count = MOST;
@@ -135,7 +136,7 @@ bool draw_preset(nebel_volume_desc *volume)
                 "Fog as it was measured: extinction, albedo and phase. Change them afterwards as you like."))
         return false;
     if (chosen == 0) return false;
-    const nebel_preset *preset = &presets[chosen - 1];
+    const nebel_fog_preset *preset = &presets[chosen - 1];
     for (int c = 0; c < 3; c++) {
         volume->extinction[c] = preset->extinction[c];
         volume->albedo[c] = preset->albedo[c];
@@ -168,7 +169,7 @@ void fit_density(nebel_volume_desc *volume)
         volume->density.type = NEBEL_DENSITY_CONSTANT;
 }
 
-bool draw_numbers(nb_panel *panel, nebel_volume_desc *volume, nebel_volume_entry *entry, double reach)
+bool draw_numbers(nb_panel *panel, nebel_volume_desc *volume, nebel_volume_track *entry, double reach)
 {
     static const char *const operations[] = {"adds", "excludes", "replaces"};
     int operation = volume->operation;
@@ -205,12 +206,12 @@ bool draw_commands(nb_panel *panel, size_t index, nebel_volume_origin origin)
     char name[160];
     if (press("Duplicate", "A new volume with the same numbers. It will stand at the end of the file's fog.")) {
         const nebel_volume_desc copy = panel->now->volumes[index];
-        const nebel_volume_entry entry = panel->now->entries[index];
+        const nebel_volume_track entry = panel->now->entries[index];
         snprintf(name, sizeof name, "%.120s copy", panel->now->names[index]);
         panel->is_out_of_memory |= nb_edition_add(panel->now, &copy, &entry, name) != 0;
         panel->fog_changed = 1;
     }
-    if (origin != NEBEL_VOLUME_WRITTEN && origin != NEBEL_VOLUME_MOVING) return false;
+    if (origin != NEBEL_VOLUME_STATIC && origin != NEBEL_VOLUME_ANIMATED) return false;
     ImGui::SameLine();
     if (!press("Remove", "Takes the volume away. Ctrl + Z brings it back.")) return false;
     nb_edition_remove(panel->now, index);
@@ -244,7 +245,7 @@ bool draw_key(nb_panel *panel, size_t index, size_t key)
 
 void draw_keys(nb_panel *panel, size_t index)
 {
-    const nebel_volume_entry &entry = panel->now->entries[index];
+    const nebel_volume_track &entry = panel->now->entries[index];
     const bool is_open =
         ImGui::TreeNodeEx("keys", entry.key_count > 0 ? ImGuiTreeNodeFlags_DefaultOpen : 0,
                           entry.key_count > 0 ? "keys: %u" : "keys: it stands still", unsigned(entry.key_count));
@@ -272,7 +273,7 @@ bool draw_open_volume(nb_panel *panel, size_t index, double reach)
     static const char *const origins[] = {"", "", "settings of another program: changes here are not saved",
                                           "a node of a model: changes here are not saved"};
     const nebel_volume_origin origin = panel->origins[index];
-    const bool is_saved = origin == NEBEL_VOLUME_WRITTEN || origin == NEBEL_VOLUME_MOVING;
+    const bool is_saved = origin == NEBEL_VOLUME_STATIC || origin == NEBEL_VOLUME_ANIMATED;
     if (is_saved)
         panel->fog_changed |= draw_name(panel, index);
     else
@@ -318,7 +319,7 @@ void add_volume(nb_panel *panel, double reach)
         volume.source[i] = 0.5;
     }
     volume.shape.type = NEBEL_SHAPE_BOX;
-    const nebel_volume_entry entry = nb_edition_plain_entry();
+    const nebel_volume_track entry = nb_edition_plain_entry();
     panel->is_out_of_memory |= nb_edition_add(panel->now, &volume, &entry, "new") != 0;
     panel->fog_changed = 1;
 }
@@ -344,7 +345,7 @@ bool draw_strewing(nb_panel *panel, nebel_nebula_desc *nebula, nebel_transform *
     if (nebula->points == nullptr) {
         changed |= slide_whole("particles", &count, 1, MOST_PARTICLES, true, "How many there are.");
         changed |= draw_density(panel, &nebula->density, reach, false);
-        changed |= slide("fade", &nebula->fade, 0, 1, "%.2f", false,
+        changed |= slide("fade", &nebula->dimming, 0, 1, "%.2f", false,
                          "How much the density dims particles, in place of thinning them out.");
         changed |= draw_shape(panel, &nebula->shape, reach, true);
     } else {
@@ -363,8 +364,8 @@ bool draw_turbulence(nebel_nebula_desc *nebula, double reach)
 {
     bool changed = drag("turbulence", &nebula->turbulence, 1, reach / 10, 0, "%.4g m",
                         "How far eddies carry particles from where they were strewn.");
-    return drag("eddies", &nebula->turbulence_size, 1, reach / 10, 0,
-                nebula->turbulence_size > 0 ? "%.4g m" : "a quarter of the shape",
+    return drag("eddies", &nebula->turbulence_scale, 1, reach / 10, 0,
+                nebula->turbulence_scale > 0 ? "%.4g m" : "a quarter of the shape",
                 "How large the largest eddies are. 0: a quarter of the extent.") ||
            changed;
 }
@@ -394,11 +395,11 @@ bool draw_nebula_numbers(nb_panel *panel, nebel_nebula_desc *nebula, nebel_trans
     static const char *const profiles[] = {"soft", "gaussian", "ball"};
     int profile = nebula->profile;
     bool changed = draw_strewing(panel, nebula, place, reach);
-    changed |= choose("profile", &profile, profiles, NEBEL_PARTICLE_COUNT,
+    changed |= choose("profile", &profile, profiles, NEBEL_PARTICLE_PROFILE_COUNT,
                       "How a particle thins from its middle to its surface.");
     nebula->profile = nebel_particle_profile(profile);
-    changed |=
-        drag("size [m]", nebula->size, 2, 0.01, 1e-6, "%.4g", "Radius of the smallest and the largest particle.");
+    changed |= drag("size [m]", nebula->radius_range, 2, 0.01, 1e-6, "%.4g",
+                    "Radius of the smallest and the largest particle.");
     changed |= drag("absorption [1/m]", nebula->absorption, 3, 0.01, 0, "%.4g", "In the middle of a particle.");
     changed |=
         pick("emission [1/m]", nebula->emission, false, "What the middle of a particle shines, radiance per metre.");

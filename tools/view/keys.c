@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static nebel_volume_key *keys_of(nebel_volume_entry *entry)
+static nebel_volume_key *keys_of(nebel_volume_track *entry)
 {
     return (nebel_volume_key *)entry->keys;
 }
@@ -22,24 +22,24 @@ static nebel_volume_desc bare(const nebel_volume_desc *volume)
 }
 
 /* The first key that is not before a frame. */
-static size_t find(const nebel_volume_entry *entry, double frame)
+static size_t find(const nebel_volume_track *entry, double frame)
 {
     size_t i = 0;
     while (i < entry->key_count && entry->keys[i].frame < frame) i++;
     return i;
 }
 
-static int make_own(nebel_volume_entry *entry, const nebel_volume_desc *volume)
+static int make_own(nebel_volume_track *entry, const nebel_volume_desc *volume)
 {
-    if (entry->own != NULL) return 0;
+    if (entry->base != NULL) return 0;
     nebel_volume_desc *const own = malloc(sizeof *own);
     if (own == NULL) return -1;
     *own = bare(volume);
-    entry->own = own;
+    entry->base = own;
     return 0;
 }
 
-static int insert(nebel_volume_entry *entry, size_t at, const nebel_volume_desc *volume)
+static int insert(nebel_volume_track *entry, size_t at, const nebel_volume_desc *volume)
 {
     nebel_volume_key *const keys = realloc(keys_of(entry), (entry->key_count + 1) * sizeof *keys);
     if (keys == NULL) return -1;
@@ -52,7 +52,7 @@ static int insert(nebel_volume_entry *entry, size_t at, const nebel_volume_desc 
 
 int nb_keys_set(nb_edition *edition, size_t volume, double frame)
 {
-    nebel_volume_entry *const entry = &edition->entries[volume];
+    nebel_volume_track *const entry = &edition->entries[volume];
     const size_t at = find(entry, frame);
     const int is_new = at == entry->key_count || entry->keys[at].frame != frame;
     if (is_new && insert(entry, at, &edition->volumes[volume]) != 0) return -1;
@@ -63,10 +63,10 @@ int nb_keys_set(nb_edition *edition, size_t volume, double frame)
 /* A volume at a frame has its own parts and planes. */
 static void place(nb_edition *edition, size_t index, double frame)
 {
-    const nebel_volume_entry *const entry = &edition->entries[index];
+    const nebel_volume_track *const entry = &edition->entries[index];
     const nebel_shape own = edition->volumes[index].shape;
     if (entry->key_count == 0) return;
-    edition->volumes[index] = nebel_volume_between_keys(entry->keys, entry->key_count, frame);
+    edition->volumes[index] = nebel_interpolate_volume(entry->keys, entry->key_count, frame);
     nebel_shape *const shape = &edition->volumes[index].shape;
     shape->parts = own.parts;
     shape->planes = own.planes;
@@ -81,14 +81,14 @@ void nb_keys_place(nb_edition *edition, double frame)
 
 void nb_keys_remove(nb_edition *edition, size_t volume, size_t key)
 {
-    nebel_volume_entry *const entry = &edition->entries[volume];
+    nebel_volume_track *const entry = &edition->entries[volume];
     nebel_volume_key *const keys = keys_of(entry);
     if (entry->key_count == 1) {
         place(edition, volume, keys->frame);
         free(keys);
-        free((void *)entry->own);
+        free((void *)entry->base);
         entry->keys = NULL;
-        entry->own = NULL;
+        entry->base = NULL;
     } else {
         memmove(keys + key, keys + key + 1, (entry->key_count - key - 1) * sizeof *keys);
     }
@@ -97,7 +97,7 @@ void nb_keys_remove(nb_edition *edition, size_t volume, size_t key)
 
 void nb_keys_move(nb_edition *edition, size_t volume, size_t key, double frame)
 {
-    nebel_volume_entry *const entry = &edition->entries[volume];
+    nebel_volume_track *const entry = &edition->entries[volume];
     const int has_room_before = key == 0 || frame > entry->keys[key - 1].frame;
     const int has_room_behind = key + 1 == entry->key_count || frame < entry->keys[key + 1].frame;
     if (has_room_before && has_room_behind) keys_of(entry)[key].frame = frame;
@@ -119,11 +119,11 @@ static void store_kind(nebel_volume_desc *to, const nebel_volume_desc *from)
 
 static int store(nb_edition *edition, const nb_edition *before, size_t index, double frame)
 {
-    nebel_volume_entry *const entry = &edition->entries[index];
+    nebel_volume_track *const entry = &edition->entries[index];
     const nebel_volume_desc now = bare(&edition->volumes[index]);
     nebel_volume_desc was = bare(&before->volumes[index]);
     if (entry->key_count == 0 || before->entries[index].key_count == 0) return 0;
-    store_kind((nebel_volume_desc *)entry->own, &now);
+    store_kind((nebel_volume_desc *)entry->base, &now);
     for (size_t i = 0; i < entry->key_count; i++) store_kind(&keys_of(entry)[i].volume, &now);
     store_kind(&was, &now);
     return nb_edition_is_same_volume(&was, &now) ? 0 : nb_keys_set(edition, index, frame);
@@ -186,7 +186,7 @@ int nb_keys_find_range(const nb_edition *edition, double range[2])
         range[1] = edition->camera_keys[count - 1].frame;
     }
     for (size_t i = 0; i < edition->count; i++) {
-        const nebel_volume_entry *const entry = &edition->entries[i];
+        const nebel_volume_track *const entry = &edition->entries[i];
         if (entry->key_count == 0) continue;
         const double first = entry->keys[0].frame, last = entry->keys[entry->key_count - 1].frame;
         range[0] = has_keys ? fmin(range[0], first) : first;

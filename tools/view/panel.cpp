@@ -87,7 +87,7 @@ const char *describe_method(nebel_method method)
     case NEBEL_METHOD_ADDITIVE:
         return "additive, at vertices";
     default:
-        return nebel_method_word(method);
+        return nebel_method_name(method);
     }
 }
 

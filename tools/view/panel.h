@@ -26,8 +26,8 @@ typedef struct nb_panel {
     nb_edition *now;                    /* fog and light, changed in place */
     const nebel_volume_origin *origins; /* of the volumes */
     const char *const *cell_names;
-    const nebel_model *models; /* of the file: their names */
-    const nebel_scene *loaded; /* that makes noise */
+    const nebel_scene_model *models; /* of the file: their names */
+    const nebel_scene *loaded;       /* that makes noise */
     nb_held_noise held_noise;
     nb_look *look;
     const char *note;    /* why the picture is not what was chosen; "": it is */

@@ -117,7 +117,7 @@ bool slide_strength(double intensity[3])
 }
 
 // The light falls off between the two angles.
-bool draw_cone(nebel_lamp *lamp)
+bool draw_cone(nebel_light *lamp)
 {
     bool changed = slide_direction(lamp->direction, "turn", "Where it shines to, seen from above: 0 is along z.",
                                    "height", "How far above the horizon it shines to.");
@@ -130,7 +130,7 @@ bool draw_cone(nebel_lamp *lamp)
     return changed;
 }
 
-bool draw_lamp(nebel_lamp *lamp, double reach)
+bool draw_lamp(nebel_light *lamp, double reach)
 {
     double radius = lamp->radius > 0 ? lamp->radius : 1e-3;
     bool changed = slide_strength(lamp->intensity);
@@ -142,14 +142,14 @@ bool draw_lamp(nebel_lamp *lamp, double reach)
         lamp->radius = fmax(1e-3, fmin(1e6, radius));
         changed = true;
     }
-    return (lamp->type == NEBEL_LAMP_SPOT && draw_cone(lamp)) || changed;
+    return (lamp->type == NEBEL_LIGHT_SPOT && draw_cone(lamp)) || changed;
 }
 
 bool draw_lamp_header(nb_panel *panel, size_t index, double reach)
 {
     const Owner owner("lights", index);
-    const char *const name = panel->data->lamp_names[index];
-    nebel_lamp *const lamp = &panel->now->lamps[index];
+    const char *const name = panel->data->light_names[index];
+    nebel_light *const lamp = &panel->now->lamps[index];
     char title[160];
     snprintf(title, sizeof title, "%.100s%s%u###lamp", name, name[0] != '\0' ? ", lamp " : "lamp ", unsigned(index));
     const bool is_open = ImGui::CollapsingHeader(title);
@@ -172,7 +172,7 @@ const char *name_of(const char *path)
 }
 
 // Scales of 0 would leave nothing.
-bool draw_scale(nebel_model *model)
+bool draw_scale(nebel_scene_model *model)
 {
     double scales[3] = {model->scale[0], model->scale[1], model->scale[2]};
     if (!drag("scale", scales, 3, 0.1, -DBL_MAX, "%.4g",
@@ -183,7 +183,7 @@ bool draw_scale(nebel_model *model)
     return true;
 }
 
-bool draw_model_place(nebel_model *model, double reach)
+bool draw_model_place(nebel_scene_model *model, double reach)
 {
     bool changed = drag_place("position", model->position, reach, "Where the model is.");
     if (!model->is_heightfield) {
@@ -194,7 +194,7 @@ bool draw_model_place(nebel_model *model, double reach)
     return drag_length("height", &model->height, "Of white above black.") || changed;
 }
 
-bool draw_model(nebel_model *model, double reach, bool *goes)
+bool draw_model(nebel_scene_model *model, double reach, bool *goes)
 {
     if (model->has_fog) ImGui::TextDisabled("brings fog, which follows once it is saved");
     bool changed = draw_model_place(model, reach);
@@ -206,10 +206,10 @@ bool draw_model(nebel_model *model, double reach, bool *goes)
 
 bool draw_model_header(nb_panel *panel, size_t index, double reach, bool *goes)
 {
-    nebel_model *const model = &panel->now->models[index];
-    const Owner owner("models", model->source);
+    nebel_scene_model *const model = &panel->now->models[index];
+    const Owner owner("models", model->model_index);
     char title[160];
-    snprintf(title, sizeof title, "%.100s###model", name_of(panel->models[model->source].file));
+    snprintf(title, sizeof title, "%.100s###model", name_of(panel->models[model->model_index].path));
     const bool is_open = ImGui::CollapsingHeader(title);
     note_place("open");
     if (!is_open) return false;

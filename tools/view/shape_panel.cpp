@@ -103,7 +103,8 @@ bool draw_planes(nb_panel *panel, nebel_shape *shape, double reach)
         nb_shape_remove_plane(shape, gone);
         changed = true;
     }
-    if (shape->plane_count < NEBEL_MAX_PLANES && press("Add a plane", "A copy of the last plane, turned round.")) {
+    if (shape->plane_count < NEBEL_MAX_SHAPE_PLANES &&
+        press("Add a plane", "A copy of the last plane, turned round.")) {
         panel->is_out_of_memory |= nb_shape_add_plane(shape) != 0;
         changed = true;
     }
@@ -137,7 +138,7 @@ bool draw_parts(nb_panel *panel, nebel_shape *shape, double reach)
         nb_shape_remove_part(shape, gone);
         changed = true;
     }
-    if (shape->part_count < NEBEL_MAX_LEAVES && press("Add a part", "A copy of the last part.")) {
+    if (shape->part_count < NEBEL_MAX_SHAPE_LEAVES && press("Add a part", "A copy of the last part.")) {
         panel->is_out_of_memory |= nb_shape_add_part(shape) != 0;
         changed = true;
     }
@@ -234,7 +235,7 @@ bool draw_density_numbers(nebel_density *density, double reach)
         changed = drag_place("middle", density->center, reach, "Where the fog is thickest.");
         return drag_length("sigma", &density->sigma, "How far from there it has thinned to 61 %.") || changed;
     case NEBEL_DENSITY_SOFT_EDGE:
-        return drag_length("edge", &density->distance, "How far inside of the surface the fog is full.");
+        return drag_length("edge", &density->edge_width, "How far inside of the surface the fog is full.");
     default:
         return false;
     }
@@ -245,7 +246,7 @@ void complete_density(nebel_density *density, const double place[3], double size
 {
     if (!(density->scale_height > 0)) density->scale_height = size;
     if (!(density->sigma > 0)) density->sigma = size;
-    if (!(density->distance > 0)) density->distance = size / 4;
+    if (!(density->edge_width > 0)) density->edge_width = size / 4;
     if (density->power < 1) density->power = 1;
     if (memcmp(density->from, density->to, sizeof density->from) != 0) return;
     memcpy(density->center, place, sizeof density->center);
@@ -271,14 +272,14 @@ bool draw_lattice(nebel_noise_desc *desc)
 {
     double size[3];
     for (int i = 0; i < 3; i++) size[i] = double(desc->size[i]);
-    bool changed = drag("cells", desc->cells, 3, 1, 0, "%.4g",
+    bool changed = drag("cells", desc->frequency, 3, 1, 0, "%.4g",
                         "How many there are along each axis of the box: more are smaller. Waves are two cells long, "
                         "cells two voxels at least.");
-    for (int i = 0; i < 3; i++) limit(&desc->cells[i], 1, least_share, size[i] / 2);
+    for (int i = 0; i < 3; i++) limit(&desc->frequency[i], 1, least_share, size[i] / 2);
     changed |= drag("voxels", size, 3, 10, 1, "%.0f",
                     "Along each axis of the box. More of them show smaller octaves and take longer.");
     for (int i = 0; i < 3; i++) {
-        limit(&size[i], 1, fmax(1, ceil(2 * desc->cells[i])), NEBEL_MAX_GRID_SIZE);
+        limit(&size[i], 1, fmax(1, ceil(2 * desc->frequency[i])), NEBEL_MAX_GRID_SIZE);
         desc->size[i] = size_t(size[i]);
     }
     return changed;
@@ -291,25 +292,25 @@ bool draw_octaves(nebel_noise_desc *desc)
                                "Each has half the size of the one before; those of less than two voxels are left out.");
     changed |= slide("gain", &desc->gain, 0.01, 1, "%.3f", false, "The weight of an octave to that of the one before.");
     changed |= slide("coverage", &desc->coverage, 0.01, 1, "%.3f", false, "The less, the farther apart are the wisps.");
-    changed |= drag("soft faces", desc->edge, 3, 0.2, 0, "%.3g",
+    changed |= drag("soft faces", desc->falloff, 3, 0.2, 0, "%.3g",
                     "Over this part of the box the density rises from 0 on its faces, along each axis; 0.5 at most.");
     changed |= ImGui::DragInt("noise seed", &seed, 0.1f, 0, INT_MAX, "%d", ImGuiSliderFlags_AlwaysClamp);
     note_place("noise seed");
     explain("Another number: other wisps of the same kind.");
     limit(&desc->gain, 1, least_share, 1);
     limit(&desc->coverage, 1, least_share, 1);
-    limit(desc->edge, 3, 0, 0.5);
+    limit(desc->falloff, 3, 0, 0.5);
     desc->seed = uint32_t(seed);
     return changed;
 }
 
 bool draw_motion(nebel_scene_noise *noise)
 {
-    bool changed = drag("drift", noise->drift, 3, 0.1, -DBL_MAX, "%.4g", "Wind: in cells for each frame.");
-    changed |= drag("change", &noise->change, 1, 0.1, -DBL_MAX, "%.4g a frame",
+    bool changed = drag("drift", noise->velocity, 3, 0.1, -DBL_MAX, "%.4g", "Wind: in cells for each frame.");
+    changed |= drag("change", &noise->evolution, 1, 0.1, -DBL_MAX, "%.4g a frame",
                     "At 1 it is another after each frame; smaller octaves change sooner.");
-    limit(noise->drift, 3, -most_motion, most_motion);
-    limit(&noise->change, 1, -most_motion, most_motion);
+    limit(noise->velocity, 3, -most_motion, most_motion);
+    limit(&noise->evolution, 1, -most_motion, most_motion);
     return changed;
 }
 
@@ -326,7 +327,7 @@ bool replace_noise(nb_panel *panel, nebel_density *density)
     nb_held_noise *const held = &panel->held_noise;
     nebel_grid *fresh = nullptr;
     const double start = now();
-    const nebel_result result = nebel_change_scene_noise(panel->loaded, density->grid, &held->noise, &fresh);
+    const nebel_result result = nebel_update_scene_noise(panel->loaded, density->grid, &held->noise, &fresh);
     held->seconds = now() - start;
     panel->is_out_of_memory |= result == NEBEL_ERROR_MEMORY;
     if (result != NEBEL_OK) return false;
@@ -344,7 +345,7 @@ bool draw_noise(nb_panel *panel, nebel_density *density, bool moves)
     nb_held_noise *const held = &panel->held_noise;
     const unsigned here = ImGui::GetID("noise");
     nebel_scene_noise noise;
-    if (!nebel_find_scene_noise(panel->loaded, density->grid, &noise)) return false;
+    if (!nebel_get_scene_noise(panel->loaded, density->grid, &noise)) return false;
     if (held->owner == here) noise = held->noise;
     bool changed = draw_lattice(&noise.desc);
     changed |= draw_octaves(&noise.desc);

@@ -106,8 +106,8 @@ static int make_picture(work *w, uint32_t by)
 static void take_light(nebel_scene_data *scene, const nb_twin_wish *wish)
 {
     const nebel_scene_data *const light = &wish->light;
-    scene->lamps = wish->lamps;
-    scene->lamp_count = light->lamp_count;
+    scene->lights = wish->lamps;
+    scene->light_count = light->light_count;
     memcpy(scene->background, light->background, sizeof scene->background);
     memcpy(scene->ambient, light->ambient, sizeof scene->ambient);
     scene->environment = light->environment;
@@ -129,11 +129,11 @@ static nebel_result set_method(work *w)
 static nebel_result prepare(work *w)
 {
     nb_twin *const twin = w->twin;
-    const nebel_renderer_desc desc = {.threads = 0};
+    const nebel_cpu_renderer_desc desc = {.thread_count = 0};
     take_light(&twin->scene, &w->wish);
     const nebel_result result = w->renderer != NULL
                                     ? nebel_set_renderer_fog(w->renderer, w->wish.fog)
-                                    : nebel_create_renderer(&twin->scene, w->wish.fog, &desc, &w->renderer);
+                                    : nebel_create_cpu_renderer(&twin->scene, w->wish.fog, &desc, &w->renderer);
     return result == NEBEL_OK ? set_method(w) : result;
 }
 

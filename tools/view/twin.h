@@ -18,7 +18,7 @@ typedef struct nb_twin_wish {
     nebel_method method;
     nebel_factor_desc factor;
     nebel_cells *cells;     /* of the methods of that name; the twin's from then on */
-    nebel_lamp *lamps;      /* by malloc; the twin's from then on */
+    nebel_light *lamps;     /* by malloc; the twin's from then on */
     nebel_scene_data light; /* sun, ambient and background of it, and how many lamps there are */
     nebel_snapshot *fog;
 } nb_twin_wish;

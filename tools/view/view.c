@@ -138,7 +138,7 @@ static nebel_result open_stage(viewer *all)
 
 static void watch_files(viewer *all)
 {
-    nb_watch_open(&all->watch, all->settings->scene, all->draft.data.files, all->draft.data.file_count);
+    nb_watch_open(&all->watch, all->settings->scene, all->draft.data.paths, all->draft.data.path_count);
 }
 
 /* All that a context of OpenGL has. */
@@ -366,7 +366,7 @@ static nebel_result replace_draft(viewer *all, const nb_draft *fresh)
 static nebel_result read_again(viewer *all)
 {
     nb_draft fresh;
-    const nebel_camera view = all->draft.data.camera, before = nebel_scene_contents(all->draft.file)->camera;
+    const nebel_camera view = all->draft.data.camera, before = nebel_get_scene_data(all->draft.file)->camera;
     say(all, "");
     nb_watch_take(&all->watch);
     all->panel.file_is_newer = 0;
@@ -376,7 +376,7 @@ static nebel_result read_again(viewer *all)
     if (result != NEBEL_OK) return forgive(result);
     watch_files(all);
     set_home(all);
-    if (is_same_camera(&before, &nebel_scene_contents(fresh.file)->camera)) all->draft.data.camera = view;
+    if (is_same_camera(&before, &nebel_get_scene_data(fresh.file)->camera)) all->draft.data.camera = view;
     nb_report_message("view: read %s again", all->settings->scene);
     return NEBEL_OK;
 }
@@ -513,7 +513,7 @@ static double find_clock(const viewer *all)
 {
     const double *const range = all->panel.frames, length = range[1] - range[0];
     const double on = all->clock - range[0];
-    return all->draft.data.moves_on ? all->clock : range[0] + on - length * floor(on / length);
+    return all->draft.data.has_endless_motion ? all->clock : range[0] + on - length * floor(on / length);
 }
 
 /* Whole frames, as those of a film. */
@@ -586,7 +586,7 @@ static int fill_panel(viewer *all)
     all->frame = all->draft.frame;
     panel->frame = &all->frame;
     panel->camera_is_keyed = !nb_draft_can_save_camera(&all->draft);
-    panel->models = nebel_scene_contents(all->draft.scene)->models;
+    panel->models = nebel_get_scene_data(all->draft.scene)->models;
     panel->note = explain_method(all);
     panel->reason = all->refusal;
     if (!nb_draft_find_frames(&all->draft, panel->frames)) panel->frames[0] = panel->frames[1] = 0;
@@ -617,10 +617,10 @@ static nebel_result make_cells(viewer *all, nebel_cells **cells)
 }
 
 /* To be freed. */
-static nebel_lamp *copy_lamps(const nebel_scene_data *scene)
+static nebel_light *copy_lamps(const nebel_scene_data *scene)
 {
-    nebel_lamp *const lamps = malloc((scene->lamp_count + 1) * sizeof *lamps);
-    if (lamps != NULL && scene->lamp_count > 0) memcpy(lamps, scene->lamps, scene->lamp_count * sizeof *lamps);
+    nebel_light *const lamps = malloc((scene->light_count + 1) * sizeof *lamps);
+    if (lamps != NULL && scene->light_count > 0) memcpy(lamps, scene->lights, scene->light_count * sizeof *lamps);
     return lamps;
 }
 
