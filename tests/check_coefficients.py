@@ -1,10 +1,16 @@
 #!/usr/bin/env python3
-"""The coefficients of the elementary functions are those that scripts/fit_elementary.py derives."""
+"""The coefficients of the elementary functions and the tables of sRGB are those that scripts/ derives."""
 import os
 import subprocess
 import sys
 
 root = os.environ["NEBEL_SOURCE"]
-sys.exit(subprocess.call([sys.executable, os.path.join(root, "scripts", "fit_elementary.py"), "--check",
-                          os.path.join(root, "src", "formulas", "elementary.inc"),
-                          os.path.join(root, "src", "kernels", "packet.h")]))
+
+
+def check(script, *files):
+    command = [sys.executable, os.path.join(root, "scripts", script), "--check"]
+    return subprocess.call(command + [os.path.join(root, "src", file) for file in files])
+
+
+sys.exit(check("fit_elementary.py", "formulas/elementary.inc", "kernels/packet.h") or
+         check("make_srgb.py", "kernels/srgb_table.c"))

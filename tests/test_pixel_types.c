@@ -155,7 +155,7 @@ static double tolerance_of(const nebel_pixels *p, double wanted)
 {
     switch (kinds[p->type].sample) {
     case BYTE:
-        return p->srgb ? .51 : .501;
+        return .501;
     case SHORT:
         return .5 + 65535 * 3e-6 + (p->srgb ? .2 : 0);
     case HALF:

@@ -5,6 +5,7 @@
 #define NB_FAST
 
 #include "picture.h"
+#include "srgb.h"
 
 #include "formulas/prelude.h"
 
@@ -21,34 +22,6 @@ enum { PIECE = NB_PICTURE_PIECE };
 #define DARKEST_POWER NB_F(0.04045)   /* below it sRGB is linear; */
 #define DARKEST_LIGHT NB_F(0.0031308) /* the same as light */
 #define SLOPE 12.92f
-
-/* Of a byte: ((c + 0.055) / 1.055)^2.4 as a polynomial, minimax with the slope of encoding as its weight: off by what 0.0034 of a
- * byte is. */
-NB_INLINE nb_real decode_byte(nb_real byte)
-{
-    nb_real p = NB_F(-3.1057903e-16);
-    p = p * byte + NB_F(2.93758778e-13);
-    p = p * byte + NB_F(-1.26239477e-10);
-    p = p * byte + NB_F(4.63201779e-08);
-    p = p * byte + NB_F(7.67512665e-06);
-    p = p * byte + NB_F(0.000134899936);
-    p = p * byte + NB_F(0.000875157595);
-    return nb_select(byte > NB_F(10.5), p, byte * nb_splat(1 / (255 * SLOPE)));
-}
-
-/* 255 (1.055 x^(1 / 2.4) - 0.055), 0 <= x <= 1, as a minimax polynomial of the fourth root: off by 0.0018. Of the square root a
- * polynomial of degree 6 is off by 0.04. */
-NB_INLINE nb_real encode_byte(nb_real x)
-{
-    const nb_real s = nb_sqrt(nb_sqrt(x));
-    nb_real p = NB_F(-17.3775883);
-    p = p * s + NB_F(73.8310013);
-    p = p * s + NB_F(-147.258209);
-    p = p * s + NB_F(320.128204);
-    p = p * s + NB_F(41.3166771);
-    p = p * s + NB_F(-15.6417522);
-    return nb_select(x > DARKEST_LIGHT, p, x * nb_splat(255 * SLOPE));
-}
 
 NB_INLINE nb_real power(nb_real x, float exponent)
 {
@@ -75,20 +48,17 @@ typedef struct light {
 
 /* What one of a haze's pixels has of it, packets of them. */
 typedef struct haze {
-    nb_real octaves, radiance[3];
-    nb_real corner[3], step[3];
+    nb_real octaves, nearest_x, nearest, growth;
     int along_ray;
 } haze;
 
 static haze make_haze(const nb_picture_haze *h)
 {
-    haze made = {.octaves = nb_splat(h->octaves), .along_ray = h->along_ray};
-    for (int c = 0; c < 3; c++) {
-        made.radiance[c] = nb_splat(h->radiance[c]);
-        made.corner[c] = nb_splat(h->corner[c]);
-        made.step[c] = nb_splat(h->step_x[c]);
-    }
-    return made;
+    return (haze){.octaves = nb_splat(h->octaves),
+                  .nearest_x = nb_splat(h->nearest_x),
+                  .nearest = nb_splat(h->nearest),
+                  .growth = nb_splat(h->growth),
+                  .along_ray = h->along_ray};
 }
 
 /* Not less than 0 nor NaN is what fog acts on: the exponential of everything else is 1. */
@@ -96,9 +66,8 @@ NB_INLINE nb_real transmittance_of(const haze *h, nb_real x, nb_real depth)
 {
     nb_real way = depth;
     if (!h->along_ray) {
-        const nb_vec3 to =
-            nb_vec3(h->corner[0] + x * h->step[0], h->corner[1] + x * h->step[1], h->corner[2] + x * h->step[2]);
-        way = depth * nb_sqrt(nb_dot3(to, to));
+        const nb_real across = x - h->nearest_x;
+        way = depth * nb_sqrt(across * (across * h->growth) + h->nearest);
     }
     return nb_light_after(way * h->octaves);
 }
@@ -197,7 +166,7 @@ static uint32_t store_triples(const uint32_t *words, uint32_t count, unsigned ch
 
 /* A pixel to each word, the first sample lowest; of three samples, with the next pixel's first behind them but for the last
  * pixel, behind which nothing may be read. */
-static void load_bytes(const nb_picture_job *job, uint32_t *words)
+NB_INLINE void load_bytes(const nb_picture_job *job, uint32_t *words)
 {
     const uint32_t last = job->count - 1;
     if (job->type == NEBEL_PIXEL_RGBA8) {
@@ -210,7 +179,7 @@ static void load_bytes(const nb_picture_job *job, uint32_t *words)
 }
 
 /* From the first to the last, each over the fourth byte of the one before. */
-static void store_bytes(const nb_picture_job *job, const uint32_t *words)
+NB_INLINE void store_bytes(const nb_picture_job *job, const uint32_t *words)
 {
     const uint32_t last = job->count - 1;
     if (job->type == NEBEL_PIXEL_RGBA8) {
@@ -223,44 +192,140 @@ static void store_bytes(const nb_picture_job *job, const uint32_t *words)
     memcpy(out + 3 * (size_t)last, words + last, 3);
 }
 
-/* In-scattering is 1 where white is in light, 255 in stored numbers. Neither sum is negative. */
-NB_INLINE nb_bits fog_byte(nb_bits byte, nb_real transmittance, nb_real in_scattering, int srgb)
+/* ---- bytes as they stand --------------------------------------------------------------------- */
+
+/* In-scattering is 255 where white is. The sum is not negative. */
+NB_INLINE nb_bits fog_byte(nb_bits byte, nb_real transmittance, nb_real in_scattering)
 {
     const nb_real x = nb_from_bits(byte | NB_INTEGER_BITS) - NB_INTEGER;
-    const nb_real sum = transmittance * (srgb ? decode_byte(x) : x) + in_scattering;
-    const nb_real done = srgb ? encode_byte(nb_min(sum, NB_F(1.0))) : nb_min(sum, NB_F(255.0));
-    return nb_to_bits(done + NB_INTEGER) - NB_INTEGER_BITS;
+    const nb_real sum = nb_min(transmittance * x + in_scattering, NB_F(255.0));
+    return nb_to_bits(sum + NB_INTEGER) - NB_INTEGER_BITS;
 }
 
-/* `srgb` and `is_haze` are constants. */
-NB_INLINE void fog_words(const nb_picture_job *job, const float *haze_transmittance, uint32_t *words, int srgb,
-                         int is_haze)
+/* `is_haze` is a constant. */
+NB_INLINE void fog_words(const nb_picture_job *job, const float *haze_transmittance, uint32_t *words, int is_haze)
 {
     for (uint32_t i = 0; i < job->count; i += NB_WIDTH) {
-        const light l = light_at(job, haze_transmittance, i, srgb ? 1 : 255, is_haze);
+        const light l = light_at(job, haze_transmittance, i, 255, is_haze);
         float lanes[NB_WIDTH];
         memcpy(lanes, words + i, sizeof lanes);
         const nb_bits pixel = nb_to_bits(nb_load_lanes(lanes));
         nb_bits done = pixel & 0xff000000u;
         for (int c = 0; c < 3; c++)
-            done = done | fog_byte((pixel >> (8 * c)) & 0xffu, l.transmittance[c], l.in_scattering[c], srgb) << (8 * c);
+            done = done | fog_byte((pixel >> (8 * c)) & 0xffu, l.transmittance[c], l.in_scattering[c]) << (8 * c);
         nb_store_lanes(lanes, nb_from_bits(done));
         memcpy(words + i, lanes, sizeof lanes);
     }
 }
 
-static void fog_bytes(const nb_picture_job *job, const float *haze_transmittance)
+static void fog_stored(const nb_picture_job *job, const float *haze_transmittance)
 {
     uint32_t words[PIECE] = {0};
     load_bytes(job, words);
-    if (job->srgb && job->haze != NULL)
-        fog_words(job, haze_transmittance, words, 1, 1);
-    else if (job->srgb)
-        fog_words(job, haze_transmittance, words, 1, 0);
-    else if (job->haze != NULL)
-        fog_words(job, haze_transmittance, words, 0, 1);
+    if (job->haze != NULL)
+        fog_words(job, haze_transmittance, words, 1);
     else
-        fog_words(job, haze_transmittance, words, 0, 0);
+        fog_words(job, haze_transmittance, words, 0);
+    store_bytes(job, words);
+}
+
+/* ---- bytes in linear light ------------------------------------------------------------------- */
+
+/* Numbers of tables, one load each: instructions that gather take longer on many processors. Sixteen at a time would have more
+ * places than there are registers. */
+#if defined(NB_ISA_AVX512)
+enum { LOOKED_UP = 8 };
+typedef float looked_up __attribute__((vector_size(4 * LOOKED_UP)));
+
+NB_INLINE nb_real join(const looked_up *parts)
+{
+    return _mm512_insertf32x8(_mm512_castps256_ps512((__m256)parts[0]), (__m256)parts[1], 1);
+}
+#else
+enum { LOOKED_UP = NB_WIDTH };
+typedef nb_real looked_up;
+
+NB_INLINE nb_real join(const looked_up *parts)
+{
+    return parts[0];
+}
+#endif
+
+enum { PARTS = NB_WIDTH / LOOKED_UP };
+
+NB_INLINE nb_real light_of_bytes(const unsigned char *from, uint32_t step)
+{
+    looked_up parts[PARTS];
+    for (uint32_t p = 0; p < PARTS; p++) {
+        float lanes[LOOKED_UP];
+        for (uint32_t i = 0; i < LOOKED_UP; i++) lanes[i] = nb_srgb_light[from[step * (p * LOOKED_UP + i)]];
+        memcpy(&parts[p], lanes, sizeof lanes);
+    }
+    return join(parts);
+}
+
+/* In bits 16 to 23. The lights lie in memory, because taking them out of registers takes longer. */
+NB_INLINE nb_bits bytes_of_light(const uint32_t *lights)
+{
+    looked_up parts[PARTS];
+    for (uint32_t p = 0; p < PARTS; p++) {
+        uint32_t lanes[LOOKED_UP];
+        for (uint32_t i = 0; i < LOOKED_UP; i++)
+            lanes[i] = nb_srgb_bytes[(lights[p * LOOKED_UP + i] >> 16) - NB_SRGB_FIRST];
+        memcpy(&parts[p], lanes, sizeof lanes);
+    }
+    nb_real all;
+    memcpy(&all, lights, sizeof all);
+    return nb_to_bits(all) + nb_to_bits(join(parts));
+}
+
+/* `step`, of bytes from pixel to pixel, and `is_haze` are constants. */
+NB_INLINE void blend_lights(const nb_picture_job *job, const float *haze_transmittance, uint32_t lights[3][PIECE],
+                            uint32_t step, int is_haze)
+{
+    unsigned char padded[4 * PIECE];
+    const unsigned char *from = job->color;
+    if (job->count % NB_WIDTH != 0) {
+        memset(padded, 0, sizeof padded);
+        from = memcpy(padded, job->color, step * (size_t)job->count);
+    }
+    for (uint32_t i = 0; i < job->count; i += NB_WIDTH) {
+        const light l = light_at(job, haze_transmittance, i, 1, is_haze);
+        for (uint32_t c = 0; c < 3; c++) {
+            const nb_real sum = l.transmittance[c] * light_of_bytes(from + step * i + c, step) + l.in_scattering[c];
+            const nb_real clamped = nb_max(nb_min(sum, nb_splat(NB_SRGB_MOST)), nb_splat(NB_SRGB_LEAST));
+            memcpy(lights[c] + i, &clamped, sizeof clamped);
+        }
+    }
+}
+
+/* Over the colors of words. */
+static void encode_lights(uint32_t lights[3][PIECE], uint32_t count, uint32_t *words)
+{
+    for (uint32_t i = 0; i < count; i += NB_WIDTH) {
+        nb_bits pixel;
+        memcpy(&pixel, words + i, sizeof pixel);
+        const nb_bits r = bytes_of_light(lights[0] + i), g = bytes_of_light(lights[1] + i);
+        const nb_bits b = bytes_of_light(lights[2] + i);
+        pixel = (pixel & 0xff000000u) | r >> 16 | (g >> 8 & 0xff00u) | (b & 0xff0000u);
+        memcpy(words + i, &pixel, sizeof pixel);
+    }
+}
+
+static void fog_linear(const nb_picture_job *job, const float *haze_transmittance)
+{
+    uint32_t words[PIECE] = {0}, lights[3][PIECE];
+    const int has_alpha = job->type == NEBEL_PIXEL_RGBA8;
+    if (has_alpha) load_bytes(job, words);
+    if (has_alpha && job->haze != NULL)
+        blend_lights(job, haze_transmittance, lights, 4, 1);
+    else if (has_alpha)
+        blend_lights(job, haze_transmittance, lights, 4, 0);
+    else if (job->haze != NULL)
+        blend_lights(job, haze_transmittance, lights, 3, 1);
+    else
+        blend_lights(job, haze_transmittance, lights, 3, 0);
+    encode_lights(lights, job->count, words);
     store_bytes(job, words);
 }
 
@@ -361,9 +426,11 @@ void NB_SUFFIXED(nb_picture_)(const nb_picture_job *job)
 {
     float transmittance[PIECE];
     if (job->haze != NULL) fill_transmittance(job, transmittance);
-    if (job->type == NEBEL_PIXEL_RGBA8 || job->type == NEBEL_PIXEL_RGB8)
-        fog_bytes(job, transmittance);
-    else
+    if (job->type != NEBEL_PIXEL_RGBA8 && job->type != NEBEL_PIXEL_RGB8)
         fog_samples(job, transmittance);
+    else if (job->srgb)
+        fog_linear(job, transmittance);
+    else
+        fog_stored(job, transmittance);
     if (job->kept != NULL) keep_transmittance(job, transmittance);
 }

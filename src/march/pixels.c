@@ -211,12 +211,28 @@ static nebel_result haze_piece(const piece *at)
     return NEBEL_OK;
 }
 
+/* The way's foot on the row's line, which no difference of large numbers makes inexact. A step so small that it changes nothing
+ * is none. */
+static void aim_row(const nebel_pixels *p, uint32_t y, nb_picture_haze *haze)
+{
+    double square = 0, along = 0, step = 0;
+    for (int c = 0; c < 3; c++) {
+        const double corner = (double)p->corner[c] + y * (double)p->step_y[c], step_x = (double)p->step_x[c];
+        square += corner * corner;
+        along += corner * step_x;
+        step += step_x * step_x;
+    }
+    const int is_still = !(step > 1e-26 * square);
+    haze->nearest_x = is_still ? 0 : (float)(-along / step);
+    haze->nearest = (float)(is_still ? square : fmax(square - along * along / step, 0));
+    haze->growth = is_still ? 0 : (float)step;
+}
+
 static nebel_result fog_pieces(piece *at)
 {
     const nebel_pixels *p = at->pixels;
     for (at->y = p->first_row; at->y < end_row(p); at->y++) {
-        for (int c = 0; c < 3 && at->haze != NULL; c++)
-            at->haze->corner[c] = p->corner[c] + (float)at->y * p->step_y[c];
+        if (at->haze != NULL) aim_row(p, at->y, at->haze);
         for (at->x = 0; at->x < p->width; at->x += PIECE) {
             at->count = p->width - at->x < PIECE ? p->width - at->x : PIECE;
             const nebel_result result = at->haze != NULL ? haze_piece(at) : trace_piece(at);
@@ -233,7 +249,6 @@ static nb_picture_haze make_haze(const nebel_snapshot *snapshot, const nebel_pix
     nb_picture_haze haze = {.octaves = (float)(-fmin(medium->body.extinction[0], most) / ln2),
                             .along_ray = p->depth_type == NEBEL_PIXEL_DEPTH_RADIAL};
     for (int c = 0; c < 3; c++) haze.radiance[c] = (float)medium->radiance[c];
-    memcpy(haze.step_x, p->step_x, sizeof haze.step_x);
     return haze;
 }
 
