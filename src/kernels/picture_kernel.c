@@ -271,7 +271,7 @@ NB_INLINE nb_bits bytes_of_light(const uint32_t *lights)
     for (uint32_t p = 0; p < PARTS; p++) {
         uint32_t lanes[LOOKED_UP];
         for (uint32_t i = 0; i < LOOKED_UP; i++)
-            lanes[i] = nb_srgb_bytes[(lights[p * LOOKED_UP + i] >> 16) - NB_SRGB_FIRST];
+            lanes[i] = nb_srgb_bytes[(size_t)(lights[p * LOOKED_UP + i] >> 16) - NB_SRGB_FIRST];
         memcpy(&parts[p], lanes, sizeof lanes);
     }
     nb_real all;
