@@ -4,15 +4,15 @@
     make_srgb.py FILE              write it
     make_srgb.py --check FILE      exit 1 unless it is as written
 
-The first gives the light of each byte. The second gives the byte nearest to a light without arithmetic on floats: its upper
-16 bits, sign, exponent and the first 7 bits of the fraction, say where to look. The lights of one entry have at most two bytes,
-because 128 entries an octave lie closer than bytes do. What stands there and the light's bits add up to the byte in bits 16 to
-23: the lower 16 bits carry into it from the first light on that belongs to the higher byte.
+The first table gives the linear light of each byte. The second table gives the byte nearest to a light, in integers only. Its
+index is the upper 16 bits of the float: sign, exponent and the first 7 bits of the fraction. Entries are narrower than bytes,
+128 an octave, so each entry covers at most two bytes. The sum of the entry and the float's bits is the byte, in bits 16 to 23.
+If the light belongs to the higher byte, the lower 16 bits of that sum carry into it.
 """
 import struct
 import sys
 
-OCTAVES = 13  # below 1; a byte less than half of the first one is 0, and so is light below 2^-13
+OCTAVES = 13  # below 1; light below 2^-13 is less than half of byte 1
 FIRST = (127 - OCTAVES) << 7
 COUNT = OCTAVES << 7
 
@@ -23,7 +23,7 @@ def decode(byte):
 
 
 def bits_from(light):
-    """Of the least float that is not below."""
+    """The bits of the smallest float that is not below `light`."""
     bits = struct.unpack("<I", struct.pack("<f", light))[0]
     return bits if struct.unpack("<f", struct.pack("<I", bits))[0] >= light else bits + 1
 

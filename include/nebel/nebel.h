@@ -752,7 +752,7 @@ typedef struct nebel_pixels {
 /* out = transmittance * color + in-scattering, alpha as it is, in float throughout. Whole numbers are clamped and rounded
  * to nearest; white and radiance 1 are their largest. Without `srgb` the numbers are blended in whatever encoding
  * the picture has: physics asks for light, old hardware and most data sets of foggy pictures blend sRGB as it stands.
- * With `srgb` bytes are off by at most 0.51 (0.5 is the rounding), numbers of 16 bits by 0.7.
+ * With `srgb` bytes are off by at most 0.501 (0.5 is the rounding) if radiance is at most 1, numbers of 16 bits by 0.7.
  *
  * Fog that is one volume everywhere, of constant density, grey and of one source, and in RGBA8 as it stands boxes that take
  * all colours alike and have one source, take the shortest way; everything else goes

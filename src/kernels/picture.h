@@ -12,7 +12,7 @@ typedef struct nb_picture_haze {
     float octaves; /* minus how many times a meter halves the light */
     float radiance[3];
     int along_ray; /* depth is a distance, not a multiple of the way at depth 1 */
-    /* That way's square, of the row's pixel x: nearest + growth (x - nearest_x)^2. */
+    /* The square of that way at pixel x of the row is nearest + growth (x - nearest_x)^2. */
     float nearest_x, nearest, growth;
     uint32_t first;             /* of the row's pixels, the piece's first */
     const unsigned char *depth; /* of the piece */

@@ -231,47 +231,47 @@ static void fog_stored(const nb_picture_job *job, const float *haze_transmittanc
 
 /* ---- bytes in linear light ------------------------------------------------------------------- */
 
-/* Numbers of tables, one load each: instructions that gather take longer on many processors. Sixteen at a time would have more
- * places than there are registers. */
+/* Table entries are loaded one by one, because gather instructions take longer on many processors. A packet of 16 lanes is
+ * joined from two halves: its 16 indices would not fit into the registers. */
 #if defined(NB_ISA_AVX512)
-enum { LOOKED_UP = 8 };
-typedef float looked_up __attribute__((vector_size(4 * LOOKED_UP)));
+enum { PART_WIDTH = 8 };
+typedef float part __attribute__((vector_size(4 * PART_WIDTH)));
 
-NB_INLINE nb_real join(const looked_up *parts)
+NB_INLINE nb_real join(const part *parts)
 {
     return _mm512_insertf32x8(_mm512_castps256_ps512((__m256)parts[0]), (__m256)parts[1], 1);
 }
 #else
-enum { LOOKED_UP = NB_WIDTH };
-typedef nb_real looked_up;
+enum { PART_WIDTH = NB_WIDTH };
+typedef nb_real part;
 
-NB_INLINE nb_real join(const looked_up *parts)
+NB_INLINE nb_real join(const part *parts)
 {
     return parts[0];
 }
 #endif
 
-enum { PARTS = NB_WIDTH / LOOKED_UP };
+enum { PARTS = NB_WIDTH / PART_WIDTH };
 
 NB_INLINE nb_real light_of_bytes(const unsigned char *from, uint32_t step)
 {
-    looked_up parts[PARTS];
+    part parts[PARTS];
     for (uint32_t p = 0; p < PARTS; p++) {
-        float lanes[LOOKED_UP];
-        for (uint32_t i = 0; i < LOOKED_UP; i++) lanes[i] = nb_srgb_light[from[step * (p * LOOKED_UP + i)]];
+        float lanes[PART_WIDTH];
+        for (uint32_t i = 0; i < PART_WIDTH; i++) lanes[i] = nb_srgb_light[from[step * (p * PART_WIDTH + i)]];
         memcpy(&parts[p], lanes, sizeof lanes);
     }
     return join(parts);
 }
 
-/* In bits 16 to 23. The lights lie in memory, because taking them out of registers takes longer. */
+/* Returns the bytes in bits 16 to 23. Indices are loaded from memory, because extracting them from a vector takes longer. */
 NB_INLINE nb_bits bytes_of_light(const uint32_t *lights)
 {
-    looked_up parts[PARTS];
+    part parts[PARTS];
     for (uint32_t p = 0; p < PARTS; p++) {
-        uint32_t lanes[LOOKED_UP];
-        for (uint32_t i = 0; i < LOOKED_UP; i++)
-            lanes[i] = nb_srgb_bytes[(size_t)(lights[p * LOOKED_UP + i] >> 16) - NB_SRGB_FIRST];
+        uint32_t lanes[PART_WIDTH];
+        for (uint32_t i = 0; i < PART_WIDTH; i++)
+            lanes[i] = nb_srgb_bytes[(size_t)(lights[p * PART_WIDTH + i] >> 16) - NB_SRGB_FIRST];
         memcpy(&parts[p], lanes, sizeof lanes);
     }
     nb_real all;
@@ -279,7 +279,7 @@ NB_INLINE nb_bits bytes_of_light(const uint32_t *lights)
     return nb_to_bits(all) + nb_to_bits(join(parts));
 }
 
-/* `step`, of bytes from pixel to pixel, and `is_haze` are constants. */
+/* `step`, the size of a pixel, and `is_haze` are constants. */
 NB_INLINE void blend_lights(const nb_picture_job *job, const float *haze_transmittance, uint32_t lights[3][PIECE],
                             uint32_t step, int is_haze)
 {
@@ -293,13 +293,13 @@ NB_INLINE void blend_lights(const nb_picture_job *job, const float *haze_transmi
         const light l = light_at(job, haze_transmittance, i, 1, is_haze);
         for (uint32_t c = 0; c < 3; c++) {
             const nb_real sum = l.transmittance[c] * light_of_bytes(from + step * i + c, step) + l.in_scattering[c];
-            const nb_real clamped = nb_max(nb_min(sum, nb_splat(NB_SRGB_MOST)), nb_splat(NB_SRGB_LEAST));
+            const nb_real clamped = nb_max(nb_min(sum, nb_splat(NB_SRGB_MAX_LIGHT)), nb_splat(NB_SRGB_MIN_LIGHT));
             memcpy(lights[c] + i, &clamped, sizeof clamped);
         }
     }
 }
 
-/* Over the colors of words. */
+/* Replaces the colors of `words` and keeps their alpha. */
 static void encode_lights(uint32_t lights[3][PIECE], uint32_t count, uint32_t *words)
 {
     for (uint32_t i = 0; i < count; i += NB_WIDTH) {

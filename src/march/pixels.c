@@ -211,8 +211,8 @@ static nebel_result haze_piece(const piece *at)
     return NEBEL_OK;
 }
 
-/* The way's foot on the row's line, which no difference of large numbers makes inexact. A step so small that it changes nothing
- * is none. */
+/* Splits the way at depth 1 into a part along the row and a part across it: the sum of their squares cancels nothing. A step
+ * too small to change the way counts as 0. */
 static void aim_row(const nebel_pixels *p, uint32_t y, nb_picture_haze *haze)
 {
     double square = 0, along = 0, step = 0;
