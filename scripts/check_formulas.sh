@@ -7,8 +7,7 @@ cd "$(dirname "$0")/.."
 formulas=src/formulas
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-passed=0
-failed=0
+targets=0
 
 mapfile -t order < <(grep -v '^#' "$formulas/ORDER")
 listed=$(printf '%s\n' "${order[@]}" | sort)
@@ -19,17 +18,24 @@ if [ "$listed" != "$present" ]; then
     exit 1
 fi
 
-# verdict NAME COMMAND...: one line for each target; a warning is a failure.
+# verdict NAME COMMAND...: one line for each target that fails, beside as many others as there are processors. A warning is a failure.
 verdict() {
-    local name=$1
+    local name=$1 output=$work/output_$targets
     shift
-    if "$@" >"$work/output" 2>&1 && ! grep -q '^WARNING' "$work/output"; then
-        passed=$((passed + 1))
+    if [ "$(jobs -rp | wc -l)" -ge "$(nproc)" ]; then wait -n; fi
+    if "$@" >"$output" 2>&1 && ! grep -q '^WARNING' "$output"; then
+        rm "$output"
     else
-        failed=$((failed + 1))
         echo "check_formulas: $name:"
-        head -40 "$work/output"
-    fi
+        head -40 "$output"
+    fi &
+}
+
+# The files of the next target.
+name_files() {
+    targets=$((targets + 1))
+    object=$work/formulas_$targets.o
+    shader=$work/formulas_$targets.frag
 }
 
 warnings=(-Wall -Wextra -Wpedantic -Wconversion -Wdouble-promotion -Wshadow -Wstrict-prototypes -Wmissing-prototypes
@@ -48,8 +54,9 @@ try_c() {
     local keep=()
     case $compiler in *gcc) keep=(-fkeep-inline-functions -fkeep-static-functions) ;; esac
     for width in "" -DNB_FAST=1; do
+        name_files
         verdict "$compiler, $name $width" "$compiler" -std=c11 -O1 -ffp-contract=off -fno-math-errno "${warnings[@]}" \
-            "${keep[@]}" -Isrc -Iinclude "$@" $width -c "$work/formulas.c" -o "$work/formulas.o"
+            "${keep[@]}" -Isrc -Iinclude "$@" $width -c "$work/formulas.c" -o "$object"
     done
 }
 
@@ -57,14 +64,15 @@ try_c() {
 try_glsl() {
     local version=$1
     shift
+    name_files
     {
         echo "#version $version"
         for file in "$@" prelude_glsl.glsl prelude_shader.glsl; do cat "$formulas/$file"; done
         for file in "${order[@]}"; do cat "$formulas/$file"; done
         echo "out vec4 color;"
         echo "void main() { color = vec4(0.0); }"
-    } >"$work/formulas.frag"
-    verdict "GLSL $version" glslangValidator -S frag "$work/formulas.frag"
+    } >"$shader"
+    verdict "GLSL $version" glslangValidator -S frag "$shader"
 }
 
 for compiler in gcc clang; do
@@ -84,5 +92,7 @@ try_c aarch64-linux-gnu-gcc 'neon, double' -DNB_DOUBLE=1 -DNB_ISA_NEON=1
 try_glsl "330 core"
 try_glsl "300 es" prelude_300es.glsl
 
-echo "check_formulas: ${#order[@]} files, $passed targets passed, $failed failed"
+wait
+failed=$(find "$work" -name 'output_*' | wc -l)
+echo "check_formulas: ${#order[@]} files, $((targets - failed)) targets passed, $failed failed"
 [ "$failed" -eq 0 ]
