@@ -1,5 +1,14 @@
 # Suites: files test_NAME.c, many of which are compiled into one program.
 
+# The sources of all suites, or of those that NEBEL_TEST_SUITES names.
+function(nebel_find_suites result)
+    nebel_glob(sources test_*.c)
+    if(NEBEL_TEST_SUITES)
+        list(FILTER sources INCLUDE REGEX "/(${NEBEL_TEST_SUITES})\\.c$")
+    endif()
+    set(${result} ${sources} PARENT_SCOPE)
+endfunction()
+
 # The library that a suite needs, by its name and its headers: core, scene, cpu or gl.
 function(nebel_library_of_suite result source)
     file(STRINGS ${source} includes REGEX "^#include")
