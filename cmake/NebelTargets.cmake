@@ -42,7 +42,12 @@ string(REPLACE "-O3" "-O2" CMAKE_C_FLAGS_RELEASE "${CMAKE_C_FLAGS_RELEASE}")
 function(nebel_set_options target)
     set_target_properties(${target} PROPERTIES
         C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
-    target_compile_options(${target} PRIVATE ${nebel_warnings} ${nebel_arithmetic} ${nebel_sanitizers})
+    # Fuzzers count branches of what they link. Tests and the libraries above that are faster without.
+    set(sanitizers ${nebel_sanitizers})
+    if(target MATCHES "^nebel_(test|cpu|gl|bench)")
+        list(REMOVE_ITEM sanitizers -fsanitize=fuzzer-no-link)
+    endif()
+    target_compile_options(${target} PRIVATE ${nebel_warnings} ${nebel_arithmetic} ${sanitizers})
     target_link_options(${target} PRIVATE ${nebel_sanitizers})
 endfunction()
 
