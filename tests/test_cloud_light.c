@@ -59,7 +59,9 @@ static void test_light_of_slabs(void **state)
     static const struct {
         double depth, cosine;
     } slabs[] = {{1, 1}, {4, 1}, {16, 1}, {64, 1}, {2, .342}, {4, .5}, {16, .5}, {64, .5}, {16, .2}};
-    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.seed = 1}});
+    nebel_clouds *clouds = make(
+        1,
+        (const nebel_cloud_layer[]){{.type = NEBEL_CLOUD_STRATUS, .coverage = 1, .droplet_diameter = 20, .seed = 1}});
     nebel_cloud_workspace *workspace;
     nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     const double apart = (double)clouds->layers[0].apart;

@@ -26,7 +26,8 @@ static void test_shadows(void **state)
         least = fmin(least, (double)part);
         sum += (double)part / 400;
     }
-    assert_true(least < .25 && sum > .3 && sum < .95);
+    /* Light that leaves clouds aside is in their shadows, too. */
+    assert_true(least < .3 && sum > .3 && sum < .95);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_lighting(view);
     nebel_destroy_clouds(clouds);

@@ -94,7 +94,8 @@ nb_cloud_light nb_cloud_clear_light(const nebel_cloud_lighting *view, const doub
 float nb_cloud_part_through(const nb_cloud_layer *layer, float depth, double sun)
 {
     const float cosine = nb_larger(LOWEST_SUN, (float)sun);
-    return nb_slab_through(layer->slab, depth * cosine, cosine);
+    const float through = nb_slab_through(layer->slab, depth * cosine, cosine);
+    return through + layer->spill * (1 - through);
 }
 
 /* Integral of 3 x^2 - 2 x^3 up to x = 1, and of 1 behind it: nb_cloud_base_thins. */
@@ -194,21 +195,49 @@ nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_lighting *view, const double di
     return ray;
 }
 
-/* The slab's normal has the sun's way in the plane of that and straight up: it leads up where the way up is as long as a level slab would
- * have it, to the sun where it is no shorter than that to the sun. */
+/* Of light that falls by so many times e nothing is left. */
+#define MOST_LOSS 12
+
+/* What is so deep in a cloud no longer knows how its surface above is turned. */
+#define TURNED_DEPTH 2.5f
+
+/* The cosine of the sun to the slab's normal, which has the sun's way in the plane of that and straight up: it leads up where the way up
+ * is as long as a level slab would have it, to the sun where it is no shorter than that to the sun, and the more to the sun the less
+ * clouds are slabs: their light comes in by their sides, too. */
+static float turn_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths, float cosine)
+{
+    const float shallow = layer->shallow;
+    const float shape = nb_smaller(1, (depths->up + shallow * cosine) / (depths->sun + shallow));
+    const float turned = cosine + (shape - cosine) * TURNED_DEPTH / (TURNED_DEPTH + depths->up);
+    if (!(layer->broken > 0)) return turned;
+    return (float)nb_exp((1 - (double)layer->broken) * nb_log((double)turned));
+}
+
+/* Light that leaves a cloud aside is lost to a slab as if that absorbed it: diffused light falls as sinh does, and what a slab without loss
+ * would have to be to send as much is deeper above and less deep below. */
+static void lose_aside(double loss, nb_slab_place *place)
+{
+    const double falls = nb_exp(-nb_min(MOST_LOSS, loss * (double)place->above));
+    const double lost = nb_exp(-2 * nb_min(MOST_LOSS, loss * (double)place->below));
+    const double below = (1 - lost) / ((1 + lost) * loss);
+    place->above = (float)(0.5 * (1 - falls) * ((1 + falls) / loss + (1 - falls) * below) / falls);
+    place->below = (float)below;
+}
+
 static nb_slab_place slab_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths, const nb_cloud_sight *sight)
 {
     const float cosine = nb_larger(LOWEST_SUN, sight->sun);
-    const float shallow = layer->shallow, apart = layer->apart;
-    const float m = nb_smaller(1, (depths->up + shallow * cosine) / (depths->sun + shallow));
+    const float apart = layer->apart, m = turn_of(layer, depths, cosine);
     const float level = 1 - sight->sun * sight->sun, aside = sight->rise - sight->sun * sight->ahead;
-    return (nb_slab_place){
+    nb_slab_place place = {
         .above = apart * m * depths->sun,
         .below = apart * nb_smaller(m * depths->away, depths->down),
         .sun = m,
-        .rise = m * sight->ahead + (level > 1e-6f ? sqrtf((1 - m * m) / level) * aside : 0),
+        .rise = m * sight->ahead + (level > 1e-6f ? sqrtf(nb_larger(0, 1 - m * m) / level) * aside : 0),
         .ahead = sight->ahead,
     };
+    if (layer->loss > 0) lose_aside((double)(layer->loss / apart), &place);
+    return place;
 }
 
 nb_cloud_parts nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths,

@@ -382,6 +382,36 @@ static void set_ranks(const nb_cloud_noise *noise, nb_cloud_layer *layer)
 #define LEAST_SHALLOW 0.3f
 #define SHALLOW_PART 0.05f
 
+/* Clouds are so wide in sizes of heaps where half of all is cloud, times 0.66, and so high in parts of the layer's height: means of
+ * the ways through them along and up. Billows cut heaps. */
+#define WIDE_PART 0.27
+#define CUTS_PER_WAY 3.2
+#define HIGH_PART 0.43
+#define CUT_OF_HEIGHT 0.57
+
+/* Fitted to paths (docs/clouds.md). */
+#define BROKEN_FLATNESS 2.05
+#define BROKEN_POWER 1.7
+#define LOSS 6.9
+#define LOSS_DEPTH 21.0
+#define SPILL 0.24
+#define SPILL_DEPTH 14.0
+
+/* Of a cloud that is so many times wider than high, and so deep along. */
+static void set_sides(nb_cloud_layer *layer)
+{
+    const double cut = layer->kind == NEBEL_CLOUD_CUMULUS ? (double)layer->detail : 0;
+    const double narrow = pow(1 - (double)layer->coverage, 0.6) / WIDE_PART + CUTS_PER_WAY * cut;
+    layer->broken = layer->loss = layer->spill = 0;
+    if (!(narrow > 0)) return;
+    const double wide = (double)layer->size / narrow, depth = wide * (double)layer->extinction;
+    const double high = HIGH_PART * (1 - CUT_OF_HEIGHT * cut) / (double)layer->per_thickness;
+    const double broken = 1 / (1 + pow(wide / (BROKEN_FLATNESS * high), BROKEN_POWER));
+    layer->broken = (float)broken;
+    layer->loss = (float)(broken * LOSS / (depth + LOSS_DEPTH));
+    layer->spill = (float)(broken * SPILL * depth / (depth + SPILL_DEPTH));
+}
+
 static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *desc, nb_cloud_layer *layer)
 {
     const double radius = clouds->atmosphere->airs.radius, speed = hypot(desc->wind[0], desc->wind[1]);
@@ -403,6 +433,7 @@ static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *des
     layer->apart = layer->slab->apart;
     layer->shallow = LEAST_SHALLOW + SHALLOW_PART * layer->extinction / layer->per_thickness;
     layer->size = (float)desc->cell_size;
+    set_sides(layer);
     layer->hidden_height = hidden_heights[desc->type != NEBEL_CLOUD_CUMULUS] / layer->per_thickness;
     layer->hidden_width = hidden_widths[desc->type != NEBEL_CLOUD_CUMULUS] * (float)desc->cell_size;
     set_octaves(desc, radius, layer);

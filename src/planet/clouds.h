@@ -55,6 +55,9 @@ typedef struct nb_cloud_layer {
     nb_layer_map weather; /* level_count 0: none */
     float apart;          /* what part of scattering leads away */
     float shallow; /* optical depth up to which a place counts as one of a level slab, however the way to the sun is */
+    /* Of layers whose clouds end aside (cloud_light.c), all 0 where they are closed: how little a cloud is like a level slab, to 1; what
+     * part of light leaves it aside per unit of optical depth; what part of light that a slab would send up goes down there. */
+    float broken, loss, spill;
     nb_slab *slab; /* light in slabs of such cloud */
     nb_cloud_phase phase;
 } nb_cloud_layer;
