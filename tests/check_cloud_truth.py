@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Compares the light of broken clouds with the reference path tracer: the mean over pictures from above, from below and aslant.
+"""Compares the light of broken clouds with the reference path tracer: the mean over pictures from above, from below and
+aslant.
 
 check_cloud_truth.py [SET] [SAMPLES] [SEED]: paths of SAMPLES for each of 24 x 24 pixels and each color (2), of a set of layers:
 few; many, whose coverage, extinction and sizes differ; sheets; earth, with air, sky and ground. Without these pictures show nothing
@@ -40,13 +41,14 @@ VACUUM = {"airs": [{"type": "exponential", "scattering": 1e-12, "scale_height": 
 
 def scene(layer, sun, view, is_earth):
     height = 2 if view == "below" else 8000
-    ahead = {"above": (0, -1, 0), "below": (0, 1, 0), "aslant": (0, -0.5, 0.87)}[view]
+    ahead = {"below": (0, 1, 0), "aslant": (0, -0.5, 0.87)}.get(view, (0, -1, 0))
     turn = math.radians(sun)
     camera = {"position": [0, height, 0], "look_at": [ahead[0], height + ahead[1], ahead[2]], "up": [1, 0, 0],
               "vertical_fov": 40 if view == "aslant" else 100}
+    planet = {"preset": "earth"} if is_earth else VACUUM
     return {"nebel": 1, "fog": [], "camera": camera,
             "sun": {"direction": [0.6 * math.cos(turn), math.sin(turn), 0.8 * math.cos(turn)], "irradiance": 1},
-            "planet": {"model": "physical", **({"preset": "earth"} if is_earth else VACUUM), "clouds": [layer]}}
+            "planet": {"model": "physical", **planet, "clouds": [layer]}}
 
 
 def render(of, folder, *options):
