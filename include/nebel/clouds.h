@@ -148,7 +148,8 @@ nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, cons
 
 /* What part of the sun's light comes through clouds to n places, straight or scattered on the way; width as of
  * nebel_compute_cloud_extinction. Nothing tells an error: of even layers it is within 0.01, but 0.025 where the sun is less than four
- * degrees high (docs/clouds.md, "Light of clouds", has the table); of cumulus it is not known. Errors: ARGUMENT. */
+ * degrees high (docs/clouds.md, "Light of clouds", has the tables); of cumulus the mean over the ground is within 0.02, and that of
+ * one place is not known. Errors: ARGUMENT. */
 nebel_result nebel_compute_cloud_sun_transmittance(nebel_cloud_workspace *workspace, double width, size_t n,
                                                    const double (*places)[3], size_t place_stride, float *parts);
 
