@@ -171,7 +171,7 @@ static void compare_light_of_crowds(const nebel_cloud_layer *layer, double even,
     uint64_t numbers = 29;
     for (int i = 0; i < 3; i++) {
         if (!nb_test_tries((size_t)(i + turn) % 3, 3)) continue;
-        const double truth = show_pixels(workspace, directions[i], 10, pixels_of(1200), &numbers).mean;
+        const double truth = show_pixels(workspace, directions[i], 10, pixels_of(3600), &numbers).mean;
         for (int k = 0; k < 3; k++) {
             const nb_shown seen = show_pixels(workspace, directions[i], widths[k], pixels_of(3000), &numbers);
             print_message("pixels of %.0f m: light of %.4f, grain of %.4f; of thin rays %.4f\n", widths[k], seen.mean,
