@@ -137,7 +137,7 @@ def jobs(arguments, folder):
         for method in methods:
             for device in devices:
                 name = f"{path.stem}.{method}.{device}.exr"
-                yield name, [nebel, "render", path, "-o", folder / name, "-s", SIZE, "--samples", "2", "-t", "1", "--method", method,
+                yield name, [nebel, "render", path, "-o", folder / name, "-s", SIZE, "--samples", "2", "--method", method,
                              "--device", device], ""
 
 
@@ -149,8 +149,9 @@ def record(arguments):
         name, command, text = job
         done = subprocess.run([str(x) for x in command], input=text, capture_output=True, text=True)
         if done.returncode != 0:
-            # What is refused is part of the record: the message without the checkout's path.
+            # What is refused is part of the record, but for the message, which names files.
             (folder / name).with_suffix(".error").write_text(f"status {done.returncode}\n")
+            print(f"{name}: {done.stderr.splitlines()[-1] if done.stderr else 'no message'}")
         elif name.endswith(".csv"):
             (folder / name).write_text(done.stdout)
         return done.returncode == 0
