@@ -35,27 +35,28 @@ extern "C" {
 
 /* What a layer looks like, and its numbers where none are given. */
 typedef enum nebel_cloud_type {
-    NEBEL_CLOUD_CUMULUS = 0, /* flat bases, heaped tops: 900 to 2700 m */
+    NEBEL_CLOUD_CUMULUS = 0, /* flat bases, rounded tops: 900 to 2700 m */
     NEBEL_CLOUD_STRATUS,     /* a sheet with gaps: 300 to 800 m */
     NEBEL_CLOUD_CIRRUS,      /* thin wisps of ice, drawn out along the wind: 8000 to 9500 m */
     NEBEL_CLOUD_TYPE_COUNT
 } nebel_cloud_type;
 
-/* One layer. 0 stands for the number of its kind, but for kind and wind. Lengths of a kind are those of the Earth: on
+/* One layer. 0 stands for the number of its type, but for type and wind. Lengths of a type are those of the Earth: on
  * planets with less than 100 km of air they shrink with it, `cell_size` no further than with the layer's height. */
 typedef struct nebel_cloud_layer {
     nebel_cloud_type type;
-    double base, top;  /* m above the ground, 0 < base < top, within the air; no top: as high as the kind */
+    double base, top;  /* m above the ground, 0 < base < top, within the air; no top: as high as the type */
     double coverage;   /* part of the planet under clouds, 0 to 1; of cumulus before detail is cut out */
     double extinction; /* 1/m in their middle, to NEBEL_MAX_COMPONENT_EXTINCTION */
-    double
-        cell_size; /* m, of the largest heaps: half of the distance from one to the next; 1e-3 to 1e9, at most NEBEL_MAX_CLOUD_CELL_RADII */
-    double erosion;          /* how deep billows cut into them, to 1; NEBEL_CLOUD_NONE: not at all */
-    double patchiness;       /* how much more clouds are here than there, over ten sizes and more, to 1, or NONE */
-    double droplet_diameter; /* um, of drops, twice their effective radius: 4 to 50 */
+    /* m, of the largest cells: half of the distance from one to the next; 1e-3 to 1e9, at most NEBEL_MAX_CLOUD_CELL_RADII
+     * of the planet's radius. */
+    double cell_size;
+    double erosion;          /* how deep Worley noise cuts into them, to 1; NEBEL_CLOUD_NONE: not at all */
+    double patchiness;       /* variation of the coverage over ten cells and more, to 1, or NEBEL_CLOUD_NONE */
+    double droplet_diameter; /* um, twice the effective radius of the droplets: 4 to 50 */
     uint32_t seed;           /* of the noise */
-    double wind
-        [2]; /* m per unit of time, within 1e12, along x and z at the ground place over the centre: the shell turns */
+    /* m per unit of time, within 1e12, along x and z at the point of the ground above the centre: the shell rotates. */
+    double wind[2];
     nebel_planet_map weather_map; /* one channel; times the coverage; as maps of layers lie. {0}: 1 everywhere */
 } nebel_cloud_layer;
 
@@ -87,7 +88,7 @@ void nebel_destroy_clouds(nebel_clouds *clouds);
 nebel_result nebel_compute_cloud_extinction(const nebel_clouds *clouds, double time, double width, size_t n,
                                             const double (*places)[3], size_t place_stride, float *extinction);
 
-/* The phase function of a layer's drops, 1/sr for red, green and blue (light of 680, 550 and 440 nm), at n cosines within -1 and 1 of the
+/* The phase function of a layer's droplets, 1/sr for red, green and blue (light of 680, 550 and 440 nm), at n cosines within -1 and 1 of the
  * angle by which light is turned. Cumulus and stratus: Mie's theory for water, sizes of a gamma distribution with an effective
  * variance of 0.1, by a table; cirrus: NEBEL_PHASE_DROPLETS. docs/clouds.md says how far off. Any thread. Errors: ARGUMENT. */
 nebel_result nebel_cloud_phase(const nebel_clouds *clouds, uint32_t layer, size_t n, const double *cosines,
@@ -135,13 +136,13 @@ typedef struct nebel_cloud_transfer {
     float transmittance[NEBEL_MAX_CLOUD_NODES];    /* of clouds alone, grey */
     float in_scattering[NEBEL_MAX_CLOUD_NODES][3]; /* of clouds alone, as if nothing else were on the way */
     float error;                                   /* of transmittance: what quadrature tells, of all pieces */
-    uint32_t
-        density_queries; /* how often density was asked behind where the ray enters layers; 0: it comes near no cloud */
+    /* How often the density was queried after the ray enters layers; 0: it comes near no cloud. */
+    uint32_t density_queries;
 } nebel_cloud_transfer;
 
 /* Along n rays up to t_max or the ground. spreads: width of a ray's pixel per metre of the way, 0 to 10: what is narrower is seen as
  * a mean. Strides in bytes; of spreads 0 is one for all rays. Sixteen rays and more at once take half as long as one by one, and
- * have the same bits. One thread per workspace. Errors: ARGUMENT (NULL, a ray or spread not in order); then no knots are written. */
+ * have the same bits. One thread per workspace. Errors: ARGUMENT (NULL, a ray or spread not in order); then nothing is written. */
 nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
                                 const double *spreads, size_t spread_stride, nebel_cloud_transfer *knots,
                                 size_t knot_stride);
@@ -161,9 +162,9 @@ nebel_result nebel_compute_cloud_sky_transmittance(nebel_cloud_workspace *worksp
 
 /* What part of its light the air has along a ray, under clouds and between them. */
 typedef struct nebel_air_shadow {
-    uint32_t count; /* of pieces; 0: all of its light everywhere */
-    float t[NEBEL_MAX_AIR_SHADOW_SEGMENTS +
-            1]; /* m, ascending: piece k is from t[k] to t[k + 1]; elsewhere there is no shade */
+    uint32_t count; /* of segments; 0: all of its light everywhere */
+    /* m, ascending: segment k is from t[k] to t[k + 1]; elsewhere there is no shadow. */
+    float t[NEBEL_MAX_AIR_SHADOW_SEGMENTS + 1];
     float transmittance[NEBEL_MAX_AIR_SHADOW_SEGMENTS][3]; /* of what clear air has there, 0 to 1 */
 } nebel_air_shadow;
 
@@ -176,7 +177,7 @@ nebel_result nebel_trace_cloud_shadow_on_air(nebel_cloud_workspace *workspace, s
 
 /* What part of the sun's and of the sky's light fog has along a ray. */
 typedef struct nebel_fog_shadow {
-    uint32_t count;                             /* of pieces; 0: all of it everywhere */
+    uint32_t count;                             /* of segments; 0: all of it everywhere */
     float t[NEBEL_MAX_FOG_SHADOW_SEGMENTS + 1]; /* m, ascending, as of nebel_air_shadow */
     float sun_transmittance[NEBEL_MAX_FOG_SHADOW_SEGMENTS], sky_transmittance[NEBEL_MAX_FOG_SHADOW_SEGMENTS];
     float error[NEBEL_MAX_FOG_SHADOW_SEGMENTS]; /* of either: what a mean over twice the width differs by */

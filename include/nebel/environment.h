@@ -58,8 +58,8 @@ typedef struct nebel_environment {
     double zenith[3], horizon[3], ground[3]; /* gradient: radiance from straight above, level and from straight below, 0
                                                 to 1e9; linear in the sine of the elevation between them */
     nebel_environment_map *map;              /* map: not NULL */
-    double
-        rotation; /* map: degrees about +y, within -NEBEL_MAX_ENVIRONMENT_ROTATION and that; > 0 takes what is at -z to -x */
+    /* map: degrees about +y, within -NEBEL_MAX_ENVIRONMENT_ROTATION and that; > 0 takes what is at -z to -x. */
+    double rotation;
     double intensity; /* map: factor of its radiance, > 0, at most 1e9 of both together; 0: 1 */
 } nebel_environment;
 

@@ -43,12 +43,11 @@ typedef struct nebel_gl_renderer nebel_gl_renderer;
 typedef struct nebel_gl_renderer_desc {
     nebel_allocator allocator;
     nebel_log log;
-    uint32_t
-        shadow_map_size; /* texels of a side of each of the sun's four shadow maps, and of eight more where it lights
-                             fog, 64 to 16384; 0: 2048. A lamp's six have a quarter of it, less where they would take
-                             more than 128 MiB together, but 64 */
-    nebel_parallel_for_fn
-        run; /* for threads that make tables of air, and walk through clouds; NULL: one part after the other */
+    /* Texels of a side of each of the sun's four shadow maps, and of eight more where it lights fog, 64 to 16384; 0: 2048.
+     * The six of a point or spot light have a quarter of it, less where they would take more than 128 MiB together, but 64. */
+    uint32_t shadow_map_size;
+    /* For threads that make tables of air and trace clouds; NULL: one part after the other. */
+    nebel_parallel_for_fn run;
     void *run_user;
 } nebel_gl_renderer_desc;
 

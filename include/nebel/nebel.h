@@ -168,8 +168,8 @@ typedef struct nebel_shape {
     double point[3], normal[3];    /* half space */
     const nebel_plane *planes;     /* convex: 1 to NEBEL_MAX_SHAPE_PLANES */
     size_t plane_count;
-    const struct nebel_shape
-        *parts; /* union, intersection: 1 to NEBEL_MAX_SHAPE_LEAVES leaves in all, NEBEL_MAX_SHAPE_NESTING deep */
+    /* union, intersection: 1 to NEBEL_MAX_SHAPE_LEAVES leaves in all, NEBEL_MAX_SHAPE_NESTING deep. */
+    const struct nebel_shape *parts;
     size_t part_count;
 } nebel_shape;
 
@@ -492,9 +492,10 @@ nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3]);
 /* Sets the sun. Cost O(1). Errors: ARGUMENT, VALUE. */
 nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun);
 
-/* Sets the lamps, `count` of them, in place of those before; they are copied. They light volumes with an albedo. A query
- * asks for each lamp as it does for the sun, except for lamps too weak or too far away to matter: their light is left
- * out, and counted in `error`. Cost O(count). Errors: ARGUMENT, VALUE, MEMORY; the lamps are then as they were. */
+/* Sets the point and spot lights, `count` of them, in place of those before; they are copied. They light volumes with an
+ * albedo. A query costs for each light what it costs for the sun, except for lights too weak or too far away to matter: their
+ * light is left out, and counted in `error`. Cost O(count). Errors: ARGUMENT, VALUE, MEMORY; the lights are then as they
+ * were. */
 nebel_result nebel_set_lamps(nebel_fog *fog, size_t count, const nebel_light *lamps);
 
 /* Sets the most that all fog together hides, 0 to 1; 0: no limit, as 1. Where transmittance T of a channel is less than
@@ -527,7 +528,7 @@ typedef struct nebel_sunlit_fog {
 /* Returns 1, or 0 where the sun lights no fog of the snapshot; *fog is then untouched. Cost O(n). Any thread. */
 int nebel_snapshot_sunlit_fog(const nebel_snapshot *snapshot, nebel_sunlit_fog *fog);
 
-/* The same of the lamps: writes the corners [m] of a box outside of which no fog is lit by them, infinite where it has
+/* The same of point and spot lights: writes the corners [m] of a box outside of which no fog is lit by them, infinite where it has
  * no end, and returns 1; or returns 0 where they light no fog, with min and max untouched. Cost O(n). Any thread. */
 int nebel_snapshot_lamplit_fog(const nebel_snapshot *snapshot, double min[3], double max[3]);
 
@@ -541,7 +542,7 @@ int nebel_snapshot_scattering_fog(const nebel_snapshot *snapshot, double min[3],
  * ray comes to what a snapshot with `sun` adds, and each has its transmittance. */
 typedef struct nebel_split_fog {
     nebel_snapshot *sun, *sky; /* lit by the sun alone, by ambient light alone */
-    nebel_snapshot *own;       /* by lamps, and what the fog emits and its source; NULL where there is none of it */
+    nebel_snapshot *own;       /* with point and spot lights, emission and source; NULL where there is none of it */
     double max_opacity;        /* 0 to 1, 1: no limit. The parts are not limited: the limit holds for their sum */
 } nebel_split_fog;
 
@@ -553,13 +554,13 @@ void nebel_release_split_light(nebel_split_fog *split);
 /* The same fog by all its lights, with another sun. As above. */
 nebel_result nebel_relight(const nebel_snapshot *snapshot, const nebel_sun *sun, nebel_snapshot **lit);
 
-/* How many lamps the snapshot has. */
+/* How many point and spot lights the snapshot has. */
 size_t nebel_snapshot_lamp_count(const nebel_snapshot *snapshot);
 
-/* Where lamp `number`, less than their count, is, and its radius as it was given [m]. Any thread. */
+/* Where light `number`, less than their count, is, and its radius as it was given [m]. Any thread. */
 void nebel_snapshot_lamp(const nebel_snapshot *snapshot, size_t number, double position[3], double *radius);
 
-/* ---- asking ---------------------------------------------------------------------------------- */
+/* ---- queries --------------------------------------------------------------------------------- */
 
 typedef struct nebel_ray {
     double origin[3];    /* m */
@@ -570,16 +571,15 @@ typedef struct nebel_ray {
 typedef struct nebel_transfer {
     double transmittance[3]; /* RGB, 0..1 */
     double in_scattering[3]; /* RGB radiance, >= 0 */
-    double
-        error; /* of the six numbers, absolute: a bound; of light from the sun and lamps an estimate with a margin, which
-                     scripts/check_lit_truth.py tries on a million random rays. In double hardly ever more than the tolerance and 1e-8,
-                     in float than the tolerance and 1e-4 but for one of a thousand rays of the hardest kind, which
-                     touch a surface or run level with one to the last bits; at the silhouette of a body whose optical
-                     depth is in the thousands one of fourteen has up to 3e-3. Transmittance below the smallest normal
-                     number of the precision is 0, and the error that number at least. 1e30: nothing is known of
-                     light from height fog that grows beyond 1e18 times its extinction and lets light through.
-                     Voxels that the sun lights: an estimate, which none of 13,700 rays through random voxels exceeded;
-                     light that reaches between cells of many optical depths each may escape it */
+    /* Absolute error of the six numbers: a bound; of light from the sun and other lights an estimate with a margin, which
+     * scripts/check_lit_truth.py tries on a million random rays. In double hardly ever more than the tolerance and 1e-8,
+     * in float than the tolerance and 1e-4 but for one of a thousand rays of the hardest kind, which touch a surface or run
+     * level with one to the last bits; at the silhouette of a body whose optical depth is in the thousands one of fourteen
+     * has up to 3e-3. Transmittance below the smallest normal number of the precision is 0, and the error that number at
+     * least. 1e30: nothing is known of light from height fog that grows beyond 1e18 times its extinction and lets light
+     * through. Voxels that the sun lights: an estimate, which none of 13,700 rays through random voxels exceeded; light that
+     * reaches between cells of many optical depths each may escape it. */
+    double error;
 } nebel_transfer;
 
 typedef enum nebel_precision {
@@ -587,13 +587,13 @@ typedef enum nebel_precision {
     NEBEL_PRECISION_FLOAT       /* 32 bit with 64-bit positions, several rays at once */
 } nebel_precision;
 
-/* Along which pieces of its way each of n rays is reached by a light, as whoever knows the surfaces has found out. A
- * ray begins where the light reaches it; at each of its toggles [m from its start] the light ceases to reach it, or
- * begins to again. One that begins in shadow has 0 as its first toggle. Toggles are 0 or more and do not descend;
- * INFINITY, those beyond the ray's end and pairs of equal ones are legal and do nothing. */
+/* Along which segments each of n rays is visible from a light, as the caller knows who knows the surfaces. A ray starts
+ * visible; at each of its boundaries [m from its start] it becomes hidden, or visible again. One that starts hidden has 0 as
+ * its first boundary. Boundaries are 0 or more and ascend; INFINITY, those beyond the ray's end and pairs of equal ones are
+ * legal and do nothing. */
 typedef struct nebel_ray_visibility {
-    const uint32_t *offsets; /* n + 1 numbers that do not descend: those of ray i are toggles[first[i]] up to but not
-                              toggles[first[i + 1]] */
+    /* n + 1 numbers that do not descend: those of ray i are boundaries[offsets[i]] up to but not boundaries[offsets[i + 1]]. */
+    const uint32_t *offsets;
     const float *boundaries; /* may be NULL where there are none */
 } nebel_ray_visibility;
 
@@ -608,12 +608,11 @@ typedef struct nebel_trace_desc {
                              transmittance. */
     int ignore_distances;   /* nonzero: volumes act wherever their shape is. For rays that do not begin at the eye, as
                              those to a light, since `start` and `cutoff` of a volume count from where a ray starts. */
-    const nebel_ray_visibility
-        *sun_visibility; /* of the rays of the call: where the sun reaches them past surfaces. NULL:
-                             everywhere. Fog in shadow scatters no sunlight; transmittance stays as it is, to the bit.
-                             The ends of pieces are taken as exact: `error` says nothing of them */
-    const nebel_ray_visibility
-        *light_visibility; /* the same of the lamps, one for each lamp of the snapshot, in their order */
+    /* Of the rays of the call: where surfaces do not hide them from the sun. NULL: visible everywhere. Fog in shadow scatters
+     * no sunlight; transmittance stays as it is, to the bit. Boundaries are taken as exact: `error` says nothing of them. */
+    const nebel_ray_visibility *sun_visibility;
+    /* The same of the other lights, one for each light of the snapshot, in their order. */
+    const nebel_ray_visibility *light_visibility;
 } nebel_trace_desc;
 
 #define NEBEL_DEFAULT_TOLERANCE 0.002
@@ -622,7 +621,7 @@ typedef struct nebel_trace_desc {
  * of the alignment of what they part. desc NULL: the same as all
  * zero. rays and transfers must not overlap. A ray with t_max 0 gives transmittance 1, in-scattering 0. Float results are the same bits for every isa and
  * for every way of splitting the rays into calls. Any thread. Errors: ARGUMENT (NULL, an unknown precision, an odd stride, a tolerance or a ray that is NaN,
- * infinite where it must not be, of no direction, of negative t_max; toggles that descend, are negative or NaN),
+ * infinite where it must not be, of no direction, of negative t_max; boundaries that descend, are negative or NaN),
  * UNSUPPORTED (isa not available), UNBOUNDED (emission in an endless volume that does not absorb), MEMORY (scratch for
  * very many volumes on one ray). On an error the contents of transfers are undefined.
  *

@@ -43,22 +43,22 @@ typedef struct nebel_nebula_desc {
     nebel_allocator allocator;
     nebel_log log;
     nebel_shape shape;     /* particles start inside of it; bounded */
-    nebel_density density; /* how thickly they are strewn there */
+    nebel_density density; /* how many of them are there */
     /* 0: the density thins particles out; 1: it dims them, and they are equally many everywhere; between 0 and 1
-     * density^(1 - fade) thins them out and density^fade dims them. Where few are left single ones show. Not of points. */
+     * density^(1 - dimming) thins them out and density^dimming dims them. Where few are left single ones show. Not of points. */
     double dimming;
     size_t count;
     const double (*points)[3]; /* m, `count` of them: where particles start, in place of shape and density, which are
                                   not read; NULL: those */
     uint64_t seed;             /* the same particles for the same description, on every machine */
     nebel_particle_profile profile;
-    double radius_range
-        [2]; /* m, smallest and largest radius, 1e-15 to 1e15 (GAUSSIAN: 3e-15); as many of one octave as of the
-                       next. Both 0: 0.05, 0.2 */
+    /* m, smallest and largest radius, 1e-15 to 1e15 (GAUSSIAN: 3e-15); as many of one octave as of the next. Both 0: 0.05,
+     * 0.2. */
+    double radius_range[2];
     double absorption[3]; /* 1/m at a particle's centre, 0 to 1e9 */
     double emission[3];   /* radiance per metre at a particle's centre, 0 to 1e9, with its color */
-    const double (
-        *colors)[3]; /* factors of emission, >= 0, which drift through the cloud from the first to the last; NULL: 1 */
+    /* Factors of emission, >= 0, which drift through the nebula from the first to the last; NULL: 1. */
+    const double (*colors)[3];
     size_t color_count;
     double turbulence;       /* m, 0 to 1e15: how far eddies carry particles; 0: not at all */
     double turbulence_scale; /* m, 1e-15 to 1e15: the largest eddies, and how fast colours change. 0: a quarter of the

@@ -10,11 +10,11 @@
 extern "C" {
 #endif
 
-/* A place of fog. */
+/* A point in fog. */
 typedef struct nebel_sample_point {
     double position[3]; /* m */
-    double
-        distance; /* m from where its ray starts, >= 0, for `start` and `cutoff` of volumes; < 0: these do not count */
+    /* m from where its ray starts, >= 0, for `start` and `cutoff` of volumes; < 0: these do not count. */
+    double distance;
 } nebel_sample_point;
 
 /* What all fog together is at a place. Without `emission` a path of light ends or is scattered there. */

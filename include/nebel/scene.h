@@ -121,8 +121,8 @@ typedef struct nebel_planet {
     uint32_t cloud_layer_count;
     const nebel_clouds *clouds; /* the scene's; NULL until nebel_load_scene_planets, and where there are no layers */
 
-    nebel_textured_planet_desc
-        textured_desc; /* LAYERS: a day is counted in frames; maps are the scene's; no allocator and log */
+    /* TEXTURED: periods are counted in frames; maps are the scene's; no allocator and log. */
+    nebel_textured_planet_desc textured_desc;
     const nebel_textured_planet *textured; /* the scene's; NULL until nebel_load_scene_planets */
 } nebel_planet;
 
