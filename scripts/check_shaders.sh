@@ -59,7 +59,7 @@ try_opengl() {
         printf 'uniform highp sampler2D opaque;\n#define NEBEL_OPAQUE_DEPTH(at) texture(opaque, at).x\n'
         text "$1"
         printf 'in highp vec3 place; out highp vec4 color;\nvoid main()\n{%s\n' "$calls"
-        printf '    color = vec4(light.transmittance + light.in_scattering, 1.0);\n}\n'
+        printf '    color = vec4(transfer.transmittance + transfer.in_scattering, 1.0);\n}\n'
     } >"$file.frag"
     verdict "$1 $3" glslangValidator "$file.frag"
 }
@@ -103,7 +103,7 @@ layout(location = 0) out vec4 color;
 GLSL
         printf '%b' "$1"
         text glsl_450
-        printf 'void main()\n{%s\n    color = vec4(light.transmittance + light.in_scattering, 1.0);\n}\n' "$calls"
+        printf 'void main()\n{%s\n    color = vec4(transfer.transmittance + transfer.in_scattering, 1.0);\n}\n' "$calls"
     } >"$file.frag"
     verdict "glsl_450 $1" glslangValidator -V "$file.frag" -o "$file.spv"
 }
@@ -136,7 +136,7 @@ HLSL
         printf '%b' "$1"
         text hlsl
         printf 'float4 main(float3 place : TEXCOORD0) : SV_Target\n{%s\n' "$calls"
-        printf '    return float4(light.transmittance + light.in_scattering, 1.0);\n}\n'
+        printf '    return float4(transfer.transmittance + transfer.in_scattering, 1.0);\n}\n'
     } >"$file.hlsl"
     verdict "hlsl $1" glslangValidator -D -S frag -e main -V "$file.hlsl" -o "$file.spv"
 }
