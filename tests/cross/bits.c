@@ -46,7 +46,7 @@ static nebel_volume_desc make_volume(int number)
     v.shape.radius = uniform(1, 3);
     v.density.scale_height = uniform(.5, 3);
     v.density.sigma = uniform(1, 2);
-    v.density.distance = uniform(.2, 1);
+    v.density.edge_width = uniform(.2, 1);
     const int is_round = v.shape.type == NEBEL_SHAPE_SPHERE || v.shape.type == NEBEL_SHAPE_ELLIPSOID;
     if (v.density.type == NEBEL_DENSITY_RADIAL && !is_round) v.density.type = NEBEL_DENSITY_CONSTANT;
     place(v.shape.center, 3);

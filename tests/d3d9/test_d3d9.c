@@ -183,7 +183,7 @@ static double worst_of(const nebel_d3d9_fog *fog, const d3d9_vertex *vertices, c
     double worst = 0;
     for (int i = 0; i < MOST_PROCESSED; i++) {
         nebel_d3d9_vertex vertex = {.specular_alpha = (vertices[i].specular >> 24) / 255.};
-        to_camera(vertices[i].place, vertex.place);
+        to_camera(vertices[i].place, vertex.position);
         const double f = nebel_compute_d3d9_vertex_factor(fog, &vertex);
         worst = fmax(worst, fabs((processed[i].specular >> 24) - 255 * f));
     }
@@ -295,7 +295,7 @@ static void test_range_fog_draws_the_distance_of_vertices(void **state)
         for (uint32_t i = 0; i < 12; i++) {
             const float z = places[i / 2][0], half_side = places[i / 2][1];
             const nebel_d3d9_fog fog = {1, BLUE, 0, mode, 2, 10, .2f, i % 2};
-            const nebel_d3d9_vertex vertex = {.place = {(double)half_side, (double)half_side, (double)z}};
+            const nebel_d3d9_vertex vertex = {.position = {(double)half_side, (double)half_side, (double)z}};
             d3d9_picture picture;
             d3d9_set_fog(&floats, &fog);
             draw_across(&floats, z, half_side);
