@@ -78,7 +78,7 @@ static void compare(const nebel_cloud_layer *desc, double height)
     nebel_destroy_clouds(clouds);
 }
 
-static void test_shade_of_heaps(void **state)
+static void test_shade_of_cumulus(void **state)
 {
     (void)state;
     static const double heights[] = {60, 30, 10};
@@ -91,6 +91,6 @@ static void test_shade_of_heaps(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_shade_of_heaps)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_shade_of_cumulus)};
     return cmocka_run_group_tests(tests, make_air, free_air);
 }

@@ -384,7 +384,7 @@ static const char *fault_of(const nebel_tessellation_desc *desc, const nebel_tri
 {
     if (!nb_allocator_is_valid(&desc->allocator)) return "the allocator needs both functions or neither";
     if (desc->channel < 0 || desc->channel > 2) return "channel is none of 0, 1, 2";
-    if (desc->max_depth > 48) return "deepest is more than 48";
+    if (desc->max_depth > 48) return "max_depth is more than 48";
     if (given->position_stride != 0 && given->position_stride < 12) return "position_stride is less than 12";
     if ((given->vertex_count > 0 && given->positions == NULL) || (given->triangle_count > 0 && given->indices == NULL))
         return "positions and indices must not be NULL";

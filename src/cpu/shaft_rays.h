@@ -34,7 +34,7 @@ void nb_shafts_clip(const nb_lit_box *box, const nb_rays *rays, double advance, 
  * memory is out. */
 int nb_shafts_keep(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_shaft_rays *rays);
 
-/* The toggles of a packet, of the shadows that were kept and the last one of each ray; `first` as in nebel_ray_visibility.
+/* The boundaries of a packet, of the shadows that were kept and the last one of each ray; `first` is as `offsets` of nebel_ray_visibility.
  * Returns 0 when memory is out. */
 int nb_shafts_finish(nb_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays, const float *length,
                      double advance, uint32_t *first);

@@ -16,7 +16,8 @@ static nebel_result check(const nebel_scene_data *scene, const nebel_gl_renderer
     }
     if (desc->shadow_map_size != 0 &&
         (desc->shadow_map_size < LEAST_SHADOW_SIZE || desc->shadow_map_size > MOST_SHADOW_SIZE)) {
-        return nb_fail(log, NEBEL_ERROR_ARGUMENT, "OpenGL renderer: shadow_size is %u; %d to %d, or 0, are possible",
+        return nb_fail(log, NEBEL_ERROR_ARGUMENT,
+                       "OpenGL renderer: shadow_map_size is %u; %d to %d, or 0, are possible",
                        (unsigned)desc->shadow_map_size, LEAST_SHADOW_SIZE, MOST_SHADOW_SIZE);
     }
     return NEBEL_OK;

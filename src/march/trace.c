@@ -129,11 +129,11 @@ static nebel_result explain(const nb_trace_job *job, nebel_result result, size_t
 static const char *fault_of_pieces(const nebel_ray_visibility *pieces, size_t i)
 {
     const uint32_t first = pieces->offsets[i], end = pieces->offsets[i + 1];
-    if (first > end) return "`first` must not descend";
-    if (first < end && pieces->boundaries == NULL) return "toggles must not be NULL";
+    if (first > end) return "`offsets` must not descend";
+    if (first < end && pieces->boundaries == NULL) return "boundaries must not be NULL";
     float last = 0;
     for (uint32_t k = first; k < end; k++) {
-        if (!(pieces->boundaries[k] >= last)) return "toggles must be 0 or more and not descend";
+        if (!(pieces->boundaries[k] >= last)) return "boundaries must be 0 or more and not descend";
         last = pieces->boundaries[k];
     }
     return NULL;
@@ -159,9 +159,9 @@ static nebel_result check_shadows(const nebel_snapshot *snapshot, const nebel_tr
 {
     nebel_result result = NEBEL_OK;
     if (desc->sun_visibility != NULL)
-        result = check_pieces(snapshot, desc->sun_visibility, "sunlit", n, desc->failed_ray);
+        result = check_pieces(snapshot, desc->sun_visibility, "sun_visibility", n, desc->failed_ray);
     for (size_t i = 0; i < snapshot->lamp_count && desc->light_visibility != NULL && result == NEBEL_OK; i++)
-        result = check_pieces(snapshot, &desc->light_visibility[i], "lamplit", n, desc->failed_ray);
+        result = check_pieces(snapshot, &desc->light_visibility[i], "light_visibility", n, desc->failed_ray);
     return result;
 }
 

@@ -382,8 +382,8 @@ static void set_ranks(const nb_cloud_noise *noise, nb_cloud_layer *layer)
 #define LEAST_SHALLOW 0.3f
 #define SHALLOW_PART 0.05f
 
-/* How wide clouds are in sizes of heaps, by (1 - coverage) to the power of 0.6, and how high in parts of the layer's height: means of level
- * and upright ways through them, of 150 and 6,000 in 13 layers each within 30 %. Billows cut heaps so often. */
+/* How wide clouds are in sizes of cells, by (1 - coverage) to the power of 0.6, and how high in parts of the layer's height: means of level
+ * and upright ways through them, of 150 and 6,000 in 13 layers each within 30 %. Worley noise cuts them so often. */
 #define WIDE_PART 0.27
 #define CUTS_PER_WAY 3.2
 #define HIGH_PART 0.43

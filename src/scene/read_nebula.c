@@ -1,4 +1,4 @@
-/* One entry of the section "nebula". Particles are strewn later, by nebel_generate_scene_particles. */
+/* One entry of the section "nebula". nebel_generate_scene_particles makes the particles later. */
 #include "scene/save_places.h"
 #include "scene/scene_internal.h"
 
