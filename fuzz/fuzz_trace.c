@@ -24,7 +24,7 @@ int LLVMFuzzerInitialize(int *count, char ***words)
 }
 
 /* Reads the input in pieces of `piece` bytes; returns whether it is good. */
-static int read_in_pieces(nb_rays *rays, const char *text, size_t size, size_t piece)
+static int read_in_pieces(nb_ray_list *rays, const char *text, size_t size, size_t piece)
 {
     for (size_t at = 0; at < size; at += piece) {
         if (!nb_rays_feed(rays, text + at, size - at < piece ? size - at : piece)) return 0;
@@ -62,7 +62,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (size == 0) return 0;
     const char *const text = (const char *)data + 1;
     const size_t piece = (size_t)data[0] + 1;
-    nb_rays whole = {0}, pieces = {0};
+    nb_ray_list whole = {0}, pieces = {0};
     const int good = read_in_pieces(&whole, text, size - 1, SIZE_MAX / 2);
     demand(good == read_in_pieces(&pieces, text, size - 1, piece));
     demand(whole.count == pieces.count && whole.line == pieces.line);

@@ -39,7 +39,7 @@ static double light_of(const along *media)
 }
 
 /* Clouds are 0, air is 1. */
-static void sample(const along *media, nebel_cloud_transfer *knots, nb_cloud_haze *haze)
+static void sample(const along *media, nebel_cloud_transfer *knots, nb_aerial_nodes *haze)
 {
     knots->count = KNOTS;
     for (int k = 0; k < KNOTS; k++) {
@@ -62,7 +62,7 @@ static void test_what_means_miss_is_told(void **state)
     for (int i = 0; i < TIMES; i++) {
         const along media = throw_media(&numbers);
         nebel_cloud_transfer knots;
-        nb_cloud_haze haze;
+        nb_aerial_nodes haze;
         float over[NEBEL_MAX_CLOUD_NODES];
         sample(&media, &knots, &haze);
         nb_cloud_haze_sum(&knots, 0, &haze, over);
@@ -81,7 +81,7 @@ static void test_the_bound_is_met(void **state)
 {
     (void)state;
     nebel_cloud_transfer knots = {.count = 2, .t = {1, 2}, .transmittance = {1, .25f}};
-    nb_cloud_haze haze;
+    nb_aerial_nodes haze;
     float over[NEBEL_MAX_CLOUD_NODES];
     for (int c = 0; c < 3; c++)
         for (int k = 0; k < 2; k++) {

@@ -43,7 +43,7 @@ static double sent_by_model(const nebel_cloud_lighting *view, double depth, doub
             const double way = (k + .5) * step, x = is_above ? way * out : depth - way * out;
             const nb_cloud_depths depths = {(float)(x / cosine), (float)((depth - x) / cosine), (float)x,
                                             (float)(depth - x)};
-            const nb_cloud_parts parts = nb_cloud_parts_of(layer, &depths, &sight);
+            const nb_cloud_irradiance parts = nb_cloud_parts_of(layer, &depths, &sight);
             const nb_cloud_source s = nb_cloud_source_of(&ray, 0, &parts, &white);
             radiance += step * exp(-apart * way) * (double)s.often[1];
             if (is_above) radiance += step * exp(-way) * (double)s.once[1];
@@ -88,9 +88,9 @@ static void test_light_of_slabs(void **state)
 }
 
 /* As of a piece of a ray. */
-static float sun_depth_of(nebel_cloud_workspace *workspace, const double place[3], const nb_cloud_grain *grain)
+static float sun_depth_of(nebel_cloud_workspace *workspace, const double place[3], const nb_cloud_resolution *grain)
 {
-    nb_cloud_asked asked = {.place = {place[0], place[1], place[2]}, .grain = *grain};
+    nb_cloud_depth_query asked = {.place = {place[0], place[1], place[2]}, .grain = *grain};
     nb_cloud_find_depths(workspace, 1, &asked);
     return asked.depths.sun;
 }
@@ -105,7 +105,7 @@ static void test_ways_to_the_sun(void **state)
     nebel_cloud_workspace *workspace;
     nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     const double *sun = view->sun.direction;
-    const nb_cloud_grain grain = {.width = 6, .first = 16, .wide = 100};
+    const nb_cloud_resolution grain = {.width = 6, .first = 16, .wide = 100};
     uint64_t numbers = 17;
     double sum[2] = {0, 0}, bias[2] = {0, 0};
     int between = 0;
@@ -153,7 +153,7 @@ static void test_ways_to_a_sun_below_level(void **state)
         const nebel_ray ray = {{0, 900, z}, {sun[0], sun[1], sun[2]}, HUGE_VAL};
         const double first = -log(brute_force(clouds, &ray, 0, 95e3, 20)),
                      truth = first - log(brute_force(clouds, &ray, 95e3, 260e3, 20));
-        const double near = (double)sun_depth_of(workspace, from, &(nb_cloud_grain){6, 16, 100, 0}),
+        const double near = (double)sun_depth_of(workspace, from, &(nb_cloud_resolution){6, 16, 100, 0}),
                      far = (double)nb_cloud_sun_depth_at(workspace, from, 100);
         if (i == 0)
             print_message(

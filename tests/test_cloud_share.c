@@ -13,7 +13,7 @@ static int at(int x, int y)
 }
 
 typedef struct picture {
-    nb_cloud_block block;
+    nb_cloud_pixel_block block;
     nebel_cloud_transfer knots[ALL], truth[ALL];
     int is_asked[ALL];
 } picture;

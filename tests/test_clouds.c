@@ -19,7 +19,7 @@
 /* In the middle of a layer's height. */
 static int is_cloud(const nebel_clouds *clouds, const nb_cloud_layer *layer, const double unit[3])
 {
-    nb_cloud_looks looks = {.count = 1};
+    nb_cloud_density_query looks = {.count = 1};
     for (int c = 0; c < 3; c++) looks.place[c][0] = (layer->low + layer->high) / 2 * unit[c];
     nb_cloud_look_alone(clouds->kernel, &clouds->noise, layer, &looks);
     return looks.whole[0] > 0;

@@ -222,7 +222,7 @@ static void transmittance_has_the_bits_that_it_has_alone(void **state)
 /* ---- the lattice ----------------------------------------------------------------------------- */
 
 /* What the kernels make of its numbers in one column: see trace_sun_lattice.h. */
-static double in_lattice(const nb_grid_lattice *l, const double at[3], double *deviation)
+static double in_lattice(const nb_sun_lattice *l, const double at[3], double *deviation)
 {
     int first[3];
     double share[3], sum = 0;
@@ -243,7 +243,7 @@ static double in_lattice(const nb_grid_lattice *l, const double at[3], double *d
     return l->step * sum;
 }
 
-static double by_lattice(const nb_grid_lattice *l, const double cell[3], const double leaves[3], double *deviation)
+static double by_lattice(const nb_sun_lattice *l, const double cell[3], const double leaves[3], double *deviation)
 {
     double at[3] = {0, 0, cell[l->axis]};
     for (int s = 0; s < 2; s++) at[s] = (cell[l->side[s]] - l->lean[s] * cell[l->axis]) * l->per_cell - l->first[s];
@@ -264,7 +264,7 @@ static void lattices_say_how_far_they_are_off(void **state)
         const nebel_allocator heap = nb_resolve_allocator(&(nebel_allocator){0});
         double way[3];
         for (int a = 0; a < 3; a++) way[a] = c.sun[a] * c.rate[a];
-        nb_grid_lattice *l = nb_grid_lattice_make(c.grid, &heap, way, (nb_lattice_limit){2, (size_t)1 << 25, 1});
+        nb_sun_lattice *l = nb_grid_lattice_make(c.grid, &heap, way, (nb_sun_lattice_limit){2, (size_t)1 << 25, 1});
         assert_non_null(l);
         for (int n = 0; n < PLACES; n++, places++) {
             double place[3], cell[3], leaves[3], length, deviation;

@@ -137,7 +137,7 @@ static void take_stretch(const nb_solid *solid, stretch_ends *e)
     at[(*count)++] = solid->leave;
 }
 
-static void walk_lines(const nb_mask *mask, const nb_mask_lines *lines, stretch_ends *e)
+static void walk_lines(const nb_alpha_mask *mask, const nb_mask_lines *lines, stretch_ends *e)
 {
     nb_mask_walk walk;
     memset(e->count, 0, sizeof e->count);
@@ -148,7 +148,7 @@ static void walk_lines(const nb_mask *mask, const nb_mask_lines *lines, stretch_
 }
 
 /* How many places of a line its stretches and nb_mask_is_hole disagree about, but for those near an end. */
-static size_t compare_line(const nb_mask *mask, const nb_mask_lines *lines, int line, const stretch_ends *e,
+static size_t compare_line(const nb_alpha_mask *mask, const nb_mask_lines *lines, int line, const stretch_ends *e,
                            uint64_t *numbers, size_t *places)
 {
     const double *from[2] = {&lines->from[0][line], &lines->from[1][line]};
@@ -171,7 +171,7 @@ static size_t compare_line(const nb_mask *mask, const nb_mask_lines *lines, int 
 }
 
 /* Of a packet whose second line is not asked for, and whose third is too long. */
-static size_t compare_lines(const nb_mask *mask, uint64_t *numbers, size_t *places)
+static size_t compare_lines(const nb_alpha_mask *mask, uint64_t *numbers, size_t *places)
 {
     static stretch_ends e;
     nb_mask_lines lines;
@@ -204,7 +204,7 @@ static void a_line_is_cut_where_alpha_passes_the_cutoff(void **state)
         const nebel_texture texture = {width, height, texels[0]};
         const nebel_scene_data scene = {.texture_count = 1, .textures = &texture};
         const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
-        nb_mask mask;
+        nb_alpha_mask mask;
         for (int i = 0; i < WIDE * HIGH; i++) {
             const int x = i % WIDE, y = i / WIDE, inside = hypot(x - 20, y - 15) < 11 && hypot(x - 22, y - 17) > 4;
             texels[i][3] = kind == 0 ? (uint8_t)(inside ? 255 : 0) : (uint8_t)dice(&numbers, 0, 256);

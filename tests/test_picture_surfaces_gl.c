@@ -196,7 +196,7 @@ static void test_small_scenes(void **state)
 
 static void ray_of_pixel(const nebel_camera *camera, uint32_t x, uint32_t y, double origin[3], double direction[3])
 {
-    nb_axes axes;
+    nb_camera_axes axes;
     const double u = 2 * (x + .5) / 32 - 1, v = 1 - 2 * (y + .5) / 24, h = tan(camera->vertical_fov * pi / 360);
     assert_int_equal(nb_camera_find_axes(camera, NULL, &axes), NEBEL_OK);
     for (int i = 0; i < 3; i++) {

@@ -29,14 +29,15 @@ static void expect_near(const char *what, double got, double wanted, double rela
 /* ---- optical depth --------------------------------------------------------------------------- */
 
 /* One kind of air that takes 1/m at the ground. */
-static nb_airs make_airs(double radius, double top, double scale)
+static nb_air_components make_airs(double radius, double top, double scale)
 {
-    return (nb_airs){.radius = radius, .top = top, .airs = {{.extinction = {1, 1, 1}, .scale = scale}}, .count = 1};
+    return (nb_air_components){
+        .radius = radius, .top = top, .airs = {{.extinction = {1, 1, 1}, .scale = scale}}, .count = 1};
 }
 
-static nb_track track_from(double radius, double zenith)
+static nb_atmosphere_ray track_from(double radius, double zenith)
 {
-    return (nb_track){radius, radius * cos(zenith * DEGREES)};
+    return (nb_atmosphere_ray){radius, radius * cos(zenith * DEGREES)};
 }
 
 /* Chapman's function at X: e^-height over a planet whose radius is X scale heights. Below the horizon T12 counts as if
@@ -92,8 +93,8 @@ static void lengths_are_those_of_T13(void **state)
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         const double *row = rows[i];
-        const nb_airs airs = make_airs(6360, 6460, row[0]);
-        const nb_track track = track_from(6360 + row[1], row[2]);
+        const nb_air_components airs = make_airs(6360, 6460, row[0]);
+        const nb_atmosphere_ray track = track_from(6360 + row[1], row[2]);
         const double end = fmin(nb_track_enter(track, airs.radius), nb_track_leave(track, airs.top));
         double depth[3];
         nb_track_depth(&airs, track, end, depth);
@@ -106,11 +107,11 @@ static void lengths_are_those_of_T13(void **state)
 static void pieces_add_up(void **state)
 {
     (void)state;
-    nb_airs airs = make_airs(6360, 6460, 8);
-    airs.airs[1] = (nb_air){.extinction = {2, 0, 1}, .center = 25, .width = 15};
+    nb_air_components airs = make_airs(6360, 6460, 8);
+    airs.airs[1] = (nb_air_component){.extinction = {2, 0, 1}, .center = 25, .width = 15};
     airs.count = 2;
     for (int i = 0; i < 1000; i++) {
-        const nb_track track = track_from(6361 + 97.0 * (i % 17) / 17, 93.0 * (i % 31) / 31);
+        const nb_atmosphere_ray track = track_from(6361 + 97.0 * (i % 17) / 17, 93.0 * (i % 31) / 31);
         const double end = fmin(nb_track_enter(track, airs.radius), nb_track_leave(track, airs.top));
         const double cut = end * (i % 13) / 13;
         double whole[3], first[3], rest[3];
@@ -172,17 +173,17 @@ static void gain_is_that_of_T31(void **state)
                                      {10000, 0.09454518608437013, 0.17501879121877703, 0.32030411574217416},
                                      {50000, 0.06237947042135505, 0.10835963614682466, 0.21987139072115106}};
     nebel_atmosphere *earth = make(nebel_lookup_atmosphere("earth"));
-    const nb_airs *airs = &earth->airs;
+    const nb_air_components *airs = &earth->airs;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         const double radius = airs->radius + rows[i][0], horizon = -sqrt(1 - pow(airs->radius / radius, 2));
         double sum[3] = {0, 0, 0};
         for (int k = 0; k < 2 * 8 * 16; k++) { /* from the horizon up and down, denser near it */
-            const nb_rule *rule = &earth->rule;
+            const nb_gauss_rule *rule = &earth->rule;
             const double part = (k / 16 + 0.5 * (1 + rule->nodes[k % 8])) / 16,
                          span = k % 16 < 8 ? 1 - horizon : -1 - horizon;
             const double weight = 0.5 / 16 * rule->weights[k % 8] * 3 * part * part * fabs(span);
-            const nb_track track = {radius, radius * (horizon + span * part * part * part)};
-            nb_path path;
+            const nb_atmosphere_ray track = {radius, radius * (horizon + span * part * part * part)};
+            nb_ray_nodes path;
             nb_path_lay(airs, NULL, rule, track,
                         fmin(nb_track_enter(track, airs->radius), nb_track_leave(track, airs->top)), 0, NULL, &path);
             for (int n = 0; n < path.count; n++)
@@ -202,11 +203,11 @@ static void gain_is_that_of_T31(void **state)
 /* Scattered once, of green (1) or another colour. */
 static double gather(const nebel_atmosphere *atmosphere, double height, double zenith, double sun, int c)
 {
-    const nb_track track = track_from(atmosphere->airs.radius + height, zenith);
+    const nb_atmosphere_ray track = track_from(atmosphere->airs.radius + height, zenith);
     const double end =
         fmin(nb_track_enter(track, atmosphere->airs.radius), nb_track_leave(track, atmosphere->airs.top));
-    const nb_aspect aspect = {cos(zenith * DEGREES), cos((zenith - sun) * DEGREES), cos(sun * DEGREES)};
-    nb_gathered gathered;
+    const nb_moment_basis aspect = {cos(zenith * DEGREES), cos((zenith - sun) * DEGREES), cos(sun * DEGREES)};
+    nb_in_scattered gathered;
     double once[3];
     nb_gather(atmosphere, &atmosphere->rule, track, aspect, 1, &end, &gathered);
     nb_gathered_once(atmosphere, &gathered, aspect.sun, once);
@@ -224,7 +225,7 @@ static void light_is_that_of_T40(void **state)
                        {.scattering = {0, 1.5e-6, 0}, .absorption = {0, 0.5e-6, 2e-6}, .scale_height = 3e4}},
         .component_count = 2};
     nebel_atmosphere *small = make(&desc);
-    const nb_track level = {1.4e6, 0}, up = {1.4e6, 1.4e6};
+    const nb_atmosphere_ray level = {1.4e6, 0}, up = {1.4e6, 1.4e6};
     double depth[3];
     expect_near("up", nb_track_leave(up, small->airs.top), 1e5, 1e-12);
     expect_near("level", nb_track_leave(level, small->airs.top), 538516.4807134504, 1e-12);
@@ -238,7 +239,7 @@ static void light_is_that_of_T40(void **state)
         .absorption = {1.2e-6}, .profile = NEBEL_COMPONENT_TENT, .center_height = 2.5e5, .half_width = 2.5e5};
     desc.components[1] = (nebel_atmosphere_component){.scattering = {0, 1e-6, 0}, .scale_height = 1e15};
     nebel_atmosphere *odd = make(&desc);
-    nb_track_depth(&odd->airs, (nb_track){1e6, 1e6}, 5e5, depth);
+    nb_track_depth(&odd->airs, (nb_atmosphere_ray){1e6, 1e6}, 5e5, depth);
     expect_near("layer", exp(-depth[0]), 0.7408182206817179, 1e-9);
     nb_track_depth(&odd->airs, level, 538516.4807134504, depth);
     expect_near("even", exp(-depth[1]), 0.5836134122275815, 1e-8);
@@ -278,7 +279,7 @@ static void add_ground(const nebel_atmosphere *atmosphere, const nebel_sun *sun,
                        const nebel_transfer *transfer, double once[3], double all[3])
 {
     const double radius = atmosphere->airs.radius, height = ray->origin[1];
-    const nb_track track = {radius + height, (radius + height) * ray->direction[1]};
+    const nb_atmosphere_ray track = {radius + height, (radius + height) * ray->direction[1]};
     const double way = nb_track_enter(track, radius);
     if (!(way < HUGE_VAL)) return;
     double place[3], up[3], cosine = 0;
@@ -312,13 +313,13 @@ static void skies_are_those_of_T41(void **state)
                                    {sin(zenith) * cos(azimuth), cos(zenith), sin(zenith) * sin(azimuth)},
                                    (double)INFINITY};
             const nebel_transfer transfer = trace(earth, &sun, ray);
-            const nb_track track = {earth->airs.radius + ray.origin[1],
-                                    (earth->airs.radius + ray.origin[1]) * cos(zenith)};
+            const nb_atmosphere_ray track = {earth->airs.radius + ray.origin[1],
+                                             (earth->airs.radius + ray.origin[1]) * cos(zenith)};
             const double cosine = ray.direction[0] * sun.direction[0] + ray.direction[1] * sun.direction[1];
-            nb_gathered gathered;
+            nb_in_scattered gathered;
             const double end = fmin(nb_track_enter(track, earth->airs.radius), nb_track_leave(track, earth->airs.top));
             double once[3];
-            nb_gather(earth, &earth->rule, track, (nb_aspect){cos(zenith), cosine, cos(low)}, 1, &end, &gathered);
+            nb_gather(earth, &earth->rule, track, (nb_moment_basis){cos(zenith), cosine, cos(low)}, 1, &end, &gathered);
             nb_gathered_once(earth, &gathered, cosine, once);
             double all[3];
             memcpy(all, transfer.in_scattering, sizeof all);
@@ -353,11 +354,11 @@ static void twilights_agree(void **state)
         for (int i = 0; i < 16; i++) {
             const double zenith = views[i / 2][0] * DEGREES, turn = views[i / 2][1] * DEGREES,
                          low = (90 + depths[s]) * DEGREES;
-            const nb_track track = track_from(fast->airs.radius + (i % 2 ? 1e4 : 10), views[i / 2][0]);
+            const nb_atmosphere_ray track = track_from(fast->airs.radius + (i % 2 ? 1e4 : 10), views[i / 2][0]);
             const double end = nb_track_leave(track, fast->airs.top);
-            const nb_aspect aspect = {cos(zenith), sin(zenith) * cos(turn) * sin(low) + cos(zenith) * cos(low),
-                                      cos(low)};
-            nb_gathered a, b;
+            const nb_moment_basis aspect = {cos(zenith), sin(zenith) * cos(turn) * sin(low) + cos(zenith) * cos(low),
+                                            cos(low)};
+            nb_in_scattered a, b;
             nb_gather(fast, &fast->rule, track, aspect, 1, &end, &a);
             nb_gather(precise, &precise->rule, track, aspect, 1, &end, &b);
             double once[3];
@@ -426,7 +427,7 @@ static void check_furnace(nebel_atmosphere_quality quality)
     for (size_t i = 0; i < sizeof views / sizeof *views; i++) {
         const double angle = views[i][1] * DEGREES, height = views[i][0];
         const nebel_ray ray = {{0, height, 0}, {sin(angle), cos(angle), 0}, (double)INFINITY};
-        const nb_track track = {6.36e6 + height, (6.36e6 + height) * cos(angle)};
+        const nb_atmosphere_ray track = {6.36e6 + height, (6.36e6 + height) * cos(angle)};
         const double way = nb_track_enter(track, 6.36e6);
         double light[3] = {0, 0, 0}, ground[3] = {0, 0, 0};
         nebel_transfer clear = {.error = 0};
@@ -692,7 +693,7 @@ static void parts_may_come_in_any_order(void **state)
     desc.run = run_backwards;
     desc.run_user = &calls;
     nebel_atmosphere *backwards = make(&desc);
-    const nb_scatter *a = &forwards->scatter, *b = &backwards->scatter;
+    const nb_scattering_table *a = &forwards->scatter, *b = &backwards->scatter;
     assert_true(calls > 0);
     assert_memory_equal(a->fields, b->fields, (size_t)(a->heights * a->suns) * sizeof *a->fields);
     assert_memory_equal(a->ground, b->ground, (size_t)a->suns * sizeof *a->ground);
@@ -713,11 +714,11 @@ static void expect_same_light(int count, const nb_node_light *a, const nb_node_l
 /* At nodes of rays up, down and level, by day and in twilight. */
 static void try_kernel(const nebel_atmosphere *atmosphere, nb_gather_fn *kernel)
 {
-    const nb_airs *airs = &atmosphere->airs;
+    const nb_air_components *airs = &atmosphere->airs;
     for (int i = 0; i < 60; i++) {
-        const nb_track track = track_from(airs->radius + 1e4 * (i % 4), 80 + i % 5 * 4);
+        const nb_atmosphere_ray track = track_from(airs->radius + 1e4 * (i % 4), 80 + i % 5 * 4);
         const double end = fmin(nb_track_enter(track, airs->radius), nb_track_leave(track, airs->top));
-        nb_path path;
+        nb_ray_nodes path;
         nb_node_light light, same;
         nb_path_lay(airs, NULL, &atmosphere->rule, track, end, 0, NULL, &path);
         const nb_gather_job job = {

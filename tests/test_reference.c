@@ -325,10 +325,10 @@ static estimate measure_flux(const layer *l, int above, uint32_t paths)
                                    .extinction = {l->depth / 10, l->depth / 10, l->depth / 10},
                                    .albedo = {l->albedo, l->albedo, l->albedo}};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, &fog, 1);
-    static nb_lone_ray lone;
+    static nb_single_ray lone;
     static const nb_geometry nothing;
     static const nebel_scene_data no_lamps;
-    const nb_path_world world = {.media.fog = snapshot,
+    const nb_path_scene world = {.media.fog = snapshot,
                                  .scene = &no_lamps,
                                  .geometry = &nothing,
                                  .to_sun = {sqrt(1 - l->sun * l->sun), l->sun, 0},
@@ -435,12 +435,12 @@ static void variances_are_those_of_T38(void **state)
         if (i > 0 && !nb_test_tries((size_t)i, 3)) continue;
         nebel_snapshot *fog = loosely_bounded_fog(cases[i].part);
         const nb_media media = {.fog = fog};
-        const nb_track track = {.media = &media, .ray = {{0, 0, 0}, {0, 0, 1}, cases[i].depth / cases[i].part}};
+        const nb_tracker track = {.media = &media, .ray = {{0, 0, 0}, {0, 0, 1}, cases[i].depth / cases[i].part}};
         const double expected = exp(-cases[i].depth), variance[2] = {cases[i].delta, cases[i].ratio};
         double sum[2] = {0}, square[2] = {0};
-        nb_chance chance = nb_chance_of(1, 2, 3, (uint32_t)i);
+        nb_rng chance = nb_chance_of(1, 2, 3, (uint32_t)i);
         for (int n = 0; n < FLIGHTS; n++) {
-            nb_flight flight;
+            nb_free_flight flight;
             double weight[2];
             assert_int_equal(nb_track_fly(&track, &chance, &flight), NEBEL_OK);
             assert_int_equal(nb_track_transmittance(&track, &chance, &weight[1]), NEBEL_OK);

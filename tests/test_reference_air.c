@@ -201,11 +201,11 @@ static const layer layers[] = {
  * the flux over pi. */
 static estimate measure_flux(const globe *g, const layer *l, int above, uint32_t paths)
 {
-    static nb_lone_ray lone;
+    static nb_single_ray lone;
     static nb_planet_medium medium;
     static const nb_geometry nothing;
     nb_planet_medium_set(&medium, &g->planet, 0);
-    const nb_path_world world = {.media = {.planets = &medium, .planet_count = 1},
+    const nb_path_scene world = {.media = {.planets = &medium, .planet_count = 1},
                                  .scene = &g->scene,
                                  .geometry = &nothing,
                                  .to_sun = {sqrt(1 - l->sun * l->sun), l->sun, 0},

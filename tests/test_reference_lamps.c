@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const nebel_light point = {.position = {10, 5, 0}, .intensity = {100, 100, 100}};
-static const nb_meeting nothing = {.t = HUGE_VAL};
+static const nb_path_vertex nothing = {.t = HUGE_VAL};
 
 /* ---- paths ----------------------------------------------------------------------------------- */
 
@@ -21,13 +21,13 @@ typedef struct tally {
 typedef struct trial {
     nebel_scene_data scene;
     nb_geometry geometry;
-    nb_path_world world;
+    nb_path_scene world;
 } trial;
 
 static void start(trial *t, const nebel_light *lamps, size_t count, const nebel_volume_desc *volume)
 {
     *t = (trial){.scene = {.light_count = count, .lights = lamps}};
-    t->world = (nb_path_world){.media.fog = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, volume, 1),
+    t->world = (nb_path_scene){.media.fog = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, volume, 1),
                                .scene = &t->scene,
                                .geometry = &t->geometry,
                                .is_grey = 1,
@@ -44,9 +44,9 @@ static nebel_volume_desc white_fog(double extinction)
     return (nebel_volume_desc){.extinction = {extinction, extinction, extinction}, .albedo = {1, 1, 1}};
 }
 
-static void follow(const trial *t, const nebel_ray *eye, const nb_meeting *at, double weight, tally *all)
+static void follow(const trial *t, const nebel_ray *eye, const nb_path_vertex *at, double weight, tally *all)
 {
-    static nb_lone_ray lone;
+    static nb_single_ray lone;
     nb_path_light light;
     const uint32_t number[4] = {all->count++};
     assert_int_equal(nb_path_trace(&t->world, &(nb_path_eye){.ray = *eye, .first = *at}, number, &lone, &light),
@@ -71,7 +71,7 @@ static tally see_airlight(double extinction, const nebel_light *lamp, double len
     enum { PATHS = 40000 };
     const nebel_volume_desc fog = white_fog(extinction);
     const nebel_ray eye = {{0, 0, 0}, {1, 0, 0}, length};
-    const nb_meeting black = {.t = length};
+    const nb_path_vertex black = {.t = length};
     tally all = {0, 0, 0};
     trial t;
     start(&t, lamp, 1, &fog);
@@ -121,10 +121,10 @@ static void places_are_those_of_T20(void **state)
     const double angle = 15 * test_pi / 180;
     const nebel_light lamp = {.position = {20 * cos(angle), 20 * sin(angle), 0}, .intensity = {1, 1, 1}};
     const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 60};
-    const nb_passing passing = nb_passing_of(&lamp, &ray);
+    const nb_light_pass passing = nb_passing_of(&lamp, &ray);
     for (int i = 0; i < 3; i++) {
         const double t = nb_passing_draw(&passing, chances[i]);
-        const nb_lamp_sight sight = nb_lamp_sight_from(&lamp, (const double[3]){t, 0, 0});
+        const nb_sampled_light sight = nb_lamp_sight_from(&lamp, (const double[3]){t, 0, 0});
         assert_true(fabs(t - places[i]) < 1e-12 * places[i]);
         assert_true(fabs(sight.beam / nb_passing_density(&passing, t) - .5318835164163347) < 1e-12);
     }
@@ -139,7 +139,7 @@ static void places_are_as_dense_as_they_say(void **state)
     for (size_t i = 0; i < sizeof lamps / sizeof *lamps; i++) {
         const nebel_light lamp = {.position = {lamps[i][0], lamps[i][1], 0}, .radius = .25, .intensity = {1, 1, 1}};
         const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 10};
-        const nb_passing passing = nb_passing_of(&lamp, &ray);
+        const nb_light_pass passing = nb_passing_of(&lamp, &ray);
         const double middle = nb_passing_draw(&passing, .3);
         double sum = 0;
         enum { STEPS = 4000 };

@@ -254,7 +254,7 @@ typedef struct steps {
 
 /* Many short pieces, each of air, of fog in sunlight and of fog in the sky's light for itself. How much brighter the sky is than at the
  * origin is for test_render_planet to try. */
-static steps step_along(const world *w, const nb_daylight *daylight, const nebel_snapshot *by_sun,
+static steps step_along(const world *w, const nb_irradiance_table *daylight, const nebel_snapshot *by_sun,
                         const nebel_snapshot *by_sky, nebel_ray ray)
 {
     enum { STEPS = 4000 };
@@ -312,7 +312,7 @@ static void mist_is_lit_by_place(void **state)
     static const struct {
         double height, pitch, sun[3];
     } views[] = {{1.5e6, -1, {.995, .1, 0}}, {2e4, -.1, {0, .05, -1}}, {1e5, -.2, {0, .05, 1}}, {300, 0, {.2, .03, 1}}};
-    static nb_daylight daylight;
+    static nb_irradiance_table daylight;
     for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
         world w;
         make_world(views[v].sun, &w);

@@ -237,7 +237,7 @@ static void daylight_is_that_of_the_air(void **state)
     (void)state;
     static const char *const names[] = {"earth", "mars", "toy"};
     static const double to_sun[3] = {.48, .6, .64}, origin[1][3] = {{0, 0, 0}};
-    static nb_daylight daylight;
+    static nb_irradiance_table daylight;
     for (int n = 0; n < 3; n++) {
         world w;
         make_world(names[n], to_sun, &w);
@@ -313,7 +313,7 @@ static void fog_has_the_sky_from_all_sides(void **state)
     static const char *const names[] = {"earth", "mars"};
     static const double to_sun[3] = {.48, .6, .64};
     static const double heights[] = {.999, .7, .3, .1, .03, 0, -.03, -.1, -.3};
-    static nb_daylight daylight;
+    static nb_irradiance_table daylight;
     for (int n = 0; n < 2; n++) {
         world w;
         make_world(names[n], to_sun, &w);

@@ -8,8 +8,8 @@ enum { SIDE = NB_REGION, PIXELS = SIDE * SIDE };
 /* Both answers for a region. */
 typedef struct test_both {
     nb_region_points points[NB_TOGETHER];
-    nb_seen seen[NB_TOGETHER];
-    nb_rays rays;
+    nb_region_hits seen[NB_TOGETHER];
+    nb_ray_batch rays;
     nb_packets packets;
     nb_hits raster, ray;
     int hits, differences, misses;
@@ -80,7 +80,7 @@ static void compare_picture(nebel_renderer *renderer, const nebel_camera *camera
     assert_int_equal(nb_view_set(&view, camera, width, height, &renderer->log), NEBEL_OK);
     assert_int_equal(nb_geometry_place(geometry, view.position), NEBEL_OK);
     nb_view_place(&view, geometry->origin, geometry->bounds_min, geometry->bounds_max);
-    nb_raster_set(&raster, geometry, &view, &(nb_picture){width, height, nb_sample_range_of(samples)}, 1);
+    nb_raster_set(&raster, geometry, &view, &(nb_raster_target){width, height, nb_sample_range_of(samples)}, 1);
     for (uint32_t top = 0; top + SIDE <= height; top += SIDE) {
         for (uint32_t left = 0; left + SIDE <= width; left += SIDE) {
             for (uint32_t s = 0; s < samples; s++) nb_sample_region(s, samples, &both->points[s]);

@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 /* All lengths half as long is a change of everything after which cells still touch, and portals lie in faces. */
-static const nb_space half = {.unit = .5};
+static const nb_file_units half = {.unit = .5};
 
 enum { MOST = 64 };
 

@@ -64,11 +64,11 @@ static void set_holed(holed *h, uint64_t seed, float (*positions)[3])
 typedef struct trial {
     nb_sun_cells cells;
     nb_shadow_tree tree;
-    nb_shafts shafts;
-    nb_rays rays;
+    nb_sun_shafts shafts;
+    nb_ray_batch rays;
     nb_view view;
     float distance[NB_BATCH];
-    nb_eye eye;
+    nb_eye_visibility eye;
     size_t toggles, shadows, wrong;
 } trial;
 
@@ -378,7 +378,7 @@ static void ends_of_lamplight_are_those_of_visibility(void **state)
     static float positions[3 * TRIANGLES][3];
     static holed h;
     static trial run;
-    static nb_lamp_shafts shafts;
+    static nb_light_shafts shafts;
     (void)state;
     for (uint64_t seed = 0; seed < 12; seed++) {
         uint64_t numbers = 37 * seed + 5;
@@ -551,7 +551,7 @@ static void shafts_are_those_of_small_steps(void **state)
     const nebel_frame_desc frame = {.camera = p.camera, .width = SIDE, .height = SIDE, .samples = 1};
     assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
     double worst = 0, square = 0;
-    static nb_rays rays;
+    static nb_ray_batch rays;
     nb_view view;
     nb_region_points points;
     nb_sample_region(0, 1, &points);
@@ -648,7 +648,7 @@ static void lamp_shafts_are_those_of_small_steps(void **state)
     assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
     double worst = 0, square = 0;
     int shaded = 0;
-    static nb_rays rays;
+    static nb_ray_batch rays;
     nb_view view;
     nb_region_points points;
     nb_sample_region(0, 1, &points);

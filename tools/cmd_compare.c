@@ -51,19 +51,19 @@ static const char examples[] = "Examples:\n"
                                "Exit status: 0 compared, 1 a picture could not be read or written, the sizes\n"
                                "differ or the RMSE is above --fail-above, 2 the call was wrong.\n";
 
-typedef struct settings {
+typedef struct nb_compare_options {
     const char *paths[2];
     const char *output; /* NULL: none */
     const char *channel;
     double amplify, fail_above;
-} settings;
+} nb_compare_options;
 
 /* Two pictures and which of their channels belong together. */
-typedef struct pair {
+typedef struct nb_sample_pair {
     nebel_image images[2];
     uint32_t *channels[2]; /* positions in each, `channel_count` of them */
     uint32_t channel_count;
-} pair;
+} nb_sample_pair;
 
 typedef struct findings {
     double square_sum, peak;
@@ -84,7 +84,7 @@ static int find_channel(const nebel_image *image, const char *name)
 }
 
 /* 0 where one of the pictures has no such channel; *missing says which. */
-static int add_channel(pair *both, const char *name, int *missing)
+static int add_channel(nb_sample_pair *both, const char *name, int *missing)
 {
     for (int i = 0; i < 2; i++) {
         const int position = find_channel(&both->images[i], name);
@@ -96,7 +96,7 @@ static int add_channel(pair *both, const char *name, int *missing)
     return 1;
 }
 
-static int add_color(pair *both)
+static int add_color(nb_sample_pair *both)
 {
     int missing;
     const int found =
@@ -105,7 +105,7 @@ static int add_color(pair *both)
     return found;
 }
 
-static int report_missing(const settings *wanted, const pair *both, int which, const char *name)
+static int report_missing(const nb_compare_options *wanted, const nb_sample_pair *both, int which, const char *name)
 {
     char list[512] = "";
     size_t used = 0;
@@ -117,7 +117,7 @@ static int report_missing(const settings *wanted, const pair *both, int which, c
     return nb_report_failure("compare: %s: has no channel %s; it has%s", wanted->paths[which], name, list);
 }
 
-static int choose_channels(const settings *wanted, pair *both)
+static int choose_channels(const nb_compare_options *wanted, nb_sample_pair *both)
 {
     const uint32_t most = both->images[0].channel_count > 3 ? both->images[0].channel_count : 3;
     for (int i = 0; i < 2; i++) both->channels[i] = calloc(most, sizeof(uint32_t));
@@ -139,7 +139,7 @@ static int choose_channels(const settings *wanted, pair *both)
 
 /* ---- the numbers ----------------------------------------------------------------------------- */
 
-static double sample_of(const pair *both, int which, size_t pixel, uint32_t channel)
+static double sample_of(const nb_sample_pair *both, int which, size_t pixel, uint32_t channel)
 {
     const nebel_image *const image = &both->images[which];
     return (double)image->samples[pixel * image->channel_count + both->channels[which][channel]];
@@ -152,12 +152,12 @@ static double difference_of(double a, double b)
     return same ? 0 : (double)INFINITY;
 }
 
-static size_t pixels_of(const pair *both)
+static size_t pixels_of(const nb_sample_pair *both)
 {
     return (size_t)both->images[0].width * both->images[0].height;
 }
 
-static findings measure(const pair *both)
+static findings measure(const nb_sample_pair *both)
 {
     findings found = {0};
     const size_t pixels = pixels_of(both);
@@ -177,7 +177,7 @@ static findings measure(const pair *both)
     return found;
 }
 
-static double rmse_of(const pair *both, const findings *found)
+static double rmse_of(const nb_sample_pair *both, const findings *found)
 {
     return sqrt(found->square_sum / ((double)pixels_of(both) * both->channel_count));
 }
@@ -193,7 +193,7 @@ static void print_psnr(double peak, double rmse)
     }
 }
 
-static void print_findings(const settings *wanted, const pair *both, const findings *found)
+static void print_findings(const nb_compare_options *wanted, const nb_sample_pair *both, const findings *found)
 {
     const nebel_image *const image = &both->images[0];
     const int is_png = nebel_get_image_format(wanted->paths[0]) == NEBEL_IMAGE_PNG;
@@ -227,7 +227,7 @@ static float shade(double difference, double amplify, nebel_image_format format)
 }
 
 /* The first three channels, or the only one in all three. */
-static void paint(const pair *both, const settings *wanted, float *samples)
+static void paint(const nb_sample_pair *both, const nb_compare_options *wanted, float *samples)
 {
     const nebel_image_format format = nebel_get_image_format(wanted->output);
     const size_t pixels = pixels_of(both);
@@ -240,7 +240,7 @@ static void paint(const pair *both, const settings *wanted, float *samples)
     }
 }
 
-static int write_difference(const pair *both, const settings *wanted, nb_report_listener *listener)
+static int write_difference(const nb_sample_pair *both, const nb_compare_options *wanted, nb_report_listener *listener)
 {
     static const char *const names[] = {"R", "G", "B"};
     const size_t pixels = pixels_of(both);
@@ -259,7 +259,7 @@ static int write_difference(const pair *both, const settings *wanted, nb_report_
 
 /* ---- the command ----------------------------------------------------------------------------- */
 
-static int read_settings(nb_arguments *arguments, settings *wanted)
+static int read_settings(nb_arguments *arguments, nb_compare_options *wanted)
 {
     for (int i = 0; i < 2; i++) wanted->paths[i] = arguments->operands[i];
     wanted->output = arguments->values[OUTPUT];
@@ -273,7 +273,7 @@ static int read_settings(nb_arguments *arguments, settings *wanted)
     return arguments->misused ? nb_report_misuse("compare", "compare: nothing was done") : -1;
 }
 
-static int read_pictures(const settings *wanted, pair *both, nb_report_listener *listener)
+static int read_pictures(const nb_compare_options *wanted, nb_sample_pair *both, nb_report_listener *listener)
 {
     const nebel_scene_desc desc = {.log = nb_report_log(listener)};
     for (int i = 0; i < 2; i++) {
@@ -292,7 +292,7 @@ static int read_pictures(const settings *wanted, pair *both, nb_report_listener 
     return choose_channels(wanted, both);
 }
 
-static int compare(const settings *wanted, pair *both)
+static int compare(const nb_compare_options *wanted, nb_sample_pair *both)
 {
     nb_report_listener listener = {0};
     int status = wanted->output != NULL ? nb_target_check(wanted->output) : NB_DONE;
@@ -312,8 +312,8 @@ static int compare(const settings *wanted, pair *both)
 static int run(int count, char **words)
 {
     nb_arguments arguments;
-    settings wanted = {0};
-    pair both = {0};
+    nb_compare_options wanted = {0};
+    nb_sample_pair both = {0};
     int status = nb_options_parse(&nb_commands_compare, count, words, &arguments);
     if (status < 0) status = read_settings(&arguments, &wanted);
     if (status >= 0) return status;

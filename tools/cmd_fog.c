@@ -60,7 +60,7 @@ typedef struct crew {
     nb_fingerprint start; /* of the records */
     mtx_t lock;
     nb_jobs jobs;
-    nb_meter meter;
+    nb_progress_bar meter;
     double airlight[3]; /* of the last picture */
     int unwritten;      /* how many in a row */
 } crew;

@@ -56,47 +56,47 @@ static const char examples[] = "Examples:\n"
 /* ---- the pictures ---------------------------------------------------------------------------- */
 
 /* What lives as long as all frames. */
-typedef struct studio {
-    const nb_render_call *wanted;
+typedef struct nb_render_state {
+    const nb_render_arguments *wanted;
     nb_report_listener listener;
     nb_load_result loaded;
     nebel_renderer *renderer; /* of the CPU */
-    nb_finer finer;
+    nb_refined_scene finer;
     nebel_cells *cells; /* of the methods of that name */
 #if defined(NEBEL_HAVE_GL)
-    nb_gl_painter painter; /* of OpenGL */
+    nb_gl_offscreen painter; /* of OpenGL */
 #endif
     float *samples[NB_LAYER_COUNT]; /* NULL: not wanted */
     nb_shutter shutter;
     uint32_t sub_frame, sub_frames; /* times of a picture: which is in work, of how many */
     float *interleaved;             /* all planes pixel by pixel; NULL where there is only one */
-    nb_meter meter;
+    nb_progress_bar meter;
     nb_jobs jobs;
     nb_render_out out;
     nb_render_item item; /* in work */
     int has_moved;       /* the fog is that of the time `moved_to`, in frames */
     double moved_to;
-} studio;
+} nb_render_state;
 
 /* Pixels that are rendered at once. */
-static size_t count_pixels(const studio *all)
+static size_t count_pixels(const nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     return (size_t)wanted->width * (all->out.band_rows > 0 ? all->out.band_rows : wanted->height);
 }
 
-static float *allocate_pixels(const studio *all, uint32_t channels)
+static float *allocate_pixels(const nb_render_state *all, uint32_t channels)
 {
     const size_t most = SIZE_MAX / sizeof(float) / channels, pixels = count_pixels(all);
     return pixels <= most ? malloc(pixels * channels * sizeof(float)) : NULL;
 }
 
-static int writes_plane(const nb_render_call *wanted, int which)
+static int writes_plane(const nb_render_arguments *wanted, int which)
 {
-    return which == NB_LAYER_COLOR || (wanted->aov && nb_layer_is_known((nb_layer)which, wanted->gl, wanted->method));
+    return which == NB_LAYER_COLOR || (wanted->aov && nb_layer_is_known((nb_aov)which, wanted->gl, wanted->method));
 }
 
-static uint32_t count_channels(const nb_render_call *wanted)
+static uint32_t count_channels(const nb_render_arguments *wanted)
 {
     uint32_t count = 0;
     for (int i = 0; i < NB_LAYER_COUNT; i++) count += writes_plane(wanted, i) ? nb_layer_kinds[i].channels : 0;
@@ -104,13 +104,13 @@ static uint32_t count_channels(const nb_render_call *wanted)
 }
 
 /* The standard error is told whether it is written or not. */
-static int allocate_planes(studio *all)
+static int allocate_planes(nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     int good = 1;
     for (int i = 0; i < NB_LAYER_COUNT && good; i++) {
         if (!writes_plane(wanted, i) &&
-            (i != NB_LAYER_STANDARD_ERROR || !nb_layer_is_known((nb_layer)i, wanted->gl, wanted->method)))
+            (i != NB_LAYER_STANDARD_ERROR || !nb_layer_is_known((nb_aov)i, wanted->gl, wanted->method)))
             continue;
         all->samples[i] = allocate_pixels(all, nb_layer_kinds[i].channels);
         good = all->samples[i] != NULL;
@@ -125,7 +125,7 @@ static int allocate_planes(studio *all)
                              (unsigned)all->wanted->width, (unsigned)all->wanted->height);
 }
 
-static void free_studio(studio *all)
+static void free_studio(nb_render_state *all)
 {
     for (int i = 0; i < NB_LAYER_COUNT; i++) free(all->samples[i]);
     free(all->interleaved);
@@ -141,7 +141,7 @@ static void free_studio(studio *all)
 }
 
 /* Hardware shows what it has stored. */
-static void show_light(const nb_render_call *wanted, size_t pixels, float *samples)
+static void show_light(const nb_render_arguments *wanted, size_t pixels, float *samples)
 {
     if (nebel_method_blends_stored(wanted->method))
         nebel_encode_srgb(pixels, samples, wanted->exposure, samples);
@@ -150,9 +150,9 @@ static void show_light(const nb_render_call *wanted, size_t pixels, float *sampl
 }
 
 /* The picture of all planes that are wanted. */
-static nebel_image join_planes(studio *all, const char *names[NB_LAYERS_MOST_CHANNELS])
+static nebel_image join_planes(nb_render_state *all, const char *names[NB_LAYERS_MOST_CHANNELS])
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     const nebel_window *const window = &all->item.window;
     const size_t pixels = (size_t)window->width * window->height;
     nebel_image image = {.width = window->width, .height = window->height, .channel_names = names};
@@ -160,7 +160,7 @@ static nebel_image join_planes(studio *all, const char *names[NB_LAYERS_MOST_CHA
     for (int i = 0; i < NB_LAYER_COUNT; i++) {
         if (!writes_plane(wanted, i)) continue;
         if (all->interleaved != NULL)
-            nb_layer_interleave((nb_layer)i, all->samples[i], pixels, image.channel_count, of, all->interleaved);
+            nb_layer_interleave((nb_aov)i, all->samples[i], pixels, image.channel_count, of, all->interleaved);
         for (uint32_t c = 0; c < nb_layer_kinds[i].channels; c++)
             names[image.channel_count++] = nb_layer_kinds[i].names[c];
     }
@@ -169,21 +169,21 @@ static nebel_image join_planes(studio *all, const char *names[NB_LAYERS_MOST_CHA
     return image;
 }
 
-static int write_item(studio *all)
+static int write_item(nb_render_state *all)
 {
     const char *names[NB_LAYERS_MOST_CHANNELS];
     const nebel_image image = join_planes(all, names);
     return nb_render_out_write(&all->out, &all->item, &image);
 }
 
-static void show_share(studio *all, double of_item)
+static void show_share(nb_render_state *all, double of_item)
 {
     nb_jobs_show(&all->jobs, &all->meter, all->out.band_rows > 0 ? "band" : "frame", of_item);
 }
 
 static int show_progress(size_t done, size_t total, void *user)
 {
-    studio *const all = user;
+    nb_render_state *const all = user;
     if (!all->wanted->gl)
         nb_interrupt_listen(); /* from the first call on the library asks again and again; OpenGL seldom */
     nb_jobs_answer(&all->jobs);
@@ -193,9 +193,9 @@ static int show_progress(size_t done, size_t total, void *user)
 }
 
 /* The samples from `first_sample` on, at a time. */
-static nebel_result trace_samples(studio *all, double time, uint32_t first_sample, uint32_t count)
+static nebel_result trace_samples(nb_render_state *all, double time, uint32_t first_sample, uint32_t count)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     const nebel_frame_desc desc = {
         .camera = nebel_get_scene_camera(all->loaded.scene, time),
         .width = wanted->width,
@@ -225,7 +225,7 @@ static nebel_result trace_samples(studio *all, double time, uint32_t first_sampl
 }
 
 /* Puts the fog and the light of the scene to a time. */
-static nebel_result move_to(studio *all, double time)
+static nebel_result move_to(nb_render_state *all, double time)
 {
     if (all->has_moved && all->moved_to == time) return NEBEL_OK;
     const nebel_result result = nb_load_move_fog(&all->loaded, time);
@@ -236,9 +236,9 @@ static nebel_result move_to(studio *all, double time)
 }
 
 /* Each sample at its time, while the shutter is open. */
-static nebel_result trace_motion(studio *all)
+static nebel_result trace_motion(nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     const size_t pixels = (size_t)all->item.window.width * all->item.window.height;
     nb_shutter_begin(&all->shutter);
     for (uint32_t i = 0; i < wanted->samples; i++) {
@@ -253,7 +253,7 @@ static nebel_result trace_motion(studio *all)
     return NEBEL_OK;
 }
 
-static nebel_result trace_frame(studio *all)
+static nebel_result trace_frame(nb_render_state *all)
 {
     return all->wanted->shutter > 0 ? trace_motion(all) : trace_samples(all, all->item.frame, 0, 0);
 }
@@ -267,7 +267,7 @@ static nebel_vertex_desc look_of(nebel_method method, const nebel_scene_data *sc
     return look;
 }
 
-static const nebel_scene_data *surfaces_of(const studio *all)
+static const nebel_scene_data *surfaces_of(const nb_render_state *all)
 {
     return all->wanted->tessellation.max_error > 0 ? &all->finer.data : nebel_get_scene_data(all->loaded.scene);
 }
@@ -287,7 +287,7 @@ static nebel_gl_method gl_method(nebel_method method)
     return methods[method];
 }
 
-static nebel_result draw_frame(studio *all)
+static nebel_result draw_frame(nb_render_state *all)
 {
     const nebel_scene_data *const scene = nebel_get_scene_data(all->loaded.scene);
     const nebel_vertex_desc look = look_of(all->wanted->method, scene);
@@ -319,9 +319,9 @@ static nebel_result draw_frame(studio *all)
     return nb_gl_painter_draw(&all->painter, all->item.frame, &desc, &wanted);
 }
 
-static int open_gl(studio *all)
+static int open_gl(nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     const int status = nb_gl_painter_open(&all->painter, wanted->scene, &all->loaded, surfaces_of(all), wanted->method,
                                           &all->listener);
     if (status != NB_DONE || wanted->quiet) return status;
@@ -344,9 +344,9 @@ static int open_gl(studio *all)
 }
 #endif
 
-static int render_frame(studio *all)
+static int render_frame(nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     if (all->jobs.is_chief) show_share(all, 0);
     all->listener.mode = NB_REPORT_KEEP; /* that the frame was stopped is no news */
     const nebel_result result = wanted->gl ? draw_frame(all) : trace_frame(all);
@@ -357,21 +357,21 @@ static int render_frame(studio *all)
 }
 
 /* Of a picture; bands know their own alone. */
-static void note_spread(const studio *all)
+static void note_spread(const nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     const size_t pixels = (size_t)wanted->width * wanted->height;
     if (all->out.band_rows == 0 && all->samples[NB_LAYER_STANDARD_ERROR] != NULL && !wanted->quiet)
         nb_spread_report(all->samples[NB_LAYER_STANDARD_ERROR], 3 * pixels, wanted->samples);
 }
 
-static int move_fog(studio *all)
+static int move_fog(nb_render_state *all)
 {
     const nebel_result result = all->wanted->shutter > 0 ? NEBEL_OK : move_to(all, all->item.frame);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 
-static int make_item(studio *all)
+static int make_item(nb_render_state *all)
 {
     char what[500];
     (void)snprintf(what, sizeof what, "render: %s", all->wanted->output);
@@ -385,7 +385,7 @@ static int make_item(studio *all)
 }
 
 /* Makes an item, or finds it there, and joins the parts of its file when it was the last one. */
-static int do_item(studio *all, uint64_t number)
+static int do_item(nb_render_state *all, uint64_t number)
 {
     all->item = nb_render_out_item(&all->out, number);
     const int is_there = nb_render_out_has(&all->out, &all->item);
@@ -404,7 +404,7 @@ static const char *name_movers(const nebel_scene_data *scene)
                                                           : ", clouds drift with \"wind\"";
 }
 
-static void note_stillness(const nebel_scene *scene, const nb_render_call *wanted)
+static void note_stillness(const nebel_scene *scene, const nb_render_arguments *wanted)
 {
     const nebel_scene_data *const data = nebel_get_scene_data(scene);
     if (data->turntable_frames > 0 || data->camera_key_count > 1 || data->animated_volume_count > 0 ||
@@ -415,7 +415,7 @@ static void note_stillness(const nebel_scene *scene, const nb_render_call *wante
                       wanted->scene, name_movers(data));
 }
 
-static void warn_of_light(const nebel_scene_data *scene, const nb_render_call *wanted)
+static void warn_of_light(const nebel_scene_data *scene, const nb_render_arguments *wanted)
 {
     if (wanted->method != NEBEL_METHOD_EXACT) return;
     nb_warn_of_darkness(scene, wanted->scene);
@@ -423,7 +423,7 @@ static void warn_of_light(const nebel_scene_data *scene, const nb_render_call *w
 }
 
 /* What the scene has beside its cells is not drawn. */
-static void note_other_fog(const nebel_scene_data *scene, const nb_render_call *wanted)
+static void note_other_fog(const nebel_scene_data *scene, const nb_render_arguments *wanted)
 {
     if (wanted->quiet || (scene->volume_count == 0 && scene->nebula_count == 0)) return;
     nb_report_message("note: %s: --method cells draws the section \"cells\" alone; \"fog\" and \"nebula\" are left out",
@@ -435,9 +435,9 @@ static int takes_cells(nebel_method method)
     return method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_CELLS_PIXEL;
 }
 
-static int make_cells(studio *all)
+static int make_cells(nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     const nebel_scene_data *const scene = nebel_get_scene_data(all->loaded.scene);
     if (!takes_cells(wanted->method)) return NB_DONE;
     if (scene->cells == NULL)
@@ -458,7 +458,7 @@ static double reach_of(nebel_method method, const nebel_factor_desc *factor)
     return factor->start < factor->end ? factor->end - factor->start : (double)INFINITY;
 }
 
-static void note_coarseness(const nebel_scene_data *scene, const nb_render_call *wanted)
+static void note_coarseness(const nebel_scene_data *scene, const nb_render_arguments *wanted)
 {
     nebel_factor_desc factor;
     if (wanted->quiet || !nb_render_takes_factor(wanted->method) || scene->classic->stage != NEBEL_STAGE_VERTEX ||
@@ -472,9 +472,9 @@ static void note_coarseness(const nebel_scene_data *scene, const nb_render_call 
                       wanted->scene, longest, reach);
 }
 
-static int check_classic(const studio *all)
+static int check_classic(const nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     const nebel_scene_data *const scene = nebel_get_scene_data(all->loaded.scene);
     if (wanted->method == NEBEL_METHOD_D3D9 && scene->classic_d3d9 == NULL)
         return nb_report_failure(
@@ -489,9 +489,9 @@ static int check_classic(const studio *all)
     return NB_DONE;
 }
 
-static int choose_method(studio *all)
+static int choose_method(nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     const nebel_scene_data *const scene = nebel_get_scene_data(all->loaded.scene);
     const nebel_cell_stage stage =
         wanted->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL;
@@ -508,14 +508,14 @@ static int choose_method(studio *all)
 }
 
 /* Which of the limits left triangles above the bound. */
-static const char *name_limit(const nb_finer *finer)
+static const char *name_limit(const nb_refined_scene *finer)
 {
     if (finer->deepest_count == 0) return "--tessellate-triangles";
     return finer->deepest_count == finer->over_count ? "--tessellate-depth"
                                                      : "--tessellate-triangles and --tessellate-depth";
 }
 
-static void note_tessellation(const nb_render_call *wanted, const nb_finer *finer)
+static void note_tessellation(const nb_render_arguments *wanted, const nb_refined_scene *finer)
 {
     if (wanted->quiet) return;
     nb_report_message("note: %s: %zu triangles became %zu; the fog's factor is within %.3g of the exact one",
@@ -526,7 +526,7 @@ static void note_tessellation(const nb_render_call *wanted, const nb_finer *fine
                       wanted->scene, finer->over_count, name_limit(finer));
 }
 
-static int refuse_tessellation(const studio *all)
+static int refuse_tessellation(const nb_render_state *all)
 {
     const nebel_scene *const scene = all->loaded.scene;
     const size_t volume = nb_finer_find_unproven(scene, all->wanted->first_frame);
@@ -536,9 +536,9 @@ static int refuse_tessellation(const studio *all)
                              all->listener.kept);
 }
 
-static int tessellate(studio *all)
+static int tessellate(nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     if (wanted->tessellation.max_error == 0) return NB_DONE;
     const nebel_camera camera = nebel_get_scene_camera(all->loaded.scene, wanted->first_frame);
     nebel_tessellation_desc desc = wanted->tessellation;
@@ -555,7 +555,7 @@ static int tessellate(studio *all)
     return NB_DONE;
 }
 
-static int open_renderer(studio *all)
+static int open_renderer(nb_render_state *all)
 {
     nebel_cpu_renderer_desc desc = all->wanted->renderer;
     desc.log = nb_report_log(&all->listener);
@@ -564,7 +564,7 @@ static int open_renderer(studio *all)
 }
 
 /* Before the long work. */
-static int check_count(const studio *all)
+static int check_count(const nb_render_state *all)
 {
     const size_t count = nebel_get_scene_data(all->loaded.scene)->volume_count;
     if (!all->wanted->gl || count <= NEBEL_MAX_PACKED_VOLUMES) return NB_DONE;
@@ -573,9 +573,9 @@ static int check_count(const studio *all)
                              all->wanted->scene, count, NEBEL_MAX_PACKED_VOLUMES);
 }
 
-static int choose_scattering(studio *all)
+static int choose_scattering(nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     nebel_scene *const scene = all->loaded.scene;
     const nebel_diffusion_desc by_default = {0};
     const int is_off = wanted->scattering == NB_SCATTERING_OFF;
@@ -591,9 +591,9 @@ static int choose_scattering(studio *all)
 #define FILM_PIXEL_BYTES 0.5
 #define LOSSLESS_PIXEL_BYTES 3.0
 
-static double count_bytes(const studio *all)
+static double count_bytes(const nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     const double channels = count_channels(wanted);
     double bytes = ((wanted->aov ? 2 : 1) + (wanted->shutter > 0 ? 1 : 0)) * channels * sizeof(float) +
                    (wanted->gl ? GL_PIXEL_BYTES : 0);
@@ -604,9 +604,9 @@ static double count_bytes(const studio *all)
 }
 
 /* Samples and threads take nothing worth counting. */
-static int charge_pictures(studio *all)
+static int charge_pictures(nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     char what[96];
     (void)snprintf(what, sizeof what, "--size: %s of %u x %u pixels", wanted->is_film ? "a film" : "a picture",
                    (unsigned)wanted->width, (unsigned)wanted->height);
@@ -614,9 +614,9 @@ static int charge_pictures(studio *all)
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
 
-static int load(studio *all)
+static int load(nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     int status = nb_load_file(wanted->scene, 1, &all->listener, &all->loaded);
     if (status == NB_DONE) status = nb_render_out_spare(&all->out, nebel_get_scene_data(all->loaded.scene));
     if (status == NB_DONE) status = check_count(all);
@@ -625,9 +625,9 @@ static int load(studio *all)
     return status == NB_DONE ? nb_load_fog(wanted->scene, wanted->first_frame, &all->listener, &all->loaded) : status;
 }
 
-static int set_up(studio *all)
+static int set_up(nb_render_state *all)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     int status = load(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
@@ -640,9 +640,9 @@ static int set_up(studio *all)
     return wanted->gl ? open_gl(all) : open_renderer(all);
 }
 
-static void summarize(const studio *all, double seconds)
+static void summarize(const nb_render_state *all, double seconds)
 {
-    const nb_render_call *const wanted = all->wanted;
+    const nb_render_arguments *const wanted = all->wanted;
     char span[32], count[128] = "";
     const int is_one = !wanted->many_frames && all->out.band_rows == 0 && all->jobs.all_kept == 0;
     nb_meter_write_span(seconds, span, sizeof span);
@@ -654,12 +654,12 @@ static void summarize(const studio *all, double seconds)
 
 static int is_made(void *user, uint64_t item)
 {
-    const studio *const all = user;
+    const nb_render_state *const all = user;
     return nb_render_out_is_made(&all->out, item);
 }
 
 /* Before the items: what all processes need, and whether they agree on what that is. */
-static int prepare(studio *all)
+static int prepare(nb_render_state *all)
 {
     char name[NEBEL_MAX_RECORD + 1];
     int status = nb_render_out_check(&all->out, &all->jobs);
@@ -675,14 +675,15 @@ static int prepare(studio *all)
                          name);
 }
 
-static int render(const nb_render_call *wanted)
+static int render(const nb_render_arguments *wanted)
 {
-    studio all = {.wanted = wanted, .meter = nb_meter_start(wanted->quiet), .listener = {.quiet = wanted->quiet}};
+    nb_render_state all = {
+        .wanted = wanted, .meter = nb_meter_start(wanted->quiet), .listener = {.quiet = wanted->quiet}};
     all.jobs = nb_jobs_of(&wanted->shard);
     all.sub_frames = wanted->shutter > 0 ? wanted->samples : 1;
     int status = nb_jobs_join(&all.jobs);
     if (status != NB_DONE) return status;
-    nb_render_call own = *wanted;
+    nb_render_arguments own = *wanted;
     own.quiet |= !all.jobs.is_chief; /* what one has said need not be repeated */
     all.wanted = &own;
     all.listener.quiet = own.quiet;
@@ -706,7 +707,7 @@ static int render(const nb_render_call *wanted)
 static int run(int count, char **words)
 {
     nb_arguments arguments;
-    nb_render_call wanted = {0};
+    nb_render_arguments wanted = {0};
     int status = nb_options_parse(&nb_commands_render, count, words, &arguments);
     if (status < 0) status = nb_render_call_read(&arguments, &wanted);
     if (status >= 0) return status;

@@ -72,11 +72,11 @@ static const char examples[] = "Examples:\n"
 
 enum { LAST_FRAME = 1000000 };
 
-typedef struct settings {
+typedef struct nb_trace_options {
     nebel_trace_desc trace;
     uint32_t frame;
     int threads;
-} settings;
+} nb_trace_options;
 
 /* ---- reading --------------------------------------------------------------------------------- */
 
@@ -85,7 +85,7 @@ static int report_line(size_t line, const char *problem)
     return nb_report_failure("standard input:%zu: %s", line, problem);
 }
 
-static int read_rays(nb_rays *rays)
+static int read_rays(nb_ray_list *rays)
 {
     enum { PIECE = 1 << 18 };
     char *const piece = malloc(PIECE);
@@ -109,23 +109,23 @@ static int read_rays(nb_rays *rays)
 /* Rays are traced in blocks: whoever is free takes the next one. */
 enum { BLOCK = 1024 };
 
-typedef struct work {
+typedef struct nb_trace_work {
     const nebel_snapshot *fog;
     nebel_trace_desc desc;
-    const nb_rays *rays;
+    const nb_ray_list *rays;
     nebel_transfer *transfers;
     atomic_size_t next_block;
     atomic_size_t first_failed; /* the lowest ray that is an error; the number of rays: none */
-} work;
+} nb_trace_work;
 
-static void note_failure(work *shared, size_t ray)
+static void note_failure(nb_trace_work *shared, size_t ray)
 {
     size_t first = atomic_load(&shared->first_failed);
     while (ray < first && !atomic_compare_exchange_weak(&shared->first_failed, &first, ray)) {
     }
 }
 
-static nebel_result trace(const work *shared, size_t first, size_t count, size_t *failed)
+static nebel_result trace(const nb_trace_work *shared, size_t first, size_t count, size_t *failed)
 {
     nebel_trace_desc desc = shared->desc;
     *failed = 0;
@@ -136,7 +136,7 @@ static nebel_result trace(const work *shared, size_t first, size_t count, size_t
 
 static void trace_blocks(int worker, int count, void *user)
 {
-    work *const shared = user;
+    nb_trace_work *const shared = user;
     (void)worker, (void)count;
     for (;;) {
         const size_t first = BLOCK * atomic_fetch_add(&shared->next_block, 1);
@@ -151,7 +151,7 @@ static void trace_blocks(int worker, int count, void *user)
 }
 
 /* Traces the ray alone once more, to hear what is wrong with it. */
-static int report_ray(const work *shared, size_t ray, nb_report_listener *listener)
+static int report_ray(const nb_trace_work *shared, size_t ray, nb_report_listener *listener)
 {
     size_t failed;
     listener->mode = NB_REPORT_KEEP;
@@ -162,10 +162,10 @@ static int report_ray(const work *shared, size_t ray, nb_report_listener *listen
 }
 
 /* The results, or NULL after a message. */
-static nebel_transfer *trace_all(const nebel_snapshot *fog, const nb_rays *rays, const settings *wanted,
+static nebel_transfer *trace_all(const nebel_snapshot *fog, const nb_ray_list *rays, const nb_trace_options *wanted,
                                  nb_report_listener *listener)
 {
-    work shared = {.fog = fog, .desc = wanted->trace, .rays = rays};
+    nb_trace_work shared = {.fog = fog, .desc = wanted->trace, .rays = rays};
     shared.transfers =
         rays->count < SIZE_MAX / sizeof(nebel_transfer) ? malloc((rays->count + 1) * sizeof(nebel_transfer)) : NULL;
     if (shared.transfers == NULL) {
@@ -188,13 +188,13 @@ static nebel_transfer *trace_all(const nebel_snapshot *fog, const nb_rays *rays,
 enum { COLUMNS = 7, SHARE = 2048, LINE_SIZE = COLUMNS * (NB_SHORTEST_SIZE + 1) };
 
 /* Each worker writes the text of SHARE results, which then go out in order. */
-typedef struct page {
+typedef struct nb_output_page {
     const nebel_transfer *transfers;
     size_t count; /* results on this page */
     nebel_precision precision;
     char *text; /* workers * SHARE * LINE_SIZE */
     size_t sizes[NB_WORKERS_MOST];
-} page;
+} nb_output_page;
 
 static size_t write_number(double number, nebel_precision precision, char *text)
 {
@@ -227,7 +227,7 @@ static size_t write_light(const nebel_transfer *transfer, nebel_precision precis
 
 static void write_share(int worker, int count, void *user)
 {
-    page *const shared = user;
+    nb_output_page *const shared = user;
     (void)count;
     const size_t first = (size_t)worker * SHARE;
     char *const text = shared->text + first * LINE_SIZE;
@@ -239,7 +239,7 @@ static void write_share(int worker, int count, void *user)
 }
 
 /* 0 or the errno of what went wrong. */
-static int write_page(page *shared, int workers)
+static int write_page(nb_output_page *shared, int workers)
 {
     nb_workers_run(workers, write_share, shared);
     int error = 0;
@@ -249,11 +249,11 @@ static int write_page(page *shared, int workers)
     return error;
 }
 
-static int write_lights(const nebel_transfer *transfers, size_t count, const settings *wanted)
+static int write_lights(const nebel_transfer *transfers, size_t count, const nb_trace_options *wanted)
 {
     static const char header[] = "T_r,T_g,T_b,S_r,S_g,S_b,error\n";
     const size_t step = (size_t)wanted->threads * SHARE;
-    page shared = {.precision = wanted->trace.precision, .text = malloc(step * LINE_SIZE)};
+    nb_output_page shared = {.precision = wanted->trace.precision, .text = malloc(step * LINE_SIZE)};
     if (shared.text == NULL) return nb_report_failure("standard output: out of memory");
     nb_shortest_prepare();
     int error = nb_output_write(STDOUT_FILENO, header, sizeof header - 1);
@@ -269,7 +269,7 @@ static int write_lights(const nebel_transfer *transfers, size_t count, const set
 /* ---- the command ----------------------------------------------------------------------------- */
 
 /* -1 to go on, or the exit status. */
-static int read_settings(nb_arguments *arguments, settings *wanted)
+static int read_settings(nb_arguments *arguments, nb_trace_options *wanted)
 {
     static const char *const precisions[] = {"double", "float", NULL};
     const uint32_t threads = nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
@@ -302,7 +302,7 @@ static void note_planets(const nebel_scene_data *scene, const char *path)
                           path);
 }
 
-static int trace_scene(const char *path, settings *wanted, nb_rays *rays)
+static int trace_scene(const char *path, nb_trace_options *wanted, nb_ray_list *rays)
 {
     nb_report_listener listener = {0};
     nb_load_result loaded;
@@ -325,11 +325,11 @@ static int trace_scene(const char *path, settings *wanted, nb_rays *rays)
 static int run(int count, char **words)
 {
     nb_arguments arguments;
-    settings wanted = {0};
+    nb_trace_options wanted = {0};
     int status = nb_options_parse(&nb_commands_trace, count, words, &arguments);
     if (status < 0) status = read_settings(&arguments, &wanted);
     if (status >= 0) return status;
-    nb_rays rays = {0};
+    nb_ray_list rays = {0};
     status = trace_scene(arguments.operands[0], &wanted, &rays);
     nb_rays_free(&rays);
     return status;

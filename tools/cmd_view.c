@@ -44,7 +44,7 @@ static const char examples[] = "Examples:\n"
 #if defined(NEBEL_HAVE_VIEWER)
 enum { SMALLEST_SIDE = 64, LARGEST_SIDE = 8192 };
 
-static void read_size(nb_arguments *arguments, nb_view_settings *wanted)
+static void read_size(nb_arguments *arguments, nb_viewer_options *wanted)
 {
     const char *const text = arguments->values[SIZE];
     const char *const middle = text != NULL ? strchr(text, 'x') : NULL;
@@ -59,7 +59,7 @@ static void read_size(nb_arguments *arguments, nb_view_settings *wanted)
 
 static int view(nb_arguments *arguments)
 {
-    nb_view_settings wanted = {.scene = arguments->operands[0], .width = 1280, .height = 720};
+    nb_viewer_options wanted = {.scene = arguments->operands[0], .width = 1280, .height = 720};
     read_size(arguments, &wanted);
     wanted.exposure = nb_options_number(arguments, EXPOSURE, -20, 20, 0);
     wanted.frame = nb_options_number(arguments, FRAME, 0, 1000000, 0);

@@ -33,7 +33,8 @@ static nebel_result refine_mesh(const nebel_mesh *mesh, const nebel_tessellation
     return NEBEL_OK;
 }
 
-static nebel_result add_mesh(const nebel_snapshot *fog, const nebel_tessellation_desc *desc, size_t i, nb_finer *finer)
+static nebel_result add_mesh(const nebel_snapshot *fog, const nebel_tessellation_desc *desc, size_t i,
+                             nb_refined_scene *finer)
 {
     const nebel_mesh *const mesh = &finer->data.meshes[i];
     nebel_triangles triangles = {.positions = mesh->positions,
@@ -53,10 +54,10 @@ static nebel_result add_mesh(const nebel_snapshot *fog, const nebel_tessellation
 }
 
 nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *fog,
-                           const nebel_tessellation_desc *desc, nb_finer *finer)
+                           const nebel_tessellation_desc *desc, nb_refined_scene *finer)
 {
     const size_t count = scene->mesh_count;
-    *finer = (nb_finer){.data = *scene};
+    *finer = (nb_refined_scene){.data = *scene};
     finer->meshes = calloc(count + 1, sizeof *finer->meshes);
     finer->made = calloc(count + 1, sizeof *finer->made);
     finer->attributes = calloc(count + 1, sizeof *finer->attributes);
@@ -67,7 +68,7 @@ nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *
     return result;
 }
 
-void nb_finer_light(nb_finer *finer, const nebel_scene_data *scene)
+void nb_finer_light(nb_refined_scene *finer, const nebel_scene_data *scene)
 {
     memcpy(finer->data.sun_direction, scene->sun_direction, sizeof scene->sun_direction);
     memcpy(finer->data.sun_irradiance, scene->sun_irradiance, sizeof scene->sun_irradiance);
@@ -104,7 +105,7 @@ size_t nb_finer_find_unproven(const nebel_scene *scene, double frame)
     return proven;
 }
 
-void nb_finer_free(nb_finer *finer)
+void nb_finer_free(nb_refined_scene *finer)
 {
     for (size_t i = 0; i < finer->data.mesh_count; i++) {
         if (finer->made != NULL) nebel_destroy_tessellation(finer->made[i]);
@@ -113,7 +114,7 @@ void nb_finer_free(nb_finer *finer)
     free(finer->meshes);
     free(finer->made);
     free(finer->attributes);
-    *finer = (nb_finer){.triangles = 0};
+    *finer = (nb_refined_scene){.triangles = 0};
 }
 
 static double edge_of(const nebel_mesh *mesh, uint32_t a, uint32_t b)

@@ -6,25 +6,25 @@
 #include <nebel/scene.h>
 
 /* What the scene's meshes become for one eye; the rest of the scene is as it was. */
-typedef struct nb_finer {
+typedef struct nb_refined_scene {
     nebel_scene_data data;
     nebel_mesh *meshes;
     nebel_tessellation **made;
     float **attributes;                                            /* of each mesh: normals, then texture coordinates */
     size_t triangles_before, triangles, over_count, deepest_count; /* of all meshes */
     double error;
-} nb_finer;
+} nb_refined_scene;
 
 /* Tessellates every mesh, each within the limits of `desc`. Errors: those of nebel_tessellate. */
 nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *fog,
-                           const nebel_tessellation_desc *desc, nb_finer *finer);
+                           const nebel_tessellation_desc *desc, nb_refined_scene *finer);
 
 /* Lights it as the scene is lit now. */
-void nb_finer_light(nb_finer *finer, const nebel_scene_data *scene);
+void nb_finer_light(nb_refined_scene *finer, const nebel_scene_data *scene);
 
 /* The volume with which the fog of the scene up to there has no proof at a frame; their number where none is found. */
 size_t nb_finer_find_unproven(const nebel_scene *scene, double frame);
-void nb_finer_free(nb_finer *finer);
+void nb_finer_free(nb_refined_scene *finer);
 
 /* m */
 double nb_finer_find_longest_edge(const nebel_scene_data *scene);

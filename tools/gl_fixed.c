@@ -11,8 +11,8 @@
 /* What is hidden of the range of depth is not seen. */
 static const double depth_slack = 1.01;
 
-typedef struct work {
-    const nb_gl_fixed *fixed;
+typedef struct nb_fixed_work {
+    const nb_gl_fixed_function *fixed;
     const nebel_gl_frame_desc *desc;
     uint32_t side, width, height; /* samples of a pixel either way, and of the picture */
     nebel_view view;
@@ -21,7 +21,7 @@ typedef struct work {
     float *color, *in_scattering, *depth, *normal; /* of all samples, the top row first */
     float *texels;                                 /* four for each, the lowest row first */
     unsigned textures[2], depth_buffer, target;    /* the light of surfaces, and what is drawn */
-} work;
+} nb_fixed_work;
 
 /* ---- surfaces -------------------------------------------------------------------------------- */
 
@@ -33,7 +33,7 @@ static uint32_t find_side(uint32_t samples)
     return side;
 }
 
-static int allocate(work *w)
+static int allocate(nb_fixed_work *w)
 {
     const size_t pixels = (size_t)w->width * w->height;
     w->color = malloc(pixels * 3 * sizeof(float));
@@ -47,7 +47,7 @@ static int allocate(work *w)
 }
 
 /* Fog that only adds leaves the light of the surfaces as it is, dimmed by the fog before the sun. */
-static nebel_result draw_surfaces(work *w)
+static nebel_result draw_surfaces(nb_fixed_work *w)
 {
     nebel_gl_frame_desc desc = *w->desc;
     const nebel_gl_planes planes = {
@@ -108,7 +108,7 @@ static void store_colors(float (*colors)[4], size_t count)
         }
 }
 
-static nebel_result fog_mesh(const work *w, const nebel_mesh *mesh, nebel_vertex_output *stream)
+static nebel_result fog_mesh(const nb_fixed_work *w, const nebel_mesh *mesh, nebel_vertex_output *stream)
 {
     const nebel_vertex_format format = format_of(nebel_gl_get_classic_method(w->classic));
     const nebel_vertex_desc *const look = w->desc->vertex;
@@ -124,7 +124,7 @@ static nebel_result fog_mesh(const work *w, const nebel_mesh *mesh, nebel_vertex
     return result;
 }
 
-static nebel_result fog_meshes(work *w)
+static nebel_result fog_meshes(nb_fixed_work *w)
 {
     const nebel_scene_data *const scene = w->fixed->scene;
     nebel_result result = NEBEL_OK;
@@ -147,7 +147,7 @@ static void multiply(const double a[16], const double b[16], double out[16])
 }
 
 /* The view's projection has no end: this one holds what is seen, so that depth has its digits where surfaces are. */
-static void set_projection(const work *w, double projection[16])
+static void set_projection(const nb_fixed_work *w, double projection[16])
 {
     const size_t pixels = (size_t)w->width * w->height;
     double nearest = HUGE_VAL, farthest = 0, corner = 1;
@@ -167,7 +167,7 @@ static void set_projection(const work *w, double projection[16])
 }
 
 /* From positions of a mesh; and to the texture of what is seen, from positions, too. */
-static void set_matrices(const work *w, const double projection[16], const nebel_mesh *mesh)
+static void set_matrices(const nb_fixed_work *w, const double projection[16], const nebel_mesh *mesh)
 {
     static const double half[16] = {.5, 0, 0, 0, 0, .5, 0, 0, 0, 0, .5, 0, .5, .5, .5, 1};
     double place[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, eye[16], clip[16], texture[16];
@@ -223,7 +223,7 @@ static void draw_background(void)
     glEnable(GL_DEPTH_TEST);
 }
 
-static nebel_result draw_fog(const work *w, const double projection[16])
+static nebel_result draw_fog(const nb_fixed_work *w, const double projection[16])
 {
     const nebel_scene_data *const scene = w->fixed->scene;
     const int one_pass = nebel_gl_get_classic_method(w->classic) == NEBEL_GL_CLASSIC_FOG_COORD;
@@ -242,7 +242,7 @@ static nebel_result draw_fog(const work *w, const double projection[16])
 }
 
 /* The picture of surfaces whose light is in the texture. */
-static nebel_result draw_picture(const work *w)
+static nebel_result draw_picture(const nb_fixed_work *w)
 {
     const nebel_scene_data *const scene = w->fixed->scene;
     double projection[16];
@@ -264,7 +264,7 @@ static nebel_result draw_picture(const work *w)
 
 /* ---- pictures -------------------------------------------------------------------------------- */
 
-static void make_texture(const work *w, unsigned name)
+static void make_texture(const nb_fixed_work *w, unsigned name)
 {
     glBindTexture(GL_TEXTURE_2D, name);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
@@ -274,7 +274,7 @@ static void make_texture(const work *w, unsigned name)
     glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, (GLsizei)w->width, (GLsizei)w->height, 0, GL_RGBA, GL_FLOAT, NULL);
 }
 
-static nebel_result make_target(work *w)
+static nebel_result make_target(nb_fixed_work *w)
 {
     glGenTextures(2, w->textures);
     for (int i = 0; i < 2; i++) make_texture(w, w->textures[i]);
@@ -294,7 +294,7 @@ static nebel_result make_target(work *w)
 }
 
 /* Leaves OpenGL as nebel's renderer knows it. */
-static void delete_target(const work *w)
+static void delete_target(const nb_fixed_work *w)
 {
     glDisable(GL_DEPTH_TEST);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
@@ -305,14 +305,14 @@ static void delete_target(const work *w)
     glDeleteTextures(2, w->textures);
 }
 
-static size_t texel_of(const work *w, size_t pixel)
+static size_t texel_of(const nb_fixed_work *w, size_t pixel)
 {
     const size_t x = pixel % w->width, y = pixel / w->width;
     return 4 * ((w->height - 1 - y) * w->width + x);
 }
 
 /* Means of the samples of each pixel, of planes whose top row comes first. */
-static void reduce(const work *w, const float *samples, float *plane)
+static void reduce(const nb_fixed_work *w, const float *samples, float *plane)
 {
     const size_t side = w->side, width = w->desc->width, height = w->desc->height;
     for (size_t i = 0; i < 3 * width * height; i++) {
@@ -325,7 +325,7 @@ static void reduce(const work *w, const float *samples, float *plane)
 }
 
 /* Of the samples that met a surface. */
-static void reduce_depth(const work *w, float *plane)
+static void reduce_depth(const nb_fixed_work *w, float *plane)
 {
     const size_t side = w->side, width = w->desc->width, height = w->desc->height;
     for (size_t i = 0; i < width * height; i++) {
@@ -342,7 +342,7 @@ static void reduce_depth(const work *w, float *plane)
 }
 
 /* Draws surfaces of this light, and reads what became of it into `out`, which may be the same. */
-static nebel_result fog_light(const work *w, const float *light, float *out)
+static nebel_result fog_light(const nb_fixed_work *w, const float *light, float *out)
 {
     const size_t pixels = (size_t)w->width * w->height;
     for (size_t i = 0; i < pixels; i++) {
@@ -359,7 +359,7 @@ static nebel_result fog_light(const work *w, const float *light, float *out)
 }
 
 /* Black surfaces show what fog adds, and white ones what else it lets through. */
-static nebel_result read_fog(const work *w, const nebel_gl_planes *planes)
+static nebel_result read_fog(const nb_fixed_work *w, const nebel_gl_planes *planes)
 {
     const size_t count = 3 * (size_t)w->width * w->height;
     for (size_t i = 0; i < count; i++) w->in_scattering[i] = 0;
@@ -372,7 +372,7 @@ static nebel_result read_fog(const work *w, const nebel_gl_planes *planes)
     return result;
 }
 
-static nebel_result draw_planes(const work *w, const nebel_gl_planes *planes)
+static nebel_result draw_planes(const nb_fixed_work *w, const nebel_gl_planes *planes)
 {
     const size_t count = 3 * (size_t)w->width * w->height;
     for (size_t i = 0; i < count; i++) w->color[i] = (float)store((double)(w->color[i] - w->in_scattering[i]));
@@ -388,7 +388,7 @@ static nebel_result draw_planes(const work *w, const nebel_gl_planes *planes)
 
 /* ---- all ------------------------------------------------------------------------------------- */
 
-static nebel_result create_classic(work *w)
+static nebel_result create_classic(nb_fixed_work *w)
 {
     static const nebel_gl_classic_kind kinds[NEBEL_GL_METHOD_COUNT] = {
         [NEBEL_GL_METHOD_FOG_COORD] = NEBEL_GL_CLASSIC_FOG_COORD,
@@ -399,14 +399,14 @@ static nebel_result create_classic(work *w)
     return nebel_create_gl_classic(&desc, &w->classic);
 }
 
-static nebel_result say(const work *w, nebel_result result, const char *text)
+static nebel_result say(const nb_fixed_work *w, nebel_result result, const char *text)
 {
     const nebel_log *const log = &w->fixed->log;
     if (log->write != NULL) log->write(result, text, log->user);
     return result;
 }
 
-static nebel_result draw(work *w, const nebel_gl_planes *planes)
+static nebel_result draw(nb_fixed_work *w, const nebel_gl_planes *planes)
 {
     if (!allocate(w)) return say(w, NEBEL_ERROR_MEMORY, "frame: out of memory; ask for fewer pixels or samples");
     nebel_result result = draw_surfaces(w);
@@ -423,9 +423,10 @@ static nebel_result draw(work *w, const nebel_gl_planes *planes)
     return result;
 }
 
-nebel_result nb_gl_fixed_draw(const nb_gl_fixed *fixed, const nebel_gl_frame_desc *desc, const nebel_gl_planes *planes)
+nebel_result nb_gl_fixed_draw(const nb_gl_fixed_function *fixed, const nebel_gl_frame_desc *desc,
+                              const nebel_gl_planes *planes)
 {
-    work w = {.fixed = fixed, .desc = desc, .side = find_side(desc->samples)};
+    nb_fixed_work w = {.fixed = fixed, .desc = desc, .side = find_side(desc->samples)};
     w.width = desc->width * w.side;
     w.height = desc->height * w.side;
     const nebel_result result = draw(&w, planes);

@@ -2,7 +2,7 @@
 
 #include "gl_fixed.h"
 
-static nebel_result set_particles(const nb_gl_painter *painter)
+static nebel_result set_particles(const nb_gl_offscreen *painter)
 {
     const nebel_scene *const scene = painter->loaded->scene;
     const size_t count = nebel_get_scene_data(scene)->particle_count;
@@ -25,7 +25,7 @@ static int suits_fixed(const nebel_scene_data *scene)
     return scene->particle_count == 0 && scene->camera.projection == NEBEL_PROJECTION_PERSPECTIVE;
 }
 
-static void note_driver(const nb_gl_painter *painter, nebel_method method)
+static void note_driver(const nb_gl_offscreen *painter, nebel_method method)
 {
     nb_report_message("note: --device gl: %s", painter->context.renderer);
     if (painter->context.no_desktop[0] != '\0')
@@ -37,11 +37,11 @@ static void note_driver(const nb_gl_painter *painter, nebel_method method)
                                                   : "that has neither particles nor this projection");
 }
 
-int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_result *loaded,
+int nb_gl_painter_open(nb_gl_offscreen *painter, const char *name, const nb_load_result *loaded,
                        const nebel_scene_data *scene, nebel_method method, nb_report_listener *listener)
 {
     const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener), .run = nebel_parallel_for_openmp};
-    *painter = (nb_gl_painter){.loaded = loaded, .scene = scene, .log = desc.log};
+    *painter = (nb_gl_offscreen){.loaded = loaded, .scene = scene, .log = desc.log};
     const int fixed = is_of_fixed(method) && suits_fixed(scene);
     painter->is_fixed = fixed && nb_gl_context_open(&painter->context, NB_GL_API_FIXED) == 0;
     if (!painter->is_fixed && nb_gl_context_open_any(&painter->context) != 0) {
@@ -58,7 +58,7 @@ int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_r
 }
 
 /* Particles are drawn in another way than other fog. */
-static nebel_result set_fog(const nb_gl_painter *painter, double frame)
+static nebel_result set_fog(const nb_gl_offscreen *painter, double frame)
 {
     nebel_snapshot *volumes = NULL;
     if (nebel_get_scene_data(painter->loaded->scene)->particle_count == 0) {
@@ -71,26 +71,26 @@ static nebel_result set_fog(const nb_gl_painter *painter, double frame)
 }
 
 /* Cells are all fog there is. */
-static nebel_result clear_fog(const nb_gl_painter *painter)
+static nebel_result clear_fog(const nb_gl_offscreen *painter)
 {
     const nebel_result result = nebel_set_gl_renderer_fog(painter->renderer, NULL);
     return result == NEBEL_OK ? nebel_set_gl_renderer_particles(painter->renderer, NULL, 0) : result;
 }
 
-nebel_result nb_gl_painter_draw(nb_gl_painter *painter, double frame, const nebel_gl_frame_desc *desc,
+nebel_result nb_gl_painter_draw(nb_gl_offscreen *painter, double frame, const nebel_gl_frame_desc *desc,
                                 const nebel_gl_planes *planes)
 {
     const int by_cells = desc->method == NEBEL_GL_METHOD_CELLS || desc->method == NEBEL_GL_METHOD_CELLS_PIXEL;
     nebel_result result = by_cells ? clear_fog(painter) : set_fog(painter, frame);
     if (result == NEBEL_OK && painter->is_fixed) {
-        const nb_gl_fixed by = {painter->renderer, painter->scene, painter->loaded->fog, painter->log};
+        const nb_gl_fixed_function by = {painter->renderer, painter->scene, painter->loaded->fog, painter->log};
         return nb_gl_fixed_draw(&by, desc, planes);
     }
     if (result == NEBEL_OK) result = nebel_gl_render_frame(painter->renderer, desc);
     return result == NEBEL_OK ? nebel_gl_read_planes(painter->renderer, planes) : result;
 }
 
-void nb_gl_painter_close(nb_gl_painter *painter)
+void nb_gl_painter_close(nb_gl_offscreen *painter)
 {
     if (painter->renderer == NULL) return;
     nebel_destroy_gl_renderer(painter->renderer);

@@ -166,14 +166,14 @@ static void print_models(const nebel_scene_data *scene)
 }
 
 /* How many volumes have each shape and density. */
-typedef struct census {
+typedef struct nb_scene_counts {
     size_t counts[NEBEL_SHAPE_COUNT][NEBEL_DENSITY_COUNT];
     size_t excluded[NEBEL_SHAPE_COUNT];
-} census;
+} nb_scene_counts;
 
-static census count_volumes(const nebel_scene_data *scene)
+static nb_scene_counts count_volumes(const nebel_scene_data *scene)
 {
-    census all = {0};
+    nb_scene_counts all = {0};
     for (size_t i = 0; i < scene->volume_count; i++) {
         const nebel_volume_desc *const volume = &scene->volumes[i];
         if (volume->operation == NEBEL_OPERATION_EXCLUDE) {
@@ -187,7 +187,7 @@ static census count_volumes(const nebel_scene_data *scene)
 
 static void print_volumes(const nebel_scene_data *scene)
 {
-    const census all = count_volumes(scene);
+    const nb_scene_counts all = count_volumes(scene);
     (void)printf("fog: %zu volume%s\n", scene->volume_count, scene->volume_count == 1 ? "" : "s");
     for (int s = 0; s < NEBEL_SHAPE_COUNT; s++) {
         for (int d = 0; d < NEBEL_DENSITY_COUNT; d++) {

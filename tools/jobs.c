@@ -181,7 +181,7 @@ double nb_jobs_share(nb_jobs *jobs, double of_item, uint64_t *done, uint64_t *al
     return *all > 0 ? ((double)*done + of_item) / (double)*all : 1;
 }
 
-void nb_jobs_show(nb_jobs *jobs, nb_meter *meter, const char *what, double of_item)
+void nb_jobs_show(nb_jobs *jobs, nb_progress_bar *meter, const char *what, double of_item)
 {
     uint64_t done, count;
     const double share = nb_jobs_share(jobs, of_item, &done, &count);

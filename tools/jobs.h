@@ -107,7 +107,7 @@ void nb_jobs_answer(const nb_jobs *jobs);
 double nb_jobs_share(nb_jobs *jobs, double of_item, uint64_t *done, uint64_t *all);
 
 /* Shows it: "frame 3 of 96", where there are several. */
-void nb_jobs_show(nb_jobs *jobs, nb_meter *meter, const char *what, double of_item);
+void nb_jobs_show(nb_jobs *jobs, nb_progress_bar *meter, const char *what, double of_item);
 
 /* The worst status of all processes that joined. What each made, kept and failed is added up in all_made, all_kept and
  * all_failed. After an interrupt the process ends instead: its launcher ends the others. */

@@ -4,7 +4,7 @@
 
 #include <nebel/render.h>
 
-typedef enum nb_layer {
+typedef enum nb_aov {
     NB_LAYER_COLOR,
     NB_LAYER_TRANSMITTANCE,
     NB_LAYER_IN_SCATTERING,
@@ -13,7 +13,7 @@ typedef enum nb_layer {
     NB_LAYER_ERROR,
     NB_LAYER_STANDARD_ERROR,
     NB_LAYER_COUNT
-} nb_layer;
+} nb_aov;
 
 enum { NB_LAYERS_MOST_CHANNELS = 16 }; /* that one picture has */
 
@@ -25,9 +25,9 @@ typedef struct nb_layer_kind {
 extern const nb_layer_kind nb_layer_kinds[NB_LAYER_COUNT];
 
 /* Whether a method knows this layer. Neither OpenGL nor classic fog knows a bound of its error. */
-int nb_layer_is_known(nb_layer layer, int is_gl, nebel_method method);
+int nb_layer_is_known(nb_aov layer, int is_gl, nebel_method method);
 
 /* Puts a layer of so many pixels into every pixel of `of` channels, from channel `first` on. */
-void nb_layer_interleave(nb_layer layer, const float *samples, size_t pixels, uint32_t first, uint32_t of, float *out);
+void nb_layer_interleave(nb_aov layer, const float *samples, size_t pixels, uint32_t first, uint32_t of, float *out);
 
 #endif

@@ -30,15 +30,16 @@ static double clock_seconds(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-nb_meter nb_meter_start(int quiet)
+nb_progress_bar nb_meter_start(int quiet)
 {
     const char *const terminal = getenv("TERM");
     const int able = terminal != NULL && terminal[0] != '\0' && strcmp(terminal, "dumb") != 0;
     const double now = clock_seconds();
-    return (nb_meter){.visible = !quiet && able && isatty(STDERR_FILENO), .started = now, .began = now, .drawn = -1};
+    return (nb_progress_bar){
+        .visible = !quiet && able && isatty(STDERR_FILENO), .started = now, .began = now, .drawn = -1};
 }
 
-void nb_meter_begin(nb_meter *meter)
+void nb_meter_begin(nb_progress_bar *meter)
 {
     meter->began = clock_seconds();
 }
@@ -87,7 +88,7 @@ static void draw(double done, const char *label, const char *left)
     nb_report_status(line);
 }
 
-void nb_meter_write_lines(nb_meter *meter)
+void nb_meter_write_lines(nb_progress_bar *meter)
 {
     if (meter->visible) return;
     meter->line_pause = first_line_pause;
@@ -95,20 +96,20 @@ void nb_meter_write_lines(nb_meter *meter)
 }
 
 /* Whether it is time to say something. */
-static int is_due(const nb_meter *meter, double now)
+static int is_due(const nb_progress_bar *meter, double now)
 {
     if (meter->visible) return meter->drawn < 0 || now - meter->drawn >= drawing_pause;
     return meter->line_pause > 0 && now - meter->drawn >= meter->line_pause;
 }
 
-static void write_line(nb_meter *meter, double done, const char *label, const char *left)
+static void write_line(nb_progress_bar *meter, double done, const char *label, const char *left)
 {
     nb_report_message("%s%s%d %%%s%s", label, label[0] != '\0' ? ", " : "", (int)(100 * done),
                       left[0] != '\0' ? ", " : "", left);
     meter->line_pause = fmin(2 * meter->line_pause, longest_line_pause);
 }
 
-void nb_meter_show(nb_meter *meter, double done, const char *label)
+void nb_meter_show(nb_progress_bar *meter, double done, const char *label)
 {
     if (!meter->visible && meter->line_pause == 0) return;
     const double now = clock_seconds();
@@ -128,12 +129,12 @@ void nb_meter_show(nb_meter *meter, double done, const char *label)
         write_line(meter, share, label, left);
 }
 
-void nb_meter_say(const nb_meter *meter, const char *words)
+void nb_meter_say(const nb_progress_bar *meter, const char *words)
 {
     if (meter->visible) nb_report_status(words);
 }
 
-double nb_meter_end(nb_meter *meter)
+double nb_meter_end(nb_progress_bar *meter)
 {
     if (meter->visible) nb_report_status("");
     return clock_seconds() - meter->started;

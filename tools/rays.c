@@ -17,7 +17,7 @@ static const char *const number_names[NUMBERS] = {"ox", "oy", "oz", "dx", "dy", 
 __attribute__((format(printf, 2, 3)))
 #endif
 static int
-reject(nb_rays *rays, const char *format, ...)
+reject(nb_ray_list *rays, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -31,7 +31,7 @@ static int is_blank(char c)
     return c == ' ' || c == '\t';
 }
 
-static int reserve_entry(nb_rays *rays)
+static int reserve_entry(nb_ray_list *rays)
 {
     if (rays->count < rays->capacity) return 1;
     const size_t most = SIZE_MAX / sizeof *rays->entries;
@@ -43,7 +43,7 @@ static int reserve_entry(nb_rays *rays)
     return 1;
 }
 
-static int read_number(nb_rays *rays, const char *text, size_t size, int which, double *number)
+static int read_number(nb_ray_list *rays, const char *text, size_t size, int which, double *number)
 {
     const int shown = size < QUOTED ? (int)size : QUOTED;
     const char *const more = size > QUOTED ? "..." : "";
@@ -65,7 +65,7 @@ static int read_number(nb_rays *rays, const char *text, size_t size, int which, 
 }
 
 /* Up to NUMBERS + 1 numbers, so that one too many is seen. Returns how many, or -1 on an error. */
-static int read_numbers(nb_rays *rays, const char *text, const char *end, double *numbers)
+static int read_numbers(nb_ray_list *rays, const char *text, const char *end, double *numbers)
 {
     int count = 0;
     for (;;) {
@@ -78,7 +78,7 @@ static int read_numbers(nb_rays *rays, const char *text, const char *end, double
     }
 }
 
-static int check_ray(nb_rays *rays, const double *numbers)
+static int check_ray(nb_ray_list *rays, const double *numbers)
 {
     if (numbers[3] == 0 && numbers[4] == 0 && numbers[5] == 0) {
         return reject(rays, "the direction dx dy dz is 0 0 0; give it a length");
@@ -87,7 +87,7 @@ static int check_ray(nb_rays *rays, const double *numbers)
     return 1;
 }
 
-static int take_line(nb_rays *rays, const char *text, size_t size)
+static int take_line(nb_ray_list *rays, const char *text, size_t size)
 {
     if (rays->line == 1 && size >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0) {
         text += 3;
@@ -109,13 +109,13 @@ static int take_line(nb_rays *rays, const char *text, size_t size)
     return 1;
 }
 
-static int reject_length(nb_rays *rays)
+static int reject_length(nb_ray_list *rays)
 {
     return reject(rays, "the line is longer than %d bytes; break it up", NB_RAYS_LONGEST_LINE);
 }
 
 /* Keeps the beginning of a line until its end comes. */
-static int keep_partial(nb_rays *rays, const char *data, size_t size)
+static int keep_partial(nb_ray_list *rays, const char *data, size_t size)
 {
     if (size > NB_RAYS_LONGEST_LINE - rays->partial_size) return reject_length(rays);
     if (rays->partial == NULL) rays->partial = malloc(NB_RAYS_LONGEST_LINE);
@@ -125,14 +125,14 @@ static int keep_partial(nb_rays *rays, const char *data, size_t size)
     return 1;
 }
 
-static int take_partial(nb_rays *rays)
+static int take_partial(nb_ray_list *rays)
 {
     const size_t size = rays->partial_size;
     rays->partial_size = 0;
     return take_line(rays, rays->partial, size);
 }
 
-int nb_rays_feed(nb_rays *rays, const char *data, size_t size)
+int nb_rays_feed(nb_ray_list *rays, const char *data, size_t size)
 {
     const char *const end = data + size;
     while (data < end) {
@@ -152,14 +152,14 @@ int nb_rays_feed(nb_rays *rays, const char *data, size_t size)
     return 1;
 }
 
-int nb_rays_finish(nb_rays *rays)
+int nb_rays_finish(nb_ray_list *rays)
 {
     return rays->partial_size == 0 || take_partial(rays);
 }
 
-void nb_rays_free(nb_rays *rays)
+void nb_rays_free(nb_ray_list *rays)
 {
     free(rays->entries);
     free(rays->partial);
-    *rays = (nb_rays){0};
+    *rays = (nb_ray_list){0};
 }

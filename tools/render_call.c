@@ -123,7 +123,7 @@ static int read_pair(const char *text, char separator, uint32_t most, uint32_t *
     return good && *a <= most && *b <= most;
 }
 
-static void read_size(nb_arguments *arguments, nb_render_call *wanted)
+static void read_size(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     wanted->width = 1280;
     wanted->height = 720;
@@ -138,7 +138,7 @@ static void read_size(nb_arguments *arguments, nb_render_call *wanted)
     }
 }
 
-static void read_frames(nb_arguments *arguments, nb_render_call *wanted)
+static void read_frames(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     wanted->first_frame = nb_options_whole(arguments, FRAME, 0, LAST_FRAME, 0);
     wanted->last_frame = wanted->first_frame;
@@ -154,7 +154,7 @@ static void read_frames(nb_arguments *arguments, nb_render_call *wanted)
 /* A side of a WebP. */
 enum { FILM_SIDE = 16383 };
 
-static void read_film(nb_arguments *arguments, nb_render_call *wanted)
+static void read_film(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     static const int of_films[] = {FPS, QUALITY};
     wanted->fps = nb_options_number(arguments, FPS, 1, NEBEL_MAX_MOVIE_RATE, NEBEL_DEFAULT_MOVIE_RATE);
@@ -176,7 +176,7 @@ static void read_film(nb_arguments *arguments, nb_render_call *wanted)
 
 static const char standard_output[] = "/dev/stdout";
 
-static void read_output(nb_arguments *arguments, nb_render_call *wanted)
+static void read_output(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     wanted->output = arguments->values[OUTPUT];
     if (wanted->output == NULL) {
@@ -213,7 +213,7 @@ int nb_render_takes_color(nebel_method method)
     return nb_render_takes_factor(method) || method == NEBEL_METHOD_FOG_COORD || method == NEBEL_METHOD_ALPHA;
 }
 
-static void read_tessellate(nb_arguments *arguments, nb_render_call *wanted)
+static void read_tessellate(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     nebel_tessellation_desc *const desc = &wanted->tessellation;
     desc->max_triangles = nb_options_whole(arguments, TESSELLATE_TRIANGLES, 1, 1000000000, 1 << 18);
@@ -234,7 +234,7 @@ static void read_tessellate(nb_arguments *arguments, nb_render_call *wanted)
         nb_options_refuse(arguments, TESSELLATE, "is for one frame: another camera needs other triangles");
 }
 
-static void read_reference(nb_arguments *arguments, nb_render_call *wanted)
+static void read_reference(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     static const int of_reference[] = {BOUNCES, SEED};
     wanted->bounces = nb_options_whole(arguments, BOUNCES, 1, 10000, 0);
@@ -246,7 +246,7 @@ static void read_reference(nb_arguments *arguments, nb_render_call *wanted)
         nb_options_reject(arguments, METHOD, "is for --device cpu; leave out --device gl");
 }
 
-static void read_device(nb_arguments *arguments, nb_render_call *wanted)
+static void read_device(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     static const char *const devices[] = {"cpu", "gl", NULL};
     static const int of_cpu[] = {TOLERANCE, ISA, THREADS};
@@ -265,7 +265,7 @@ static void read_device(nb_arguments *arguments, nb_render_call *wanted)
         nb_options_refuse(arguments, TOLERANCE, "is for --method exact; leave it out with another");
 }
 
-static void read_shutter(nb_arguments *arguments, nb_render_call *wanted)
+static void read_shutter(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     wanted->shutter = nb_options_number(arguments, SHUTTER, 0, 1, 0);
     if (wanted->shutter == 0) return;
@@ -277,10 +277,10 @@ static void read_shutter(nb_arguments *arguments, nb_render_call *wanted)
                           "has many cameras, and each needs other triangles; leave out --tessellate");
 }
 
-static void read_scattering(nb_arguments *arguments, nb_render_call *wanted)
+static void read_scattering(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     static const char *const models[] = {"off", "diffusion", NULL};
-    static const nb_scattering chosen[] = {NB_SCATTERING_OFF, NB_SCATTERING_DIFFUSION};
+    static const nb_scattering_option chosen[] = {NB_SCATTERING_OFF, NB_SCATTERING_DIFFUSION};
     const int is_reference = wanted->method == NEBEL_METHOD_PATH;
     /* The reference scatters light as often as it likes: a solution would be work for nothing. */
     wanted->scattering = is_reference ? NB_SCATTERING_OFF : NB_SCATTERING_OF_FILE;
@@ -290,7 +290,7 @@ static void read_scattering(nb_arguments *arguments, nb_render_call *wanted)
     wanted->scattering = chosen[nb_options_choice(arguments, MULTIPLE_SCATTERING, models, 0)];
 }
 
-static void read_jobs(nb_arguments *arguments, nb_render_call *wanted)
+static void read_jobs(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     static const int of_files[] = {SHARD, RESUME, BANDS};
     wanted->shard = nb_jobs_read_shard(arguments, SHARD);
@@ -306,7 +306,7 @@ static void read_jobs(nb_arguments *arguments, nb_render_call *wanted)
     nb_jobs_refuse_special(arguments, of_files, sizeof of_files / sizeof *of_files, wanted->output);
 }
 
-int nb_render_call_read(nb_arguments *arguments, nb_render_call *wanted)
+int nb_render_call_read(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     wanted->scene = arguments->operands[0];
     wanted->aov = arguments->values[AOV] != NULL;

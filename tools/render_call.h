@@ -8,13 +8,13 @@
 #include <nebel/render.h>
 
 /* What becomes of light that fog has scattered once. */
-typedef enum nb_scattering {
+typedef enum nb_scattering_option {
     NB_SCATTERING_OF_FILE,
     NB_SCATTERING_OFF,
     NB_SCATTERING_DIFFUSION /* as the file says, or by default */
-} nb_scattering;
+} nb_scattering_option;
 
-typedef struct nb_render_call {
+typedef struct nb_render_arguments {
     const char *scene, *output;
     nebel_image_format format; /* of pictures; a film has none */
     uint32_t width, height, samples;
@@ -30,9 +30,9 @@ typedef struct nb_render_call {
     double fps;         /* of a film, and */
     int quality;        /* NEBEL_DEFAULT_MOVIE_QUALITY */
     nebel_method method;
-    nb_scattering scattering;
+    nb_scattering_option scattering;
     nebel_cpu_renderer_desc renderer;
-} nb_render_call;
+} nb_render_arguments;
 
 enum { NB_RENDER_OPTIONS = 26 };
 
@@ -43,6 +43,6 @@ int nb_render_takes_factor(nebel_method method);
 int nb_render_takes_color(nebel_method method);
 
 /* -1 to go on, or the exit status after messages. */
-int nb_render_call_read(nb_arguments *arguments, nb_render_call *call);
+int nb_render_call_read(nb_arguments *arguments, nb_render_arguments *call);
 
 #endif

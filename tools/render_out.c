@@ -17,7 +17,7 @@
 /* Pixels of a band where nobody says how many rows it has: a few megabytes, and seconds of work. */
 enum { BAND_PIXELS = 1 << 18 };
 
-static uint32_t choose_band_rows(const nb_render_call *wanted, int is_spread)
+static uint32_t choose_band_rows(const nb_render_arguments *wanted, int is_spread)
 {
     const uint32_t steps = BAND_PIXELS / (NEBEL_WINDOW_STEP * wanted->width);
     if (wanted->band_rows > 0) return wanted->band_rows;
@@ -25,7 +25,7 @@ static uint32_t choose_band_rows(const nb_render_call *wanted, int is_spread)
     return (steps > 0 ? steps : 1) * NEBEL_WINDOW_STEP;
 }
 
-static uint32_t count_frames(const nb_render_call *wanted)
+static uint32_t count_frames(const nb_render_arguments *wanted)
 {
     return wanted->last_frame - wanted->first_frame + 1;
 }
@@ -35,7 +35,7 @@ static uint32_t count_bands(const nb_render_out *out)
     return out->band_rows > 0 ? (out->wanted->height + out->band_rows - 1) / out->band_rows : 1;
 }
 
-nb_render_out nb_render_out_of(const nb_render_call *wanted, const nb_jobs *jobs, nb_report_listener *listener)
+nb_render_out nb_render_out_of(const nb_render_arguments *wanted, const nb_jobs *jobs, nb_report_listener *listener)
 {
     const int is_spread = nb_jobs_are_shared(jobs) || wanted->resume;
     nb_render_out out = {.wanted = wanted, .listener = listener, .asked = UINT64_MAX};
@@ -63,7 +63,7 @@ uint64_t nb_render_out_group(const nb_render_out *out)
 
 nb_render_item nb_render_out_item(const nb_render_out *out, uint64_t number)
 {
-    const nb_render_call *const wanted = out->wanted;
+    const nb_render_arguments *const wanted = out->wanted;
     const uint32_t bands = count_bands(out), band = (uint32_t)(number % bands);
     nb_render_item item = {.number = number,
                            .frame = wanted->first_frame + (uint32_t)(number / bands),
@@ -76,7 +76,7 @@ nb_render_item nb_render_out_item(const nb_render_out *out, uint64_t number)
 }
 
 /* The file name of a frame; free it. NULL after a message. */
-static char *name_picture(const nb_render_call *wanted, uint32_t frame)
+static char *name_picture(const nb_render_arguments *wanted, uint32_t frame)
 {
     char *const name =
         wanted->many_frames && !wanted->is_film ? nb_pattern_expand(wanted->output, frame) : strdup(wanted->output);
@@ -86,7 +86,7 @@ static char *name_picture(const nb_render_call *wanted, uint32_t frame)
 
 /* ---- before the work ------------------------------------------------------------------------- */
 
-static int check_picture(const nb_render_call *wanted, uint32_t frame)
+static int check_picture(const nb_render_arguments *wanted, uint32_t frame)
 {
     char *const name = name_picture(wanted, frame);
     int status = name != NULL ? nb_folder_make_for(name) : NB_FAILED;
@@ -98,7 +98,7 @@ static int check_picture(const nb_render_call *wanted, uint32_t frame)
 /* Each process looks at its own; of those that joined the first one does it for all. */
 int nb_render_out_check(const nb_render_out *out, const nb_jobs *jobs)
 {
-    const nb_render_call *const wanted = out->wanted;
+    const nb_render_arguments *const wanted = out->wanted;
     const uint32_t step = jobs->shard.count > 0 && count_bands(out) == 1 ? jobs->shard.count : 1;
     const uint32_t first = step > 1 ? jobs->shard.number : 0;
     if (wanted->is_film)
@@ -114,7 +114,7 @@ int nb_render_out_check(const nb_render_out *out, const nb_jobs *jobs)
 
 int nb_render_out_spare(const nb_render_out *out, const nebel_scene_data *contents)
 {
-    const nb_render_call *const wanted = out->wanted;
+    const nb_render_arguments *const wanted = out->wanted;
     const uint32_t last = wanted->is_film ? wanted->first_frame : wanted->last_frame;
     for (uint32_t frame = wanted->first_frame; frame <= last; frame++) {
         char *const name = name_picture(wanted, frame);
@@ -133,7 +133,7 @@ static nebel_movie_desc film_desc(const nb_render_out *out)
 
 int nb_render_out_open(nb_render_out *out)
 {
-    const nb_render_call *const wanted = out->wanted;
+    const nb_render_arguments *const wanted = out->wanted;
     if (!wanted->is_film) return NB_DONE;
     const nebel_movie_desc desc = film_desc(out);
     nb_interrupt_hold();
@@ -149,7 +149,7 @@ int nb_render_out_open(nb_render_out *out)
 /* ---- records --------------------------------------------------------------------------------- */
 
 /* Whatever changes a pixel; threads and instruction sets do not. */
-static void add_options(const nb_render_call *wanted, const nebel_scene_data *contents, nb_fingerprint *print)
+static void add_options(const nb_render_arguments *wanted, const nebel_scene_data *contents, nb_fingerprint *print)
 {
     const uint64_t whole[] = {wanted->width,
                               wanted->height,
@@ -170,7 +170,7 @@ static void add_options(const nb_render_call *wanted, const nebel_scene_data *co
 
 int nb_render_out_sign(nb_render_out *out, const nebel_scene_data *contents)
 {
-    const nb_render_call *const wanted = out->wanted;
+    const nb_render_arguments *const wanted = out->wanted;
     const int needs_it = out->part_count > 0 || wanted->resume;
     if (!nb_record_can_add_scene(wanted->scene))
         return needs_it ? nb_report_failure("render: %s: --shard, --resume, --bands and MPI need a scene in a file",
@@ -194,7 +194,7 @@ static nb_fingerprint print_picture(const nb_render_out *out, uint32_t frame)
 /* Of a picture in a file of its own, or a film. */
 static void record_file(const nb_render_out *out, uint32_t frame, char record[NEBEL_MAX_RECORD + 1])
 {
-    const nb_render_call *const wanted = out->wanted;
+    const nb_render_arguments *const wanted = out->wanted;
     nb_fingerprint print = print_picture(out, frame);
     if (wanted->is_film) {
         print = out->base;

@@ -13,7 +13,7 @@
 #include "report.h"
 
 typedef struct nb_render_out {
-    const nb_render_call *wanted;
+    const nb_render_arguments *wanted;
     nb_report_listener *listener;
     uint32_t band_rows;  /* 0: pictures are rendered as a whole */
     uint32_t part_count; /* of a file; 0: files are written directly */
@@ -31,7 +31,7 @@ typedef struct nb_render_item {
     nebel_window window; /* of the frame */
 } nb_render_item;
 
-nb_render_out nb_render_out_of(const nb_render_call *wanted, const nb_jobs *jobs, nb_report_listener *listener);
+nb_render_out nb_render_out_of(const nb_render_arguments *wanted, const nb_jobs *jobs, nb_report_listener *listener);
 
 uint64_t nb_render_out_count_items(const nb_render_out *out);
 uint64_t nb_render_out_group(const nb_render_out *out); /* items of a file */

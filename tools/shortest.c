@@ -12,11 +12,11 @@
 enum { LOWEST_POWER = -292, HIGHEST_POWER = 324, POWERS = HIGHEST_POWER - LOWEST_POWER + 1 };
 
 /* The 128 leading bits of a power of ten, rounded up. */
-typedef struct power {
+typedef struct nb_decimal_power {
     uint64_t high, low;
-} power;
+} nb_decimal_power;
 
-static power powers[POWERS];
+static nb_decimal_power powers[POWERS];
 
 /* ---- the table ------------------------------------------------------------------------------- */
 
@@ -76,10 +76,10 @@ static int is_zero_below(const big *number, int bit)
 }
 
 /* `exact`: the number is the power times a power of two, not its floor. */
-static power leading_bits(const big *number, int exact)
+static nb_decimal_power leading_bits(const big *number, int exact)
 {
     const int top = highest_bit(number);
-    power leading = {bits_from(number, top - 63), bits_from(number, top - 127)};
+    nb_decimal_power leading = {bits_from(number, top - 63), bits_from(number, top - 127)};
     if (!exact || !is_zero_below(number, top - 127)) {
         leading.low++;
         leading.high += leading.low == 0;
@@ -105,10 +105,10 @@ void nb_shortest_prepare(void)
 
 /* ---- the digits ------------------------------------------------------------------------------ */
 
-typedef struct decimal {
+typedef struct nb_shortest_decimal {
     uint64_t digits;
     int exponent;
-} decimal;
+} nb_shortest_decimal;
 
 /* fraction * 2^exponent; `narrow`: the number below is only half as far as the number above. */
 typedef struct binary {
@@ -126,7 +126,7 @@ static uint64_t multiply_high(uint64_t a, uint64_t b)
 }
 
 /* p * factor / 2^128, rounded to odd: the last bit says whether anything was cut off. */
-static uint64_t multiply_to_odd(power p, uint64_t factor)
+static uint64_t multiply_to_odd(nb_decimal_power p, uint64_t factor)
 {
     const uint64_t carry = multiply_high(p.low, factor);
     const uint64_t low = p.high * factor + carry;
@@ -151,12 +151,12 @@ static int floor_log10(int exponent, int narrow)
     return floor_divide_power(exponent * 1262611 - (narrow ? 524031 : 0), 22);
 }
 
-static decimal shortest(binary number)
+static nb_shortest_decimal shortest(binary number)
 {
     const uint64_t odd = number.fraction & 1;
     const int k = floor_log10(number.exponent, number.narrow);
     const int shift = number.exponent + floor_log2_of_power_of_ten(-k) + 1;
-    const power p = powers[-k - LOWEST_POWER];
+    const nb_decimal_power p = powers[-k - LOWEST_POWER];
     /* Four times the number and its bounds, in units of 10^k; the bounds themselves belong to even numbers only. */
     const uint64_t middle = 4 * number.fraction;
     const uint64_t lower = multiply_to_odd(p, (middle - 2 + (uint64_t)number.narrow) << shift) + odd;
@@ -166,12 +166,12 @@ static decimal shortest(binary number)
     if (s >= 10) {
         const uint64_t tens = s / 10;
         const int below = lower <= 40 * tens, above = 40 * tens + 40 <= upper;
-        if (below != above) return (decimal){tens + (uint64_t)above, k + 1};
+        if (below != above) return (nb_shortest_decimal){tens + (uint64_t)above, k + 1};
     }
     const int below = lower <= 4 * s, above = 4 * s + 4 <= upper;
-    if (below != above) return (decimal){s + (uint64_t)above, k};
+    if (below != above) return (nb_shortest_decimal){s + (uint64_t)above, k};
     const int nearer_above = value > 4 * s + 2 || (value == 4 * s + 2 && (s & 1) != 0);
-    return (decimal){s + (uint64_t)nearer_above, k};
+    return (nb_shortest_decimal){s + (uint64_t)nearer_above, k};
 }
 
 /* ---- the text -------------------------------------------------------------------------------- */
@@ -211,7 +211,7 @@ static size_t write_scientific(char *text, const char *digits, int count, int ex
 }
 
 /* `precision`: the digits of %g from which on it turns to an exponent. */
-static size_t write_decimal(char *text, decimal number, int precision)
+static size_t write_decimal(char *text, nb_shortest_decimal number, int precision)
 {
     char digits[20] = "0";
     int count = 0;

@@ -6,17 +6,17 @@
 #include <threads.h>
 #include <unistd.h>
 
-typedef struct share {
+typedef struct nb_thread_range {
     thrd_t thread;
     int started;
     int worker, count;
     nb_workers_fn work;
     void *user;
-} share;
+} nb_thread_range;
 
 static int run_share(void *user)
 {
-    const share *const mine = user;
+    const nb_thread_range *const mine = user;
     mine->work(mine->worker, mine->count, mine->user);
     return 0;
 }
@@ -32,9 +32,9 @@ int nb_workers_available(void)
 
 void nb_workers_run(int count, nb_workers_fn work, void *user)
 {
-    share shares[NB_WORKERS_MOST];
+    nb_thread_range shares[NB_WORKERS_MOST];
     for (int i = 1; i < count; i++) {
-        shares[i] = (share){.worker = i, .count = count, .work = work, .user = user};
+        shares[i] = (nb_thread_range){.worker = i, .count = count, .work = work, .user = user};
         shares[i].started = thrd_create(&shares[i].thread, run_share, &shares[i]) == thrd_success;
     }
     work(0, count, user);

@@ -8,9 +8,9 @@
 #include <nebel/scene.h>
 
 /* Unit vectors in the world. */
-typedef struct nb_axes {
+typedef struct nb_camera_axes {
     double right[3], up[3], forward[3];
-} nb_axes;
+} nb_camera_axes;
 
 static inline int nb_camera_is_finite(const double v[3])
 {
@@ -18,7 +18,7 @@ static inline int nb_camera_is_finite(const double v[3])
 }
 
 /* Across the view where `up` is along it: the axis that is farthest from it tells. */
-static inline void nb_camera_choose_right(nb_axes *axes)
+static inline void nb_camera_choose_right(nb_camera_axes *axes)
 {
     int least = 0;
     for (int i = 1; i < 3; i++) {
@@ -31,7 +31,7 @@ static inline void nb_camera_choose_right(nb_axes *axes)
 }
 
 /* Errors: VALUE. */
-static inline nebel_result nb_camera_find_axes(const nebel_camera *camera, const nebel_log *log, nb_axes *axes)
+static inline nebel_result nb_camera_find_axes(const nebel_camera *camera, const nebel_log *log, nb_camera_axes *axes)
 {
     double up[3];
     if (!nb_camera_is_finite(camera->position) || !nb_camera_is_finite(camera->look_at) ||

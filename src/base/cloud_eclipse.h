@@ -8,7 +8,7 @@
 
 /* What other planets leave of the light of clouds at a place: of the sun's part, which is as large as in what falls on level ground
  * and from all sides there. */
-static inline void nb_cloud_uneclipsed(const nb_world *worlds, int count, int cloudy, const double place[3],
+static inline void nb_cloud_uneclipsed(const nb_planet *worlds, int count, int cloudy, const double place[3],
                                        const double to_sun[3], double disc, double part[3])
 {
     const double left = nb_worlds_uneclipsed(worlds, count, cloudy, place, to_sun, disc);
@@ -27,10 +27,10 @@ static inline void nb_cloud_uneclipsed(const nb_world *worlds, int count, int cl
 
 /* Dims what clouds send from between two places of a ray by what is left in the middle. `to_sun` and `disc` as of
  * nb_worlds_light. */
-static inline void nb_cloud_eclipse(const nb_world *worlds, int count, const nebel_ray *ray, const double to_sun[3],
+static inline void nb_cloud_eclipse(const nb_planet *worlds, int count, const nebel_ray *ray, const double to_sun[3],
                                     double disc, nebel_cloud_transfer *knots)
 {
-    const nb_world *const cloudy = nb_worlds_cloudy(worlds, count);
+    const nb_planet *const cloudy = nb_worlds_cloudy(worlds, count);
     const double length = nb_vector_length(ray->direction);
     float before[3] = {0, 0, 0}, light[3] = {0, 0, 0};
     if (cloudy == NULL || count < 2) return;

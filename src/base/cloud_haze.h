@@ -7,19 +7,19 @@
 #include <math.h>
 
 /* What air and fog do up to each knot. */
-typedef struct nb_cloud_haze {
+typedef struct nb_aerial_nodes {
     float left[3][NEBEL_MAX_CLOUD_NODES], light[3][NEBEL_MAX_CLOUD_NODES];
-} nb_cloud_haze;
+} nb_aerial_nodes;
 
 /* What is asked of the air of a ray: many rays in one direction, up to knots->t. */
-typedef struct nb_cloud_rays {
+typedef struct nb_cloud_air_rays {
     double along[3][NEBEL_MAX_CLOUD_NODES];
     const double *direction[3];
     nebel_transfer_planes transfers; /* of the haze */
-} nb_cloud_rays;
+} nb_cloud_air_rays;
 
-static inline void nb_cloud_haze_ask(const nebel_cloud_transfer *knots, const double direction[3], nb_cloud_haze *haze,
-                                     nb_cloud_rays *rays)
+static inline void nb_cloud_haze_ask(const nebel_cloud_transfer *knots, const double direction[3],
+                                     nb_aerial_nodes *haze, nb_cloud_air_rays *rays)
 {
     rays->transfers.error = NULL;
     for (int c = 0; c < 3; c++) {
@@ -31,19 +31,19 @@ static inline void nb_cloud_haze_ask(const nebel_cloud_transfer *knots, const do
 }
 
 /* What fog and air do up to some of the knots: the first, the last, and those between them where it matters. */
-typedef struct nb_cloud_marks {
+typedef struct nb_cloud_fog_nodes {
     int is_set[NEBEL_MAX_CLOUD_NODES];
-    nb_cloud_haze haze;
-} nb_cloud_marks;
+    nb_aerial_nodes haze;
+} nb_cloud_fog_nodes;
 
 /* Of one colour: what fog leaves up to knot k, where that is known. */
-static inline float nb_cloud_fog_left(const nb_cloud_marks *marks, const nb_cloud_haze *air, int c, uint32_t k)
+static inline float nb_cloud_fog_left(const nb_cloud_fog_nodes *marks, const nb_aerial_nodes *air, int c, uint32_t k)
 {
     return air->left[c][k] > 0 ? marks->haze.left[c][k] / air->left[c][k] : 0;
 }
 
 /* Of one colour, what fog adds to light from knot a to knot b, less what it takes of the air's behind it. */
-static inline float nb_cloud_fog_light(const nb_cloud_marks *marks, const nb_cloud_haze *air, int c, uint32_t a,
+static inline float nb_cloud_fog_light(const nb_cloud_fog_nodes *marks, const nb_aerial_nodes *air, int c, uint32_t a,
                                        uint32_t b)
 {
     return marks->haze.light[c][b] - marks->haze.light[c][a] -
@@ -54,8 +54,8 @@ static inline float nb_cloud_fog_light(const nb_cloud_marks *marks, const nb_clo
  * evenly. Let T and S be transmittance and light of clouds (c), air (a) and fog (f). What fog adds is the integral of T_a dS_f, at
  * most what is found of it and what is found to be missing of the air's, (T_f(a) - T_f(b)) dS_a; all of either lies somewhere between
  * T_c(a) and T_c(b). What fog takes of clouds is within (T_f(a) - T_f(b)) T_a dS_c. */
-static inline float nb_cloud_haze_doubt(const nebel_cloud_transfer *knots, const nb_cloud_marks *marks,
-                                        const nb_cloud_haze *air, uint32_t a, uint32_t b)
+static inline float nb_cloud_haze_doubt(const nebel_cloud_transfer *knots, const nb_cloud_fog_nodes *marks,
+                                        const nb_aerial_nodes *air, uint32_t a, uint32_t b)
 {
     const float fallen = knots->transmittance[a] - knots->transmittance[b];
     float most = 0;
@@ -70,8 +70,8 @@ static inline float nb_cloud_haze_doubt(const nebel_cloud_transfer *knots, const
 }
 
 /* The two neighbouring marks between which most is in doubt: *a and *b. Returns all doubts. */
-static inline float nb_cloud_haze_worst(const nebel_cloud_transfer *knots, const nb_cloud_marks *marks,
-                                        const nb_cloud_haze *air, uint32_t *a, uint32_t *b)
+static inline float nb_cloud_haze_worst(const nebel_cloud_transfer *knots, const nb_cloud_fog_nodes *marks,
+                                        const nb_aerial_nodes *air, uint32_t *a, uint32_t *b)
 {
     float all = 0, most = -1;
     uint32_t before = 0;
@@ -90,7 +90,7 @@ static inline float nb_cloud_haze_worst(const nebel_cloud_transfer *knots, const
     return all;
 }
 
-static inline void nb_cloud_mark(nb_cloud_marks *marks, uint32_t k, const float left[3], const float light[3])
+static inline void nb_cloud_mark(nb_cloud_fog_nodes *marks, uint32_t k, const float left[3], const float light[3])
 {
     marks->is_set[k] = 1;
     for (int c = 0; c < 3; c++) {
@@ -101,7 +101,7 @@ static inline void nb_cloud_mark(nb_cloud_marks *marks, uint32_t k, const float 
 
 /* The next knot to mark, between a and b: where no knot is, one is put in the middle, where clouds are as between both and air is not
  * yet known. 0: no more can be had. */
-static inline uint32_t nb_cloud_haze_cut(uint32_t a, uint32_t b, nebel_cloud_transfer *knots, nb_cloud_marks *marks)
+static inline uint32_t nb_cloud_haze_cut(uint32_t a, uint32_t b, nebel_cloud_transfer *knots, nb_cloud_fog_nodes *marks)
 {
     const float middle = 0.5f * (knots->t[a] + knots->t[b]);
     if (b > a + 1) return (a + b) / 2;
@@ -126,7 +126,7 @@ static inline uint32_t nb_cloud_haze_cut(uint32_t a, uint32_t b, nebel_cloud_tra
 
 /* The knot to mark next: the first, the last, then others while light is in doubt by more than the tolerance, times light where that
  * is more than 1. -1: none. air need not be known up to a knot that is new, which makes knots one more. *doubt: what is left. */
-static inline int nb_cloud_haze_next(nebel_cloud_transfer *knots, nb_cloud_marks *marks, const nb_cloud_haze *air,
+static inline int nb_cloud_haze_next(nebel_cloud_transfer *knots, nb_cloud_fog_nodes *marks, const nb_aerial_nodes *air,
                                      float tolerance, float *doubt)
 {
     const uint32_t last = knots->count - 1;
@@ -143,8 +143,8 @@ static inline int nb_cloud_haze_next(nebel_cloud_transfer *knots, nb_cloud_marks
 }
 
 /* Of one colour, what air and fog do up to each knot: between two marks fog counts as spread evenly over the way. */
-static inline void nb_cloud_haze_add_fog(const nebel_cloud_transfer *knots, const nb_cloud_marks *marks, int c,
-                                         const nb_cloud_haze *air, nb_cloud_haze *haze)
+static inline void nb_cloud_haze_add_fog(const nebel_cloud_transfer *knots, const nb_cloud_fog_nodes *marks, int c,
+                                         const nb_aerial_nodes *air, nb_aerial_nodes *haze)
 {
     haze->left[c][0] = marks->haze.left[c][0];
     haze->light[c][0] = marks->haze.light[c][0];
@@ -162,7 +162,7 @@ static inline void nb_cloud_haze_add_fog(const nebel_cloud_transfer *knots, cons
 }
 
 /* Of one colour, the light up to each knot, without what of the haze before it clouds leave. */
-static inline void nb_cloud_haze_sum(const nebel_cloud_transfer *knots, int c, const nb_cloud_haze *haze,
+static inline void nb_cloud_haze_sum(const nebel_cloud_transfer *knots, int c, const nb_aerial_nodes *haze,
                                      float over[NEBEL_MAX_CLOUD_NODES])
 {
     float sum = haze->light[c][0];
@@ -178,7 +178,7 @@ static inline void nb_cloud_haze_sum(const nebel_cloud_transfer *knots, int c, c
 
 /* By how much light up to the last knot may be off at most, of the colour that is worst, as transmittances between two knots count as
  * their mean: both fall all the way, and light may all come from where either begins. */
-static inline float nb_cloud_haze_missed(const nebel_cloud_transfer *knots, const nb_cloud_haze *haze)
+static inline float nb_cloud_haze_missed(const nebel_cloud_transfer *knots, const nb_aerial_nodes *haze)
 {
     float most = 0;
     for (int c = 0; c < 3; c++) {

@@ -22,13 +22,13 @@ enum {
 };
 
 /* Its pixels row by row. */
-typedef struct nb_cloud_block {
+typedef struct nb_cloud_pixel_block {
     int is_wanted[NB_CLOUD_SHARE]; /* they need clouds */
     int is_open[NB_CLOUD_SHARE];   /* and end at no surface: in the sky, or on the planet's ground */
     float ground[NB_CLOUD_SHARE];  /* m, of the planet with clouds, through their middles; 0: they do not meet it */
     nebel_cloud_transfer *knots[NB_CLOUD_SHARE]; /* and keep them here */
     int level[NB_CLOUD_SHARE];                   /* by nb_cloud_block_begin */
-} nb_cloud_block;
+} nb_cloud_pixel_block;
 
 /* How far apart transmittances around a pixel are at most, as a part of the largest or of LEAST_LEFT where that is more; and light, of
  * the brightest, or of that part of what it would be without gaps: the sky behind is bright as well. */
@@ -131,7 +131,7 @@ static inline int nb_cloud_is_by_ground(const nebel_cloud_transfer *a, float gro
 }
 
 /* The mean of pixels a and b for pixel i, which is between them. */
-static inline nebel_cloud_transfer nb_cloud_between(const nb_cloud_block *block, int i, int a, int b)
+static inline nebel_cloud_transfer nb_cloud_between(const nb_cloud_pixel_block *block, int i, int a, int b)
 {
     nebel_cloud_transfer of_a = *block->knots[a], of_b = *block->knots[b];
     const float *const ground = block->ground;
@@ -151,7 +151,7 @@ static inline int nb_cloud_level(int x, int y)
 
 /* Pixels around one, as many as are in its block; 0: it or one of them needs no clouds or ends at a surface, or is not in its row, or
  * one alone meets the ground. */
-static inline int nb_cloud_around(const nb_cloud_block *block, int i, int around[NB_CLOUD_SHARE_AROUND])
+static inline int nb_cloud_around(const nb_cloud_pixel_block *block, int i, int around[NB_CLOUD_SHARE_AROUND])
 {
     static const int counts[NB_CLOUD_SHARE_LEVELS] = {0, 4, 6};
     static const int steps[NB_CLOUD_SHARE_LEVELS][NB_CLOUD_SHARE_AROUND][2] = {
@@ -171,7 +171,7 @@ static inline int nb_cloud_around(const nb_cloud_block *block, int i, int around
 }
 
 /* Which pixels have a level but the first: the others have rays in any case. */
-static inline void nb_cloud_block_begin(nb_cloud_block *block)
+static inline void nb_cloud_block_begin(nb_cloud_pixel_block *block)
 {
     int around[NB_CLOUD_SHARE_AROUND];
     for (int i = 0; i < NB_CLOUD_SHARE; i++) {
@@ -188,7 +188,7 @@ static inline int nb_cloud_is_lone(const nebel_cloud_transfer *knots)
 }
 
 /* Whether a pixel has the mean of two beside it, those above and below where they are nearer than left and right. */
-static inline int nb_cloud_share(const nb_cloud_block *block, int i)
+static inline int nb_cloud_share(const nb_cloud_pixel_block *block, int i)
 {
     const int level = block->level[i];
     const nebel_cloud_transfer *knots[NB_CLOUD_SHARE_AROUND];
@@ -206,7 +206,7 @@ static inline int nb_cloud_share(const nb_cloud_block *block, int i)
 }
 
 /* Pixels of a level, those before being known: they have what lies between others, or need a ray. */
-static inline void nb_cloud_block_ask(const nb_cloud_block *block, int level, int is_asked[NB_CLOUD_SHARE])
+static inline void nb_cloud_block_ask(const nb_cloud_pixel_block *block, int level, int is_asked[NB_CLOUD_SHARE])
 {
     for (int i = 0; i < NB_CLOUD_SHARE; i++) {
         const int is_next = block->is_wanted[i] && block->level[i] == level;

@@ -12,9 +12,13 @@ enum { NB_DAYLIGHT_HEIGHTS = 65, NB_DAYLIGHT_SUNS = 65, NB_DAYLIGHT_SKIES = 129 
 
 /* Whose light of the sky: level surfaces have what falls on them, fog what comes from all sides, the ground below included. Under a
  * sun in the zenith that is 18 times as much, by night 3 times. */
-typedef enum nb_daylight_of { NB_DAYLIGHT_OF_SURFACES, NB_DAYLIGHT_OF_FOG, NB_DAYLIGHT_OF_COUNT } nb_daylight_of;
+typedef enum nb_irradiance_receiver {
+    NB_DAYLIGHT_OF_SURFACES,
+    NB_DAYLIGHT_OF_FOG,
+    NB_DAYLIGHT_OF_COUNT
+} nb_irradiance_receiver;
 
-typedef struct nb_daylight {
+typedef struct nb_irradiance_table {
     const nebel_atmosphere *atmosphere;
     nebel_sun sun; /* of irradiance 1 */
     double center[3], radius, thickness;
@@ -22,7 +26,7 @@ typedef struct nb_daylight {
      * it is lower the air is asked itself: the edge of the planet's shadow bears no interpolation. */
     float depth[NB_DAYLIGHT_HEIGHTS][NB_DAYLIGHT_SUNS][3];
     float sky[NB_DAYLIGHT_OF_COUNT][NB_DAYLIGHT_SKIES][3]; /* logarithms of parts of that at the scene's origin */
-} nb_daylight;
+} nb_irradiance_table;
 
 /* Deeper than this counts as night. */
 #define NB_DAYLIGHT_MOST_DEPTH 80.
@@ -86,15 +90,15 @@ static inline int nb_daylight_is_near(const nebel_planet *home, const double to_
 }
 
 /* At a height, with the sun so high. `across` is at right angles to the way to it. */
-static inline void nb_daylight_place(const nb_daylight *daylight, const double across[3], double height, double sun,
-                                     double place[3])
+static inline void nb_daylight_place(const nb_irradiance_table *daylight, const double across[3], double height,
+                                     double sun, double place[3])
 {
     const double radius = daylight->radius + height, side = sqrt(fmax(0, 1 - sun * sun));
     for (int c = 0; c < 3; c++)
         place[c] = daylight->center[c] + radius * (sun * daylight->sun.direction[c] + side * across[c]);
 }
 
-static inline void nb_daylight_set_depths(nb_daylight *daylight, const double across[3])
+static inline void nb_daylight_set_depths(nb_irradiance_table *daylight, const double across[3])
 {
     for (int h = 0; h < NB_DAYLIGHT_HEIGHTS; h++) {
         const double part = h / (NB_DAYLIGHT_HEIGHTS - 1.), height = daylight->thickness * part * part;
@@ -169,14 +173,16 @@ static inline float nb_daylight_part(double light, double there)
 }
 
 /* The place on the ground that a row of skies is of. */
-static inline void nb_daylight_place_of(const nb_daylight *daylight, const double across[3], int row, double place[3])
+static inline void nb_daylight_place_of(const nb_irradiance_table *daylight, const double across[3], int row,
+                                        double place[3])
 {
     const double part = (2. * row / (NB_DAYLIGHT_SKIES - 1) - 1) * nb_daylight_spread(1);
     const double sun = copysign(NB_DAYLIGHT_TWILIGHT * expm1(fabs(part)), part);
     nb_daylight_place(daylight, across, 0, fmax(-1, fmin(1, sun)), place);
 }
 
-static inline void nb_daylight_set_level_skies(nb_daylight *daylight, const nebel_planet *home, const double across[3])
+static inline void nb_daylight_set_level_skies(nb_irradiance_table *daylight, const nebel_planet *home,
+                                               const double across[3])
 {
     static const double origin[3] = {0, 0, 0};
     const nebel_irradiance there = nb_daylight_ask(&daylight->sun, home->atmosphere, origin);
@@ -190,7 +196,7 @@ static inline void nb_daylight_set_level_skies(nb_daylight *daylight, const nebe
 }
 
 /* Every second row is asked for, which takes thirty rays each. */
-static inline void nb_daylight_set_round_skies(nb_daylight *daylight, const nebel_planet *planet,
+static inline void nb_daylight_set_round_skies(nb_irradiance_table *daylight, const nebel_planet *planet,
                                                const nebel_planet *home, const double across[3])
 {
     static const double origin[3] = {0, 0, 0};
@@ -209,7 +215,7 @@ static inline void nb_daylight_set_round_skies(nb_daylight *daylight, const nebe
 
 /* Tables for a sun in a direction of length 1. `home` is the planet whose sky is that of the scene's origin. Both have
  * their atmosphere. */
-static inline void nb_daylight_set(nb_daylight *daylight, const nebel_planet *planet, const nebel_planet *home,
+static inline void nb_daylight_set(nb_irradiance_table *daylight, const nebel_planet *planet, const nebel_planet *home,
                                    const double to_sun[3])
 {
     daylight->atmosphere = planet->atmosphere;

@@ -18,25 +18,25 @@
 /* Over wider fog, m, it is taken to change. */
 #define NB_FOG_SHADE_MOST_EVEN 2e4
 
-typedef struct nb_fog_roof {
+typedef struct nb_cloud_shadow_extent {
     int is_shaded;         /* clouds leave other light here than there: fog is to be shaded by its place */
     int owns_ambient;      /* ambient light is the planet's sky */
     float clear_sky;       /* over clouds, as part of that which fog has at the origin */
     double min[3], max[3]; /* of the fog */
-} nb_fog_roof;
+} nb_cloud_shadow_extent;
 
-typedef struct nb_part_range {
+typedef struct nb_value_range {
     float least, most;
-} nb_part_range;
+} nb_value_range;
 
-static inline void nb_part_widen(nb_part_range *r, float part)
+static inline void nb_part_widen(nb_value_range *r, float part)
 {
     r->least = fminf(r->least, part);
     r->most = fmaxf(r->most, part);
 }
 
 static inline nebel_result nb_fog_roof_ask(nebel_cloud_workspace *clouds, double width, const double place[1][3],
-                                           nb_part_range *sun, nb_part_range *sky)
+                                           nb_value_range *sun, nb_value_range *sky)
 {
     float of_sun, of_sky;
     nebel_result result = nebel_compute_cloud_sun_transmittance(clouds, width, 1, place, 0, &of_sun);
@@ -47,7 +47,7 @@ static inline nebel_result nb_fog_roof_ask(nebel_cloud_workspace *clouds, double
     return NEBEL_OK;
 }
 
-static inline int nb_fog_roof_is_small(const nb_fog_roof *roof)
+static inline int nb_fog_roof_is_small(const nb_cloud_shadow_extent *roof)
 {
     for (int c = 0; c < 3; c++)
         if (!(roof->max[c] - roof->min[c] < NB_FOG_SHADE_MOST_EVEN)) return 0;
@@ -55,8 +55,8 @@ static inline int nb_fog_roof_is_small(const nb_fog_roof *roof)
 }
 
 /* Over the fog, and to the origin, whose shade the snapshot has. */
-static inline nebel_result nb_fog_roof_compare(nebel_cloud_workspace *clouds, nb_fog_roof *roof, nb_part_range *sun,
-                                               nb_part_range *sky)
+static inline nebel_result nb_fog_roof_compare(nebel_cloud_workspace *clouds, nb_cloud_shadow_extent *roof,
+                                               nb_value_range *sun, nb_value_range *sky)
 {
     enum { PLACES = 5 };
     const double *const min = roof->min, *const max = roof->max;
@@ -72,14 +72,14 @@ static inline nebel_result nb_fog_roof_compare(nebel_cloud_workspace *clouds, nb
     return result;
 }
 
-/* owns_ambient: see nb_fog_roof. Where the origin is in the night the snapshot has no sun, but fog may lie by day. Errors:
+/* owns_ambient: see nb_cloud_shadow_extent. Where the origin is in the night the snapshot has no sun, but fog may lie by day. Errors:
  * ARGUMENT. */
 static inline nebel_result nb_fog_roof_set(nebel_cloud_workspace *clouds, const nebel_snapshot *snapshot,
-                                           int owns_ambient, nb_fog_roof *roof)
+                                           int owns_ambient, nb_cloud_shadow_extent *roof)
 {
     static const double origin[1][3] = {{0, 0, 0}};
-    nb_part_range sun = {1, 0}, sky = {1, 0};
-    *roof = (nb_fog_roof){.owns_ambient = owns_ambient, .clear_sky = 1};
+    nb_value_range sun = {1, 0}, sky = {1, 0};
+    *roof = (nb_cloud_shadow_extent){.owns_ambient = owns_ambient, .clear_sky = 1};
     if (!nebel_snapshot_skylit_fog(snapshot, roof->min, roof->max)) return NEBEL_OK;
     nebel_result result = nb_fog_roof_ask(clouds, NB_FOG_SHADE_ORIGIN, origin, &sun, &sky);
     if (owns_ambient) roof->clear_sky = 1 / fmaxf(sky.most, 1e-6f);
@@ -90,15 +90,16 @@ static inline nebel_result nb_fog_roof_set(nebel_cloud_workspace *clouds, const 
 /* ---- along a ray ----------------------------------------------------------------------------- */
 
 /* What clouds leave, in parts: of the sun, and of the sky as of that which fog has at the origin. */
-typedef struct nb_fog_shade {
+typedef struct nb_fog_shadow {
     int is_found;
     nebel_fog_shadow pieces;
     float end;       /* m, no fog is beyond */
     float clear_sky; /* over clouds, from the last piece on */
-} nb_fog_shade;
+} nb_fog_shadow;
 
 /* Where a ray is within the box of the fog; returns whether it is. */
-static inline int nb_fog_roof_cross(const nb_fog_roof *roof, const nebel_ray *ray, const double unit[3], double at[2])
+static inline int nb_fog_roof_cross(const nb_cloud_shadow_extent *roof, const nebel_ray *ray, const double unit[3],
+                                    double at[2])
 {
     at[0] = 0;
     at[1] = HUGE_VAL;
@@ -115,12 +116,12 @@ static inline int nb_fog_roof_cross(const nb_fog_roof *roof, const nebel_ray *ra
 }
 
 /* Along the whole ray, whatever its t_max; spread as of nebel_trace_cloud_shadow_on_fog. Errors: ARGUMENT. */
-static inline nebel_result nb_fog_shade_along(nebel_cloud_workspace *clouds, const nb_fog_roof *roof, nebel_ray ray,
-                                              double spread, nb_fog_shade *shade)
+static inline nebel_result nb_fog_shade_along(nebel_cloud_workspace *clouds, const nb_cloud_shadow_extent *roof,
+                                              nebel_ray ray, double spread, nb_fog_shadow *shade)
 {
     double unit[3], at[2];
     const double length = nb_vector_length(ray.direction);
-    *shade = (nb_fog_shade){.is_found = 1, .clear_sky = roof->clear_sky};
+    *shade = (nb_fog_shadow){.is_found = 1, .clear_sky = roof->clear_sky};
     for (int c = 0; c < 3; c++) unit[c] = ray.direction[c] / length;
     if (!nb_fog_roof_cross(roof, &ray, unit, at)) return NEBEL_OK;
     ray.t_max = at[1];

@@ -7,7 +7,7 @@
 
 #include <nebel/scene.h>
 
-typedef struct nb_lighting {
+typedef struct nb_surface_lighting {
     float background[3], ambient[3];
     nebel_environment environment; /* whatever its type: all ambient light */
     int shows_ambient;             /* where no surface is, in place of the background; which is the same light where
@@ -15,7 +15,7 @@ typedef struct nb_lighting {
     float sun[3], sunlight[3];     /* 0 where there is no sun; sunlight: its irradiance over pi */
     double sun_direction[3];
     int has_sun;
-} nb_lighting;
+} nb_surface_lighting;
 
 /* All the ambient light of a scene, whatever its type. */
 static inline nebel_environment nb_scene_environment(const nebel_scene_data *scene)
@@ -49,7 +49,8 @@ static inline int nb_lighting_is_light(const double rgb[3])
 }
 
 /* Errors: VALUE. */
-static inline nebel_result nb_lighting_set(nb_lighting *lighting, const nebel_scene_data *scene, const nebel_log *log)
+static inline nebel_result nb_lighting_set(nb_surface_lighting *lighting, const nebel_scene_data *scene,
+                                           const nebel_log *log)
 {
     double direction[3] = {scene->sun_direction[0], scene->sun_direction[1], scene->sun_direction[2]};
     if (!nb_lighting_is_light(scene->background) || !nb_lighting_is_light(scene->ambient) ||

@@ -8,17 +8,17 @@
 
 #include <nebel/scene.h>
 
-typedef struct nb_world {
+typedef struct nb_planet {
     const nebel_planet *planet;
     double center[3], radius, top; /* m; top: of its air, from the centre */
     nebel_sky_view *view;
-    nb_daylight *daylight; /* NULL: there are no models in sunlight */
-} nb_world;
+    nb_irradiance_table *daylight; /* NULL: there are no models in sunlight */
+} nb_planet;
 
 /* The power of a place with regard to the ball of a planet's air: the square of a tangent's length. Where two balls that do
  * not overlap have the same is a plane between them, so that seen from a place a ball is never behind one of larger power
  * (Edelsbrunner, An acyclicity theorem for cell complexes in d dimension, 1990). */
-static inline double nb_world_power(const nb_world *world, const double place[3])
+static inline double nb_world_power(const nb_planet *world, const double place[3])
 {
     double from[3];
     for (int c = 0; c < 3; c++) from[c] = place[c] - world->center[c];
@@ -26,24 +26,24 @@ static inline double nb_world_power(const nb_world *world, const double place[3]
     return (far - world->top) * (far + world->top);
 }
 
-static inline nb_world nb_world_of(const nebel_planet *planet)
+static inline nb_planet nb_world_of(const nebel_planet *planet)
 {
-    nb_world world = {.planet = planet,
-                      .radius = planet->atmosphere_desc.radius,
-                      .top = planet->atmosphere_desc.radius + planet->atmosphere_desc.thickness};
+    nb_planet world = {.planet = planet,
+                       .radius = planet->atmosphere_desc.radius,
+                       .top = planet->atmosphere_desc.radius + planet->atmosphere_desc.thickness};
     nb_vector_ball_middle(planet->atmosphere_desc.ground_point, planet->atmosphere_desc.radius, world.center);
     return world;
 }
 
 /* Planets that are loaded: whatever ray leaves the position, it passes none after a later one. Without view and daylight.
  * Returns how many. */
-static inline int nb_worlds_set(nb_world worlds[NEBEL_MAX_PLANETS], const nebel_scene_data *scene,
+static inline int nb_worlds_set(nb_planet worlds[NEBEL_MAX_PLANETS], const nebel_scene_data *scene,
                                 const double position[3])
 {
     int count = 0;
     for (size_t i = 0; i < scene->planet_count && i < NEBEL_MAX_PLANETS; i++) {
         if (scene->planets[i].atmosphere == NULL) continue;
-        const nb_world world = nb_world_of(&scene->planets[i]);
+        const nb_planet world = nb_world_of(&scene->planets[i]);
         int place = count++;
         for (; place > 0 && nb_world_power(&worlds[place - 1], position) > nb_world_power(&world, position); place--)
             worlds[place] = worlds[place - 1];
@@ -53,7 +53,7 @@ static inline int nb_worlds_set(nb_world worlds[NEBEL_MAX_PLANETS], const nebel_
 }
 
 /* No air of any planet is farther from a position. */
-static inline double nb_worlds_reach(const nb_world *worlds, int count, const double position[3])
+static inline double nb_worlds_reach(const nb_planet *worlds, int count, const double position[3])
 {
     double reach = 0;
     for (int k = 0; k < count; k++) {
@@ -77,7 +77,7 @@ static inline void nb_worlds_disc_light(const nebel_scene_data *scene, double ra
 }
 
 /* How far the ground is from an eye above it; 0: the ray does not meet it. */
-static inline double nb_world_ground(const nb_world *world, const double eye[3], const double unit[3])
+static inline double nb_world_ground(const nb_planet *world, const double eye[3], const double unit[3])
 {
     double to[3];
     for (int c = 0; c < 3; c++) to[c] = world->center[c] - eye[c];
@@ -87,7 +87,7 @@ static inline double nb_world_ground(const nb_world *world, const double eye[3],
 }
 
 /* The planet with clouds; NULL: there is none. */
-static inline const nb_world *nb_worlds_cloudy(const nb_world *worlds, int count)
+static inline const nb_planet *nb_worlds_cloudy(const nb_planet *worlds, int count)
 {
     for (int k = 0; k < count; k++)
         if (worlds[k].planet->clouds != NULL) return &worlds[k];
@@ -95,10 +95,10 @@ static inline const nb_world *nb_worlds_cloudy(const nb_world *worlds, int count
 }
 
 /* How far its ground is; 0 where there is none. */
-static inline double nb_worlds_cloudy_ground(const nb_world *worlds, int count, const double eye[3],
+static inline double nb_worlds_cloudy_ground(const nb_planet *worlds, int count, const double eye[3],
                                              const double unit[3])
 {
-    const nb_world *world = nb_worlds_cloudy(worlds, count);
+    const nb_planet *world = nb_worlds_cloudy(worlds, count);
     return world != NULL ? nb_world_ground(world, eye, unit) : 0;
 }
 
@@ -108,7 +108,7 @@ static inline double nb_worlds_cloudy_ground(const nb_world *worlds, int count, 
 
 /* A pixel whose middle meets the ground may have samples that see the sky: the ray through its middle (of any length, `pixel` radians
  * wide), where it is no more than a pixel's corner below the horizon, lifted to just above it. Returns whether it was. */
-static inline int nb_world_lift(const nb_world *world, const double eye[3], double pixel, double direction[3])
+static inline int nb_world_lift(const nb_planet *world, const double eye[3], double pixel, double direction[3])
 {
     const double length = nb_vector_length(direction);
     double down[3], unit[3];
@@ -128,15 +128,15 @@ static inline int nb_world_lift(const nb_world *world, const double eye[3], doub
 }
 
 /* By the ground of the planet with clouds. */
-static inline int nb_worlds_lift(const nb_world *worlds, int count, const double eye[3], double pixel,
+static inline int nb_worlds_lift(const nb_planet *worlds, int count, const double eye[3], double pixel,
                                  double direction[3])
 {
-    const nb_world *world = nb_worlds_cloudy(worlds, count);
+    const nb_planet *world = nb_worlds_cloudy(worlds, count);
     return world != NULL && nb_world_lift(world, eye, pixel, direction);
 }
 
 /* Whose shadow, and whose sky, a place is in. */
-static inline int nb_worlds_nearest(const nb_world *worlds, int count, const double place[3])
+static inline int nb_worlds_nearest(const nb_planet *worlds, int count, const double place[3])
 {
     int nearest = 0;
     for (int k = 1; k < count; k++)
@@ -145,7 +145,7 @@ static inline int nb_worlds_nearest(const nb_world *worlds, int count, const dou
 }
 
 /* What other planets than `world` leave of the sun's disc; `to_sun` and `sun` as of nb_eclipse_left. */
-static inline double nb_worlds_uneclipsed(const nb_world *worlds, int count, int world, const double place[3],
+static inline double nb_worlds_uneclipsed(const nb_planet *worlds, int count, int world, const double place[3],
                                           const double to_sun[3], double sun)
 {
     double left = 1;
@@ -155,7 +155,7 @@ static inline double nb_worlds_uneclipsed(const nb_world *worlds, int count, int
 }
 
 /* The light at a place, of a sun of irradiance 1. */
-static inline nebel_irradiance nb_worlds_light(const nb_world *worlds, int count, const double place[3],
+static inline nebel_irradiance nb_worlds_light(const nb_planet *worlds, int count, const double place[3],
                                                const double to_sun[3], double disc)
 {
     const int nearest = nb_worlds_nearest(worlds, count, place);
@@ -175,11 +175,12 @@ static inline nebel_irradiance nb_worlds_light(const nb_world *worlds, int count
 enum { NB_WORLDS_RAYS = 256 };
 
 /* Light of one planet's air. */
-typedef struct nb_worlds_part {
+typedef struct nb_planet_transfer {
     float left[3][NB_WORLDS_RAYS], light[3][NB_WORLDS_RAYS], error[NB_WORLDS_RAYS];
-} nb_worlds_part;
+} nb_planet_transfer;
 
-static inline void nb_worlds_lay_behind(const nb_worlds_part *part, size_t n, const nebel_transfer_planes *transfers)
+static inline void nb_worlds_lay_behind(const nb_planet_transfer *part, size_t n,
+                                        const nebel_transfer_planes *transfers)
 {
     for (size_t i = 0; i < n; i++) {
         float most = 0;
@@ -193,11 +194,11 @@ static inline void nb_worlds_lay_behind(const nb_worlds_part *part, size_t n, co
 }
 
 /* nebel_trace_sky_view, through the air of all; at most NB_WORLDS_RAYS rays. */
-static inline nebel_result nb_worlds_trace(const nb_world *worlds, int count, size_t n,
+static inline nebel_result nb_worlds_trace(const nb_planet *worlds, int count, size_t n,
                                            const double *const direction[3], const float *t_max,
                                            const nebel_transfer_planes *transfers)
 {
-    nb_worlds_part part;
+    nb_planet_transfer part;
     nebel_transfer_planes planes = {.error = part.error};
     for (int c = 0; c < 3; c++) {
         planes.transmittance[c] = part.left[c];

@@ -54,7 +54,7 @@ static double find_width(const double (*vertices)[3], size_t count, const double
     return around > 0 ? nb_vector_length(area) / around : 0;
 }
 
-static void set_square(polygon *square, const nb_cell_plane *plane, const nb_cell *cell)
+static void set_square(polygon *square, const nb_cell_plane *plane, const nb_fog_cell *cell)
 {
     double center[3], u[3], v[3], diagonal[3], axis[3] = {0, 0, 0};
     int smallest = 0;
@@ -97,7 +97,7 @@ static void cut(polygon *p, const nb_cell_plane *plane, double slack)
 /* By all planes of the cell but one; NO_FACE: by all. */
 #define NO_FACE SIZE_MAX
 
-static void cut_all(const nebel_cells *cells, const nb_cell *cell, size_t but, double slack, polygon *p)
+static void cut_all(const nebel_cells *cells, const nb_fog_cell *cell, size_t but, double slack, polygon *p)
 {
     for (size_t i = 0; i < cell->plane_count && p->count > 0; i++)
         if (i != but) cut(p, &cells->planes[cell->first_plane + i], slack);
@@ -167,7 +167,7 @@ static int lies_in(const nb_cell_plane *plane, const polygon *p, double toleranc
 /* What face `a` of the first cell and face `b` of the second share. 0: memory is out. */
 static int join_faces(nebel_cells *cells, const size_t ends[2], size_t a, size_t b, polygon *work)
 {
-    const nb_cell *first = &cells->cells[ends[0]], *second = &cells->cells[ends[1]];
+    const nb_fog_cell *first = &cells->cells[ends[0]], *second = &cells->cells[ends[1]];
     const nb_cell_plane *face = &cells->planes[first->first_plane + a];
     const nb_cell_plane *other = &cells->planes[second->first_plane + b];
     const double slack = KEPT * cells->tolerance;
@@ -185,7 +185,8 @@ static int join_faces(nebel_cells *cells, const size_t ends[2], size_t a, size_t
 }
 
 /* Whether the face comes near the second cell anywhere; most do not, and need not be compared with its faces. */
-static int comes_near(const nebel_cells *cells, const nb_cell *first, size_t a, const nb_cell *second, polygon *work)
+static int comes_near(const nebel_cells *cells, const nb_fog_cell *first, size_t a, const nb_fog_cell *second,
+                      polygon *work)
 {
     double area[3];
     set_square(work, &cells->planes[first->first_plane + a], first);
@@ -195,7 +196,7 @@ static int comes_near(const nebel_cells *cells, const nb_cell *first, size_t a, 
     return find_width((const double(*)[3])work->vertices, work->count, area) > cells->tolerance;
 }
 
-static int are_near(const nebel_cells *cells, const nb_cell *a, const nb_cell *b)
+static int are_near(const nebel_cells *cells, const nb_fog_cell *a, const nb_fog_cell *b)
 {
     for (int i = 0; i < 3; i++)
         if (fmax(a->low[i], b->low[i]) - fmin(a->high[i], b->high[i]) > cells->tolerance) return 0;
@@ -204,7 +205,7 @@ static int are_near(const nebel_cells *cells, const nb_cell *a, const nb_cell *b
 
 static int join_cells(nebel_cells *cells, const size_t ends[2], polygon *work)
 {
-    const nb_cell *first = &cells->cells[ends[0]], *second = &cells->cells[ends[1]];
+    const nb_fog_cell *first = &cells->cells[ends[0]], *second = &cells->cells[ends[1]];
     if (!are_near(cells, first, second)) return 1;
     for (size_t a = 0; a < first->plane_count; a++) {
         if (!comes_near(cells, first, a, second, work)) continue;
@@ -246,7 +247,7 @@ static nebel_result check_ends(const nebel_cells *cells, const nebel_log *log, s
 }
 
 /* How far a place is outside the cell; <= 0: inside. */
-static double find_way_out(const nebel_cells *cells, const nb_cell *cell, const double x[3])
+static double find_way_out(const nebel_cells *cells, const nb_fog_cell *cell, const double x[3])
 {
     double way = -HUGE_VAL;
     for (size_t i = 0; i < cell->plane_count; i++)

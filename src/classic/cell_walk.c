@@ -17,7 +17,7 @@
 #define EDGE_ON 1e-12
 
 /* A way from the eye: eye + t step, t from 0 to 1 at the point. */
-typedef struct walk {
+typedef struct nb_cell_traversal {
     const nebel_cells *cells;
     const double *eye;
     int has_walls;
@@ -25,22 +25,22 @@ typedef struct walk {
     double forward[3]; /* unit length */
     double step[3], length;
     double depth; /* Z of the point's surface at the point's x and y */
-} walk;
+} nb_cell_traversal;
 
 /* What is in one cell. Where it begins at the eye there is no entry, where it ends at the point no exit. */
-typedef struct piece {
+typedef struct nb_cell_piece {
     size_t cell;
     double from, to;
     const nb_cell_plane *entry, *exit;
-} piece;
+} nb_cell_piece;
 
 /* ---- pieces ---------------------------------------------------------------------------------- */
 
 /* Source: Cyrus and Beck, Generalized two- and three-dimensional clipping (1978). */
-static int clip(const walk *way, size_t number, piece *out)
+static int clip(const nb_cell_traversal *way, size_t number, nb_cell_piece *out)
 {
-    const nb_cell *cell = &way->cells->cells[number];
-    *out = (piece){number, 0, 1, NULL, NULL};
+    const nb_fog_cell *cell = &way->cells->cells[number];
+    *out = (nb_cell_piece){number, 0, 1, NULL, NULL};
     for (size_t i = 0; i < cell->plane_count; i++) {
         const nb_cell_plane *plane = &way->cells->planes[cell->first_plane + i];
         const double along = nb_vector_dot(plane->normal, way->step), outside = nb_cell_plane_distance(plane, way->eye);
@@ -60,20 +60,20 @@ static int clip(const walk *way, size_t number, piece *out)
 }
 
 /* By the place on the way; where cells overlap a little, by what they hold, never by their number. */
-static int comes_before(const walk *way, const piece *a, const piece *b)
+static int comes_before(const nb_cell_traversal *way, const nb_cell_piece *a, const nb_cell_piece *b)
 {
-    const nb_cell *x = &way->cells->cells[a->cell], *y = &way->cells->cells[b->cell];
+    const nb_fog_cell *x = &way->cells->cells[a->cell], *y = &way->cells->cells[b->cell];
     if (a->from != b->from) return a->from < b->from;
     if (a->to != b->to) return a->to < b->to;
     if (x->density != y->density) return x->density < y->density;
     return memcmp(x->color, y->color, sizeof x->color) < 0;
 }
 
-static size_t find_pieces(const walk *way, piece *pieces)
+static size_t find_pieces(const nb_cell_traversal *way, nb_cell_piece *pieces)
 {
     size_t count = 0;
     for (size_t i = 0; i < way->cells->cell_count; i++) {
-        piece found;
+        nb_cell_piece found;
         if (!clip(way, i, &found)) continue;
         size_t place = count++;
         for (; place > 0 && comes_before(way, &found, &pieces[place - 1]); place--) pieces[place] = pieces[place - 1];
@@ -98,7 +98,7 @@ static int is_in_portal(const nebel_cells *cells, const nb_portal *portal, const
     return 1;
 }
 
-static int is_open(const walk *way, const piece *from, const piece *into)
+static int is_open(const nb_cell_traversal *way, const nb_cell_piece *from, const nb_cell_piece *into)
 {
     double x[3];
     for (int i = 0; i < 3; i++) x[i] = way->eye[i] + from->to * way->step[i];
@@ -111,13 +111,13 @@ static int is_open(const walk *way, const piece *from, const piece *into)
     return 0;
 }
 
-static int is_at_eye(const walk *way, const piece *p)
+static int is_at_eye(const nb_cell_traversal *way, const nb_cell_piece *p)
 {
     return p->from * way->length <= way->cells->tolerance;
 }
 
 /* How many of the pieces are seen: those up to the first wall. */
-static size_t count_seen(const walk *way, const piece *pieces, size_t count)
+static size_t count_seen(const nb_cell_traversal *way, const nb_cell_piece *pieces, size_t count)
 {
     if (!way->has_walls || count == 0) return count;
     if (!is_at_eye(way, &pieces[0])) return 0;
@@ -130,7 +130,8 @@ static size_t count_seen(const walk *way, const piece *pieces, size_t count)
 
 /* Z of a plane at the point's own x and y, as it is printed: in view space A x + B y + C Z = D is n . x = distance, C
  * = n . forward, and from the point it is (distance - n . point) / C along the axis. `otherwise` where C = 0. */
-static double find_printed_depth(const walk *way, const double normal[3], double distance, double otherwise)
+static double find_printed_depth(const nb_cell_traversal *way, const double normal[3], double distance,
+                                 double otherwise)
 {
     const double *x = way->point->position;
     const double c = nb_vector_dot(normal, way->forward);
@@ -138,7 +139,7 @@ static double find_printed_depth(const walk *way, const double normal[3], double
     return nb_vector_dot(way->step, way->forward) + (distance - nb_vector_dot(normal, x)) / c;
 }
 
-static double find_place(const walk *way, double t, const nb_cell_plane *plane)
+static double find_place(const nb_cell_traversal *way, double t, const nb_cell_plane *plane)
 {
     if (way->cells->span == NEBEL_SPAN_RAY) return t * way->length;
     const double depth = t * nb_vector_dot(way->step, way->forward);
@@ -146,12 +147,12 @@ static double find_place(const walk *way, double t, const nb_cell_plane *plane)
     return fmin(fmax(find_printed_depth(way, plane->normal, plane->distance, depth), 0), way->depth);
 }
 
-static double find_from(const walk *way, const piece *p)
+static double find_from(const nb_cell_traversal *way, const nb_cell_piece *p)
 {
     return find_place(way, p->from, is_at_eye(way, p) ? NULL : p->entry);
 }
 
-static double find_to(const walk *way, const piece *p)
+static double find_to(const nb_cell_traversal *way, const nb_cell_piece *p)
 {
     if (p->exit == NULL && way->cells->span == NEBEL_SPAN_PRINTED) return way->depth;
     return find_place(way, p->to, p->exit);
@@ -159,13 +160,13 @@ static double find_to(const walk *way, const piece *p)
 
 /* ---- layers ---------------------------------------------------------------------------------- */
 
-static int is_same_fog(const nb_cell *a, const nb_cell *b)
+static int is_same_fog(const nb_fog_cell *a, const nb_fog_cell *b)
 {
     return a->density == b->density && a->color[0] == b->color[0] && a->color[1] == b->color[1] &&
            a->color[2] == b->color[2];
 }
 
-static int continues(const walk *way, const piece *before, const piece *p)
+static int continues(const nb_cell_traversal *way, const nb_cell_piece *before, const nb_cell_piece *p)
 {
     const nebel_cells *cells = way->cells;
     return cells->grouped && is_same_fog(&cells->cells[before->cell], &cells->cells[p->cell]) &&
@@ -179,9 +180,10 @@ static double find_intensity(const nebel_cells *cells, double density, double sp
     return fmin(amount, 1);
 }
 
-static nebel_cell_segment make_layer(const walk *way, const piece *first, const piece *last)
+static nebel_cell_segment make_layer(const nb_cell_traversal *way, const nb_cell_piece *first,
+                                     const nb_cell_piece *last)
 {
-    const nb_cell *cell = &way->cells->cells[first->cell];
+    const nb_fog_cell *cell = &way->cells->cells[first->cell];
     nebel_cell_segment layer = {
         .from = find_from(way, first), .to = find_to(way, last), .first_cell = first->cell, .last_cell = last->cell};
     memcpy(layer.color, cell->color, sizeof layer.color);
@@ -192,9 +194,9 @@ static nebel_cell_segment make_layer(const walk *way, const piece *first, const 
 /* Called for each layer, from the eye on. */
 typedef void take_layer(const nebel_cell_segment *layer, void *user);
 
-static void find_layers(const walk *way, take_layer *take, void *user)
+static void find_layers(const nb_cell_traversal *way, take_layer *take, void *user)
 {
-    piece pieces[NEBEL_MAX_CELLS];
+    nb_cell_piece pieces[NEBEL_MAX_CELLS];
     const size_t count = count_seen(way, pieces, find_pieces(way, pieces));
     for (size_t first = 0, last; first < count; first = last + 1) {
         last = first;
@@ -212,10 +214,10 @@ static int is_place(const double x[3])
     return isfinite(x[0]) && isfinite(x[1]) && isfinite(x[2]);
 }
 
-static nebel_result set_view(const nebel_cells *cells, const nebel_cell_view *view, walk *way)
+static nebel_result set_view(const nebel_cells *cells, const nebel_cell_view *view, nb_cell_traversal *way)
 {
     const double *f = view->forward, largest = fmax(fabs(f[0]), fmax(fabs(f[1]), fabs(f[2])));
-    *way = (walk){.cells = cells, .eye = view->eye, .has_walls = cells->has_walls && !view->ignore_walls};
+    *way = (nb_cell_traversal){.cells = cells, .eye = view->eye, .has_walls = cells->has_walls && !view->ignore_walls};
     if (!is_place(view->eye)) return NEBEL_ERROR_ARGUMENT;
     if (cells->span == NEBEL_SPAN_RAY) return NEBEL_OK;
     if (!is_place(f) || !(largest > 0)) return NEBEL_ERROR_ARGUMENT;
@@ -226,7 +228,7 @@ static nebel_result set_view(const nebel_cells *cells, const nebel_cell_view *vi
 }
 
 /* 0: the point has no fog. */
-static int set_point(walk *way, const nebel_cell_point *point)
+static int set_point(nb_cell_traversal *way, const nebel_cell_point *point)
 {
     way->point = point;
     if (!is_place(point->position)) return 0;
@@ -248,7 +250,7 @@ static void add_layer(const nebel_cell_segment *layer, void *user)
 }
 
 /* Each element has bytes of its own. */
-static int are_streams(const nb_span *points, const nb_span *fog, size_t n)
+static int are_streams(const nb_memory_span *points, const nb_memory_span *fog, size_t n)
 {
     if (n == 0) return 1;
     return points->stride >= points->size && fog->stride >= fog->size && nb_span_fits(points, n) &&
@@ -259,14 +261,14 @@ nebel_result nebel_compute_cell_fog(const nebel_cells *cells, const nebel_cell_v
                                     const nebel_cell_point *points, size_t point_stride, nebel_cell_fog *fog,
                                     size_t fog_stride)
 {
-    walk way;
+    nb_cell_traversal way;
     if (cells == NULL || view == NULL || (n > 0 && (points == NULL || fog == NULL))) return NEBEL_ERROR_ARGUMENT;
     const nebel_result result = set_view(cells, view, &way);
     if (result != NEBEL_OK) return result;
     if (point_stride == 0) point_stride = sizeof *points;
     if (fog_stride == 0) fog_stride = sizeof *fog;
-    const nb_span from = {(uintptr_t)points, sizeof *points, point_stride};
-    const nb_span to = {(uintptr_t)fog, sizeof *fog, fog_stride};
+    const nb_memory_span from = {(uintptr_t)points, sizeof *points, point_stride};
+    const nb_memory_span to = {(uintptr_t)fog, sizeof *fog, fog_stride};
     if (!are_streams(&from, &to, n)) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
         const nebel_cell_point *point = nb_stride_from(points, point_stride, i);
@@ -277,14 +279,14 @@ nebel_result nebel_compute_cell_fog(const nebel_cells *cells, const nebel_cell_v
     return NEBEL_OK;
 }
 
-typedef struct list {
+typedef struct nb_cell_list {
     nebel_cell_segment *layers;
     size_t room, count;
-} list;
+} nb_cell_list;
 
 static void list_layer(const nebel_cell_segment *layer, void *user)
 {
-    list *to = user;
+    nb_cell_list *to = user;
     if (to->count < to->room) to->layers[to->count] = *layer;
     to->count++;
 }
@@ -293,12 +295,12 @@ nebel_result nebel_compute_cell_segments(const nebel_cells *cells, const nebel_c
                                          const nebel_cell_point *point, size_t room, nebel_cell_segment *layers,
                                          size_t *count)
 {
-    walk way;
+    nb_cell_traversal way;
     if (cells == NULL || view == NULL || point == NULL || count == NULL || (room > 0 && layers == NULL))
         return NEBEL_ERROR_ARGUMENT;
     const nebel_result result = set_view(cells, view, &way);
     if (result != NEBEL_OK) return result;
-    list to = {layers, room, 0};
+    nb_cell_list to = {layers, room, 0};
     if (set_point(&way, point)) find_layers(&way, list_layer, &to);
     *count = to.count;
     return NEBEL_OK;

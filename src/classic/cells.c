@@ -28,14 +28,14 @@ nebel_volume_desc nebel_volume_from_cell(const nebel_cell *cell)
 /* ---- one cell -------------------------------------------------------------------------------- */
 
 /* Messages of the core about a cell, which do not know its number. */
-typedef struct rumour {
+typedef struct nb_cell_note {
     const nebel_log *log;
     size_t cell;
-} rumour;
+} nb_cell_note;
 
 static void pass_on(nebel_result result, const char *message, void *user)
 {
-    const rumour *about = user;
+    const nb_cell_note *about = user;
     nb_fail(about->log, result, "cell %zu: %s", about->cell, message);
 }
 
@@ -51,7 +51,7 @@ static nebel_result check_cell(const nebel_log *log, const nebel_cell *cell)
     return nb_check_color(log, "color", cell->color, NEBEL_MAX_AMOUNT);
 }
 
-static int add_plane(nebel_cells *cells, nb_cell *cell, const nb_leaf *leaf, const double local[3], double distance,
+static int add_plane(nebel_cells *cells, nb_fog_cell *cell, const nb_leaf *leaf, const double local[3], double distance,
                      double tie)
 {
     long double n[3] = {0, 0, 0}, square = 0, d = (long double)distance;
@@ -73,7 +73,7 @@ static int add_plane(nebel_cells *cells, nb_cell *cell, const nb_leaf *leaf, con
     return 1;
 }
 
-static int add_box(nebel_cells *cells, nb_cell *cell, const nb_leaf *leaf)
+static int add_box(nebel_cells *cells, nb_fog_cell *cell, const nb_leaf *leaf)
 {
     for (int i = 0; i < 3; i++) {
         double normal[3] = {0, 0, 0};
@@ -85,7 +85,7 @@ static int add_box(nebel_cells *cells, nb_cell *cell, const nb_leaf *leaf)
     return 1;
 }
 
-static int add_faces(nebel_cells *cells, nb_cell *cell, const nb_volume *volume)
+static int add_faces(nebel_cells *cells, nb_fog_cell *cell, const nb_volume *volume)
 {
     const nb_leaf *leaf = &volume->leaves[0];
     if (leaf->type == NB_LEAF_BOX) return add_box(cells, cell, leaf);
@@ -108,7 +108,7 @@ static nebel_result check_ends(const nebel_log *log, const nb_volume *volume)
     return NEBEL_OK;
 }
 
-static nebel_result set_cell(nebel_cells *cells, const nebel_log *log, const nebel_cell *from, nb_cell *cell)
+static nebel_result set_cell(nebel_cells *cells, const nebel_log *log, const nebel_cell *from, nb_fog_cell *cell)
 {
     nebel_result result = check_cell(log, from);
     if (result != NEBEL_OK) return result;
@@ -116,7 +116,7 @@ static nebel_result set_cell(nebel_cells *cells, const nebel_log *log, const neb
     const nebel_volume_desc desc = nebel_volume_from_cell(from);
     result = nb_volume_resolve(&cells->allocator, log, &desc, &volume);
     if (result != NEBEL_OK) return result;
-    *cell = (nb_cell){.first_plane = cells->plane_count, .density = from->density};
+    *cell = (nb_fog_cell){.first_plane = cells->plane_count, .density = from->density};
     memcpy(cell->color, from->color, sizeof cell->color);
     memcpy(cell->low, volume.low, sizeof cell->low);
     memcpy(cell->high, volume.high, sizeof cell->high);
@@ -143,7 +143,7 @@ static void set_tolerance(nebel_cells *cells)
     }
 }
 
-static size_t inset_planes(const nebel_cells *cells, const nb_cell *cell, double (*planes)[4])
+static size_t inset_planes(const nebel_cells *cells, const nb_fog_cell *cell, double (*planes)[4])
 {
     for (size_t i = 0; i < cell->plane_count; i++) {
         const nb_cell_plane *plane = &cells->planes[cell->first_plane + i];
@@ -153,14 +153,14 @@ static size_t inset_planes(const nebel_cells *cells, const nb_cell *cell, double
     return cell->plane_count;
 }
 
-static int are_apart(const nebel_cells *cells, const nb_cell *a, const nb_cell *b)
+static int are_apart(const nebel_cells *cells, const nb_fog_cell *a, const nb_fog_cell *b)
 {
     for (int i = 0; i < 3; i++)
         if (fmin(a->high[i], b->high[i]) - fmax(a->low[i], b->low[i]) <= cells->tolerance) return 1;
     return 0;
 }
 
-static int overlap(const nebel_cells *cells, const nb_cell *a, const nb_cell *b, double (*planes)[4])
+static int overlap(const nebel_cells *cells, const nb_fog_cell *a, const nb_fog_cell *b, double (*planes)[4])
 {
     double low[3], high[3];
     if (are_apart(cells, a, b)) return 0;
@@ -190,7 +190,7 @@ static nebel_result set_cells(nebel_cells *cells, const nebel_cells_desc *desc)
     cells->cells = nb_allocate_zero(&cells->allocator, desc->cell_count, sizeof *cells->cells);
     if (cells->cells == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "cells: out of memory");
     for (size_t i = 0; i < desc->cell_count; i++) {
-        rumour about = {&desc->log, i};
+        nb_cell_note about = {&desc->log, i};
         const nebel_log log = {pass_on, &about};
         const nebel_result result = set_cell(cells, &log, &desc->cells[i], &cells->cells[i]);
         if (result != NEBEL_OK) {

@@ -11,11 +11,11 @@ typedef struct nb_cell_plane {
     double normal[3], distance, tie;
 } nb_cell_plane;
 
-typedef struct nb_cell {
+typedef struct nb_fog_cell {
     double low[3], high[3];
     size_t first_plane, plane_count;
     double density, color[3];
-} nb_cell;
+} nb_fog_cell;
 
 /* Vertices go counterclockwise as seen against the normal. */
 typedef struct nb_portal {
@@ -34,7 +34,7 @@ struct nebel_cells {
 
     size_t cell_count, plane_count, portal_count, vertex_count;
     size_t plane_capacity, portal_capacity, vertex_capacity;
-    nb_cell *cells;
+    nb_fog_cell *cells;
     nb_cell_plane *planes;
     nb_portal *portals;
     double (*vertices)[3];

@@ -35,27 +35,27 @@ typedef struct known_leaf {
 } known_leaf;
 
 /* The fog of a body in an intersection of leaves, so many times. */
-typedef struct part {
+typedef struct nb_error_part {
     const nb_volume *body; /* whose fog it is */
     double extinction;     /* times the coefficient of the intersection */
     size_t leaf_count;
     known_leaf leaves[MOST_LEAVES];
-} part;
+} nb_error_part;
 
 struct nb_fog_bound {
     nebel_allocator allocator;
     double eye[3], least_factor;
-    part *parts;
+    nb_error_part *parts;
     size_t part_count, part_room;
 };
 
 /* ---- integrals along a stretch ----------------------------------------------------------------- */
 
 /* A triangle, and the length of the way to it. */
-typedef struct view {
-    const sight *world;
+typedef struct nb_bound_view {
+    const nb_jet_ray *world;
     jet length;
-} view;
+} nb_bound_view;
 
 /* offset + share times slope. */
 typedef struct line {
@@ -63,18 +63,18 @@ typedef struct line {
     jet slope;
 } line;
 
-static jet extent(const stretch *inside)
+static jet extent(const nb_body_interval *inside)
 {
     return greatest(difference(inside->to, inside->from), constant(0));
 }
 
-static int is_empty(const stretch *inside)
+static int is_empty(const nb_body_interval *inside)
 {
     return inside->to.value.high <= inside->from.value.low;
 }
 
 /* Where a stretch begins, but within the way where it is empty. */
-static jet beginning(const stretch *inside)
+static jet beginning(const nb_body_interval *inside)
 {
     return least(inside->from, constant(1));
 }
@@ -85,7 +85,7 @@ static jet at_share(const line *l, jet share)
 }
 
 /* Of the product of at most three lines: two points of Gauss are exact. */
-static jet integrate_lines(const line *lines, size_t count, const stretch *inside)
+static jet integrate_lines(const line *lines, size_t count, const nb_body_interval *inside)
 {
     const double places[2] = {0.21132486540518711775, 0.78867513459481288225};
     const jet from = beginning(inside), size = extent(inside);
@@ -100,7 +100,7 @@ static jet integrate_lines(const line *lines, size_t count, const stretch *insid
 }
 
 /* n . (eye + share way - origin) */
-static line line_along(const double normal[3], const double eye[3], const double origin[3], const sight *s)
+static line line_along(const double normal[3], const double eye[3], const double origin[3], const nb_jet_ray *s)
 {
     double at[3], from[3];
     for (int i = 0; i < 3; i++) {
@@ -116,7 +116,7 @@ static line plus(double offset, double factor, const line *l)
 }
 
 /* The part where the line is not negative. */
-static void part_at_zero(stretch *inside, const line *l)
+static void part_at_zero(nb_body_interval *inside, const line *l)
 {
     part_at(inside, l->offset, times(-1, l->slope));
 }
@@ -143,7 +143,7 @@ static jet ratio(jet x)
 
 /* Of e^-u, from the end where the fog is dense. Where the density comes near its limit, and where a triangle is so
  * large that the fog is dense at either end, nothing more is known than the largest density. */
-static jet integrate_exponential(const line *u, const stretch *inside)
+static jet integrate_exponential(const line *u, const nb_body_interval *inside)
 {
     const double lowest = u->offset + smaller(u->slope.value.low, 0);
     const int sinks = u->slope.value.low + u->slope.value.high < 0;
@@ -153,10 +153,10 @@ static jet integrate_exponential(const line *u, const stretch *inside)
     return product(product(size, exponential_of_minus(at_share(u, sinks ? to : from))), ratio(change));
 }
 
-static jet integrate_height(const nebel_density *density, const line *u, const stretch *inside)
+static jet integrate_height(const nebel_density *density, const line *u, const nb_body_interval *inside)
 {
     if (density->below == NEBEL_BELOW_GROW) return integrate_exponential(u, inside);
-    stretch above = *inside, below = *inside;
+    nb_body_interval above = *inside, below = *inside;
     const line depth = plus(0, -1, u);
     part_at_zero(&above, u);
     part_at_zero(&below, &depth);
@@ -166,9 +166,9 @@ static jet integrate_height(const nebel_density *density, const line *u, const s
 /* ---- linear and gaussian ------------------------------------------------------------------------- */
 
 /* Of u clamped to 0..1. */
-static jet integrate_ramp(const line *u, const stretch *inside)
+static jet integrate_ramp(const line *u, const nb_body_interval *inside)
 {
-    stretch ramp = *inside, full = *inside;
+    nb_body_interval ramp = *inside, full = *inside;
     const line rest = plus(1, -1, u), over = plus(-1, 1, u);
     part_at_zero(&ramp, u);
     part_at_zero(&ramp, &rest);
@@ -188,14 +188,15 @@ static jet error_function(jet x)
 
 /* In metres: e^-m (erf x_to - erf x_from) sigma sqrt(pi / 2), where x = (share |way| + e . way / |way|) / (sqrt(2)
  * sigma), e from the centre to the eye, and m = |e x way|^2 / (2 sigma^2 |way|^2). */
-static jet integrate_gaussian(const nebel_density *density, const double eye[3], const stretch *inside, const view *v)
+static jet integrate_gaussian(const nebel_density *density, const double eye[3], const nb_body_interval *inside,
+                              const nb_bound_view *v)
 {
     double from[3], at[3];
     for (int i = 0; i < 3; i++) from[i] = eye[i] - density->center[i];
     for (int i = 0; i < 3; i++) at[i] = nb_vector_dot(from, v->world->way[i]);
     if (v->length.value.low <= 1e-12 * v->length.value.high) return unknown(0, v->length.value.high);
     const double sigma = density->sigma, width = sigma * sqrt(2);
-    const sight moment = moments(v->world, 3, from);
+    const nb_jet_ray moment = moments(v->world, 3, from);
     const jet over = reciprocal(v->length), start = product(linear(at), over);
     const jet m = product(times(.5 / (sigma * sigma), square_of_way(&moment, 3)), product(over, over));
     const jet to = sum(product(inside->to, v->length), start), first = sum(product(inside->from, v->length), start);
@@ -254,7 +255,8 @@ static jet chord_between(int power, jet c, jet from, jet to)
 /* Of the density of a ball: (1 - r^2)^power, or min(1, gain (1 - r^2)), which is a difference of two balls. In metres.
  * x = (share |w|^2 + e . w) / (radius |w|) in the ball's frame, c = 1 - |e x w|^2 / (radius |w|)^2; all that is there
  * vanishes at the silhouette. */
-static jet integrate_ball(const part *p, const stretch *inside, const view *v, const sight *s)
+static jet integrate_ball(const nb_error_part *p, const nb_body_interval *inside, const nb_bound_view *v,
+                          const nb_jet_ray *s)
 {
     const known_leaf *const own = &p->leaves[0];
     const double radius = own->leaf->radius, inverse = 1 / radius;
@@ -262,7 +264,7 @@ static jet integrate_ball(const part *p, const stretch *inside, const view *v, c
     if (speed.value.low <= 1e-12 * speed.value.high) return unknown(0, v->length.value.high);
     double at[3];
     for (int i = 0; i < 3; i++) at[i] = nb_vector_dot(own->eye, s->way[i]);
-    const sight moment = moments(s, 3, own->eye);
+    const nb_jet_ray moment = moments(s, 3, own->eye);
     const jet over = reciprocal(speed), start = product(linear(at), over);
     const jet m = product(times(inverse * inverse, square_of_way(&moment, 3)), product(over, over));
     const jet c = difference(constant(1), m);
@@ -281,14 +283,14 @@ static jet integrate_ball(const part *p, const stretch *inside, const view *v, c
 
 /* The least of min(1, depth behind a face / width): in the part of the body where one face is the nearest, or all are
  * far, it is one line. */
-static jet integrate_soft_planes(const part *p, const stretch *inside, const sight *s)
+static jet integrate_soft_planes(const nb_error_part *p, const nb_body_interval *inside, const nb_jet_ray *s)
 {
     static const double origin[3] = {0, 0, 0};
     const known_leaf *const own = &p->leaves[0];
     const size_t count = own->leaf->face_count;
     line depths[MOST_SOFT_PLANES];
     jet integral;
-    stretch plateau = *inside;
+    nb_body_interval plateau = *inside;
     for (size_t i = 0; i < count; i++) {
         const nb_face *const face = &own->body->faces[own->leaf->first_face + i];
         const double scale = face->inverse_length / own->body->density.edge_width;
@@ -299,7 +301,7 @@ static jet integrate_soft_planes(const part *p, const stretch *inside, const sig
     }
     integral = extent(&plateau);
     for (size_t i = 0; i < count; i++) {
-        stretch near = *inside;
+        nb_body_interval near = *inside;
         const line rest = plus(1, -1, &depths[i]);
         part_at_zero(&near, &depths[i]);
         part_at_zero(&near, &rest);
@@ -312,7 +314,7 @@ static jet integrate_soft_planes(const part *p, const stretch *inside, const sig
     return integral;
 }
 
-static void part_at_axis(stretch *inside, jet rise, double low, double high, double eye)
+static void part_at_axis(nb_body_interval *inside, jet rise, double low, double high, double eye)
 {
     part_at(inside, high - eye, rise);
     part_at(inside, eye - low, times(-1, rise));
@@ -320,14 +322,15 @@ static void part_at_axis(stretch *inside, jet rise, double low, double high, dou
 
 /* The product over the axes of min(1, depth behind the nearer face / width): each axis has an edge on both sides and a
  * plateau, and so the box at most 27 parts. */
-static jet integrate_soft_box(const part *p, const stretch *inside, const sight *s, int axis, line *lines, size_t count)
+static jet integrate_soft_box(const nb_error_part *p, const nb_body_interval *inside, const nb_jet_ray *s, int axis,
+                              line *lines, size_t count)
 {
     if (is_empty(inside)) return constant(0);
     if (axis == 3) return integrate_lines(lines, count, inside);
     const known_leaf *const own = &p->leaves[0];
     const double low = own->leaf->low[axis], high = own->leaf->high[axis];
     const double width = own->body->density.edge_width, edge = smaller(width, .5 * (high - low));
-    stretch near = *inside, far = *inside, plateau = *inside;
+    nb_body_interval near = *inside, far = *inside, plateau = *inside;
     const double at[3] = {s->way[0][axis], s->way[1][axis], s->way[2][axis]};
     const jet rise = linear(at);
     part_at_axis(&near, rise, low, low + edge, own->eye[axis]);
@@ -343,9 +346,9 @@ static jet integrate_soft_box(const part *p, const stretch *inside, const sight 
 
 /* ---- the fog of a part ----------------------------------------------------------------------------- */
 
-static sight in_leaf(const nb_leaf *leaf, const sight *world)
+static nb_jet_ray in_leaf(const nb_leaf *leaf, const nb_jet_ray *world)
 {
-    sight s;
+    nb_jet_ray s;
     if (leaf->aligned) return *world;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) s.way[i][k] = nb_vector_dot(leaf->matrix + 3 * k, world->way[i]);
@@ -358,10 +361,10 @@ static int has_edge_of_its_own(const nb_volume *body)
     return body->density.type == NEBEL_DENSITY_RADIAL || body->density.type == NEBEL_DENSITY_SOFT_EDGE;
 }
 
-static jet integrate_own_edge(const part *p, const stretch *inside, const view *v)
+static jet integrate_own_edge(const nb_error_part *p, const nb_body_interval *inside, const nb_bound_view *v)
 {
     const nb_leaf *const leaf = p->leaves[0].leaf;
-    const sight s = in_leaf(leaf, v->world);
+    const nb_jet_ray s = in_leaf(leaf, v->world);
     line lines[MOST_FACTORS];
     if (leaf->type == NB_LEAF_BALL) return integrate_ball(p, inside, v, &s);
     const jet shares = leaf->type == NB_LEAF_BOX ? integrate_soft_box(p, inside, &s, 0, lines, 0)
@@ -369,7 +372,8 @@ static jet integrate_own_edge(const part *p, const stretch *inside, const view *
     return product(v->length, shares);
 }
 
-static jet integrate_linear(const nebel_density *density, const double eye[3], const stretch *inside, const view *v)
+static jet integrate_linear(const nebel_density *density, const double eye[3], const nb_body_interval *inside,
+                            const nb_bound_view *v)
 {
     double axis[3], square = 0;
     for (int i = 0; i < 3; i++) {
@@ -382,7 +386,8 @@ static jet integrate_linear(const nebel_density *density, const double eye[3], c
 }
 
 /* The integral of the density along a stretch of the way [m]. */
-static jet integrate(const part *p, const double eye[3], const stretch *inside, const view *v)
+static jet integrate(const nb_error_part *p, const double eye[3], const nb_body_interval *inside,
+                     const nb_bound_view *v)
 {
     const nebel_density *const density = &p->body->density;
     if (is_empty(inside)) return constant(0);
@@ -410,7 +415,7 @@ static size_t piece_count(const nb_leaf *leaf)
     return leaf->type == NB_LEAF_CAPSULE ? 3 : 1;
 }
 
-static void cut_capsule(stretch *inside, const known_leaf *known, const sight *s, size_t piece)
+static void cut_capsule(nb_body_interval *inside, const known_leaf *known, const nb_jet_ray *s, size_t piece)
 {
     const double length = known->leaf->length, *const eye = known->eye;
     const double center[3] = {eye[0], eye[1], eye[2] - (piece == 2 ? length : 0)};
@@ -421,10 +426,10 @@ static void cut_capsule(stretch *inside, const known_leaf *known, const sight *s
     cut_round(inside, s, piece == 0 ? 2 : 3, 1, piece == 0 ? eye : center);
 }
 
-static void cut_leaf(stretch *inside, const known_leaf *known, size_t piece, const view *v)
+static void cut_leaf(nb_body_interval *inside, const known_leaf *known, size_t piece, const nb_bound_view *v)
 {
     const nb_leaf *const leaf = known->leaf;
-    const sight s = in_leaf(leaf, v->world);
+    const nb_jet_ray s = in_leaf(leaf, v->world);
     if (nb_volume_has_distances(known->body)) cut_distances(inside, known->body, v->length);
     switch (leaf->type) {
     case NB_LEAF_BOX:
@@ -453,23 +458,24 @@ static void cut_leaf(stretch *inside, const known_leaf *known, size_t piece, con
 }
 
 /* Over all choices of one piece of each leaf that is not cut yet. */
-static jet integrate_pieces(const part *p, const double eye[3], size_t next, stretch inside, const view *v)
+static jet integrate_pieces(const nb_error_part *p, const double eye[3], size_t next, nb_body_interval inside,
+                            const nb_bound_view *v)
 {
     for (; next < p->leaf_count && piece_count(p->leaves[next].leaf) == 1; next++)
         cut_leaf(&inside, &p->leaves[next], 0, v);
     if (next == p->leaf_count) return integrate(p, eye, &inside, v);
     jet integral = constant(0);
     for (size_t i = 0; i < piece_count(p->leaves[next].leaf); i++) {
-        stretch piece = inside;
+        nb_body_interval piece = inside;
         cut_leaf(&piece, &p->leaves[next], i, v);
         if (!is_empty(&piece)) integral = sum(integral, integrate_pieces(p, eye, next + 1, piece, v));
     }
     return integral;
 }
 
-static jet depth_of_part(const part *p, const double eye[3], const view *v)
+static jet depth_of_part(const nb_error_part *p, const double eye[3], const nb_bound_view *v)
 {
-    stretch inside = {constant(0), constant(1)};
+    nb_body_interval inside = {constant(0), constant(1)};
     size_t next = 0;
     if (has_edge_of_its_own(p->body)) {
         if (nb_volume_has_distances(p->body)) cut_distances(&inside, p->body, v->length);
@@ -478,9 +484,9 @@ static jet depth_of_part(const part *p, const double eye[3], const view *v)
     return times(p->extinction, integrate_pieces(p, eye, next, inside, v));
 }
 
-static jet optical_depth(const nb_fog_bound *bound, const sight *s)
+static jet optical_depth(const nb_fog_bound *bound, const nb_jet_ray *s)
 {
-    const view v = {s, length_of_way(s)};
+    const nb_bound_view v = {s, length_of_way(s)};
     jet depth = constant(0);
     for (size_t i = 0; i < bound->part_count; i++) depth = sum(depth, depth_of_part(&bound->parts[i], bound->eye, &v));
     depth.value.low = larger(depth.value.low, 0);
@@ -497,7 +503,7 @@ static double bound_of_widths(double a, double b, double c)
 
 static jet factor(const nb_fog_bound *bound, const double ways[3][3])
 {
-    sight s;
+    nb_jet_ray s;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) s.way[i][k] = ways[i][k];
     set_edges(&s);
@@ -527,11 +533,11 @@ double nb_bound_fog(const nb_fog_bound *bound, const double ways[3][3])
 /* ---- intersections of leaves ------------------------------------------------------------------------ */
 
 /* A body's leaves, and those of all that take its fog away, which follow one another as `bodies` do. */
-typedef struct mixture {
+typedef struct nb_error_mixture {
     const nb_volume *bodies[MOST_LEAVES + 1];
     size_t body_count, leaf_count;
     known_leaf leaves[MOST_LEAVES];
-} mixture;
+} nb_error_mixture;
 
 static int is_inside(const nb_volume *body, size_t leaves)
 {
@@ -550,7 +556,7 @@ static int is_inside(const nb_volume *body, size_t leaves)
 }
 
 /* Whether the first body's fog is where these leaves are. */
-static int has_fog(const mixture *m, size_t leaves)
+static int has_fog(const nb_error_mixture *m, size_t leaves)
 {
     for (size_t i = 0; i < m->body_count; i++) {
         if (is_inside(m->bodies[i], leaves) != (i == 0)) return 0;
@@ -567,7 +573,7 @@ static int parity(size_t bits)
 }
 
 /* The sum over the subsets of (-1)^(leaves left out) times the fog there. */
-static int coefficient(const mixture *m, size_t leaves)
+static int coefficient(const nb_error_mixture *m, size_t leaves)
 {
     int sum = 0;
     for (size_t subset = leaves;; subset = (subset - 1) & leaves) {
@@ -591,7 +597,7 @@ static void bring_into_frame(known_leaf *known, const double eye[3])
 }
 
 /* 0: too many leaves. */
-static int mix(mixture *m, const nb_volume *body, const double eye[3])
+static int mix(nb_error_mixture *m, const nb_volume *body, const double eye[3])
 {
     if (m->leaf_count + body->leaf_count > MOST_LEAVES) return 0;
     m->bodies[m->body_count++] = body;
@@ -603,13 +609,13 @@ static int mix(mixture *m, const nb_volume *body, const double eye[3])
     return 1;
 }
 
-static nebel_result add_part(nb_fog_bound *bound, const mixture *m, size_t leaves, double extinction)
+static nebel_result add_part(nb_fog_bound *bound, const nb_error_mixture *m, size_t leaves, double extinction)
 {
     if (!nb_grow(&bound->allocator, (void **)&bound->parts, sizeof *bound->parts, bound->part_count, &bound->part_room,
                  bound->part_count + 1))
         return NEBEL_ERROR_MEMORY;
-    part *const p = &bound->parts[bound->part_count++];
-    *p = (part){.body = m->bodies[0], .extinction = extinction};
+    nb_error_part *const p = &bound->parts[bound->part_count++];
+    *p = (nb_error_part){.body = m->bodies[0], .extinction = extinction};
     for (size_t i = 0; i < m->leaf_count; i++)
         if (leaves >> i & 1) p->leaves[p->leaf_count++] = m->leaves[i];
     return NEBEL_OK;
@@ -652,7 +658,7 @@ static nebel_result refuse_parts(const nebel_log *log)
 /* A body of one leaf of which nothing is taken away, as most are, is one part. */
 static nebel_result add_body(nb_fog_bound *bound, const nebel_snapshot *snapshot, const nb_volume *body, int channel)
 {
-    mixture m = {.body_count = 0};
+    nb_error_mixture m = {.body_count = 0};
     nebel_result result = NEBEL_OK;
     if (!is_known_density(body)) return refuse_density(&snapshot->log, body);
     if (!mix(&m, body, bound->eye)) return refuse_parts(&snapshot->log);

@@ -7,16 +7,16 @@
 #include <stdint.h>
 
 /* The bytes of n elements: `size` at `first`, and again every `stride`. */
-typedef struct nb_span {
+typedef struct nb_memory_span {
     uintptr_t first;
     size_t size, stride;
-} nb_span;
+} nb_memory_span;
 
 /* Whether n > 0 elements end within the address space. */
-int nb_span_fits(const nb_span *s, size_t n);
+int nb_span_fits(const nb_memory_span *s, size_t n);
 
 /* Elements of equal strides keep their places within the stride. Of others only arrays apart are taken. */
-int nb_spans_share_bytes(const nb_span *a, const nb_span *b, size_t n);
+int nb_spans_share_bytes(const nb_memory_span *a, const nb_memory_span *b, size_t n);
 
 /* The stride in bytes, its default put in. */
 size_t nb_layout_stride(const nebel_vertex_output *output);

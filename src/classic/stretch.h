@@ -8,14 +8,14 @@
 #include "media/volume.h"
 
 /* A triangle as seen from the eye, in the frame of a leaf or of the world. */
-typedef struct sight {
+typedef struct nb_jet_ray {
     double way[3][3];  /* to the corners */
     double edge[3][3]; /* from corner i to the next */
-} sight;
+} nb_jet_ray;
 
 /* ---- the triangle ---------------------------------------------------------------------------- */
 
-static inline void set_edges(sight *s)
+static inline void set_edges(nb_jet_ray *s)
 {
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) s->edge[i][k] = s->way[(i + 1) % 3][k] - s->way[i][k];
@@ -23,7 +23,7 @@ static inline void set_edges(sight *s)
 
 /* Least distance of the origin from a triangle in so many dimensions, or less: that of the middle, without the radius
  * about it. */
-static inline double least_distance(const sight *s, int dimensions)
+static inline double least_distance(const nb_jet_ray *s, int dimensions)
 {
     double middle[3], square = 0, radius = 0;
     for (int k = 0; k < dimensions; k++) {
@@ -39,7 +39,7 @@ static inline double least_distance(const sight *s, int dimensions)
 }
 
 /* |way|^2 in so many dimensions; its derivative along an edge is linear. */
-static inline jet square_of_way(const sight *s, int dimensions)
+static inline jet square_of_way(const nb_jet_ray *s, int dimensions)
 {
     const double near = least_distance(s, dimensions);
     double products[3][3] = {{0}};
@@ -57,7 +57,7 @@ static inline jet square_of_way(const sight *s, int dimensions)
 }
 
 /* |way|, which changes no faster than the place does. */
-static inline jet length_of_way(const sight *s)
+static inline jet length_of_way(const nb_jet_ray *s)
 {
     const jet square = square_of_way(s, 3);
     jet a = root(square);
@@ -72,9 +72,9 @@ static inline jet length_of_way(const sight *s)
 /* ---- shares of the way in a leaf -------------------------------------------------------------- */
 
 /* The stretch [from, to] of the way, as shares of it, that is in a body. */
-typedef struct stretch {
+typedef struct nb_body_interval {
     jet from, to;
-} stretch;
+} nb_body_interval;
 
 /* E / n where n > E, else 1; E > 0. */
 static inline jet crossing(double e, jet n)
@@ -89,7 +89,7 @@ static inline jet crossing(double e, jet n)
 
 /* A half-space: share times rise <= depth, where depth is that of the eye in it. From an eye in the plane a way is in
  * or out, whole; which of both where it is level with the plane is not known here. */
-static inline void cut(stretch *inside, double depth, jet rise)
+static inline void cut(nb_body_interval *inside, double depth, jet rise)
 {
     if (depth > 0 && rise.value.high <= depth) return;
     if (depth > 0)
@@ -103,7 +103,7 @@ static inline void cut(stretch *inside, double depth, jet rise)
 }
 
 /* Takes away that the ends change. */
-static inline stretch hold(stretch s)
+static inline nb_body_interval hold(nb_body_interval s)
 {
     for (int i = 0; i < 3; i++) s.from.along[i] = s.to.along[i] = (interval){0, 0};
     return s;
@@ -111,16 +111,17 @@ static inline stretch hold(stretch s)
 
 /* Keeps the part of a body in a half-space, the rest of which, with the same density at the plane, is another part.
  * What either gains by a move of the end the other loses: neither counts it. */
-static inline void part_at(stretch *inside, double depth, jet rise)
+static inline void part_at(nb_body_interval *inside, double depth, jet rise)
 {
-    stretch end = {constant(0), constant(1)};
+    nb_body_interval end = {constant(0), constant(1)};
     cut(&end, depth, rise);
     end = hold(end);
     inside->from = greatest(inside->from, end.from);
     inside->to = least(inside->to, end.to);
 }
 
-static inline void cut_axis(stretch *inside, const sight *s, int axis, double low, double high, double eye)
+static inline void cut_axis(nb_body_interval *inside, const nb_jet_ray *s, int axis, double low, double high,
+                            double eye)
 {
     const double at[3] = {s->way[0][axis], s->way[1][axis], s->way[2][axis]};
     const jet rise = linear(at);
@@ -128,7 +129,8 @@ static inline void cut_axis(stretch *inside, const sight *s, int axis, double lo
     cut(inside, eye - low, times(-1, rise));
 }
 
-static inline void cut_faces(stretch *inside, const sight *s, const nb_face *faces, size_t count, const double eye[3])
+static inline void cut_faces(nb_body_interval *inside, const nb_jet_ray *s, const nb_face *faces, size_t count,
+                             const double eye[3])
 {
     for (size_t f = 0; f < count; f++) {
         double at[3];
@@ -138,9 +140,9 @@ static inline void cut_faces(stretch *inside, const sight *s, const nb_face *fac
 }
 
 /* e x way, linear like the way. In two dimensions it has one component, and e and the ways no third. */
-static inline sight moments(const sight *s, int dimensions, const double e[3])
+static inline nb_jet_ray moments(const nb_jet_ray *s, int dimensions, const double e[3])
 {
-    sight m;
+    nb_jet_ray m;
     for (int i = 0; i < 3; i++) {
         const double *const w = s->way[i];
         m.way[i][0] = dimensions == 3 ? e[1] * w[2] - e[2] * w[1] : 0;
@@ -154,12 +156,13 @@ static inline sight moments(const sight *s, int dimensions, const double e[3])
 /* A ball, or an endless tube in two dimensions: A share^2 + 2 B share + C <= 0, whose discriminant B^2 - A C is
  * A radius^2 - |e x way|^2 by Lagrange's identity, of terms that know less of each other. Where a part of the triangle
  * is beyond the silhouette both ends meet, and their difference, 0 there, is in what is found. */
-static inline void cut_round(stretch *inside, const sight *s, int dimensions, double radius, const double eye[3])
+static inline void cut_round(nb_body_interval *inside, const nb_jet_ray *s, int dimensions, double radius,
+                             const double eye[3])
 {
     double at[3] = {0, 0, 0};
     for (int k = 0; k < dimensions; k++)
         for (int i = 0; i < 3; i++) at[i] += eye[k] * s->way[i][k];
-    const sight moment = moments(s, dimensions, eye);
+    const nb_jet_ray moment = moments(s, dimensions, eye);
     const jet a = square_of_way(s, dimensions), b = linear(at);
     const jet discriminant = difference(times(radius * radius, a), square_of_way(&moment, 3));
     if (discriminant.value.high <= 0) {
@@ -179,7 +182,8 @@ static inline void cut_round(stretch *inside, const sight *s, int dimensions, do
 /* A cone x^2 + y^2 <= q^2, q = radius + slope z: A share^2 + 2 B share + C <= 0 in the form (+, +, -) of x, y, q, which
  * holds in the mirrored cone, q < 0, too; the planes at both ends leave that out. The reciprocals of both ends,
  * (+-sqrt(B^2 - A C) - B) / C, are those of no ends where they are not positive, and stay finite where A passes 0. */
-static inline void cut_cone(stretch *inside, const sight *s, double radius, double slope, const double eye[3])
+static inline void cut_cone(nb_body_interval *inside, const nb_jet_ray *s, double radius, double slope,
+                            const double eye[3])
 {
     const double q = radius + slope * eye[2], square = eye[0] * eye[0] + eye[1] * eye[1];
     const double c = square - q * q;
@@ -188,7 +192,7 @@ static inline void cut_cone(stretch *inside, const sight *s, double radius, doub
         inside->to = least(inside->to, unknown(0, 1));
         return;
     }
-    sight across; /* eye x way: of x and q, y and q, x and y */
+    nb_jet_ray across; /* eye x way: of x and q, y and q, x and y */
     double at[3];
     for (int i = 0; i < 3; i++) {
         const double *const w = s->way[i];
@@ -211,7 +215,7 @@ static inline void cut_cone(stretch *inside, const sight *s, double radius, doub
 }
 
 /* From `start` to `cutoff` metres of a way of such a length. */
-static inline void cut_distances(stretch *inside, const nb_volume *body, jet length)
+static inline void cut_distances(nb_body_interval *inside, const nb_volume *body, jet length)
 {
     if (body->start > 0) inside->from = greatest(inside->from, crossing(body->start, length));
     if (body->cutoff <= NEBEL_MAX_LENGTH) inside->to = least(inside->to, crossing(body->cutoff, length));

@@ -25,12 +25,12 @@ typedef struct middle {
     uint32_t vertex, next;
 } middle;
 
-typedef struct triangle {
+typedef struct nb_split_triangle {
     uint32_t corners[3]; /* vertices */
     uint32_t edges[3];   /* from a corner to the next */
     float error;         /* its bound; below 0: not asked for yet */
     unsigned depth;
-} triangle;
+} nb_split_triangle;
 
 typedef struct mesh {
     nebel_tessellation made; /* first: what the caller sees */
@@ -44,7 +44,7 @@ typedef struct mesh {
     edge *edges;
     uint32_t *middle_of; /* of each edge: the first of the vertices in its middle; NONE: it is whole */
     middle *middles;
-    triangle *triangles;
+    nb_split_triangle *triangles;
     uint32_t *indices;
     nb_fog_bound *bound;
     uint32_t *queue; /* triangles that may have to be halved, the oldest first */
@@ -97,7 +97,7 @@ static int is_halved(const mesh *m, uint32_t e)
 
 /* The longest of a triangle's edges that can be halved; 3: there is none. Of equal ones the first of the mesh, for all
  * triangles. */
-static int find_longest(const mesh *m, const triangle *t)
+static int find_longest(const mesh *m, const nb_split_triangle *t)
 {
     int longest = 3;
     double square = 0;
@@ -161,7 +161,7 @@ static uint32_t half_at(const mesh *m, uint32_t number, uint32_t point)
     return e->halves[e->ends[0] == point ? 0 : 1];
 }
 
-static void set_error(const mesh *m, triangle *t)
+static void set_error(const mesh *m, nb_split_triangle *t)
 {
     double ways[3][3];
     for (int c = 0; c < 3; c++)
@@ -173,30 +173,30 @@ static void set_error(const mesh *m, triangle *t)
 static nebel_result halve(mesh *m, size_t number, int at)
 {
     if (!GROW(m, triangles, triangle_count, triangle_room)) return NEBEL_ERROR_MEMORY;
-    const triangle was = m->triangles[number];
+    const nb_split_triangle was = m->triangles[number];
     const int next = (at + 1) % 3, last = (at + 2) % 3;
     const uint32_t a = was.corners[at], b = was.corners[next], c = was.corners[last];
     uint32_t vertex, between;
     nebel_result result = find_middle(m, was.edges[at], a, b, &vertex);
     if (result == NEBEL_OK) result = add_edge(m, m->points[vertex], m->points[c], &between);
     if (result != NEBEL_OK) return result;
-    triangle *const left = &m->triangles[number], *const right = &m->triangles[m->triangle_count++];
+    nb_split_triangle *const left = &m->triangles[number], *const right = &m->triangles[m->triangle_count++];
     const uint32_t left_half = half_at(m, was.edges[at], m->points[a]);
     const uint32_t right_half = half_at(m, was.edges[at], m->points[b]);
-    *left = (triangle){{a, vertex, c}, {left_half, between, was.edges[last]}, -1, was.depth + 1};
-    *right = (triangle){{vertex, b, c}, {right_half, was.edges[next], between}, -1, was.depth + 1};
+    *left = (nb_split_triangle){{a, vertex, c}, {left_half, between, was.edges[last]}, -1, was.depth + 1};
+    *right = (nb_split_triangle){{vertex, b, c}, {right_half, was.edges[next], between}, -1, was.depth + 1};
     return NEBEL_OK;
 }
 
 /* ---- refinement ------------------------------------------------------------------------------ */
 
-static int has_halved_edge(const mesh *m, const triangle *t)
+static int has_halved_edge(const mesh *m, const nb_split_triangle *t)
 {
     return is_halved(m, t->edges[0]) || is_halved(m, t->edges[1]) || is_halved(m, t->edges[2]);
 }
 
 /* The edge at which a triangle is to be halved; 3: it stays. What neighbours have halved needs no bound. */
-static int choose_edge(const mesh *m, triangle *t)
+static int choose_edge(const mesh *m, nb_split_triangle *t)
 {
     if (has_halved_edge(m, t)) return find_longest(m, t);
     if (t->error < 0) set_error(m, t);
@@ -314,7 +314,7 @@ static nebel_result join_edges(mesh *m, const table *seen)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < m->triangle_count && result == NEBEL_OK; i++) {
-        triangle *const t = &m->triangles[i];
+        nb_split_triangle *const t = &m->triangles[i];
         for (int k = 0; k < 3 && result == NEBEL_OK; k++)
             result = join_edge(m, seen, m->points[t->corners[k]], m->points[t->corners[(k + 1) % 3]], &t->edges[k]);
     }
@@ -327,7 +327,7 @@ static void copy_positions(mesh *m, const nebel_triangles *given)
     for (size_t v = 0; v < given->vertex_count; v++)
         memcpy(m->positions[v], (const unsigned char *)given->positions + v * stride, size);
     for (size_t i = 0; i < given->triangle_count; i++)
-        m->triangles[i] = (triangle){
+        m->triangles[i] = (nb_split_triangle){
             .corners = {given->indices[3 * i], given->indices[3 * i + 1], given->indices[3 * i + 2]}, .error = -1};
 }
 
@@ -406,7 +406,7 @@ static void *finish_indices(mesh *m)
 {
     m->indices = nb_allocate(&m->allocator, m->triangle_count, 3 * sizeof *m->indices);
     for (size_t i = 0; i < m->triangle_count && m->indices != NULL; i++) {
-        const triangle *const t = &m->triangles[i];
+        const nb_split_triangle *const t = &m->triangles[i];
         for (size_t k = 0; k < 3; k++) m->indices[3 * i + k] = t->corners[k];
         m->made.error = fmax(m->made.error, (double)t->error);
         if ((double)t->error <= m->desc.max_error) continue;

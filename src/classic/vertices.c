@@ -55,13 +55,13 @@ typedef struct call {
 } call;
 
 /* Numbers of a block, and the directions of its rays. */
-typedef struct block {
+typedef struct nb_vertex_block {
     size_t first, count;
     float points[3 * NB_VERTEX_BLOCK];
     float factor[NB_VERTEX_BLOCK];
     float direction[3][NB_VERTEX_BLOCK], t_max[NB_VERTEX_BLOCK];
     float light[3][NB_VERTEX_BLOCK];
-} block;
+} nb_vertex_block;
 
 /* Bytes; of longer ones most is not read. */
 enum { LONGEST_STRUCTURE = 256 };
@@ -72,7 +72,7 @@ static const unsigned char *position_at(const nebel_vertices *vertices, size_t i
 }
 
 /* The block's positions one after the other: where they are, or copied. */
-static const float *gather_points(const nebel_vertices *vertices, block *b)
+static const float *gather_points(const nebel_vertices *vertices, nb_vertex_block *b)
 {
     const size_t size = 3 * sizeof(float), stride = vertices->position_stride;
     const unsigned char *from = position_at(vertices, b->first);
@@ -86,7 +86,7 @@ static const float *gather_points(const nebel_vertices *vertices, block *b)
 /* ---- through the march ----------------------------------------------------------------------- */
 
 /* Rays that nothing is asked of where the vertex is at the eye, no place, or beyond all reach. */
-static void set_ray(const call *c, const float point[3], block *b, size_t i)
+static void set_ray(const call *c, const float point[3], nb_vertex_block *b, size_t i)
 {
     double way[3], square = 0;
     for (int k = 0; k < 3; k++) {
@@ -98,7 +98,7 @@ static void set_ray(const call *c, const float point[3], block *b, size_t i)
     b->t_max[i] = is_way ? (float)sqrt(square) : 0;
 }
 
-static nebel_result trace_block(const call *c, block *b)
+static nebel_result trace_block(const call *c, nb_vertex_block *b)
 {
     const float *const points = gather_points(&c->vertices, b);
     for (size_t i = 0; i < b->count; i++) set_ray(c, points + 3 * i, b, i);
@@ -116,7 +116,7 @@ static nebel_result trace_block(const call *c, block *b)
 /* ---- blocks ---------------------------------------------------------------------------------- */
 
 /* Structures are so much memory that the next block's are asked for while this one's fog is found. */
-static void transmit_block(const call *c, block *b)
+static void transmit_block(const call *c, nb_vertex_block *b)
 {
     const size_t stride = c->vertices.position_stride;
     nb_transmit_job job = {.boxes = c->boxes,
@@ -134,7 +134,7 @@ static void transmit_block(const call *c, block *b)
 }
 
 /* A last packet reaches beyond the vertices, and is to find numbers there. */
-static void pad(const call *c, block *b)
+static void pad(const call *c, nb_vertex_block *b)
 {
     enum { LANES = 16 };
     for (size_t i = b->count; i % LANES != 0; i++) {
@@ -143,7 +143,7 @@ static void pad(const call *c, block *b)
     }
 }
 
-static nebel_result find_factors(const call *c, block *b)
+static nebel_result find_factors(const call *c, nb_vertex_block *b)
 {
     nebel_result result = NEBEL_OK;
     if (c->by_boxes)
@@ -155,7 +155,7 @@ static nebel_result find_factors(const call *c, block *b)
 }
 
 /* After the first stream the factors have the curve in them. */
-static void write_block(const call *c, const nebel_vertex_output *outputs, size_t output_count, block *b)
+static void write_block(const call *c, const nebel_vertex_output *outputs, size_t output_count, nb_vertex_block *b)
 {
     nb_vertices_job job = {.count = b->count,
                            .factor = b->factor,
@@ -184,7 +184,7 @@ static size_t most_in_block(const call *c)
 static nebel_result run(const call *c, size_t n, const nebel_vertex_output *outputs, size_t output_count)
 {
     const size_t most = most_in_block(c);
-    block b;
+    nb_vertex_block b;
     for (b.first = 0; b.first < n; b.first += b.count) {
         b.count = n - b.first < most ? n - b.first : most;
         const nebel_result result = find_factors(c, &b);

@@ -13,10 +13,10 @@ _Static_assert((int)NB_BATCH <= (int)NB_WORLDS_RAYS, "a batch is traced at once"
 
 /* ---- the frame ------------------------------------------------------------------------------- */
 
-nebel_result nb_air_set_daylights(nb_air *air, const nebel_planet *home, const nebel_log *log)
+nebel_result nb_air_set_daylights(nb_air_frame *air, const nebel_planet *home, const nebel_log *log)
 {
     for (int i = 0; i < air->count; i++) {
-        nb_world *world = &air->worlds[i];
+        nb_planet *world = &air->worlds[i];
         if (world->daylight != NULL) continue;
         world->daylight = nb_allocate(air->allocator, 1, sizeof *world->daylight);
         if (world->daylight == NULL)
@@ -26,7 +26,7 @@ nebel_result nb_air_set_daylights(nb_air *air, const nebel_planet *home, const n
     return NEBEL_OK;
 }
 
-nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_allocator *allocator,
+nebel_result nb_air_set(nb_air_frame *air, const nebel_scene_data *scene, const nebel_allocator *allocator,
                         const nebel_log *log, const double position[3], const double to_sun[3], int ends, int threads)
 {
     nebel_sky_view_desc desc = {.sun = nb_scene_sun(scene),
@@ -46,7 +46,7 @@ nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_
     air->owns_ambient = nb_scene_owns_ambient(scene);
     air->reach = nb_worlds_reach(air->worlds, air->count, position);
     for (int i = 0; i < air->count && result == NEBEL_OK; i++) {
-        nb_world *world = &air->worlds[i];
+        nb_planet *world = &air->worlds[i];
         desc.atmosphere = world->planet->atmosphere;
         result = nebel_create_sky_view(&desc, &world->view);
     }
@@ -55,7 +55,7 @@ nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_
     return result;
 }
 
-void nb_air_free(nb_air *air)
+void nb_air_free(nb_air_frame *air)
 {
     for (int i = 0; i < air->count; i++) {
         nebel_destroy_sky_view(air->worlds[i].view);
@@ -66,13 +66,13 @@ void nb_air_free(nb_air *air)
 
 /* ---- along rays ------------------------------------------------------------------------------ */
 
-nebel_result nb_air_trace(const nb_air *air, size_t n, const double *const direction[3], const float *t_max,
+nebel_result nb_air_trace(const nb_air_frame *air, size_t n, const double *const direction[3], const float *t_max,
                           const nebel_transfer_planes *transfers)
 {
     return nb_worlds_trace(air->worlds, air->count, n, direction, t_max, transfers);
 }
 
-static double uneclipsed(const nb_air *air, int world, const double place[3])
+static double uneclipsed(const nb_air_frame *air, int world, const double place[3])
 {
     return nb_worlds_uneclipsed(air->worlds, air->count, world, place, air->to_sun, air->sun_radius);
 }
@@ -85,7 +85,7 @@ static float behind(float t)
     return 1e-5f * t + 1e-3f;
 }
 
-static void find_ground_of(const nb_world *world, const nb_rays *rays, nb_ground *ground)
+static void find_ground_of(const nb_planet *world, const nb_ray_batch *rays, nb_ground_batch *ground)
 {
     const double *const direction[3] = {rays->direction[0], rays->direction[1], rays->direction[2]};
     const nebel_ground_planes planes = {.distance = ground->distance,
@@ -95,9 +95,9 @@ static void find_ground_of(const nb_world *world, const nb_rays *rays, nb_ground
     nebel_trace_ground(world->view, NB_BATCH, direction, &planes);
 }
 
-static void keep_nearer(int world, const nb_ground *next, nb_air_scratch *scratch)
+static void keep_nearer(int world, const nb_ground_batch *next, nb_air_scratch *scratch)
 {
-    nb_ground *ground = &scratch->ground;
+    nb_ground_batch *ground = &scratch->ground;
     for (int i = 0; i < NB_BATCH; i++) {
         if (!(next->distance[i] < ground->distance[i])) continue;
         scratch->world[i] = world;
@@ -110,8 +110,8 @@ static void keep_nearer(int world, const nb_ground *next, nb_air_scratch *scratc
     }
 }
 
-void nb_air_find_ground(const nb_air *air, double advance, const nb_rays *rays, const int *inside, nb_hits *hits,
-                        nb_air_scratch *scratch)
+void nb_air_find_ground(const nb_air_frame *air, double advance, const nb_ray_batch *rays, const int *inside,
+                        nb_hits *hits, nb_air_scratch *scratch)
 {
     float *distance = scratch->ground.distance;
     find_ground_of(&air->worlds[0], rays, &scratch->ground);
@@ -139,7 +139,8 @@ int nb_air_sees_ground(const nb_air_scratch *scratch)
 }
 
 /* The ground is not lifted: no surface hides fog and lamps from it there. */
-static void set_starts(const double position[3], const nb_rays *rays, const nb_points *points, nb_air_scratch *scratch)
+static void set_starts(const double position[3], const nb_ray_batch *rays, const nb_surface_batch *points,
+                       nb_air_scratch *scratch)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         const float distance = scratch->ground.distance[i];
@@ -151,11 +152,11 @@ static void set_starts(const double position[3], const nb_rays *rays, const nb_p
     }
 }
 
-void nb_air_set_points(const nb_air *air, double advance, const double position[3], const double origin[3],
-                       const float sun[3], const nb_rays *rays, nb_air_scratch *scratch, nb_hits *hits,
-                       nb_points *points)
+void nb_air_set_points(const nb_air_frame *air, double advance, const double position[3], const double origin[3],
+                       const float sun[3], const nb_ray_batch *rays, nb_air_scratch *scratch, nb_hits *hits,
+                       nb_surface_batch *points)
 {
-    nb_ground *ground = &scratch->ground;
+    nb_ground_batch *ground = &scratch->ground;
     for (int i = 0; i < NB_BATCH; i++) {
         const float distance = ground->distance[i];
         const int world = scratch->world[i];
@@ -185,7 +186,8 @@ void nb_air_set_points(const nb_air *air, double advance, const double position[
     set_starts(position, rays, points, scratch);
 }
 
-void nb_air_light_at(const nb_air *air, nb_daylight_of of, const double place[3], double sun[3], double sky[3])
+void nb_air_light_at(const nb_air_frame *air, nb_irradiance_receiver of, const double place[3], double sun[3],
+                     double sky[3])
 {
     const int nearest = nb_worlds_nearest(air->worlds, air->count, place);
     nb_daylight_at(air->worlds[nearest].daylight, of, place, sun, sky);
@@ -193,13 +195,13 @@ void nb_air_light_at(const nb_air *air, nb_daylight_of of, const double place[3]
     for (int c = 0; c < 3; c++) sun[c] *= left;
 }
 
-nebel_irradiance nb_air_ask(const nb_air *air, const double place[3])
+nebel_irradiance nb_air_ask(const nb_air_frame *air, const double place[3])
 {
     return nb_worlds_light(air->worlds, air->count, place, air->to_sun, air->sun_radius);
 }
 
-void nb_air_set_daylight(const nb_air *air, const double origin[3], const nb_hits *hits, const nb_points *points,
-                         nb_air_scratch *scratch)
+void nb_air_set_daylight(const nb_air_frame *air, const double origin[3], const nb_hits *hits,
+                         const nb_surface_batch *points, nb_air_scratch *scratch)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         double place[3], sun[3] = {0, 0, 0}, sky[3] = {1, 1, 1};
@@ -251,7 +253,7 @@ static double disc_scale(double sun, double radius, double width, int c)
     return sun * sun / sum;
 }
 
-static void add_sun(const nb_air *air, double cosine, double width, double light[3])
+static void add_sun(const nb_air_frame *air, double cosine, double width, double light[3])
 {
     const double sun = air->sun_radius, radius = fmax(sun, 0.5 * width), reach = radius + width;
     /* Most rays are that far off that cos x >= 1 - x^2 / 2 says so. */
@@ -261,7 +263,7 @@ static void add_sun(const nb_air *air, double cosine, double width, double light
         light[c] += air->sun_light[c] * disc_scale(sun, radius, width, c) * disc(radius, width, angle, c);
 }
 
-int nb_air_sees_sun(const nb_air *air, const nb_lighting *lighting, const nb_rays *rays)
+int nb_air_sees_sun(const nb_air_frame *air, const nb_surface_lighting *lighting, const nb_ray_batch *rays)
 {
     if (!(air->sun_radius > 0 && lighting->has_sun)) return 0;
     const double near = cos(fmin(PI, air->sun_radius + 2 * air->pixel));
@@ -274,7 +276,7 @@ int nb_air_sees_sun(const nb_air *air, const nb_lighting *lighting, const nb_ray
 }
 
 /* Near the edge of one planet, seen as a disc. */
-static int passes_rim(const nb_world *world, const double position[3], double pixel, const nb_rays *rays)
+static int passes_rim(const nb_planet *world, const double position[3], double pixel, const nb_ray_batch *rays)
 {
     double to[3];
     for (int c = 0; c < 3; c++) to[c] = world->center[c] - position[c];
@@ -289,14 +291,15 @@ static int passes_rim(const nb_world *world, const double position[3], double pi
     return 0;
 }
 
-int nb_air_sees_rim(const nb_air *air, const nb_rays *rays)
+int nb_air_sees_rim(const nb_air_frame *air, const nb_ray_batch *rays)
 {
     for (int k = 0; k < air->count; k++)
         if (passes_rim(&air->worlds[k], air->position, air->pixel, rays)) return 1;
     return 0;
 }
 
-void nb_air_background(const nb_air *air, const nb_lighting *lighting, const nb_rays *rays, int lane, double light[3])
+void nb_air_background(const nb_air_frame *air, const nb_surface_lighting *lighting, const nb_ray_batch *rays, int lane,
+                       double light[3])
 {
     double unit[3], cosine = 0;
     for (int c = 0; c < 3; c++) {

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-NB_CLONES static void set_inside(const nb_frame *frame, const nb_place *place, int *inside)
+NB_CLONES static void set_inside(const nb_frame *frame, const nb_batch_place *place, int *inside)
 {
     const uint32_t columns = frame->width - place->left, rows = frame->height - place->top, first = place->first;
     NB_SIMD
@@ -33,7 +33,7 @@ static void set_clear(nb_light_samples *samples)
 
 /* From the ray's start, before it was advanced, to the hit or to infinity; 0 outside the picture, where nothing is
  * asked. In two loops: compilers do not speculate arithmetic. */
-NB_CLONES static void set_distances(double advance, const nb_rays *rays, const nb_hits *hits, const int *inside,
+NB_CLONES static void set_distances(double advance, const nb_ray_batch *rays, const nb_hits *hits, const int *inside,
                                     float *restrict distance)
 {
     NB_SIMD
@@ -167,10 +167,10 @@ NB_CLONES static void mask_ends(const int *restrict lit, float *restrict distanc
 }
 
 /* On planets what is seen need not be near the geometry. */
-static nb_starts starts_of(const nb_frame *frame, const nb_scratch *scratch)
+static nb_ray_starts starts_of(const nb_frame *frame, const nb_scratch *scratch)
 {
     const int has_air = frame->air.count > 0;
-    nb_starts starts;
+    nb_ray_starts starts;
     for (int c = 0; c < 3; c++) {
         starts.origin[c] = has_air ? frame->view.position[c] : frame->renderer->geometry.origin[c];
         starts.offset[c] = has_air ? scratch->air.start[c] : scratch->points.start[c];
@@ -181,7 +181,7 @@ static nb_starts starts_of(const nb_frame *frame, const nb_scratch *scratch)
 /* What fog leaves of the sun's light where it is lit at all. */
 static nebel_result trace_sun_fog(const nb_frame *frame, nb_scratch *scratch, float (*transmittance)[NB_BATCH])
 {
-    const nb_starts starts = starts_of(frame, scratch);
+    const nb_ray_starts starts = starts_of(frame, scratch);
     nebel_ray_planes rays = {.t_max = scratch->distance};
     nebel_transfer_planes transfers = {.error = NULL};
     for (int c = 0; c < 3; c++) {
@@ -235,9 +235,9 @@ static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
 }
 
 /* What fog leaves of a lamp's light where it is lit at all. */
-static nebel_result trace_lamp_fog(const nb_frame *frame, const nb_starts *starts, nb_scratch *scratch)
+static nebel_result trace_lamp_fog(const nb_frame *frame, const nb_ray_starts *starts, nb_scratch *scratch)
 {
-    nb_lamp_ways *ways = &scratch->lamp;
+    nb_shadow_rays *ways = &scratch->lamp;
     nebel_ray_planes rays = {.t_max = ways->reach};
     nebel_transfer_planes transfers = {.error = NULL};
     for (int c = 0; c < 3; c++) {
@@ -254,7 +254,7 @@ static nebel_result trace_lamp_fog(const nb_frame *frame, const nb_starts *start
 
 static void add_lamp(const nebel_light *lamp, int is_dimmed, nb_scratch *scratch)
 {
-    const nb_lamp_ways *ways = &scratch->lamp;
+    const nb_shadow_rays *ways = &scratch->lamp;
     for (int c = 0; c < 3; c++) {
         const float intensity = (float)lamp->intensity[c];
         for (int i = 0; i < NB_BATCH; i++) {
@@ -265,7 +265,7 @@ static void add_lamp(const nebel_light *lamp, int is_dimmed, nb_scratch *scratch
     }
 }
 
-static int is_lit_anywhere(const nb_lamp_ways *ways)
+static int is_lit_anywhere(const nb_shadow_rays *ways)
 {
     int lit = 0;
     for (int i = 0; i < NB_BATCH; i++) lit |= ways->lit[i];
@@ -277,7 +277,7 @@ static nebel_result add_lamplight(const nb_frame *frame, nb_scratch *scratch)
 {
     const nebel_renderer *renderer = frame->renderer;
     const nb_geometry *geometry = &renderer->geometry;
-    const nb_starts starts = starts_of(frame, scratch);
+    const nb_ray_starts starts = starts_of(frame, scratch);
     const int is_dimmed = dims_sun(renderer);
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < renderer->scene->light_count && result == NEBEL_OK; i++) {
@@ -292,7 +292,7 @@ static nebel_result add_lamplight(const nb_frame *frame, nb_scratch *scratch)
 }
 
 /* color = transmittance * surface + in_scattering; Lambert's surface = reflectance * (irradiance / pi + ambient). */
-NB_CLONES static void set_colors(const nb_lighting *lighting, nb_scratch *scratch)
+NB_CLONES static void set_colors(const nb_surface_lighting *lighting, nb_scratch *scratch)
 {
     for (int c = 0; c < 3; c++) {
         const float ambient = lighting->ambient[c], background = lighting->background[c];
@@ -310,7 +310,7 @@ NB_CLONES static void set_colors(const nb_lighting *lighting, nb_scratch *scratc
 }
 
 /* The same where ambient light depends on the direction: of the normal, or of the ray where the background shows it. */
-static void set_colors_by_direction(const nb_lighting *lighting, nb_scratch *scratch)
+static void set_colors_by_direction(const nb_surface_lighting *lighting, nb_scratch *scratch)
 {
     const nb_light_samples *samples = &scratch->samples;
     for (int i = 0; i < NB_BATCH; i++) {
@@ -360,7 +360,7 @@ static void set_colors_in_air(const nb_frame *frame, nb_scratch *scratch)
     }
 }
 
-static int has_one_light(const nb_lighting *lighting)
+static int has_one_light(const nb_surface_lighting *lighting)
 {
     return lighting->environment.type == NEBEL_ENVIRONMENT_CONSTANT;
 }
@@ -391,7 +391,7 @@ static void set_stored_colors(const nb_frame *frame, nb_scratch *scratch)
     memcpy(samples->in_scattering, fog.in_scattering, sizeof fog.in_scattering);
 }
 
-static void find_hits(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)
+static void find_hits(const nb_frame *frame, const nb_batch_place *place, uint32_t sample, nb_scratch *scratch)
 {
     const nb_geometry *geometry = &frame->renderer->geometry;
     const nb_region_points *points = &scratch->points_of_region[sample];
@@ -409,7 +409,7 @@ static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
 {
     const nebel_renderer *renderer = frame->renderer;
     const nb_geometry *geometry = &renderer->geometry;
-    const nb_lighting *lighting = &frame->lighting;
+    const nb_surface_lighting *lighting = &frame->lighting;
     nb_surface_points(geometry, renderer->scene, &renderer->table, &scratch->rays, &scratch->hits, lighting->sun,
                       &scratch->points);
     if (frame->air.count > 0)
@@ -432,13 +432,13 @@ static void find_ground(const nb_frame *frame, nb_scratch *scratch)
                            &scratch->air);
 }
 
-void nb_batch_find(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)
+void nb_batch_find(const nb_frame *frame, const nb_batch_place *place, uint32_t sample, nb_scratch *scratch)
 {
     set_inside(frame, place, scratch->inside);
     find_hits(frame, place, sample, scratch);
 }
 
-void nb_batch_find_centers(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
+void nb_batch_find_centers(const nb_frame *frame, const nb_batch_place *place, nb_scratch *scratch)
 {
     set_inside(frame, place, scratch->inside);
     nb_view_rays(&frame->view, place->left, place->top, scratch->centers.x + place->first,
@@ -464,7 +464,7 @@ nebel_result nb_batch_light(const nb_frame *frame, nb_scratch *scratch)
     return result;
 }
 
-nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)
+nebel_result nb_batch_render(const nb_frame *frame, const nb_batch_place *place, uint32_t sample, nb_scratch *scratch)
 {
     nb_batch_find(frame, place, sample, scratch);
     if (frame->renderer->method == NEBEL_METHOD_PATH) return nb_reference_trace(frame, place, scratch);

@@ -10,7 +10,7 @@ static void turn(const double axes[3][3], const float *position, float corner[3]
     for (int i = 0; i < 3; i++) corner[i] = (float)nb_vector_dot(axes[i], p);
 }
 
-double nb_caster_area(const nb_caster *t)
+double nb_caster_area(const nb_occluder *t)
 {
     const double bx = (double)t->corner[1][0] - (double)t->corner[0][0];
     const double by = (double)t->corner[1][1] - (double)t->corner[0][1];
@@ -21,9 +21,10 @@ double nb_caster_area(const nb_caster *t)
 
 /* The gradient of texture coordinates in the plane of the corners: of all that change along two edges as they do, the one
  * that does not change across the plane. Seen by the sun corners lie at one height. */
-static nb_sheet make_sheet(const nb_surface *surface, const uint32_t *index, const nb_caster *t, int is_for_sun)
+static nb_masked_occluder make_sheet(const nb_batch_surface *surface, const uint32_t *index, const nb_occluder *t,
+                                     int is_for_sun)
 {
-    nb_sheet sheet = {.mask = surface->mask};
+    nb_masked_occluder sheet = {.mask = surface->mask};
     double edge[2][3], normal[3], across[2][3], texels[3][2];
     for (int k = 0; k < 3; k++) {
         const float *uv = surface->mesh->uvs + 2 * (size_t)index[k];
@@ -48,14 +49,14 @@ static nb_sheet make_sheet(const nb_surface *surface, const uint32_t *index, con
     return sheet;
 }
 
-static void fill(const nb_geometry *geometry, const double axes[3][3], int is_for_sun, nb_casters *casters)
+static void fill(const nb_geometry *geometry, const double axes[3][3], int is_for_sun, nb_occluders *casters)
 {
     uint32_t sheet_count = 0;
     for (size_t s = 0; s < geometry->surface_count; s++) {
-        const nb_surface *surface = &geometry->surfaces[s];
+        const nb_batch_surface *surface = &geometry->surfaces[s];
         for (size_t t = 0; t < surface->mesh->triangle_count; t++) {
             const uint32_t *index = surface->mesh->indices + 3 * t;
-            nb_caster *triangle = &casters->triangles[casters->count];
+            nb_occluder *triangle = &casters->triangles[casters->count];
             for (int k = 0; k < 3; k++) turn(axes, surface->positions + 3 * (size_t)index[k], triangle->corner[k]);
             const double area = nb_caster_area(triangle);
             const float depth = triangle->corner[0][2] + triangle->corner[1][2] + triangle->corner[2][2];
@@ -68,7 +69,8 @@ static void fill(const nb_geometry *geometry, const double axes[3][3], int is_fo
     }
 }
 
-nebel_result nb_casters_list(const nb_geometry *geometry, const double axes[3][3], int is_for_sun, nb_casters *casters)
+nebel_result nb_casters_list(const nb_geometry *geometry, const double axes[3][3], int is_for_sun,
+                             nb_occluders *casters)
 {
     const nebel_allocator *allocator = &geometry->allocator;
     size_t count = 0, holed = 0;
@@ -77,7 +79,7 @@ nebel_result nb_casters_list(const nb_geometry *geometry, const double axes[3][3
         count += triangles;
         holed += geometry->surfaces[s].mask != NULL ? triangles : 0;
     }
-    *casters = (nb_casters){.triangles = nb_allocate(allocator, count + 1, sizeof *casters->triangles)};
+    *casters = (nb_occluders){.triangles = nb_allocate(allocator, count + 1, sizeof *casters->triangles)};
     if (casters->triangles == NULL) return NEBEL_ERROR_MEMORY;
     if (holed > 0) {
         casters->numbers = nb_allocate(allocator, count, sizeof *casters->numbers);
@@ -88,12 +90,12 @@ nebel_result nb_casters_list(const nb_geometry *geometry, const double axes[3][3
     return NEBEL_OK;
 }
 
-void nb_casters_free(nb_casters *casters, const nebel_allocator *allocator)
+void nb_casters_free(nb_occluders *casters, const nebel_allocator *allocator)
 {
     nb_release(allocator, casters->triangles);
     nb_release(allocator, casters->numbers);
     nb_release(allocator, casters->sheets);
-    *casters = (nb_casters){.count = 0};
+    *casters = (nb_occluders){.count = 0};
 }
 
 void nb_shadow_plane(const double normal[3], const double point[3], float plane[4])

@@ -230,7 +230,7 @@ static nebel_result set_vertices(const nb_frame *frame, const nebel_mesh *mesh, 
     return result;
 }
 
-static nebel_result set_surface(const nb_frame *frame, const nb_surface *surface)
+static nebel_result set_surface(const nb_frame *frame, const nb_batch_surface *surface)
 {
     enum { BLOCK = 1024 };
     const nebel_mesh *mesh = surface->mesh;
@@ -267,7 +267,7 @@ nebel_result nb_classic_fog_set_vertices(const nb_frame *frame)
 
 static nb_vertex_fog interpolate(const nb_frame *frame, const nb_hits *hits, int lane)
 {
-    const nb_surface *surface = &frame->renderer->geometry.surfaces[hits->surface[lane]];
+    const nb_batch_surface *surface = &frame->renderer->geometry.surfaces[hits->surface[lane]];
     const uint32_t *index = surface->mesh->indices + 3 * (size_t)hits->triangle[lane];
     const nb_vertex_fog *fog = frame->renderer->vertex_fog + surface->first_vertex;
     const nb_vertex_fog *a = &fog[index[0]], *b = &fog[index[1]], *c = &fog[index[2]];
@@ -279,7 +279,7 @@ static nb_vertex_fog interpolate(const nb_frame *frame, const nb_hits *hits, int
 
 /* ---- per pixel ------------------------------------------------------------------------------- */
 
-static nb_vertex_fog fog_of_pixel(const nb_frame *frame, const nb_rays *rays, const nb_hits *hits, int lane)
+static nb_vertex_fog fog_of_pixel(const nb_frame *frame, const nb_ray_batch *rays, const nb_hits *hits, int lane)
 {
     const double way = frame->view.advance + (double)hits->t[lane] / (double)rays->length[lane];
     const int parallel = frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC;

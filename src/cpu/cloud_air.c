@@ -105,7 +105,7 @@ static int is_corner(uint32_t x, uint32_t y)
     return x % CELL == 0 && (y == 0 || y == NB_BLOCK - 1);
 }
 
-static int is_close(const nb_shaded_piece *a, const nb_shaded_piece *b)
+static int is_close(const nb_shadowed_segment *a, const nb_shadowed_segment *b)
 {
     int is = fabsf(b->t - a->t) <= ALIKE_FAR * a->t;
     for (int c = 0; c < 3; c++) is &= fabsf(b->part[c] - a->part[c]) <= ALIKE_PART;
@@ -114,7 +114,7 @@ static int is_close(const nb_shaded_piece *a, const nb_shaded_piece *b)
 
 static int are_alike(const nb_cloud_scratch *clouds, const uint32_t corners[4])
 {
-    const nb_shaded_piece *first = clouds->shaded[corners[0]];
+    const nb_shadowed_segment *first = clouds->shaded[corners[0]];
     const uint32_t count = clouds->shaded_count[corners[0]];
     for (int i = 1; i < 4; i++) {
         if (clouds->shaded_count[corners[i]] != count) return 0;
@@ -125,9 +125,9 @@ static int are_alike(const nb_cloud_scratch *clouds, const uint32_t corners[4])
 }
 
 /* A piece between those at the corners. */
-static nb_shaded_piece between(const nb_shaded_piece *const at[4], uint32_t k, const float weights[4])
+static nb_shadowed_segment between(const nb_shadowed_segment *const at[4], uint32_t k, const float weights[4])
 {
-    nb_shaded_piece piece = {.t = 0};
+    nb_shadowed_segment piece = {.t = 0};
     for (int i = 0; i < 4; i++) {
         piece.t += weights[i] * at[i][k].t;
         for (int c = 0; c < 3; c++) {
@@ -140,7 +140,7 @@ static nb_shaded_piece between(const nb_shaded_piece *const at[4], uint32_t k, c
 
 static void fill_pixel(const uint32_t corners[4], float u, float v, uint32_t lane, nb_cloud_scratch *clouds)
 {
-    const nb_shaded_piece *at[4];
+    const nb_shadowed_segment *at[4];
     const float weights[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
     for (int i = 0; i < 4; i++) at[i] = clouds->shaded[corners[i]];
     clouds->shaded_count[lane] = clouds->shaded_count[corners[0]];
@@ -161,14 +161,14 @@ static void fill_cell(uint32_t cell, int is_own[NB_BATCH], nb_cloud_scratch *clo
     }
 }
 
-static int is_in_picture(const nb_frame *frame, const nb_place *place, uint32_t lane)
+static int is_in_picture(const nb_frame *frame, const nb_batch_place *place, uint32_t lane)
 {
     return nb_lane_x(place->first + lane) < frame->width - place->left &&
            nb_lane_y(place->first + lane) < frame->height - place->top;
 }
 
 /* First the corners, then those whose corners are not alike. At the picture's edge each pixel has its own. */
-nebel_result nb_cloud_air_shade(const nb_frame *frame, const nb_place *place, nb_cloud_scratch *clouds)
+nebel_result nb_cloud_air_shade(const nb_frame *frame, const nb_batch_place *place, nb_cloud_scratch *clouds)
 {
     int is_first[NB_BATCH], is_later[NB_BATCH], is_whole[CELLS];
     for (uint32_t cell = 0; cell < CELLS; cell++)
@@ -195,7 +195,7 @@ static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_
     for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
         const uint32_t lane = asked->lanes[i], first = asked->first[i];
         const nebel_cloud_transfer *knots = &clouds->knots[lane];
-        nb_cloud_haze *air = &clouds->air[lane];
+        nb_aerial_nodes *air = &clouds->air[lane];
         for (int c = 0; c < 3; c++)
             for (uint32_t k = 0; k < knots->count; k++) {
                 air->left[c][k] = asked->left[c][first + k];

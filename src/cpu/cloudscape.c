@@ -48,7 +48,7 @@ void nb_cloudscape_free(nb_frame *frame)
 /* The air has the shade of those that are lifted. */
 static void lift_rays(const nb_frame *frame, nb_cloud_scratch *clouds)
 {
-    const nb_air *air = &frame->air;
+    const nb_air_frame *air = &frame->air;
     int any = 0;
     clouds->middles = clouds->rays;
     for (int i = 0; i < NB_BATCH; i++) {
@@ -64,7 +64,7 @@ static void lift_rays(const nb_frame *frame, nb_cloud_scratch *clouds)
     clouds->lifted = clouds->rays;
 }
 
-nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
+nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_batch_place *place, nb_scratch *scratch)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
     nb_view_rays(&frame->view, place->left, place->top, scratch->centers.x + place->first,
@@ -98,7 +98,7 @@ static float end_of(const nb_frame *frame, const nb_scratch *scratch, uint32_t l
     const nebel_ray ray = nb_cloud_air_ray(frame, &scratch->clouds, lane);
     double unit[3];
     unit_of(&scratch->clouds, &ray, lane, unit);
-    const nb_world *world = &frame->air.worlds[scratch->air.world[lane]];
+    const nb_planet *world = &frame->air.worlds[scratch->air.world[lane]];
     return (float)nb_cloud_ground_end(world->center, ray.origin, unit, (double)distance);
 }
 
@@ -110,7 +110,7 @@ static int is_found(const nb_cloud_scratch *clouds, int lane)
     return nb_cloud_is_found(knots->count, knots->t[0], last, clouds->reach[lane], clouds->end[lane]);
 }
 
-static void take_ray(const nb_rays *from, int lane, nb_rays *to)
+static void take_ray(const nb_ray_batch *from, int lane, nb_ray_batch *to)
 {
     to->length[lane] = from->length[lane];
     for (int c = 0; c < 3; c++) {
@@ -139,7 +139,7 @@ static uint32_t lane_of(int pixel)
 /* Some pixels of a block, all at once. */
 static nebel_result trace_pixels(const nb_frame *frame, const int is_asked[NB_CLOUD_SHARE], nb_cloud_scratch *clouds)
 {
-    const nb_air *const air = &frame->air;
+    const nb_air_frame *const air = &frame->air;
     uint32_t count = 0, lanes[NB_BATCH];
     for (int i = 0; i < NB_CLOUD_SHARE; i++) {
         const uint32_t lane = lane_of(i);
@@ -159,7 +159,7 @@ static nebel_result trace_pixels(const nb_frame *frame, const int is_asked[NB_CL
     return result;
 }
 
-static nebel_result trace_block(const nb_frame *frame, nb_cloud_block *block, nb_cloud_scratch *clouds)
+static nebel_result trace_block(const nb_frame *frame, nb_cloud_pixel_block *block, nb_cloud_scratch *clouds)
 {
     nebel_result result = NEBEL_OK;
     nb_cloud_block_begin(block);
@@ -175,7 +175,7 @@ static nebel_result trace_block(const nb_frame *frame, nb_cloud_block *block, nb
 static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
-    nb_cloud_block block;
+    nb_cloud_pixel_block block;
     for (int i = 0; i < NB_CLOUD_SHARE; i++) {
         const uint32_t lane = lane_of(i);
         if (scratch->inside[lane]) {
@@ -260,8 +260,8 @@ static nebel_result find_fog(const nb_frame *frame, nb_haze_fn haze, nb_scratch 
 static void mix_lane(int has_fog, nb_cloud_scratch *clouds, int lane)
 {
     const nebel_cloud_transfer *knots = &clouds->knots[lane];
-    const nb_cloud_haze *air = &clouds->air[lane];
-    nb_cloud_haze haze = *air;
+    const nb_aerial_nodes *air = &clouds->air[lane];
+    nb_aerial_nodes haze = *air;
     for (int c = 0; c < 3; c++) {
         float over[NEBEL_MAX_CLOUD_NODES];
         if (has_fog) nb_cloud_haze_add_fog(knots, &clouds->marks[lane], c, air, &haze);

@@ -13,7 +13,7 @@ typedef nebel_result (*nb_haze_fn)(const nb_frame *frame, nb_scratch *scratch);
 
 /* For the samples of a batch to come: clouds are found once for all samples of a pixel, along the ray through its middle
  * and as wide as it; so is their shade on the air. */
-nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_place *place, nb_scratch *scratch);
+nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_batch_place *place, nb_scratch *scratch);
 
 /* Puts clouds among the air and fog of a batch that scratch->samples holds up to scratch->distance. With T and S of clouds
  * (c) and of what else is there (h), light up to a knot is the sum of T_h dS_c + T_c dS_h with the means of both ends. */

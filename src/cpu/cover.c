@@ -4,7 +4,7 @@
 #include <string.h>
 
 /* Depth rises by so much along both axes of the plane; infinite where the sun passes along the triangle. */
-static void slope_of(const nb_caster *t, double slope[2])
+static void slope_of(const nb_occluder *t, double slope[2])
 {
     double a[3], b[3];
     for (int i = 0; i < 3; i++) {
@@ -16,13 +16,13 @@ static void slope_of(const nb_caster *t, double slope[2])
     slope[1] = (a[0] * b[2] - a[2] * b[0]) / area;
 }
 
-static int is_within(const nb_cell *a, const nb_cell *b)
+static int is_within(const nb_sun_cell *a, const nb_sun_cell *b)
 {
     return (a->low[0] >= b->low[0]) & (a->high[0] <= b->high[0]) & (a->low[1] >= b->low[1]) &
            (a->high[1] <= b->high[1]);
 }
 
-nb_depths nb_depths_in(const nb_caster *t, const nb_cell *bounds, const nb_cell *cell)
+nb_depths nb_depths_in(const nb_occluder *t, const nb_sun_cell *bounds, const nb_sun_cell *cell)
 {
     const float a = t->corner[0][2], b = t->corner[1][2], c = t->corner[2][2];
     const float least = nb_least(nb_least(a, b), c), most = nb_most(nb_most(a, b), c);
@@ -84,13 +84,13 @@ static nb_passage pass_edge(const float a[3], const float b[3], const double pla
 
 /* ---- layers ---------------------------------------------------------------------------------- */
 
-typedef struct nb_layer {
+typedef struct nb_occlusion_layer {
     float farthest;
     int passes;     /* how often it passes over a place of the cell */
     uint64_t edges; /* what is left of them */
-} nb_layer;
+} nb_occlusion_layer;
 
-static void add_triangle(const nb_caster *t, const double place[2], const double reach[2], nb_layer *layer)
+static void add_triangle(const nb_occluder *t, const double place[2], const double reach[2], nb_occlusion_layer *layer)
 {
     int left = 0;
     for (int k = 0; k < 3; k++) {
@@ -114,8 +114,8 @@ static void sort_by_depth(const nb_depths *depths, size_t count, uint8_t *order)
     }
 }
 
-float nb_covered_from(const nb_casters *casters, const uint32_t *list, const nb_depths *depths, size_t count,
-                      const nb_cell *cell)
+float nb_covered_from(const nb_occluders *casters, const uint32_t *list, const nb_depths *depths, size_t count,
+                      const nb_sun_cell *cell)
 {
     uint8_t order[NB_COVER_MOST];
     double place[2], reach[2];
@@ -125,13 +125,13 @@ float nb_covered_from(const nb_casters *casters, const uint32_t *list, const nb_
         place[i] = 0.5 * ((double)cell->low[i] + (double)cell->high[i]);
         reach[i] = 0.5 * ((double)cell->high[i] - (double)cell->low[i]);
     }
-    nb_layer layer = {-INFINITY, 0, 0};
+    nb_occlusion_layer layer = {-INFINITY, 0, 0};
     for (size_t i = 0; i < count; i++) {
         const nb_depths *next = &depths[order[i]];
         if (nb_has_holes(casters, list[order[i]])) continue;
         if (next->nearest > layer.farthest) {
             if (layer.passes != 0 && layer.edges == 0) return layer.farthest;
-            layer = (nb_layer){-INFINITY, 0, 0};
+            layer = (nb_occlusion_layer){-INFINITY, 0, 0};
         }
         add_triangle(&casters->triangles[list[order[i]]], place, reach, &layer);
         layer.farthest = nb_most(layer.farthest, next->farthest);

@@ -10,7 +10,7 @@ static double part_of(double place, int count, int *first)
 }
 
 /* Light that falls by powers of ten is interpolated by its logarithm. */
-static void find_sun(const nb_daylight *daylight, double height, double cosine, double light[3])
+static void find_sun(const nb_irradiance_table *daylight, double height, double cosine, double light[3])
 {
     int h, s;
     const double v = part_of(sqrt(height / daylight->thickness) * (NB_DAYLIGHT_HEIGHTS - 1), NB_DAYLIGHT_HEIGHTS, &h);
@@ -23,7 +23,8 @@ static void find_sun(const nb_daylight *daylight, double height, double cosine, 
     }
 }
 
-void nb_daylight_at(const nb_daylight *daylight, nb_daylight_of of, const double place[3], double sun[3], double sky[3])
+void nb_daylight_at(const nb_irradiance_table *daylight, nb_irradiance_receiver of, const double place[3],
+                    double sun[3], double sky[3])
 {
     double from[3];
     for (int c = 0; c < 3; c++) from[c] = place[c] - daylight->center[c];

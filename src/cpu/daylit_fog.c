@@ -11,7 +11,7 @@
 /* ---- the frame ------------------------------------------------------------------------------- */
 
 /* Whether two places have another light. */
-static int differ(const nb_air *air, const nebel_irradiance *a, const nebel_irradiance *b)
+static int differ(const nb_air_frame *air, const nebel_irradiance *a, const nebel_irradiance *b)
 {
     double brightest = 0, sun = 0;
     int sky = 0;
@@ -29,7 +29,7 @@ static void find_middle(const double min[3], const double max[3], double middle[
 }
 
 /* Whether light is the same all over a box. From corner to corner of one that is thinner than the air it changes steadily. */
-static int is_even(const nb_air *air, const double min[3], const double max[3])
+static int is_even(const nb_air_frame *air, const double min[3], const double max[3])
 {
     double middle[3];
     for (int c = 0; c < 3; c++)
@@ -55,7 +55,7 @@ static nebel_result find_cloud_shade(const nb_frame *frame, float *part)
                                                  origin, 0, part);
 }
 
-static void light_at(const nb_air *air, const double place[3], double sun[3], double sky[3])
+static void light_at(const nb_air_frame *air, const double place[3], double sun[3], double sky[3])
 {
     nb_air_light_at(air, NB_DAYLIGHT_OF_FOG, place, sun, sky);
     for (int c = 0; c < 3; c++) {
@@ -65,7 +65,7 @@ static void light_at(const nb_air *air, const double place[3], double sun[3], do
 }
 
 /* Without tables, to `sun`, where it is the same everywhere. */
-static void set_even_light(nb_air *air, const nebel_planet *home, const double place[3], nebel_sun *sun)
+static void set_even_light(nb_air_frame *air, const nebel_planet *home, const double place[3], nebel_sun *sun)
 {
     static const double origin[3] = {0, 0, 0};
     const nebel_irradiance there = nb_air_ask(air, place);
@@ -83,7 +83,7 @@ static void set_even_light(nb_air *air, const nebel_planet *home, const double p
 
 nebel_result nb_daylit_fog_set(nb_frame *frame)
 {
-    nb_air *air = &frame->air;
+    nb_air_frame *air = &frame->air;
     const nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
     double min[3], max[3], middle[3] = {0, 0, 0};
@@ -119,7 +119,7 @@ static nebel_result trace_part(const nebel_snapshot *fog, const nebel_ray_planes
 }
 
 nebel_result nb_daylit_fog_trace(const nb_frame *frame, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
-                                 const nebel_transfer_planes *transfers, nb_air_knots *knot)
+                                 const nebel_transfer_planes *transfers, nb_aerial_batch_nodes *knot)
 {
     const nebel_split_fog *fog = &frame->air.fog;
     if (!nb_daylit_fog_is(&frame->air))
@@ -138,9 +138,9 @@ nebel_result nb_daylit_fog_trace(const nb_frame *frame, const nebel_ray_planes *
     return result;
 }
 
-void nb_daylit_fog_light(const nb_frame *frame, const nb_rays *rays, nb_air_knots *knot)
+void nb_daylit_fog_light(const nb_frame *frame, const nb_ray_batch *rays, nb_aerial_batch_nodes *knot)
 {
-    const nb_air *air = &frame->air;
+    const nb_air_frame *air = &frame->air;
     for (int i = 0; i < NB_BATCH; i++) {
         double place[3], sun[3], sky[3];
         if (!(knot->at[i] > 0)) continue;
@@ -155,7 +155,7 @@ void nb_daylit_fog_light(const nb_frame *frame, const nb_rays *rays, nb_air_knot
 }
 
 /* Where a ray is nearest to the middle of a ball, and half of what the ball cuts out of it; 0: it does not meet it. */
-static double pass(const nb_world *world, const double position[3], const double unit[3], double *half)
+static double pass(const nb_planet *world, const double position[3], const double unit[3], double *half)
 {
     double to[3], square = world->top * world->top;
     for (int c = 0; c < 3; c++) to[c] = world->center[c] - position[c];
@@ -165,7 +165,7 @@ static double pass(const nb_world *world, const double position[3], const double
     return square > 0 ? along : 0;
 }
 
-static double pass_first(const nb_air *air, const nb_rays *rays, int lane, double *half)
+static double pass_first(const nb_air_frame *air, const nb_ray_batch *rays, int lane, double *half)
 {
     double unit[3], nearest = 0;
     for (int c = 0; c < 3; c++) unit[c] = rays->direction[c][lane] / (double)rays->length[lane];
@@ -173,13 +173,13 @@ static double pass_first(const nb_air *air, const nb_rays *rays, int lane, doubl
     return nearest;
 }
 
-float nb_daylit_fog_lowest(const nb_air *air, const nb_rays *rays, int lane)
+float nb_daylit_fog_lowest(const nb_air_frame *air, const nb_ray_batch *rays, int lane)
 {
     double half = 0;
     return (float)fmax(0, pass_first(air, rays, lane, &half));
 }
 
-float nb_daylit_fog_enters(const nb_air *air, const nb_rays *rays, int lane)
+float nb_daylit_fog_enters(const nb_air_frame *air, const nb_ray_batch *rays, int lane)
 {
     double half = 0;
     const double nearest = pass_first(air, rays, lane, &half);

@@ -14,7 +14,7 @@ int nb_even_may_be(const nb_frame *frame)
 
 /* ---- what has an edge ------------------------------------------------------------------------ */
 
-static int sees_models(const nb_frame *frame, const nb_place *place, uint32_t count, nb_scratch *scratch)
+static int sees_models(const nb_frame *frame, const nb_batch_place *place, uint32_t count, nb_scratch *scratch)
 {
     if (frame->renderer->geometry.scene == NULL) return 0;
     for (uint32_t s = 0; s < count; s++) {
@@ -123,7 +123,7 @@ static int sees_clouds_alone(const nb_frame *frame, const nb_scratch *scratch)
     return any;
 }
 
-nebel_result nb_even_render(const nb_frame *frame, const nb_place *place, uint32_t count, nb_scratch *scratch,
+nebel_result nb_even_render(const nb_frame *frame, const nb_batch_place *place, uint32_t count, nb_scratch *scratch,
                             int *is_even)
 {
     const uint32_t right = frame->width - place->left, below = frame->height - place->top - nb_lane_y(place->first);

@@ -4,7 +4,7 @@
 
 nebel_result nb_fog_shade_set(nb_frame *frame)
 {
-    nb_air *const air = &frame->air;
+    nb_air_frame *const air = &frame->air;
     if (frame->cloud_view == NULL) return NEBEL_OK;
     return nb_fog_roof_set(frame->renderer->scratch[0].clouds.workspace, frame->renderer->fog, air->owns_ambient,
                            &air->roof);
@@ -12,9 +12,9 @@ nebel_result nb_fog_shade_set(nb_frame *frame)
 
 /* ---- along rays ------------------------------------------------------------------------------ */
 
-static nebel_result find(const nb_frame *frame, const nb_cloud_scratch *clouds, int lane, nb_fog_shade *shade)
+static nebel_result find(const nb_frame *frame, const nb_cloud_scratch *clouds, int lane, nb_fog_shadow *shade)
 {
-    const nb_air *const air = &frame->air;
+    const nb_air_frame *const air = &frame->air;
     nebel_ray ray;
     for (int c = 0; c < 3; c++) {
         ray.origin[c] = air->position[c];
@@ -31,10 +31,10 @@ void nb_fog_shade_start(nb_scratch *scratch)
 
 nebel_result nb_fog_shade_find(const nb_frame *frame, nb_scratch *scratch)
 {
-    const nb_air_knots *const end = &scratch->air.knots[0];
+    const nb_aerial_batch_nodes *const end = &scratch->air.knots[0];
     nebel_result result = NEBEL_OK;
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
-        nb_fog_shade *const shade = &scratch->air.fog_shade[i];
+        nb_fog_shadow *const shade = &scratch->air.fog_shade[i];
         float light = 0;
         for (int c = 0; c < 3; c++) light += end->fog_sun[c][i] + end->fog_sky[c][i];
         if (scratch->inside[i] && light > 0 && !shade->is_found) result = find(frame, &scratch->clouds, i, shade);
@@ -44,7 +44,7 @@ nebel_result nb_fog_shade_find(const nb_frame *frame, nb_scratch *scratch)
 
 typedef struct sum {
     float length, integral, within;
-    nb_part_range range;
+    nb_value_range range;
 } sum;
 
 static void add(sum *s, float length, float part, float within)
@@ -63,10 +63,10 @@ static float mean_of(const sum *s, float *doubt, float *within)
     return mean;
 }
 
-nb_shade_between nb_fog_shade_between(const nb_fog_shade *shade, float a, float b)
+nb_segment_shadow nb_fog_shade_between(const nb_fog_shadow *shade, float a, float b)
 {
     const nebel_fog_shadow *const p = &shade->pieces;
-    nb_shade_between between;
+    nb_segment_shadow between;
     sum sun = {.range = {HUGE_VALF, -HUGE_VALF}}, sky = sun;
     for (uint32_t k = 0; k < p->count && p->t[k] < b; k++) {
         const float length = fminf(b, p->t[k + 1]) - fmaxf(a, p->t[k]);
@@ -85,7 +85,7 @@ nb_shade_between nb_fog_shade_between(const nb_fog_shade *shade, float a, float 
     return between;
 }
 
-float nb_fog_shade_cut(const nb_fog_shade *shade, float a, float b)
+float nb_fog_shade_cut(const nb_fog_shadow *shade, float a, float b)
 {
     const nebel_fog_shadow *const p = &shade->pieces;
     uint32_t first = 0, end = 0;

@@ -15,9 +15,9 @@ void nb_fog_shade_start(nb_scratch *scratch);
 nebel_result nb_fog_shade_find(const nb_frame *frame, nb_scratch *scratch);
 
 /* Between two places of a ray. */
-nb_shade_between nb_fog_shade_between(const nb_fog_shade *shade, float a, float b);
+nb_segment_shadow nb_fog_shade_between(const nb_fog_shadow *shade, float a, float b);
 
 /* A place between two others at which pieces of shade meet, with as many on both sides; 0: they are in one. */
-float nb_fog_shade_cut(const nb_fog_shade *shade, float a, float b);
+float nb_fog_shade_cut(const nb_fog_shadow *shade, float a, float b);
 
 #endif

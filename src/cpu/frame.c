@@ -9,13 +9,13 @@
 #include <string.h>
 
 /* What the threads of a frame share. */
-typedef struct nb_state {
+typedef struct nb_frame_progress {
     const nebel_frame_desc *desc;
     size_t total, done;  /* parts: a few samples of a region */
     size_t step;         /* parts between two calls of progress */
     int stop;            /* a thread failed or the caller had enough */
     nebel_result result; /* of the first that failed */
-} nb_state;
+} nb_frame_progress;
 
 /* ---- checks ---------------------------------------------------------------------------------- */
 
@@ -147,7 +147,7 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     frame->sample_count = desc->sample_count != 0 ? desc->sample_count : frame->samples;
     frame->rasters = nb_raster_is_apt(geometry, frame->view.projection, desc->width, desc->height);
     if (frame->rasters) {
-        const nb_picture picture = {desc->width, desc->height, nb_sample_range_of(frame->samples)};
+        const nb_raster_target picture = {desc->width, desc->height, nb_sample_range_of(frame->samples)};
         nb_raster_set(&frame->raster, geometry, &frame->view, &picture, renderer->threads);
     }
     frame->trace =
@@ -165,10 +165,10 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
 
 /* ---- regions --------------------------------------------------------------------------------- */
 
-static nebel_result render_batch(const nb_frame *frame, const nb_place *place, uint32_t first, uint32_t count,
+static nebel_result render_batch(const nb_frame *frame, const nb_batch_place *place, uint32_t first, uint32_t count,
                                  nb_scratch *scratch)
 {
-    nb_place now = *place;
+    nb_batch_place now = *place;
     int is_even = 0;
     nebel_result result = frame->cloud_view != NULL ? nb_cloudscape_start(frame, place, scratch) : NEBEL_OK;
     if (result == NEBEL_OK && nb_even_may_be(frame)) result = nb_even_render(frame, place, count, scratch, &is_even);
@@ -192,7 +192,7 @@ static nebel_result render_samples(const nb_frame *frame, uint32_t left, uint32_
     if (frame->rasters) {
         nb_raster_region(&frame->raster, left, top, count, scratch->points_of_region, scratch->seen);
     }
-    nb_place place = {left, top, 0, 0};
+    nb_batch_place place = {left, top, 0, 0};
     for (; place.first < NB_PIXELS && top + nb_lane_y(place.first) < frame->height; place.first += NB_BATCH) {
         const nebel_result result = render_batch(frame, &place, first, count, scratch);
         if (result != NEBEL_OK) return result;
@@ -201,7 +201,7 @@ static nebel_result render_samples(const nb_frame *frame, uint32_t left, uint32_
 }
 
 /* One thread at a time. */
-static void add_part(nb_state *state, nebel_result result)
+static void add_part(nb_frame_progress *state, nebel_result result)
 {
     state->done++;
     if (result == NEBEL_OK && state->result == NEBEL_OK && state->desc->progress != NULL &&
@@ -216,7 +216,7 @@ static void add_part(nb_state *state, nebel_result result)
 }
 
 /* Returns whether that was the last one to be done. */
-static int count_part(nb_state *state, nebel_result result)
+static int count_part(nb_frame_progress *state, nebel_result result)
 {
     int stop;
 #pragma omp critical(nb_count_part)
@@ -236,7 +236,7 @@ static uint32_t count_regions(uint32_t pixels)
     return (pixels + NB_REGION - 1) / NB_REGION;
 }
 
-static void render_region(const nb_frame *frame, size_t number, nb_state *state, nb_scratch *scratch)
+static void render_region(const nb_frame *frame, size_t number, nb_frame_progress *state, nb_scratch *scratch)
 {
     const uint32_t columns = count_regions(frame->window.width);
     const uint32_t left = frame->window.left + (uint32_t)(number % columns) * NB_REGION;
@@ -246,14 +246,14 @@ static void render_region(const nb_frame *frame, size_t number, nb_state *state,
         const nebel_result result = render_samples(frame, left, top, frame->first_sample + first, count, scratch);
         if (count_part(state, result)) return;
     }
-    nb_place place = {left, top, 0, 0};
+    nb_batch_place place = {left, top, 0, 0};
     for (; place.first < NB_PIXELS && top + nb_lane_y(place.first) < frame->height; place.first += NB_BATCH) {
         nb_planes_finish(frame, &place, scratch);
         if (frame->renderer->method == NEBEL_METHOD_PATH) nb_reference_finish(frame, &place, scratch);
     }
 }
 
-static void render_regions(const nb_frame *frame, size_t regions, nb_state *state)
+static void render_regions(const nb_frame *frame, size_t regions, nb_frame_progress *state)
 {
 #pragma omp parallel for schedule(dynamic, 1) num_threads(frame->renderer->threads)
     for (size_t i = 0; i < regions; i++) {
@@ -283,7 +283,7 @@ nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc
     }
     const size_t regions = (size_t)count_regions(made.window.width) * count_regions(made.window.height);
     const size_t parts = regions * count_groups(&made);
-    nb_state state = {.desc = desc, .total = parts, .step = (parts + 99) / 100};
+    nb_frame_progress state = {.desc = desc, .total = parts, .step = (parts + 99) / 100};
     render_regions(&made, regions, &state);
     free_frame(&made);
     if (state.result == NEBEL_ERROR_LIMIT) return nb_fail(&renderer->log, state.result, "frame: stopped");

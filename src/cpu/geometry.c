@@ -85,7 +85,7 @@ static float longest_edge(const nebel_mesh *mesh)
 }
 
 /* Vertices that are not finite are left out; Embree leaves out their triangles. */
-static void set_bounds(nb_surface *surface)
+static void set_bounds(nb_batch_surface *surface)
 {
     for (size_t i = 0; i < 3; i++) {
         float low = INFINITY, high = -INFINITY;
@@ -103,8 +103,8 @@ static void set_bounds(nb_surface *surface)
 /* Triangles of an edge of a 16th of their surface are few enough to be looked at one by one. */
 #define COARSE 16.0f
 
-double nb_surface_distance(const nb_surface *surface, uint32_t triangle, const float start[3], const float unit[3],
-                           double *cosine)
+double nb_surface_distance(const nb_batch_surface *surface, uint32_t triangle, const float start[3],
+                           const float unit[3], double *cosine)
 {
     const nebel_mesh *const mesh = surface->mesh;
     const uint32_t *const index = mesh->indices + 3 * (size_t)triangle;
@@ -124,7 +124,7 @@ double nb_surface_distance(const nb_surface *surface, uint32_t triangle, const f
     return height / rise;
 }
 
-static void measure(nb_geometry *geometry, nb_surface *surface)
+static void measure(nb_geometry *geometry, nb_batch_surface *surface)
 {
     set_bounds(surface);
     surface->longest_edge = longest_edge(surface->mesh);
@@ -239,21 +239,21 @@ static nebel_result make_tree(nb_geometry *geometry)
 }
 
 static nebel_result find_mask(nb_geometry *geometry, const nebel_scene_data *scene, const nebel_mesh *mesh,
-                              const nb_mask **found)
+                              const nb_alpha_mask **found)
 {
     if (mesh->alpha_cutoff == 0) return NEBEL_OK;
     for (size_t i = 0; i < geometry->mask_count && *found == NULL; i++) {
-        const nb_mask *mask = &geometry->masks[i];
+        const nb_alpha_mask *mask = &geometry->masks[i];
         if (mask->number == mesh->mask && mask->cutoff == mesh->alpha_cutoff) *found = mask;
     }
     if (*found != NULL) return NEBEL_OK;
     *found = &geometry->masks[geometry->mask_count++];
-    return nb_mask_make((nb_mask *)*found, &geometry->allocator, scene, mesh->mask, mesh->alpha_cutoff);
+    return nb_mask_make((nb_alpha_mask *)*found, &geometry->allocator, scene, mesh->mask, mesh->alpha_cutoff);
 }
 
 static nebel_result make_surface(nb_geometry *geometry, const nebel_scene_data *scene, const nebel_mesh *mesh)
 {
-    nb_surface *surface = &geometry->surfaces[geometry->surface_count++];
+    nb_batch_surface *surface = &geometry->surfaces[geometry->surface_count++];
     surface->mesh = mesh;
     surface->first_vertex = geometry->vertex_count;
     geometry->vertex_count += mesh->vertex_count;
@@ -289,7 +289,7 @@ static void world_bounds(const nb_geometry *geometry, double low[3], double high
         low[i] = HUGE_VAL;
         high[i] = -HUGE_VAL;
         for (size_t s = 0; s < geometry->surface_count; s++) {
-            const nb_surface *surface = &geometry->surfaces[s];
+            const nb_batch_surface *surface = &geometry->surfaces[s];
             low[i] = fmin(low[i], surface->mesh->origin[i] + (double)surface->low[i]);
             high[i] = fmax(high[i], surface->mesh->origin[i] + (double)surface->high[i]);
         }
@@ -297,7 +297,7 @@ static void world_bounds(const nb_geometry *geometry, double low[3], double high
 }
 
 /* What is too far out for Embree becomes no number, which it leaves out with its triangles, as rasterizing does. */
-static void move_positions(const double origin[3], nb_surface *surface)
+static void move_positions(const double origin[3], nb_batch_surface *surface)
 {
     const nebel_mesh *mesh = surface->mesh;
     double *const shift = surface->shift;
@@ -314,7 +314,7 @@ static void move_positions(const double origin[3], nb_surface *surface)
  * alone. */
 static void drop_holes(const struct RTCFilterFunctionNArguments *met)
 {
-    const nb_surface *surface = met->geometryUserPtr;
+    const nb_batch_surface *surface = met->geometryUserPtr;
     const float *us = (const float *)met->hit + 3 * (size_t)met->N, *vs = us + met->N;
     const unsigned *triangles = (const unsigned *)met->hit + 5 * (size_t)met->N;
     for (unsigned i = 0; i < met->N; i++) {
@@ -334,7 +334,7 @@ static void drop_holes(const struct RTCFilterFunctionNArguments *met)
  * within the rounding of its corners. Rows of N numbers of the rays: start, least t, direction, time, t of what is met. */
 static void drop_false_shadows(const struct RTCFilterFunctionNArguments *met)
 {
-    const nb_surface *surface = met->geometryUserPtr;
+    const nb_batch_surface *surface = met->geometryUserPtr;
     const float *rays = (const float *)met->ray;
     const unsigned *triangles = (const unsigned *)met->hit + 5 * (size_t)met->N;
     const size_t n = met->N;
@@ -349,7 +349,7 @@ static void drop_false_shadows(const struct RTCFilterFunctionNArguments *met)
 
 static nebel_result attach(nb_geometry *geometry, size_t number)
 {
-    const nb_surface *surface = &geometry->surfaces[number];
+    const nb_batch_surface *surface = &geometry->surfaces[number];
     const RTCGeometry triangles = rtcNewGeometry(geometry->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     if (triangles == NULL) return result_of(rtcGetDeviceError(geometry->device));
     rtcSetSharedGeometryBuffer(triangles, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, surface->positions, 0,

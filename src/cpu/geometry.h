@@ -22,18 +22,18 @@ typedef struct nb_node {
 } nb_node;
 
 /* A mesh with its positions relative to the origin of the geometry. */
-typedef struct nb_surface {
+typedef struct nb_batch_surface {
     const nebel_mesh *mesh;
-    const nb_mask *mask;   /* NULL: no holes */
-    float *positions;      /* 3 per vertex, and one float more: Embree loads four */
-    int16_t *ends;         /* 4 per vertex: like those of a node, in the picture that is being rasterized */
-    float low[3], high[3]; /* corners of the mesh around its own origin */
-    double shift[3];       /* what its positions have been moved by */
+    const nb_alpha_mask *mask; /* NULL: no holes */
+    float *positions;          /* 3 per vertex, and one float more: Embree loads four */
+    int16_t *ends;             /* 4 per vertex: like those of a node, in the picture that is being rasterized */
+    float low[3], high[3];     /* corners of the mesh around its own origin */
+    double shift[3];           /* what its positions have been moved by */
     float longest_edge;
     int is_coarse;       /* it has triangles nearly as large as itself: see nb_surface_distance */
     size_t first_vertex; /* among the vertices of all surfaces */
     uint32_t first_id;   /* of its triangles in the geometry, a multiple of NB_FAN */
-} nb_surface;
+} nb_batch_surface;
 
 typedef struct nb_geometry {
     nebel_allocator allocator;
@@ -44,9 +44,9 @@ typedef struct nb_geometry {
     float bounds_min[3], bounds_max[3]; /* relative to origin; 0 where there are no triangles */
     double largest_radius;              /* of a mesh around its own origin */
     size_t surface_count;
-    size_t vertex_count;  /* of all surfaces */
-    nb_surface *surfaces; /* the number of a surface is its geometry ID in Embree */
-    nb_mask *masks;       /* each pair of a texture and a cutoff once */
+    size_t vertex_count;        /* of all surfaces */
+    nb_batch_surface *surfaces; /* the number of a surface is its geometry ID in Embree */
+    nb_alpha_mask *masks;       /* each pair of a texture and a cutoff once */
     size_t mask_count;
     uint32_t *owners; /* the surface of NB_FAN triangles whose IDs follow each other */
     void *nodes;
@@ -60,8 +60,8 @@ typedef struct nb_geometry {
 
 /* How far the plane of a triangle is from a place of the geometry along a direction of length 1, found in double: Embree
  * tells that from differences of floats as large as the triangle. `cosine` of the angle to the normal, if not NULL. */
-double nb_surface_distance(const nb_surface *surface, uint32_t triangle, const float start[3], const float unit[3],
-                           double *cosine);
+double nb_surface_distance(const nb_batch_surface *surface, uint32_t triangle, const float start[3],
+                           const float unit[3], double *cosine);
 
 /* The surface of the triangle with the given ID. */
 static inline uint32_t nb_owner_of(const nb_geometry *geometry, uint32_t id)

@@ -7,16 +7,16 @@
 #include <string.h>
 
 /* The knot 0 of a lane is where its ray ends. The start is none: nothing is before it. */
-typedef struct nb_knot {
+typedef struct nb_aerial_node {
     float at, fog_left[3], fog_light[3], air_left[3], air_light[3];
     float fog_sun[3], fog_sky[3], sun[3], sky[3]; /* of daylit fog, else 0 */
-    nb_shade_between shade;                       /* of clouds, from the knot before */
+    nb_segment_shadow shade;                      /* of clouds, from the knot before */
     float fog_sum[3], limit[3]; /* of daylit fog with max_opacity: its light, what the limit keeps of it */
-} nb_knot;
+} nb_aerial_node;
 
-static nb_knot start_of(const nb_air *air)
+static nb_aerial_node start_of(const nb_air_frame *air)
 {
-    nb_knot knot = {.fog_left = {1, 1, 1}, .air_left = {1, 1, 1}, .limit = {1, 1, 1}};
+    nb_aerial_node knot = {.fog_left = {1, 1, 1}, .air_left = {1, 1, 1}, .limit = {1, 1, 1}};
     for (int c = 0; c < 3 && nb_daylit_fog_is(air); c++) {
         knot.sun[c] = (float)air->sun_at_eye[c];
         knot.sky[c] = (float)air->sky_at_eye[c];
@@ -24,10 +24,10 @@ static nb_knot start_of(const nb_air *air)
     return knot;
 }
 
-static nb_knot knot_of(const nb_air *air, const nb_air_scratch *scratch, int lane, int place)
+static nb_aerial_node knot_of(const nb_air_frame *air, const nb_air_scratch *scratch, int lane, int place)
 {
-    const nb_air_knots *knots = &scratch->knots[scratch->order[lane][place]];
-    nb_knot knot = {.at = knots->at[lane], .shade = {.sun = 1, .sky = 1}, .limit = {1, 1, 1}};
+    const nb_aerial_batch_nodes *knots = &scratch->knots[scratch->order[lane][place]];
+    nb_aerial_node knot = {.at = knots->at[lane], .shade = {.sun = 1, .sky = 1}, .limit = {1, 1, 1}};
     if (air->roof.is_shaded) knot.shade = knots->shade[lane];
     for (int c = 0; c < 3; c++) {
         knot.fog_left[c] = knots->fog_left[c][lane];
@@ -45,25 +45,25 @@ static nb_knot knot_of(const nb_air *air, const nb_air_scratch *scratch, int lan
 }
 
 /* Without clouds' shade, what fog between two knots has from the sun and from the sky, in the mean of the light of both. */
-static float sun_between(const nb_knot *a, const nb_knot *b, int c)
+static float sun_between(const nb_aerial_node *a, const nb_aerial_node *b, int c)
 {
     return 0.5f * (a->sun[c] + b->sun[c]) * (b->fog_sun[c] - a->fog_sun[c]);
 }
 
-static float sky_between(const nb_knot *a, const nb_knot *b, int c)
+static float sky_between(const nb_aerial_node *a, const nb_aerial_node *b, int c)
 {
     return 0.5f * (a->sky[c] + b->sky[c]) * (b->fog_sky[c] - a->fog_sky[c]);
 }
 
 /* The same without max_opacity, with what fog has of its own. */
-static float unlimited_between(const nb_knot *a, const nb_knot *b, int c)
+static float unlimited_between(const nb_aerial_node *a, const nb_aerial_node *b, int c)
 {
     return (b->fog_light[c] - a->fog_light[c]) + b->shade.sun * sun_between(a, b, c) +
            b->shade.sky * sky_between(a, b, c);
 }
 
 /* max_opacity limits all light up to a place, not that of pieces (see nebel_set_max_opacity). */
-static void limit_opacity(const nb_air *air, const nb_knot *before, nb_knot *knot)
+static void limit_opacity(const nb_air_frame *air, const nb_aerial_node *before, nb_aerial_node *knot)
 {
     const float most = (float)air->fog.max_opacity;
     for (int c = 0; c < 3; c++) {
@@ -73,35 +73,36 @@ static void limit_opacity(const nb_air *air, const nb_knot *before, nb_knot *kno
     }
 }
 
-static int is_limited(const nb_air *air)
+static int is_limited(const nb_air_frame *air)
 {
     return nb_daylit_fog_is(air) && air->fog.max_opacity < 1;
 }
 
 /* The knot of a place behind the one before. */
-static nb_knot knot_after(const nb_air *air, const nb_air_scratch *scratch, int lane, int place, const nb_knot *before)
+static nb_aerial_node knot_after(const nb_air_frame *air, const nb_air_scratch *scratch, int lane, int place,
+                                 const nb_aerial_node *before)
 {
-    nb_knot knot = knot_of(air, scratch, lane, place);
+    nb_aerial_node knot = knot_of(air, scratch, lane, place);
     if (is_limited(air)) limit_opacity(air, before, &knot);
     return knot;
 }
 
 /* The light of fog between two knots. */
-static float fog_between(const nb_knot *a, const nb_knot *b, int c)
+static float fog_between(const nb_aerial_node *a, const nb_aerial_node *b, int c)
 {
     if (!(b->limit[c] < 1)) return unlimited_between(a, b, c);
     return b->limit[c] * b->fog_sum[c] - a->limit[c] * a->fog_sum[c];
 }
 
 /* By how much that may be off: all fog may be at one place. */
-static float shade_doubt(const nb_knot *a, const nb_knot *b, int c)
+static float shade_doubt(const nb_aerial_node *a, const nb_aerial_node *b, int c)
 {
     return b->limit[c] *
            (fabsf(b->shade.sun_doubt * sun_between(a, b, c)) + fabsf(b->shade.sky_doubt * sky_between(a, b, c)));
 }
 
 /* The same within pieces of shade. */
-static float within(const nb_knot *a, const nb_knot *b)
+static float within(const nb_aerial_node *a, const nb_aerial_node *b)
 {
     float most = 0;
     for (int c = 0; c < 3; c++)
@@ -111,7 +112,7 @@ static float within(const nb_knot *a, const nb_knot *b)
     return most;
 }
 
-static float fog_doubt(const nb_knot *a, const nb_knot *b, int c)
+static float fog_doubt(const nb_aerial_node *a, const nb_aerial_node *b, int c)
 {
     return 0.5f * b->limit[c] *
                (fabsf((b->sun[c] - a->sun[c]) * (b->fog_sun[c] - a->fog_sun[c])) +
@@ -125,12 +126,12 @@ static float fog_doubt(const nb_knot *a, const nb_knot *b, int c)
 #define LEAST_PART 0.03125f
 
 /* The light of a lane by what is known. */
-static void sum_light(const nb_air *air, const nb_air_scratch *scratch, int lane, float light[3])
+static void sum_light(const nb_air_frame *air, const nb_air_scratch *scratch, int lane, float light[3])
 {
-    nb_knot before = start_of(air);
+    nb_aerial_node before = start_of(air);
     for (int c = 0; c < 3; c++) light[c] = 0;
     for (int i = 0; i < scratch->count[lane]; i++) {
-        const nb_knot here = knot_after(air, scratch, lane, i, &before);
+        const nb_aerial_node here = knot_after(air, scratch, lane, i, &before);
         for (int c = 0; c < 3; c++)
             light[c] += 0.5f * (before.fog_left[c] + here.fog_left[c]) * (here.air_light[c] - before.air_light[c]) +
                         0.5f * (before.air_left[c] + here.air_left[c]) * fog_between(&before, &here, c);
@@ -139,7 +140,7 @@ static void sum_light(const nb_air *air, const nb_air_scratch *scratch, int lane
 }
 
 /* What may be off of each colour of a lane, in tolerances. */
-static void find_scales(const nb_air *air, const nb_air_scratch *scratch, int lane, float scales[3])
+static void find_scales(const nb_air_frame *air, const nb_air_scratch *scratch, int lane, float scales[3])
 {
     float light[3];
     sum_light(air, scratch, lane, light);
@@ -147,14 +148,14 @@ static void find_scales(const nb_air *air, const nb_air_scratch *scratch, int la
 }
 
 /* What is in doubt of the light between two knots. */
-static float color_doubt(const nb_knot *a, const nb_knot *b, int c)
+static float color_doubt(const nb_aerial_node *a, const nb_aerial_node *b, int c)
 {
     return 0.5f * fabsf((a->fog_left[c] - b->fog_left[c]) * (b->air_light[c] - a->air_light[c])) +
            0.5f * fabsf((a->air_left[c] - b->air_left[c]) * fog_between(a, b, c)) +
            0.5f * (a->air_left[c] + b->air_left[c]) * fog_doubt(a, b, c);
 }
 
-static float doubt(const nb_knot *a, const nb_knot *b, const float scales[3])
+static float doubt(const nb_aerial_node *a, const nb_aerial_node *b, const float scales[3])
 {
     float most = 0;
     for (int c = 0; c < 3; c++) most = fmaxf(most, color_doubt(a, b, c) / scales[c]);
@@ -162,15 +163,15 @@ static float doubt(const nb_knot *a, const nb_knot *b, const float scales[3])
 }
 
 /* The piece of a lane that is in doubt most, with the knots at its ends, and all doubts, in those scales. */
-static int find_worst(const nb_air *air, const nb_air_scratch *scratch, int lane, const float scales[3], nb_knot *a,
-                      nb_knot *b, float *all)
+static int find_worst(const nb_air_frame *air, const nb_air_scratch *scratch, int lane, const float scales[3],
+                      nb_aerial_node *a, nb_aerial_node *b, float *all)
 {
     int worst = 0;
     float most = -1;
-    nb_knot before = start_of(air);
+    nb_aerial_node before = start_of(air);
     *all = 0;
     for (int i = 0; i < scratch->count[lane]; i++) {
-        const nb_knot here = knot_after(air, scratch, lane, i, &before);
+        const nb_aerial_node here = knot_after(air, scratch, lane, i, &before);
         const float is = doubt(&before, &here, scales);
         *all += is;
         if (is > most) {
@@ -185,7 +186,7 @@ static int find_worst(const nb_air *air, const nb_air_scratch *scratch, int lane
 }
 
 /* Whether most of the doubt is about where in the shade of clouds fog is. */
-static int is_by_shade(const nb_knot *a, const nb_knot *b, const float scales[3])
+static int is_by_shade(const nb_aerial_node *a, const nb_aerial_node *b, const float scales[3])
 {
     float most = 0;
     for (int c = 0; c < 3; c++)
@@ -195,10 +196,10 @@ static int is_by_shade(const nb_knot *a, const nb_knot *b, const float scales[3]
 
 /* Fog is mostly near and air far: what begins at the eye is cut where air begins to count, other long pieces nearer to
  * their start. */
-static float cut(const nb_frame *frame, const nb_scratch *scratch, int lane, const nb_knot *a, const nb_knot *b,
-                 const float scales[3])
+static float cut(const nb_frame *frame, const nb_scratch *scratch, int lane, const nb_aerial_node *a,
+                 const nb_aerial_node *b, const float scales[3])
 {
-    const nb_rays *const rays = &scratch->rays;
+    const nb_ray_batch *const rays = &scratch->rays;
     if (is_by_shade(a, b, scales)) return nb_fog_shade_cut(&scratch->air.fog_shade[lane], a->at, b->at);
     if (a->at == 0 && nb_daylit_fog_is(&frame->air) && !frame->air.is_fog_even) {
         const float enters = nb_daylit_fog_enters(&frame->air, rays, lane);
@@ -213,10 +214,10 @@ static float cut(const nb_frame *frame, const nb_scratch *scratch, int lane, con
 /* Of the piece up to a knot. */
 static void shade_piece(nb_air_scratch *scratch, int lane, int place)
 {
-    static const nb_shade_between none = {.sun = 1, .sky = 1};
+    static const nb_segment_shadow none = {.sun = 1, .sky = 1};
     const uint8_t *const order = scratch->order[lane];
-    const nb_fog_shade *const shade = &scratch->fog_shade[lane];
-    nb_air_knots *const knots = &scratch->knots[order[place]];
+    const nb_fog_shadow *const shade = &scratch->fog_shade[lane];
+    nb_aerial_batch_nodes *const knots = &scratch->knots[order[place]];
     const float before = place > 0 ? scratch->knots[order[place - 1]].at[lane] : 0;
     knots->shade[lane] = shade->is_found ? nb_fog_shade_between(shade, before, knots->at[lane]) : none;
 }
@@ -230,14 +231,14 @@ static void insert(nb_air_scratch *scratch, int lane, int place, int knot)
 }
 
 /* A fresh one, before the one at a place. */
-static void cut_at(const nb_air *air, nb_air_scratch *scratch, int lane, int place, float at)
+static void cut_at(const nb_air_frame *air, nb_air_scratch *scratch, int lane, int place, float at)
 {
     scratch->fresh.at[lane] = scratch->knots[scratch->known[lane]].at[lane] = at;
     insert(scratch, lane, place, scratch->known[lane]++);
     for (int i = place; i < place + 2 && air->roof.is_shaded; i++) shade_piece(scratch, lane, i);
 }
 
-static void copy_lane(const nb_air_knots *from, int lane, nb_air_knots *to)
+static void copy_lane(const nb_aerial_batch_nodes *from, int lane, nb_aerial_batch_nodes *to)
 {
     to->at[lane] = from->at[lane];
     for (int c = 0; c < 3; c++) {
@@ -268,7 +269,7 @@ static int place_of(const nb_air_scratch *scratch, int lane, float at)
 }
 
 /* All that is known of a ray before its end, which comes last. */
-static void put_in_order(const nb_air *air, nb_air_scratch *scratch, int lane)
+static void put_in_order(const nb_air_frame *air, nb_air_scratch *scratch, int lane)
 {
     const float end = scratch->knots[0].at[lane];
     scratch->order[lane][0] = 0;
@@ -281,7 +282,7 @@ static void put_in_order(const nb_air *air, nb_air_scratch *scratch, int lane)
 }
 
 /* By clouds. */
-static void shade(const nb_cloud_scratch *clouds, nb_air_knots *knot)
+static void shade(const nb_cloud_scratch *clouds, nb_aerial_batch_nodes *knot)
 {
     for (int c = 0; c < 3; c++)
         for (int i = 0; i < NB_BATCH; i++)
@@ -290,7 +291,7 @@ static void shade(const nb_cloud_scratch *clouds, nb_air_knots *knot)
 }
 
 static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
-                               nb_scratch *scratch, nb_air_knots *knot)
+                               nb_scratch *scratch, nb_aerial_batch_nodes *knot)
 {
     const double *const direction[3] = {scratch->rays.direction[0], scratch->rays.direction[1],
                                         scratch->rays.direction[2]};
@@ -313,7 +314,7 @@ static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fo
 /* The first knot of daylit fog, which light at both ends of a ray does not tell of; 0: none, or it is there already. */
 static float first_cut(const nb_frame *frame, const nb_scratch *scratch, int lane)
 {
-    const nb_air_knots *end = &scratch->air.knots[0];
+    const nb_aerial_batch_nodes *end = &scratch->air.knots[0];
     const float place = nb_daylit_fog_lowest(&frame->air, &scratch->rays, lane);
     float light = 0;
     for (int c = 0; c < 3; c++) light = fmaxf(light, end->fog_sun[c][lane] + end->fog_sky[c][lane]);
@@ -338,7 +339,7 @@ static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
             continue;
         }
         find_scales(&frame->air, air, i, scales);
-        nb_knot a, b;
+        nb_aerial_node a, b;
         const int worst = find_worst(&frame->air, air, i, scales, &a, &b, &all);
         if (all <= frame->air.tolerance) continue;
         const float place = cut(frame, scratch, i, &a, &b, scales);
@@ -352,7 +353,7 @@ static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
 /* Of rays without fog. */
 static void take_air(nb_scratch *scratch)
 {
-    const nb_air_knots *all = &scratch->air.knots[0];
+    const nb_aerial_batch_nodes *all = &scratch->air.knots[0];
     for (int c = 0; c < 3; c++) {
         memcpy(scratch->samples.transmittance[c], all->air_left[c], sizeof all->air_left[c]);
         memcpy(scratch->samples.in_scattering[c], all->air_light[c], sizeof all->air_light[c]);
@@ -361,7 +362,7 @@ static void take_air(nb_scratch *scratch)
 }
 
 /* What the limit adds to the error: the light of fog up to the end is off by as much as what the limit keeps of it. */
-static float limit_error(const nb_knot *end, float most, float error)
+static float limit_error(const nb_aerial_node *end, float most, float error)
 {
     float worst = 0;
     for (int c = 0; c < 3; c++)
@@ -370,16 +371,16 @@ static float limit_error(const nb_knot *end, float most, float error)
     return worst;
 }
 
-static void sum_up(const nb_air *of, nb_scratch *scratch, int lane)
+static void sum_up(const nb_air_frame *of, nb_scratch *scratch, int lane)
 {
     static const float plain[3] = {1, 1, 1};
     const nb_air_scratch *air = &scratch->air;
     nb_light_samples *samples = &scratch->samples;
-    nb_knot before = start_of(of), a, b;
+    nb_aerial_node before = start_of(of), a, b;
     float light[3], all = 0;
     (void)find_worst(of, air, lane, plain, &a, &b, &all);
     for (int i = 0; i < air->count[lane]; i++) {
-        const nb_knot here = knot_after(of, air, lane, i, &before);
+        const nb_aerial_node here = knot_after(of, air, lane, i, &before);
         all += within(&before, &here);
         before = here;
     }
@@ -424,7 +425,7 @@ void nb_haze_forget(nb_scratch *scratch)
 nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
                          nb_scratch *scratch)
 {
-    nb_air_knots *first = &scratch->air.knots[0];
+    nb_aerial_batch_nodes *first = &scratch->air.knots[0];
     const double *const direction[3] = {scratch->rays.direction[0], scratch->rays.direction[1],
                                         scratch->rays.direction[2]};
     nebel_transfer_planes transfers = {.error = first->air_error};

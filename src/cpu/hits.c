@@ -36,7 +36,7 @@ static int any(const int *active)
     return found;
 }
 
-static void set_packet(struct RTCRayHit16 *packet, const nb_rays *rays, int first)
+static void set_packet(struct RTCRayHit16 *packet, const nb_ray_batch *rays, int first)
 {
     struct RTCRay16 *ray = &packet->ray;
     set_constants(ray);
@@ -62,7 +62,7 @@ static void get_packet(const struct RTCRayHit16 *packet, nb_hits *hits, int firs
     memcpy(hits->normal[2] + first, packet->hit.Ng_z, ROW);
 }
 
-void nb_hits_trace(RTCScene scene, const nb_rays *rays, const int *active, nb_packets *packets, nb_hits *hits)
+void nb_hits_trace(RTCScene scene, const nb_ray_batch *rays, const int *active, nb_packets *packets, nb_hits *hits)
 {
     struct RTCIntersectContext context = coherent_context();
     for (int p = 0; p < NB_PACKETS; p++) {
@@ -74,7 +74,7 @@ void nb_hits_trace(RTCScene scene, const nb_rays *rays, const int *active, nb_pa
     }
 }
 
-static int is_large(const nb_geometry *geometry, const nb_rays *rays, const nb_hits *hits, int i)
+static int is_large(const nb_geometry *geometry, const nb_ray_batch *rays, const nb_hits *hits, int i)
 {
     float rise = 0, length2 = 0;
     if (hits->surface[i] == NB_NONE) return 0;
@@ -86,11 +86,11 @@ static int is_large(const nb_geometry *geometry, const nb_rays *rays, const nb_h
     return NB_LONG_EDGE * distance < edge * sqrtf(length2);
 }
 
-void nb_hits_refine(const nb_geometry *geometry, const nb_rays *rays, nb_hits *hits)
+void nb_hits_refine(const nb_geometry *geometry, const nb_ray_batch *rays, nb_hits *hits)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         if (!is_large(geometry, rays, hits, i)) continue;
-        const nb_surface *const surface = &geometry->surfaces[hits->surface[i]];
+        const nb_batch_surface *const surface = &geometry->surfaces[hits->surface[i]];
         const float start[3] = {rays->start[0][i], rays->start[1][i], rays->start[2][i]};
         const float unit[3] = {rays->unit[0][i], rays->unit[1][i], rays->unit[2][i]};
         double cosine;

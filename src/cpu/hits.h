@@ -27,10 +27,10 @@ typedef struct nb_packets {
 } nb_packets;
 
 /* The first hit of every ray with active[i] == -1 (else 0). `active` is aligned to 64 bytes. */
-void nb_hits_trace(RTCScene scene, const nb_rays *rays, const int *active, nb_packets *packets, nb_hits *hits);
+void nb_hits_trace(RTCScene scene, const nb_ray_batch *rays, const int *active, nb_packets *packets, nb_hits *hits);
 
 /* Finds in double how far it is to triangles that are much larger than the way to them, of which floats lose that. */
-void nb_hits_refine(const nb_geometry *geometry, const nb_rays *rays, nb_hits *hits);
+void nb_hits_refine(const nb_geometry *geometry, const nb_ray_batch *rays, nb_hits *hits);
 
 /* Clears active[i] where something lies between start i and infinity. All rays go in one direction. */
 void nb_hits_shadow(RTCScene scene, float (*start)[NB_BATCH], const float direction[3], int *active,

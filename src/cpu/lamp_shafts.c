@@ -23,7 +23,7 @@ typedef struct nb_lamp_place {
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
-NB_CLONES static void move_rays(const nb_lamp_place *lamp, const nb_rays *rays, int first, nb_shaft_rays *packet)
+NB_CLONES static void move_rays(const nb_lamp_place *lamp, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
 {
     for (int c = 0; c < 3; c++) {
         const double place = lamp->place[c];
@@ -191,7 +191,8 @@ typedef struct nb_hole {
 } nb_hole;
 
 /* What a shadow keeps before the hole stays in `found`, what it keeps behind goes to `rest`. */
-static void cut_hole(const nb_hole *hole, const nb_shaft_rays *rays, int i, nb_stretch *found, nb_stretch *rest)
+static void cut_hole(const nb_hole *hole, const nb_shaft_rays *rays, int i, nb_shaft_interval *found,
+                     nb_shaft_interval *rest)
 {
     const double p[3] = {(double)rays->start[0][i], (double)rays->start[1][i], (double)rays->start[2][i]};
     const double d[3] = {(double)rays->way[0][i], (double)rays->way[1][i], (double)rays->way[2][i]};
@@ -216,8 +217,8 @@ static void cut_hole(const nb_hole *hole, const nb_shaft_rays *rays, int i, nb_s
     found->leave[i] = fminf((float)enter, found->leave[i]);
 }
 
-NB_ALWAYS_INLINE int add(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sheet *sheet,
-                         const nb_sheet_lamp *lamp, const nb_stretch *found, nb_shaft_rays *rays)
+NB_ALWAYS_INLINE int add(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_masked_occluder *sheet,
+                         const nb_sheet_lamp *lamp, const nb_shaft_interval *found, nb_shaft_rays *rays)
 {
     int fresh[NB_PACKET];
     if (sheet != NULL) return nb_sheet_cast(sheet, lamp, shafts, allocator, found, rays);
@@ -232,7 +233,7 @@ typedef struct nb_seen_caster {
 
 /* Returns 0 where the lamp is in the triangle's plane. Triangles with a common edge get the same plane there, to the
  * bit. */
-NB_ALWAYS_INLINE int see(const nb_caster *caster, const nb_lamp_place *lamp, nb_seen_caster *seen)
+NB_ALWAYS_INLINE int see(const nb_occluder *caster, const nb_lamp_place *lamp, nb_seen_caster *seen)
 {
     static const double here[3] = {0, 0, 0};
     double corner[3][3], way[2][3];
@@ -258,13 +259,13 @@ NB_ALWAYS_INLINE int see(const nb_caster *caster, const nb_lamp_place *lamp, nb_
     return 1;
 }
 
-NB_ALWAYS_INLINE int cast(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+NB_ALWAYS_INLINE int cast(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
                           size_t number, const nb_lamp_place *lamp, const nb_flats *flats, nb_shaft_rays *rays)
 {
-    const nb_caster *caster = &tree->casters[number];
-    const nb_sheet *sheet = nb_shadow_tree_sheet(tree, number);
+    const nb_occluder *caster = &tree->casters[number];
+    const nb_masked_occluder *sheet = nb_shadow_tree_sheet(tree, number);
     nb_seen_caster seen;
-    nb_stretch found, rest;
+    nb_shaft_interval found, rest;
     float corner[3][3], slack = 0;
     for (int k = 0; k < 3; k++)
         for (int c = 0; c < 3; c++) {
@@ -288,7 +289,7 @@ typedef struct nb_lamp_visit {
 enum { VISITS = NB_SHADOW_LEVELS * NB_SHADOW_FAN };
 
 /* Returns 0 when memory is out. */
-NB_CLONES static int walk_to_lamp(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+NB_CLONES static int walk_to_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
                                   const nb_lamp_place *lamp, const nb_flats *flats, nb_shaft_rays *rays)
 {
     nb_lamp_visit visits[VISITS];
@@ -309,8 +310,8 @@ NB_CLONES static int walk_to_lamp(nb_shafts *shafts, const nebel_allocator *allo
 
 /* ---- lamps ----------------------------------------------------------------------------------- */
 
-static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                       const nb_lamp_place *lamp, const nb_rays *rays, int first, nb_shaft_rays *packet)
+static int find_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                       const nb_lamp_place *lamp, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
 {
     nb_flats flats;
     for (int i = 0; i < NB_PACKET; i++) {
@@ -324,9 +325,9 @@ static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, cons
     return walk_to_lamp(shafts, allocator, tree, lamp, &flats, packet);
 }
 
-static int find_lamp(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                     const nb_lamp_place *lamp, const float *from, const float *to, const nb_rays *rays, double advance,
-                     uint32_t *numbers)
+static int find_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                     const nb_lamp_place *lamp, const float *from, const float *to, const nb_ray_batch *rays,
+                     double advance, uint32_t *numbers)
 {
     for (int p = 0; p < NB_BATCH; p += NB_PACKET) {
         for (int i = 0; i < NB_PACKET; i++) numbers[p + i] = (uint32_t)shafts->toggle_count;
@@ -344,7 +345,7 @@ static int find_lamp(nb_shafts *shafts, const nebel_allocator *allocator, const 
     return 1;
 }
 
-static int make_room(nb_lamp_shafts *shafts, const nebel_allocator *allocator, size_t lamps)
+static int make_room(nb_light_shafts *shafts, const nebel_allocator *allocator, size_t lamps)
 {
     void *numbers = shafts->numbers, *pieces = shafts->pieces;
     const int grown =
@@ -364,9 +365,9 @@ static nb_lamp_place place_lamp(const nebel_snapshot *fog, size_t number, const 
     return lamp;
 }
 
-nebel_result nb_lamp_shafts_find(nb_lamp_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                                 const nebel_snapshot *fog, const nb_lit_box *box, const nb_rays *rays, double advance,
-                                 const float *distance)
+nebel_result nb_lamp_shafts_find(nb_light_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                                 const nebel_snapshot *fog, const nb_lit_box *box, const nb_ray_batch *rays,
+                                 double advance, const float *distance)
 {
     const size_t count = nebel_snapshot_lamp_count(fog);
     float from[NB_BATCH], to[NB_BATCH];
@@ -384,7 +385,7 @@ nebel_result nb_lamp_shafts_find(nb_lamp_shafts *shafts, const nebel_allocator *
     return NEBEL_OK;
 }
 
-void nb_lamp_shafts_free(nb_lamp_shafts *shafts, const nebel_allocator *allocator)
+void nb_lamp_shafts_free(nb_light_shafts *shafts, const nebel_allocator *allocator)
 {
     nb_shafts_free(&shafts->shafts, allocator);
     nb_release(allocator, shafts->numbers);

@@ -8,20 +8,20 @@
 #include <nebel/nebel.h>
 
 /* What a thread works in; all zero at first. */
-typedef struct nb_lamp_shafts {
-    nb_shafts shafts;  /* the toggles of all lamps */
-    uint32_t *numbers; /* the member `first` of all pieces */
+typedef struct nb_light_shafts {
+    nb_sun_shafts shafts; /* the toggles of all lamps */
+    uint32_t *numbers;    /* the member `first` of all pieces */
     size_t number_capacity;
     nebel_ray_visibility *pieces; /* one for each lamp of the fog: what nebel_trace_desc.lamplit takes */
     size_t piece_capacity;
-} nb_lamp_shafts;
+} nb_light_shafts;
 
 /* As nb_shafts_find, for all lamps of the fog. What is nearer to a lamp than its radius casts no shadow. Errors:
  * MEMORY. */
-nebel_result nb_lamp_shafts_find(nb_lamp_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                                 const nebel_snapshot *fog, const nb_lit_box *box, const nb_rays *rays, double advance,
-                                 const float *distance);
+nebel_result nb_lamp_shafts_find(nb_light_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                                 const nebel_snapshot *fog, const nb_lit_box *box, const nb_ray_batch *rays,
+                                 double advance, const float *distance);
 
-void nb_lamp_shafts_free(nb_lamp_shafts *shafts, const nebel_allocator *allocator);
+void nb_lamp_shafts_free(nb_light_shafts *shafts, const nebel_allocator *allocator);
 
 #endif

@@ -26,9 +26,9 @@ static double cone_of(const nebel_light *lamp, const double direction[3])
     return s * s * (3 - 2 * s);
 }
 
-nb_lamp_sight nb_lamp_sight_from(const nebel_light *lamp, const double place[3])
+nb_sampled_light nb_lamp_sight_from(const nebel_light *lamp, const double place[3])
 {
-    nb_lamp_sight sight;
+    nb_sampled_light sight;
     for (int i = 0; i < 3; i++) sight.direction[i] = lamp->position[i] - place[i];
     const double distance = nb_vector_length(sight.direction), radius = nb_bulb(lamp->radius);
     for (int i = 0; i < 3 && distance > 0; i++) sight.direction[i] /= distance;
@@ -42,11 +42,11 @@ nb_lamp_sight nb_lamp_sight_from(const nebel_light *lamp, const double place[3])
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
-nb_passing nb_passing_of(const nebel_light *lamp, const nebel_ray *ray)
+nb_light_pass nb_passing_of(const nebel_light *lamp, const nebel_ray *ray)
 {
     double to_lamp[3], aside[3];
     for (int i = 0; i < 3; i++) to_lamp[i] = lamp->position[i] - ray->origin[i];
-    nb_passing p = {.start = -nb_vector_dot(to_lamp, ray->direction), .t_max = ray->t_max};
+    nb_light_pass p = {.start = -nb_vector_dot(to_lamp, ray->direction), .t_max = ray->t_max};
     for (int i = 0; i < 3; i++) aside[i] = to_lamp[i] + p.start * ray->direction[i];
     p.aside = fmax(nb_vector_length(aside), nb_bulb(lamp->radius));
     /* One angle between two places; as the difference of two it would be lost to rounding far from the lamp. */
@@ -54,14 +54,14 @@ nb_passing nb_passing_of(const nebel_light *lamp, const nebel_ray *ray)
     return p;
 }
 
-double nb_passing_draw(const nb_passing *p, double chance)
+double nb_passing_draw(const nb_light_pass *p, double chance)
 {
     const double angle = chance * p->angle, square = p->start * p->start + p->aside * p->aside;
     const double down = p->aside * cos(angle) - p->start * sin(angle);
     return down > 0 ? fmin(square * sin(angle) / down, p->t_max) : p->t_max;
 }
 
-double nb_passing_density(const nb_passing *p, double t)
+double nb_passing_density(const nb_light_pass *p, double t)
 {
     const double from = p->start + t;
     return p->aside / (p->angle * (p->aside * p->aside + from * from));
@@ -76,7 +76,7 @@ double nb_lamp_weight_at(const nebel_light *lamp, const nebel_ray *ray)
 
 double nb_lamp_weight_along(const nebel_light *lamp, const nebel_ray *ray)
 {
-    const nb_passing passing = nb_passing_of(lamp, ray);
+    const nb_light_pass passing = nb_passing_of(lamp, ray);
     return largest(lamp->intensity) * passing.angle / passing.aside;
 }
 
@@ -104,7 +104,7 @@ double nb_lamps_density(const nebel_scene_data *scene, const nebel_ray *ray, dou
 {
     double density = 0;
     for (size_t i = 0; i < scene->light_count; i++) {
-        const nb_passing passing = nb_passing_of(&scene->lights[i], ray);
+        const nb_light_pass passing = nb_passing_of(&scene->lights[i], ray);
         const double part = nb_lamp_weight_along(&scene->lights[i], ray) / sum;
         if (part > 0) density += part * nb_passing_density(&passing, t);
     }

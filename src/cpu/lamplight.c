@@ -7,23 +7,23 @@
 #define PI 3.14159265358979323846
 
 /* As formulas/lamp.inc has it: full within the inner angle, nothing beyond the outer one. */
-typedef struct cone {
+typedef struct nb_spot_cone {
     float axis[3], edge, rise;
-} cone;
+} nb_spot_cone;
 
-static cone cone_of(const nebel_light *lamp)
+static nb_spot_cone cone_of(const nebel_light *lamp)
 {
-    if (lamp->type != NEBEL_LIGHT_SPOT) return (cone){{0, 0, 0}, -1, 1e30f}; /* everything is within */
+    if (lamp->type != NEBEL_LIGHT_SPOT) return (nb_spot_cone){{0, 0, 0}, -1, 1e30f}; /* everything is within */
     const double edge = cos(lamp->outer_angle * (PI / 180)), inner = cos(lamp->inner_angle * (PI / 180));
     const double *d = lamp->direction, length = hypot(hypot(d[0], d[1]), d[2]);
-    return (cone){{(float)(d[0] / length), (float)(d[1] / length), (float)(d[2] / length)},
-                  (float)edge,
-                  (float)fmin(1 / (inner - edge), 1e30)};
+    return (nb_spot_cone){{(float)(d[0] / length), (float)(d[1] / length), (float)(d[2] / length)},
+                          (float)edge,
+                          (float)fmin(1 / (inner - edge), 1e30)};
 }
 
-NB_CLONES static void set_ways(const cone *within, float radius, float clear, const float *restrict place,
-                               const nb_starts *starts, const nb_hits *hits, const nb_points *points,
-                               nb_lamp_ways *ways)
+NB_CLONES static void set_ways(const nb_spot_cone *within, float radius, float clear, const float *restrict place,
+                               const nb_ray_starts *starts, const nb_hits *hits, const nb_surface_batch *points,
+                               nb_shadow_rays *ways)
 {
     const float lx = place[0], ly = place[1], lz = place[2], edge = within->edge, rise = within->rise;
     const float *sx = starts->offset[0], *sy = starts->offset[1], *sz = starts->offset[2];
@@ -51,16 +51,16 @@ NB_CLONES static void set_ways(const cone *within, float radius, float clear, co
     }
 }
 
-void nb_lamp_ways_set(const nebel_light *lamp, const nb_starts *starts, const nb_hits *hits, const nb_points *points,
-                      nb_lamp_ways *ways)
+void nb_lamp_ways_set(const nebel_light *lamp, const nb_ray_starts *starts, const nb_hits *hits,
+                      const nb_surface_batch *points, nb_shadow_rays *ways)
 {
-    const cone within = cone_of(lamp);
+    const nb_spot_cone within = cone_of(lamp);
     float place[3];
     for (int c = 0; c < 3; c++) place[c] = (float)(lamp->position[c] - starts->origin[c]);
     set_ways(&within, (float)nb_bulb(lamp->radius), (float)lamp->radius, place, starts, hits, points, ways);
 }
 
-void nb_lamp_ways_shadow(RTCScene scene, nb_points *points, nb_lamp_ways *ways, nb_packets *packets)
+void nb_lamp_ways_shadow(RTCScene scene, nb_surface_batch *points, nb_shadow_rays *ways, nb_packets *packets)
 {
     nb_hits_between(scene, points->start, ways->direction, ways->shadowed, ways->lit, packets);
 }

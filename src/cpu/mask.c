@@ -15,17 +15,17 @@ static uint32_t before(uint32_t x, uint32_t size)
 }
 
 /* Alpha at the corners of a cell, less the threshold. */
-typedef struct nb_cell {
+typedef struct nb_mask_cell {
     float at[2][2]; /* by y, x */
-} nb_cell;
+} nb_mask_cell;
 
-NB_ALWAYS_INLINE nb_cell cell_of(uint32_t corners, float threshold)
+NB_ALWAYS_INLINE nb_mask_cell cell_of(uint32_t corners, float threshold)
 {
-    return (nb_cell){{{(float)(corners & 255) - threshold, (float)(corners >> 8 & 255) - threshold},
-                      {(float)(corners >> 16 & 255) - threshold, (float)(corners >> 24) - threshold}}};
+    return (nb_mask_cell){{{(float)(corners & 255) - threshold, (float)(corners >> 8 & 255) - threshold},
+                           {(float)(corners >> 16 & 255) - threshold, (float)(corners >> 24) - threshold}}};
 }
 
-static int has_edge(const nb_cell *cell)
+static int has_edge(const nb_mask_cell *cell)
 {
     const int solid = (cell->at[0][0] >= 0) + (cell->at[0][1] >= 0) + (cell->at[1][0] >= 0) + (cell->at[1][1] >= 0);
     return solid % 4 != 0;
@@ -45,7 +45,7 @@ NB_ALWAYS_INLINE uint32_t shift_of(int falls_x, int falls_y)
 /* The square that begins at a cell is larger by one than the least of those that begin at its three neighbours ahead
  * (the largest square of ones in a matrix of bits, by dynamic programming). A sweep from the far side of the texture; as
  * squares go on at the opposite border it is repeated until nothing changes, which is returned. */
-static int sweep(const nb_mask *mask, int falls_x, int falls_y)
+static int sweep(const nb_alpha_mask *mask, int falls_x, int falls_y)
 {
     const uint32_t width = mask->width, height = mask->height, shift = shift_of(falls_x, falls_y);
     int changed = 0;
@@ -66,11 +66,11 @@ static int sweep(const nb_mask *mask, int falls_x, int falls_y)
     return changed;
 }
 
-static void set_clearances(const nb_mask *mask)
+static void set_clearances(const nb_alpha_mask *mask)
 {
     const size_t count = (size_t)mask->width * mask->height;
     for (size_t i = 0; i < count; i++) {
-        const nb_cell cell = cell_of(mask->corners[i], mask->threshold);
+        const nb_mask_cell cell = cell_of(mask->corners[i], mask->threshold);
         mask->clearances[i] = has_edge(&cell) ? 0 : UINT32_MAX;
     }
     for (int way = 0; way < 4; way++)
@@ -78,7 +78,7 @@ static void set_clearances(const nb_mask *mask)
         }
 }
 
-static void set_corners(const nb_mask *mask, const nebel_texture *texture)
+static void set_corners(const nb_alpha_mask *mask, const nebel_texture *texture)
 {
     const uint32_t width = mask->width, height = mask->height;
     for (uint32_t y = 0; y < height; y++)
@@ -91,12 +91,12 @@ static void set_corners(const nb_mask *mask, const nebel_texture *texture)
         }
 }
 
-nebel_result nb_mask_make(nb_mask *mask, const nebel_allocator *allocator, const nebel_scene_data *scene,
+nebel_result nb_mask_make(nb_alpha_mask *mask, const nebel_allocator *allocator, const nebel_scene_data *scene,
                           int32_t number, float cutoff)
 {
     const nebel_texture *texture = &scene->textures[number];
     const size_t count = (size_t)texture->width * texture->height;
-    *mask = (nb_mask){.number = number, .cutoff = cutoff, .width = texture->width, .height = texture->height};
+    *mask = (nb_alpha_mask){.number = number, .cutoff = cutoff, .width = texture->width, .height = texture->height};
     mask->threshold = 255 * cutoff - 0.125f;
     mask->corners = nb_allocate(allocator, count, sizeof *mask->corners);
     mask->clearances = nb_allocate(allocator, count, sizeof *mask->clearances);
@@ -106,7 +106,7 @@ nebel_result nb_mask_make(nb_mask *mask, const nebel_allocator *allocator, const
     return NEBEL_OK;
 }
 
-void nb_mask_free(nb_mask *mask, const nebel_allocator *allocator)
+void nb_mask_free(nb_alpha_mask *mask, const nebel_allocator *allocator)
 {
     nb_release(allocator, mask->corners);
     nb_release(allocator, mask->clearances);
@@ -123,13 +123,13 @@ static uint32_t find_cell(double place, uint32_t size, double *within)
     return round >= 0 && round < size ? (uint32_t)round : 0;
 }
 
-int nb_mask_is_hole(const nb_mask *mask, float u, float v)
+int nb_mask_is_hole(const nb_alpha_mask *mask, float u, float v)
 {
     const double x = isfinite(u) ? (double)u * mask->width : 0, y = isfinite(v) ? (double)v * mask->height : 0;
     double f, g;
     const uint32_t column = find_cell(x, mask->width, &f), row = find_cell(y, mask->height, &g);
     const size_t number = (size_t)row * mask->width + column;
-    const nb_cell cell = cell_of(mask->corners[number], mask->threshold);
+    const nb_mask_cell cell = cell_of(mask->corners[number], mask->threshold);
     if (mask->clearances[number] > 0) return cell.at[0][0] < 0;
     const double above = (double)cell.at[0][0] + f * (double)(cell.at[0][1] - cell.at[0][0]);
     const double below = (double)cell.at[1][0] + f * (double)(cell.at[1][1] - cell.at[1][0]);
@@ -173,7 +173,7 @@ NB_CLONES static void begin_lines(nb_mask_walk *walk, const nb_mask_lines *lines
     }
 }
 
-void nb_mask_begin(nb_mask_walk *walk, const nb_mask *mask, const nb_mask_lines *lines)
+void nb_mask_begin(nb_mask_walk *walk, const nb_alpha_mask *mask, const nb_mask_lines *lines)
 {
     walk->mask = mask;
     walk->is_over = 0;
@@ -184,12 +184,12 @@ void nb_mask_begin(nb_mask_walk *walk, const nb_mask *mask, const nb_mask_lines 
 /* A step of each line: through its cell, or through all ahead that are like it. Alpha over the threshold on the way is
  * a + b s + c s^2, whose sign changes at two places at most: so there are three pieces, of which some may have no
  * length. */
-typedef struct nb_step {
+typedef struct nb_mask_step {
     double a[NB_PACKET], b[NB_PACKET], c[NB_PACKET], length[NB_PACKET];
     double change[2][NB_PACKET]; /* s where the second piece begins and the third; 0 for those that are missing */
     double value[3][NB_PACKET];  /* of each piece, of its sign; a missing one is like the next */
     int is_cut[NB_PACKET];       /* there may be changes */
-} nb_step;
+} nb_mask_step;
 
 /* In which cell a line is along one axis, among those around the mask, and how far within; and in which of the mask that
  * is. Halves keep the quotient from whole numbers. */
@@ -199,9 +199,9 @@ typedef struct nb_step {
     const int32_t column = cell - (size) * (int32_t)((cell + 0.5) * (inverse))
 
 /* Returns whether any line may have changes on its way. */
-NB_ALWAYS_INLINE int enter_cells(const nb_mask_walk *walk, nb_step *step)
+NB_ALWAYS_INLINE int enter_cells(const nb_mask_walk *walk, nb_mask_step *step)
 {
-    const nb_mask *mask = walk->mask;
+    const nb_alpha_mask *mask = walk->mask;
     const uint32_t *restrict corners = mask->corners, *restrict clearances = mask->clearances;
     const int32_t width = (int32_t)mask->width, height = (int32_t)mask->height;
     const double inverse_width = 1.0 / width, inverse_height = 1.0 / height;
@@ -214,7 +214,7 @@ NB_ALWAYS_INLINE int enter_cells(const nb_mask_walk *walk, nb_step *step)
         ENTER(x, cell_x, f, width, inverse_width, column);
         ENTER(y, cell_y, g, height, inverse_height, row);
         const int32_t cell = row * width + column;
-        const nb_cell v = cell_of(corners[cell], threshold);
+        const nb_mask_cell v = cell_of(corners[cell], threshold);
         const int32_t clearance = (int32_t)(clearances[cell] >> walk->shift[i] & 255);
         const double reach = clearance > 0 ? clearance : 1;
         const double across = ((way_x < 0 ? 1 - reach - margin : reach + margin) - f) * walk->inverse[0][i];
@@ -242,7 +242,7 @@ NB_ALWAYS_INLINE int enter_cells(const nb_mask_walk *walk, nb_step *step)
 }
 
 /* Parts steps at the roots. */
-NB_ALWAYS_INLINE void cut_cells(nb_step *step)
+NB_ALWAYS_INLINE void cut_cells(nb_mask_step *step)
 {
     NB_SIMD
     for (int i = 0; i < NB_PACKET; i++) {
@@ -266,9 +266,9 @@ NB_ALWAYS_INLINE void cut_cells(nb_step *step)
 }
 
 /* Where stretches end: with one of the three pieces, or with the line. */
-typedef struct nb_ends {
+typedef struct nb_mask_ends {
     double since[4][NB_PACKET], at[4][NB_PACKET]; /* at -1: there is no such end */
-} nb_ends;
+} nb_mask_ends;
 
 /* Goes on to a piece. Macro, as loops in loops become no vectors. */
 #define TAKE_PIECE(k, begin, value)                                                                                    \
@@ -280,7 +280,7 @@ typedef struct nb_ends {
     } while (0)
 
 /* Returns whether there is any end. */
-NB_ALWAYS_INLINE int take_step(nb_mask_walk *walk, const nb_step *step, nb_ends *ends)
+NB_ALWAYS_INLINE int take_step(nb_mask_walk *walk, const nb_mask_step *step, nb_mask_ends *ends)
 {
     int any = 0, goes_on = 0;
     NB_SIMD
@@ -310,7 +310,7 @@ NB_ALWAYS_INLINE int take_step(nb_mask_walk *walk, const nb_step *step, nb_ends 
 }
 
 /* Without a branch, as it would be guessed wrong every other time. */
-NB_ALWAYS_INLINE void list_stretches(nb_mask_walk *walk, const nb_ends *ends)
+NB_ALWAYS_INLINE void list_stretches(nb_mask_walk *walk, const nb_mask_ends *ends)
 {
     for (uint32_t i = 0; i < NB_PACKET; i++)
         for (int k = 0; k < 4; k++) {
@@ -321,8 +321,8 @@ NB_ALWAYS_INLINE void list_stretches(nb_mask_walk *walk, const nb_ends *ends)
 
 NB_CLONES static void walk_lines(nb_mask_walk *walk)
 {
-    nb_step step;
-    nb_ends ends;
+    nb_mask_step step;
+    nb_mask_ends ends;
     while (!walk->is_over && walk->count == 0) {
         if (enter_cells(walk, &step)) cut_cells(&step);
         if (take_step(walk, &step, &ends)) list_stretches(walk, &ends);

@@ -11,7 +11,7 @@
 
 #include <nebel/scene.h>
 
-typedef struct nb_mask {
+typedef struct nb_alpha_mask {
     int32_t number; /* of the texture */
     float cutoff;   /* as the meshes have it */
     uint32_t width, height;
@@ -20,15 +20,15 @@ typedef struct nb_mask {
                              lowest one up. Cell 0 begins at the centre of texel 0, all are periodic */
     uint32_t *clearances; /* of each cell, a byte for each of the four ways of lines, as corners: the side of the square
                              of cells without an edge of a hole that begins there, at most 255; 0: it has one itself */
-} nb_mask;
+} nb_alpha_mask;
 
 /* Errors: MEMORY. */
-nebel_result nb_mask_make(nb_mask *mask, const nebel_allocator *allocator, const nebel_scene_data *scene,
+nebel_result nb_mask_make(nb_alpha_mask *mask, const nebel_allocator *allocator, const nebel_scene_data *scene,
                           int32_t number, float cutoff);
-void nb_mask_free(nb_mask *mask, const nebel_allocator *allocator);
+void nb_mask_free(nb_alpha_mask *mask, const nebel_allocator *allocator);
 
 /* Whether there is a hole at these texture coordinates. What is no number is 0. */
-int nb_mask_is_hole(const nb_mask *mask, float u, float v);
+int nb_mask_is_hole(const nb_alpha_mask *mask, float u, float v);
 
 /* A stretch of a line without holes. */
 typedef struct nb_solid {
@@ -38,7 +38,7 @@ typedef struct nb_solid {
 
 /* The lines of a packet over a mask, each from s = 0 to 1. Its place at s is start + s way, in cells; never below 0. */
 typedef struct nb_mask_walk {
-    const nb_mask *mask;
+    const nb_alpha_mask *mask;
     double start[2][NB_PACKET], way[2][NB_PACKET], inverse[2][NB_PACKET]; /* of the way; never infinite */
     uint32_t shift[NB_PACKET];                                            /* of the clearance for its way */
     double at[NB_PACKET];                                                 /* how far it has been walked */
@@ -58,7 +58,7 @@ typedef struct nb_mask_lines {
 } nb_mask_lines;
 
 /* Lines that are not walked are found at once. */
-void nb_mask_begin(nb_mask_walk *walk, const nb_mask *mask, const nb_mask_lines *lines);
+void nb_mask_begin(nb_mask_walk *walk, const nb_alpha_mask *mask, const nb_mask_lines *lines);
 
 /* Finds more stretches, those of a line one after the other; 0 where there are none left. */
 int nb_mask_next(nb_mask_walk *walk);

@@ -186,7 +186,7 @@ double nb_scatterer_value(const nb_scatterer *scatterer, double cosine)
 
 /* ---- grounds --------------------------------------------------------------------------------- */
 
-static double up_at(const nb_world *world, const double place[3], double up[3])
+static double up_at(const nb_planet *world, const double place[3], double up[3])
 {
     for (int c = 0; c < 3; c++) up[c] = place[c] - world->center[c];
     const double far = nb_vector_length(up);
@@ -195,7 +195,7 @@ static double up_at(const nb_world *world, const double place[3], double up[3])
 }
 
 /* How far the ground is; HUGE_VAL: it is not met. */
-static double ground_at(const nb_world *world, const nebel_ray *ray)
+static double ground_at(const nb_planet *world, const nebel_ray *ray)
 {
     double up[3];
     const double far = up_at(world, ray->origin, up);
@@ -208,7 +208,7 @@ nb_ground_hit nb_media_find_ground(const nb_media *media, const nebel_ray *ray)
 {
     nb_ground_hit hit = {.world = NULL, .t = HUGE_VAL};
     for (int i = 0; i < media->planet_count; i++) {
-        const nb_world *world = &media->planets[i].world;
+        const nb_planet *world = &media->planets[i].world;
         const double t = ground_at(world, ray);
         if (!(t < hit.t && t <= ray->t_max)) continue;
         double place[3];
@@ -232,7 +232,7 @@ double nb_media_sun_left(const nb_media *media, const double place[3], const dou
         if (nb_world_power(&media->planets[i].world, place) < nb_world_power(&media->planets[nearest].world, place))
             nearest = i;
     for (int i = 0; i < media->planet_count; i++) {
-        const nb_world *world = &media->planets[i].world;
+        const nb_planet *world = &media->planets[i].world;
         if (i == nearest)
             left *= ground_at(world, &ray) < HUGE_VAL ? 0 : 1;
         else

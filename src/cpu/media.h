@@ -74,8 +74,8 @@ double nb_media_air_transmittance(const nb_media *media, const nebel_ray *ray, i
 
 /* Where a ray meets the ground of a planet. */
 typedef struct nb_ground_hit {
-    const nb_world *world; /* NULL: it meets none up to its t_max */
-    double t;              /* m; 0 from the ground or below it downwards */
+    const nb_planet *world; /* NULL: it meets none up to its t_max */
+    double t;               /* m; 0 from the ground or below it downwards */
     double normal[3];
     double place[3]; /* just above the ground, where rays go on */
 } nb_ground_hit;

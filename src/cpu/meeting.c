@@ -8,15 +8,15 @@
 
 /* ---- surfaces -------------------------------------------------------------------------------- */
 
-void nb_lone_ray_clear(nb_lone_ray *lone)
+void nb_lone_ray_clear(nb_single_ray *lone)
 {
     memset(lone, 0, sizeof *lone);
     for (int i = 0; i < NB_BATCH; i++) lone->hits.surface[i] = NB_NONE;
 }
 
-nb_meeting nb_meeting_of(const nb_hits *hits, const nb_points *points, int i)
+nb_path_vertex nb_meeting_of(const nb_hits *hits, const nb_surface_batch *points, int i)
 {
-    nb_meeting meeting = {.t = HUGE_VAL};
+    nb_path_vertex meeting = {.t = HUGE_VAL};
     if (hits->surface[i] == NB_NONE) return meeting;
     meeting.t = (double)hits->t[i];
     meeting.cosine = points->cosine[i];
@@ -55,7 +55,7 @@ int nb_meeting_is_shadowed(const nb_geometry *geometry, const double origin[3], 
     return ray.tfar < 0;
 }
 
-static void take_hit(const struct RTCRayHit *found, nb_rays *rays, nb_hits *hits)
+static void take_hit(const struct RTCRayHit *found, nb_ray_batch *rays, nb_hits *hits)
 {
     const struct RTCRay *ray = &found->ray;
     const float start[3] = {ray->org_x, ray->org_y, ray->org_z}, unit[3] = {ray->dir_x, ray->dir_y, ray->dir_z};
@@ -72,17 +72,17 @@ static void take_hit(const struct RTCRayHit *found, nb_rays *rays, nb_hits *hits
     hits->v[0] = found->hit.v;
 }
 
-static nb_meeting find_surface(const nb_path_world *world, const nebel_ray *along, nb_lone_ray *lone)
+static nb_path_vertex find_surface(const nb_path_scene *world, const nebel_ray *along, nb_single_ray *lone)
 {
     struct RTCRayHit found;
     struct RTCIntersectContext context;
     const float sun[3] = {(float)world->to_sun[0], (float)world->to_sun[1], (float)world->to_sun[2]};
-    if (world->geometry->scene == NULL) return (nb_meeting){.t = HUGE_VAL};
+    if (world->geometry->scene == NULL) return (nb_path_vertex){.t = HUGE_VAL};
     rtcInitIntersectContext(&context);
     set_ray(world->geometry, along->origin, along->direction, &found.ray);
     found.hit.geomID = found.hit.primID = found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(world->geometry->scene, &context, &found);
-    if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return (nb_meeting){.t = HUGE_VAL};
+    if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return (nb_path_vertex){.t = HUGE_VAL};
     take_hit(&found, &lone->rays, &lone->hits);
     nb_surface_points(world->geometry, world->scene, world->table, &lone->rays, &lone->hits, sun, &lone->points);
     return nb_meeting_of(&lone->hits, &lone->points, 0);
@@ -96,13 +96,13 @@ static double behind(double t)
     return 1e-5 * t + 1e-3;
 }
 
-void nb_meeting_end_at_ground(const nb_path_world *world, nebel_ray *ray, nb_meeting *meeting)
+void nb_meeting_end_at_ground(const nb_path_scene *world, nebel_ray *ray, nb_path_vertex *meeting)
 {
     const nb_ground_hit hit = nb_media_find_ground(&world->media, ray);
     const int meets_surface = meeting->t < HUGE_VAL;
     /* From on the ground or below it all surfaces are seen before it. */
     if (hit.world == NULL || (meets_surface && (hit.t == 0 || hit.t + behind(meeting->t) >= meeting->t))) return;
-    *meeting = (nb_meeting){.t = hit.t, .is_ground = 1};
+    *meeting = (nb_path_vertex){.t = hit.t, .is_ground = 1};
     ray->t_max = hit.t;
     for (int c = 0; c < 3; c++) {
         meeting->reflectance[c] = (float)hit.world->planet->atmosphere_desc.ground_albedo[c];
@@ -113,9 +113,9 @@ void nb_meeting_end_at_ground(const nb_path_world *world, nebel_ray *ray, nb_mee
     meeting->lit = world->has_sun && meeting->cosine > 0;
 }
 
-nb_meeting nb_meeting_find(const nb_path_world *world, nebel_ray *ray, nb_lone_ray *lone)
+nb_path_vertex nb_meeting_find(const nb_path_scene *world, nebel_ray *ray, nb_single_ray *lone)
 {
-    nb_meeting meeting = find_surface(world, ray, lone);
+    nb_path_vertex meeting = find_surface(world, ray, lone);
     ray->t_max = meeting.t;
     nb_meeting_end_at_ground(world, ray, &meeting);
     return meeting;

@@ -2,10 +2,10 @@
 
 enum { VISITS = NB_WALL_LEVELS * NB_WALL_FAN };
 
-typedef struct nb_visit {
+typedef struct nb_crossing_visit {
     int level;
     uint32_t node;
-} nb_visit;
+} nb_crossing_visit;
 
 /* Children that the beam may meet, as bits. */
 NB_ALWAYS_INLINE uint32_t meet_children(const nb_wall_node *node, const nb_beam *beam)
@@ -30,7 +30,7 @@ NB_ALWAYS_INLINE uint32_t meet_children(const nb_wall_node *node, const nb_beam 
 }
 
 /* Puts a passage of each ray where it belongs. Returns 0 where there is no room. */
-NB_ALWAYS_INLINE int sort_in(float *restrict passage, nb_passages *passages)
+NB_ALWAYS_INLINE int sort_in(float *restrict passage, nb_boundary_crossings *passages)
 {
     int any = 0;
     for (int k = 0; k < passages->count; k++) {
@@ -52,10 +52,10 @@ NB_ALWAYS_INLINE int sort_in(float *restrict passage, nb_passages *passages)
 
 /* A ray passes between both ends of a wall if it has them on different sides. Which end is on which side is the same for
  * all walls that have this end in common, so that no ray slips through between them. */
-NB_ALWAYS_INLINE int pass_wall(const nb_wall *wall, const nb_shaft_rays *rays, const float *restrict scale,
-                               nb_passages *passages)
+NB_ALWAYS_INLINE int pass_wall(const nb_shadow_boundary *wall, const nb_shaft_rays *rays, const float *restrict scale,
+                               nb_boundary_crossings *passages)
 {
-    const nb_wall w = *wall;
+    const nb_shadow_boundary w = *wall;
     uint32_t passage[NB_PACKET];
     float sorted[NB_PACKET];
     NB_SIMD
@@ -81,7 +81,7 @@ NB_ALWAYS_INLINE int pass_wall(const nb_wall *wall, const nb_shaft_rays *rays, c
     return sort_in(sorted, passages);
 }
 
-NB_ALWAYS_INLINE int alternate(const nb_passages *passages, int is_dark)
+NB_ALWAYS_INLINE int alternate(const nb_boundary_crossings *passages, int is_dark)
 {
     uint32_t dark[NB_PACKET], wrong = 0;
     for (int i = 0; i < NB_PACKET; i++) dark[i] = (uint32_t)is_dark;
@@ -98,10 +98,10 @@ NB_ALWAYS_INLINE int alternate(const nb_passages *passages, int is_dark)
     return (wrong & 1) == 0;
 }
 
-NB_CLONES static int find_passages(const nb_walls *walls, const nb_beam *beam, const nb_shaft_rays *rays, int is_dark,
-                                   nb_passages *passages)
+NB_CLONES static int find_passages(const nb_shadow_boundaries *walls, const nb_beam *beam, const nb_shaft_rays *rays,
+                                   int is_dark, nb_boundary_crossings *passages)
 {
-    nb_visit visits[VISITS];
+    nb_crossing_visit visits[VISITS];
     float scale[NB_PACKET];
     int count = 1;
     NB_SIMD
@@ -110,14 +110,14 @@ NB_CLONES static int find_passages(const nb_walls *walls, const nb_beam *beam, c
         scale[i] = 1 / (square > 1e-30f ? square : 1e-30f);
     }
     passages->count = 0;
-    visits[0] = (nb_visit){walls->level_count - 1, 0};
+    visits[0] = (nb_crossing_visit){walls->level_count - 1, 0};
     while (count > 0) {
-        const nb_visit visit = visits[--count];
+        const nb_crossing_visit visit = visits[--count];
         uint32_t children = meet_children(&walls->levels[visit.level][visit.node], beam);
         for (; children != 0; children &= children - 1) {
             const uint32_t child = NB_WALL_FAN * visit.node + (uint32_t)__builtin_ctz(children);
             if (visit.level > 0)
-                visits[count++] = (nb_visit){visit.level - 1, child};
+                visits[count++] = (nb_crossing_visit){visit.level - 1, child};
             else if (!pass_wall(&walls->walls[child], rays, scale, passages))
                 return 0;
         }
@@ -125,8 +125,8 @@ NB_CLONES static int find_passages(const nb_walls *walls, const nb_beam *beam, c
     return alternate(passages, is_dark);
 }
 
-int nb_passages_find(const nb_walls *walls, const nb_beam *beam, const nb_shaft_rays *rays, int is_dark,
-                     nb_passages *passages)
+int nb_passages_find(const nb_shadow_boundaries *walls, const nb_beam *beam, const nb_shaft_rays *rays, int is_dark,
+                     nb_boundary_crossings *passages)
 {
     return find_passages(walls, beam, rays, is_dark, passages);
 }

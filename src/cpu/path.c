@@ -29,11 +29,11 @@ typedef struct waiting_path {
 
 /* A path at work. */
 typedef struct path {
-    const nb_path_world *world;
+    const nb_path_scene *world;
     const nb_path_eye *eye;
     path_share share;
-    nb_lone_ray *lone;
-    nb_chance chance;
+    nb_single_ray *lone;
+    nb_rng chance;
     int channel;
     nebel_ray ray;
     int is_first;         /* the ray is the camera's */
@@ -50,7 +50,7 @@ typedef struct path {
 /* ---- directions ------------------------------------------------------------------------------ */
 
 /* The direction at an angle to the axis, by chance around it. */
-static void turn_about(const double axis[3], double cosine, nb_chance *chance, double direction[3])
+static void turn_about(const double axis[3], double cosine, nb_rng *chance, double direction[3])
 {
     const double angle = 2 * PI * nb_chance_next(chance), sine = sqrt(fmax(0, 1 - cosine * cosine));
     double across[3] = {0, 0, 0}, third[3];
@@ -68,7 +68,7 @@ static void turn_about(const double axis[3], double cosine, nb_chance *chance, d
 }
 
 /* Lambert: as often as the cosine. What points below the triangle, where shading normals lean, is mirrored up. */
-static void reflect_diffusely(const nb_meeting *at, nb_chance *chance, double direction[3])
+static void reflect_diffusely(const nb_path_vertex *at, nb_rng *chance, double direction[3])
 {
     double normal[3] = {(double)at->normal[0], (double)at->normal[1], (double)at->normal[2]};
     const double side[3] = {(double)at->side[0], (double)at->side[1], (double)at->side[2]};
@@ -90,9 +90,9 @@ static void add(path *p, const double light[3], double share)
 static nebel_result add_arriving(path *p, const double origin[3], const double direction[3], double reach,
                                  double shadowed, const double light[3], double share)
 {
-    const nb_path_world *world = p->world;
+    const nb_path_scene *world = p->world;
     if (!(share > 0) || nb_meeting_is_shadowed(world->geometry, origin, direction, shadowed)) return NEBEL_OK;
-    nb_track way = {.media = &world->media, .ray.t_max = reach, .ignore_distances = 1, .channel = p->channel};
+    nb_tracker way = {.media = &world->media, .ray.t_max = reach, .ignore_distances = 1, .channel = p->channel};
     memcpy(way.ray.origin, origin, sizeof way.ray.origin);
     memcpy(way.ray.direction, direction, sizeof way.ray.direction);
     double transmittance = 1;
@@ -105,7 +105,7 @@ static nebel_result add_arriving(path *p, const double origin[3], const double d
 /* Sunlight that reaches a place, `share` of which goes on along the path. */
 static nebel_result add_sunlight(path *p, const double origin[3], double share)
 {
-    const nb_path_world *world = p->world;
+    const nb_path_scene *world = p->world;
     if (!world->has_sun) return NEBEL_OK;
     const double left = nb_media_sun_left(&world->media, origin, world->to_sun, world->disc);
     return add_arriving(p, origin, world->to_sun, HUGE_VAL, HUGE_VAL, world->sun, left * share);
@@ -115,18 +115,18 @@ static nebel_result add_sunlight(path *p, const double origin[3], double share)
 
 /* A ray along which fog may be lit by lamps. */
 typedef struct lit_ray {
-    nb_track track; /* as far as there may be fog */
-    double sum;     /* what all lamps weigh along it; 0: none lights it */
+    nb_tracker track; /* as far as there may be fog */
+    double sum;       /* what all lamps weigh along it; 0: none lights it */
 } lit_ray;
 
 /* A lamp that was chosen for a place, as often as its probability says. */
 typedef struct chosen_lamp {
     const nebel_light *lamp; /* NULL: none shines there */
-    nb_lamp_sight sight;
+    nb_sampled_light sight;
     double probability;
 } chosen_lamp;
 
-static lit_ray light_ray(const nb_path_world *world, const nb_track *track)
+static lit_ray light_ray(const nb_path_scene *world, const nb_tracker *track)
 {
     lit_ray lit = {.track = *track, .sum = 0};
     if (nb_media_are_empty(&world->media) || world->scene->light_count == 0) return lit;
@@ -150,7 +150,7 @@ static nebel_result add_scattered(path *p, const double place[3], const nb_scatt
 {
     const chosen_lamp chosen = choose_lamp(p, place);
     if (chosen.lamp == NULL) return NEBEL_OK;
-    const nb_lamp_sight *sight = &chosen.sight;
+    const nb_sampled_light *sight = &chosen.sight;
     const double cosine = fmin(fmax(nb_vector_dot(p->ray.direction, sight->direction), -1), 1);
     const double value = nb_scatterer_value(scatterer, cosine) * sight->fluence / chosen.probability;
     double light[3];
@@ -162,7 +162,7 @@ static nebel_result add_scattered(path *p, const double place[3], const nb_scatt
 static nebel_result choose_scatterer(path *p, const nebel_sample_point *place, const nb_matter *matter,
                                      nb_scatterer *scatterer)
 {
-    const nb_path_world *world = p->world;
+    const nb_path_scene *world = p->world;
     const int channel = world->is_grey ? -1 : p->channel;
     return nb_media_choose(&world->media, place, matter, channel, nb_chance_next(&p->chance), scatterer);
 }
@@ -177,7 +177,7 @@ static double density_of(const path *p, const lit_ray *lit, double extinction, d
 }
 
 /* Where a flight collides, once the throughput is that of what is scattered there. */
-static nebel_result add_colliding_light(path *p, const lit_ray *lit, const nb_flight *flight,
+static nebel_result add_colliding_light(path *p, const lit_ray *lit, const nb_free_flight *flight,
                                         const nb_scatterer *scatterer)
 {
     if (!(lit->sum > 0)) return NEBEL_OK;
@@ -189,13 +189,13 @@ static nebel_result add_colliding_light(path *p, const lit_ray *lit, const nb_fl
 /* Where a lamp sees the ray pass. */
 static nebel_result add_passing_light(path *p, const lit_ray *lit)
 {
-    const nb_path_world *world = p->world;
+    const nb_path_scene *world = p->world;
     if (!(lit->sum > 0)) return NEBEL_OK;
     const nebel_ray *ray = &lit->track.ray;
     const nebel_light *lamp =
         nb_lamps_choose(world->scene, nb_lamp_weight_along, ray, lit->sum, nb_chance_next(&p->chance));
-    const nb_passing passing = nb_passing_of(lamp, ray);
-    nb_track way = lit->track;
+    const nb_light_pass passing = nb_passing_of(lamp, ray);
+    nb_tracker way = lit->track;
     way.ray.t_max = nb_passing_draw(&passing, nb_chance_next(&p->chance));
     nebel_sample_point place;
     nb_matter matter;
@@ -212,13 +212,13 @@ static nebel_result add_passing_light(path *p, const lit_ray *lit)
 }
 
 /* At a surface. */
-static nebel_result add_reflected(path *p, const nb_meeting *at)
+static nebel_result add_reflected(path *p, const nb_path_vertex *at)
 {
     const double normal[3] = {(double)at->normal[0], (double)at->normal[1], (double)at->normal[2]};
     const double side[3] = {(double)at->side[0], (double)at->side[1], (double)at->side[2]};
     if (p->world->scene->light_count == 0) return NEBEL_OK;
     const chosen_lamp chosen = choose_lamp(p, p->ray.origin);
-    const nb_lamp_sight *sight = &chosen.sight;
+    const nb_sampled_light *sight = &chosen.sight;
     if (chosen.lamp == NULL || nb_vector_dot(side, sight->direction) <= 0) return NEBEL_OK;
     const double share = nb_vector_dot(normal, sight->direction) * sight->beam / (PI * chosen.probability);
     return add_arriving(p, p->ray.origin, sight->direction, sight->reach, sight->shadowed, chosen.lamp->intensity,
@@ -304,9 +304,9 @@ static void turn(path *p, const nb_scatterer *scatterer, const double place[3])
 }
 
 /* Scatters at a collision. The throughput is 0 where the light is absorbed. */
-static nebel_result scatter(path *p, const lit_ray *lit, const nb_flight *flight)
+static nebel_result scatter(path *p, const lit_ray *lit, const nb_free_flight *flight)
 {
-    const nb_path_world *world = p->world;
+    const nb_path_scene *world = p->world;
     nb_scatterer scatterer;
     nebel_result result = choose_scatterer(p, &flight->place, &flight->matter, &scatterer);
     if (result != NEBEL_OK) return result;
@@ -322,7 +322,7 @@ static nebel_result scatter(path *p, const lit_ray *lit, const nb_flight *flight
     return result;
 }
 
-static nebel_result reflect(path *p, const nb_meeting *at)
+static nebel_result reflect(path *p, const nb_path_vertex *at)
 {
     const double *origin = p->world->geometry->origin;
     for (int c = 0; c < 3; c++) {
@@ -349,13 +349,13 @@ static int survives(path *p)
 }
 
 /* The first ray of a path of light from behind the media, which has no flight. */
-static nebel_result pass(path *p, const nb_track *track, nb_flight *flight)
+static nebel_result pass(path *p, const nb_tracker *track, nb_free_flight *flight)
 {
     memset(flight, 0, sizeof *flight);
     return nb_track_transmittance(track, &p->chance, &flight->weight);
 }
 
-static nebel_result fly(path *p, const nb_track *track, const lit_ray *lit, nb_flight *flight)
+static nebel_result fly(path *p, const nb_tracker *track, const lit_ray *lit, nb_free_flight *flight)
 {
     nebel_result result = add_passing_light(p, lit);
     if (result == NEBEL_OK) result = nb_track_fly(track, &p->chance, flight);
@@ -364,11 +364,11 @@ static nebel_result fly(path *p, const nb_track *track, const lit_ray *lit, nb_f
 }
 
 /* One ray of the path, to its next bounce. *ended: nothing more comes. */
-static nebel_result go_on(path *p, const nb_meeting *at, nb_flight *flight, int *ended)
+static nebel_result go_on(path *p, const nb_path_vertex *at, nb_free_flight *flight, int *ended)
 {
-    const nb_path_world *world = p->world;
+    const nb_path_scene *world = p->world;
     const path_share share = p->is_first ? p->share : ALL;
-    const nb_track track = {&world->media, p->ray, !p->is_first, p->channel, share == SCATTERED};
+    const nb_tracker track = {&world->media, p->ray, !p->is_first, p->channel, share == SCATTERED};
     const lit_ray lit = light_ray(world, &track);
     nebel_result result = share == PASSED ? pass(p, &track, flight) : fly(p, &track, &lit, flight);
     if (result != NEBEL_OK) return result;
@@ -388,12 +388,12 @@ static nebel_result go_on(path *p, const nb_meeting *at, nb_flight *flight, int 
 }
 
 /* Follows a path until it ends; others may wait then. */
-static nebel_result follow(path *p, const nb_meeting *first)
+static nebel_result follow(path *p, const nb_path_vertex *first)
 {
-    const nb_path_world *world = p->world;
-    nb_meeting at = *first;
+    const nb_path_scene *world = p->world;
+    nb_path_vertex at = *first;
     for (;;) {
-        nb_flight flight;
+        nb_free_flight flight;
         int ended;
         p->bounces++;
         const nebel_result result = go_on(p, &at, &flight, &ended);
@@ -416,7 +416,7 @@ static nebel_result follow_all(path *p)
         p->bounces = next->bounces;
         memcpy(p->throughput, next->throughput, sizeof p->throughput);
         if (p->bounces == p->world->bounces || !survives(p)) continue;
-        const nb_meeting at = nb_meeting_find(p->world, &p->ray, p->lone);
+        const nb_path_vertex at = nb_meeting_find(p->world, &p->ray, p->lone);
         result = follow(p, &at);
     }
     return result;
@@ -435,16 +435,16 @@ static void gather(const path *p, int is_grey, nb_path_light *light)
     }
 }
 
-nebel_result nb_path_trace(const nb_path_world *world, const nb_path_eye *eye, const uint32_t number[4],
-                           nb_lone_ray *lone, nb_path_light *light)
+nebel_result nb_path_trace(const nb_path_scene *world, const nb_path_eye *eye, const uint32_t number[4],
+                           nb_single_ray *lone, nb_path_light *light)
 {
     static const path_share whole[] = {ALL}, parts[] = {SCATTERED, PASSED};
     const int has_air = world->media.planet_count > 0;
     const path_share *shares = has_air ? parts : whole;
-    const nb_chance stream = nb_chance_of(number[0], number[1], number[2], number[3]);
+    const nb_rng stream = nb_chance_of(number[0], number[1], number[2], number[3]);
     memset(light, 0, sizeof *light);
     for (int c = 0; c < (world->is_grey ? 1 : 3); c++) {
-        nb_chance chance = stream;
+        nb_rng chance = stream;
         chance.state += (uint64_t)c << 62;
         for (int i = 0; i < (has_air ? 2 : 1); i++) {
             path p = {.world = world, .eye = eye, .share = shares[i], .lone = lone, .chance = chance};

@@ -13,7 +13,7 @@ static uint32_t least(uint32_t a, uint32_t b)
     return a < b ? a : b;
 }
 
-static nb_area area_of(const nb_frame *frame, const nb_place *place)
+static nb_area area_of(const nb_frame *frame, const nb_batch_place *place)
 {
     const nebel_window *window = &frame->window;
     const uint32_t left = place->left - window->left, top = place->top + nb_lane_y(place->first) - window->top;
@@ -98,7 +98,7 @@ static void add_depths(const nb_frame *frame, const nb_area *area, int is_first,
     }
 }
 
-void nb_planes_add(const nb_frame *frame, const nb_place *place, int is_first, nb_scratch *scratch)
+void nb_planes_add(const nb_frame *frame, const nb_batch_place *place, int is_first, nb_scratch *scratch)
 {
     const nebel_frame *planes = frame->planes;
     const nb_light_samples *samples = &scratch->samples;
@@ -134,7 +134,7 @@ static void divide_depths(const nb_frame *frame, const nb_area *area, const uint
     }
 }
 
-void nb_planes_finish(const nb_frame *frame, const nb_place *place, const nb_scratch *scratch)
+void nb_planes_finish(const nb_frame *frame, const nb_batch_place *place, const nb_scratch *scratch)
 {
     const nebel_frame *planes = frame->planes;
     const nb_area area = area_of(frame, place);

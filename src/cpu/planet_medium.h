@@ -33,7 +33,7 @@ typedef struct nb_shells {
 } nb_shells;
 
 typedef struct nb_planet_medium {
-    nb_world world;
+    nb_planet world;
     double time; /* of clouds */
     nebel_cloud_layer layers[NEBEL_MAX_CLOUD_LAYERS];
     uint32_t layer_count;

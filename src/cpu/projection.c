@@ -37,9 +37,9 @@ void nb_projection_set(nb_projection *projection, const nb_view *view)
 enum { PIECE = 256, EVERYWHERE = INT16_MAX };
 
 /* The ends of some vertices. */
-typedef struct nb_ends {
+typedef struct nb_screen_ends {
     int x0[PIECE], y0[PIECE], x1[PIECE], y1[PIECE];
-} nb_ends;
+} nb_screen_ends;
 
 static inline double limit(double x, double low, double high)
 {
@@ -61,8 +61,8 @@ static inline int last_pixel(double x, double last)
 }
 
 /* EVERYWHERE behind the camera's plane: a triangle that crosses it may lie anywhere. */
-NB_CLONES static void project_vertices(const nb_projection *projection, const nb_picture *picture,
-                                       const float *restrict positions, size_t count, nb_ends *restrict ends)
+NB_CLONES static void project_vertices(const nb_projection *projection, const nb_raster_target *picture,
+                                       const float *restrict positions, size_t count, nb_screen_ends *restrict ends)
 {
     const double(*rows)[3] = projection->rows, *shift = projection->shift;
     const double ax = rows[0][0], ay = rows[0][1], az = rows[0][2], bx = rows[1][0], by = rows[1][1], bz = rows[1][2];
@@ -84,7 +84,7 @@ NB_CLONES static void project_vertices(const nb_projection *projection, const nb
     }
 }
 
-NB_CLONES static void pack_ends(const nb_ends *restrict ends, size_t count, int16_t *restrict packed)
+NB_CLONES static void pack_ends(const nb_screen_ends *restrict ends, size_t count, int16_t *restrict packed)
 {
     NB_SIMD
     for (size_t v = 0; v < count; v++) {
@@ -95,13 +95,14 @@ NB_CLONES static void pack_ends(const nb_ends *restrict ends, size_t count, int1
     }
 }
 
-static void project_surface(const nb_projection *projection, const nb_picture *picture, const nb_surface *surface)
+static void project_surface(const nb_projection *projection, const nb_raster_target *picture,
+                            const nb_batch_surface *surface)
 {
     const size_t count = surface->mesh->vertex_count;
 #pragma omp for schedule(static) nowait
     for (size_t first = 0; first < count; first += PIECE) {
         const size_t number = count - first < PIECE ? count - first : PIECE;
-        nb_ends ends;
+        nb_screen_ends ends;
         project_vertices(projection, picture, surface->positions + 3 * first, number, &ends);
         pack_ends(&ends, number, surface->ends + 4 * first);
     }
@@ -138,7 +139,7 @@ static inline void set_ends(const int16_t *restrict a, const int16_t *restrict b
     memcpy(ends, &chosen, sizeof chosen);
 }
 
-static void set_leaf(const nb_surface *surface, uint32_t first, nb_node *leaf)
+static void set_leaf(const nb_batch_surface *surface, uint32_t first, nb_node *leaf)
 {
     const uint32_t left = surface->mesh->triangle_count - first, count = left < NB_FAN ? left : NB_FAN;
     const uint32_t *index = surface->mesh->indices + 3 * (size_t)first;
@@ -171,7 +172,8 @@ static void set_level(nb_geometry *geometry, int level)
     }
 }
 
-void nb_project_geometry(const nb_projection *projection, const nb_picture *picture, nb_geometry *geometry, int threads)
+void nb_project_geometry(const nb_projection *projection, const nb_raster_target *picture, nb_geometry *geometry,
+                         int threads)
 {
 #pragma omp parallel num_threads(threads)
     {
@@ -181,7 +183,7 @@ void nb_project_geometry(const nb_projection *projection, const nb_picture *pict
 #pragma omp barrier
 #pragma omp for schedule(static)
         for (size_t i = 0; i < geometry->node_counts[0]; i++) {
-            const nb_surface *surface = &geometry->surfaces[geometry->owners[i]];
+            const nb_batch_surface *surface = &geometry->surfaces[geometry->owners[i]];
             set_leaf(surface, (uint32_t)(i * NB_FAN) - surface->first_id, &geometry->levels[0][i]);
         }
         for (int level = 1; level < geometry->level_count; level++) set_level(geometry, level);

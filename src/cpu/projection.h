@@ -15,16 +15,16 @@ typedef struct nb_projection {
 } nb_projection;
 
 /* The pixels of a picture and the samples they take. */
-typedef struct nb_picture {
+typedef struct nb_raster_target {
     uint32_t width, height;
     nb_sample_range range;
-} nb_picture;
+} nb_raster_target;
 
 void nb_projection_set(nb_projection *projection, const nb_view *view);
 
 /* Writes the ends of all vertices and the tree of rectangles. A rectangle holds all pixels of whose points its
  * triangle may hold one, and maybe some more. */
-void nb_project_geometry(const nb_projection *projection, const nb_picture *picture, nb_geometry *geometry,
+void nb_project_geometry(const nb_projection *projection, const nb_raster_target *picture, nb_geometry *geometry,
                          int threads);
 
 #endif

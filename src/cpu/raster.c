@@ -13,7 +13,7 @@ int nb_raster_is_apt(const nb_geometry *geometry, nebel_projection projection, u
     return geometry->node_counts[0] * NB_FAN <= (size_t)width * height;
 }
 
-void nb_raster_set(nb_raster *raster, nb_geometry *geometry, const nb_view *view, const nb_picture *picture,
+void nb_raster_set(nb_raster *raster, nb_geometry *geometry, const nb_view *view, const nb_raster_target *picture,
                    int threads)
 {
     raster->geometry = geometry;
@@ -35,7 +35,7 @@ static const nb_owner nobody = {NB_NONE, 0, 0, NULL, NULL};
 static nb_owner find_owner(const nb_geometry *geometry, uint32_t id)
 {
     const uint32_t number = nb_owner_of(geometry, id);
-    const nb_surface *surface = &geometry->surfaces[number];
+    const nb_batch_surface *surface = &geometry->surfaces[number];
     const nebel_mesh *mesh = surface->mesh;
     return (nb_owner){number, surface->first_id, mesh->triangle_count, mesh->indices, surface->positions};
 }
@@ -195,7 +195,8 @@ static inline void fill_block(nb_functions f, const float *restrict xs, const fl
     }
 }
 
-NB_CLONES static void fill(const nb_pending *pending, int orthographic, const float *xs, const float *ys, nb_seen *seen)
+NB_CLONES static void fill(const nb_pending *pending, int orthographic, const float *xs, const float *ys,
+                           nb_region_hits *seen)
 {
     for (uint32_t k = 0; k < pending->count; k++) {
         const nb_functions functions = functions_of(pending, k, orthographic);
@@ -216,19 +217,19 @@ NB_CLONES static void fill(const nb_pending *pending, int orthographic, const fl
 enum { LEAVES = 64 };
 
 /* A region on its way through the tree of rectangles. */
-typedef struct nb_walk {
+typedef struct nb_raster_walk {
     const nb_raster *raster;
     int left, top;
     uint32_t count; /* of samples */
     const nb_region_points *points;
-    nb_seen *seen;
+    nb_region_hits *seen;
     int16_t least_ends[4 * NB_FAN]; /* of rectangles that meet the region, NB_FAN times */
     nb_owner owner;                 /* of the last leaf */
     uint32_t leaf_count, leaves[LEAVES];
     nb_pending pending;
-} nb_walk;
+} nb_raster_walk;
 
-static void flush(nb_walk *walk)
+static void flush(nb_raster_walk *walk)
 {
     const nb_projection *projection = &walk->raster->projection;
     prefetch_positions(walk->raster->geometry, &walk->pending);
@@ -250,7 +251,7 @@ static inline int last_block(int pixel)
     return (pixel < NB_REGION ? pixel : NB_REGION - 1) / NB_BLOCK;
 }
 
-static void add_triangle(nb_walk *walk, const int16_t *ends, uint32_t id)
+static void add_triangle(nb_raster_walk *walk, const int16_t *ends, uint32_t id)
 {
     nb_pending *pending = &walk->pending;
     const uint32_t place = pending->count++;
@@ -262,7 +263,7 @@ static void add_triangle(nb_walk *walk, const int16_t *ends, uint32_t id)
 }
 
 /* The children of a node that the region meets, in ascending order. */
-static uint32_t find_children(const nb_walk *walk, const nb_node *node, uint32_t *children)
+static uint32_t find_children(const nb_raster_walk *walk, const nb_node *node, uint32_t *children)
 {
     int16_t misses[4 * NB_FAN];
     NB_SIMD
@@ -277,14 +278,14 @@ static uint32_t find_children(const nb_walk *walk, const nb_node *node, uint32_t
     return count;
 }
 
-static void prefetch_indices(nb_walk *walk, uint32_t id)
+static void prefetch_indices(nb_raster_walk *walk, uint32_t id)
 {
     if (!owns(&walk->owner, id)) walk->owner = find_owner(walk->raster->geometry, id);
     const uintptr_t address = (uintptr_t)indices_of(&walk->owner, id);
     for (uintptr_t i = 0; i < 3 * NB_FAN * sizeof(uint32_t); i += 64) __builtin_prefetch((const void *)(address + i));
 }
 
-static void visit_leaf(nb_walk *walk, uint32_t number)
+static void visit_leaf(nb_raster_walk *walk, uint32_t number)
 {
     const nb_node *leaf = &walk->raster->geometry->levels[0][number];
     uint32_t children[NB_FAN];
@@ -297,13 +298,13 @@ static void visit_leaf(nb_walk *walk, uint32_t number)
     if (walk->pending.count > PENDING - NB_FAN) flush(walk);
 }
 
-static void visit_leaves(nb_walk *walk)
+static void visit_leaves(nb_raster_walk *walk)
 {
     for (uint32_t i = 0; i < walk->leaf_count; i++) visit_leaf(walk, walk->leaves[i]);
     walk->leaf_count = 0;
 }
 
-static void add_leaf(nb_walk *walk, uint32_t number)
+static void add_leaf(nb_raster_walk *walk, uint32_t number)
 {
     const nb_node *leaf = &walk->raster->geometry->levels[0][number];
     __builtin_prefetch(leaf);
@@ -312,7 +313,7 @@ static void add_leaf(nb_walk *walk, uint32_t number)
     if (walk->leaf_count == LEAVES) visit_leaves(walk);
 }
 
-static void visit(nb_walk *walk, int level, uint32_t number)
+static void visit(nb_raster_walk *walk, int level, uint32_t number)
 {
     if (level == 0) {
         add_leaf(walk, number);
@@ -323,13 +324,13 @@ static void visit(nb_walk *walk, int level, uint32_t number)
     for (uint32_t i = 0; i < count; i++) visit(walk, level - 1, number * NB_FAN + children[i]);
 }
 
-static void set_least_ends(nb_walk *walk)
+static void set_least_ends(nb_raster_walk *walk)
 {
     const int ends[4] = {-walk->left - NB_REGION + 1, -walk->top - NB_REGION + 1, walk->left, walk->top};
     for (int i = 0; i < 4 * NB_FAN; i++) walk->least_ends[i] = (int16_t)ends[i % 4];
 }
 
-static void clear(int orthographic, nb_seen *seen)
+static void clear(int orthographic, nb_region_hits *seen)
 {
     for (int i = 0; i < NB_PIXELS; i++) {
         seen->nearness[i] = orthographic ? -INFINITY : 0;
@@ -338,10 +339,10 @@ static void clear(int orthographic, nb_seen *seen)
 }
 
 void nb_raster_region(const nb_raster *raster, uint32_t left, uint32_t top, uint32_t count,
-                      const nb_region_points *points, nb_seen *seen)
+                      const nb_region_points *points, nb_region_hits *seen)
 {
     const nb_geometry *geometry = raster->geometry;
-    nb_walk walk;
+    nb_raster_walk walk;
     walk.raster = raster;
     walk.left = (int)left;
     walk.top = (int)top;
@@ -360,9 +361,9 @@ void nb_raster_region(const nb_raster *raster, uint32_t left, uint32_t top, uint
 
 /* ---- hits ------------------------------------------------------------------------------------ */
 
-typedef struct nb_corners {
+typedef struct nb_raster_corners {
     float corner[3][3][NB_BATCH];
-} nb_corners;
+} nb_raster_corners;
 
 static inline void gather_lane(const float *p, float (*corner)[NB_BATCH], uint32_t i)
 {
@@ -372,7 +373,7 @@ static inline void gather_lane(const float *p, float (*corner)[NB_BATCH], uint32
 }
 
 /* Lanes that show the background get a triangle that is none. */
-static void gather_corners(const nb_geometry *geometry, const uint32_t *ids, nb_hits *hits, nb_corners *corners)
+static void gather_corners(const nb_geometry *geometry, const uint32_t *ids, nb_hits *hits, nb_raster_corners *corners)
 {
     static const float origin[3] = {0, 0, 0};
     static const uint32_t point[3] = {0, 0, 0};
@@ -392,7 +393,7 @@ static void gather_corners(const nb_geometry *geometry, const uint32_t *ids, nb_
 
 /* Where the rays meet the planes of their triangles (Moeller and Trumbore 1997), and the weights of the corners there.
  */
-NB_CLONES static void intersect(const nb_corners *corners, const nb_rays *rays, nb_hits *hits)
+NB_CLONES static void intersect(const nb_raster_corners *corners, const nb_ray_batch *rays, nb_hits *hits)
 {
     NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
@@ -425,13 +426,13 @@ static int shows_background(const uint32_t *ids)
     return common == NB_NONE;
 }
 
-void nb_raster_hits(const nb_geometry *geometry, const uint32_t *ids, const nb_rays *rays, nb_hits *hits)
+void nb_raster_hits(const nb_geometry *geometry, const uint32_t *ids, const nb_ray_batch *rays, nb_hits *hits)
 {
     if (shows_background(ids)) {
         memset(hits->surface, 0xff, sizeof hits->surface);
         return;
     }
-    nb_corners corners;
+    nb_raster_corners corners;
     gather_corners(geometry, ids, hits, &corners);
     intersect(&corners, rays, hits);
 }

@@ -19,7 +19,7 @@ static nebel_result set_planets(nb_frame *frame, double time)
 {
     const nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
-    nb_world worlds[NEBEL_MAX_PLANETS];
+    nb_planet worlds[NEBEL_MAX_PLANETS];
     const int count = nb_worlds_set(worlds, scene, frame->view.position);
     if (count == 0) return NEBEL_OK;
     frame->planets = nb_allocate(&renderer->allocator, (size_t)count, sizeof *frame->planets);
@@ -40,13 +40,13 @@ nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc)
 {
     const nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
-    nb_path_world *world = &frame->world;
+    nb_path_scene *world = &frame->world;
     if (renderer->method != NEBEL_METHOD_PATH) return NEBEL_OK;
     if (scene->max_opacity > 0 && scene->max_opacity < 1)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
                        "frame: max_opacity is a look that no light has; the reference cannot show it");
     const int has_fog = renderer->fog != NULL && nebel_get_volume_count(renderer->fog) > 0;
-    *world = (nb_path_world){.media.fog = has_fog ? renderer->fog : NULL,
+    *world = (nb_path_scene){.media.fog = has_fog ? renderer->fog : NULL,
                              .scene = scene,
                              .geometry = &renderer->geometry,
                              .table = &renderer->table,
@@ -68,7 +68,7 @@ void nb_reference_free(nb_frame *frame)
 }
 
 /* From where lengths along the ray count: before it was advanced to the geometry. */
-static nebel_ray eye_ray(const nb_frame *frame, const nb_rays *rays, int i)
+static nebel_ray eye_ray(const nb_frame *frame, const nb_ray_batch *rays, int i)
 {
     const int parallel = frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
     nebel_ray ray = {.t_max = HUGE_VAL};
@@ -118,7 +118,7 @@ static void clear_sums(uint32_t first, nb_sums *sums)
     }
 }
 
-nebel_result nb_reference_trace(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
+nebel_result nb_reference_trace(const nb_frame *frame, const nb_batch_place *place, nb_scratch *scratch)
 {
     const nebel_renderer *renderer = frame->renderer;
     if (nb_hits_any(&scratch->hits))
@@ -148,7 +148,7 @@ static double standard_error(double sum, double square, uint32_t n)
     return n > 1 ? sqrt(fmax(square / n - mean * mean, 0) / (n - 1)) : 0;
 }
 
-void nb_reference_finish(const nb_frame *frame, const nb_place *place, const nb_scratch *scratch)
+void nb_reference_finish(const nb_frame *frame, const nb_batch_place *place, const nb_scratch *scratch)
 {
     const nb_sums *sums = &scratch->sums;
     for (uint32_t i = 0; i < NB_BATCH; i++) {

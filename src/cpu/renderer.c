@@ -54,8 +54,8 @@ static nebel_result allocate_scratch(nebel_renderer *renderer)
     const uintptr_t skip = (ALIGNMENT - address % ALIGNMENT) % ALIGNMENT;
     renderer->scratch = (nb_scratch *)((char *)renderer->scratch_memory + skip);
     for (int i = 0; i < renderer->threads; i++) {
-        renderer->scratch[i].shafts = (nb_shafts){.shadows = NULL};
-        renderer->scratch[i].lamp_shafts = (nb_lamp_shafts){.numbers = NULL};
+        renderer->scratch[i].shafts = (nb_sun_shafts){.shadows = NULL};
+        renderer->scratch[i].lamp_shafts = (nb_light_shafts){.numbers = NULL};
         renderer->scratch[i].clouds.workspace = NULL;
         renderer->scratch[i].air.is_kept = 0;
     }

@@ -13,6 +13,6 @@ NB_CLONES static void set_points(float x, float y, nb_region_points *points)
 
 void nb_sample_region(uint32_t index, uint32_t count, nb_region_points *points)
 {
-    const nb_pixel_point point = nb_pixel_sample(index, count);
+    const nb_pixel_position point = nb_pixel_sample(index, count);
     set_points((float)point.x, (float)point.y, points);
 }

@@ -3,14 +3,14 @@
 #include <math.h>
 #include <string.h>
 
-typedef struct nb_key {
+typedef struct nb_bvh_key {
     uint32_t code, number;
-} nb_key;
+} nb_bvh_key;
 
 /* What is needed while a tree is built. */
 typedef struct nb_making {
-    nb_casters casters;
-    nb_key *keys, *other_keys;
+    nb_occluders casters;
+    nb_bvh_key *keys, *other_keys;
     float low[3], scale; /* corner of all triangles; steps of codes per metre */
 } nb_making;
 
@@ -39,7 +39,7 @@ static uint32_t spread(uint32_t x)
     return (x | x << 2) & 0x09249249u;
 }
 
-static uint32_t code_of(const nb_making *making, const nb_caster *t)
+static uint32_t code_of(const nb_making *making, const nb_occluder *t)
 {
     uint32_t code = 0;
     for (int i = 0; i < 3; i++) {
@@ -53,7 +53,7 @@ static uint32_t code_of(const nb_making *making, const nb_caster *t)
 enum { DIGIT = 10, DIGITS = 3 };
 
 /* By one digit of the code, equal ones in the order they had. */
-static void sort_digit(const nb_key *from, size_t count, int shift, nb_key *to)
+static void sort_digit(const nb_bvh_key *from, size_t count, int shift, nb_bvh_key *to)
 {
     size_t places[1 << DIGIT] = {0}, place = 0;
     const uint32_t mask = (1u << DIGIT) - 1;
@@ -69,10 +69,10 @@ static void sort_digit(const nb_key *from, size_t count, int shift, nb_key *to)
 static void sort_triangles(nb_making *making)
 {
     for (size_t i = 0; i < making->casters.count; i++)
-        making->keys[i] = (nb_key){code_of(making, &making->casters.triangles[i]), (uint32_t)i};
+        making->keys[i] = (nb_bvh_key){code_of(making, &making->casters.triangles[i]), (uint32_t)i};
     for (int d = 0; d < DIGITS; d++) {
         sort_digit(making->keys, making->casters.count, d * DIGIT, making->other_keys);
-        nb_key *const sorted = making->other_keys;
+        nb_bvh_key *const sorted = making->other_keys;
         making->other_keys = making->keys;
         making->keys = sorted;
     }
@@ -113,7 +113,7 @@ static void set_leaves(nb_shadow_tree *tree, const nb_making *making, size_t num
     for (size_t k = 0; k < NB_SHADOW_FAN * NB_SHADOW_FAN; k++) {
         const size_t place = number * NB_SHADOW_FAN * NB_SHADOW_FAN + k;
         if (place >= making->casters.count) break;
-        const nb_caster *t = &making->casters.triangles[making->keys[place].number];
+        const nb_occluder *t = &making->casters.triangles[making->keys[place].number];
         tree->casters[place] = *t;
         if (tree->numbers != NULL) tree->numbers[place] = making->casters.numbers[making->keys[place].number];
         for (int c = 0; c < 3; c++) enlarge(node, (int)(k / NB_SHADOW_FAN), t->corner[c], t->corner[c]);
@@ -184,7 +184,7 @@ static int allocate_tree(nb_shadow_tree *tree, const nebel_allocator *allocator,
 static nebel_result build(nb_shadow_tree *tree, const nb_geometry *geometry, nb_making *making, int threads)
 {
     static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    nb_casters *casters = &making->casters;
+    nb_occluders *casters = &making->casters;
     if (nb_casters_list(geometry, axes, 0, casters) != NEBEL_OK) return NEBEL_ERROR_MEMORY;
     making->keys = nb_allocate(&geometry->allocator, casters->count + 1, sizeof *making->keys);
     making->other_keys = nb_allocate(&geometry->allocator, casters->count + 1, sizeof *making->other_keys);

@@ -20,9 +20,9 @@ typedef struct nb_shadow_tree {
     double origin[3]; /* of the geometry, when this was built */
     int is_built;
     size_t count; /* of triangles, leaf after leaf */
-    nb_caster *casters;
-    uint32_t *numbers; /* as in nb_casters */
-    nb_sheet *sheets;
+    nb_occluder *casters;
+    uint32_t *numbers; /* as in nb_occluders */
+    nb_masked_occluder *sheets;
     void *nodes;
     int level_count;
     nb_shadow_node *levels[NB_SHADOW_LEVELS]; /* parts of `nodes`, those above leaves first; the last has one node */
@@ -33,7 +33,7 @@ typedef struct nb_shadow_tree {
 nebel_result nb_shadow_tree_set_lamps(nb_shadow_tree *tree, const nb_geometry *geometry, int threads);
 
 /* NULL: the triangle has no holes. */
-static inline const nb_sheet *nb_shadow_tree_sheet(const nb_shadow_tree *tree, size_t triangle)
+static inline const nb_masked_occluder *nb_shadow_tree_sheet(const nb_shadow_tree *tree, size_t triangle)
 {
     return tree->numbers == NULL || tree->numbers[triangle] == NB_NONE ? NULL : &tree->sheets[tree->numbers[triangle]];
 }

@@ -27,16 +27,16 @@ typedef struct nb_shaft_rays {
 } nb_shaft_rays;
 
 /* What of each ray is within the box and asked for, in m from its start. */
-void nb_shafts_clip(const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance, float *from,
+void nb_shafts_clip(const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance, float *from,
                     float *to);
 
 /* Keeps the last shadow of a lane, as a part of the one that was kept before where it touches that. Returns 0 when
  * memory is out. */
-int nb_shafts_keep(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_shaft_rays *rays);
+int nb_shafts_keep(nb_sun_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_shaft_rays *rays);
 
 /* The boundaries of a packet, of the shadows that were kept and the last one of each ray; `first` is as `offsets` of nebel_ray_visibility.
  * Returns 0 when memory is out. */
-int nb_shafts_finish(nb_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays, const float *length,
+int nb_shafts_finish(nb_sun_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays, const float *length,
                      double advance, uint32_t *first);
 
 /* Whether nothing is asked for of a packet. */
@@ -48,13 +48,13 @@ static inline int nb_is_empty(const float *from, const float *to)
 }
 
 /* What a prism leaves of each ray. */
-typedef struct nb_stretch {
+typedef struct nb_shaft_interval {
     float enter[NB_PACKET], leave[NB_PACKET];
-} nb_stretch;
+} nb_shaft_interval;
 
 /* Shadows that touch the last one, at the place where the first of both ends, make it longer; others take its place.
  * Returns whether in any lane there was one that is to be kept; what takes its place is in `found` still. */
-NB_ALWAYS_INLINE int nb_extend(const nb_stretch *found, nb_shaft_rays *rays, int *restrict fresh)
+NB_ALWAYS_INLINE int nb_extend(const nb_shaft_interval *found, nb_shaft_rays *rays, int *restrict fresh)
 {
     int any = 0;
     NB_SIMD
@@ -72,7 +72,7 @@ NB_ALWAYS_INLINE int nb_extend(const nb_stretch *found, nb_shaft_rays *rays, int
     return any;
 }
 
-static inline int nb_replace(nb_shafts *shafts, const nebel_allocator *allocator, const nb_stretch *found,
+static inline int nb_replace(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shaft_interval *found,
                              const int *fresh, nb_shaft_rays *rays)
 {
     for (uint32_t i = 0; i < NB_PACKET; i++) {
@@ -95,7 +95,7 @@ static inline int nb_replace(nb_shafts *shafts, const nebel_allocator *allocator
     } while (0)
 
 /* One side of a prism. */
-NB_ALWAYS_INLINE void nb_cut(const float *plane, const nb_shaft_rays *rays, nb_stretch *stretch)
+NB_ALWAYS_INLINE void nb_cut(const float *plane, const nb_shaft_rays *rays, nb_shaft_interval *stretch)
 {
     const float a = plane[0], b = plane[1], c = plane[2], d = plane[3];
     NB_SIMD
@@ -110,7 +110,7 @@ NB_ALWAYS_INLINE void nb_cut(const float *plane, const nb_shaft_rays *rays, nb_s
 }
 
 /* One that the third axis runs along. */
-NB_ALWAYS_INLINE void nb_cut_side(const float *plane, const nb_shaft_rays *rays, nb_stretch *stretch)
+NB_ALWAYS_INLINE void nb_cut_side(const float *plane, const nb_shaft_rays *rays, nb_shaft_interval *stretch)
 {
     const float a = plane[0], b = plane[1], d = plane[3];
     NB_SIMD
@@ -124,7 +124,7 @@ NB_ALWAYS_INLINE void nb_cut_side(const float *plane, const nb_shaft_rays *rays,
     }
 }
 
-NB_ALWAYS_INLINE void nb_cross_prism(const nb_prism *prism, const nb_shaft_rays *rays, nb_stretch *found)
+NB_ALWAYS_INLINE void nb_cross_prism(const nb_prism *prism, const nb_shaft_rays *rays, nb_shaft_interval *found)
 {
     for (int i = 0; i < NB_PACKET; i++) {
         found->enter[i] = rays->from[i];

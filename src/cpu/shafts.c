@@ -10,7 +10,7 @@ static const float far_away = 1e18f;
 /* ---- rays ------------------------------------------------------------------------------------ */
 
 /* What of each ray is within the box. */
-NB_CLONES static void clip(const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance,
+NB_CLONES static void clip(const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance,
                            float *restrict from, float *restrict to)
 {
     NB_SIMD
@@ -31,13 +31,13 @@ NB_CLONES static void clip(const nb_lit_box *box, const nb_rays *rays, double ad
     }
 }
 
-void nb_shafts_clip(const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance, float *from,
+void nb_shafts_clip(const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance, float *from,
                     float *to)
 {
     clip(box, rays, advance, distance, from, to);
 }
 
-NB_CLONES static void turn(const nb_sun_cells *cells, const nb_rays *rays, int first, nb_shaft_rays *packet)
+NB_CLONES static void turn(const nb_sun_cells *cells, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
 {
     for (int a = 0; a < 3; a++) {
         const float x = cells->axes[a][0], y = cells->axes[a][1], z = cells->axes[a][2];
@@ -54,7 +54,7 @@ NB_CLONES static void turn(const nb_sun_cells *cells, const nb_rays *rays, int f
 
 /* ---- the eye --------------------------------------------------------------------------------- */
 
-nb_eye nb_shafts_eye(const nb_sun_cells *cells, const nb_geometry *geometry, const nb_view *view)
+nb_eye_visibility nb_shafts_eye(const nb_sun_cells *cells, const nb_geometry *geometry, const nb_view *view)
 {
     struct RTCIntersectContext context;
     float eye[3], turned[3], margin = 0;
@@ -87,7 +87,7 @@ static int touch(float enter, float leave, float other_enter, float other_leave)
     return (enter <= other_leave + gap) & (leave >= other_enter - gap);
 }
 
-int nb_shafts_keep(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_shaft_rays *rays)
+int nb_shafts_keep(nb_sun_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_shaft_rays *rays)
 {
     const float enter = rays->enter[lane], leave = rays->leave[lane];
     if (!(enter <= leave)) return 1;
@@ -148,11 +148,11 @@ NB_ALWAYS_INLINE void meet_children(const nb_cell_node *node, const nb_beam *bea
 
 enum { VISITS = (NB_CELL_LEVELS + NB_LEAF_LEVELS) * NB_CELL_FAN };
 
-typedef struct nb_visit {
+typedef struct nb_shaft_visit {
     float begin, end; /* m along the rays */
     uint32_t child;   /* NB_CELL_FAN times the number of the node that it belongs to, and its place there */
     int is_dark;
-} nb_visit;
+} nb_shaft_visit;
 
 /* Numbers of children, the farthest along the beam first: what is found next mostly touches what was found last. How far
  * is not below 0, so that it is in the order of its bits; the last four of them make room for the number. */
@@ -172,7 +172,8 @@ NB_ALWAYS_INLINE int sort_children(const nb_met *met, uint32_t *order)
 }
 
 /* Returns how many. */
-NB_ALWAYS_INLINE int list_children(const nb_cell_node *nodes, uint32_t number, const nb_beam *beam, nb_visit *visits)
+NB_ALWAYS_INLINE int list_children(const nb_cell_node *nodes, uint32_t number, const nb_beam *beam,
+                                   nb_shaft_visit *visits)
 {
     nb_met met;
     uint32_t order[NB_CELL_FAN];
@@ -180,14 +181,14 @@ NB_ALWAYS_INLINE int list_children(const nb_cell_node *nodes, uint32_t number, c
     const int count = sort_children(&met, order);
     for (int i = 0; i < count; i++) {
         const uint32_t k = order[i] % NB_CELL_FAN;
-        visits[i] = (nb_visit){beam->from + met.begin[k], beam->from + met.end[k], NB_CELL_FAN * number + k,
-                               (int)(met.children >> 16 >> k & 1)};
+        visits[i] = (nb_shaft_visit){beam->from + met.begin[k], beam->from + met.end[k], NB_CELL_FAN * number + k,
+                                     (int)(met.children >> 16 >> k & 1)};
     }
     return count;
 }
 
 /* Whether any ray is asked for between these places, and not known to be in shadow there. */
-NB_ALWAYS_INLINE int is_open(const nb_visit *visit, const nb_shaft_rays *rays)
+NB_ALWAYS_INLINE int is_open(const nb_shaft_visit *visit, const nb_shaft_rays *rays)
 {
     const float begin = visit->begin, end = visit->end;
     int any = 0;
@@ -201,7 +202,8 @@ NB_ALWAYS_INLINE int is_open(const nb_visit *visit, const nb_shaft_rays *rays)
 }
 
 /* What a cell leaves of each ray. */
-NB_ALWAYS_INLINE void cross_cell(const nb_cell_node *node, uint32_t child, const nb_shaft_rays *rays, nb_stretch *found)
+NB_ALWAYS_INLINE void cross_cell(const nb_cell_node *node, uint32_t child, const nb_shaft_rays *rays,
+                                 nb_shaft_interval *found)
 {
     const float low_x = node->low[0][child], high_x = node->high[0][child];
     const float low_y = node->low[1][child], high_y = node->high[1][child];
@@ -221,7 +223,7 @@ NB_ALWAYS_INLINE void cross_cell(const nb_cell_node *node, uint32_t child, const
     }
 }
 
-NB_ALWAYS_INLINE void cross_prism(const nb_prism *prism, const nb_shaft_rays *rays, nb_stretch *found)
+NB_ALWAYS_INLINE void cross_prism(const nb_prism *prism, const nb_shaft_rays *rays, nb_shaft_interval *found)
 {
     for (int i = 0; i < NB_PACKET; i++) {
         found->enter[i] = rays->from[i];
@@ -244,18 +246,18 @@ NB_ALWAYS_INLINE int is_recent(const nb_recent *recent, uint32_t child)
 }
 
 /* Returns 0 when memory is out. */
-NB_CLONES static int walk(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
+NB_CLONES static int walk(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
                           const nb_beam *beam, nb_shaft_rays *rays)
 {
-    nb_visit visits[VISITS];
+    nb_shaft_visit visits[VISITS];
     nb_recent recent;
     memset(&recent, 0, sizeof recent); /* of no prism: that of a node */
     int count = list_children(cells->nodes, 0, beam, visits);
     while (count > 0) {
-        const nb_visit visit = visits[--count];
+        const nb_shaft_visit visit = visits[--count];
         const nb_cell_node *node = &cells->nodes[visit.child / NB_CELL_FAN];
         const uint32_t place = visit.child % NB_CELL_FAN, child = node->child[place];
-        nb_stretch found;
+        nb_shaft_interval found;
         int fresh[NB_PACKET];
         if (is_recent(&recent, child) || !is_open(&visit, rays)) continue;
         if (visit.is_dark) {
@@ -263,7 +265,7 @@ NB_CLONES static int walk(nb_shafts *shafts, const nebel_allocator *allocator, c
         } else if ((child & NB_IS_PRISM) != 0) {
             const uint32_t prism = child & ~NB_IS_PRISM;
             recent.children[child % RECENT] = child;
-            const nb_sheet *sheet = nb_sun_cells_sheet(cells, prism);
+            const nb_masked_occluder *sheet = nb_sun_cells_sheet(cells, prism);
             cross_prism(&cells->prisms[prism], rays, &found);
             if (sheet != NULL && !nb_sheet_cast(sheet, NULL, shafts, allocator, &found, rays)) return 0;
             if (sheet != NULL) continue;
@@ -301,7 +303,7 @@ static void sort_shadows(nb_shadow *shadows, size_t count)
 }
 
 /* Writes the shadows in `sorted`, lane after lane; ends[i] is where those of lane i end. */
-static void sort_by_lane(nb_shafts *shafts, size_t ends[NB_PACKET])
+static void sort_by_lane(nb_sun_shafts *shafts, size_t ends[NB_PACKET])
 {
     size_t places[NB_PACKET + 1] = {0};
     for (size_t i = 0; i < shafts->shadow_count; i++) places[shafts->shadows[i].lane + 1]++;
@@ -313,13 +315,13 @@ static void sort_by_lane(nb_shafts *shafts, size_t ends[NB_PACKET])
 }
 
 /* From where fog begins to count, in which a shadow that begins with it begins at 0. */
-static void toggle(nb_shafts *shafts, float t)
+static void toggle(nb_sun_shafts *shafts, float t)
 {
     shafts->toggles[shafts->toggle_count++] = nb_most(t, 0);
 }
 
 /* The shadows of one lane, sorted, as toggles. */
-static void join(nb_shafts *shafts, const nb_shadow *shadows, size_t count, float skipped)
+static void join(nb_sun_shafts *shafts, const nb_shadow *shadows, size_t count, float skipped)
 {
     float enter = shadows[0].enter, leave = shadows[0].leave;
     for (size_t i = 1; i < count; i++) {
@@ -335,7 +337,7 @@ static void join(nb_shafts *shafts, const nb_shadow *shadows, size_t count, floa
     toggle(shafts, leave + skipped);
 }
 
-static int reserve_toggles(nb_shafts *shafts, const nebel_allocator *allocator, size_t more)
+static int reserve_toggles(nb_sun_shafts *shafts, const nebel_allocator *allocator, size_t more)
 {
     void *toggles = shafts->toggles;
     const int grown = nb_grow(allocator, &toggles, sizeof *shafts->toggles, shafts->toggle_count,
@@ -344,7 +346,7 @@ static int reserve_toggles(nb_shafts *shafts, const nebel_allocator *allocator, 
     return grown;
 }
 
-static int make_room(nb_shafts *shafts, const nebel_allocator *allocator)
+static int make_room(nb_sun_shafts *shafts, const nebel_allocator *allocator)
 {
     void *sorted = shafts->sorted;
     const int grown =
@@ -353,7 +355,7 @@ static int make_room(nb_shafts *shafts, const nebel_allocator *allocator)
     return grown && reserve_toggles(shafts, allocator, 2 * shafts->shadow_count);
 }
 
-int nb_shafts_finish(nb_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays, const float *length,
+int nb_shafts_finish(nb_sun_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays, const float *length,
                      double advance, uint32_t *first)
 {
     for (uint32_t i = 0; i < NB_PACKET; i++)
@@ -371,7 +373,7 @@ int nb_shafts_finish(nb_shafts *shafts, const nebel_allocator *allocator, nb_sha
 }
 
 /* By the prisms behind triangles. Returns 0 when memory is out. */
-static int find_by_prisms(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
+static int find_by_prisms(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
                           const float *length, double advance, uint32_t *first, nb_shaft_rays *packet)
 {
     for (int i = 0; i < NB_PACKET; i++) {
@@ -387,8 +389,8 @@ static int find_by_prisms(nb_shafts *shafts, const nebel_allocator *allocator, c
 }
 
 /* What of the passages of a ray is asked for, as toggles. There is room for them. */
-static void toggle_passages(nb_shafts *shafts, const nb_passages *passages, int ray, int is_dark, float from, float to,
-                            float skipped)
+static void toggle_passages(nb_sun_shafts *shafts, const nb_boundary_crossings *passages, int ray, int is_dark,
+                            float from, float to, float skipped)
 {
     int k = 0;
     for (; k < passages->count && passages->rows[k][ray] <= from; k++) is_dark = nb_enters(passages->rows[k][ray]);
@@ -401,8 +403,8 @@ static void toggle_passages(nb_shafts *shafts, const nb_passages *passages, int 
 }
 
 /* By walls, from the eye on. Returns 0 where that is not possible. */
-static int find_passages_from_eye(const nb_walls *walls, const nb_shaft_rays *packet, const float *skipped, int is_dark,
-                                  nb_passages *passages)
+static int find_passages_from_eye(const nb_shadow_boundaries *walls, const nb_shaft_rays *packet, const float *skipped,
+                                  int is_dark, nb_boundary_crossings *passages)
 {
     nb_shaft_rays rays = *packet;
     nb_beam beam;
@@ -411,10 +413,11 @@ static int find_passages_from_eye(const nb_walls *walls, const nb_shaft_rays *pa
     return nb_passages_find(walls, &beam, &rays, is_dark, passages);
 }
 
-static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
-                       const nb_rays *rays, double advance, nb_eye eye, int first, nb_shaft_rays *packet)
+static int find_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
+                       const nb_ray_batch *rays, double advance, nb_eye_visibility eye, int first,
+                       nb_shaft_rays *packet)
 {
-    nb_passages passages;
+    nb_boundary_crossings passages;
     float skipped[NB_PACKET];
     turn(cells, rays, first, packet);
     for (int i = 0; i < NB_PACKET; i++) skipped[i] = (float)(advance * (double)rays->length[first + i]);
@@ -433,9 +436,9 @@ static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, cons
     return 1;
 }
 
-nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
-                            const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance,
-                            nb_eye eye)
+nebel_result nb_shafts_find(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
+                            const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance,
+                            nb_eye_visibility eye)
 {
     float from[NB_BATCH], to[NB_BATCH];
     clip(box, rays, advance, distance, from, to);
@@ -454,7 +457,7 @@ nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator,
     return NEBEL_OK;
 }
 
-void nb_shafts_free(nb_shafts *shafts, const nebel_allocator *allocator)
+void nb_shafts_free(nb_sun_shafts *shafts, const nebel_allocator *allocator)
 {
     nb_release(allocator, shafts->shadows);
     nb_release(allocator, shafts->sorted);

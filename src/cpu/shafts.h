@@ -11,11 +11,11 @@ typedef struct nb_lit_box {
 } nb_lit_box;
 
 /* Where rays begin. */
-typedef enum nb_eye {
+typedef enum nb_eye_visibility {
     NB_EYE_UNKNOWN = 0, /* or each at another place */
     NB_EYE_IN_LIGHT,
     NB_EYE_IN_SHADOW
-} nb_eye;
+} nb_eye_visibility;
 
 /* A stretch of a packet's ray in shadow. */
 typedef struct nb_shadow {
@@ -24,7 +24,7 @@ typedef struct nb_shadow {
 } nb_shadow;
 
 /* What a thread works in; all zero at first. */
-typedef struct nb_shafts {
+typedef struct nb_sun_shafts {
     nb_shadow *shadows; /* of a packet, as they were found */
     size_t shadow_count, shadow_capacity;
     nb_shadow *sorted; /* the same by lane, as many as there is room for the others */
@@ -33,19 +33,19 @@ typedef struct nb_shafts {
     size_t toggle_count, toggle_capacity;
     uint32_t first[NB_BATCH + 1]; /* see nebel_ray_visibility */
     size_t by_walls, by_prisms;   /* packets, up to now */
-} nb_shafts;
+} nb_sun_shafts;
 
 /* Whether the eye of the view is in shadow, in the sun that cells are made for. UNKNOWN, too, where it is so near the
  * border of a shadow that rounding would say. */
-nb_eye nb_shafts_eye(const nb_sun_cells *cells, const nb_geometry *geometry, const nb_view *view);
+nb_eye_visibility nb_shafts_eye(const nb_sun_cells *cells, const nb_geometry *geometry, const nb_view *view);
 
 /* `distance` is how far fog is asked for along each ray, 0 where it is not, and `advance` as in nb_view. Where the eye is
  * known rays must end before they pass a surface; the ends of shadows are found with far less work then. Errors:
  * MEMORY. */
-nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
-                            const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance,
-                            nb_eye eye);
+nebel_result nb_shafts_find(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
+                            const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance,
+                            nb_eye_visibility eye);
 
-void nb_shafts_free(nb_shafts *shafts, const nebel_allocator *allocator);
+void nb_shafts_free(nb_sun_shafts *shafts, const nebel_allocator *allocator);
 
 #endif

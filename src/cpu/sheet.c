@@ -9,10 +9,10 @@ typedef struct nb_sheet_lines {
 } nb_sheet_lines;
 
 /* Of one end of the stretches, its places in texels. */
-NB_ALWAYS_INLINE void look_up(const nb_sheet *sheet, const nb_sheet_lamp *lamp, const nb_shaft_rays *rays,
+NB_ALWAYS_INLINE void look_up(const nb_masked_occluder *sheet, const nb_sheet_lamp *lamp, const nb_shaft_rays *rays,
                               const float *t, double (*texel)[NB_PACKET], double *farness)
 {
-    const nb_sheet s = *sheet;
+    const nb_masked_occluder s = *sheet;
     const double none[3] = {0, 0, 0}, distance = lamp != NULL ? lamp->distance : 1;
     const double *place = lamp != NULL ? lamp->place : none, *normal = lamp != NULL ? lamp->normal : none;
     const int is_lamp = lamp != NULL;
@@ -29,8 +29,8 @@ NB_ALWAYS_INLINE void look_up(const nb_sheet *sheet, const nb_sheet_lamp *lamp, 
 }
 
 /* Stretches that are in a shadow that is known are not asked for. Returns whether any is. */
-NB_CLONES static int look_up_ends(const nb_sheet *sheet, const nb_sheet_lamp *lamp, const nb_stretch *found,
-                                  const nb_shaft_rays *rays, nb_sheet_lines *lines)
+NB_CLONES static int look_up_ends(const nb_masked_occluder *sheet, const nb_sheet_lamp *lamp,
+                                  const nb_shaft_interval *found, const nb_shaft_rays *rays, nb_sheet_lines *lines)
 {
     int any = 0;
     for (int i = 0; i < NB_PACKET; i++) {
@@ -46,7 +46,7 @@ NB_CLONES static int look_up_ends(const nb_sheet *sheet, const nb_sheet_lamp *la
 }
 
 /* As nb_extend and nb_replace, of one lane. */
-static int add(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, float enter, float leave,
+static int add(nb_sun_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, float enter, float leave,
                nb_shaft_rays *rays)
 {
     const float gap = nb_closeness * fabsf(fminf(leave, rays->leave[lane]));
@@ -70,8 +70,8 @@ static float place_at(double s, float enter, float leave, double near, double fa
     return s >= 1 ? leave : (float)((double)enter + part * ((double)leave - (double)enter));
 }
 
-int nb_sheet_cast(const nb_sheet *sheet, const nb_sheet_lamp *lamp, nb_shafts *shafts, const nebel_allocator *allocator,
-                  const nb_stretch *found, nb_shaft_rays *rays)
+int nb_sheet_cast(const nb_masked_occluder *sheet, const nb_sheet_lamp *lamp, nb_sun_shafts *shafts,
+                  const nebel_allocator *allocator, const nb_shaft_interval *found, nb_shaft_rays *rays)
 {
     nb_sheet_lines lines;
     nb_mask_walk walk;

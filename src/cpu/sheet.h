@@ -13,7 +13,7 @@ typedef struct nb_sheet_lamp {
 
 /* Adds to the shadows of a packet what the sheet's mask leaves of the stretches that are behind its triangle. `lamp`
  * NULL: of the sun, else rays start relative to the lamp. Returns 0 when memory is out. */
-int nb_sheet_cast(const nb_sheet *sheet, const nb_sheet_lamp *lamp, nb_shafts *shafts, const nebel_allocator *allocator,
-                  const nb_stretch *found, nb_shaft_rays *rays);
+int nb_sheet_cast(const nb_masked_occluder *sheet, const nb_sheet_lamp *lamp, nb_sun_shafts *shafts,
+                  const nebel_allocator *allocator, const nb_shaft_interval *found, nb_shaft_rays *rays);
 
 #endif

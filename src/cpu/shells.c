@@ -25,7 +25,7 @@ nebel_result nb_shells_set(nb_frame *frame, const nebel_frame_desc *desc)
     return NEBEL_OK;
 }
 
-static nebel_ray ray_of(const nb_frame *frame, const nb_rays *rays, int lane)
+static nebel_ray ray_of(const nb_frame *frame, const nb_ray_batch *rays, int lane)
 {
     nebel_ray ray = {.t_max = HUGE_VAL};
     for (int c = 0; c < 3; c++) {

@@ -11,25 +11,25 @@ enum { ENOUGH = 48 }; /* triangles of a cell that is not divided */
 typedef struct nb_division {
     nb_sun_cells *cells;
     const nebel_allocator *allocator;
-    nb_casters casters;
-    nb_cell *bounds;    /* of each triangle */
-    uint32_t *prism_of; /* of each triangle; UINT32_MAX: none yet */
-    uint32_t *list;     /* numbers of triangles, those of a cell after those of the cells that it is part of */
+    nb_occluders casters;
+    nb_sun_cell *bounds; /* of each triangle */
+    uint32_t *prism_of;  /* of each triangle; UINT32_MAX: none yet */
+    uint32_t *list;      /* numbers of triangles, those of a cell after those of the cells that it is part of */
     size_t list_count, list_capacity;
-    nb_cell all; /* of the plane */
+    nb_sun_cell all; /* of the plane */
 } nb_division;
 
 /* A cell that is to be a child, and where its triangles are in the list. */
-typedef struct nb_part {
-    nb_cell cell;
+typedef struct nb_sun_cell_part {
+    nb_sun_cell cell;
     size_t first, count;
     float reach[2]; /* sum of what they take of both sides of the cell */
     int is_whole;   /* dividing it helps no more */
-} nb_part;
+} nb_sun_cell_part;
 
 /* ---- prisms ---------------------------------------------------------------------------------- */
 
-static void make_prism(const nb_caster *t, double side, nb_prism *prism)
+static void make_prism(const nb_occluder *t, double side, nb_prism *prism)
 {
     double corner[3][3], way[3][3];
     for (int k = 0; k < 3; k++)
@@ -49,7 +49,7 @@ static void make_prism(const nb_caster *t, double side, nb_prism *prism)
 static int add_prism(nb_division *d, uint32_t triangle)
 {
     nb_sun_cells *cells = d->cells;
-    const nb_caster *t = &d->casters.triangles[triangle];
+    const nb_occluder *t = &d->casters.triangles[triangle];
     const size_t count = cells->prism_count, wanted = count + 1;
     void *prisms = cells->prisms, *numbers = cells->numbers;
     const int grown = nb_grow(d->allocator, &prisms, sizeof *cells->prisms, count, &cells->prism_capacity, wanted) &&
@@ -91,7 +91,7 @@ static int add_node(nb_division *d, uint32_t *number)
     return 1;
 }
 
-static void set_child(nb_division *d, uint32_t number, int k, const nb_cell *cell, nb_depths depths, uint32_t child)
+static void set_child(nb_division *d, uint32_t number, int k, const nb_sun_cell *cell, nb_depths depths, uint32_t child)
 {
     nb_cell_node *node = &d->cells->nodes[number];
     for (int i = 0; i < 2; i++) {
@@ -104,9 +104,9 @@ static void set_child(nb_division *d, uint32_t number, int k, const nb_cell *cel
 }
 
 /* What both have of the plane. */
-static inline nb_cell common(const nb_cell *a, const nb_cell *b)
+static inline nb_sun_cell common(const nb_sun_cell *a, const nb_sun_cell *b)
 {
-    nb_cell both;
+    nb_sun_cell both;
     for (int i = 0; i < 2; i++) {
         both.low[i] = a->low[i] > b->low[i] ? a->low[i] : b->low[i];
         both.high[i] = a->high[i] < b->high[i] ? a->high[i] : b->high[i];
@@ -115,15 +115,15 @@ static inline nb_cell common(const nb_cell *a, const nb_cell *b)
 }
 
 /* A node of triangles, or of nodes of as many as there are for each. */
-static int add_leaf(nb_division *d, const nb_cell *cell, const uint32_t *list, const nb_depths *depths, size_t count,
-                    uint32_t *number)
+static int add_leaf(nb_division *d, const nb_sun_cell *cell, const uint32_t *list, const nb_depths *depths,
+                    size_t count, uint32_t *number)
 {
     size_t each = 1;
     while (each * NB_CELL_FAN < count) each *= NB_CELL_FAN;
     if (!add_node(d, number)) return 0;
     for (size_t first = 0, k = 0; first < count; first += each, k++) {
         const size_t here = count - first < each ? count - first : each;
-        const nb_cell bounds = each == 1 ? common(&d->bounds[list[first]], cell) : *cell;
+        const nb_sun_cell bounds = each == 1 ? common(&d->bounds[list[first]], cell) : *cell;
         nb_depths below = {INFINITY, INFINITY};
         uint32_t child;
         for (size_t i = first; i < first + here; i++) below.nearest = nb_least(below.nearest, depths[i].nearest);
@@ -139,7 +139,7 @@ static int add_leaf(nb_division *d, const nb_cell *cell, const uint32_t *list, c
 
 /* Drops triangles that are behind the cover of the cell: their shadows add nothing to it. `child` has where shadows
  * begin, and from where on all is shadow. */
-static int finish_cell(nb_division *d, const nb_part *part, nb_depths *child, uint32_t *number)
+static int finish_cell(nb_division *d, const nb_sun_cell_part *part, nb_depths *child, uint32_t *number)
 {
     uint32_t *list = d->list + part->first;
     nb_depths *depths = nb_allocate(d->allocator, part->count, sizeof *depths);
@@ -161,7 +161,7 @@ static int finish_cell(nb_division *d, const nb_part *part, nb_depths *child, ui
 }
 
 /* Those of the triangles that touch the cell. */
-static int list_part(nb_division *d, const nb_part *whole, nb_part *part)
+static int list_part(nb_division *d, const nb_sun_cell_part *whole, nb_sun_cell_part *part)
 {
     void *grown = d->list;
     if (!nb_grow(d->allocator, &grown, sizeof *d->list, d->list_count, &d->list_capacity, d->list_count + whole->count))
@@ -172,7 +172,7 @@ static int list_part(nb_division *d, const nb_part *whole, nb_part *part)
     size_t count = 0;
     float reach[2] = {0, 0};
     for (size_t i = 0; i < whole->count; i++) {
-        const nb_cell both = common(&d->bounds[from[i]], &part->cell);
+        const nb_sun_cell both = common(&d->bounds[from[i]], &part->cell);
         const float x = both.high[0] - both.low[0], y = both.high[1] - both.low[1];
         const int touches = (x >= 0) & (y >= 0);
         list[count] = from[i];
@@ -188,9 +188,9 @@ static int list_part(nb_division *d, const nb_part *whole, nb_part *part)
 }
 
 /* Across the side that has more triangles beside each other. Returns 0 when memory is out. */
-static int halve(nb_division *d, nb_part *part, nb_part *other)
+static int halve(nb_division *d, nb_sun_cell_part *part, nb_sun_cell_part *other)
 {
-    const nb_part whole = *part;
+    const nb_sun_cell_part whole = *part;
     const float x = whole.cell.high[0] - whole.cell.low[0], y = whole.cell.high[1] - whole.cell.low[1];
     const int axis = y * whole.reach[0] > x * whole.reach[1];
     const float middle = 0.5f * (whole.cell.low[axis] + whole.cell.high[axis]);
@@ -203,7 +203,7 @@ static int halve(nb_division *d, nb_part *part, nb_part *other)
 }
 
 /* The one with most triangles that is to be divided; -1: none is. */
-static int largest_part(const nb_part *parts, int count)
+static int largest_part(const nb_sun_cell_part *parts, int count)
 {
     int largest = -1;
     for (int k = 0; k < count; k++)
@@ -212,9 +212,9 @@ static int largest_part(const nb_part *parts, int count)
     return largest;
 }
 
-static int divide(nb_division *d, const nb_part *whole, int level, nb_depths *all, uint32_t *number)
+static int divide(nb_division *d, const nb_sun_cell_part *whole, int level, nb_depths *all, uint32_t *number)
 {
-    nb_part parts[NB_CELL_FAN] = {*whole};
+    nb_sun_cell_part parts[NB_CELL_FAN] = {*whole};
     const size_t used = d->list_count;
     int count = 1, k;
     if (!add_node(d, number)) return 0;
@@ -250,9 +250,9 @@ static void set_axes(const double sun[3], double axes[3][3])
     nb_vector_cross(axes[2], axes[0], axes[1]);
 }
 
-static nb_cell bounds_of(const nb_caster *t)
+static nb_sun_cell bounds_of(const nb_occluder *t)
 {
-    nb_cell bounds = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+    nb_sun_cell bounds = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < 2; i++) {
             bounds.low[i] = nb_least(bounds.low[i], t->corner[k][i]);
@@ -262,9 +262,9 @@ static nb_cell bounds_of(const nb_caster *t)
 }
 
 /* All triangles, and the bounds of each. */
-static nb_part list_all(nb_division *d, size_t count)
+static nb_sun_cell_part list_all(nb_division *d, size_t count)
 {
-    nb_part all = {.cell = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}}, .count = count};
+    nb_sun_cell_part all = {.cell = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}}, .count = count};
     for (size_t t = 0; t < count; t++) {
         d->list[t] = (uint32_t)t;
         d->prism_of[t] = UINT32_MAX;
@@ -291,7 +291,7 @@ static nebel_result build(nb_division *d, const nb_geometry *geometry, const dou
     d->list_capacity = count;
     d->cells->sheets = d->casters.sheets;
     d->casters.sheets = NULL;
-    const nb_part all = list_all(d, count);
+    const nb_sun_cell_part all = list_all(d, count);
     nb_depths depths;
     uint32_t number;
     d->all = all.cell;

@@ -42,11 +42,11 @@ typedef struct nb_sun_cells {
     nb_prism *prisms;
     size_t prism_count, prism_capacity;
     uint32_t *numbers; /* of each prism's sheet, or NB_NONE; NULL: no triangle has holes */
-    nb_sheet *sheets;
+    nb_masked_occluder *sheets;
     size_t number_capacity;
     nb_cell_node *nodes; /* the first is above all; none: there are no shadows */
     size_t node_count, node_capacity;
-    nb_walls walls;
+    nb_shadow_boundaries walls;
 } nb_sun_cells;
 
 /* Builds for a sun in this direction, of length 1, or keeps what is built where that is for the same sun and place.
@@ -54,7 +54,7 @@ typedef struct nb_sun_cells {
 nebel_result nb_sun_cells_set(nb_sun_cells *cells, const nb_geometry *geometry, const double sun[3]);
 
 /* NULL: the triangle has no holes. */
-static inline const nb_sheet *nb_sun_cells_sheet(const nb_sun_cells *cells, uint32_t prism)
+static inline const nb_masked_occluder *nb_sun_cells_sheet(const nb_sun_cells *cells, uint32_t prism)
 {
     return cells->numbers == NULL || cells->numbers[prism] == NB_NONE ? NULL : &cells->sheets[cells->numbers[prism]];
 }

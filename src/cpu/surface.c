@@ -57,7 +57,7 @@ static void sample_texture(const nebel_texture *texture, const nb_srgb_table *ta
 
 /* Unit normals of the triangles, turned to the camera, also for shading until smooth ones are known. Scaled by the
  * largest component first: squares of the areas of small and large triangles leave the range of float. */
-NB_CLONES static void set_sides(const nb_rays *rays, const nb_hits *hits, nb_points *points)
+NB_CLONES static void set_sides(const nb_ray_batch *rays, const nb_hits *hits, nb_surface_batch *points)
 {
     NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
@@ -76,20 +76,20 @@ NB_CLONES static void set_sides(const nb_rays *rays, const nb_hits *hits, nb_poi
 }
 
 /* Three numbers of each corner of a triangle. */
-typedef struct nb_corners {
+typedef struct nb_surface_corners {
     const float *at[3];
-} nb_corners;
+} nb_surface_corners;
 
-static nb_corners corners_of(const nebel_mesh *mesh, const float *numbers, uint32_t triangle)
+static nb_surface_corners corners_of(const nebel_mesh *mesh, const float *numbers, uint32_t triangle)
 {
     const uint32_t *index = mesh->indices + 3 * (size_t)triangle;
-    return (nb_corners){
+    return (nb_surface_corners){
         {numbers + 3 * (size_t)index[0], numbers + 3 * (size_t)index[1], numbers + 3 * (size_t)index[2]}};
 }
 
-static void set_smooth_normal(const nebel_mesh *mesh, const nb_hits *hits, int i, nb_points *points)
+static void set_smooth_normal(const nebel_mesh *mesh, const nb_hits *hits, int i, nb_surface_batch *points)
 {
-    const nb_corners normal = corners_of(mesh, mesh->normals, hits->triangle[i]);
+    const nb_surface_corners normal = corners_of(mesh, mesh->normals, hits->triangle[i]);
     const float u = hits->u[i], v = hits->v[i], w = 1 - u - v;
     for (int k = 0; k < 3; k++) {
         points->normal[k][i] = w * normal.at[0][k] + u * normal.at[1][k] + v * normal.at[2][k];
@@ -97,7 +97,7 @@ static void set_smooth_normal(const nebel_mesh *mesh, const nb_hits *hits, int i
 }
 
 static void multiply_texture(const nebel_texture *texture, const nb_srgb_table *table, const nebel_mesh *mesh,
-                             const nb_hits *hits, int i, nb_points *points)
+                             const nb_hits *hits, int i, nb_surface_batch *points)
 {
     const uint32_t *index = mesh->indices + 3 * (size_t)hits->triangle[i];
     const float *a = mesh->uvs + 2 * (size_t)index[0];
@@ -111,11 +111,11 @@ static void multiply_texture(const nebel_texture *texture, const nb_srgb_table *
 
 /* What has to be fetched from the meshes. */
 static void fetch(const nb_geometry *geometry, const nebel_scene_data *scene, const nb_srgb_table *table,
-                  const nb_hits *hits, nb_points *points)
+                  const nb_hits *hits, nb_surface_batch *points)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         if (hits->surface[i] == NB_NONE) continue;
-        const nb_surface *surface = &geometry->surfaces[hits->surface[i]];
+        const nb_batch_surface *surface = &geometry->surfaces[hits->surface[i]];
         const nebel_mesh *mesh = surface->mesh;
         points->edge[i] = surface->longest_edge;
         if (surface->is_coarse) points->edge[i] = fminf(points->edge[i], NB_LONG_EDGE * hits->t[i]);
@@ -129,7 +129,7 @@ static void fetch(const nb_geometry *geometry, const nebel_scene_data *scene, co
 
 /* Unit length, on the side of the camera; the triangle's own where the interpolated normal is none. The interpolated
  * one alone says whether a surface faces the sun: its triangles would leave a hard line along their edges. */
-NB_CLONES static void finish_normals(const float *restrict sun, nb_points *points)
+NB_CLONES static void finish_normals(const float *restrict sun, nb_surface_batch *points)
 {
     const float sun_x = sun[0], sun_y = sun[1], sun_z = sun[2];
     NB_SIMD
@@ -158,8 +158,8 @@ NB_CLONES static void finish_normals(const float *restrict sun, nb_points *point
  * After Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, whose heights are bounded one by one. */
 static float height_of_tangents(const nebel_mesh *mesh, const nb_hits *hits, int i)
 {
-    const nb_corners place = corners_of(mesh, mesh->positions, hits->triangle[i]);
-    const nb_corners normal = corners_of(mesh, mesh->normals, hits->triangle[i]);
+    const nb_surface_corners place = corners_of(mesh, mesh->positions, hits->triangle[i]);
+    const nb_surface_corners normal = corners_of(mesh, mesh->normals, hits->triangle[i]);
     const float u = hits->u[i], v = hits->v[i], weight[3] = {1 - u - v, u, v};
     float height = 0;
     for (int a = 0; a < 3; a++) {
@@ -175,7 +175,7 @@ static float height_of_tangents(const nebel_mesh *mesh, const nb_hits *hits, int
 
 /* Triangles that face away from the sun where their normals do not would shade themselves: shadow rays start on the
  * round surface there. Hollow ones do shade themselves. */
-static void set_rises(const nb_geometry *geometry, const nb_hits *hits, nb_points *points)
+static void set_rises(const nb_geometry *geometry, const nb_hits *hits, nb_surface_batch *points)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         if (!points->away[i] || hits->surface[i] == NB_NONE) continue;
@@ -193,7 +193,7 @@ static void set_rises(const nb_geometry *geometry, const nb_hits *hits, nb_point
  * went into it: the way to it, its coordinates, and the edges of the triangle. 2^-20 of their sum is on the safe side. Edges
  * that are longer yet were left out by nb_hits_refine, and are again where the shadow ray meets their triangle.
  */
-NB_CLONES static void lift(const nb_rays *rays, const nb_hits *hits, nb_points *points)
+NB_CLONES static void lift(const nb_ray_batch *rays, const nb_hits *hits, nb_surface_batch *points)
 {
     NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
@@ -216,7 +216,7 @@ NB_CLONES static void lift(const nb_rays *rays, const nb_hits *hits, nb_points *
 }
 
 void nb_surface_points(const nb_geometry *geometry, const nebel_scene_data *scene, const nb_srgb_table *table,
-                       const nb_rays *rays, const nb_hits *hits, const float sun[3], nb_points *points)
+                       const nb_ray_batch *rays, const nb_hits *hits, const float sun[3], nb_surface_batch *points)
 {
     set_sides(rays, hits, points);
     fetch(geometry, scene, table, hits, points);

@@ -21,10 +21,10 @@
 #define STOPS_OF_AIR 8
 
 /* A piece of a track, with the rate at which chance stops in it. */
-typedef struct piece {
+typedef struct nb_majorant_piece {
     double end, rate; /* m, 1/m */
     double boost;     /* collisions are so many times more often than the extinction says */
-} piece;
+} nb_majorant_piece;
 
 /* How flights through air alone are to collide. */
 typedef struct boosts {
@@ -48,13 +48,13 @@ static double largest(const double rgb[3])
     return fmax(rgb[0], fmax(rgb[1], rgb[2]));
 }
 
-static void start_walk(const nb_track *track, nb_media_part part, nb_media_walk *walk)
+static void start_walk(const nb_tracker *track, nb_media_part part, nb_media_walk *walk)
 {
     nb_media_walk_start(track->media, &track->ray, track->ignore_distances, part, walk);
 }
 
 /* How much air alone is on the way. */
-static nebel_result find_boosts(const nb_track *track, double reach, boosts *air)
+static nebel_result find_boosts(const nb_tracker *track, double reach, boosts *air)
 {
     nb_media_walk walk;
     *air = (boosts){.more = MORE_DEPTH};
@@ -76,7 +76,7 @@ static nebel_result find_boosts(const nb_track *track, double reach, boosts *air
 }
 
 /* Of a piece of air alone. */
-static void set_boost(const boosts *air, double from, piece *p)
+static void set_boost(const boosts *air, double from, nb_majorant_piece *p)
 {
     const double depth = p->rate * (p->end - from);
     if (!(depth > 0)) return;
@@ -84,8 +84,8 @@ static void set_boost(const boosts *air, double from, piece *p)
     p->rate *= STOPS_OF_AIR * p->boost;
 }
 
-static nebel_result next_piece(const nb_track *track, nb_media_walk *walk, double t, double reach, const boosts *air,
-                               piece *p)
+static nebel_result next_piece(const nb_tracker *track, nb_media_walk *walk, double t, double reach, const boosts *air,
+                               nb_majorant_piece *p)
 {
     const nebel_result result = nb_media_walk_to(walk, t);
     if (result != NEBEL_OK) return result;
@@ -100,7 +100,7 @@ static nebel_result next_piece(const nb_track *track, nb_media_walk *walk, doubl
     return NEBEL_OK;
 }
 
-nebel_result nb_track_look(const nb_track *track, double t, nb_media_part part, nebel_sample_point *place,
+nebel_result nb_track_look(const nb_tracker *track, double t, nb_media_part part, nebel_sample_point *place,
                            nb_matter *matter)
 {
     const nebel_ray *ray = &track->ray;
@@ -110,13 +110,13 @@ nebel_result nb_track_look(const nb_track *track, double t, nb_media_part part, 
 }
 
 /* The way to the next stop at this rate. */
-static double draw_way(double rate, nb_chance *chance)
+static double draw_way(double rate, nb_rng *chance)
 {
     return rate > 0 ? -log1p(-nb_chance_next(chance)) / rate : HUGE_VAL;
 }
 
 /* Whether the flight ends at its stop, by chance, with what it weighs from there on. */
-static int collides(const piece *p, double extinction, nb_chance *chance, double *weight)
+static int collides(const nb_majorant_piece *p, double extinction, nb_rng *chance, double *weight)
 {
     const double part = p->boost * extinction / p->rate;
     if (nb_chance_next(chance) * p->rate < p->boost * extinction) {
@@ -127,7 +127,7 @@ static int collides(const piece *p, double extinction, nb_chance *chance, double
     return 0;
 }
 
-nebel_result nb_track_fly(const nb_track *track, nb_chance *chance, nb_flight *flight)
+nebel_result nb_track_fly(const nb_tracker *track, nb_rng *chance, nb_free_flight *flight)
 {
     const double reach = !nb_media_are_empty(track->media) ? nb_track_reach(&track->ray) : 0;
     nb_media_walk walk;
@@ -137,7 +137,7 @@ nebel_result nb_track_fly(const nb_track *track, nb_chance *chance, nb_flight *f
     nebel_result result = find_boosts(track, reach, &air);
     start_walk(track, NB_MEDIA_ALL, &walk);
     for (double t = 0; t < reach && result == NEBEL_OK;) {
-        piece p;
+        nb_majorant_piece p;
         result = next_piece(track, &walk, t, reach, &air, &p);
         while (result == NEBEL_OK && (t += draw_way(p.rate, chance)) < p.end) {
             result = nb_track_look(track, t, NB_MEDIA_ALL, &flight->place, &flight->matter);
@@ -153,14 +153,14 @@ nebel_result nb_track_fly(const nb_track *track, nb_chance *chance, nb_flight *f
 }
 
 /* 0: the weight is gone. */
-static int survives(double *weight, nb_chance *chance)
+static int survives(double *weight, nb_rng *chance)
 {
     if (*weight >= SMALL_WEIGHT) return 1;
     *weight = nb_chance_next(chance) * SMALL_WEIGHT < *weight ? SMALL_WEIGHT : 0;
     return *weight > 0;
 }
 
-nebel_result nb_track_transmittance(const nb_track *track, nb_chance *chance, double *transmittance)
+nebel_result nb_track_transmittance(const nb_tracker *track, nb_rng *chance, double *transmittance)
 {
     const double reach = !nb_media_are_empty(track->media) ? nb_track_reach(&track->ray) : 0;
     const int channel = track->channel;

@@ -83,7 +83,7 @@ NB_CLONES static void plane_points(const nb_view *view, const double *restrict b
     }
 }
 
-static void orthographic_directions(const nb_view *view, nb_rays *rays)
+static void orthographic_directions(const nb_view *view, nb_ray_batch *rays)
 {
     for (int c = 0; c < 3; c++) {
         for (int i = 0; i < NB_BATCH; i++) rays->direction[c][i] = view->axes.forward[c];
@@ -91,7 +91,7 @@ static void orthographic_directions(const nb_view *view, nb_rays *rays)
 }
 
 static void panorama_directions(const nb_view *view, const double base[3], const float *x, const float *y,
-                                nb_rays *rays)
+                                nb_ray_batch *rays)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         const double longitude = base[0] + (double)x[i] * view->step_x[0];
@@ -105,7 +105,7 @@ static void panorama_directions(const nb_view *view, const double base[3], const
     }
 }
 
-NB_CLONES static void set_units(nb_rays *rays)
+NB_CLONES static void set_units(nb_ray_batch *rays)
 {
     NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
@@ -120,7 +120,7 @@ NB_CLONES static void set_units(nb_rays *rays)
     }
 }
 
-NB_CLONES static void set_starts(const nb_view *view, nb_rays *rays)
+NB_CLONES static void set_starts(const nb_view *view, nb_ray_batch *rays)
 {
     const int orthographic = view->projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
     for (int c = 0; c < 3; c++) {
@@ -146,13 +146,13 @@ double nb_view_pixel(const nb_view *view, uint32_t height)
     return view->projection == NEBEL_PROJECTION_PANORAMA ? pi / height : nb_vector_length(view->step_y);
 }
 
-void nb_view_finish_rays(const nb_view *view, nb_rays *rays)
+void nb_view_finish_rays(const nb_view *view, nb_ray_batch *rays)
 {
     set_units(rays);
     set_starts(view, rays);
 }
 
-void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float *x, const float *y, nb_rays *rays)
+void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float *x, const float *y, nb_ray_batch *rays)
 {
     double base[3];
     for (int c = 0; c < 3; c++) base[c] = view->corner[c] + left * view->step_x[c] + top * view->step_y[c];

@@ -15,20 +15,20 @@
 typedef struct nb_view {
     nebel_projection projection;
     double position[3]; /* m, world */
-    nb_axes axes;
+    nb_camera_axes axes;
     double corner[3], step_x[3], step_y[3];
     double start[3]; /* position relative to the origin of the geometry */
     double advance;  /* rays skip this multiple of their direction before they meet the geometry */
 } nb_view;
 
 /* The rays of a batch. */
-typedef struct nb_rays {
+typedef struct nb_ray_batch {
     double direction[3][NB_BATCH]; /* of any length */
     double offset[3][NB_BATCH];    /* of the ray's start from the camera's position; orthographic only */
     float length[NB_BATCH];        /* of `direction` */
     float unit[3][NB_BATCH];
     float start[3][NB_BATCH]; /* relative to the origin of the geometry, advanced */
-} nb_rays;
+} nb_ray_batch;
 
 /* Checks a camera and makes it ready. Errors: VALUE. */
 nebel_result nb_view_set(nb_view *view, const nebel_camera *camera, uint32_t width, uint32_t height,
@@ -43,9 +43,9 @@ void nb_view_place(nb_view *view, const double origin[3], const float bounds_min
 double nb_view_pixel(const nb_view *view, uint32_t height);
 
 /* The rays through the points left + x, top + y. */
-void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float *x, const float *y, nb_rays *rays);
+void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float *x, const float *y, nb_ray_batch *rays);
 
 /* What follows of directions that were changed. */
-void nb_view_finish_rays(const nb_view *view, nb_rays *rays);
+void nb_view_finish_rays(const nb_view *view, nb_ray_batch *rays);
 
 #endif

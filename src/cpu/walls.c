@@ -15,21 +15,21 @@ static const float bottomless = 1e30f;
 /* ---- edges ----------------------------------------------------------------------------------- */
 
 /* From its lower end to the other one, in an order that neighbours agree about. */
-typedef struct nb_edge {
+typedef struct nb_boundary_edge {
     const float *a, *b;
     int is_left; /* the triangle is to the left of the edge */
-} nb_edge;
+} nb_boundary_edge;
 
 static int is_place(const float *a, const float *b)
 {
     return (a[0] == b[0]) & (a[1] == b[1]) & (a[2] == b[2]);
 }
 
-static nb_edge edge_of(const nb_caster *t, int k)
+static nb_boundary_edge edge_of(const nb_occluder *t, int k)
 {
     const float *a = t->corner[k], *b = t->corner[(k + 1) % 3];
     const int turns_left = nb_caster_area(t) > 0, forward = nb_comes_first(a, b);
-    return forward ? (nb_edge){a, b, turns_left} : (nb_edge){b, a, !turns_left};
+    return forward ? (nb_boundary_edge){a, b, turns_left} : (nb_boundary_edge){b, a, !turns_left};
 }
 
 /* The same for both ways along an edge; seldom the same for different edges. */
@@ -46,27 +46,27 @@ static uint32_t key_of(const float *a, const float *b)
     return key;
 }
 
-static void set_keys(const nb_casters *casters, const uint32_t *list, size_t count, uint32_t *keys)
+static void set_keys(const nb_occluders *casters, const uint32_t *list, size_t count, uint32_t *keys)
 {
     for (size_t i = 0; i < count; i++) {
-        const nb_caster *t = &casters->triangles[list[i]];
+        const nb_occluder *t = &casters->triangles[list[i]];
         for (int k = 0; k < 3; k++) keys[3 * i + (size_t)k] = key_of(t->corner[k], t->corner[(k + 1) % 3]);
     }
 }
 
-static int is_same(const nb_edge *a, const nb_edge *b)
+static int is_same(const nb_boundary_edge *a, const nb_boundary_edge *b)
 {
     return is_place(a->a, b->a) && is_place(a->b, b->b);
 }
 
 /* Whether no triangle has the edge on its other side. Edges have the numbers of their keys. Others than the first one that
  * is the same are none, so that walls are looked for once. */
-static int is_outline(const nb_casters *casters, const uint32_t *list, const uint32_t *keys, size_t count,
-                      size_t number, const nb_edge *edge)
+static int is_outline(const nb_occluders *casters, const uint32_t *list, const uint32_t *keys, size_t count,
+                      size_t number, const nb_boundary_edge *edge)
 {
     for (size_t n = 0; n < 3 * count; n++) {
         if (keys[n] != keys[number] || n == number) continue;
-        const nb_edge other = edge_of(&casters->triangles[list[n / 3]], (int)(n % 3));
+        const nb_boundary_edge other = edge_of(&casters->triangles[list[n / 3]], (int)(n % 3));
         if (is_same(&other, edge) && (n < number || other.is_left != edge->is_left)) return 0;
     }
     return 1;
@@ -75,18 +75,18 @@ static int is_outline(const nb_casters *casters, const uint32_t *list, const uin
 /* ---- what lies over and under an edge -------------------------------------------------------- */
 
 /* A part of the edge, in shares of it, and depths at both ends of the part. */
-typedef struct nb_span {
+typedef struct nb_boundary_span {
     double begin, end, depth[2];
-} nb_span;
+} nb_boundary_span;
 
-static inline double depth_at(const nb_span *s, double u)
+static inline double depth_at(const nb_boundary_span *s, double u)
 {
     const double way = s->end - s->begin;
     return way > 0 ? s->depth[0] + (s->depth[1] - s->depth[0]) * ((u - s->begin) / way) : s->depth[0];
 }
 
 /* What of the edge is where offset + u rise >= 0. */
-static void cut(double offset, double rise, nb_span *s)
+static void cut(double offset, double rise, nb_boundary_span *s)
 {
     if (rise > 0)
         s->begin = fmax(s->begin, -offset / rise);
@@ -96,7 +96,7 @@ static void cut(double offset, double rise, nb_span *s)
         s->end = -1;
 }
 
-static void clip_to_cell(const nb_edge *e, const nb_cell *cell, nb_span *s)
+static void clip_to_cell(const nb_boundary_edge *e, const nb_sun_cell *cell, nb_boundary_span *s)
 {
     for (int i = 0; i < 2; i++) {
         const double a = (double)e->a[i], way = (double)e->b[i] - a;
@@ -106,7 +106,7 @@ static void clip_to_cell(const nb_edge *e, const nb_cell *cell, nb_span *s)
 }
 
 /* Depth where corners have these weights; what rounding makes of none is none. */
-static double depth_between(const nb_caster *t, const double weights[3])
+static double depth_between(const nb_occluder *t, const double weights[3])
 {
     double sum = 0, all = 0;
     for (int k = 0; k < 3; k++) {
@@ -118,7 +118,7 @@ static double depth_between(const nb_caster *t, const double weights[3])
 }
 
 /* What the triangle has of the part of an edge; nothing: 0. */
-static int span_of(const nb_caster *t, const nb_edge *e, const nb_span *part, nb_span *s)
+static int span_of(const nb_occluder *t, const nb_boundary_edge *e, const nb_boundary_span *part, nb_boundary_span *s)
 {
     const double side = nb_caster_area(t) > 0 ? 1 : -1;
     double offset[3], rise[3];
@@ -139,7 +139,7 @@ static int span_of(const nb_caster *t, const nb_edge *e, const nb_span *part, nb
     return 1;
 }
 
-static int has_edge(const nb_caster *t, const nb_edge *e)
+static int has_edge(const nb_occluder *t, const nb_boundary_edge *e)
 {
     int ends = 0;
     for (int k = 0; k < 3; k++) ends += is_place(t->corner[k], e->a) || is_place(t->corner[k], e->b);
@@ -149,11 +149,11 @@ static int has_edge(const nb_caster *t, const nb_edge *e)
 /* ---- walls of an edge ------------------------------------------------------------------------ */
 
 typedef struct nb_outline {
-    nb_walls *walls;
+    nb_shadow_boundaries *walls;
     const nebel_allocator *allocator;
-    nb_edge edge;
-    nb_span whole; /* the edge with its own depths */
-    nb_span spans[MOST];
+    nb_boundary_edge edge;
+    nb_boundary_span whole; /* the edge with its own depths */
+    nb_boundary_span spans[MOST];
     size_t count;
 } nb_outline;
 
@@ -168,12 +168,12 @@ static void place_at(const nb_outline *o, double u, float place[2])
 /* From u = begin to end, over a surface of these depths. Returns 0 when memory is out. */
 static int add_wall(nb_outline *o, double begin, double end, double first, double last)
 {
-    nb_walls *walls = o->walls;
+    nb_shadow_boundaries *walls = o->walls;
     void *grown = walls->walls;
     if (!nb_grow(o->allocator, &grown, sizeof *walls->walls, walls->count, &walls->capacity, walls->count + 1))
         return 0;
     walls->walls = grown;
-    nb_wall wall;
+    nb_shadow_boundary wall;
     const int k = o->edge.is_left ? 0 : 1;
     place_at(o, begin, k == 0 ? wall.from : wall.to);
     place_at(o, end, k == 0 ? wall.to : wall.from);
@@ -199,11 +199,11 @@ static int add_above(nb_outline *o, double begin, double end, double first, doub
 }
 
 /* The one of those that are all along the part whose depth at u is least; NULL: there is none. */
-static const nb_span *nearest_at(const nb_outline *o, double begin, double end, double u)
+static const nb_boundary_span *nearest_at(const nb_outline *o, double begin, double end, double u)
 {
-    const nb_span *nearest = NULL;
+    const nb_boundary_span *nearest = NULL;
     for (size_t i = 0; i < o->count; i++) {
-        const nb_span *s = &o->spans[i];
+        const nb_boundary_span *s = &o->spans[i];
         if (s->begin > begin || s->end < end) continue;
         if (nearest == NULL || depth_at(s, u) < depth_at(nearest, u)) nearest = s;
     }
@@ -213,7 +213,7 @@ static const nb_span *nearest_at(const nb_outline *o, double begin, double end, 
 /* A part of the edge on which no span begins or ends. What is least at both ends of a part is least all along it. */
 static int add_part(nb_outline *o, double begin, double end, int level)
 {
-    const nb_span *first = nearest_at(o, begin, end, begin), *last = nearest_at(o, begin, end, end);
+    const nb_boundary_span *first = nearest_at(o, begin, end, begin), *last = nearest_at(o, begin, end, end);
     if (first == NULL) return add_above(o, begin, end, (double)bottomless, (double)bottomless);
     const double gap[2] = {depth_at(last, begin) - depth_at(first, begin), depth_at(first, end) - depth_at(last, end)};
     const double middle = begin + (end - begin) * (gap[0] / (gap[0] + gap[1]));
@@ -241,18 +241,18 @@ static size_t list_splits(const nb_outline *o, double *splits)
     return count;
 }
 
-static int add_outline(nb_outline *o, const nb_casters *casters, const uint32_t *list, size_t count,
-                       const nb_span *part)
+static int add_outline(nb_outline *o, const nb_occluders *casters, const uint32_t *list, size_t count,
+                       const nb_boundary_span *part)
 {
-    const nb_edge *e = &o->edge;
+    const nb_boundary_edge *e = &o->edge;
     double splits[MOST_SPLITS];
     o->count = 0;
     for (size_t i = 0; i < count; i++) {
-        const nb_caster *t = &casters->triangles[list[i]];
+        const nb_occluder *t = &casters->triangles[list[i]];
         if (!has_edge(t, e)) o->count += (size_t)span_of(t, e, part, &o->spans[o->count]);
     }
     const double a = (double)e->a[2], way = (double)e->b[2] - a;
-    o->whole = (nb_span){part->begin, part->end, {a + part->begin * way, a + part->end * way}};
+    o->whole = (nb_boundary_span){part->begin, part->end, {a + part->begin * way, a + part->end * way}};
     const size_t ends = list_splits(o, splits);
     o->walls->looks += count + ends * o->count;
     for (size_t i = 1; i < ends; i++)
@@ -261,7 +261,7 @@ static int add_outline(nb_outline *o, const nb_casters *casters, const uint32_t 
 }
 
 /* An edge along the high side of a cell, beyond which there is another one. */
-static int is_of_next(const nb_edge *e, const nb_cell *cell, const nb_cell *last)
+static int is_of_next(const nb_boundary_edge *e, const nb_sun_cell *cell, const nb_sun_cell *last)
 {
     int next = 0;
     for (int i = 0; i < 2; i++)
@@ -270,14 +270,14 @@ static int is_of_next(const nb_edge *e, const nb_cell *cell, const nb_cell *last
 }
 
 /* Leaves and the like are all edges, with many others over each: prisms are cheaper there than walls are found. */
-static int is_enough(const nb_walls *walls, const nb_casters *casters, size_t count)
+static int is_enough(const nb_shadow_boundaries *walls, const nb_occluders *casters, size_t count)
 {
     const uint64_t most = 10000000 + 64 * (uint64_t)casters->count;
     return casters->numbers != NULL || count > MOST || walls->looks > most;
 }
 
-int nb_walls_add(nb_walls *walls, const nebel_allocator *allocator, const nb_casters *casters, const uint32_t *list,
-                 size_t count, const nb_cell *cell, const nb_cell *last)
+int nb_walls_add(nb_shadow_boundaries *walls, const nebel_allocator *allocator, const nb_occluders *casters,
+                 const uint32_t *list, size_t count, const nb_sun_cell *cell, const nb_sun_cell *last)
 {
     nb_outline outline = {.walls = walls, .allocator = allocator};
     uint32_t keys[3 * MOST];
@@ -286,7 +286,7 @@ int nb_walls_add(nb_walls *walls, const nebel_allocator *allocator, const nb_cas
     if (walls->is_unknown) return 1;
     set_keys(casters, list, count, keys);
     for (size_t n = 0; n < 3 * count; n++) {
-        nb_span part = {0, 1, {0, 0}};
+        nb_boundary_span part = {0, 1, {0, 0}};
         outline.edge = edge_of(&casters->triangles[list[n / 3]], (int)(n % 3));
         clip_to_cell(&outline.edge, cell, &part);
         if (!(part.begin < part.end) || is_of_next(&outline.edge, cell, last)) continue;
@@ -301,7 +301,7 @@ int nb_walls_add(nb_walls *walls, const nebel_allocator *allocator, const nb_cas
 /* A wall's place on a curve that stays near where it is: Morton, A Computer Oriented Geodetic Data Base, 1966. */
 typedef struct nb_placed {
     uint64_t place;
-    nb_wall wall;
+    nb_shadow_boundary wall;
 } nb_placed;
 
 static uint64_t spread_bits(uint64_t x)
@@ -312,7 +312,7 @@ static uint64_t spread_bits(uint64_t x)
     return x;
 }
 
-static uint64_t place_of(const nb_wall *wall, const nb_cell *bounds)
+static uint64_t place_of(const nb_shadow_boundary *wall, const nb_sun_cell *bounds)
 {
     uint64_t place = 0;
     const float x = bounds->high[0] - bounds->low[0], y = bounds->high[1] - bounds->low[1];
@@ -332,7 +332,7 @@ static int compare_placed(const void *a, const void *b)
     return memcmp(&p->wall, &q->wall, sizeof p->wall);
 }
 
-static int sort_walls(nb_walls *walls, const nebel_allocator *allocator, const nb_cell *bounds)
+static int sort_walls(nb_shadow_boundaries *walls, const nebel_allocator *allocator, const nb_sun_cell *bounds)
 {
     nb_placed *placed = nb_allocate(allocator, walls->count, sizeof *placed);
     if (placed == NULL) return 0;
@@ -353,7 +353,7 @@ static void set_empty(nb_wall_node *node)
 }
 
 /* More than rounding may move a ray. */
-static void bound_wall(const nb_wall *wall, nb_wall_node *node, size_t k)
+static void bound_wall(const nb_shadow_boundary *wall, nb_wall_node *node, size_t k)
 {
     for (int i = 0; i < 2; i++) {
         const float low = nb_least(wall->from[i], wall->to[i]), high = nb_most(wall->from[i], wall->to[i]);
@@ -384,7 +384,7 @@ static size_t parents_of(size_t count)
     return (count + NB_WALL_FAN - 1) / NB_WALL_FAN;
 }
 
-int nb_walls_finish(nb_walls *walls, const nebel_allocator *allocator, const nb_cell *bounds)
+int nb_walls_finish(nb_shadow_boundaries *walls, const nebel_allocator *allocator, const nb_sun_cell *bounds)
 {
     size_t all = 0;
     if (walls->is_unknown) nb_walls_free(walls, allocator);
@@ -413,15 +413,15 @@ int nb_walls_finish(nb_walls *walls, const nebel_allocator *allocator, const nb_
     return 1;
 }
 
-void nb_walls_free(nb_walls *walls, const nebel_allocator *allocator)
+void nb_walls_free(nb_shadow_boundaries *walls, const nebel_allocator *allocator)
 {
     nb_release(allocator, walls->walls);
     nb_release(allocator, walls->nodes);
-    *walls = (nb_walls){.count = 0};
+    *walls = (nb_shadow_boundaries){.count = 0};
 }
 
 /* Whether the place is as near to the line through the wall as that, in the plane. */
-static int touches(const nb_wall *wall, const float place[3], float margin)
+static int touches(const nb_shadow_boundary *wall, const float place[3], float margin)
 {
     const double x = (double)wall->to[0] - (double)wall->from[0], y = (double)wall->to[1] - (double)wall->from[1];
     const double off = x * ((double)place[1] - (double)wall->from[1]) - y * ((double)place[0] - (double)wall->from[0]);
@@ -436,7 +436,7 @@ static int is_near(const nb_wall_node *node, int k, const float place[3], float 
     return near;
 }
 
-static int meets(const nb_walls *walls, int level, size_t number, const float place[3], float margin)
+static int meets(const nb_shadow_boundaries *walls, int level, size_t number, const float place[3], float margin)
 {
     const nb_wall_node *node = &walls->levels[level][number];
     for (int k = 0; k < NB_WALL_FAN; k++) {
@@ -448,7 +448,7 @@ static int meets(const nb_walls *walls, int level, size_t number, const float pl
     return 0;
 }
 
-int nb_walls_meet(const nb_walls *walls, const float place[3], float margin)
+int nb_walls_meet(const nb_shadow_boundaries *walls, const float place[3], float margin)
 {
     return walls->level_count > 0 && meets(walls, walls->level_count - 1, 0, place, margin);
 }

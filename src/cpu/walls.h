@@ -20,36 +20,36 @@ enum {
 
 /* Shadow is to the left of the way between both places of the plane; over them it reaches from `top` to `bottom`, which
  * is 1e30 where there is no surface. Depths change evenly between the places. */
-typedef struct nb_wall {
+typedef struct nb_shadow_boundary {
     float from[2], to[2], top[2], bottom[2];
-} nb_wall;
+} nb_shadow_boundary;
 
 /* Of children that there are not, `low` is above `high`. */
 typedef struct nb_wall_node {
     float low[2][NB_WALL_FAN], high[2][NB_WALL_FAN], top[NB_WALL_FAN], bottom[NB_WALL_FAN];
 } nb_wall_node;
 
-typedef struct nb_walls {
-    nb_wall *walls;
+typedef struct nb_shadow_boundaries {
+    nb_shadow_boundary *walls;
     size_t count, capacity;
     int is_unknown; /* there are holes in surfaces, or too many triangles over each other */
     uint64_t looks; /* at triangles, while walls were looked for */
     nb_wall_node *nodes;
     int level_count;
     nb_wall_node *levels[NB_WALL_LEVELS]; /* those above walls first; the last has one node */
-} nb_walls;
+} nb_shadow_boundaries;
 
 /* Adds the walls in a cell. `list` has the triangles that the sun may see there; edges along the high sides of a cell are
  * those of the next one, if that is not `last` in this direction. Returns 0 when memory is out. */
-int nb_walls_add(nb_walls *walls, const nebel_allocator *allocator, const nb_casters *casters, const uint32_t *list,
-                 size_t count, const nb_cell *cell, const nb_cell *last);
+int nb_walls_add(nb_shadow_boundaries *walls, const nebel_allocator *allocator, const nb_occluders *casters,
+                 const uint32_t *list, size_t count, const nb_sun_cell *cell, const nb_sun_cell *last);
 
 /* Makes the tree when all walls are there, which are within these bounds. Returns 0 when memory is out. */
-int nb_walls_finish(nb_walls *walls, const nebel_allocator *allocator, const nb_cell *bounds);
+int nb_walls_finish(nb_shadow_boundaries *walls, const nebel_allocator *allocator, const nb_sun_cell *bounds);
 
 /* Whether a wall is so near that rounding may say on which side the place is. */
-int nb_walls_meet(const nb_walls *walls, const float place[3], float margin);
+int nb_walls_meet(const nb_shadow_boundaries *walls, const float place[3], float margin);
 
-void nb_walls_free(nb_walls *walls, const nebel_allocator *allocator);
+void nb_walls_free(nb_shadow_boundaries *walls, const nebel_allocator *allocator);
 
 #endif

@@ -16,14 +16,14 @@ const nebel_planet *nb_gl_air_planet(const nebel_scene_data *scene)
 
 /* ---- the tables ------------------------------------------------------------------------------ */
 
-/* Depths, and behind them skies, of nb_daylight. */
+/* Depths, and behind them skies, of nb_irradiance_table. */
 enum {
     DEPTHS = NB_DAYLIGHT_HEIGHTS * NB_DAYLIGHT_SUNS,
     SKIES = NB_DAYLIGHT_OF_COUNT * NB_DAYLIGHT_SKIES,
     DAYLIGHT_WORDS = DEPTHS + SKIES
 };
 
-static int are_same(const nb_gl_air *air, const nebel_sky_view_desc *desc, const nb_world *worlds, int count,
+static int are_same(const nb_gl_air *air, const nebel_sky_view_desc *desc, const nb_planet *worlds, int count,
                     int is_lit)
 {
     const nebel_sky_view_desc *const of = &air->of;
@@ -64,9 +64,9 @@ static nebel_result make_views(nb_gl_air *air, nebel_sky_view_desc desc, int cou
 
 /* It does not depend on the eye. */
 static nebel_result find_daylight(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
-                                  const nebel_scene_data *scene, const double to_sun[3], nb_world *world)
+                                  const nebel_scene_data *scene, const double to_sun[3], nb_planet *world)
 {
-    nb_daylight **const kept = &air->daylight[world->planet - scene->planets];
+    nb_irradiance_table **const kept = &air->daylight[world->planet - scene->planets];
     if (*kept == NULL) *kept = nb_allocate_zero(allocator, 1, sizeof **kept);
     if (*kept == NULL)
         return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL: out of memory for the light of models on planets");
@@ -95,7 +95,7 @@ static nebel_result measure(nb_gl_air *air, size_t *total)
     nebel_result result = NEBEL_OK;
     *total = 0;
     for (int i = 0; i < air->count && result == NEBEL_OK; i++) {
-        const nb_world *const world = &air->worlds[i];
+        const nb_planet *const world = &air->worlds[i];
         size_t count = 0;
         result = nebel_pack_sky_view(world->view, NULL, 0, &count);
         air->first[i] = (int)*total;
@@ -105,7 +105,7 @@ static nebel_result measure(nb_gl_air *air, size_t *total)
     return result;
 }
 
-static void pack_daylight(const nb_daylight *daylight, nebel_texel_f32 *words)
+static void pack_daylight(const nb_irradiance_table *daylight, nebel_texel_f32 *words)
 {
     const float *const depth = daylight->depth[0][0], *const sky = daylight->sky[0][0];
     for (int i = 0; i < DEPTHS; i++)
@@ -146,7 +146,7 @@ nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, con
                            const nb_context *context, const nebel_scene_data *scene, const double eye[3], int ends,
                            int is_lit)
 {
-    nb_world worlds[NEBEL_MAX_PLANETS];
+    nb_planet worlds[NEBEL_MAX_PLANETS];
     const int count = nb_worlds_set(worlds, scene, eye);
     /* The ground of one planet ends the air of others. */
     const nebel_sky_view_desc desc = {.sun = nb_scene_sun(scene),
@@ -182,7 +182,7 @@ void nb_gl_air_release(nb_gl_air *air, const nebel_allocator *allocator)
 /* ---- programs -------------------------------------------------------------------------------- */
 
 /* As the eye sees it: the way up from its centre, the height above the ground. */
-static void look_from(const nb_gl_air *air, const nb_world *world, float eye[4])
+static void look_from(const nb_gl_air *air, const nb_planet *world, float eye[4])
 {
     double from[3];
     for (int c = 0; c < 3; c++) from[c] = air->of.position[c] - world->center[c];

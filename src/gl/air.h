@@ -9,15 +9,15 @@
 typedef struct nb_gl_air {
     nebel_parallel_for_fn run; /* for threads; NULL: none */
     void *run_user;
-    unsigned texture;                                /* all tables, in OpenGL; 0: not made yet */
-    nebel_sky_view_desc of;                          /* what they are made of, but for the planet */
-    const nebel_atmosphere *made[NEBEL_MAX_PLANETS]; /* the same */
-    nb_world worlds[NEBEL_MAX_PLANETS];              /* in the order of their tables */
-    int count;                                       /* 0: nothing is made */
-    int first[NEBEL_MAX_PLANETS];                    /* words of the texture: where the table of a world begins */
-    int light[NEBEL_MAX_PLANETS];                    /* from there on, where the light at places begins; -1: none */
-    nb_daylight *daylight[NEBEL_MAX_PLANETS];        /* of planets as the scene has them; NULL: not made yet */
-    const nebel_atmosphere *home;                    /* of `daylight` */
+    unsigned texture;                                 /* all tables, in OpenGL; 0: not made yet */
+    nebel_sky_view_desc of;                           /* what they are made of, but for the planet */
+    const nebel_atmosphere *made[NEBEL_MAX_PLANETS];  /* the same */
+    nb_planet worlds[NEBEL_MAX_PLANETS];              /* in the order of their tables */
+    int count;                                        /* 0: nothing is made */
+    int first[NEBEL_MAX_PLANETS];                     /* words of the texture: where the table of a world begins */
+    int light[NEBEL_MAX_PLANETS];                     /* from there on, where the light at places begins; -1: none */
+    nb_irradiance_table *daylight[NEBEL_MAX_PLANETS]; /* of planets as the scene has them; NULL: not made yet */
+    const nebel_atmosphere *home;                     /* of `daylight` */
 } nb_gl_air;
 
 /* The first planet of a scene where it has air; NULL: there is none. */

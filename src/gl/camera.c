@@ -41,7 +41,7 @@ nebel_result nb_camera_look(const nebel_camera *camera, uint32_t width, uint32_t
                             nebel_view *view)
 {
     *view = (nebel_view){.width = width, .height = height};
-    nb_axes axes;
+    nb_camera_axes axes;
     nebel_result result = nb_camera_find_axes(camera, log, &axes);
     if (result == NEBEL_OK) result = nb_camera_check_projection(camera, log);
     if (result != NEBEL_OK) return result;
@@ -81,7 +81,7 @@ double nb_camera_pixel(const nebel_view *view, int panorama)
 
 /* ---- samples --------------------------------------------------------------------------------- */
 
-nebel_view nb_camera_move(const nebel_view *view, nb_pixel_point point)
+nebel_view nb_camera_move(const nebel_view *view, nb_pixel_position point)
 {
     nebel_view moved = *view;
     for (int column = 0; column < 4; column++) {

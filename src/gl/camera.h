@@ -16,7 +16,7 @@ nebel_result nb_camera_look(const nebel_camera *camera, uint32_t width, uint32_t
 double nb_camera_pixel(const nebel_view *view, int panorama);
 
 /* The view whose pixel centres see what `view` sees at `point`. */
-nebel_view nb_camera_move(const nebel_view *view, nb_pixel_point point);
+nebel_view nb_camera_move(const nebel_view *view, nb_pixel_position point);
 
 /* a - b in float, without losing digits of what both have in common. */
 void nb_camera_subtract(const double a[3], const double b[3], float difference[3]);

@@ -44,7 +44,7 @@ static void add_fog(texels *t, uint32_t first, float end, float sun, float sky)
     add(t, end, light);
 }
 
-uint32_t nb_gl_cloud_shade_write(const nb_shaded_piece *air, uint32_t air_count, const nb_fog_shade *fog,
+uint32_t nb_gl_cloud_shade_write(const nb_shadowed_segment *air, uint32_t air_count, const nb_fog_shadow *fog,
                                  uint32_t *words, size_t stride)
 {
     texels t = {words, 1, stride};

@@ -22,7 +22,7 @@ typedef struct nb_gl_cloud_shade {
 /* The texels of a pixel, `stride` texels from one to the next: how many pieces of air and of fog there are, and where those of fog
  * begin; where each piece of air begins, and what part of its light it has; where each piece of fog ends, and what there is of the
  * sun and, as part of clear_sky, of the sky. fog NULL: it has none. Returns how many texels. */
-uint32_t nb_gl_cloud_shade_write(const nb_shaded_piece *air, uint32_t air_count, const nb_fog_shade *fog,
+uint32_t nb_gl_cloud_shade_write(const nb_shadowed_segment *air, uint32_t air_count, const nb_fog_shadow *fog,
                                  uint32_t *words, size_t stride);
 
 /* Layers of texels, the lowest row first, to the texture on the active unit, which is NB_UNIT_SHADE; wants the usual unpacking.

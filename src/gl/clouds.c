@@ -20,7 +20,7 @@ typedef struct job {
     float *marks; /* where fog is to be known next, and along which ray */
     const float *places;
     float *over, *shade;
-    const nb_fog_roof *roof;
+    const nb_cloud_shadow_extent *roof;
     uint32_t *words; /* of shade */
     uint32_t begin;  /* the first row of each part in this round */
 } job;
@@ -169,10 +169,10 @@ void nb_gl_clouds_release(nb_gl_clouds *clouds)
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
-static void set_knots(const nebel_cloud_transfer *knots, nb_cloud_knot *list)
+static void set_knots(const nebel_cloud_transfer *knots, nb_cloud_pixel_node *list)
 {
     for (uint32_t k = 0; k < knots->count; k++) {
-        list[k] = (nb_cloud_knot){.t = knots->t[k], .left = knots->transmittance[k]};
+        list[k] = (nb_cloud_pixel_node){.t = knots->t[k], .left = knots->transmittance[k]};
         memcpy(list[k].light, knots->in_scattering[k], sizeof list[k].light);
     }
 }
@@ -269,7 +269,7 @@ static nebel_result trace_block(const job *j, nb_cloud_part *part, uint32_t left
 {
     const nebel_view *const view = j->picture->view;
     nb_cloud_bundle *const bundle = part->bundle;
-    nb_cloud_block block;
+    nb_cloud_pixel_block block;
     nebel_result result = NEBEL_OK;
     for (uint32_t i = 0; i < NB_CLOUD_SHARE; i++) {
         const uint32_t x = left + i % NB_CLOUD_SHARE_COLUMNS, y = top + i / NB_CLOUD_SHARE_COLUMNS;
@@ -336,7 +336,7 @@ static void write_shade_row(const job *j, nb_cloud_part *part, uint32_t y)
         const size_t i = y * width + x;
         const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
         nebel_ray ray;
-        nb_fog_shade fog;
+        nb_fog_shadow fog;
         const double spread = ray_at(picture, x, y, &ray);
         (void)lift(picture, spread, &ray);
         if (j->roof != NULL) part->result = nb_fog_shade_along(part->workspace, j->roof, ray, spread, &fog);
@@ -348,8 +348,8 @@ static void write_shade_row(const job *j, nb_cloud_part *part, uint32_t y)
     }
 }
 
-nebel_result nb_gl_clouds_write_shade(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_fog_roof *roof,
-                                      uint32_t *words, uint32_t *layers)
+nebel_result nb_gl_clouds_write_shade(nb_gl_clouds *clouds, const nb_cloud_picture *picture,
+                                      const nb_cloud_shadow_extent *roof, uint32_t *words, uint32_t *layers)
 {
     job j = {.clouds = clouds, .picture = picture, .row = write_shade_row, .roof = roof, .words = words};
     for (int i = 0; i < NB_CLOUD_PARTS; i++) clouds->parts[i].layers = 0;
@@ -371,14 +371,14 @@ static float shaded_at(const nb_cloud_part *part, const nb_cloud_pixel *pixel, i
 /* All that is known of a ray. */
 typedef struct nb_cloud_mix {
     nebel_cloud_transfer knots;
-    nb_cloud_haze air;
-    nb_cloud_marks marks;
+    nb_aerial_nodes air;
+    nb_cloud_fog_nodes marks;
 } nb_cloud_mix;
 
-static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_cloud_knot *list,
+static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_cloud_pixel_node *list,
                              const nb_cloud_pixel *pixel, const double direction[3], nb_cloud_mix *mix)
 {
-    nb_cloud_rays rays;
+    nb_cloud_air_rays rays;
     mix->knots = (nebel_cloud_transfer){.count = pixel->count};
     memset(&mix->marks, 0, sizeof mix->marks);
     for (uint32_t k = 0; k < pixel->count; k++) {
@@ -399,7 +399,7 @@ static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_c
 /* Knots move over from those before, and one may come between them. */
 static nebel_result choose_pixel(const job *j, nb_cloud_part *part, nb_cloud_pixel *pixel, const double direction[3])
 {
-    const nb_cloud_knot *const before = part->before + pixel->first;
+    const nb_cloud_pixel_node *const before = part->before + pixel->first;
     nb_cloud_mix mix;
     float doubt;
     nebel_result result = find_mix(j, part, before, pixel, direction, &mix);
@@ -409,7 +409,7 @@ static nebel_result choose_pixel(const job *j, nb_cloud_part *part, nb_cloud_pix
     result = keep_knots(j, part, &mix.knots, pixel);
     for (uint32_t k = 0; k < count && result == NEBEL_OK; k++) {
         const uint32_t at = pixel->count > count && (int)k >= pixel->next ? k + 1 : k;
-        nb_cloud_knot *const knot = &part->knots[pixel->first + at];
+        nb_cloud_pixel_node *const knot = &part->knots[pixel->first + at];
         knot->is_marked = before[k].is_marked;
         memcpy(knot->haze_left, before[k].haze_left, sizeof knot->haze_left);
         memcpy(knot->haze_light, before[k].haze_light, sizeof knot->haze_light);
@@ -438,7 +438,7 @@ nebel_result nb_gl_clouds_choose(nb_gl_clouds *clouds, const nb_cloud_picture *p
     const size_t pixels = (size_t)picture->view->width * picture->view->height;
     for (int i = 0; i < NB_CLOUD_PARTS; i++) {
         nb_cloud_part *const part = &clouds->parts[i];
-        nb_cloud_knot *const knots = part->knots;
+        nb_cloud_pixel_node *const knots = part->knots;
         const size_t capacity = part->capacity;
         part->knots = part->before;
         part->capacity = part->capacity_before;
@@ -469,7 +469,7 @@ void nb_gl_clouds_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, co
             const size_t i = (size_t)y * picture->view->width + x;
             const nb_cloud_pixel *const pixel = &clouds->pixels[i];
             if (pixel->count == 0 || pixel->next < 0) continue;
-            nb_cloud_knot *const knot = &part->knots[pixel->first + (uint32_t)pixel->next];
+            nb_cloud_pixel_node *const knot = &part->knots[pixel->first + (uint32_t)pixel->next];
             knot->is_marked = 1;
             memcpy(knot->haze_left, left + 4 * i, sizeof knot->haze_left);
             memcpy(knot->haze_light, light + 4 * i, sizeof knot->haze_light);
@@ -479,12 +479,12 @@ void nb_gl_clouds_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, co
 
 /* Without fog where none is marked. */
 static nebel_result mix_pixel(const job *j, const nb_cloud_part *part, const nb_cloud_pixel *pixel,
-                              const double direction[3], nb_cloud_knot *list)
+                              const double direction[3], nb_cloud_pixel_node *list)
 {
     nb_cloud_mix mix;
     const nebel_result result = find_mix(j, part, list, pixel, direction, &mix);
     if (result != NEBEL_OK) return result;
-    nb_cloud_haze haze = mix.air;
+    nb_aerial_nodes haze = mix.air;
     for (int c = 0; c < 3; c++) {
         float over[NEBEL_MAX_CLOUD_NODES];
         if (mix.marks.is_set[0]) nb_cloud_haze_add_fog(&mix.knots, &mix.marks, c, &mix.air, &haze);
@@ -516,7 +516,7 @@ nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *pict
 #define NEAR_GROUND 1e-6
 
 /* Before a surface within the clouds they are as between the knots around it. */
-static void lay_over(const nb_cloud_knot *knots, uint32_t count, float end, float over[4])
+static void lay_over(const nb_cloud_pixel_node *knots, uint32_t count, float end, float over[4])
 {
     static const float clear[4] = {0, 0, 0, 1};
     float t[NEBEL_MAX_CLOUD_NODES], part;
@@ -524,7 +524,7 @@ static void lay_over(const nb_cloud_knot *knots, uint32_t count, float end, floa
     if (count == 0 || !(end > knots[0].t)) return;
     for (uint32_t i = 0; i < count; i++) t[i] = knots[i].t;
     const uint32_t k = nb_cloud_haze_find(count, t, end, &part);
-    const nb_cloud_knot *const a = &knots[k], *const b = &knots[part > 0 ? k + 1 : k];
+    const nb_cloud_pixel_node *const a = &knots[k], *const b = &knots[part > 0 ? k + 1 : k];
     for (int c = 0; c < 3; c++) over[c] = (1 - part) * a->light[c] + part * b->light[c];
     over[3] = (1 - part) * a->left + part * b->left;
 }
@@ -543,7 +543,7 @@ static nb_cloud_end end_at(const job *j, const double direction[3], float t)
     if (!(t > 0)) return (nb_cloud_end){.t = HUGE_VALF, .is_in_sky = 1};
     for (int c = 0; c < 3; c++) unit[c] = direction[c] / length;
     for (int k = 0; k < j->picture->world_count; k++) {
-        const nb_world *const world = &j->picture->worlds[k];
+        const nb_planet *const world = &j->picture->worlds[k];
         double from[3];
         for (int c = 0; c < 3; c++) from[c] = j->picture->eye[c] + (double)t * unit[c] - world->center[c];
         if (nb_vector_length(from) - world->radius < NEAR_GROUND * ((double)t + world->radius)) {
@@ -555,7 +555,7 @@ static nb_cloud_end end_at(const job *j, const double direction[3], float t)
 }
 
 /* NULL for a pixel without knots: the list of none may be NULL, to which nothing is added. */
-static const nb_cloud_knot *knots_of(const nb_cloud_part *part, const nb_cloud_pixel *pixel)
+static const nb_cloud_pixel_node *knots_of(const nb_cloud_part *part, const nb_cloud_pixel *pixel)
 {
     return pixel->count > 0 ? part->knots + pixel->first : NULL;
 }
@@ -563,7 +563,7 @@ static const nb_cloud_knot *knots_of(const nb_cloud_part *part, const nb_cloud_p
 /* Whether knots up to the ground do for a ray that ends there: among fog they must. */
 static int is_found(const job *j, const nb_cloud_part *part, const nb_cloud_pixel *pixel, float end)
 {
-    const nb_cloud_knot *const knots = knots_of(part, pixel);
+    const nb_cloud_pixel_node *const knots = knots_of(part, pixel);
     if (pixel->count == 0 || j->picture->has_fog) return 1;
     return nb_cloud_is_found(pixel->count, knots[0].t, knots[pixel->count - 1].t, HUGE_VALF, end);
 }
@@ -573,7 +573,7 @@ static nebel_result lay_anew(const job *j, nb_cloud_part *part, const nb_cloud_p
                              double spread, float over[4])
 {
     nb_cloud_pixel anew = *pixel;
-    nb_cloud_knot list[NEBEL_MAX_CLOUD_NODES];
+    nb_cloud_pixel_node list[NEBEL_MAX_CLOUD_NODES];
     nebel_cloud_transfer knots;
     nebel_result result = trace_rays(j->picture, part, 1, ray, &spread, &knots);
     if (result != NEBEL_OK) return result;

@@ -16,12 +16,12 @@
 enum { NB_CLOUD_PARTS = 8 };
 
 /* Of a ray, at some place of it. */
-typedef struct nb_cloud_knot {
+typedef struct nb_cloud_pixel_node {
     float t, left;  /* m; transmittance of clouds */
     float light[3]; /* of clouds alone; once they are mixed with air and fog: what is added to `left` of the haze's */
     float haze_left[3], haze_light[3]; /* of air and fog, where they are marked */
     int is_marked;
-} nb_cloud_knot;
+} nb_cloud_pixel_node;
 
 /* Of the pixels of a block, row by row; and of those of them that are asked together. */
 typedef struct nb_cloud_bundle {
@@ -33,9 +33,9 @@ typedef struct nb_cloud_bundle {
 typedef struct nb_cloud_part {
     nebel_cloud_workspace *workspace;
     nb_cloud_bundle *bundle;
-    nb_cloud_knot *knots, *before; /* before: while more are put between them */
+    nb_cloud_pixel_node *knots, *before; /* before: while more are put between them */
     size_t count, capacity, capacity_before;
-    nb_shaded_piece *pieces;
+    nb_shadowed_segment *pieces;
     size_t piece_count, piece_capacity;
     uint32_t layers; /* of shade */
     nebel_result result;
@@ -62,10 +62,10 @@ typedef struct nb_gl_clouds {
 typedef struct nb_cloud_picture {
     const nebel_view *view; /* perspective; of a panorama its size and axes */
     int panorama;
-    nb_pixel_point point; /* of a panorama: where rays pass its pixels */
+    nb_pixel_position point; /* of a panorama: where rays pass its pixels */
     double eye[3];
     double pixel; /* width of a pixel per metre of the camera's axis, or of the way in a panorama */
-    const nb_world *worlds;
+    const nb_planet *worlds;
     int world_count;
     double to_sun[3], disc; /* as of nb_worlds_light */
     int has_fog;
@@ -87,8 +87,8 @@ nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *pi
 
 /* Their shade on the air, and on fog, NULL: which is the same everywhere: texels as nb_gl_cloud_shade_write has them, of
  * NB_CLOUD_SHADE_LAYERS layers of the picture, without fog NB_AIR_SHADE_LAYERS; *layers: how many of these are used. */
-nebel_result nb_gl_clouds_write_shade(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_fog_roof *roof,
-                                      uint32_t *words, uint32_t *layers);
+nebel_result nb_gl_clouds_write_shade(nb_gl_clouds *clouds, const nb_cloud_picture *picture,
+                                      const nb_cloud_shadow_extent *roof, uint32_t *words, uint32_t *layers);
 
 /* Where fog is to be known next among the clouds of each pixel, 0: nowhere, and the unit direction of the ray: 4 numbers for each.
  * *any: whether it is anywhere. MEMORY. */

@@ -3,9 +3,9 @@
 #include <epoxy/gl.h>
 #include <string.h>
 
-typedef struct triangle {
+typedef struct nb_triangle_instance {
     float position[3][3], normal[3][3], uv[3][2], face[3];
-} triangle;
+} nb_triangle_instance;
 
 enum { FOG_SIZE = 4 * sizeof(float), CORNERS_FOG_SIZE = 3 * FOG_SIZE };
 
@@ -58,7 +58,7 @@ static void set_attributes(GLuint place, GLuint count, GLint components, size_t 
 static void gather_triangle(const uint32_t *indices, const void *vertices, void *corners)
 {
     const nb_vertex *const from = vertices;
-    triangle *const to = corners;
+    nb_triangle_instance *const to = corners;
     for (int k = 0; k < 3; k++) {
         const nb_vertex *const v = &from[indices[k]];
         memcpy(to->position[k], v->position, sizeof v->position);
@@ -71,14 +71,15 @@ static void gather_triangle(const uint32_t *indices, const void *vertices, void 
 static nebel_result make_triangles(const nb_meshes *meshes, nb_mesh *mesh)
 {
     glGenVertexArrays(1, &mesh->corner_array);
-    const nebel_result result = make_buffer(meshes, mesh, &mesh->corners, sizeof(triangle));
+    const nebel_result result = make_buffer(meshes, mesh, &mesh->corners, sizeof(nb_triangle_instance));
     if (result != NEBEL_OK) return result;
     glBindVertexArray(mesh->corner_array);
-    set_attributes(NB_CORNER_POSITION, 3, 3, sizeof(triangle), offsetof(triangle, position));
-    set_attributes(NB_CORNER_NORMAL, 3, 3, sizeof(triangle), offsetof(triangle, normal));
-    set_attributes(NB_CORNER_UV, 3, 2, sizeof(triangle), offsetof(triangle, uv));
-    set_attributes(NB_CORNER_FACE, 1, 3, sizeof(triangle), offsetof(triangle, face));
-    return fill(meshes, mesh, mesh->vertices, sizeof(nb_vertex), mesh->corners, sizeof(triangle), gather_triangle);
+    set_attributes(NB_CORNER_POSITION, 3, 3, sizeof(nb_triangle_instance), offsetof(nb_triangle_instance, position));
+    set_attributes(NB_CORNER_NORMAL, 3, 3, sizeof(nb_triangle_instance), offsetof(nb_triangle_instance, normal));
+    set_attributes(NB_CORNER_UV, 3, 2, sizeof(nb_triangle_instance), offsetof(nb_triangle_instance, uv));
+    set_attributes(NB_CORNER_FACE, 1, 3, sizeof(nb_triangle_instance), offsetof(nb_triangle_instance, face));
+    return fill(meshes, mesh, mesh->vertices, sizeof(nb_vertex), mesh->corners, sizeof(nb_triangle_instance),
+                gather_triangle);
 }
 
 static void drop_triangles(nb_mesh *mesh)

@@ -10,7 +10,7 @@
 /* Of the light of fog by its place. */
 typedef struct changes {
     int by_air;
-    nb_fog_roof roof;
+    nb_cloud_shadow_extent roof;
 } changes;
 
 static nebel_result find_changes(const nebel_scene_data *scene, nebel_cloud_workspace *clouds,
@@ -41,7 +41,7 @@ static int is_diffuse(const nebel_log *log, const nebel_snapshot *fog)
 static nebel_sun dim(const nebel_scene_data *scene, nebel_sun sun)
 {
     static const double origin[3] = {0, 0, 0};
-    nb_world worlds[NEBEL_MAX_PLANETS] = {{.planet = &scene->planets[0]}};
+    nb_planet worlds[NEBEL_MAX_PLANETS] = {{.planet = &scene->planets[0]}};
     double to_sun[3] = {sun.direction[0], sun.direction[1], sun.direction[2]};
     (void)nb_vector_make_unit(to_sun);
     const int count = nb_worlds_set(worlds, scene, origin);

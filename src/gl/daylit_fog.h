@@ -9,10 +9,10 @@
 #include <nebel/scene.h>
 
 typedef struct nb_gl_daylit_fog {
-    nebel_snapshot *of, *lit; /* what was asked for last; NULL: nothing. The same in such a sun; NULL: needs none */
-    nebel_sun sun;            /* of the scene */
-    int by_air;               /* the air leaves more or less by place */
-    nb_fog_roof roof;         /* what clouds leave */
+    nebel_snapshot *of, *lit;    /* what was asked for last; NULL: nothing. The same in such a sun; NULL: needs none */
+    nebel_sun sun;               /* of the scene */
+    int by_air;                  /* the air leaves more or less by place */
+    nb_cloud_shadow_extent roof; /* what clouds leave */
 } nb_gl_daylit_fog;
 
 /* Sets daylit->lit, for `fog`, which may be NULL. `clouds`: of the scene at this time; NULL: it has none. Tells once of fog that

@@ -160,7 +160,7 @@ static void draw_meshes(const frame *f, unsigned program)
 /* Behind nearer surfaces. */
 static void draw_ground(const frame *f)
 {
-    const nb_shading *const shading = &f->renderer->shading;
+    const nb_scene_programs *const shading = &f->renderer->shading;
     const unsigned program = f->panorama ? shading->round_ground : shading->ground;
     glUseProgram(program);
     nb_frame_set_rays(f, program);
@@ -277,7 +277,7 @@ static nebel_result draw_factor(const frame *f)
 
 static void set_lamps(const frame *f, unsigned program)
 {
-    const nb_lamps *const lamps = &f->renderer->lamps;
+    const nb_light_maps *const lamps = &f->renderer->lamps;
     nb_frame_bind_texture(NB_UNIT_LAMPS, GL_TEXTURE_2D, lamps->words);
     nb_frame_bind_texture(NB_UNIT_LAMP_MAPS, GL_TEXTURE_2D_ARRAY, lamps->maps);
     glUniform1i(glGetUniformLocation(program, "lamp_count"), (GLint)f->renderer->scene->light_count);
@@ -299,19 +299,19 @@ static nebel_result draw_exact_fog(const frame *f)
     const nebel_gl_renderer *const r = f->renderer;
     const nebel_gl_pass pass = {
         .output = NEBEL_GL_OUTPUT_SPLIT, .depth_texture = f->place, .depth = {.encoding = NEBEL_DEPTH_ENCODING_RADIAL}};
-    nb_gl_picture picture = {.rays = f->rays,
-                             .width = f->view.width,
-                             .height = f->view.height,
-                             .panorama = f->panorama,
-                             .air = f->planet != NULL ? &r->air : NULL,
-                             .daylight = r->daylit.lit != NULL && r->daylit.by_air ? r->scene : NULL,
-                             .even_shade = f->even_shade,
-                             .cloud_shade = f->clouds != NULL ? &r->cloud_shade : NULL,
-                             .is_turned = f->clouds != NULL && f->place == r->cloud_ends,
-                             .shafts = f->shafts ? &r->shafts : NULL};
+    nb_fog_pass_input picture = {.rays = f->rays,
+                                 .width = f->view.width,
+                                 .height = f->view.height,
+                                 .panorama = f->panorama,
+                                 .air = f->planet != NULL ? &r->air : NULL,
+                                 .daylight = r->daylit.lit != NULL && r->daylit.by_air ? r->scene : NULL,
+                                 .even_shade = f->even_shade,
+                                 .cloud_shade = f->clouds != NULL ? &r->cloud_shade : NULL,
+                                 .is_turned = f->clouds != NULL && f->place == r->cloud_ends,
+                                 .shafts = f->shafts ? &r->shafts : NULL};
     double low[3], high[3];
     if (has_lamps(f) && r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, low, high))
-        picture.shade = (nb_gl_shade){{nb_lamp_map_text, nb_lamp_shade_text}, set_lamp_shade, f};
+        picture.shade = (nb_gl_visibility){{nb_lamp_map_text, nb_lamp_shade_text}, set_lamp_shade, f};
     if (!f->panorama && nebel_compute_view_rays(&f->sample_view, &pass.depth, &picture.rays) != NEBEL_OK)
         return NEBEL_ERROR_ARGUMENT;
     return nb_gl_draw_fog(r->eye_fog, &pass, &picture);
@@ -437,7 +437,7 @@ static void set_particles(const frame *f, const nebel_gl_fog_resources *fog, uns
     }
 }
 
-nebel_result nb_frame_find_light(const frame *f, const nebel_gl *passes, nb_light_kind kind,
+nebel_result nb_frame_find_light(const frame *f, const nebel_gl *passes, nb_composite_key kind,
                                  nebel_gl_fog_resources *fog, unsigned *program)
 {
     nebel_gl_renderer *const r = f->renderer;
@@ -470,10 +470,10 @@ nebel_result nb_frame_draw_particles(const frame *f)
     if (layers == 0) return NEBEL_OK;
     nb_renderer_judge_particles(r);
     const int has_fog = r->fog != NULL && nebel_get_volume_count(r->fog) > 0;
-    const nb_light_kind kind = {.of_particles = r->particles.profiles,
-                                .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
-                                .veil_layers = layers,
-                                .shafts = has_fog && f->shafts};
+    const nb_composite_key kind = {.of_particles = r->particles.profiles,
+                                   .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
+                                   .veil_layers = layers,
+                                   .shafts = has_fog && f->shafts};
     const nebel_result result = nb_frame_find_light(f, has_fog ? r->eye_fog : NULL, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.veil_buffer);
@@ -516,7 +516,8 @@ static nebel_result draw_dimming(const frame *f)
     nebel_gl_fog_resources fog;
     unsigned program = 0;
     if (!f->dims) return NEBEL_OK;
-    const nebel_result result = nb_frame_find_light(f, r->sun_cloud, (nb_light_kind){.of_dimming = 1}, &fog, &program);
+    const nebel_result result =
+        nb_frame_find_light(f, r->sun_cloud, (nb_composite_key){.of_dimming = 1}, &fog, &program);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.dimming_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
@@ -609,15 +610,15 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     const int is_lit = f->casts || has_lamps(f) || f->planet != NULL, dims = r->fog != NULL && !f->method.replaces_fog,
               along_sun = f->casts && f->planet == NULL;
     const nebel_gl *const passes = !is_lit || !dims ? NULL : along_sun ? r->sun_fog : r->eye_fog;
-    const nb_light_kind kind = {.sunlit = f->casts,
-                                .air = f->planet != NULL ? r->air.count : 0,
-                                .shells = f->layers != NULL,
-                                .lamplit = has_lamps(f),
-                                .dimmed = f->dims || f->clouds != NULL,
-                                .clouds = f->clouds != NULL,
-                                .in_fog = nb_frame_has_fog(f),
-                                .environment = has_environment(f),
-                                .veil_layers = nb_frame_count_veil_layers(f)};
+    const nb_composite_key kind = {.sunlit = f->casts,
+                                   .air = f->planet != NULL ? r->air.count : 0,
+                                   .shells = f->layers != NULL,
+                                   .lamplit = has_lamps(f),
+                                   .dimmed = f->dims || f->clouds != NULL,
+                                   .clouds = f->clouds != NULL,
+                                   .in_fog = nb_frame_has_fog(f),
+                                   .environment = has_environment(f),
+                                   .veil_layers = nb_frame_count_veil_layers(f)};
     const nebel_result result = nb_frame_find_light(f, passes, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     start_picture(f, sample);
@@ -629,7 +630,7 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
 
 /* ---- the frame ------------------------------------------------------------------------------- */
 
-static nebel_result set_sample(frame *f, nb_pixel_point point)
+static nebel_result set_sample(frame *f, nb_pixel_position point)
 {
     f->point = point;
     if (f->panorama) {
@@ -645,7 +646,7 @@ static nebel_result set_sample(frame *f, nb_pixel_point point)
 /* Fog among them is found along the rays that they are found along. */
 static nebel_result trace_clouds(frame *f)
 {
-    const nb_pixel_point point = f->point;
+    const nb_pixel_position point = f->point;
     nebel_result result = set_sample(f, nb_pixel_sample(0, 1));
     if (result == NEBEL_OK) result = nb_frame_trace_clouds(f);
     return result == NEBEL_OK ? set_sample(f, point) : result;

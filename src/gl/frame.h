@@ -13,7 +13,7 @@ typedef struct nb_gl_frame {
     const nebel_gl_frame_desc *desc;
     double ahead; /* how far before the camera the eye is [m] */
     uint32_t samples, done;
-    nb_lighting light;
+    nb_surface_lighting light;
     double eye[3];
     int panorama;
     const nebel_planet *planet;          /* with air; NULL: none */
@@ -25,7 +25,7 @@ typedef struct nb_gl_frame {
     nb_method method;
     double reach;            /* [m]: 1, or how far models are, where they are nearer */
     nebel_view view;         /* through the pixels' centres; of a panorama without clip_from_eye */
-    nb_pixel_point point;    /* of the present sample */
+    nb_pixel_position point; /* of the present sample */
     nebel_view sample_view;  /* through that */
     nebel_rays rays;         /* of sample_view, or of the panorama */
     nebel_view sun_view;     /* of all that is seen, against the sun's light */
@@ -58,7 +58,7 @@ nebel_result nb_frame_draw_particles(const nb_gl_frame *f);
 int nb_frame_count_veil_layers(const nb_gl_frame *f);
 
 /* The program that asks the fog of `passes`, NULL: none, and that fog. The kind is given but for its fog. */
-nebel_result nb_frame_find_light(const nb_gl_frame *f, const nebel_gl *passes, nb_light_kind kind,
+nebel_result nb_frame_find_light(const nb_gl_frame *f, const nebel_gl *passes, nb_composite_key kind,
                                  nebel_gl_fog_resources *fog, unsigned *program);
 
 /* ---- the sun --------------------------------------------------------------------------------- */

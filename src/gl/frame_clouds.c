@@ -38,7 +38,7 @@ static nebel_result ask(void *user)
     return nb_frame_ask(user);
 }
 
-static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, nb_pixel_point point)
+static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, nb_pixel_position point)
 {
     const nebel_scene_data *const scene = f->renderer->scene;
     nebel_sun sun = nb_scene_sun(scene);
@@ -143,7 +143,7 @@ static nebel_result find_shade(nb_gl_frame *f)
 static nebel_result draw_shade(nb_gl_frame *f, const nb_cloud_picture *picture)
 {
     nebel_gl_renderer *const r = f->renderer;
-    const nb_fog_roof *const roof = r->cloud_shade.clear_sky > 0 ? &r->daylit.roof : NULL;
+    const nb_cloud_shadow_extent *const roof = r->cloud_shade.clear_sky > 0 ? &r->daylit.roof : NULL;
     const size_t texels = count_pixels(f) * (roof != NULL ? NB_CLOUD_SHADE_LAYERS : NB_AIR_SHADE_LAYERS);
     uint32_t layers, *const words = nb_allocate(&r->allocator, texels, NB_CLOUD_SHADE_WORDS * sizeof *words);
     if (words == NULL) return NEBEL_ERROR_MEMORY;

@@ -4,7 +4,7 @@
 #include "base/camera.h"
 
 /* Depth along the view of the nearest of some places. */
-static double least_depth(const nb_axes *axes, const double from[3], const double low[3], const double high[3])
+static double least_depth(const nb_camera_axes *axes, const double from[3], const double low[3], const double high[3])
 {
     double depth = 0;
     for (int i = 0; i < 3; i++)
@@ -12,7 +12,7 @@ static double least_depth(const nb_axes *axes, const double from[3], const doubl
     return depth;
 }
 
-static double depth_of_particles(const nb_particles *particles, const nb_axes *axes, const double from[3])
+static double depth_of_particles(const nb_particles *particles, const nb_camera_axes *axes, const double from[3])
 {
     double least = HUGE_VAL;
     for (size_t i = 0; i < particles->count; i++) {
@@ -33,7 +33,7 @@ static double depth_of_fog(const nebel_gl_renderer *r, const nebel_gl_frame_desc
 }
 
 /* Before surfaces there is room for the rounding of their places, lest they are behind the eye. */
-static double depth_of_meshes(const nb_meshes *meshes, const nb_axes *axes, const double from[3])
+static double depth_of_meshes(const nb_meshes *meshes, const nb_camera_axes *axes, const double from[3])
 {
     double extent = 0;
     if (!(meshes->low[0] <= meshes->high[0])) return HUGE_VAL;
@@ -51,7 +51,7 @@ static int may_go(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 double nb_frame_go_near(const nebel_gl_renderer *r, nebel_camera *camera, const nebel_gl_frame_desc *desc)
 {
     const nebel_log silent = {0};
-    nb_axes axes;
+    nb_camera_axes axes;
     if (!may_go(r, desc) || nb_camera_find_axes(camera, &silent, &axes) != NEBEL_OK) return 0;
     double ahead = depth_of_meshes(&r->meshes, &axes, camera->position);
     ahead = fmin(ahead, depth_of_particles(&r->particles, &axes, camera->position));

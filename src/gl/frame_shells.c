@@ -143,7 +143,7 @@ static void draw_side(const nb_gl_frame *f, uint32_t number, int is_far)
 static nebel_result lay_over(const nb_gl_frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
-    const nb_light_kind kind = {
+    const nb_composite_key kind = {
         .of_shells = 1, .in_fog = nb_frame_has_fog(f), .veil_layers = nb_frame_count_veil_layers(f)};
     nebel_gl_fog_resources fog;
     unsigned program = 0;

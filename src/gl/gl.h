@@ -20,7 +20,7 @@ struct nebel_gl {
     uint32_t texture_rows, voxel_rows, node_rows, tile_rows; /* allocated */
     nb_environment environment;
     nb_programs programs;
-    nb_steps steps;
+    nb_fog_passes steps;
 
     const nebel_gl *lender;    /* set earlier in a frame: its voxels serve where they are the same; NULL: none */
     int dims_alone;            /* the fog is asked for transmittance alone: nothing of it is mixed */
@@ -47,29 +47,29 @@ nebel_result nb_gl_set_fog_around(nebel_gl *gl, nebel_snapshot *snapshot, const 
 
 /* What keeps light away from fog, as the fog's text asks for it (NEBEL_LIGHT_VISIBILITY). `set` sets the uniforms of a program
  * that is current. */
-typedef struct nb_gl_shade {
+typedef struct nb_gl_visibility {
     const char *texts[2]; /* before that of the fog; they live for ever. NULL: none */
     void (*set)(const void *of, unsigned program);
     const void *of;
-} nb_gl_shade;
+} nb_gl_visibility;
 
 /* What a pass is drawn along: rays of another view, or panorama, than the fog was set for, whose pixels lie within
  * those of that. */
-typedef struct nb_gl_picture {
+typedef struct nb_fog_pass_input {
     nebel_rays rays; /* of a panorama: its words */
     uint32_t width, height;
     int panorama;
-    nb_gl_shade shade;
+    nb_gl_visibility shade;
     const struct nb_gl_air *air;      /* on NB_UNIT_AIR, for the same eye; one sample a pixel. NULL: none */
     const nebel_scene_data *daylight; /* whose sun lights fog in that air, by its place; NULL: the fog's own sun does */
     float even_shade;                 /* part of that sun that clouds leave */
     const struct nb_gl_cloud_shade *cloud_shade; /* of clouds; NULL: there are none */
     int is_turned; /* behind its distances the depth texture has the directions of rays; with cloud_shade only */
-    const struct nb_shafts *shafts; /* where surfaces shade fog; NULL: nowhere. Changes their units */
-} nb_gl_picture;
+    const struct nb_shaft_maps *shafts; /* where surfaces shade fog; NULL: nowhere. Changes their units */
+} nb_fog_pass_input;
 
 /* nebel_gl_draw_fog along these. */
-nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nb_gl_picture *picture);
+nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nb_fog_pass_input *picture);
 
 /* Tells once, of fog that is crowded, what this driver leaves out of its light, and `why`. */
 void nb_gl_warn_of_turns(nebel_gl *gl, const char *why);

@@ -63,7 +63,7 @@ static int is_in_fog(const nebel_light *lamp, const nebel_snapshot *fog, size_t 
            radius == lamp->radius;
 }
 
-static void fill_words(nb_lamps *lamps, uint32_t rows)
+static void fill_words(nb_light_maps *lamps, uint32_t rows)
 {
     if (lamps->words == 0) {
         glGenTextures(1, &lamps->words);
@@ -80,7 +80,7 @@ static void fill_words(nb_lamps *lamps, uint32_t rows)
     glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, NEBEL_TEXTURE_WIDTH, (GLsizei)rows, GL_RGBA, GL_FLOAT, lamps->texels);
 }
 
-static int make_room(nb_lamps *lamps, const nebel_allocator *allocator, uint32_t rows)
+static int make_room(nb_light_maps *lamps, const nebel_allocator *allocator, uint32_t rows)
 {
     const size_t wanted = (size_t)rows * (NEBEL_TEXTURE_WIDTH / NB_LAMP_TEXELS);
     if (wanted <= lamps->capacity) return 1;
@@ -125,21 +125,21 @@ static size_t choose_lamps(const nebel_scene_data *scene, const double eye[3], s
     return room;
 }
 
-static uint32_t face_for(const nb_lamps *lamps, size_t count)
+static uint32_t face_for(const nb_light_maps *lamps, size_t count)
 {
     uint32_t face = lamps->most_face;
     while (face > LEAST_FACE && count * FACES * face * face > MOST_TEXELS) face /= 2;
     return face;
 }
 
-static void delete_maps(nb_lamps *lamps)
+static void delete_maps(nb_light_maps *lamps)
 {
     glDeleteFramebuffers(1, &lamps->buffer);
     glDeleteTextures(1, &lamps->maps);
     lamps->maps = lamps->buffer = 0;
 }
 
-static int resize(nb_lamps *lamps, const nebel_allocator *allocator, size_t count)
+static int resize(nb_light_maps *lamps, const nebel_allocator *allocator, size_t count)
 {
     const uint32_t face = face_for(lamps, count);
     if (count == lamps->layer_count && face == lamps->face) return 1;
@@ -151,14 +151,14 @@ static int resize(nb_lamps *lamps, const nebel_allocator *allocator, size_t coun
     return lamps->layer_count == count;
 }
 
-static int shows(const nb_lamp_source *source, const nebel_light *lamp)
+static int shows(const nb_light_map_source *source, const nebel_light *lamp)
 {
     return source->is_drawn && memcmp(source->place, lamp->position, sizeof source->place) == 0 &&
            memcmp(&source->radius, &lamp->radius, sizeof source->radius) == 0;
 }
 
 /* Lamps whose maps are there keep them; others take the layers that are left. */
-static void assign_layers(nb_lamps *lamps, const nebel_scene_data *scene, const candidate *list)
+static void assign_layers(nb_light_maps *lamps, const nebel_scene_data *scene, const candidate *list)
 {
     const size_t count = lamps->layer_count;
     for (size_t i = 0; i < scene->light_count; i++) lamps->layers[i] = -1;
@@ -182,7 +182,7 @@ static void assign_layers(nb_lamps *lamps, const nebel_scene_data *scene, const 
     }
 }
 
-static int choose_layers(nb_lamps *lamps, const nebel_allocator *allocator, const nebel_scene_data *scene,
+static int choose_layers(nb_light_maps *lamps, const nebel_allocator *allocator, const nebel_scene_data *scene,
                          const double eye[3])
 {
     GLint most = 0;
@@ -197,7 +197,7 @@ static int choose_layers(nb_lamps *lamps, const nebel_allocator *allocator, cons
     return good;
 }
 
-nebel_result nb_lamps_set(nb_lamps *lamps, const nebel_allocator *allocator, const nebel_log *log,
+nebel_result nb_lamps_set(nb_light_maps *lamps, const nebel_allocator *allocator, const nebel_log *log,
                           const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3])
 {
     const uint32_t rows = (uint32_t)(scene->light_count * NB_LAMP_TEXELS / NEBEL_TEXTURE_WIDTH + 1);
@@ -219,7 +219,7 @@ nebel_result nb_lamps_set(nb_lamps *lamps, const nebel_allocator *allocator, con
 
 /* ---- maps ------------------------------------------------------------------------------------ */
 
-static nebel_result make_maps(nb_lamps *lamps, const nebel_log *log)
+static nebel_result make_maps(nb_light_maps *lamps, const nebel_log *log)
 {
     const GLenum none = GL_NONE;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_LAMP_MAPS);
@@ -255,7 +255,7 @@ static int is_in_face(const float low[3], const float high[3], int face, float w
     return 1;
 }
 
-static void draw_face(const nb_lamps *lamps, const nb_lamp_source *source, int face, unsigned program,
+static void draw_face(const nb_light_maps *lamps, const nb_light_map_source *source, int face, unsigned program,
                       const nb_meshes *meshes)
 {
     const float share = 1 - 2.f * NB_LAMP_BORDER / (float)lamps->face;
@@ -283,7 +283,7 @@ static void draw_face(const nb_lamps *lamps, const nb_lamp_source *source, int f
     }
 }
 
-static void draw_layer(const nb_lamps *lamps, const nb_context *context, size_t layer, unsigned program,
+static void draw_layer(const nb_light_maps *lamps, const nb_context *context, size_t layer, unsigned program,
                        const nb_meshes *meshes)
 {
     static const GLfloat empty = 0;
@@ -297,7 +297,7 @@ static void draw_layer(const nb_lamps *lamps, const nb_context *context, size_t 
     }
 }
 
-nebel_result nb_lamps_draw(nb_lamps *lamps, const nb_context *context, const nebel_log *log, unsigned program,
+nebel_result nb_lamps_draw(nb_light_maps *lamps, const nb_context *context, const nebel_log *log, unsigned program,
                            const nb_meshes *meshes)
 {
     if (lamps->layer_count == 0) return NEBEL_OK;
@@ -320,14 +320,14 @@ nebel_result nb_lamps_draw(nb_lamps *lamps, const nb_context *context, const neb
     return NEBEL_OK;
 }
 
-void nb_lamps_delete(const nb_lamps *lamps)
+void nb_lamps_delete(const nb_light_maps *lamps)
 {
     glDeleteFramebuffers(1, &lamps->buffer);
     glDeleteTextures(1, &lamps->maps);
     glDeleteTextures(1, &lamps->words);
 }
 
-void nb_lamps_release(const nebel_allocator *allocator, const nb_lamps *lamps)
+void nb_lamps_release(const nebel_allocator *allocator, const nb_light_maps *lamps)
 {
     nb_release(allocator, lamps->sources);
     nb_release(allocator, lamps->texels);

@@ -11,36 +11,36 @@ enum { NB_LAMPS_MOST = 4096, NB_LAMP_BORDER = 4 };
 #define NB_LAMP_TEXELS 4 /* a part of a shader's text, too */
 
 /* What a layer of the maps shows: surfaces around a place, none nearer than the radius. */
-typedef struct nb_lamp_source {
+typedef struct nb_light_map_source {
     double place[3], radius;
     int is_drawn;
-} nb_lamp_source;
+} nb_light_map_source;
 
-typedef struct nb_lamps {
+typedef struct nb_light_maps {
     unsigned words; /* texture of NB_LAMP_TEXELS texels for each lamp, see nb_lamp_text; 0: not made yet */
     uint32_t rows;
     unsigned maps, buffer;    /* array of depth: a layer for each source, six faces, three by two; 0: not made yet */
     uint32_t most_face, face; /* texels of a face's side */
     size_t layer_count;
-    nb_lamp_source *sources; /* of the layers */
-    float *texels;           /* of the words */
-    int *layers;             /* of the lamps, -1: none */
-    size_t capacity;         /* of the two */
-} nb_lamps;
+    nb_light_map_source *sources; /* of the layers */
+    float *texels;                /* of the words */
+    int *layers;                  /* of the lamps, -1: none */
+    size_t capacity;              /* of the two */
+} nb_light_maps;
 
 /* Makes the words of a scene's lamps, and of those of the fog (NULL: none) that are the same, as seen from an eye, and chooses which of them have maps: all that shine while
  * there is room, then those that are brightest at the eye. Changes the bindings of TEXTURE_2D on the active unit. LIMIT,
  * MEMORY. */
-nebel_result nb_lamps_set(nb_lamps *lamps, const nebel_allocator *allocator, const nebel_log *log,
+nebel_result nb_lamps_set(nb_light_maps *lamps, const nebel_allocator *allocator, const nebel_log *log,
                           const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3]);
 
-/* Draws the maps that are not there yet. `program` is nb_shading.lamp_map. Depth is tested afterwards. MEMORY. */
-nebel_result nb_lamps_draw(nb_lamps *lamps, const nb_context *context, const nebel_log *log, unsigned program,
+/* Draws the maps that are not there yet. `program` is nb_scene_programs.lamp_map. Depth is tested afterwards. MEMORY. */
+nebel_result nb_lamps_draw(nb_light_maps *lamps, const nb_context *context, const nebel_log *log, unsigned program,
                            const nb_meshes *meshes);
 
 /* In OpenGL; then in memory. */
-void nb_lamps_delete(const nb_lamps *lamps);
-void nb_lamps_release(const nebel_allocator *allocator, const nb_lamps *lamps);
+void nb_lamps_delete(const nb_light_maps *lamps);
+void nb_lamps_release(const nebel_allocator *allocator, const nb_light_maps *lamps);
 
 /* The programs that make the maps, and functions that read them and the words: lamp_visible; lamplight; what
  * nebel_get_shader_source asks of surfaces, to stand before it. The last two behind the first. */

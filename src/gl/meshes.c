@@ -70,13 +70,13 @@ static nebel_result check_mesh(const nb_meshes *meshes, const nebel_scene_data *
 /* ---- vertices -------------------------------------------------------------------------------- */
 
 /* A mesh on its way to OpenGL. */
-typedef struct draft {
+typedef struct nb_gl_mesh_builder {
     const nebel_mesh *mesh;
     nb_mesh *made;
     nb_vertex *vertices;
     uint32_t *indices;
     size_t vertex_count, index_count;
-} draft;
+} nb_gl_mesh_builder;
 
 static const float *position_of(const nebel_mesh *mesh, uint32_t index)
 {
@@ -143,7 +143,7 @@ static double longest_edge(const nebel_mesh *mesh, const uint32_t *corners)
     return longest;
 }
 
-static void add_triangle(draft *d, const uint32_t *corners)
+static void add_triangle(nb_gl_mesh_builder *d, const uint32_t *corners)
 {
     const nebel_mesh *const mesh = d->mesh;
     nb_vertex last = vertex_of(mesh, corners[2]);
@@ -192,7 +192,7 @@ static nebel_result find_large(const nb_meshes *meshes, const nebel_mesh *mesh, 
     return NEBEL_OK;
 }
 
-static void fill(draft *d)
+static void fill(nb_gl_mesh_builder *d)
 {
     const nebel_mesh *const mesh = d->mesh;
     for (int i = 0; i < 3; i++) {
@@ -211,7 +211,7 @@ static void set_attribute(GLuint place, GLint size, size_t offset)
     glVertexAttribPointer(place, size, GL_FLOAT, GL_FALSE, sizeof(nb_vertex), (const void *)offset);
 }
 
-static nebel_result upload(const nb_meshes *meshes, const draft *d)
+static nebel_result upload(const nb_meshes *meshes, const nb_gl_mesh_builder *d)
 {
     nb_mesh *const made = d->made;
     glGenVertexArrays(1, &made->vertex_array);
@@ -234,7 +234,7 @@ static nebel_result upload(const nb_meshes *meshes, const draft *d)
 static nebel_result make_mesh(nb_meshes *meshes, const nebel_mesh *mesh, nb_mesh *made)
 {
     const size_t triangles = mesh->triangle_count;
-    draft d = {.mesh = mesh, .made = made};
+    nb_gl_mesh_builder d = {.mesh = mesh, .made = made};
     d.vertices = nb_allocate(&meshes->allocator, mesh->vertex_count + triangles, sizeof *d.vertices);
     d.indices = nb_allocate(&meshes->allocator, 3 * triangles, sizeof *d.indices);
     const int room = d.vertices != NULL && d.indices != NULL;

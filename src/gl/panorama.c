@@ -113,7 +113,7 @@ const char nb_panorama_tile_text[] =
 
 /* ---- numbers --------------------------------------------------------------------------------- */
 
-void nb_panorama_rays(const nebel_view *view, const double eye[3], nb_pixel_point point, nebel_rays *rays)
+void nb_panorama_rays(const nebel_view *view, const double eye[3], nb_pixel_position point, nebel_rays *rays)
 {
     const double *const axes = view->eye_from_world;
     const double step[2] = {4. / view->width, 2. / view->height};

@@ -23,7 +23,7 @@ enum { NB_PANORAMA_STRIP = 10 };
  *
  *     0: longitude and latitude of the pixels' corner at (0, 0); 1: what they grow by from pixel to pixel
  *     3, 4, 5: forward, right, up */
-void nb_panorama_rays(const nebel_view *view, const double eye[3], nb_pixel_point point, nebel_rays *rays);
+void nb_panorama_rays(const nebel_view *view, const double eye[3], nb_pixel_position point, nebel_rays *rays);
 
 /* The direction through a place of the picture, as the text has it. */
 void nb_panorama_direction(const nebel_rays *rays, double x, double y, double direction[3]);

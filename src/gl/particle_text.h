@@ -1,5 +1,5 @@
 /* What the programs of particles are made of: behind a head that defines SCENE_PARTICLES and SCENE_VEIL_LAYERS, see
- * nb_light_kind, and the texts of rays and fog. */
+ * nb_composite_key, and the texts of rays and fog. */
 #ifndef NB_GL_PARTICLE_TEXT_H
 #define NB_GL_PARTICLE_TEXT_H
 

@@ -80,9 +80,9 @@ nebel_result nb_particles_commit(const nb_particles *particles, const nebel_allo
     return result;
 }
 
-static nb_ball ball_of(const nebel_particle *p, const double eye[3])
+static nb_particle_sphere ball_of(const nebel_particle *p, const double eye[3])
 {
-    nb_ball ball = {.radius = (float)p->radius, .profile = (float)p->profile};
+    nb_particle_sphere ball = {.radius = (float)p->radius, .profile = (float)p->profile};
     for (int i = 0; i < 3; i++) {
         ball.center[i] = (float)(p->center[i] - eye[i]);
         ball.extinction[i] = (float)p->extinction[i];
@@ -111,7 +111,7 @@ static uint32_t nearness_of(float distance)
 }
 
 /* Counts what there is of each digit, then puts all in place: stable. */
-static void sort_by_digit(const nb_far *from, nb_far *to, size_t count, int shift)
+static void sort_by_digit(const nb_sorted_particle *from, nb_sorted_particle *to, size_t count, int shift)
 {
     enum { DIGITS = 2048 };
     uint32_t next[DIGITS] = {0}, sum = 0;
@@ -127,10 +127,10 @@ static void sort_by_digit(const nb_far *from, nb_far *to, size_t count, int shif
 /* From the farthest to the nearest. */
 static void sort_balls(nb_particles *particles, const double eye[3], const double *forward)
 {
-    nb_far *const first = particles->order[0], *const second = particles->order[1];
+    nb_sorted_particle *const first = particles->order[0], *const second = particles->order[1];
     for (size_t i = 0; i < particles->count; i++) {
         const float distance = distance_of(&particles->list[i], eye, forward);
-        first[i] = (nb_far){nearness_of(distance), (uint32_t)i};
+        first[i] = (nb_sorted_particle){nearness_of(distance), (uint32_t)i};
     }
     sort_by_digit(first, second, particles->count, 0);
     sort_by_digit(second, first, particles->count, 11);
@@ -147,7 +147,8 @@ static void make_objects(nb_particles *particles)
     glBindBuffer(GL_ARRAY_BUFFER, particles->buffer);
     for (GLuint i = 0; i < 3; i++) {
         glEnableVertexAttribArray(i);
-        glVertexAttribPointer(i, 4, GL_FLOAT, GL_FALSE, sizeof(nb_ball), (const void *)(i * 4 * sizeof(float)));
+        glVertexAttribPointer(i, 4, GL_FLOAT, GL_FALSE, sizeof(nb_particle_sphere),
+                              (const void *)(i * 4 * sizeof(float)));
         glVertexAttribDivisor(i, 1);
     }
 }

@@ -7,21 +7,21 @@
 #include <nebel/gl_render.h>
 
 /* As the eye sees one. */
-typedef struct nb_ball {
+typedef struct nb_particle_sphere {
     float center[3], radius; /* relative to the eye */
     float extinction[3], profile;
     float emission[3], rest;
-} nb_ball;
+} nb_particle_sphere;
 
 /* How far one is, as bits that count down with the distance. */
-typedef struct nb_far {
+typedef struct nb_sorted_particle {
     uint32_t nearness, index;
-} nb_far;
+} nb_sorted_particle;
 
 typedef struct nb_particles {
-    nebel_particle *list; /* in the world */
-    nb_ball *balls;       /* as they are drawn */
-    nb_far *order[2];     /* with one to sort into */
+    nebel_particle *list;         /* in the world */
+    nb_particle_sphere *balls;    /* as they are drawn */
+    nb_sorted_particle *order[2]; /* with one to sort into */
     size_t count;
     int is_grey;  /* every one takes all colours alike */
     int profiles; /* 2 to the number of each that occurs */

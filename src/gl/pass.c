@@ -10,12 +10,12 @@ typedef struct size {
 } size;
 
 /* The host's state is saved around this. */
-typedef struct task {
+typedef struct nb_pass_task {
     nebel_gl *gl;
     const nebel_gl_pass *pass;
-    const nb_gl_picture *picture;
+    const nb_fog_pass_input *picture;
     const nb_program *program;
-} task;
+} nb_pass_task;
 
 static nebel_result fail(const nebel_gl *gl, nebel_result result, const char *what)
 {
@@ -69,7 +69,7 @@ static nebel_result check_output(const nebel_gl *gl, const nebel_gl_pass *pass)
 }
 
 /* With the texture bound to the active unit. OpenGL ES 3.0 does not tell sizes. */
-static nebel_result check_size(const task *t, GLenum target, const char *name)
+static nebel_result check_size(const nb_pass_task *t, GLenum target, const char *name)
 {
     const nebel_gl *const gl = t->gl;
     const nebel_gl_pass *const pass = t->pass;
@@ -183,7 +183,7 @@ static void bind_host_texture(const nebel_gl *gl, GLuint unit, GLenum target, un
     glBindTexture(target, texture);
 }
 
-static nebel_result bind_textures(const task *t)
+static nebel_result bind_textures(const nb_pass_task *t)
 {
     const nebel_gl *const gl = t->gl;
     const GLenum target = t->pass->samples > 1 ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D;
@@ -228,7 +228,7 @@ static void read_places(nebel_gl *gl, const nebel_gl_pass *pass, GLfloat places[
     for (GLuint i = 0; i < pass->samples && !known; i++) places[i][0] = places[i][1] = .5f;
 }
 
-static void set_samples(const task *t, GLuint target_framebuffer)
+static void set_samples(const nb_pass_task *t, GLuint target_framebuffer)
 {
     GLfloat places[NB_SAMPLES_MOST][2] = {{0}};
     read_places(t->gl, t->pass, places);
@@ -237,7 +237,7 @@ static void set_samples(const task *t, GLuint target_framebuffer)
     glUniform2fv(t->program->sample_places, (GLsizei)t->pass->samples, places[0]);
 }
 
-static void set_tiling(const task *t)
+static void set_tiling(const nb_pass_task *t)
 {
     const nebel_gl *const gl = t->gl;
     const GLint columns = (GLint)gl->fog.tile_columns;
@@ -250,12 +250,12 @@ static void set_tiling(const task *t)
 }
 
 /* Fog, by clouds and by its place. */
-static int is_shaded(const nb_gl_picture *picture)
+static int is_shaded(const nb_fog_pass_input *picture)
 {
     return picture->cloud_shade != NULL && picture->cloud_shade->clear_sky > 0;
 }
 
-static void set_uniforms(const task *t, GLuint target_framebuffer)
+static void set_uniforms(const nb_pass_task *t, GLuint target_framebuffer)
 {
     const nb_program *const p = t->program;
     glUniform4fv(p->rays, NEBEL_RAY_TEXELS, t->picture->rays.texels[0].v);
@@ -274,7 +274,7 @@ static void set_uniforms(const task *t, GLuint target_framebuffer)
     if (t->picture->shafts != NULL) nb_shafts_set(t->picture->shafts, p->name);
 }
 
-static void draw_triangles(const task *t)
+static void draw_triangles(const nb_pass_task *t)
 {
     const uint32_t turns = is_by_sample(t->pass) ? t->pass->samples : 1;
     for (uint32_t i = 0; i < turns; i++) {
@@ -287,7 +287,7 @@ static void draw_triangles(const task *t)
 }
 
 /* What is drawn next goes there. */
-static void set_target(const task *t, const nb_band *band)
+static void set_target(const nb_pass_task *t, const nb_pass_band *band)
 {
     const nb_context *const context = &t->gl->context;
     nb_state_clear(context, band->x, band->y, band->width, band->height);
@@ -295,11 +295,11 @@ static void set_target(const task *t, const nb_band *band)
     if (t->pass->output == NEBEL_GL_OUTPUT_BLEND_GRAY) nb_state_blend(context, GL_ONE, GL_SRC_ALPHA);
 }
 
-static nebel_result draw(const task *t, GLuint target_framebuffer)
+static nebel_result draw(const nb_pass_task *t, GLuint target_framebuffer)
 {
     const nebel_result result = bind_textures(t);
     if (result != NEBEL_OK) return result;
-    set_target(t, &(nb_band){t->pass->x, t->pass->y, t->picture->width, t->picture->height});
+    set_target(t, &(nb_pass_band){t->pass->x, t->pass->y, t->picture->width, t->picture->height});
     glUseProgram(t->program->name);
     glBindVertexArray(t->gl->vertex_array);
     set_uniforms(t, target_framebuffer);
@@ -310,7 +310,7 @@ static nebel_result draw(const task *t, GLuint target_framebuffer)
 /* ---- in steps -------------------------------------------------------------------------------- */
 
 /* Samples of a pixel, and pieces of air, share its turns. */
-static int is_in_steps(const task *t)
+static int is_in_steps(const nb_pass_task *t)
 {
     return t->gl->may_tire && t->pass->samples <= 1 && t->picture->air == NULL;
 }
@@ -331,7 +331,7 @@ void nb_gl_warn_of_turns(nebel_gl *gl, const char *why)
 /* Units that have textures of several layers while steps are drawn. */
 static const GLenum layered[] = {GL_TEXTURE0 + NB_UNIT_COLOR, GL_TEXTURE0 + NB_UNIT_DEPTH};
 
-static nebel_result fit_steps(const task *t, uint32_t rows)
+static nebel_result fit_steps(const nb_pass_task *t, uint32_t rows)
 {
     nebel_gl *const gl = t->gl;
     nb_unpacking unpacking;
@@ -343,7 +343,7 @@ static nebel_result fit_steps(const task *t, uint32_t rows)
     return result;
 }
 
-static nebel_result draw_bands(const task *t, GLuint target_framebuffer)
+static nebel_result draw_bands(const nb_pass_task *t, GLuint target_framebuffer)
 {
     nebel_gl *const gl = t->gl;
     const uint32_t height = t->picture->height, rows = nb_steps_rows(t->picture->width, height);
@@ -352,7 +352,8 @@ static nebel_result draw_bands(const task *t, GLuint target_framebuffer)
     if (result == NEBEL_OK) result = bind_textures(t);
     glBindVertexArray(gl->vertex_array);
     for (uint32_t y = 0; y < height && result == NEBEL_OK; y += rows) {
-        const nb_band band = {t->pass->x, t->pass->y + y, t->picture->width, height - y < rows ? height - y : rows};
+        const nb_pass_band band = {t->pass->x, t->pass->y + y, t->picture->width,
+                                   height - y < rows ? height - y : rows};
         glUseProgram(t->program->name);
         set_uniforms(t, target_framebuffer);
         if (nb_steps_trace(&gl->steps, &gl->context, t->program->name, &band)) is_cut = 1;
@@ -364,7 +365,7 @@ static nebel_result draw_bands(const task *t, GLuint target_framebuffer)
     return result;
 }
 
-static nebel_result draw_in_steps(const task *t, GLuint target_framebuffer)
+static nebel_result draw_in_steps(const nb_pass_task *t, GLuint target_framebuffer)
 {
     GLint bound[2];
     for (int i = 0; i < 2; i++) {
@@ -379,7 +380,7 @@ static nebel_result draw_in_steps(const task *t, GLuint target_framebuffer)
     return result;
 }
 
-static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
+static nebel_result draw_with_program(nb_pass_task *t, GLuint target_framebuffer)
 {
     nebel_gl *const gl = t->gl;
     const int in_steps = is_in_steps(t);
@@ -437,20 +438,20 @@ nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass)
     if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
     if (pass == NULL) return fail(gl, NEBEL_ERROR_ARGUMENT, "the pass is missing");
     if (!gl->has_fog) return fail(gl, NEBEL_ERROR_ARGUMENT, "call nebel_gl_set_fog first");
-    nb_gl_picture picture = {.width = gl->views[0].width, .height = gl->views[0].height};
+    nb_fog_pass_input picture = {.width = gl->views[0].width, .height = gl->views[0].height};
     if (nebel_compute_view_rays(&gl->views[0], &pass->depth, &picture.rays) != NEBEL_OK) {
         return fail(gl, NEBEL_ERROR_ARGUMENT, find_depth_fault(&gl->views[0], &pass->depth));
     }
     return nb_gl_draw_fog(gl, pass, &picture);
 }
 
-nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nb_gl_picture *picture)
+nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nb_fog_pass_input *picture)
 {
     nebel_result result = nb_context_check(&gl->log, gl->vertex_array);
     if (result == NEBEL_OK) result = check_pass(gl, pass);
     if (result != NEBEL_OK) return result;
-    task t = {.gl = gl, .pass = pass, .picture = picture};
-    nb_state state;
+    nb_pass_task t = {.gl = gl, .pass = pass, .picture = picture};
+    nb_gl_state state;
     nb_state_save(&gl->context, &state);
     result = draw_with_program(&t, (GLuint)state.framebuffer);
     nb_state_restore(&gl->context, &state);

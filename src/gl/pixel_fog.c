@@ -6,7 +6,7 @@
 #include <math.h>
 
 /* What a picture is made in: texels of distances become texels of light. */
-typedef struct work {
+typedef struct nb_pixel_fog_work {
     const nb_targets *targets;
     const nebel_rays *rays;
     const nb_vertex_source *source;
@@ -14,10 +14,10 @@ typedef struct work {
     float (*transmittance)[4]; /* of the picture */
     float (*places)[3];        /* of a row, from the eye */
     float (*fog)[4];           /* of a row */
-} work;
+} nb_pixel_fog_work;
 
 /* As the texts of the shaders have it. */
-static void find_ray(const work *w, double x, double y, double origin[3], double direction[3])
+static void find_ray(const nb_pixel_fog_work *w, double x, double y, double origin[3], double direction[3])
 {
     const nebel_texel_f32 *const words = w->rays->texels;
     double length2 = 0;
@@ -29,7 +29,7 @@ static void find_ray(const work *w, double x, double y, double origin[3], double
     for (int i = 0; i < 3; i++) direction[i] /= sqrt(length2);
 }
 
-static void find_place(const work *w, uint32_t x, uint32_t y, float t, float place[3])
+static void find_place(const nb_pixel_fog_work *w, uint32_t x, uint32_t y, float t, float place[3])
 {
     double origin[3] = {0, 0, 0}, direction[3];
     if (w->source->projection == NEBEL_PROJECTION_PANORAMA)
@@ -40,7 +40,7 @@ static void find_place(const work *w, uint32_t x, uint32_t y, float t, float pla
 }
 
 /* Where there is no surface there is no fog. */
-static nebel_result set_row(const work *w, uint32_t y)
+static nebel_result set_row(const nb_pixel_fog_work *w, uint32_t y)
 {
     const uint32_t width = w->targets->width;
     const size_t first = (size_t)y * width;
@@ -66,7 +66,7 @@ static void upload(const nb_targets *t, unsigned texture, const float (*texels)[
     glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, (GLsizei)t->width, (GLsizei)t->height, GL_RGBA, GL_FLOAT, texels);
 }
 
-static nebel_result set_picture(const work *w)
+static nebel_result set_picture(const nb_pixel_fog_work *w)
 {
     const nb_targets *const t = w->targets;
     nebel_result result = NEBEL_OK;
@@ -83,7 +83,7 @@ static nebel_result set_picture(const work *w)
 nebel_result nb_pixel_fog_set(const nb_targets *targets, const nebel_allocator *allocator, const nebel_log *log,
                               const nebel_rays *rays, const nb_vertex_source *source)
 {
-    work w = {.targets = targets, .rays = rays, .source = source};
+    nb_pixel_fog_work w = {.targets = targets, .rays = rays, .source = source};
     const size_t pixels = (size_t)targets->width * targets->height;
     w.texels = nb_allocate(allocator, pixels, sizeof *w.texels);
     w.transmittance = nb_allocate(allocator, pixels, sizeof *w.transmittance);

@@ -215,7 +215,7 @@ static nebel_result refuse(const nebel_log *log, const char *what, char *words)
                    words[0] != '\0' ? words : "nothing");
 }
 
-static nebel_result compile(const nebel_log *log, unsigned kind, const nb_texts *texts, unsigned *shader)
+static nebel_result compile(const nebel_log *log, unsigned kind, const nb_shader_parts *texts, unsigned *shader)
 {
     GLint good = 0;
     *shader = glCreateShader(kind);
@@ -249,7 +249,8 @@ static nebel_result link(const nebel_log *log, unsigned vertex, unsigned fragmen
     return refuse(log, "link nebel's shaders", words);
 }
 
-nebel_result nb_program_build(const nebel_log *log, const nb_texts *vertex, const nb_texts *fragment, unsigned *name)
+nebel_result nb_program_build(const nebel_log *log, const nb_shader_parts *vertex, const nb_shader_parts *fragment,
+                              unsigned *name)
 {
     unsigned shaders[2] = {0, 0};
     *name = 0;
@@ -291,18 +292,18 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
     char head[1024];
     write_head(context, kind, head, sizeof head);
     const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
-    const nb_texts vertex = {{nb_program_version(context), vertex_text}, 2};
+    const nb_shader_parts vertex = {{nb_program_version(context), vertex_text}, 2};
     const char *const ray = kind->panorama ? nb_panorama_ray_text : "";
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
     const int is_shaded = kind->shade[0] != NULL;
-    const nb_texts fragment = {{head, is_shaded ? precision_text : "", is_shaded ? kind->shade[0] : "",
-                                is_shaded ? kind->shade[1] : "", kind->shafts ? nb_shaft_text : "",
-                                kind->air ? nb_air_words_text : "", fog, ray, tile, kind->air ? nb_air_worlds_text : "",
-                                kind->daylit ? nb_air_places_text : "", kind->clouds ? nb_cloud_shade_text : "",
-                                kind->shaded ? nb_fog_shade_text : "", kind->air ? nb_air_pieces_text : "",
-                                kind->air ? nb_air_haze_text : "", fragment_text,
-                                kind->step ? nb_step_text : whole_text},
-                               17};
+    const nb_shader_parts fragment = {{head, is_shaded ? precision_text : "", is_shaded ? kind->shade[0] : "",
+                                       is_shaded ? kind->shade[1] : "", kind->shafts ? nb_shaft_text : "",
+                                       kind->air ? nb_air_words_text : "", fog, ray, tile,
+                                       kind->air ? nb_air_worlds_text : "", kind->daylit ? nb_air_places_text : "",
+                                       kind->clouds ? nb_cloud_shade_text : "", kind->shaded ? nb_fog_shade_text : "",
+                                       kind->air ? nb_air_pieces_text : "", kind->air ? nb_air_haze_text : "",
+                                       fragment_text, kind->step ? nb_step_text : whole_text},
+                                      17};
     *program = (nb_program){.kind = *kind};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &program->name);
     if (result == NEBEL_OK) set_uniforms(program);

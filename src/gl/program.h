@@ -13,10 +13,10 @@ enum { NB_UNIT_AIR = 15 }; /* behind those of scenes; OpenGL ES has no more */
 enum { NB_SAMPLES_MOST = 32 };
 
 /* The texts of a shader, one after the other. */
-typedef struct nb_texts {
+typedef struct nb_shader_parts {
     const char *list[17];
     int count;
-} nb_texts;
+} nb_shader_parts;
 
 /* The first line of a shader. */
 const char *nb_program_version(const nb_context *context);
@@ -30,7 +30,8 @@ const char *nb_program_extension(const nb_context *context, nebel_gl_output outp
 const char *nb_program_output(nebel_gl_output output);
 
 /* Compiles and links. UNSUPPORTED, with the driver's words, where it refuses; *name is 0 then. */
-nebel_result nb_program_build(const nebel_log *log, const nb_texts *vertex, const nb_texts *fragment, unsigned *name);
+nebel_result nb_program_build(const nebel_log *log, const nb_shader_parts *vertex, const nb_shader_parts *fragment,
+                              unsigned *name);
 
 typedef struct nb_program_kind {
     int in_texture, tiled, multisampled;

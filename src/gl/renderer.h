@@ -31,10 +31,10 @@ struct nebel_gl_renderer {
     nebel_gl *sun_cloud;   /* the particles, so, too */
     nebel_snapshot *cloud; /* of the particles; NULL: not made yet */
     nb_meshes meshes;
-    nb_shading shading;
+    nb_scene_programs shading;
     nb_shadows shadows;
-    nb_shafts shafts;
-    nb_lamps lamps;
+    nb_shaft_maps shafts;
+    nb_light_maps lamps;
     nb_environment environment; /* of the scene, for surfaces and the background */
     nb_gl_air air;
     nb_gl_shells shells;

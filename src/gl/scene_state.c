@@ -3,11 +3,11 @@
 #include "shading.h"
 
 /* Which contexts know a switch. */
-typedef enum nb_known { EVERYWHERE, DESKTOP, FIXED_INDEX } nb_known;
+typedef enum nb_scene_capability { EVERYWHERE, DESKTOP, FIXED_INDEX } nb_scene_capability;
 
 static const struct {
     GLenum name;
-    nb_known known;
+    nb_scene_capability known;
 } switches[] = {
     {GL_POLYGON_OFFSET_FILL, EVERYWHERE},
     {GL_DEPTH_CLAMP, DESKTOP},
@@ -22,7 +22,7 @@ static const GLenum array_units[NB_SCENE_ARRAYS] = {GL_TEXTURE0 + NB_UNIT_SHADOW
 static const GLenum pack_names[NB_SCENE_PACK] = {GL_PACK_ALIGNMENT,   GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS,
                                                  GL_PACK_SKIP_PIXELS, GL_PACK_SWAP_BYTES, GL_PACK_LSB_FIRST};
 
-static int knows(const nb_context *c, nb_known known)
+static int knows(const nb_context *c, nb_scene_capability known)
 {
     switch (known) {
     case DESKTOP:

@@ -8,7 +8,7 @@
 enum { NB_SCENE_UNITS = 9, NB_SCENE_ARRAYS = 4, NB_SCENE_PACK = 6 };
 
 typedef struct nb_scene_state {
-    nb_state base;
+    nb_gl_state base;
     nb_unpacking unpacking;
     GLint textures[NB_SCENE_UNITS], samplers[NB_SCENE_UNITS]; /* of units 7 to 15 */
     GLint array_textures[NB_SCENE_ARRAYS];                    /* of units 10, 11, 12 and 14 */

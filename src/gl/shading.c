@@ -529,20 +529,20 @@ static void set_unit(unsigned program, const char *sampler, int unit)
     glUniform1i(glGetUniformLocation(program, sampler), unit);
 }
 
-nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, const nebel_log *log)
+nebel_result nb_shading_make(nb_scene_programs *shading, const nb_context *context, const nebel_log *log)
 {
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
-    const nb_texts surface_vertex = {{version, surface_vertex_text}, 2};
-    const nb_texts surface_fragment = {{version, precision, nb_words_text, nb_ray_text, interpolated_text,
-                                        attributes_text, nb_surface_edge_text, nb_surface_distance_text,
-                                        nb_surface_inset_text, hole_text, surface_fragment_text},
-                                       11};
+    const nb_shader_parts surface_vertex = {{version, surface_vertex_text}, 2};
+    const nb_shader_parts surface_fragment = {{version, precision, nb_words_text, nb_ray_text, interpolated_text,
+                                               attributes_text, nb_surface_edge_text, nb_surface_distance_text,
+                                               nb_surface_inset_text, hole_text, surface_fragment_text},
+                                              11};
     char block[64];
     (void)snprintf(block, sizeof block, "#define NB_SURVEY_BLOCK %d\n", (int)NB_SURVEY_BLOCK);
-    const nb_texts survey_vertex = {{version, nb_whole_vertex_text}, 2};
-    const nb_texts survey_fragment = {{version, precision, block, survey_text}, 4};
-    const nb_texts shadow_vertex = {{version, shadow_vertex_text}, 2};
-    const nb_texts shadow_fragment = {{version, precision, hole_text, shadow_fragment_text}, 4};
+    const nb_shader_parts survey_vertex = {{version, nb_whole_vertex_text}, 2};
+    const nb_shader_parts survey_fragment = {{version, precision, block, survey_text}, 4};
+    const nb_shader_parts shadow_vertex = {{version, shadow_vertex_text}, 2};
+    const nb_shader_parts shadow_fragment = {{version, precision, hole_text, shadow_fragment_text}, 4};
     nebel_result result = nb_program_build(log, &surface_vertex, &surface_fragment, &shading->surface);
     if (result == NEBEL_OK) result = nb_program_build(log, &survey_vertex, &survey_fragment, &shading->survey);
     if (result == NEBEL_OK) result = nb_program_build(log, &shadow_vertex, &shadow_fragment, &shading->shadow);
@@ -557,14 +557,14 @@ nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, con
     return NEBEL_OK;
 }
 
-nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *context, const nebel_log *log)
+nebel_result nb_shading_make_vertex_fog(nb_scene_programs *shading, const nb_context *context, const nebel_log *log)
 {
     const char *const version = nb_program_version(context);
-    const nb_texts vertex = {{version, vertex_fog_vertex_text}, 2};
-    const nb_texts fragment = {{version, precision_of(context), nb_words_text, nb_ray_text, interpolated_text,
-                                fog_attribute_text, nb_surface_edge_text, nb_surface_distance_text,
-                                nb_surface_inset_text, hole_text, nb_factor_text, vertex_fog_fragment_text},
-                               12};
+    const nb_shader_parts vertex = {{version, vertex_fog_vertex_text}, 2};
+    const nb_shader_parts fragment = {{version, precision_of(context), nb_words_text, nb_ray_text, interpolated_text,
+                                       fog_attribute_text, nb_surface_edge_text, nb_surface_distance_text,
+                                       nb_surface_inset_text, hole_text, nb_factor_text, vertex_fog_fragment_text},
+                                      12};
     if (shading->vertex_fog != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->vertex_fog);
     if (result != NEBEL_OK) return result;
@@ -573,11 +573,11 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
     return NEBEL_OK;
 }
 
-nebel_result nb_shading_make_lamp_map(nb_shading *shading, const nb_context *context, const nebel_log *log)
+nebel_result nb_shading_make_lamp_map(nb_scene_programs *shading, const nb_context *context, const nebel_log *log)
 {
     const char *const version = nb_program_version(context);
-    const nb_texts vertex = {{version, nb_lamp_map_vertex_text}, 2};
-    const nb_texts fragment = {{version, precision_of(context), hole_text, nb_lamp_map_fragment_text}, 4};
+    const nb_shader_parts vertex = {{version, nb_lamp_map_vertex_text}, 2};
+    const nb_shader_parts fragment = {{version, precision_of(context), hole_text, nb_lamp_map_fragment_text}, 4};
     if (shading->lamp_map != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->lamp_map);
     if (result != NEBEL_OK) return result;
@@ -586,11 +586,12 @@ nebel_result nb_shading_make_lamp_map(nb_shading *shading, const nb_context *con
     return NEBEL_OK;
 }
 
-nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama)
+nebel_result nb_shading_make_factor(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                    int panorama)
 {
     const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : nb_ray_text;
-    const nb_texts vertex = {{version, nb_whole_vertex_text}, 2};
-    const nb_texts fragment = {
+    const nb_shader_parts vertex = {{version, nb_whole_vertex_text}, 2};
+    const nb_shader_parts fragment = {
         {version, precision_of(context), nb_words_text, ray, nb_factor_text, nb_pixel_factor_text}, 6};
     unsigned *const name = panorama ? &shading->round_factor : &shading->factor;
     if (*name != 0) return NEBEL_OK;
@@ -601,16 +602,16 @@ nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *conte
     return NEBEL_OK;
 }
 
-nebel_result nb_shading_make_ground(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama,
-                                    int worlds)
+nebel_result nb_shading_make_ground(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                    int panorama, int worlds)
 {
     const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     char head[NB_AIR_HEAD];
-    const nb_texts vertex = {{nb_program_version(context), nb_whole_vertex_text}, 2};
-    const nb_texts fragment = {{nb_program_version(context), nb_air_head(worlds, head), precision_of(context),
-                                nb_air_words_text, fog, nb_words_text, panorama ? nb_panorama_ray_text : nb_ray_text,
-                                nb_air_worlds_text, nb_air_ground_text},
-                               9};
+    const nb_shader_parts vertex = {{nb_program_version(context), nb_whole_vertex_text}, 2};
+    const nb_shader_parts fragment = {
+        {nb_program_version(context), nb_air_head(worlds, head), precision_of(context), nb_air_words_text, fog,
+         nb_words_text, panorama ? nb_panorama_ray_text : nb_ray_text, nb_air_worlds_text, nb_air_ground_text},
+        9};
     unsigned *const name = panorama ? &shading->round_ground : &shading->ground;
     if (shading->ground_worlds != worlds) {
         glDeleteProgram(shading->ground);
@@ -631,10 +632,12 @@ static nebel_result make_round(const nb_context *context, const nebel_log *log, 
                                const char *fragment_text, const char *sampler, int unit, unsigned *name)
 {
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
-    const nb_texts vertex = {{version, option, nb_words_text, nb_panorama_box_text, round_surface_vertex_text}, 5};
-    const nb_texts fragment = {{version, option, precision, nb_words_text, nb_panorama_ray_text, nb_surface_edge_text,
-                                round_surface_text, nb_surface_distance_text, hole_text, nb_factor_text, fragment_text},
-                               11};
+    const nb_shader_parts vertex = {{version, option, nb_words_text, nb_panorama_box_text, round_surface_vertex_text},
+                                    5};
+    const nb_shader_parts fragment = {{version, option, precision, nb_words_text, nb_panorama_ray_text,
+                                       nb_surface_edge_text, round_surface_text, nb_surface_distance_text, hole_text,
+                                       nb_factor_text, fragment_text},
+                                      11};
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
     if (result != NEBEL_OK) return result;
@@ -644,7 +647,8 @@ static nebel_result make_round(const nb_context *context, const nebel_log *log, 
     return NEBEL_OK;
 }
 
-nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *context, const nebel_log *log, int with_fog)
+nebel_result nb_shading_make_round(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                   int with_fog)
 {
     const nebel_result result = make_round(context, log, "", surface_fragment_text, "scene_texture",
                                            NB_UNIT_REFLECTANCE, &shading->round_surface);
@@ -653,7 +657,7 @@ nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *contex
                       NB_UNIT_PLACE, &shading->round_vertex_fog);
 }
 
-static void write_head(const nb_context *context, const nb_light_kind *kind, char *text, size_t size)
+static void write_head(const nb_context *context, const nb_composite_key *kind, char *text, size_t size)
 {
     char limits[128], air[NB_AIR_HEAD];
     (void)snprintf(
@@ -702,15 +706,15 @@ static void set_units(unsigned program)
     set_unit(program, "shell_seen", NB_UNIT_REFLECTANCE);
 }
 
-static nb_texts light_vertex(const nb_context *context, const nb_light_kind *kind)
+static nb_shader_parts light_vertex(const nb_context *context, const nb_composite_key *kind)
 {
     const char *const version = nb_program_version(context);
-    if (!kind->of_particles) return (nb_texts){{version, nb_whole_vertex_text}, 2};
-    if (!kind->panorama) return (nb_texts){{version, nb_particle_vertex_text}, 2};
-    return (nb_texts){{version, nb_words_text, nb_panorama_box_text, nb_round_particle_vertex_text}, 4};
+    if (!kind->of_particles) return (nb_shader_parts){{version, nb_whole_vertex_text}, 2};
+    if (!kind->panorama) return (nb_shader_parts){{version, nb_particle_vertex_text}, 2};
+    return (nb_shader_parts){{version, nb_words_text, nb_panorama_box_text, nb_round_particle_vertex_text}, 4};
 }
 
-static nebel_result make_light(const nb_context *context, const nebel_log *log, const nb_light_kind *kind,
+static nebel_result make_light(const nb_context *context, const nebel_log *log, const nb_composite_key *kind,
                                unsigned *name)
 {
     char head[1280];
@@ -718,19 +722,19 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const char *const ray = kind->panorama ? nb_panorama_ray_text : nb_ray_text;
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
-    const nb_texts light = {{head, kind->air ? nb_air_words_text : "",
-                             kind->has_fog || kind->environment || kind->air ? fog : "", nb_words_text, ray,
-                             shadow_text, sun_text, kind->lamplit ? nb_lamp_map_text : "",
-                             kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_worlds_text : "",
-                             kind->air ? nb_air_places_text : "", kind->air ? nb_air_sun_text : "",
-                             kind->air ? nb_air_light_text : "", nb_veil_text, nb_device_text, light_text},
-                            16};
-    const nb_texts shell = {{head, nb_veil_text, nb_shell_over_text}, 3};
-    const nb_texts dimming = {{head, fog, nb_words_text, ray, sun_text, dimming_text}, 6};
-    const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", kind->shafts ? nb_shaft_text : "", fog,
-                                nb_words_text, ray, tile, nb_particle_start_text, nb_particle_text},
-                               9};
-    const nb_texts vertex = light_vertex(context, kind);
+    const nb_shader_parts light = {{head, kind->air ? nb_air_words_text : "",
+                                    kind->has_fog || kind->environment || kind->air ? fog : "", nb_words_text, ray,
+                                    shadow_text, sun_text, kind->lamplit ? nb_lamp_map_text : "",
+                                    kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_worlds_text : "",
+                                    kind->air ? nb_air_places_text : "", kind->air ? nb_air_sun_text : "",
+                                    kind->air ? nb_air_light_text : "", nb_veil_text, nb_device_text, light_text},
+                                   16};
+    const nb_shader_parts shell = {{head, nb_veil_text, nb_shell_over_text}, 3};
+    const nb_shader_parts dimming = {{head, fog, nb_words_text, ray, sun_text, dimming_text}, 6};
+    const nb_shader_parts particle = {{head, kind->five_taps ? nb_five_tap_text : "", kind->shafts ? nb_shaft_text : "",
+                                       fog, nb_words_text, ray, tile, nb_particle_start_text, nb_particle_text},
+                                      9};
+    const nb_shader_parts vertex = light_vertex(context, kind);
     const nebel_result result = nb_program_build(log, &vertex,
                                                  kind->of_particles ? &particle
                                                  : kind->of_dimming ? &dimming
@@ -741,7 +745,7 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     return result;
 }
 
-static int is_same(const nb_light_kind *a, const nb_light_kind *b)
+static int is_same(const nb_composite_key *a, const nb_composite_key *b)
 {
     return a->of_particles == b->of_particles && a->of_dimming == b->of_dimming && a->dimmed == b->dimmed &&
            a->sunlit == b->sunlit && a->environment == b->environment && a->lamplit == b->lamplit &&
@@ -752,8 +756,9 @@ static int is_same(const nb_light_kind *a, const nb_light_kind *b)
            a->features == b->features;
 }
 
-nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,
-                                   const nebel_log *log, const nb_light_kind *kind, unsigned *program)
+nebel_result nb_shading_find_light(nb_scene_programs *shading, const nb_context *context,
+                                   const nebel_allocator *allocator, const nebel_log *log, const nb_composite_key *kind,
+                                   unsigned *program)
 {
     for (size_t i = 0; i < shading->light_count; i++) {
         *program = shading->lights[i].name;
@@ -766,11 +771,11 @@ nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *contex
     }
     shading->lights = list;
     const nebel_result result = make_light(context, log, kind, program);
-    if (result == NEBEL_OK) shading->lights[shading->light_count++] = (nb_light_program){*kind, *program};
+    if (result == NEBEL_OK) shading->lights[shading->light_count++] = (nb_composite_program){*kind, *program};
     return result;
 }
 
-void nb_shading_delete(const nb_shading *shading)
+void nb_shading_delete(const nb_scene_programs *shading)
 {
     glDeleteProgram(shading->surface);
     glDeleteProgram(shading->survey);

@@ -27,7 +27,7 @@ enum {
 enum { NB_CASCADES = 4, NB_MOST_MAPS = 8 };
 
 /* What a program that asks fog is made for. */
-typedef struct nb_light_kind {
+typedef struct nb_composite_key {
     int of_particles; /* and the fog before them: 2 to the number of each profile that occurs; 0: of surfaces, and the
                          fog between them and the sun */
     int of_dimming;   /* of the sun by particles, for `dimmed` ones */
@@ -48,23 +48,23 @@ typedef struct nb_light_kind {
     int clouds; /* with volume, whose shadow is what dims */
     int in_texture, tiled;
     uint32_t features;
-} nb_light_kind;
+} nb_composite_key;
 
-typedef struct nb_light_program {
-    nb_light_kind kind;
+typedef struct nb_composite_program {
+    nb_composite_key kind;
     unsigned name;
-} nb_light_program;
+} nb_composite_program;
 
-typedef struct nb_shading {
+typedef struct nb_scene_programs {
     unsigned surface, survey, shadow;
     unsigned vertex_fog, round_surface, round_vertex_fog; /* 0 until they are needed; round: of panoramas */
     unsigned factor, round_factor;
     unsigned ground, round_ground;
     int ground_worlds; /* that they are made for */
     unsigned lamp_map;
-    nb_light_program *lights;
+    nb_composite_program *lights;
     size_t light_count, light_capacity;
-} nb_shading;
+} nb_scene_programs;
 
 /* What is drawn over the whole picture: its vertices, and the ray of a pixel. nb_words_text: scene_rays are the words of
  * nebel_compute_view_rays, or of a panorama, whose ray is another. */
@@ -72,27 +72,30 @@ extern const char nb_whole_vertex_text[], nb_words_text[], nb_ray_text[];
 
 /* Compile and link what is not there yet, which changes the current program. UNSUPPORTED with the driver's words;
  * MEMORY. */
-nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, const nebel_log *log);
-nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,
-                                   const nebel_log *log, const nb_light_kind *kind, unsigned *program);
+nebel_result nb_shading_make(nb_scene_programs *shading, const nb_context *context, const nebel_log *log);
+nebel_result nb_shading_find_light(nb_scene_programs *shading, const nb_context *context,
+                                   const nebel_allocator *allocator, const nebel_log *log, const nb_composite_key *kind,
+                                   unsigned *program);
 
 /* Fog that vertices bring, over the surfaces that are seen. */
-nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *context, const nebel_log *log);
+nebel_result nb_shading_make_vertex_fog(nb_scene_programs *shading, const nb_context *context, const nebel_log *log);
 
 /* Maps around lamps. */
-nebel_result nb_shading_make_lamp_map(nb_shading *shading, const nb_context *context, const nebel_log *log);
+nebel_result nb_shading_make_lamp_map(nb_scene_programs *shading, const nb_context *context, const nebel_log *log);
 
 /* Fog factors of pixels. */
-nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama);
+nebel_result nb_shading_make_factor(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                    int panorama);
 
 /* Surfaces of panoramas, and the fog that vertices bring to them. */
-nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *context, const nebel_log *log, int with_fog);
+nebel_result nb_shading_make_round(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                   int with_fog);
 
 /* The ground of so many planets. */
-nebel_result nb_shading_make_ground(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama,
-                                    int worlds);
+nebel_result nb_shading_make_ground(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                    int panorama, int worlds);
 
 /* In OpenGL. */
-void nb_shading_delete(const nb_shading *shading);
+void nb_shading_delete(const nb_scene_programs *shading);
 
 #endif

@@ -15,7 +15,7 @@ typedef struct rectangle {
 } rectangle;
 
 /* The surfaces of a picture, block by block of pixels: the nearest and the farthest of each. */
-typedef struct survey {
+typedef struct nb_seen_survey {
     const nebel_rays *rays;
     int panorama;
     const float *blocks;    /* four floats each */
@@ -24,7 +24,7 @@ typedef struct survey {
     double nearest, farthest;
     rectangle seen[NB_CASCADES];
     double low[3], high[3]; /* a box around the fog that the sun lights, relative to the eye */
-} survey;
+} nb_seen_survey;
 
 static rectangle nothing(void)
 {
@@ -105,7 +105,7 @@ void nb_shadows_turn_fog(nb_shadows *shadows, const double sun[3])
     use_axes(shadows, sun);
 }
 
-static void find_distances(survey *s)
+static void find_distances(nb_seen_survey *s)
 {
     const size_t count = (size_t)s->columns * s->rows;
     s->nearest = HUGE_VAL;
@@ -118,7 +118,7 @@ static void find_distances(survey *s)
 }
 
 /* Distances grow by the same factor from map to map, as texels on the screen shrink. */
-static void set_ends(nb_shadows *shadows, const survey *s)
+static void set_ends(nb_shadows *shadows, const nb_seen_survey *s)
 {
     for (int k = 0; k < NB_CASCADES; k++) {
         const double share = (k + 1.) / NB_CASCADES;
@@ -144,14 +144,14 @@ typedef struct extent {
     double left, low, right, high;
 } extent;
 
-static extent block_extent(const survey *s, uint32_t column, uint32_t row)
+static extent block_extent(const nb_seen_survey *s, uint32_t column, uint32_t row)
 {
     const double left = column * (double)NB_SURVEY_BLOCK, low = row * (double)NB_SURVEY_BLOCK;
     return (extent){left, low, fmin(left + NB_SURVEY_BLOCK, s->width), fmin(low + NB_SURVEY_BLOCK, s->height)};
 }
 
 /* Of a length, which bends away from its tangent plane, that plane is a lower bound, and the corners an upper. */
-static beam make_beam(const survey *s, const extent *e)
+static beam make_beam(const nb_seen_survey *s, const extent *e)
 {
     beam b = {.least_size = HUGE_VAL};
     double middle[3];
@@ -183,7 +183,7 @@ static void include_beam(const nb_shadows *shadows, const beam *b, double near, 
 
 /* Half the opening of the cone around a block of a panorama: its corners are the farthest from its middle, unless it
  * reaches around. */
-static double opening_of(const survey *s, const extent *e, const double middle[3])
+static double opening_of(const nb_seen_survey *s, const extent *e, const double middle[3])
 {
     double least = 1;
     if (2 * (e->right - e->left) > s->width) return 3.2;
@@ -209,7 +209,7 @@ static void include_cone(const nb_shadows *shadows, const double middle[3], doub
     include(seen, at[1]);
 }
 
-static void include_round(const nb_shadows *shadows, const survey *s, const extent *e, double near, double far,
+static void include_round(const nb_shadows *shadows, const nb_seen_survey *s, const extent *e, double near, double far,
                           rectangle *seen)
 {
     double middle[3];
@@ -217,7 +217,7 @@ static void include_round(const nb_shadows *shadows, const survey *s, const exte
     include_cone(shadows, middle, opening_of(s, e, middle), near, far, seen);
 }
 
-static void include_block(const nb_shadows *shadows, const survey *s, const extent *e, double near, double far,
+static void include_block(const nb_shadows *shadows, const nb_seen_survey *s, const extent *e, double near, double far,
                           rectangle *seen)
 {
     if (s->panorama) {
@@ -229,7 +229,7 @@ static void include_block(const nb_shadows *shadows, const survey *s, const exte
 }
 
 /* Surfaces may be anywhere between the nearest and the farthest of their block. */
-static void find_rectangles(const nb_shadows *shadows, survey *s)
+static void find_rectangles(const nb_shadows *shadows, nb_seen_survey *s)
 {
     for (int k = 0; k < NB_CASCADES; k++) s->seen[k] = nothing();
     for (uint32_t row = 0; row < s->rows; row++) {
@@ -249,7 +249,7 @@ static void find_rectangles(const nb_shadows *shadows, survey *s)
 }
 
 /* How wide a pixel is at most: what other samples may see beside the surveyed. */
-static double pixel_width(const survey *s, double t)
+static double pixel_width(const nb_seen_survey *s, double t)
 {
     double width = 0;
     if (s->panorama) return t * fmax(6.3 / s->width, 3.2 / s->height);
@@ -261,7 +261,7 @@ static double pixel_width(const survey *s, double t)
 }
 
 /* Some texels at the borders belong to the filter. */
-static void lay_map(nb_shadows *shadows, const survey *s, int map, const rectangle *seen)
+static void lay_map(nb_shadows *shadows, const nb_seen_survey *s, int map, const rectangle *seen)
 {
     enum { BORDER = 4 };
     const rectangle r = *seen;
@@ -317,14 +317,14 @@ static void find_heights(nb_shadows *shadows, const double eye[3], const nb_mesh
 
 /* Of ground the maps cover what lies in the way of the sun's light past all that casts shadows, and are shared out over the
  * distances of that. */
-static void leave_ground(const nb_shadows *shadows, survey *s, const double eye[3], const nb_meshes *meshes)
+static void leave_ground(const nb_shadows *shadows, nb_seen_survey *s, const double eye[3], const nb_meshes *meshes)
 {
     const rectangle all = casting(shadows, eye, meshes);
     for (int k = 0; k < NB_CASCADES && shadows->sees_ground; k++) clip(&s->seen[k], &all);
 }
 
 /* The same for distances. */
-static void bound_distances(const nb_shadows *shadows, survey *s, const double eye[3], const nb_meshes *meshes)
+static void bound_distances(const nb_shadows *shadows, nb_seen_survey *s, const double eye[3], const nb_meshes *meshes)
 {
     double square = 0;
     for (int i = 0; i < 3; i++) {
@@ -365,12 +365,12 @@ nebel_result nb_shadows_fit(nb_shadows *shadows, const nb_context *context, cons
                             const nebel_log *log, unsigned program, const nb_targets *targets, const nebel_rays *rays,
                             int panorama, const nb_meshes *meshes)
 {
-    survey s = {.rays = rays,
-                .panorama = panorama,
-                .columns = targets->survey_width,
-                .rows = targets->survey_height,
-                .width = targets->width,
-                .height = targets->height};
+    nb_seen_survey s = {.rays = rays,
+                        .panorama = panorama,
+                        .columns = targets->survey_width,
+                        .rows = targets->survey_height,
+                        .width = targets->width,
+                        .height = targets->height};
     for (int i = 0; i < 2; i++) {
         shadows->seen_low[i] = HUGE_VAL;
         shadows->seen_high[i] = -HUGE_VAL;
@@ -408,12 +408,12 @@ static void find_radii(const rectangle *r, double *nearest, double *farthest)
     *farthest = hypot(far[0], far[1]);
 }
 
-typedef struct range {
+typedef struct nb_depth_range {
     double low, high;
-} range;
+} nb_depth_range;
 
 /* Leaves of the distances t those where low <= origin + t way <= high may hold. */
-static void clip_distances(range origin, range way, double low, double high, range *t)
+static void clip_distances(nb_depth_range origin, nb_depth_range way, double low, double high, nb_depth_range *t)
 {
     const double rise[2] = {way.high, -way.low}, over[2] = {origin.high - low, high - origin.low};
     for (int i = 0; i < 2; i++) {
@@ -423,9 +423,9 @@ static void clip_distances(range origin, range way, double low, double high, ran
     }
 }
 
-static range range_of(const double corners[4][3], int axis)
+static nb_depth_range range_of(const double corners[4][3], int axis)
 {
-    range r = {corners[0][axis], corners[0][axis]};
+    nb_depth_range r = {corners[0][axis], corners[0][axis]};
     for (int i = 1; i < 4; i++) {
         r.low = fmin(r.low, corners[i][axis]);
         r.high = fmax(r.high, corners[i][axis]);
@@ -434,21 +434,22 @@ static range range_of(const double corners[4][3], int axis)
 }
 
 /* Leaves of the distances those where the rays of a block may be in sunlit fog. */
-static void clip_to_fog(const survey *s, const extent *e, range *t)
+static void clip_to_fog(const nb_seen_survey *s, const extent *e, nb_depth_range *t)
 {
     if (s->panorama) {
         double middle[3];
         nb_panorama_direction(s->rays, .5 * (e->left + e->right), .5 * (e->low + e->high), middle);
         const double most = 2 * sin(.5 * fmin(opening_of(s, e, middle), 3.1415926535897932));
         for (int i = 0; i < 3; i++)
-            clip_distances((range){0, 0}, (range){middle[i] - most, middle[i] + most}, s->low[i], s->high[i], t);
+            clip_distances((nb_depth_range){0, 0}, (nb_depth_range){middle[i] - most, middle[i] + most}, s->low[i],
+                           s->high[i], t);
         return;
     }
     const beam b = make_beam(s, e);
-    range steps = {t->low / b.most_size, t->high / b.least_size};
+    nb_depth_range steps = {t->low / b.most_size, t->high / b.least_size};
     for (int i = 0; i < 3; i++)
         clip_distances(range_of(b.origin, i), range_of(b.way, i), s->low[i], s->high[i], &steps);
-    *t = (range){fmax(t->low, steps.low * b.least_size), fmin(t->high, steps.high * b.most_size)};
+    *t = (nb_depth_range){fmax(t->low, steps.low * b.least_size), fmin(t->high, steps.high * b.most_size)};
 }
 
 /* Places, and how near to the eye and how far from it they are across the light. */
@@ -459,7 +460,7 @@ typedef struct region {
 
 /* Of all places in sunlit fog before the surfaces of the blocks, those within a rectangle. Where a block has pixels
  * without surface, rays go on to `reach`. */
-static region places_before(const nb_shadows *shadows, const survey *s, double reach, const rectangle *within)
+static region places_before(const nb_shadows *shadows, const nb_seen_survey *s, double reach, const rectangle *within)
 {
     region all = {.around = nothing(), .nearest = HUGE_VAL};
     for (uint32_t row = 0; row < s->rows; row++) {
@@ -468,7 +469,7 @@ static region places_before(const nb_shadows *shadows, const survey *s, double r
             const extent e = block_extent(s, column, row);
             rectangle r = nothing();
             double nearest, farthest;
-            range t = {0, block[2] > 0 ? reach : (double)block[1]};
+            nb_depth_range t = {0, block[2] > 0 ? reach : (double)block[1]};
             clip_to_fog(s, &e, &t);
             if (!(t.low <= t.high)) continue;
             include_block(shadows, s, &e, t.low, t.high, &r);
@@ -487,7 +488,7 @@ static region places_before(const nb_shadows *shadows, const survey *s, double r
 /* Rays from the eye go away from it across the light. What a texel is off along a ray is in proportion to the way there
  * where texels are in proportion to the distance across: each map is a square around the eye, its side a multiple of the
  * one before. */
-static void lay_squares(nb_shadows *shadows, const survey *s, double reach, const region *seen)
+static void lay_squares(nb_shadows *shadows, const nb_seen_survey *s, double reach, const region *seen)
 {
     static const double most_ratio = 4096;
     const double farthest = seen->farthest, nearest = fmax(seen->nearest, farthest / most_ratio);
@@ -501,7 +502,7 @@ static void lay_squares(nb_shadows *shadows, const survey *s, double reach, cons
 }
 
 /* Parallel rays have no such place: the maps lie side by side, along the longer side. */
-static void lay_tiles(nb_shadows *shadows, const survey *s, const rectangle *seen)
+static void lay_tiles(nb_shadows *shadows, const nb_seen_survey *s, const rectangle *seen)
 {
     const int axis = seen->high[1] - seen->low[1] > seen->high[0] - seen->low[0], columns = shadows->count / 2;
     for (int k = 0; k < shadows->count; k++) {
@@ -517,7 +518,7 @@ static void lay_tiles(nb_shadows *shadows, const survey *s, const rectangle *see
     }
 }
 
-static int are_parallel(const survey *s)
+static int are_parallel(const nb_seen_survey *s)
 {
     int same = !s->panorama;
     for (int i = 0; i < 3; i++)
@@ -529,13 +530,13 @@ void nb_shadows_fit_fog(nb_shadows *shadows, const nb_shadows *surfaces, const n
                         const nebel_rays *rays, int panorama, const nb_meshes *meshes, const nebel_sunlit_fog *fog)
 {
     static const double longest = 1000; /* times the way across: of rays nearly along the light */
-    survey s = {.rays = rays,
-                .panorama = panorama,
-                .blocks = surfaces->blocks,
-                .columns = targets->survey_width,
-                .rows = targets->survey_height,
-                .width = targets->width,
-                .height = targets->height};
+    nb_seen_survey s = {.rays = rays,
+                        .panorama = panorama,
+                        .blocks = surfaces->blocks,
+                        .columns = targets->survey_width,
+                        .rows = targets->survey_height,
+                        .width = targets->width,
+                        .height = targets->height};
     for (int i = 0; i < 3; i++) {
         s.low[i] = fog->min[i] - rays->eye[i];
         s.high[i] = fog->max[i] - rays->eye[i];

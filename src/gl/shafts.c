@@ -136,12 +136,12 @@ static const char range_text[] =
     "    out_range = vec4(range, 0.0, 1.0);\n"
     "}\n";
 
-static nebel_result make_program(nb_shafts *shafts, const nb_context *context, const nebel_log *log)
+static nebel_result make_program(nb_shaft_maps *shafts, const nb_context *context, const nebel_log *log)
 {
     const char *const version = nb_program_version(context);
     const char *const precision = context->es ? "precision highp float;\nprecision highp int;\n" : "";
-    const nb_texts vertex = {{version, triangle_text}, 2};
-    const nb_texts fragment = {{version, precision, range_text}, 3};
+    const nb_shader_parts vertex = {{version, triangle_text}, 2};
+    const nb_shader_parts fragment = {{version, precision, range_text}, 3};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &shafts->program);
     if (result != NEBEL_OK) return result;
     glUseProgram(shafts->program);
@@ -149,13 +149,13 @@ static nebel_result make_program(nb_shafts *shafts, const nb_context *context, c
     return NEBEL_OK;
 }
 
-static GLsizei level_size(const nb_shafts *shafts, int level)
+static GLsizei level_size(const nb_shaft_maps *shafts, int level)
 {
     const uint32_t block = 1U << (LEVEL_SHIFT * level);
     return (GLsizei)((shafts->maps.size + block - 1) / block);
 }
 
-static nebel_result make_ranges(nb_shafts *shafts, const nebel_log *log)
+static nebel_result make_ranges(nb_shaft_maps *shafts, const nebel_log *log)
 {
     const GLsizei size = level_size(shafts, 1);
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_SHADOWS);
@@ -165,7 +165,7 @@ static nebel_result make_ranges(nb_shafts *shafts, const nebel_log *log)
     return nb_context_check_memory(log, "the shadows in fog; ask for smaller shadow maps");
 }
 
-static void draw_level(const nb_shafts *shafts, const nb_context *context, int level)
+static void draw_level(const nb_shaft_maps *shafts, const nb_context *context, int level)
 {
     const GLsizei size = level_size(shafts, level);
     const GLint place = glGetUniformLocation(shafts->program, "range_place");
@@ -181,7 +181,7 @@ static void draw_level(const nb_shafts *shafts, const nb_context *context, int l
 
 /* ---- all of it ------------------------------------------------------------------------------- */
 
-static nebel_result make(nb_shafts *shafts, const nb_context *context, const nebel_log *log)
+static nebel_result make(nb_shaft_maps *shafts, const nb_context *context, const nebel_log *log)
 {
     nebel_result result = NEBEL_OK;
     if (shafts->program == 0) result = make_program(shafts, context, log);
@@ -189,7 +189,7 @@ static nebel_result make(nb_shafts *shafts, const nb_context *context, const neb
     return result;
 }
 
-nebel_result nb_shafts_draw(nb_shafts *shafts, const nb_context *context, const nebel_log *log, unsigned program,
+nebel_result nb_shafts_draw(nb_shaft_maps *shafts, const nb_context *context, const nebel_log *log, unsigned program,
                             unsigned vertex_array, const nb_shadows *surfaces, const nb_targets *targets,
                             const nebel_rays *rays, int panorama, const nb_meshes *meshes, const nebel_sunlit_fog *fog)
 {
@@ -216,7 +216,7 @@ static void bind(unsigned program, const char *sampler, GLuint unit, unsigned te
     glBindSampler(unit, 0);
 }
 
-void nb_shafts_set(const nb_shafts *shafts, unsigned program)
+void nb_shafts_set(const nb_shaft_maps *shafts, unsigned program)
 {
     const nb_shadows *const s = &shafts->maps;
     float places[NB_MOST_MAPS][4] = {{0}};
@@ -238,7 +238,7 @@ void nb_shafts_set(const nb_shafts *shafts, unsigned program)
     glUniform2f(glGetUniformLocation(program, "shaft_heights"), s->high, 1 / (s->high - s->low));
 }
 
-void nb_shafts_delete(const nb_shafts *shafts)
+void nb_shafts_delete(const nb_shaft_maps *shafts)
 {
     nb_shadows_delete(&shafts->maps);
     glDeleteTextures(1, &shafts->ranges);

@@ -144,8 +144,8 @@ static nebel_result fit_program(const nb_context *context, const nebel_log *log,
     const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : nb_ray_text;
     const char *const precision = context->es ? "precision highp float;\nprecision highp int;\n" : "";
     const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
-    const nb_texts vertex = {{version, nb_whole_vertex_text}, 2};
-    const nb_texts fragment = {{version, precision, fog, nb_words_text, ray, nb_shell_ball_text, text}, 7};
+    const nb_shader_parts vertex = {{version, nb_whole_vertex_text}, 2};
+    const nb_shader_parts fragment = {{version, precision, fog, nb_words_text, ray, nb_shell_ball_text, text}, 7};
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
     if (result == NEBEL_OK) set_units(*name);

@@ -1,11 +1,11 @@
 #include "state.h"
 
 /* Which contexts know a switch. */
-typedef enum nb_known { EVERYWHERE, DESKTOP, SAMPLE_MASKS, SAMPLE_SHADING, DEPTH_BOUNDS } nb_known;
+typedef enum nb_capability { EVERYWHERE, DESKTOP, SAMPLE_MASKS, SAMPLE_SHADING, DEPTH_BOUNDS } nb_capability;
 
 static const struct {
     GLenum name;
-    nb_known known;
+    nb_capability known;
 } switches[] = {
     {GL_STENCIL_TEST, EVERYWHERE},     {GL_DEPTH_TEST, EVERYWHERE},
     {GL_CULL_FACE, EVERYWHERE},        {GL_RASTERIZER_DISCARD, EVERYWHERE},
@@ -25,7 +25,7 @@ static const GLenum blending_names[NB_STATE_BLENDING] = {GL_BLEND_SRC_RGB,      
 static const GLenum unpack_names[NB_STATE_UNPACK] = {GL_UNPACK_ALIGNMENT,   GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS,
                                                      GL_UNPACK_SKIP_PIXELS, GL_UNPACK_SWAP_BYTES, GL_UNPACK_LSB_FIRST};
 
-static int knows(const nb_context *c, nb_known known)
+static int knows(const nb_context *c, nb_capability known)
 {
     switch (known) {
     case DESKTOP:
@@ -68,7 +68,7 @@ static GLboolean indexed_switch(int by_index, GLenum name, GLuint index)
 
 /* ---- reading --------------------------------------------------------------------------------- */
 
-static void save_units(const nb_context *c, nb_state *s)
+static void save_units(const nb_context *c, nb_gl_state *s)
 {
     glGetIntegerv(GL_ACTIVE_TEXTURE, &s->active_unit);
     for (int i = 0; i < NB_STATE_UNITS; i++) {
@@ -79,7 +79,7 @@ static void save_units(const nb_context *c, nb_state *s)
     }
 }
 
-static void save_block(nb_state *s)
+static void save_block(nb_gl_state *s)
 {
     glGetIntegerv(GL_UNIFORM_BUFFER_BINDING, &s->uniform_buffer);
     glGetIntegeri_v(GL_UNIFORM_BUFFER_BINDING, 0, &s->block);
@@ -87,7 +87,7 @@ static void save_block(nb_state *s)
     glGetInteger64i_v(GL_UNIFORM_BUFFER_SIZE, 0, &s->block_size);
 }
 
-static void save_switches(const nb_context *c, nb_state *s)
+static void save_switches(const nb_context *c, nb_gl_state *s)
 {
     s->switches = s->clip_distances = s->scissors = 0;
     for (unsigned i = 0; i < SWITCHES; i++) {
@@ -121,7 +121,7 @@ void nb_blending_save(const nb_context *c, nb_blending *b)
     }
 }
 
-static void save_masks(const nb_context *c, nb_state *s)
+static void save_masks(const nb_context *c, nb_gl_state *s)
 {
     for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) {
         if (c->switches_by_buffer) {
@@ -134,7 +134,7 @@ static void save_masks(const nb_context *c, nb_state *s)
     }
 }
 
-static void pause_feedback(const nb_context *c, nb_state *s)
+static void pause_feedback(const nb_context *c, nb_gl_state *s)
 {
     GLboolean active = GL_FALSE, paused = GL_FALSE;
     if (c->pauses_feedback) {
@@ -145,7 +145,7 @@ static void pause_feedback(const nb_context *c, nb_state *s)
     if (s->feedback) glPauseTransformFeedback();
 }
 
-void nb_state_save(const nb_context *c, nb_state *s)
+void nb_state_save(const nb_context *c, nb_gl_state *s)
 {
     pause_feedback(c, s);
     glGetIntegerv(GL_CURRENT_PROGRAM, &s->program);
@@ -168,7 +168,7 @@ void nb_state_save(const nb_context *c, nb_state *s)
 
 /* ---- writing --------------------------------------------------------------------------------- */
 
-static void restore_units(const nb_context *c, const nb_state *s)
+static void restore_units(const nb_context *c, const nb_gl_state *s)
 {
     for (int i = 0; i < NB_STATE_UNITS; i++) {
         glActiveTexture((GLenum)(GL_TEXTURE0 + i));
@@ -180,7 +180,7 @@ static void restore_units(const nb_context *c, const nb_state *s)
 }
 
 /* Size 0 says that the whole buffer is bound. */
-static void restore_block(const nb_state *s)
+static void restore_block(const nb_gl_state *s)
 {
     if (s->block_size > 0) {
         glBindBufferRange(GL_UNIFORM_BUFFER, 0, (GLuint)s->block, (GLintptr)s->block_start, (GLsizeiptr)s->block_size);
@@ -241,7 +241,7 @@ void nb_blending_restore(const nb_context *c, const nb_blending *b)
 
 /* A program that was deleted while it was current is gone for good once another takes its place. Core profiles have one
  * polygon mode for both faces. */
-void nb_state_restore(const nb_context *c, const nb_state *s)
+void nb_state_restore(const nb_context *c, const nb_gl_state *s)
 {
     glUseProgram(glIsProgram((GLuint)s->program) ? (GLuint)s->program : 0);
     glBindVertexArray((GLuint)s->vertex_array);

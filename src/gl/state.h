@@ -19,7 +19,7 @@ typedef struct nb_blending {
 } nb_blending;
 
 /* For drawing. */
-typedef struct nb_state {
+typedef struct nb_gl_state {
     GLint program, vertex_array, active_unit, framebuffer;
     nb_unit units[NB_STATE_UNITS];
     GLint uniform_buffer, block;
@@ -30,7 +30,7 @@ typedef struct nb_state {
     GLboolean mask[NB_STATE_BUFFERS][4];
     nb_blending blending;
     GLint polygon_mode[2], sample_mask;
-} nb_state;
+} nb_gl_state;
 
 /* For uploads. */
 typedef struct nb_unpacking {
@@ -39,13 +39,13 @@ typedef struct nb_unpacking {
 } nb_unpacking;
 
 /* Saves, and pauses transform feedback where it is under way, which would keep programs from changing. */
-void nb_state_save(const nb_context *context, nb_state *state);
-void nb_state_restore(const nb_context *context, const nb_state *state);
+void nb_state_save(const nb_context *context, nb_gl_state *state);
+void nb_state_restore(const nb_context *context, const nb_gl_state *state);
 
 /* Everything that would keep fragments away or change them is switched off; fragments cover the rectangle alone. */
 void nb_state_clear(const nb_context *context, uint32_t x, uint32_t y, uint32_t width, uint32_t height);
 
-/* Of nb_state alone. */
+/* Of nb_gl_state alone. */
 void nb_blending_save(const nb_context *context, nb_blending *blending);
 void nb_blending_restore(const nb_context *context, const nb_blending *blending);
 

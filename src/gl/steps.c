@@ -92,8 +92,8 @@ static nebel_result build(const nb_context *context, const nebel_log *log, const
                           const char *text, int unit, unsigned *name)
 {
     if (*name != 0) return NEBEL_OK;
-    const nb_texts vertex = {{nb_program_version(context), triangle_text}, 2};
-    const nb_texts fragment = {{nb_program_version(context), extension, output, text}, 4};
+    const nb_shader_parts vertex = {{nb_program_version(context), triangle_text}, 2};
+    const nb_shader_parts fragment = {{nb_program_version(context), extension, output, text}, 4};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
     if (result != NEBEL_OK) return result;
     glUseProgram(*name);
@@ -102,7 +102,8 @@ static nebel_result build(const nb_context *context, const nebel_log *log, const
     return NEBEL_OK;
 }
 
-static nebel_result build_programs(nb_steps *s, const nb_context *context, const nebel_log *log, nebel_gl_output output)
+static nebel_result build_programs(nb_fog_passes *s, const nb_context *context, const nebel_log *log,
+                                   nebel_gl_output output)
 {
     const nebel_result result = build(context, log, "", "", count_text, NB_UNIT_COLOR, &s->count_program);
     if (result != NEBEL_OK) return result;
@@ -110,7 +111,7 @@ static nebel_result build_programs(nb_steps *s, const nb_context *context, const
                  NB_UNIT_DEPTH, &s->compose_programs[output]);
 }
 
-static void delete_progress(nb_steps *s)
+static void delete_progress(nb_fog_passes *s)
 {
     glDeleteTextures(2, s->progress);
     glDeleteFramebuffers(2, s->framebuffers);
@@ -118,7 +119,7 @@ static void delete_progress(nb_steps *s)
     s->width = s->height = 0;
 }
 
-static int make_framebuffer(nb_steps *s, int i)
+static int make_framebuffer(nb_fog_passes *s, int i)
 {
     GLenum buffers[LAYERS];
     glGenFramebuffers(1, &s->framebuffers[i]);
@@ -131,7 +132,7 @@ static int make_framebuffer(nb_steps *s, int i)
     return glCheckFramebufferStatus(GL_DRAW_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
 }
 
-static void make_texture(nb_steps *s, int i)
+static void make_texture(nb_fog_passes *s, int i)
 {
     glGenTextures(1, &s->progress[i]);
     glBindTexture(GL_TEXTURE_2D_ARRAY, s->progress[i]);
@@ -142,7 +143,7 @@ static void make_texture(nb_steps *s, int i)
                  GL_FLOAT, NULL);
 }
 
-static nebel_result make_progress(nb_steps *s, const nebel_log *log)
+static nebel_result make_progress(nb_fog_passes *s, const nebel_log *log)
 {
     int complete = 1;
     for (int i = 0; i < 2; i++) make_texture(s, i);
@@ -158,7 +159,7 @@ static nebel_result make_progress(nb_steps *s, const nebel_log *log)
     return result;
 }
 
-nebel_result nb_steps_fit(nb_steps *steps, const nb_context *context, const nebel_log *log, nebel_gl_output output,
+nebel_result nb_steps_fit(nb_fog_passes *steps, const nb_context *context, const nebel_log *log, nebel_gl_output output,
                           uint32_t width, uint32_t height)
 {
     if (steps->query == 0) glGenQueries(1, &steps->query);
@@ -171,13 +172,13 @@ nebel_result nb_steps_fit(nb_steps *steps, const nb_context *context, const nebe
     return make_progress(steps, log);
 }
 
-void nb_steps_delete(nb_steps *steps)
+void nb_steps_delete(nb_fog_passes *steps)
 {
     delete_progress(steps);
     glDeleteQueries(1, &steps->query);
     glDeleteProgram(steps->count_program);
     for (int i = 0; i < NEBEL_GL_OUTPUT_COUNT; i++) glDeleteProgram(steps->compose_programs[i]);
-    *steps = (nb_steps){0};
+    *steps = (nb_fog_passes){0};
 }
 
 /* ---- drawing --------------------------------------------------------------------------------- */
@@ -189,7 +190,7 @@ static void bind_progress(GLuint unit, unsigned texture)
 }
 
 /* From the progress `source` to the other one, which is returned. */
-static int draw_step(const nb_steps *s, unsigned program, int source)
+static int draw_step(const nb_fog_passes *s, unsigned program, int source)
 {
     glUseProgram(program);
     bind_progress(NB_UNIT_COLOR, s->progress[source]);
@@ -210,7 +211,7 @@ static int can_count(const nb_context *context)
 }
 
 /* Draws into the other progress, which the next step writes anew. */
-static int is_any_left(const nb_steps *s, int source)
+static int is_any_left(const nb_fog_passes *s, int source)
 {
     GLuint left = 0;
     glBeginQuery(GL_ANY_SAMPLES_PASSED, s->query);
@@ -220,7 +221,7 @@ static int is_any_left(const nb_steps *s, int source)
     return left != 0;
 }
 
-int nb_steps_trace(const nb_steps *s, const nb_context *context, unsigned program, const nb_band *band)
+int nb_steps_trace(const nb_fog_passes *s, const nb_context *context, unsigned program, const nb_pass_band *band)
 {
     static const GLfloat zeros[4] = {0, 0, 0, 0};
     const GLint is_last = glGetUniformLocation(program, "pass_is_last");
@@ -242,7 +243,7 @@ int nb_steps_trace(const nb_steps *s, const nb_context *context, unsigned progra
     return counts && left;
 }
 
-void nb_steps_compose(const nb_steps *s, nebel_gl_output output, const nb_band *band)
+void nb_steps_compose(const nb_fog_passes *s, nebel_gl_output output, const nb_pass_band *band)
 {
     const unsigned program = s->compose_programs[output];
     glUseProgram(program);

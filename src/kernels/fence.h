@@ -9,16 +9,16 @@ NB_INLINE nb_vec3 nb_most3(nb_vec3 a, nb_vec3 b)
 
 /* A start outside two planes is left behind by them where the other end is so, too: where on some axis sign * way is
  * less than bound. The sign is 0 where the start is between the planes. */
-typedef struct nb_fence {
+typedef struct nb_box_reject {
     float sign[3], bound[3];
-} nb_fence;
+} nb_box_reject;
 
 /* The margin covers the roundings of nb_cross_slab: beyond it a crossing comes out at 1 or more, or at 0 or less, so
  * that leaving a box out changes no bit. */
-static nb_fence nb_make_fence(const nb_slabs *box)
+static nb_box_reject nb_make_fence(const nb_slabs *box)
 {
     const float margin = 1 - 0x1p-20f;
-    nb_fence made;
+    nb_box_reject made;
     for (int c = 0; c < 3; c++) {
         const int below = box->low[c] > 0, above = box->high[c] < 0;
         made.sign[c] = (float)(below - above);
@@ -29,7 +29,7 @@ static nb_fence nb_make_fence(const nb_slabs *box)
 
 /* Whether all ways between low and high, lane by lane, miss the box; low and high are the same packet where `one` says
  * so, a constant. The order makes a NaN count as no miss, or leaves it to the axes after it. */
-NB_INLINE int nb_is_missed(const nb_fence *f, nb_vec3 low, nb_vec3 high, int one)
+NB_INLINE int nb_is_missed(const nb_box_reject *f, nb_vec3 low, nb_vec3 high, int one)
 {
     const nb_vec3 sign = nb_vec3(nb_splat(f->sign[0]), nb_splat(f->sign[1]), nb_splat(f->sign[2]));
     const nb_vec3 bound = nb_vec3(nb_splat(f->bound[0]), nb_splat(f->bound[1]), nb_splat(f->bound[2]));
@@ -39,7 +39,7 @@ NB_INLINE int nb_is_missed(const nb_fence *f, nb_vec3 low, nb_vec3 high, int one
 }
 
 /* The boxes that are not missed. Returns how many. */
-NB_INLINE size_t nb_list_boxes(const nb_fence *fences, size_t count, nb_vec3 low, nb_vec3 high, int one,
+NB_INLINE size_t nb_list_boxes(const nb_box_reject *fences, size_t count, nb_vec3 low, nb_vec3 high, int one,
                                unsigned char *list)
 {
     size_t found = 0;

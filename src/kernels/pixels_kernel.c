@@ -73,7 +73,7 @@ NB_INLINE nb_bits blend(nb_bits pixel, const glow fog[3], nb_real light)
 /* What stays the same for a whole call, copied so that no store to the picture can change it. */
 typedef struct scene {
     nb_slabs boxes[NB_FOG_BOXES];
-    nb_fence fences[NB_FOG_BOXES];
+    nb_box_reject fences[NB_FOG_BOXES];
     size_t box_count;
     glow fog[3];
     float step[3];

@@ -181,11 +181,11 @@ NB_INLINE void advance(pipeline *p, const nb_slabs *box, nb_vec3 way, float *out
 }
 
 /* Full packets only, as below. Returns how many segments are done. */
-static size_t transmit_fan_through_one(const nb_transmit_job *job, const nb_slabs *boxes, const nb_fence *fences)
+static size_t transmit_fan_through_one(const nb_transmit_job *job, const nb_slabs *boxes, const nb_box_reject *fences)
 {
     const nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
     const nb_slabs box = boxes[0];
-    const nb_fence f = fences[0];
+    const nb_box_reject f = fences[0];
     const nb_transmit_job j = *job;
     float scratch[NB_WIDTH];
     pipeline p = make_pipeline(scratch);
@@ -203,7 +203,7 @@ static size_t transmit_fan_through_one(const nb_transmit_job *job, const nb_slab
 }
 
 /* Full packets only, as below. Returns how many segments are done. */
-static size_t transmit_fan(const nb_transmit_job *job, const nb_slabs *boxes, const nb_fence *fences)
+static size_t transmit_fan(const nb_transmit_job *job, const nb_slabs *boxes, const nb_box_reject *fences)
 {
     const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
     const nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
@@ -223,17 +223,17 @@ static size_t transmit_fan(const nb_transmit_job *job, const nb_slabs *boxes, co
  * would keep memory waiting while arithmetic is done. */
 enum { PACKETS = 8, FEW_BOXES = 4 };
 
-typedef struct block {
+typedef struct nb_segment_block {
     nb_vec3 way[PACKETS];
     nb_vec3 low, high; /* over the packets, lane by lane */
-} block;
+} nb_segment_block;
 
 NB_INLINE nb_vec3 least3(nb_vec3 a, nb_vec3 b)
 {
     return nb_vec3(nb_min(a.x, b.x), nb_min(a.y, b.y), nb_min(a.z, b.z));
 }
 
-NB_INLINE void load_block(const float *to, nb_vec3 from, size_t packets, block *made)
+NB_INLINE void load_block(const float *to, nb_vec3 from, size_t packets, nb_segment_block *made)
 {
     made->low = made->high = made->way[0] = nb_sub3(load_packed(to), from);
     for (size_t k = 1; k < packets; k++) {
@@ -244,13 +244,13 @@ NB_INLINE void load_block(const float *to, nb_vec3 from, size_t packets, block *
     }
 }
 
-static size_t transmit_blocks(const nb_transmit_job *job, const nb_slabs *boxes, const nb_fence *fences)
+static size_t transmit_blocks(const nb_transmit_job *job, const nb_slabs *boxes, const nb_box_reject *fences)
 {
     const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
     const nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
     const size_t all = job->count / NB_WIDTH;
     unsigned char list[NB_FOG_BOXES];
-    block b;
+    nb_segment_block b;
     for (size_t first = 0; first < all; first += PACKETS) {
         const size_t packets = all - first < PACKETS ? all - first : PACKETS;
         for (size_t k = 0; k < NB_WIDTH * packets; k += LINE) fetch_ahead(job, NB_WIDTH * first + k);
@@ -267,7 +267,7 @@ static size_t transmit_blocks(const nb_transmit_job *job, const nb_slabs *boxes,
 
 static size_t transmit_from_one_place(const nb_transmit_job *job, const nb_slabs *boxes)
 {
-    nb_fence fences[NB_FOG_BOXES];
+    nb_box_reject fences[NB_FOG_BOXES];
     for (size_t i = 0; i < job->box_count; i++) fences[i] = nb_make_fence(&boxes[i]);
     if (job->box_count == 1) return transmit_fan_through_one(job, boxes, fences);
     return job->box_count < FEW_BOXES ? transmit_fan(job, boxes, fences) : transmit_blocks(job, boxes, fences);

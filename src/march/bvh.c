@@ -18,25 +18,25 @@ enum { BINS = 16 };
 typedef nb_bvh_node item;
 
 /* A range of items that still needs its node filled. */
-typedef struct task {
+typedef struct nb_bvh_task {
     uint32_t node, first, count, depth;
-} task;
+} nb_bvh_task;
 
-typedef struct bounds {
+typedef struct nb_bvh_bounds {
     float low[3], high[3];
-} bounds;
+} nb_bvh_bounds;
 
 typedef struct bin {
-    bounds box;
+    nb_bvh_bounds box;
     uint32_t count;
 } bin;
 
-static bounds no_bounds(void)
+static nb_bvh_bounds no_bounds(void)
 {
-    return (bounds){{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
+    return (nb_bvh_bounds){{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
 }
 
-static void enclose(bounds *b, const float low[3], const float high[3])
+static void enclose(nb_bvh_bounds *b, const float low[3], const float high[3])
 {
     for (int k = 0; k < 3; k++) {
         b->low[k] = low[k] < b->low[k] ? low[k] : b->low[k];
@@ -45,7 +45,7 @@ static void enclose(bounds *b, const float low[3], const float high[3])
 }
 
 /* Half the surface of a box; in double, where no float extent overflows. */
-static double half_area(const bounds *b)
+static double half_area(const nb_bvh_bounds *b)
 {
     double e[3];
     for (int k = 0; k < 3; k++) e[k] = (double)b->high[k] - (double)b->low[k];
@@ -153,7 +153,7 @@ static void fill_bins(const item *items, uint32_t n, const cut *c, bin bins[BINS
 static int cheapest_cut(const bin bins[BINS])
 {
     double right_cost[BINS];
-    bounds box = no_bounds();
+    nb_bvh_bounds box = no_bounds();
     uint32_t count = 0;
     for (int b = BINS - 1; b > 0; b--) {
         enclose(&box, bins[b].box.low, bins[b].box.high);
@@ -207,12 +207,12 @@ static uint32_t split(item *items, uint32_t n, uint32_t depth)
 /* Leaves and their links first; the boxes of inner nodes are joined afterwards, children before parents. */
 static void build_topology(item *items, uint32_t n, nb_bvh_node *nodes)
 {
-    task stack[NB_BVH_DEPTH + 1];
+    nb_bvh_task stack[NB_BVH_DEPTH + 1];
     int waiting = 0;
     uint32_t used = 1;
-    stack[waiting++] = (task){0, 0, n, 0};
+    stack[waiting++] = (nb_bvh_task){0, 0, n, 0};
     while (waiting > 0) {
-        const task t = stack[--waiting];
+        const nb_bvh_task t = stack[--waiting];
         if (t.count == 1) {
             nodes[t.node] = items[t.first];
             continue;
@@ -220,8 +220,8 @@ static void build_topology(item *items, uint32_t n, nb_bvh_node *nodes)
         const uint32_t left = split(items + t.first, t.count, t.depth);
         nodes[t.node].index = used;
         nodes[t.node].unused = 0;
-        stack[waiting++] = (task){used + 1, t.first + left, t.count - left, t.depth + 1};
-        stack[waiting++] = (task){used, t.first, left, t.depth + 1};
+        stack[waiting++] = (nb_bvh_task){used + 1, t.first + left, t.count - left, t.depth + 1};
+        stack[waiting++] = (nb_bvh_task){used, t.first, left, t.depth + 1};
         used += 2;
     }
 }
@@ -232,7 +232,7 @@ static void join_boxes(nb_bvh_node *nodes, size_t count)
     for (size_t i = count; i-- > 0;) {
         nb_bvh_node *const node = &nodes[i];
         if (node->index & NB_BVH_LEAF) continue;
-        bounds box = no_bounds();
+        nb_bvh_bounds box = no_bounds();
         for (size_t child = node->index; child < (size_t)node->index + 2; child++)
             enclose(&box, nodes[child].low, nodes[child].high);
         memcpy(node->low, box.low, sizeof box.low);

@@ -20,7 +20,7 @@ enum { BATCH = 256 };
 static nebel_result trace_sun(const nb_diffusion *d, const nebel_snapshot *fog, size_t first, size_t count,
                               float out[3][BATCH])
 {
-    const nb_lattice *l = &d->lattice;
+    const nb_diffusion_lattice *l = &d->lattice;
     float offset[3][BATCH];
     nebel_ray_planes rays = {.t_max = NULL};
     nebel_transfer_planes transfers = {.error = NULL};
@@ -85,7 +85,7 @@ static double log_of(double light)
 }
 
 /* `light`: fluence and flux. */
-static void set_node(const nb_transport *t, int c, const nb_node_sun *sun, const double light[4], float *out)
+static void set_node(const nb_medium_transport *t, int c, const nb_node_sun *sun, const double light[4], float *out)
 {
     const double scaled = t->extinction[c] - t->scattering[c] + t->turned[c];
     const double turned = share(t->turned[c], scaled), cosine = share(t->forward[c], t->turned[c]);
@@ -101,7 +101,8 @@ static void set_node(const nb_transport *t, int c, const nb_node_sun *sun, const
 
 /* `light`: fluence and flux of what the sky lacks. What goes straight on dims no light: of that, the sky's own light is what
  * comes instead of what extinction as it is takes away. Nodes without fog say nothing of the sky. */
-static void set_sky_node(const nb_transport *t, int c, const nb_sky_moments *sky, const double light[4], float *out)
+static void set_sky_node(const nb_medium_transport *t, int c, const nb_sky_moments *sky, const double light[4],
+                         float *out)
 {
     const double scaled = t->extinction[c] - t->scattering[c] + t->turned[c];
     const double absorption = fmax(t->extinction[c] - t->scattering[c], 0);
@@ -122,8 +123,8 @@ static void set_moments(double part, double cosine, const double light[4], float
 }
 
 /* `light`: fluence and flux. */
-static void set_own_node(const nb_transport *t, int c, const nb_node_own *own, const double light[4], float *out,
-                         float *straight)
+static void set_own_node(const nb_medium_transport *t, int c, const nb_local_node *own, const double light[4],
+                         float *out, float *straight)
 {
     const double scaled = t->extinction[c] - t->scattering[c] + t->turned[c];
     const double turned = share(t->turned[c], scaled), cosine = share(t->forward[c], t->turned[c]);
@@ -134,7 +135,7 @@ static void set_own_node(const nb_transport *t, int c, const nb_node_own *own, c
 }
 
 /* Of what is turned, in all channels. */
-static double mean_cosine(const nb_transport *t)
+static double mean_cosine(const nb_medium_transport *t)
 {
     return share(t->forward[0] + t->forward[1] + t->forward[2], t->turned[0] + t->turned[1] + t->turned[2]);
 }
@@ -164,13 +165,14 @@ static int has_peaks(const nebel_snapshot *snapshot)
 }
 
 /* Scratch of a solution. */
-typedef struct draft {
-    nb_transport *cells;
+typedef struct nb_diffusion_builder {
+    nb_medium_transport *cells;
     nb_node_sun *sun;
     nb_diffuse_light light[3], sky;
-} draft;
+} nb_diffusion_builder;
 
-static nebel_result fill_sun(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot, draft *made)
+static nebel_result fill_sun(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot,
+                             nb_diffusion_builder *made)
 {
     const size_t nodes = nb_lattice_nodes(&d->lattice);
     const nb_diffuse_source source = {.sun = made->sun, .to_sun = d->to_sun};
@@ -180,7 +182,7 @@ static nebel_result fill_sun(nb_diffusion *d, const nebel_fog *fog, const nebel_
                                 &made->light[c]))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
-            const nb_transport t = nb_lattice_around(&d->lattice, made->cells, i);
+            const nb_medium_transport t = nb_lattice_around(&d->lattice, made->cells, i);
             float *node = &d->nodes[i * d->node_numbers];
             set_node(&t, c, &made->sun[i], &made->light[c].nodes[4 * i], node + c * NB_NODE_NUMBERS);
             node[NB_NODE_NUMBERS * d->channel_count] = (float)mean_cosine(&t);
@@ -189,7 +191,7 @@ static nebel_result fill_sun(nb_diffusion *d, const nebel_fog *fog, const nebel_
     return result;
 }
 
-static nebel_result fill_sky(nb_diffusion *d, const nebel_fog *fog, draft *made)
+static nebel_result fill_sky(nb_diffusion *d, const nebel_fog *fog, nb_diffusion_builder *made)
 {
     const size_t nodes = nb_lattice_nodes(&d->lattice);
     nb_sky_moments moments[3];
@@ -200,7 +202,7 @@ static nebel_result fill_sky(nb_diffusion *d, const nebel_fog *fog, draft *made)
                                 &made->sky))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
-            const nb_transport t = nb_lattice_around(&d->lattice, made->cells, i);
+            const nb_medium_transport t = nb_lattice_around(&d->lattice, made->cells, i);
             float *node = &d->nodes[i * d->node_numbers + nb_diffusion_second_number(d, c)];
             set_sky_node(&t, c, &moments[c], &made->sky.nodes[4 * i], node);
         }
@@ -223,7 +225,8 @@ static void forget_exact_light(const nb_diffusion *d)
 }
 
 static nebel_result solve_own(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot,
-                              const nb_own_light *own, const nb_beams *beams, nb_node_own *straight, draft *made)
+                              const nb_local_light *own, const nb_light_beams *beams, nb_local_node *straight,
+                              nb_diffusion_builder *made)
 {
     const size_t nodes = nb_lattice_nodes(&d->lattice);
     const nb_diffuse_source source = {.beams = beams};
@@ -234,7 +237,7 @@ static nebel_result solve_own(nb_diffusion *d, const nebel_fog *fog, const nebel
                                 &made->light[c]))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
-            const nb_transport t = nb_lattice_around(&d->lattice, made->cells, i);
+            const nb_medium_transport t = nb_lattice_around(&d->lattice, made->cells, i);
             float *node = &d->nodes[i * d->node_numbers];
             set_own_node(&t, c, &straight[i], &made->light[c].nodes[4 * i], node + c * NB_NODE_NUMBERS,
                          node + nb_diffusion_second_number(d, c));
@@ -244,12 +247,13 @@ static nebel_result solve_own(nb_diffusion *d, const nebel_fog *fog, const nebel
     return NEBEL_OK;
 }
 
-static nebel_result fill_own(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot, draft *made)
+static nebel_result fill_own(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot,
+                             nb_diffusion_builder *made)
 {
     const nebel_allocator *allocator = &fog->allocator;
-    const nb_own_light own = nb_find_own_light(snapshot);
-    nb_node_own *straight = nb_allocate_zero(allocator, nb_lattice_nodes(&d->lattice), sizeof *straight);
-    nb_beams beams;
+    const nb_local_light own = nb_find_own_light(snapshot);
+    nb_local_node *straight = nb_allocate_zero(allocator, nb_lattice_nodes(&d->lattice), sizeof *straight);
+    nb_light_beams beams;
     const int all = nb_beams_open(allocator, &d->lattice, &beams) && straight != NULL;
     nebel_result result = all ? NEBEL_OK : NEBEL_ERROR_MEMORY;
     memcpy(d->irradiance, own.unit, sizeof d->irradiance);
@@ -262,7 +266,8 @@ static nebel_result fill_own(nb_diffusion *d, const nebel_fog *fog, const nebel_
     return result;
 }
 
-static nebel_result fill(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot, draft *made)
+static nebel_result fill(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot,
+                         nb_diffusion_builder *made)
 {
     nebel_result result = NEBEL_OK;
     nb_lattice_mean(&d->lattice, snapshot, made->cells);
@@ -277,8 +282,8 @@ static nebel_result solve(nb_diffusion *d, const nebel_fog *fog, const nebel_sna
 {
     const nebel_allocator *allocator = &fog->allocator;
     const size_t nodes = nb_lattice_nodes(&d->lattice);
-    draft made = {.cells = nb_allocate(allocator, nb_lattice_cells(&d->lattice), sizeof *made.cells),
-                  .sun = nb_allocate(allocator, nodes, sizeof *made.sun)};
+    nb_diffusion_builder made = {.cells = nb_allocate(allocator, nb_lattice_cells(&d->lattice), sizeof *made.cells),
+                                 .sun = nb_allocate(allocator, nodes, sizeof *made.sun)};
     double *light = nb_allocate(allocator, nodes, 4 * sizeof *light);
     nebel_result result = NEBEL_ERROR_MEMORY;
     for (int c = 0; c < 3; c++) made.light[c].nodes = light;
@@ -295,7 +300,7 @@ static nebel_result solve(nb_diffusion *d, const nebel_fog *fog, const nebel_sna
 nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snapshot, nebel_snapshot *scaled, int is_own,
                                nb_diffusion **made)
 {
-    nb_lattice lattice;
+    nb_diffusion_lattice lattice;
     int lit;
     *made = NULL;
     nebel_result result = nb_lattice_place(fog, snapshot, scaled, is_own, &lattice, &lit);

@@ -19,11 +19,11 @@ typedef enum nb_lattice_end {
     NB_END_GROUND
 } nb_lattice_end;
 
-typedef struct nb_lattice {
+typedef struct nb_diffusion_lattice {
     uint32_t size[3];                   /* cells, >= 1 */
     double low[3], high[3], spacing[3]; /* m */
     nb_lattice_end ends[3][2];
-} nb_lattice;
+} nb_diffusion_lattice;
 
 /* Of one channel at a node, per unit of the sun's irradiance. */
 enum {
@@ -57,11 +57,11 @@ enum {
 };
 
 typedef struct nb_diffusion {
-    nb_lattice lattice;
+    nb_diffusion_lattice lattice;
     int channel_count;    /* 1: all channels are alike */
     int has_peaks;        /* some fog scatters forwards, so that `scaled` is another fog */
     int has_sun, has_sky; /* whether the sun lights it; whether it dims the sky */
-    int is_own;           /* it is of own light (nb_own_light), and neither of the sun nor of the sky */
+    int is_own;           /* it is of own light (nb_local_light), and neither of the sun nor of the sky */
     double to_sun[3];     /* of length 1 */
     double irradiance[3]; /* of the sun; the unit of own light */
     double skylight[3];   /* mean radiance of the sky */
@@ -88,19 +88,19 @@ static inline int nb_diffusion_has_second(const nb_diffusion *diffusion)
 }
 
 /* How many faces lie across an axis, x fastest. */
-static inline size_t nb_lattice_faces(const nb_lattice *lattice, int axis)
+static inline size_t nb_lattice_faces(const nb_diffusion_lattice *lattice, int axis)
 {
     size_t count = 1;
     for (int a = 0; a < 3; a++) count *= lattice->size[a] + (a == axis ? 1u : 0u);
     return count;
 }
 
-static inline size_t nb_lattice_cells(const nb_lattice *lattice)
+static inline size_t nb_lattice_cells(const nb_diffusion_lattice *lattice)
 {
     return (size_t)lattice->size[0] * lattice->size[1] * lattice->size[2];
 }
 
-static inline size_t nb_lattice_nodes(const nb_lattice *lattice)
+static inline size_t nb_lattice_nodes(const nb_diffusion_lattice *lattice)
 {
     return ((size_t)lattice->size[0] + 1) * ((size_t)lattice->size[1] + 1) * ((size_t)lattice->size[2] + 1);
 }
@@ -117,24 +117,24 @@ typedef struct nb_sky_moments {
 } nb_sky_moments;
 
 /* Own light in one channel on its straight way. */
-typedef struct nb_beams {
+typedef struct nb_light_beams {
     double *through[3]; /* through scaled fog: power through each face, along the axis; */
     double *taken;      /* power that fog takes from it in each cell */
     double *scaled,
         *whole; /* what is emitted, through scaled fog and through the fog as it is: four for each cell, the means of
                                fluence and flux, times the cell's volume */
-} nb_beams;
+} nb_light_beams;
 
 /* 0 when memory is out. To be closed in any case. */
-int nb_beams_open(const nebel_allocator *allocator, const nb_lattice *lattice, nb_beams *beams);
+int nb_beams_open(const nebel_allocator *allocator, const nb_diffusion_lattice *lattice, nb_light_beams *beams);
 
-void nb_beams_close(const nebel_allocator *allocator, const nb_beams *beams);
+void nb_beams_close(const nebel_allocator *allocator, const nb_light_beams *beams);
 
 /* What fog scatters: the sun's light, own light, or the sky's, of which that is solved for which it lacks. */
 typedef struct nb_diffuse_source {
     const nb_node_sun *sun; /* of each node; NULL: not the sun */
     const double *to_sun;
-    const nb_beams *beams; /* NULL: not own light */
+    const nb_light_beams *beams; /* NULL: not own light */
     nb_sky_moments sky;
 } nb_diffuse_source;
 
@@ -144,34 +144,35 @@ static inline int nb_source_is_sky(const nb_diffuse_source *source)
 }
 
 /* Light that begins in the fog or beside it: lamps', and what fog emits. */
-typedef struct nb_own_light {
+typedef struct nb_local_light {
     int has; /* whether any fog scatters any */
     int has_colour;
     double unit[3]; /* the colour of all where they have one, else 1 */
-} nb_own_light;
+} nb_local_light;
 
-nb_own_light nb_find_own_light(const nebel_snapshot *snapshot);
+nb_local_light nb_find_own_light(const nebel_snapshot *snapshot);
 
 /* Of a lamp's intensity or of what is emitted, per unit. */
-double nb_own_amount(const nb_own_light *own, const double color[3], int channel);
+double nb_own_amount(const nb_local_light *own, const double color[3], int channel);
 
 /* Follows own light on straight ways to the lattice's ends, in one channel. */
-void nb_cast_beams(const nb_lattice *lattice, const nebel_snapshot *snapshot, const nb_transport *cells, int channel,
-                   const nb_own_light *own, const nb_beams *beams);
+void nb_cast_beams(const nb_diffusion_lattice *lattice, const nebel_snapshot *snapshot,
+                   const nb_medium_transport *cells, int channel, const nb_local_light *own,
+                   const nb_light_beams *beams);
 
 /* What own light gives a node on straight ways in each channel, fluence and flux: through scaled fog; what the exact light has of it,
  * through the fog as it is; the difference, with as much flux as is left where it goes almost straight on again. */
-typedef struct nb_node_own {
+typedef struct nb_local_node {
     double scaled[3][4], whole[3][4], glow[3][4];
-} nb_node_own;
+} nb_local_node;
 
 /* Fills the nodes, which are all 0, with lamps' light. */
 nebel_result nb_light_nodes_by_lamps(const nb_diffusion *diffusion, const nebel_snapshot *fog,
-                                     const nb_transport *cells, const nb_own_light *own, nb_node_own *nodes);
+                                     const nb_medium_transport *cells, const nb_local_light *own, nb_local_node *nodes);
 
 /* Adds what is emitted, as beams have it, in one channel. */
-void nb_light_nodes_by_cells(const nb_lattice *lattice, const nb_transport *cells, const nb_beams *beams, int channel,
-                             nb_node_own *nodes);
+void nb_light_nodes_by_cells(const nb_diffusion_lattice *lattice, const nb_medium_transport *cells,
+                             const nb_light_beams *beams, int channel, nb_local_node *nodes);
 
 /* Where the scattered light of lamps and of what fog emits matters, in fog without an end [m]. 0: nowhere. */
 int nb_find_reach(const nebel_snapshot *snapshot, const nebel_snapshot *scaled, double low[3], double high[3]);
@@ -193,19 +194,20 @@ int nb_sky_has_colour(const nebel_environment *sky);
 /* Where the lattice is, and its cells: of own light, or of the sun and the sky. *lit: 0 where there is nothing to be solved.
  * Errors: UNSUPPORTED. */
 nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot, const nebel_snapshot *scaled,
-                              int is_own, nb_lattice *lattice, int *lit);
+                              int is_own, nb_diffusion_lattice *lattice, int *lit);
 
 /* Whether it holds bodies in fog that goes on beside it. */
-int nb_lattice_has_bodies(const nb_lattice *lattice);
+int nb_lattice_has_bodies(const nb_diffusion_lattice *lattice);
 
 /* The place of a node. */
-void nb_lattice_node(const nb_lattice *lattice, size_t node, double place[3]);
+void nb_lattice_node(const nb_diffusion_lattice *lattice, size_t node, double place[3]);
 
 /* One of the eight cells around a node, or the nearest one where there is none. */
-size_t nb_lattice_cell_beside(const nb_lattice *lattice, size_t node, int octant);
+size_t nb_lattice_cell_beside(const nb_diffusion_lattice *lattice, size_t node, int octant);
 
 /* What the cells around a node hold together. */
-nb_transport nb_lattice_around(const nb_lattice *lattice, const nb_transport *cells, size_t node);
+nb_medium_transport nb_lattice_around(const nb_diffusion_lattice *lattice, const nb_medium_transport *cells,
+                                      size_t node);
 
 /* g of what went almost straight on `n` times, where the rest has the mean cosine `turned`: the second moment of what is
  * taken to go straight on is that of this lobe for n = 1. */
@@ -216,7 +218,7 @@ double nb_lobe_width(double turned, double n);
 double nb_glow_width(double turned, double scaled, double whole);
 
 /* Means over the cells. */
-void nb_lattice_mean(const nb_lattice *lattice, const nebel_snapshot *snapshot, nb_transport *cells);
+void nb_lattice_mean(const nb_diffusion_lattice *lattice, const nebel_snapshot *snapshot, nb_medium_transport *cells);
 
 /* One channel's diffuse light, per unit of irradiance; the sky's lack of light, per unit of its mean radiance. */
 typedef struct nb_diffuse_light {
@@ -227,23 +229,24 @@ typedef struct nb_diffuse_light {
 } nb_diffuse_light;
 
 /* Fills *light, whose nodes are the caller's. 0 when memory is out. */
-int nb_diffusion_solve(const nebel_allocator *allocator, const nb_lattice *lattice, const nb_transport *cells,
-                       const nb_diffuse_source *source, double ground_albedo, int channel, nb_diffuse_light *light);
+int nb_diffusion_solve(const nebel_allocator *allocator, const nb_diffusion_lattice *lattice,
+                       const nb_medium_transport *cells, const nb_diffuse_source *source, double ground_albedo,
+                       int channel, nb_diffuse_light *light);
 
 /* Sets the gains of a diffusion that is ready but for them. The radiance at an end of the lattice, which comes from what
  * is scattered towards it all along a ray, carries less out than diffusion says: that knows the energy better than where
  * near the end the light is. The gains make both alike. */
 nebel_result nb_diffusion_balance(const nebel_snapshot *fog, nb_diffusion *diffusion, const nb_diffuse_light light[3]);
 
-typedef struct nb_gathered {
+typedef struct nb_diffusion_gathered {
     double light[3], diffuse[3]; /* all, and what of it is diffuse */
     double dimmed[3];            /* what undimmed ambient light has too much, per unit of the sky's mean radiance */
-} nb_gathered;
+} nb_diffusion_gathered;
 
 /* Light per unit of irradiance that rays gather from the sun's light scattered in scaled fog; of what fog is there is no
  * less, where `is_rest` is 1: what exact light of one scattering lacks. Rays of t_max 0 gather none. */
 nebel_result nb_diffusion_gather(const nebel_snapshot *fog, const nb_diffusion *diffusion, int is_rest, size_t count,
-                                 const nebel_ray *rays, nb_gathered *gathered);
+                                 const nebel_ray *rays, nb_diffusion_gathered *gathered);
 
 /* How many rays are gathered at once, at most. */
 enum { NB_DIFFUSION_RAYS = 64 };

@@ -25,15 +25,15 @@ static const double shares[HEIGHTS] = {0.17392742256872693, 0.32607257743127307,
                                        0.17392742256872693};
 
 /* What leaves along rays [m^2]: what is diffuse, and all else. */
-typedef struct power {
+typedef struct nb_flux_balance {
     double diffuse[3], rest[3];
-} power;
+} nb_flux_balance;
 
-typedef struct survey {
+typedef struct nb_energy_survey {
     const nebel_snapshot *fog;
     const nb_diffusion *diffusion;
     double ground[3]; /* radiance of the ground, in the mean */
-} survey;
+} nb_energy_survey;
 
 /* The k-th ray inwards, of length 1, with its part of the integral over the cosine and the solid angle. */
 static double set_ray(int axis, int side, int k, nebel_ray *ray)
@@ -48,7 +48,7 @@ static double set_ray(int axis, int side, int k, nebel_ray *ray)
 }
 
 /* How far a ray goes to the ground, in the lattice; HUGE_VAL: it leaves it elsewhere, or there is none. */
-static double way_to_ground(const nb_lattice *l, const nebel_ray *ray)
+static double way_to_ground(const nb_diffusion_lattice *l, const nebel_ray *ray)
 {
     if (l->ends[1][0] != NB_END_GROUND || !(ray->direction[1] < 0)) return HUGE_VAL;
     const double way = (l->low[1] - ray->origin[1]) / ray->direction[1];
@@ -60,8 +60,8 @@ static double way_to_ground(const nb_lattice *l, const nebel_ray *ray)
 }
 
 /* Adds what comes straight from the ground. */
-static nebel_result add_ground(const survey *v, nebel_ray rays[NB_DIFFUSION_RAYS],
-                               const double weights[NB_DIFFUSION_RAYS], power *sum)
+static nebel_result add_ground(const nb_energy_survey *v, nebel_ray rays[NB_DIFFUSION_RAYS],
+                               const double weights[NB_DIFFUSION_RAYS], nb_flux_balance *sum)
 {
     nebel_transfer transfers[NB_DIFFUSION_RAYS];
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .transmittance_only = 1, .ignore_distances = 1};
@@ -78,10 +78,11 @@ static nebel_result add_ground(const survey *v, nebel_ray rays[NB_DIFFUSION_RAYS
 }
 
 /* Adds what leaves around a place. */
-static nebel_result add_place(const survey *v, int axis, int side, const double place[3], double area, power *sum)
+static nebel_result add_place(const nb_energy_survey *v, int axis, int side, const double place[3], double area,
+                              nb_flux_balance *sum)
 {
     nebel_ray rays[NB_DIFFUSION_RAYS];
-    nb_gathered gathered[NB_DIFFUSION_RAYS];
+    nb_diffusion_gathered gathered[NB_DIFFUSION_RAYS];
     double weights[NB_DIFFUSION_RAYS];
     for (int k = 0; k < NB_DIFFUSION_RAYS; k++) {
         weights[k] = area * set_ray(axis, side, k, &rays[k]);
@@ -99,15 +100,15 @@ static nebel_result add_place(const survey *v, int axis, int side, const double 
 }
 
 /* Through one end of the lattice. */
-static nebel_result gather_end(const survey *v, int axis, int side, power *sum)
+static nebel_result gather_end(const nb_energy_survey *v, int axis, int side, nb_flux_balance *sum)
 {
-    const nb_lattice *l = &v->diffusion->lattice;
+    const nb_diffusion_lattice *l = &v->diffusion->lattice;
     const int across[2] = {(axis + 1) % 3, (axis + 2) % 3};
     const int count[2] = {l->size[across[0]] > 1 ? PLACES : 1, l->size[across[1]] > 1 ? PLACES : 1};
     double area = 1;
     nebel_result result = NEBEL_OK;
     for (int k = 0; k < 2; k++) area *= (l->high[across[k]] - l->low[across[k]]) / count[k];
-    *sum = (power){{0}, {0}};
+    *sum = (nb_flux_balance){{0}, {0}};
     for (int i = 0; i < count[0] * count[1] && result == NEBEL_OK; i++) {
         const int at[2] = {i % count[0], i / count[0]};
         double place[3];
@@ -128,7 +129,7 @@ static double find_gain(double leaving, double rest, double diffuse, double leas
 }
 
 /* `ends`: of each axis and side; nothing where they are not open. */
-static void balance_channel(nb_diffusion *d, int c, const nb_diffuse_light *light, const power ends[6])
+static void balance_channel(nb_diffusion *d, int c, const nb_diffuse_light *light, const nb_flux_balance ends[6])
 {
     double leaving = light->lost, diffuse = 0, rest = 0;
     for (int i = 0; i < 6; i++) {
@@ -152,8 +153,8 @@ static void balance_channel(nb_diffusion *d, int c, const nb_diffuse_light *ligh
 
 nebel_result nb_diffusion_balance(const nebel_snapshot *fog, nb_diffusion *diffusion, const nb_diffuse_light light[3])
 {
-    power ends[6];
-    survey v = {.fog = fog, .diffusion = diffusion};
+    nb_flux_balance ends[6];
+    nb_energy_survey v = {.fog = fog, .diffusion = diffusion};
     for (int c = 0; c < 3; c++) {
         v.ground[c] = light[c < diffusion->channel_count ? c : 0].ground;
         for (int i = 0; i < 6; i++) diffusion->gain[c][i / 2][i % 2] = 1;

@@ -30,17 +30,17 @@ enum {
     SHARES = 3
 };
 
-typedef struct span {
+typedef struct nb_lattice_span {
     double low, high;
     int is_endless[2];
-} span;
+} nb_lattice_span;
 
 /* ---- where lit fog is ------------------------------------------------------------------------ */
 
-static span span_of(const nb_medium *medium, int axis)
+static nb_lattice_span span_of(const nb_medium *medium, int axis)
 {
     const nebel_density *density = &medium->body.density;
-    span s = {medium->body.low[axis], medium->body.high[axis], {0, 0}};
+    nb_lattice_span s = {medium->body.low[axis], medium->body.high[axis], {0, 0}};
     if (density->type == NEBEL_DENSITY_GAUSSIAN) {
         s.low = fmax(s.low, density->center[axis] - GAUSSIAN_END * density->sigma);
         s.high = fmin(s.high, density->center[axis] + GAUSSIAN_END * density->sigma);
@@ -75,12 +75,12 @@ static int takes_part_in_own(const nb_medium *medium, int goes_on)
 }
 
 /* The span of all fog that ends and is lit, or scatters or gives own light, and whether there is any that does not. NULL, or what goes on and changes. */
-static const nb_medium *gather(const nebel_snapshot *snapshot, int is_own, int axis, span *all)
+static const nb_medium *gather(const nebel_snapshot *snapshot, int is_own, int axis, nb_lattice_span *all)
 {
-    *all = (span){HUGE_VAL, -HUGE_VAL, {0, 0}};
+    *all = (nb_lattice_span){HUGE_VAL, -HUGE_VAL, {0, 0}};
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_medium *medium = &snapshot->media[i];
-        const span s = span_of(medium, axis);
+        const nb_lattice_span s = span_of(medium, axis);
         const int goes_on = s.is_endless[0] || s.is_endless[1];
         if (!(is_own ? takes_part_in_own(medium, goes_on) : nb_medium_is_lit(medium))) continue;
         if (goes_on && axis != 1 && !is_level(medium, axis)) return medium;
@@ -116,7 +116,7 @@ static double find_height(const nebel_snapshot *scaled, double x, double z, doub
 }
 
 /* A part of the world's width for endless level fog; more than the fog that ends where there is both. */
-static void set_level_axis(nb_lattice *l, int axis, const span *s)
+static void set_level_axis(nb_diffusion_lattice *l, int axis, const nb_lattice_span *s)
 {
     const int has_bodies = s->low < s->high;
     const double margin = has_bodies ? (s->high - s->low) / 2 : 0;
@@ -125,7 +125,8 @@ static void set_level_axis(nb_lattice *l, int axis, const span *s)
     l->ends[axis][0] = l->ends[axis][1] = NB_END_LEVEL;
 }
 
-static void set_height(const nebel_snapshot *scaled, const span *s, const nebel_diffusion_desc *desc, nb_lattice *l)
+static void set_height(const nebel_snapshot *scaled, const nb_lattice_span *s, const nebel_diffusion_desc *desc,
+                       nb_diffusion_lattice *l)
 {
     const double x = (l->low[0] + l->high[0]) / 2, z = (l->low[2] + l->high[2]) / 2;
     l->low[1] = s->is_endless[0] ? find_height(scaled, x, z, DEEP) : s->low;
@@ -140,7 +141,7 @@ static void set_height(const nebel_snapshot *scaled, const span *s, const nebel_
 }
 
 /* In fog without an end a lattice of own light holds lamps and bodies that emit, with what lies around them, and ends there. */
-static void hold_own_light(const nebel_snapshot *snapshot, const nebel_snapshot *scaled, nb_lattice *l)
+static void hold_own_light(const nebel_snapshot *snapshot, const nebel_snapshot *scaled, nb_diffusion_lattice *l)
 {
     double low[3], high[3];
     const int is_everywhere = !(l->low[1] < l->high[1]);
@@ -165,9 +166,9 @@ static void hold_own_light(const nebel_snapshot *snapshot, const nebel_snapshot 
 /* ---- how fine it is -------------------------------------------------------------------------- */
 
 /* The most of all channels that fog takes after scaling, in the mean. */
-static double mean_extinction(const nb_lattice *l, const nebel_snapshot *snapshot)
+static double mean_extinction(const nb_diffusion_lattice *l, const nebel_snapshot *snapshot)
 {
-    nb_transport sum = {.extinction = {0}};
+    nb_medium_transport sum = {.extinction = {0}};
     double most = 0;
     for (int k = 0; k < PROBES * PROBES * PROBES; k++) {
         const int at[3] = {k % PROBES, k / PROBES % PROBES, k / (PROBES * PROBES)};
@@ -179,7 +180,7 @@ static double mean_extinction(const nb_lattice *l, const nebel_snapshot *snapsho
     return most / (PROBES * PROBES * PROBES);
 }
 
-static void set_cells(const nebel_snapshot *snapshot, uint32_t limit, int is_own, nb_lattice *l)
+static void set_cells(const nebel_snapshot *snapshot, uint32_t limit, int is_own, nb_diffusion_lattice *l)
 {
     const double extinction = mean_extinction(l, snapshot);
     const int is_flat = l->ends[0][0] == NB_END_LEVEL && l->high[0] - l->low[0] == 1 && l->ends[2][0] == NB_END_LEVEL &&
@@ -206,15 +207,15 @@ static void set_cells(const nebel_snapshot *snapshot, uint32_t limit, int is_own
     }
 }
 
-int nb_lattice_has_bodies(const nb_lattice *l)
+int nb_lattice_has_bodies(const nb_diffusion_lattice *l)
 {
     return (l->ends[0][0] == NB_END_LEVEL && l->size[0] > 1) || (l->ends[2][0] == NB_END_LEVEL && l->size[2] > 1);
 }
 
 nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot, const nebel_snapshot *scaled,
-                              int is_own, nb_lattice *lattice, int *lit)
+                              int is_own, nb_diffusion_lattice *lattice, int *lit)
 {
-    span spans[3];
+    nb_lattice_span spans[3];
     memset(lattice, 0, sizeof *lattice);
     *lit = 0;
     for (int a = 0; a < 3; a++) {
@@ -243,10 +244,11 @@ nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapsh
 
 /* ---- what its cells hold --------------------------------------------------------------------- */
 
-static void mean_of_cell(const nb_lattice *l, const nebel_snapshot *snapshot, const uint32_t at[3], nb_transport *mean)
+static void mean_of_cell(const nb_diffusion_lattice *l, const nebel_snapshot *snapshot, const uint32_t at[3],
+                         nb_medium_transport *mean)
 {
     const double part = 1. / (SHARES * SHARES * SHARES);
-    nb_transport sum = {.extinction = {0}};
+    nb_medium_transport sum = {.extinction = {0}};
     for (int k = 0; k < SHARES * SHARES * SHARES; k++) {
         const int share[3] = {k % SHARES, k / SHARES % SHARES, k / (SHARES * SHARES)};
         double place[3];
@@ -262,7 +264,7 @@ static void mean_of_cell(const nb_lattice *l, const nebel_snapshot *snapshot, co
     }
 }
 
-void nb_lattice_mean(const nb_lattice *lattice, const nebel_snapshot *snapshot, nb_transport *cells)
+void nb_lattice_mean(const nb_diffusion_lattice *lattice, const nebel_snapshot *snapshot, nb_medium_transport *cells)
 {
     const size_t count = nb_lattice_cells(lattice), nx = lattice->size[0], ny = lattice->size[1];
     for (size_t i = 0; i < count; i++) {
@@ -273,14 +275,14 @@ void nb_lattice_mean(const nb_lattice *lattice, const nebel_snapshot *snapshot, 
 
 /* ---- its nodes ------------------------------------------------------------------------------- */
 
-void nb_lattice_node(const nb_lattice *l, size_t node, double place[3])
+void nb_lattice_node(const nb_diffusion_lattice *l, size_t node, double place[3])
 {
     const size_t nx = l->size[0] + 1u, ny = l->size[1] + 1u;
     const size_t at[3] = {node % nx, node / nx % ny, node / (nx * ny)};
     for (int a = 0; a < 3; a++) place[a] = at[a] == l->size[a] ? l->high[a] : l->low[a] + (double)at[a] * l->spacing[a];
 }
 
-size_t nb_lattice_cell_beside(const nb_lattice *l, size_t node, int octant)
+size_t nb_lattice_cell_beside(const nb_diffusion_lattice *l, size_t node, int octant)
 {
     const size_t nx = l->size[0] + 1u, ny = l->size[1] + 1u;
     const size_t at[3] = {node % nx, node / nx % ny, node / (nx * ny)};
@@ -292,11 +294,11 @@ size_t nb_lattice_cell_beside(const nb_lattice *l, size_t node, int octant)
     return cell[0] + l->size[0] * (cell[1] + l->size[1] * cell[2]);
 }
 
-nb_transport nb_lattice_around(const nb_lattice *l, const nb_transport *cells, size_t node)
+nb_medium_transport nb_lattice_around(const nb_diffusion_lattice *l, const nb_medium_transport *cells, size_t node)
 {
-    nb_transport sum = {.extinction = {0}};
+    nb_medium_transport sum = {.extinction = {0}};
     for (int octant = 0; octant < 8; octant++) {
-        const nb_transport *t = &cells[nb_lattice_cell_beside(l, node, octant)];
+        const nb_medium_transport *t = &cells[nb_lattice_cell_beside(l, node, octant)];
         for (int c = 0; c < 3; c++) {
             sum.extinction[c] += t->extinction[c];
             sum.scattering[c] += t->scattering[c];

@@ -46,7 +46,7 @@ typedef struct walker {
     const nb_diffusion *in;         /* whose nodes `source` and the others are of; NULL: not looked up */
 } walker;
 
-typedef struct block {
+typedef struct nb_diffusion_block {
     const nebel_snapshot *fog;
     const nb_diffusion *diffusion;
     int is_rest; /* see nb_diffusion_gather */
@@ -56,7 +56,7 @@ typedef struct block {
     double step[BLOCK];
     float offset[3][BLOCK], length[BLOCK], scaled[3][BLOCK], whole[3][BLOCK];
     double direction[3][BLOCK];
-} block;
+} nb_diffusion_block;
 
 /* ---- source radiance ------------------------------------------------------------------------- */
 
@@ -68,7 +68,7 @@ static double lobe(double g, double cosine)
 }
 
 /* The eight nodes around a place, which is taken to the nearest one of the lattice, with their weights. */
-static void find_nodes(const nb_lattice *l, const double place[3], size_t nodes[8], double weights[8])
+static void find_nodes(const nb_diffusion_lattice *l, const double place[3], size_t nodes[8], double weights[8])
 {
     size_t base[3];
     double part[3];
@@ -163,7 +163,7 @@ static void look_at_own(const nb_diffusion *d, const size_t nodes[8], const doub
 }
 
 /* In the lattice that the piece is in. */
-static void look(const block *b, walker *w)
+static void look(const nb_diffusion_block *b, walker *w)
 {
     size_t nodes[8];
     double place[3], weights[8];
@@ -196,7 +196,7 @@ static void look(const block *b, walker *w)
 /* ---- along a ray ----------------------------------------------------------------------------- */
 
 /* The part of a ray in the lattice, whose ends may go on for ever. */
-static void clip(const nb_lattice *l, const double middle[3], walker *w)
+static void clip(const nb_diffusion_lattice *l, const double middle[3], walker *w)
 {
     for (int a = 0; a < 3; a++) {
         const double from = middle[a] + w->origin[a], d = w->direction[a];
@@ -218,7 +218,7 @@ static void clip(const nb_lattice *l, const double middle[3], walker *w)
 }
 
 /* To the next cell, about: a cell's width along each axis where there are any. */
-static double find_step(const nb_lattice *l, const double middle[3], const walker *w)
+static double find_step(const nb_diffusion_lattice *l, const double middle[3], const walker *w)
 {
     double step = w->end - w->t;
     if (w->t < w->enter) return w->enter - w->t;
@@ -236,7 +236,7 @@ static double find_step(const nb_lattice *l, const double middle[3], const walke
     return isfinite(step) ? ldexp(step, -w->halvings) : step;
 }
 
-static void start(block *b, size_t i, const nebel_ray *ray)
+static void start(nb_diffusion_block *b, size_t i, const nebel_ray *ray)
 {
     const nb_diffusion *d = b->diffusion;
     walker *w = &b->walkers[i];
@@ -256,19 +256,19 @@ static void start(block *b, size_t i, const nebel_ray *ray)
 }
 
 /* The weights of both ends of a step that leaves `transmittance`: the source is linear between them, the fog even. */
-typedef struct ends {
+typedef struct nb_diffusion_ends {
     double first, last;
-} ends;
+} nb_diffusion_ends;
 
-static ends weigh(double transmittance)
+static nb_diffusion_ends weigh(double transmittance)
 {
     const double depth = transmittance > 1e-30 ? -nb_log(transmittance) : 70, taken = 1 - transmittance;
     const double last = depth > 1e-3 ? (taken - depth * transmittance) / depth : depth / 2 - depth * depth / 3;
-    return (ends){taken - last, last};
+    return (nb_diffusion_ends){taken - last, last};
 }
 
 /* 0: its step has to be smaller. */
-static int is_fine(const block *b, size_t i)
+static int is_fine(const nb_diffusion_block *b, size_t i)
 {
     const walker *w = &b->walkers[i];
     int is_thick = 0;
@@ -277,7 +277,7 @@ static int is_fine(const block *b, size_t i)
 }
 
 /* Which lattice a piece is in, and its nodes at where it begins. Bodies end at the faces of their lattice, as pieces do. */
-static void enter(const block *b, walker *w, double step)
+static void enter(const nb_diffusion_block *b, walker *w, double step)
 {
     double place[3];
     const double half = fmin(step, FAR) / 2;
@@ -289,7 +289,7 @@ static void enter(const block *b, walker *w, double step)
 }
 
 /* Without fog a piece has no light, whatever its ends have. */
-static int is_empty(const block *b, size_t i)
+static int is_empty(const nb_diffusion_block *b, size_t i)
 {
     int is = 1;
     for (int c = 0; c < b->diffusion->channel_count; c++)
@@ -298,7 +298,7 @@ static int is_empty(const block *b, size_t i)
 }
 
 /* To where the lattice begins, through fog that gives nothing of its light. */
-static void go_to_lattice(block *b, size_t i)
+static void go_to_lattice(nb_diffusion_block *b, size_t i)
 {
     walker *w = &b->walkers[i];
     int is_dark = 1;
@@ -311,7 +311,7 @@ static void go_to_lattice(block *b, size_t i)
 }
 
 /* From t to the end of its step. */
-static void advance(block *b, size_t i)
+static void advance(nb_diffusion_block *b, size_t i)
 {
     walker *w = &b->walkers[i];
     const nb_diffusion *d = b->diffusion;
@@ -332,7 +332,7 @@ static void advance(block *b, size_t i)
     if (isfinite(w->t)) look(b, w);
     for (int c = 0; c < d->channel_count; c++) {
         const double scaled = (double)b->scaled[c][i], whole = d->has_peaks ? (double)b->whole[c][i] : scaled;
-        const ends of_scaled = weigh(scaled), of_whole = weigh(whole);
+        const nb_diffusion_ends of_scaled = weigh(scaled), of_whole = weigh(whole);
         w->light[c] += w->scaled[c] * (of_scaled.first * before.source[c] + of_scaled.last * w->source[c]) +
                        w->whole[c] * (of_whole.first * before.once[c] + of_whole.last * w->once[c]);
         w->spread[c] += w->scaled[c] * (of_scaled.first * before.diffuse[c] + of_scaled.last * w->diffuse[c]);
@@ -350,7 +350,7 @@ static void advance(block *b, size_t i)
 /* ---- all rays of a block, step by step ------------------------------------------------------- */
 
 /* 0: all are done. */
-static int prepare(block *b)
+static int prepare(nb_diffusion_block *b)
 {
     int goes_on = 0;
     for (size_t i = 0; i < b->count; i++) {
@@ -367,7 +367,7 @@ static int prepare(block *b)
     return goes_on;
 }
 
-static nebel_result ask(block *b, const nebel_snapshot *fog, float out[3][BLOCK])
+static nebel_result ask(nb_diffusion_block *b, const nebel_snapshot *fog, float out[3][BLOCK])
 {
     nebel_ray_planes rays = {.t_max = b->length};
     nebel_transfer_planes transfers = {.error = NULL};
@@ -380,7 +380,7 @@ static nebel_result ask(block *b, const nebel_snapshot *fog, float out[3][BLOCK]
     return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, b->count, &rays, &transfers);
 }
 
-static nebel_result go_through(block *b)
+static nebel_result go_through(nb_diffusion_block *b)
 {
     while (prepare(b)) {
         nebel_result result = ask(b, b->diffusion->scaled, b->scaled);
@@ -398,10 +398,10 @@ static nebel_result go_through(block *b)
 }
 
 nebel_result nb_diffusion_gather(const nebel_snapshot *fog, const nb_diffusion *diffusion, int is_rest, size_t count,
-                                 const nebel_ray *rays, nb_gathered *gathered)
+                                 const nebel_ray *rays, nb_diffusion_gathered *gathered)
 {
     const nb_diffusion *d = diffusion;
-    block b = {.fog = fog, .diffusion = d, .is_rest = is_rest, .count = count};
+    nb_diffusion_block b = {.fog = fog, .diffusion = d, .is_rest = is_rest, .count = count};
     for (int a = 0; a < 3; a++) b.middle[a] = d->lattice.low[a] + (d->lattice.high[a] - d->lattice.low[a]) / 2;
     for (size_t i = 0; i < count; i++) start(&b, i, &rays[i]);
     const nebel_result result = go_through(&b);
@@ -441,7 +441,7 @@ static nebel_result add_all(const nb_trace_job *job, const nb_diffusion *d)
     for (size_t first = 0; first < job->count; first += NB_DIFFUSION_RAYS) {
         const size_t n = job->count - first < NB_DIFFUSION_RAYS ? job->count - first : NB_DIFFUSION_RAYS;
         nebel_ray rays[NB_DIFFUSION_RAYS];
-        nb_gathered gathered[NB_DIFFUSION_RAYS];
+        nb_diffusion_gathered gathered[NB_DIFFUSION_RAYS];
         for (size_t i = 0; i < n; i++) rays[i] = ray_of(job, first + i);
         const nebel_result result = nb_diffusion_gather(job->snapshot, d, 1, n, rays, gathered);
         if (result != NEBEL_OK) return result;

@@ -44,7 +44,7 @@ static double most_of(const double color[3])
     return fmax(color[0], fmax(color[1], color[2]));
 }
 
-static void add_color(nb_own_light *own, const double color[3])
+static void add_color(nb_local_light *own, const double color[3])
 {
     const double most = most_of(color);
     if (!(most > 0)) return;
@@ -56,9 +56,9 @@ static void add_color(nb_own_light *own, const double color[3])
     own->has = 1;
 }
 
-nb_own_light nb_find_own_light(const nebel_snapshot *snapshot)
+nb_local_light nb_find_own_light(const nebel_snapshot *snapshot)
 {
-    nb_own_light own = {.has = 0};
+    nb_local_light own = {.has = 0};
     int scatters = 0;
     for (size_t i = 0; has_lamps(snapshot) && i < snapshot->lamp_count; i++)
         add_color(&own, snapshot->lamps[i].intensity);
@@ -73,7 +73,7 @@ nb_own_light nb_find_own_light(const nebel_snapshot *snapshot)
     return own;
 }
 
-double nb_own_amount(const nb_own_light *own, const double color[3], int channel)
+double nb_own_amount(const nb_local_light *own, const double color[3], int channel)
 {
     return own->has_colour ? color[channel] : most_of(color);
 }
@@ -138,7 +138,7 @@ int nb_find_reach(const nebel_snapshot *snapshot, const nebel_snapshot *scaled, 
         high[a] = -HUGE_VAL;
     }
     for (size_t i = 0; has_lamps(snapshot) && i < snapshot->lamp_count; i++) {
-        const nb_lamp *lamp = &snapshot->lamps[i];
+        const nb_light *lamp = &snapshot->lamps[i];
         if (most_of(lamp->intensity) > 0) widen(scaled, lamp->place, lamp->place, low, high);
     }
     for (size_t i = 0; i < snapshot->medium_count; i++) {
@@ -156,7 +156,7 @@ int nb_find_reach(const nebel_snapshot *snapshot, const nebel_snapshot *scaled, 
 
 /* ---- straight ways to cells ------------------------------------------------------------------ */
 
-int nb_beams_open(const nebel_allocator *allocator, const nb_lattice *lattice, nb_beams *beams)
+int nb_beams_open(const nebel_allocator *allocator, const nb_diffusion_lattice *lattice, nb_light_beams *beams)
 {
     beams->taken = nb_allocate(allocator, nb_lattice_cells(lattice), sizeof *beams->taken);
     beams->scaled = nb_allocate(allocator, nb_lattice_cells(lattice), 4 * sizeof *beams->scaled);
@@ -169,7 +169,7 @@ int nb_beams_open(const nebel_allocator *allocator, const nb_lattice *lattice, n
     return all;
 }
 
-void nb_beams_close(const nebel_allocator *allocator, const nb_beams *beams)
+void nb_beams_close(const nebel_allocator *allocator, const nb_light_beams *beams)
 {
     for (int a = 0; a < 3; a++) nb_release(allocator, beams->through[a]);
     nb_release(allocator, beams->taken);
@@ -178,13 +178,13 @@ void nb_beams_close(const nebel_allocator *allocator, const nb_beams *beams)
 }
 
 typedef struct caster {
-    const nb_lattice *lattice;
-    const nb_transport *cells;
+    const nb_diffusion_lattice *lattice;
+    const nb_medium_transport *cells;
     int channel, is_emitted; /* of lamps nodes know more than cells do */
-    const nb_beams *beams;
+    const nb_light_beams *beams;
 } caster;
 
-static double scaled_extinction(const nb_transport *t, int channel)
+static double scaled_extinction(const nb_medium_transport *t, int channel)
 {
     return fmax(t->extinction[channel] - t->scattering[channel] + t->turned[channel], 0);
 }
@@ -198,7 +198,7 @@ typedef struct way {
 } way;
 
 /* From `t` on. 0: it misses the lattice. */
-static int enter(const nb_lattice *l, const double from[3], double t, way *w)
+static int enter(const nb_diffusion_lattice *l, const double from[3], double t, way *w)
 {
     double end = HUGE_VAL;
     w->entered = -1;
@@ -224,7 +224,7 @@ static int enter(const nb_lattice *l, const double from[3], double t, way *w)
 
 static void pass_face(const caster *k, const way *w, int axis, int is_far, double power)
 {
-    const nb_lattice *l = k->lattice;
+    const nb_diffusion_lattice *l = k->lattice;
     size_t at[3] = {w->at[0], w->at[1], w->at[2]};
     at[axis] += (size_t)((w->direction[axis] > 0) == is_far);
     const size_t nx = l->size[0] + (axis == 0 ? 1u : 0u), ny = l->size[1] + (axis == 1 ? 1u : 0u);
@@ -243,7 +243,7 @@ static double dim(const way *w, double power, double extinction, double length, 
 
 static void cast(const caster *k, const double from[3], double start, const double direction[3], double power)
 {
-    const nb_lattice *l = k->lattice;
+    const nb_diffusion_lattice *l = k->lattice;
     const double dark = DARK * power;
     double whole = power;
     way w = {.direction = {direction[0], direction[1], direction[2]}};
@@ -252,7 +252,7 @@ static void cast(const caster *k, const double from[3], double start, const doub
     for (;;) {
         const int axis = w.next[0] <= w.next[1] ? (w.next[0] <= w.next[2] ? 0 : 2) : (w.next[1] <= w.next[2] ? 1 : 2);
         const size_t cell = w.at[0] + l->size[0] * (w.at[1] + l->size[1] * w.at[2]);
-        const nb_transport *t = &k->cells[cell];
+        const nb_medium_transport *t = &k->cells[cell];
         const double length = fmax(w.next[axis] - w.t, 0);
         double seen[4] = {0};
         const double left = dim(&w, power, scaled_extinction(t, k->channel), length,
@@ -270,14 +270,14 @@ static void cast(const caster *k, const double from[3], double start, const doub
 }
 
 /* Directions around an axis: those whose cosine is at least 1 - width. */
-typedef struct cone {
+typedef struct nb_diffusion_cone {
     double axis[3], width;
-} cone;
+} nb_diffusion_cone;
 
 /* That holds the lattice, as a lamp sees it, or the lamp's own one where that is narrower. */
-static cone aim(const nb_lattice *l, const nb_lamp *lamp)
+static nb_diffusion_cone aim(const nb_diffusion_lattice *l, const nb_light *lamp)
 {
-    cone all = {{0, 1, 0}, 2};
+    nb_diffusion_cone all = {{0, 1, 0}, 2};
     double square = 0, radius2 = 0, away[3];
     for (int a = 0; a < 3; a++) {
         away[a] = l->low[a] + (l->high[a] - l->low[a]) / 2 - lamp->place[a];
@@ -306,7 +306,7 @@ static void find_across(const double axis[3], double right[3], double up[3])
     for (int a = 0; a < 3; a++) up[a] = axis[(a + 1) % 3] * right[(a + 2) % 3] - axis[(a + 2) % 3] * right[(a + 1) % 3];
 }
 
-static double cone_of(const nb_lamp *lamp, const double direction[3])
+static double cone_of(const nb_light *lamp, const double direction[3])
 {
     double cosine = 0;
     for (int a = 0; a < 3; a++) cosine += direction[a] * lamp->axis[a];
@@ -314,9 +314,9 @@ static double cone_of(const nb_lamp *lamp, const double direction[3])
 }
 
 /* Ways that are spread evenly, along a spiral of the golden angle. */
-static void cast_lamp(const caster *k, const nb_lamp *lamp, double intensity, int count)
+static void cast_lamp(const caster *k, const nb_light *lamp, double intensity, int count)
 {
-    const cone all = aim(k->lattice, lamp);
+    const nb_diffusion_cone all = aim(k->lattice, lamp);
     double right[3], up[3];
     find_across(all.axis, right, up);
     for (int i = 0; i < count; i++) {
@@ -342,7 +342,7 @@ static double spread(size_t i, int dimension)
 /* The i-th of all ways, from a place in the cell. */
 static void cast_from_cell(const caster *k, size_t cell, size_t i, double power)
 {
-    const nb_lattice *l = k->lattice;
+    const nb_diffusion_lattice *l = k->lattice;
     const size_t at[3] = {cell % l->size[0], cell / l->size[0] % l->size[1], cell / ((size_t)l->size[0] * l->size[1])};
     const double height = 2 * spread(i, 3) - 1, angle = 2 * PI * spread(i, 4), sine = sqrt(1 - height * height);
     const double direction[3] = {sine * cos(angle), height, sine * sin(angle)};
@@ -351,9 +351,9 @@ static void cast_from_cell(const caster *k, size_t cell, size_t i, double power)
     cast(k, place, 0, direction, power);
 }
 
-static void cast_emission(const caster *k, const nb_own_light *own)
+static void cast_emission(const caster *k, const nb_local_light *own)
 {
-    const nb_lattice *l = k->lattice;
+    const nb_diffusion_lattice *l = k->lattice;
     const size_t cells = nb_lattice_cells(l);
     const double volume = l->spacing[0] * l->spacing[1] * l->spacing[2];
     size_t glowing = 0, used = 0;
@@ -365,8 +365,9 @@ static void cast_emission(const caster *k, const nb_own_light *own)
     }
 }
 
-void nb_cast_beams(const nb_lattice *lattice, const nebel_snapshot *snapshot, const nb_transport *cells, int channel,
-                   const nb_own_light *own, const nb_beams *beams)
+void nb_cast_beams(const nb_diffusion_lattice *lattice, const nebel_snapshot *snapshot,
+                   const nb_medium_transport *cells, int channel, const nb_local_light *own,
+                   const nb_light_beams *beams)
 {
     caster k = {lattice, cells, channel, 0, beams};
     const size_t count = nb_lattice_cells(lattice);
@@ -385,14 +386,14 @@ void nb_cast_beams(const nb_lattice *lattice, const nebel_snapshot *snapshot, co
 /* ---- straight ways to nodes ------------------------------------------------------------------ */
 
 /* Some nodes as a lamp sees them. */
-typedef struct view {
+typedef struct nb_light_view {
     size_t count;
     double distance[BATCH], direction[3][BATCH]; /* m; from the nodes to the lamp */
     float offset[3][BATCH], length[BATCH];
     float scaled[3][BATCH], whole[3][BATCH]; /* transmittance */
-} view;
+} nb_light_view;
 
-static void look(const nb_lattice *l, const nb_lamp *lamp, size_t first, view *v)
+static void look(const nb_diffusion_lattice *l, const nb_light *lamp, size_t first, nb_light_view *v)
 {
     for (size_t i = 0; i < v->count; i++) {
         double place[3], square = 0;
@@ -408,7 +409,7 @@ static void look(const nb_lattice *l, const nb_lamp *lamp, size_t first, view *v
     }
 }
 
-static nebel_result ask(const nb_lattice *l, const nebel_snapshot *fog, view *v, float out[3][BATCH])
+static nebel_result ask(const nb_diffusion_lattice *l, const nebel_snapshot *fog, nb_light_view *v, float out[3][BATCH])
 {
     nebel_ray_planes rays = {.t_max = v->length};
     nebel_transfer_planes transfers = {.error = NULL};
@@ -421,7 +422,7 @@ static nebel_result ask(const nb_lattice *l, const nebel_snapshot *fog, view *v,
     return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, v->count, &rays, &transfers);
 }
 
-static double turned_cosine(const nb_transport *t, int channel)
+static double turned_cosine(const nb_medium_transport *t, int channel)
 {
     return t->turned[channel] > 0 ? t->forward[channel] / t->turned[channel] : 0;
 }
@@ -432,8 +433,8 @@ static void add_light(double sum[4], double fluence, double flux, const double d
     for (int a = 0; a < 3; a++) sum[1 + a] += flux * direction[a];
 }
 
-static void add_lamp(const view *v, size_t i, const nb_lamp *lamp, const nb_own_light *own, double soft2,
-                     const nb_transport *fog, nb_node_own *node)
+static void add_lamp(const nb_light_view *v, size_t i, const nb_light *lamp, const nb_local_light *own, double soft2,
+                     const nb_medium_transport *fog, nb_local_node *node)
 {
     const double away[3] = {-v->direction[0][i], -v->direction[1][i], -v->direction[2][i]};
     const double square = v->distance[i] * v->distance[i];
@@ -451,21 +452,21 @@ static void add_lamp(const view *v, size_t i, const nb_lamp *lamp, const nb_own_
 }
 
 nebel_result nb_light_nodes_by_lamps(const nb_diffusion *diffusion, const nebel_snapshot *fog,
-                                     const nb_transport *cells, const nb_own_light *own, nb_node_own *nodes)
+                                     const nb_medium_transport *cells, const nb_local_light *own, nb_local_node *nodes)
 {
-    const nb_lattice *l = &diffusion->lattice;
+    const nb_diffusion_lattice *l = &diffusion->lattice;
     const size_t count = nb_lattice_nodes(l);
     const double cell = nb_exp(nb_log(l->spacing[0] * l->spacing[1] * l->spacing[2]) / 3);
     for (size_t first = 0; first < count; first += BATCH) {
-        view v = {.count = count - first < BATCH ? count - first : BATCH};
+        nb_light_view v = {.count = count - first < BATCH ? count - first : BATCH};
         for (size_t k = 0; has_lamps(fog) && k < fog->lamp_count; k++) {
-            const nb_lamp *lamp = &fog->lamps[k];
+            const nb_light *lamp = &fog->lamps[k];
             look(l, lamp, first, &v);
             nebel_result result = ask(l, diffusion->scaled, &v, v.scaled);
             if (result == NEBEL_OK) result = ask(l, fog, &v, v.whole);
             if (result != NEBEL_OK) return result;
             for (size_t i = 0; i < v.count; i++) {
-                const nb_transport around = nb_lattice_around(l, cells, first + i);
+                const nb_medium_transport around = nb_lattice_around(l, cells, first + i);
                 add_lamp(&v, i, lamp, own, SOFT * SOFT * cell * cell, &around, &nodes[first + i]);
             }
         }
@@ -482,8 +483,8 @@ static double times_ahead(double scaled, double whole)
 }
 
 /* The mean of the cells around it. Nothing of what is emitted and then scattered is in the exact light. */
-static void add_cells(const nb_lattice *l, const nb_transport *cells, const nb_beams *beams, size_t node, int c,
-                      nb_node_own *out)
+static void add_cells(const nb_diffusion_lattice *l, const nb_medium_transport *cells, const nb_light_beams *beams,
+                      size_t node, int c, nb_local_node *out)
 {
     const double unit = 1 / (8 * l->spacing[0] * l->spacing[1] * l->spacing[2]);
     double scaled[4] = {0}, whole[4] = {0};
@@ -494,7 +495,7 @@ static void add_cells(const nb_lattice *l, const nb_transport *cells, const nb_b
             whole[k] += beams->whole[4 * cell + k] * unit;
         }
     }
-    const nb_transport fog = nb_lattice_around(l, cells, node);
+    const nb_medium_transport fog = nb_lattice_around(l, cells, node);
     const double width = nb_lobe_width(turned_cosine(&fog, c), 1 + times_ahead(scaled[0], whole[0]));
     for (int k = 0; k < 4; k++) {
         out->scaled[c][k] += scaled[k];
@@ -502,8 +503,8 @@ static void add_cells(const nb_lattice *l, const nb_transport *cells, const nb_b
     }
 }
 
-void nb_light_nodes_by_cells(const nb_lattice *lattice, const nb_transport *cells, const nb_beams *beams, int channel,
-                             nb_node_own *nodes)
+void nb_light_nodes_by_cells(const nb_diffusion_lattice *lattice, const nb_medium_transport *cells,
+                             const nb_light_beams *beams, int channel, nb_local_node *nodes)
 {
     const size_t count = nb_lattice_nodes(lattice);
     for (size_t i = 0; i < count; i++) add_cells(lattice, cells, beams, i, channel, &nodes[i]);

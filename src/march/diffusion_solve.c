@@ -45,7 +45,7 @@ typedef struct faces {
 } faces;
 
 typedef struct solver {
-    const nb_lattice *lattice;
+    const nb_diffusion_lattice *lattice;
     const nb_diffuse_source *source;
     double ground_albedo;
     int channel;
@@ -68,18 +68,18 @@ static size_t index_in(const index3 *i, size_t nx, size_t ny)
     return i->at[0] + nx * (i->at[1] + ny * (size_t)i->at[2]);
 }
 
-static size_t cell_index(const nb_lattice *l, const index3 *i)
+static size_t cell_index(const nb_diffusion_lattice *l, const index3 *i)
 {
     return index_in(i, l->size[0], l->size[1]);
 }
 
 /* The face at the low side of where a cell is, or would be. */
-static size_t face_index(const nb_lattice *l, int axis, const index3 *i)
+static size_t face_index(const nb_diffusion_lattice *l, int axis, const index3 *i)
 {
     return index_in(i, l->size[0] + (axis == 0 ? 1u : 0u), l->size[1] + (axis == 1 ? 1u : 0u));
 }
 
-static size_t node_index(const nb_lattice *l, const index3 *i)
+static size_t node_index(const nb_diffusion_lattice *l, const index3 *i)
 {
     return index_in(i, l->size[0] + 1u, l->size[1] + 1u);
 }
@@ -128,7 +128,7 @@ static double resistance(const solver *s, int axis, size_t cell)
 
 static void join_cells(solver *s, int axis, const index3 *face)
 {
-    const nb_lattice *l = s->lattice;
+    const nb_diffusion_lattice *l = s->lattice;
     const index3 before = shifted(face, axis, -1);
     const size_t f = face_index(l, axis, face), low = cell_index(l, &before), high = cell_index(l, face);
     const double resist_low = resistance(s, axis, low), resist_high = resistance(s, axis, high);
@@ -149,7 +149,7 @@ static double returned_by_ground(const solver *s, double beam)
 /* At an end the flux outwards is part * phi - returned. */
 static void end_cells(solver *s, int axis, int side, const index3 *face)
 {
-    const nb_lattice *l = s->lattice;
+    const nb_diffusion_lattice *l = s->lattice;
     const nb_lattice_end end = l->ends[axis][side];
     const index3 within = shifted(face, axis, -side);
     const size_t f = face_index(l, axis, face), cell = cell_index(l, &within);
@@ -207,14 +207,14 @@ static double taken_from_beam(const solver *s, const index3 *cell)
 }
 
 /* Extinction after scaling, in one channel. */
-static double scaled_extinction(const nb_transport *t, int channel)
+static double scaled_extinction(const nb_medium_transport *t, int channel)
 {
     return fmax(t->extinction[channel] - (t->scattering[channel] - t->turned[channel]), 0);
 }
 
-static void set_cells(solver *s, const nb_transport *cells)
+static void set_cells(solver *s, const nb_medium_transport *cells)
 {
-    const nb_lattice *l = s->lattice;
+    const nb_diffusion_lattice *l = s->lattice;
     const int c = s->channel;
     double mean = 0, least = HUGE_VAL;
     for (size_t i = 0; i < s->cell_count; i++)
@@ -233,9 +233,9 @@ static void set_cells(solver *s, const nb_transport *cells)
 }
 
 /* The diagonal, and the right side in `residual`. */
-static void set_balance(solver *s, const nb_transport *cells)
+static void set_balance(solver *s, const nb_medium_transport *cells)
 {
-    const nb_lattice *l = s->lattice;
+    const nb_diffusion_lattice *l = s->lattice;
     const double volume = l->spacing[0] * l->spacing[1] * l->spacing[2];
     const int c = s->channel;
     index3 cell = {{0, 0, 0}};
@@ -260,7 +260,7 @@ static void set_balance(solver *s, const nb_transport *cells)
 
 static void subtract_neighbours(const solver *s, int axis, const double *x, double *out)
 {
-    const nb_lattice *l = s->lattice;
+    const nb_diffusion_lattice *l = s->lattice;
     const size_t stride = axis == 0 ? 1 : axis == 1 ? l->size[0] : (size_t)l->size[0] * l->size[1];
     uint32_t size[3];
     memcpy(size, l->size, sizeof size);
@@ -322,7 +322,7 @@ static void find_fluence(solver *s)
 /* Per area, along the axis. */
 static double flux_through(const solver *s, int axis, const index3 *face)
 {
-    const nb_lattice *l = s->lattice;
+    const nb_diffusion_lattice *l = s->lattice;
     const size_t f = face_index(l, axis, face);
     const double k = s->faces[axis].conductance[f], drive = s->faces[axis].drive[f];
     const index3 before = shifted(face, axis, -1);
@@ -335,7 +335,7 @@ static double flux_through(const solver *s, int axis, const index3 *face)
 /* At an end of the lattice, from the half cell before it. */
 static double fluence_at_end(const solver *s, int axis, int side, const index3 *face)
 {
-    const nb_lattice *l = s->lattice;
+    const nb_diffusion_lattice *l = s->lattice;
     const index3 within = shifted(face, axis, -side);
     const size_t cell = cell_index(l, &within);
     const double sign = side ? 1 : -1;
@@ -345,7 +345,7 @@ static double fluence_at_end(const solver *s, int axis, int side, const index3 *
 }
 
 /* The cells around a node, two along each axis, or the one at an end twice. */
-static index3 cell_beside(const nb_lattice *l, const index3 *node, int octant)
+static index3 cell_beside(const nb_diffusion_lattice *l, const index3 *node, int octant)
 {
     index3 cell = *node;
     for (int a = 0; a < 3; a++) {
@@ -356,14 +356,14 @@ static index3 cell_beside(const nb_lattice *l, const index3 *node, int octant)
     return cell;
 }
 
-static int end_of(const nb_lattice *l, const index3 *node, int axis)
+static int end_of(const nb_diffusion_lattice *l, const index3 *node, int axis)
 {
     return node->at[axis] == 0 ? 0 : node->at[axis] == l->size[axis] ? 1 : -1;
 }
 
 static double fluence_at(const solver *s, const index3 *node)
 {
-    const nb_lattice *l = s->lattice;
+    const nb_diffusion_lattice *l = s->lattice;
     double sum = 0;
     int count = 0;
     for (int octant = 0; octant < 8; octant++) {
@@ -395,7 +395,7 @@ static double flux_at(const solver *s, int axis, const index3 *node)
 
 static void set_leaving(const solver *s, nb_diffuse_light *light)
 {
-    const nb_lattice *l = s->lattice;
+    const nb_diffusion_lattice *l = s->lattice;
     for (int axis = 0; axis < 3; axis++) {
         uint32_t size[3];
         memcpy(size, l->size, sizeof size);
@@ -415,7 +415,7 @@ static void set_leaving(const solver *s, nb_diffuse_light *light)
 
 static double find_lost(const solver *s)
 {
-    const nb_lattice *l = s->lattice;
+    const nb_diffusion_lattice *l = s->lattice;
     double sum = 0;
     for (size_t i = 0; i < s->cell_count; i++) sum += s->lost[i] * s->phi[i];
     return sum * l->spacing[0] * l->spacing[1] * l->spacing[2];
@@ -423,7 +423,7 @@ static double find_lost(const solver *s)
 
 static void set_nodes(const solver *s, double *light)
 {
-    const nb_lattice *l = s->lattice;
+    const nb_diffusion_lattice *l = s->lattice;
     const uint32_t size[3] = {l->size[0] + 1, l->size[1] + 1, l->size[2] + 1};
     index3 node = {{0, 0, 0}};
     do {
@@ -435,7 +435,7 @@ static void set_nodes(const solver *s, double *light)
 }
 
 /* What goes up from the ground: Lambert's, of the flux there. */
-static double find_ground(const nb_lattice *l, const double *nodes)
+static double find_ground(const nb_diffusion_lattice *l, const double *nodes)
 {
     const size_t nx = l->size[0] + 1u, nz = l->size[2] + 1u;
     double sum = 0;
@@ -477,8 +477,9 @@ static void release(const nebel_allocator *allocator, const solver *s)
     }
 }
 
-int nb_diffusion_solve(const nebel_allocator *allocator, const nb_lattice *lattice, const nb_transport *cells,
-                       const nb_diffuse_source *source, double ground_albedo, int channel, nb_diffuse_light *light)
+int nb_diffusion_solve(const nebel_allocator *allocator, const nb_diffusion_lattice *lattice,
+                       const nb_medium_transport *cells, const nb_diffuse_source *source, double ground_albedo,
+                       int channel, nb_diffuse_light *light)
 {
     solver s = {.lattice = lattice,
                 .source = source,

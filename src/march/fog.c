@@ -12,7 +12,7 @@ static nebel_volume_id id_of(size_t slot, uint32_t generation)
     return (nebel_volume_id)generation << 32 | (uint32_t)slot;
 }
 
-static nb_slot *slot_of(nebel_fog *fog, nebel_volume_id id)
+static nb_fog_slot *slot_of(nebel_fog *fog, nebel_volume_id id)
 {
     const size_t slot = (uint32_t)id;
     const uint32_t generation = (uint32_t)(id >> 32);
@@ -64,7 +64,7 @@ void nebel_destroy_fog(nebel_fog *fog)
 }
 
 /* A free slot, marked by nothing yet; NULL when memory or ids are out. */
-static nb_slot *take_slot(nebel_fog *fog)
+static nb_fog_slot *take_slot(nebel_fog *fog)
 {
     if (fog->free_count > 0) return &fog->slots[fog->first_free - 1];
     if (fog->slot_count >= UINT32_MAX) return NULL;
@@ -73,11 +73,11 @@ static nb_slot *take_slot(nebel_fog *fog)
                  fog->slot_count + 1))
         return NULL;
     fog->slots = slots;
-    fog->slots[fog->slot_count] = (nb_slot){.generation = 1};
+    fog->slots[fog->slot_count] = (nb_fog_slot){.generation = 1};
     return &fog->slots[fog->slot_count];
 }
 
-static void use_slot(nebel_fog *fog, nb_slot *slot, const nb_volume *volume)
+static void use_slot(nebel_fog *fog, nb_fog_slot *slot, const nb_volume *volume)
 {
     if (fog->free_count > 0) {
         fog->free_count--;
@@ -101,7 +101,7 @@ nebel_result nebel_add_volume(nebel_fog *fog, const nebel_volume_desc *desc, neb
     nb_volume volume;
     const nebel_result result = nb_volume_resolve(&fog->allocator, &fog->log, desc, &volume);
     if (result != NEBEL_OK) return result;
-    nb_slot *slot = take_slot(fog);
+    nb_fog_slot *slot = take_slot(fog);
     if (slot == NULL) {
         nb_volume_free(&fog->allocator, &volume);
         return nb_fail(&fog->log, NEBEL_ERROR_MEMORY, "fog: out of memory for volume %zu", fog->slot_count);
@@ -115,7 +115,7 @@ nebel_result nebel_update_volume(nebel_fog *fog, nebel_volume_id id, const nebel
 {
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
     if (desc == NULL) return lacks_description(fog);
-    nb_slot *slot = slot_of(fog, id);
+    nb_fog_slot *slot = slot_of(fog, id);
     if (slot == NULL)
         return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "volume id %llu: no such volume", (unsigned long long)id);
     nb_volume volume;
@@ -129,7 +129,7 @@ nebel_result nebel_update_volume(nebel_fog *fog, nebel_volume_id id, const nebel
 nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id)
 {
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
-    nb_slot *slot = slot_of(fog, id);
+    nb_fog_slot *slot = slot_of(fog, id);
     if (slot == NULL)
         return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "volume id %llu: no such volume", (unsigned long long)id);
     nb_volume_free(&fog->allocator, &slot->volume);
@@ -174,9 +174,9 @@ nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun)
     return result;
 }
 
-static nb_lamp *resolve_lamps(const nebel_allocator *allocator, size_t count, const nebel_light *lamps)
+static nb_light *resolve_lamps(const nebel_allocator *allocator, size_t count, const nebel_light *lamps)
 {
-    nb_lamp *made = nb_allocate(allocator, count, sizeof *made);
+    nb_light *made = nb_allocate(allocator, count, sizeof *made);
     for (size_t i = 0; i < count && made != NULL; i++) made[i] = nb_lamp_resolve(&lamps[i]);
     return made;
 }
@@ -187,7 +187,7 @@ nebel_result nebel_set_lamps(nebel_fog *fog, size_t count, const nebel_light *la
     if (count > 0 && lamps == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "lamps: must not be NULL");
     const nebel_result result = nb_check_lamps(&fog->log, count, lamps);
     if (result != NEBEL_OK) return result;
-    nb_lamp *made = count > 0 ? resolve_lamps(&fog->allocator, count, lamps) : NULL;
+    nb_light *made = count > 0 ? resolve_lamps(&fog->allocator, count, lamps) : NULL;
     if (count > 0 && made == NULL)
         return nb_fail(&fog->log, NEBEL_ERROR_MEMORY, "lamps: out of memory for %zu of them", count);
     nb_release(&fog->allocator, fog->lamps);

@@ -9,13 +9,13 @@
 
 #include <nebel/diffusion.h>
 
-typedef struct nb_slot {
+typedef struct nb_fog_slot {
     nb_volume volume;
     size_t next_free; /* 1 + slot, 0: none */
     uint32_t generation;
     int used;
-    nb_grid_lattice *lattice; /* that the last commit needed, or NULL */
-} nb_slot;
+    nb_sun_lattice *lattice; /* that the last commit needed, or NULL */
+} nb_fog_slot;
 
 struct nebel_fog {
     nebel_allocator allocator;
@@ -23,10 +23,10 @@ struct nebel_fog {
     nebel_environment sky; /* one owner of its map */
     nebel_sun sun;
     size_t lamp_count;
-    nb_lamp *lamps;
+    nb_light *lamps;
     double max_opacity;
     nebel_diffusion_desc diffusion; /* cells 0: off */
-    nb_slot *slots;
+    nb_fog_slot *slots;
     size_t slot_count, slot_capacity, first_free, free_count;
 };
 

@@ -15,14 +15,14 @@
 /* ---- the media near a place or a ray --------------------------------------------------------- */
 
 /* A walk over the endless media, then over those whose boxes the ray touches. */
-typedef struct walk {
+typedef struct nb_majorant_walk {
     const nebel_snapshot *snapshot;
     size_t next_endless;
     nb_bvh_cursor cursor;
-} walk;
+} nb_majorant_walk;
 
-static void begin_walk(walk *w, const nebel_snapshot *snapshot, const double origin[3], const double direction[3],
-                       double t_max)
+static void begin_walk(nb_majorant_walk *w, const nebel_snapshot *snapshot, const double origin[3],
+                       const double direction[3], double t_max)
 {
     double inverse[3];
     for (int i = 0; i < 3; i++) inverse[i] = fabs(direction[i]) > 1e-100 ? 1 / direction[i] : 1e100;
@@ -32,7 +32,7 @@ static void begin_walk(walk *w, const nebel_snapshot *snapshot, const double ori
 }
 
 /* NULL: there are no more. */
-static const nb_medium *walk_on(walk *w)
+static const nb_medium *walk_on(nb_majorant_walk *w)
 {
     const nebel_snapshot *s = w->snapshot;
     uint32_t box;
@@ -40,7 +40,7 @@ static const nb_medium *walk_on(walk *w)
     return nb_bvh_next(&w->cursor, &box) ? &s->media[s->bounded[box]] : NULL;
 }
 
-static void begin_at(walk *w, const nebel_snapshot *snapshot, const double place[3])
+static void begin_at(nb_majorant_walk *w, const nebel_snapshot *snapshot, const double place[3])
 {
     static const double anywhere[3] = {1, 0, 0};
     begin_walk(w, snapshot, place, anywhere, 0);
@@ -58,7 +58,7 @@ static int is_at(const nb_volume *body, const nebel_sample_point *place)
 static int64_t find_cover(const nebel_snapshot *snapshot, const nebel_sample_point *place)
 {
     int64_t rank = INT64_MIN;
-    walk w;
+    nb_majorant_walk w;
     if (snapshot->covering_count == 0) return rank;
     begin_at(&w, snapshot, place->position);
     for (const nb_medium *medium; (medium = walk_on(&w)) != NULL;) {
@@ -77,7 +77,7 @@ static int shows_at(const nb_medium *medium, const nebel_sample_point *place, in
 static void sample(const nebel_snapshot *snapshot, const nebel_sample_point *place, nebel_medium_properties *matter)
 {
     const int64_t cover = find_cover(snapshot, place);
-    walk w;
+    nb_majorant_walk w;
     *matter = (nebel_medium_properties){{0}, {0}, {0}};
     begin_at(&w, snapshot, place->position);
     for (const nb_medium *medium; (medium = walk_on(&w)) != NULL;) {
@@ -92,11 +92,11 @@ static void sample(const nebel_snapshot *snapshot, const nebel_sample_point *pla
     }
 }
 
-void nb_sample_transport(const nebel_snapshot *snapshot, const double position[3], nb_transport *sum)
+void nb_sample_transport(const nebel_snapshot *snapshot, const double position[3], nb_medium_transport *sum)
 {
     const nebel_sample_point place = {{position[0], position[1], position[2]}, -1};
     const int64_t cover = find_cover(snapshot, &place);
-    walk w;
+    nb_majorant_walk w;
     begin_at(&w, snapshot, position);
     for (const nb_medium *medium; (medium = walk_on(&w)) != NULL;) {
         const nb_volume *body = &medium->body;
@@ -151,7 +151,7 @@ static double choose(const nebel_snapshot *snapshot, const nebel_sample_point *p
                      double wanted, nebel_scatterer *scatterer)
 {
     double sum = 0;
-    walk w;
+    nb_majorant_walk w;
     begin_at(&w, snapshot, place->position);
     for (const nb_medium *medium; (medium = walk_on(&w)) != NULL && sum <= wanted;) {
         double scattering[3];
@@ -197,12 +197,12 @@ typedef struct asked {
     int ignore_distances;
 } asked;
 
-static void begin_on(walk *w, const asked *a)
+static void begin_on(nb_majorant_walk *w, const asked *a)
 {
     begin_walk(w, a->snapshot, a->start, a->line.direction, HUGE_VAL);
 }
 
-static nb_presence presence_of(const asked *a, const nb_volume *body, double to)
+static nb_overlap presence_of(const asked *a, const nb_volume *body, double to)
 {
     if (!a->ignore_distances && (to <= body->start || a->from >= body->cutoff)) return NB_ABSENT;
     return nb_volume_presence(body, &a->line, a->from, to);
@@ -240,7 +240,7 @@ static double find_length(const asked *a, const nb_medium *medium)
 static double find_end(const asked *a)
 {
     double end = HUGE_VAL;
-    walk w;
+    nb_majorant_walk w;
     begin_on(&w, a);
     for (const nb_medium *medium; (medium = walk_on(&w)) != NULL;) {
         const nb_volume *body = &medium->body;
@@ -255,7 +255,7 @@ static double find_end(const asked *a)
 static int64_t find_cover_on(const asked *a, double end)
 {
     int64_t rank = INT64_MIN;
-    walk w;
+    nb_majorant_walk w;
     if (a->snapshot->covering_count == 0) return rank;
     begin_on(&w, a);
     for (const nb_medium *medium; (medium = walk_on(&w)) != NULL;) {
@@ -267,7 +267,7 @@ static int64_t find_cover_on(const asked *a, double end)
 
 static void bound_piece(const asked *a, nebel_majorant_segment *bound)
 {
-    walk w;
+    nb_majorant_walk w;
     *bound = (nebel_majorant_segment){find_end(a), {0}, {0}};
     const int64_t cover = find_cover_on(a, bound->end);
     begin_on(&w, a);

@@ -104,10 +104,10 @@ static int has_body(const nb_volume *volume)
 }
 
 /* What a snapshot takes of a fog, and how. */
-typedef struct selection {
+typedef struct nb_medium_selection {
     int is_scaled; /* see scale_medium */
     int is_level;  /* fog without an end along x or z alone */
-} selection;
+} nb_medium_selection;
 
 static int is_level(const nb_volume *volume)
 {
@@ -126,12 +126,12 @@ static void scale_medium(nb_medium *medium)
 }
 
 /* Copies the volumes that can touch a ray. 0 when memory is out. */
-static int copy_media(const nebel_fog *fog, selection of, nebel_snapshot *s)
+static int copy_media(const nebel_fog *fog, nb_medium_selection of, nebel_snapshot *s)
 {
     s->media = nb_allocate_zero(&s->allocator, fog->slot_count, sizeof *s->media);
     if (s->media == NULL) return 0;
     for (size_t i = 0; i < fog->slot_count; i++) {
-        const nb_slot *slot = &fog->slots[i];
+        const nb_fog_slot *slot = &fog->slots[i];
         if (!slot->used || !has_body(&slot->volume) || (of.is_level && !is_level(&slot->volume))) continue;
         nb_medium *medium = &s->media[s->medium_count];
         if (!nb_volume_copy(&s->allocator, &slot->volume, &medium->body)) return 0;
@@ -159,7 +159,7 @@ static int copy_lamps(const nebel_fog *fog, nebel_snapshot *s)
     return s->lamps != NULL;
 }
 
-static const nb_skylight *find_skylight(const nebel_snapshot *s, const nb_phase *phase)
+static const nb_environment_light *find_skylight(const nebel_snapshot *s, const nb_phase *phase)
 {
     for (size_t i = 0; i < s->skylight_count; i++)
         if (nb_phase_compare(nb_sky_filter_phase(s->skylights[i].filter), phase) == 0) return &s->skylights[i];
@@ -171,7 +171,7 @@ static nebel_result add_skylight(nebel_snapshot *s, nb_medium *medium)
     if (s->skylight_count == NEBEL_MAX_ENVIRONMENT_PHASES)
         return nb_fail(&s->log, NEBEL_ERROR_LIMIT, "environment: more than %d phase functions scatter it",
                        NEBEL_MAX_ENVIRONMENT_PHASES);
-    nb_sky_filter *filter = nb_sky_filter_make(&s->allocator, &s->sky, &medium->body.phase);
+    nb_environment_filter *filter = nb_sky_filter_make(&s->allocator, &s->sky, &medium->body.phase);
     if (filter == NULL) return NEBEL_ERROR_MEMORY;
     s->skylights[s->skylight_count] = nb_skylight_of(&s->sky, filter);
     medium->sky = &s->skylights[s->skylight_count++];
@@ -303,7 +303,7 @@ static int are_flat(const nebel_snapshot *s)
     return 1;
 }
 
-static nb_way_to_sun find_way_to_sun(const nebel_snapshot *s)
+static nb_sun_depth_method find_way_to_sun(const nebel_snapshot *s)
 {
     if (!s->is_sunlit) return NB_WAY_MARCHED;
     if (s->is_added) return s->medium_count <= MOST_FLAT && are_flat(s) ? NB_WAY_FLAT : NB_WAY_ADDED;
@@ -336,12 +336,12 @@ static int needs_lattice(const nebel_snapshot *s)
 }
 
 /* Two columns per cell where they come to no more than 64 MiB. */
-static const nb_lattice_limit lattice_limit = {2, (size_t)1 << 25, 1};
+static const nb_sun_lattice_limit lattice_limit = {2, (size_t)1 << 25, 1};
 
 /* The one of the commit before where it still serves. 0 when memory is out. */
 static int take_lattice(const nebel_fog *fog, const nebel_snapshot *s, nb_medium *medium)
 {
-    nb_slot *slot = &fog->slots[medium->slot];
+    nb_fog_slot *slot = &fog->slots[medium->slot];
     nebel_grid *grid = medium->body.density.grid;
     double way[3];
     nb_way_in_cells(s, &medium->body, way);
@@ -358,7 +358,7 @@ static int take_lattices(const nebel_fog *fog, nebel_snapshot *s)
     return !needs_lattice(s) || take_lattice(fog, s, &s->media[0]);
 }
 
-static nebel_result make_snapshot(const nebel_fog *fog, selection of, nebel_snapshot **snapshot)
+static nebel_result make_snapshot(const nebel_fog *fog, nb_medium_selection of, nebel_snapshot **snapshot)
 {
     nebel_snapshot *s = nb_allocate_zero(&fog->allocator, 1, sizeof *s);
     *snapshot = NULL;
@@ -409,7 +409,7 @@ static nebel_result diffuse_selected(const nebel_fog *fog, const nebel_snapshot 
                                      nb_diffusion **made)
 {
     nebel_snapshot *scaled = NULL;
-    nebel_result result = make_snapshot(fog, (selection){.is_scaled = 1, .is_level = level}, &scaled);
+    nebel_result result = make_snapshot(fog, (nb_medium_selection){.is_scaled = 1, .is_level = level}, &scaled);
     if (result == NEBEL_OK) result = nb_diffusion_make(fog, s, scaled, is_own, made);
     nebel_release_snapshot(scaled);
     return result;
@@ -418,7 +418,7 @@ static nebel_result diffuse_selected(const nebel_fog *fog, const nebel_snapshot 
 static nebel_result diffuse_level(const nebel_fog *fog, nb_diffusion **made)
 {
     nebel_snapshot *level = NULL;
-    nebel_result result = make_snapshot(fog, (selection){.is_level = 1}, &level);
+    nebel_result result = make_snapshot(fog, (nb_medium_selection){.is_level = 1}, &level);
     if (result == NEBEL_OK) result = diffuse_selected(fog, level, 1, 0, made);
     nebel_release_snapshot(level);
     return result;
@@ -441,7 +441,7 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
     if (snapshot == NULL)
         return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "snapshot: the place for it must not be NULL");
     nebel_snapshot *s;
-    nebel_result result = make_snapshot(fog, (selection){0}, &s);
+    nebel_result result = make_snapshot(fog, (nb_medium_selection){0}, &s);
     if (result == NEBEL_OK && fog->diffusion.max_cells > 0) result = diffuse(fog, s);
     if (result == NEBEL_OK) {
         *snapshot = s;
@@ -510,7 +510,7 @@ size_t nebel_snapshot_lamp_count(const nebel_snapshot *snapshot)
 void nebel_snapshot_lamp(const nebel_snapshot *snapshot, size_t number, double position[3], double *radius)
 {
     if (snapshot == NULL || number >= snapshot->lamp_count || position == NULL || radius == NULL) return;
-    const nb_lamp *lamp = &snapshot->lamps[number];
+    const nb_light *lamp = &snapshot->lamps[number];
     for (int c = 0; c < 3; c++) position[c] = lamp->place[c];
     *radius = lamp->clear;
 }

@@ -17,9 +17,9 @@ typedef struct nb_medium {
     nb_volume body;
     double radiance[3]; /* of opaque fog: source, or albedo times ambient; the most of it where there is a skylight */
     double light[3];    /* radiance * extinction + emission: radiance per metre at density 1 */
-    const nb_skylight *sky; /* what lights it instead, by the direction of the ray; NULL: nothing */
-    double densest;         /* largest extinction of any channel anywhere */
-    double brightest;       /* the same of light */
+    const nb_environment_light *sky; /* what lights it instead, by the direction of the ray; NULL: nothing */
+    double densest;                  /* largest extinction of any channel anywhere */
+    double brightest;                /* the same of light */
     double proportion; /* of the body's extent to the least of its leaves' sizes where their frames scale, at least 1;
                            for margins */
     int emits;
@@ -31,19 +31,19 @@ typedef struct nb_medium {
         turned_cosine; /* and the mean cosine of the rest. Both are the least that have its phase function's two first
                              moments: Joseph, Wiscombe and Weinman 1976 */
     size_t slot;       /* of the fog that it is from */
-    nb_grid_lattice *lattice; /* of linear voxels that the sun lights, alone; else NULL */
+    nb_sun_lattice *lattice; /* of linear voxels that the sun lights, alone; else NULL */
     int joins; /* its density is constant and its body convex, so that sums can stand for it among many of its kind */
 } nb_medium;
 
 /* How the optical depth from a place to the sun is had. */
-typedef enum nb_way_to_sun {
+typedef enum nb_sun_depth_method {
     NB_WAY_MARCHED = 0, /* by a march of its own */
     NB_WAY_ADDED,       /* convex bodies of constant density that add: what they cut out of the way, summed */
     NB_WAY_FLAT,        /* few of them, where all faces are flat: along any ray it is linear between turns */
     NB_WAY_HEIGHT,      /* one height fog without an end, and a sun above: a multiple of the density */
     NB_WAY_ALTITUDE,    /* one fog of an altitude without an end: its integral from the place on */
     NB_WAY_GRID         /* one box of voxels: they are walked through from the place on */
-} nb_way_to_sun;
+} nb_sun_depth_method;
 
 /* Bodies of more faces have very many edges, and nearly smooth shadows: their turns are not looked for. */
 #define NB_MOST_EDGED_FACES 16
@@ -56,27 +56,27 @@ struct nebel_snapshot {
     nebel_log log;
     atomic_size_t owners;
     size_t medium_count;
-    nb_medium *media;         /* in the order of nb_volume_compare: ranks ascend */
-    double largest_radiance;  /* of all volumes and channels */
-    double max_opacity;       /* 1 where there is no limit */
-    int is_sunlit;            /* whether any medium is */
-    double to_sun[3];         /* of length 1; not read where nothing is sunlit */
-    double irradiance[3];     /* of the sun */
-    int is_gray;              /* no fog has a colour in its extinction */
-    nb_way_to_sun way_to_sun; /* the same */
+    nb_medium *media;               /* in the order of nb_volume_compare: ranks ascend */
+    double largest_radiance;        /* of all volumes and channels */
+    double max_opacity;             /* 1 where there is no limit */
+    int is_sunlit;                  /* whether any medium is */
+    double to_sun[3];               /* of length 1; not read where nothing is sunlit */
+    double irradiance[3];           /* of the sun */
+    int is_gray;                    /* no fog has a colour in its extinction */
+    nb_sun_depth_method way_to_sun; /* the same */
     int is_added;     /* all media are convex bodies of constant density that add: any way's depth is a sum over them */
     int is_lit_crowd; /* many media whose depths add are lit: see trace_lit_crowd.h */
     int is_lamplit;   /* whether any medium is */
     int has_parts;    /* some body has parts, or takes fog away from others */
     size_t lamp_count;
-    nb_lamp *lamps;
-    nebel_environment sky;    /* one owner of its map */
-    size_t skylight_count;    /* one for each phase function that scatters it, where it is not constant */
-    nb_skylight *skylights;   /* each an owner of its filter */
-    const nb_medium *joining; /* one that joins; NULL where none does */
-    size_t joining_count;     /* how many do; they are of one rank */
-    size_t covering_count;    /* media that cover others */
-    size_t endless_count;     /* media without finite bounds, by index: every ray may meet them */
+    nb_light *lamps;
+    nebel_environment sky;           /* one owner of its map */
+    size_t skylight_count;           /* one for each phase function that scatters it, where it is not constant */
+    nb_environment_light *skylights; /* each an owner of its filter */
+    const nb_medium *joining;        /* one that joins; NULL where none does */
+    size_t joining_count;            /* how many do; they are of one rank */
+    size_t covering_count;           /* media that cover others */
+    size_t endless_count;            /* media without finite bounds, by index: every ray may meet them */
     uint32_t *endless;
     nebel_diffusion_desc diffusing;     /* of the fog; cells 0: off */
     struct nb_diffusion *diffusion;     /* light that is scattered more than once, of sun and sky; NULL: left out */

@@ -14,12 +14,12 @@ typedef struct selection {
     double max_opacity;
 } selection;
 
-static void keep(const nebel_snapshot *snapshot, selection kept, nb_slot *slots)
+static void keep(const nebel_snapshot *snapshot, selection kept, nb_fog_slot *slots)
 {
     for (size_t i = 0; i < snapshot->medium_count; i++) {
-        slots[i] = (nb_slot){.volume = snapshot->media[i].body,
-                             .used = 1,
-                             .lattice = nb_grid_lattice_retain(snapshot->media[i].lattice)};
+        slots[i] = (nb_fog_slot){.volume = snapshot->media[i].body,
+                                 .used = 1,
+                                 .lattice = nb_grid_lattice_retain(snapshot->media[i].lattice)};
         for (int c = 0; c < 3 && !kept.own; c++) slots[i].volume.source[c] = slots[i].volume.emission[c] = 0;
     }
 }
@@ -27,7 +27,7 @@ static void keep(const nebel_snapshot *snapshot, selection kept, nb_slot *slots)
 /* A fog that borrows all but its slots from the snapshot. */
 static nebel_result make_part(const nebel_snapshot *snapshot, selection kept, nebel_snapshot **part)
 {
-    nb_slot *slots = nb_allocate_zero(&snapshot->allocator, snapshot->medium_count, sizeof *slots);
+    nb_fog_slot *slots = nb_allocate_zero(&snapshot->allocator, snapshot->medium_count, sizeof *slots);
     if (slots == NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_MEMORY, "snapshot: out of memory for its light apart");
     nebel_fog fog = {.allocator = snapshot->allocator,

@@ -16,14 +16,14 @@ typedef nb_wide lane_place;
 typedef double lane_place;
 #endif
 
-struct crowd_event {
+struct overlap_event {
     lane_place t, reach; /* where the medium begins or ends; the least place where this end or one behind it may be */
     uint32_t contact, seat;
     int enters;
 };
 
 /* What one medium, or all below a node, gives. */
-struct crowd_sum {
+struct overlap_sum {
     nb_scalar extinction[3], light[3];
 };
 
@@ -43,7 +43,7 @@ static nb_mask one_lane(int lane)
     return nb_load_lanes(chosen) > NB_F(0.0);
 }
 
-static nb_mask is_met(const contact *k)
+static nb_mask is_met(const medium_hit *k)
 {
     return nb_narrow_mask(k->hull_enter < k->hull_leave);
 }
@@ -52,22 +52,22 @@ static nb_mask is_met(const contact *k)
 
 static int compare_events(const void *a, const void *b)
 {
-    const crowd_event *x = a, *y = b;
+    const overlap_event *x = a, *y = b;
     return (x->t > y->t) - (x->t < y->t);
 }
 
-static void list_events(const march *m, crowd *c, int lane)
+static void list_events(const packet_state *m, overlap_set *c, int lane)
 {
-    crowd_event *const events = &c->events[2 * c->seats * (size_t)lane];
+    overlap_event *const events = &c->events[2 * c->seats * (size_t)lane];
     size_t seats = 0;
     for (uint32_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+        const medium_hit *k = &m->contacts[i];
         if (!k->medium->joins || !nb_lane(is_met(k), lane)) continue;
         const leaf_span *span = &m->spans[k->first_span];
         const lane_place enter = nb_lane(span->enter, lane), leave = nb_lane(span->leave, lane);
-        events[2 * seats] = (crowd_event){enter, enter, i, (uint32_t)seats, 1};
+        events[2 * seats] = (overlap_event){enter, enter, i, (uint32_t)seats, 1};
         events[2 * seats + 1] =
-            (crowd_event){leave, leave - (lane_place)nb_lane(span->leave_slack, lane), i, (uint32_t)seats, 0};
+            (overlap_event){leave, leave - (lane_place)nb_lane(span->leave_slack, lane), i, (uint32_t)seats, 0};
         seats++;
     }
     c->count[lane] = 2 * seats;
@@ -79,12 +79,12 @@ static void list_events(const march *m, crowd *c, int lane)
 /* ---- the crowd ------------------------------------------------------------------------------- */
 
 /* Light per extinction, exactly where all in the crowd have the same. */
-static void find_common_radiance(const march *m, crowd *c)
+static void find_common_radiance(const packet_state *m, overlap_set *c)
 {
     nb_mask seen = nb_mask_false;
     c->is_even = nb_mask_true;
     for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+        const medium_hit *k = &m->contacts[i];
         if (!k->medium->joins) continue;
         const nb_mask met = is_met(k);
         for (int channel = 0; channel < 3; channel++) {
@@ -98,7 +98,7 @@ static void find_common_radiance(const march *m, crowd *c)
 }
 
 /* How many of the crowd each lane meets; the most of all lanes. */
-static size_t count_crowd(const march *m, nb_scalar lane[NB_WIDTH])
+static size_t count_crowd(const packet_state *m, nb_scalar lane[NB_WIDTH])
 {
     nb_real met = NB_F(0.0);
     for (size_t i = 0; i < m->contact_count; i++)
@@ -118,7 +118,7 @@ static int height_of(size_t count)
 }
 
 /* Room for a crowd of `most` in each lane, whose sums are 0. 0 when memory is out. */
-static int reserve_crowd(crowd *c, const nebel_allocator *allocator, size_t most)
+static int reserve_crowd(overlap_set *c, const nebel_allocator *allocator, size_t most)
 {
     c->seats = (size_t)1 << height_of(most);
     const size_t places = 2 * c->seats * NB_WIDTH;
@@ -130,21 +130,21 @@ static int reserve_crowd(crowd *c, const nebel_allocator *allocator, size_t most
         c->capacity = c->seats;
     }
     c->events = c->memory;
-    c->sums = (crowd_sum *)(void *)(c->events + places);
+    c->sums = (overlap_sum *)(void *)(c->events + places);
     memset(c->sums, 0, places * sizeof *c->sums);
     return 1;
 }
 
 /* The contact that stands for the crowd, behind all others. */
-static contact *crowd_contact(march *m)
+static medium_hit *crowd_contact(packet_state *m)
 {
     return &m->contacts[m->contact_count];
 }
 
 /* Lists the crowds of all lanes that have one. 0 when memory is out. */
-static int open_crowd(march *m, const nebel_allocator *allocator, const nebel_snapshot *snapshot)
+static int open_crowd(packet_state *m, const nebel_allocator *allocator, const nebel_snapshot *snapshot)
 {
-    crowd *c = &m->crowd;
+    overlap_set *c = &m->crowd;
     c->lanes = nb_mask_false;
     c->is_walking = 0;
     if (snapshot->joining_count < NB_LEAST_CROWD || m->contact_count < NB_LEAST_CROWD) return 1;
@@ -160,19 +160,19 @@ static int open_crowd(march *m, const nebel_allocator *allocator, const nebel_sn
         met[i] = (nb_scalar)(1 + height_of((size_t)met[i]));
     }
     find_common_radiance(m, c);
-    *crowd_contact(m) = (contact){.medium = snapshot->joining, .noise = nb_load_lanes(met) * NB_EPSILON};
+    *crowd_contact(m) = (medium_hit){.medium = snapshot->joining, .noise = nb_load_lanes(met) * NB_EPSILON};
     return 1;
 }
 
 /* Whether the walk finds the medium in the crowd instead of in its window. */
-static int is_in_crowd(const march *m, size_t index)
+static int is_in_crowd(const packet_state *m, size_t index)
 {
     return m->crowd.is_walking && m->contacts[index].medium->joins;
 }
 
 /* ---- the walk -------------------------------------------------------------------------------- */
 
-static void add_sums(crowd_sum *to, const crowd_sum *a, const crowd_sum *b)
+static void add_sums(overlap_sum *to, const overlap_sum *a, const overlap_sum *b)
 {
     for (int c = 0; c < 3; c++) {
         to->extinction[c] = a->extinction[c] + b->extinction[c];
@@ -181,11 +181,11 @@ static void add_sums(crowd_sum *to, const crowd_sum *a, const crowd_sum *b)
 }
 
 /* A medium begins or ends. */
-static void pass_event(const march *m, crowd_sum *sums, size_t seats, const crowd_event *event)
+static void pass_event(const packet_state *m, overlap_sum *sums, size_t seats, const overlap_event *event)
 {
-    const contact *k = &m->contacts[event->contact];
+    const medium_hit *k = &m->contacts[event->contact];
     size_t node = seats + event->seat;
-    sums[node] = (crowd_sum){{0, 0, 0}, {0, 0, 0}};
+    sums[node] = (overlap_sum){{0, 0, 0}, {0, 0, 0}};
     for (int c = 0; c < 3 && event->enters; c++) {
         sums[node].extinction[c] = nb_lane(k->extinction[c], 0);
         sums[node].light[c] = nb_lane(k->light[c], 0);
@@ -194,14 +194,14 @@ static void pass_event(const march *m, crowd_sum *sums, size_t seats, const crow
 }
 
 /* Passes all events up to t. */
-static void advance_crowd(march *m, nb_wide t)
+static void advance_crowd(packet_state *m, nb_wide t)
 {
-    crowd *c = &m->crowd;
+    overlap_set *c = &m->crowd;
     for (int i = 0; i < NB_WIDTH; i++) {
-        const crowd_event *events = &c->events[2 * c->seats * (size_t)i];
+        const overlap_event *events = &c->events[2 * c->seats * (size_t)i];
         const lane_place here = nb_lane(t, i);
         for (; c->next[i] < c->count[i] && events[c->next[i]].t <= here; c->next[i]++) {
-            const crowd_event *event = &events[c->next[i]];
+            const overlap_event *event = &events[c->next[i]];
             pass_event(m, &c->sums[2 * c->seats * (size_t)i], c->seats, event);
             event->enters ? c->present[i]++ : c->present[i]--;
         }
@@ -209,30 +209,30 @@ static void advance_crowd(march *m, nb_wide t)
 }
 
 /* The next event of the crowd; NB_WFAR * 2 where there is none. */
-static nb_wide next_in_crowd(const crowd *c)
+static nb_wide next_in_crowd(const overlap_set *c)
 {
     lane_place lane[NB_WIDTH];
     for (int i = 0; i < NB_WIDTH; i++) {
-        const crowd_event *events = &c->events[2 * c->seats * (size_t)i];
+        const overlap_event *events = &c->events[2 * c->seats * (size_t)i];
         lane[i] = c->next[i] < c->count[i] ? events[c->next[i]].t : (lane_place)2e18;
     }
     return load_places(lane);
 }
 
 /* Gives the crowd's contact the sums of what is there now, in `lanes`. Returns whether anything is. */
-static int mark_crowd(march *m, nb_mask lanes)
+static int mark_crowd(packet_state *m, nb_mask lanes)
 {
-    const crowd *c = &m->crowd;
+    const overlap_set *c = &m->crowd;
     nb_scalar lane[7][NB_WIDTH];
     for (int i = 0; i < NB_WIDTH; i++) {
-        const crowd_sum *sum = &c->sums[2 * c->seats * (size_t)i + 1];
+        const overlap_sum *sum = &c->sums[2 * c->seats * (size_t)i + 1];
         lane[6][i] = c->present[i] > 0;
         for (int channel = 0; channel < 3; channel++) {
             lane[channel][i] = sum->extinction[channel];
             lane[3 + channel][i] = sum->light[channel];
         }
     }
-    contact *k = crowd_contact(m);
+    medium_hit *k = crowd_contact(m);
     k->inside = nb_and(lanes, nb_load_lanes(lane[6]) > NB_F(0.0));
     if (!nb_any(k->inside)) return 0;
     for (int channel = 0; channel < 3; channel++) {

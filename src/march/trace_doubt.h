@@ -54,7 +54,7 @@ static double settle_lane(const nb_trace_job *job, size_t i, const nebel_ray *ra
 }
 
 /* The error where the lanes in doubt are settled; `rays` are those of the packet that was answered last. */
-static nb_real settle_doubts(const nb_trace_job *job, const gathered *g, nb_real error, const nebel_ray *rays,
+static nb_real settle_doubts(const nb_trace_job *job, const gathered_light *g, nb_real error, const nebel_ray *rays,
                              size_t stride, size_t count)
 {
     const nb_mask doubtful = in_doubt(job, error);
@@ -77,7 +77,7 @@ static nb_real settle_doubts(const nb_trace_job *job, const gathered *g, nb_real
 
 /* What the ends may do to light of that radiance, or densities that hardly change along endless rays, is far
  * less than double promises, so that it does not show who was asked. */
-static int is_clear(const march *m, nb_real radiance)
+static int is_clear(const packet_state *m, nb_real radiance)
 {
     const nb_real behind = largest(m->all_ends.depth) * nb_max(radiance, NB_F(1.0));
     return behind + largest(m->all_ends.light) + m->drift <= 1e-10;
@@ -101,13 +101,13 @@ enum { MOST_MARCHES = 8 };
 
 /* Ends 1e15 m away are in doubt by millimetres even here. The same light, marched again with its radiance known, has a
  * smaller error, from which the next march learns. */
-static nb_real weigh_ends(nb_trace_job *job, workspace *w, const allowance *may, const gathered *g, nb_real error)
+static nb_real weigh_ends(nb_trace_job *job, workspace *w, const allowance *may, const gathered_light *g, nb_real error)
 {
     if (job->transmittance_only || w->m.sun != NULL) return error;
-    known total = {{g->radiance[0], g->radiance[1], g->radiance[2]}, error};
+    known_interval total = {{g->radiance[0], g->radiance[1], g->radiance[2]}, error};
     w->m.total = &total;
     for (int i = 0; i < MOST_MARCHES && in_doubt(job, total.error); i++) {
-        gathered again;
+        gathered_light again;
         if (answer_packet(job, w, may, job->failed, 1, &again) != NEBEL_OK) break;
         for (int c = 0; c < 3; c++) again.depth_error[c] = again.depth_error[c] + again.ends_depth[c];
         const nb_real less = reported_error(job, &w->m, &again);

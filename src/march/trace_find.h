@@ -4,12 +4,12 @@
  * march and the place in it by Newton's method, kept inside a shrinking bracket. */
 
 /* Optical depth of one channel over h metres of a marked piece, and the extinction at its end. */
-static nb_real depth_within(const march *m, int channel, nb_wide start, nb_real h, nb_real *extinction)
+static nb_real depth_within(const packet_state *m, int channel, nb_wide start, nb_real h, nb_real *extinction)
 {
     nb_real depth = NB_F(0.0);
     *extinction = NB_F(0.0);
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         depth = depth + k->extinction[channel] * contact_integral(k, start, start + nb_widen(h), h).value;
         *extinction = *extinction + k->extinction[channel] * contact_density(k, start + nb_widen(h));
     }
@@ -26,7 +26,7 @@ static nb_real middle_of(nb_real low, nb_real high)
 
 /* The h within `length` at which the depth is `wanted`. A step of Newton's that is not half the one before would come
  * too late: down an exponential it moves by one scale height each time. */
-static nb_real find_in_piece(const march *m, int channel, nb_wide start, nb_real length, nb_real wanted)
+static nb_real find_in_piece(const packet_state *m, int channel, nb_wide start, nb_real length, nb_real wanted)
 {
     nb_real low = NB_F(0.0), high = length, h = NB_F(0.5) * length, last = length;
     for (int i = 0; i < 400 && high - low > NB_F(2.0) * NB_EPSILON * high; i++) {
@@ -48,11 +48,11 @@ static nb_real find_in_piece(const march *m, int channel, nb_wide start, nb_real
     return h;
 }
 
-static double find_depth(march *m, int channel, nb_real wanted)
+static double find_depth(packet_state *m, int channel, nb_real wanted)
 {
     nb_real depth = NB_F(0.0);
     nb_wide t = NB_W(0.0);
-    piece p;
+    ray_segment p;
     m->crowd.is_walking = nb_any(m->crowd.lanes);
     open_window(m, nb_any(ends_matter(m)));
     while (next_piece(m, t, m->rays.t_max > t, &p)) {

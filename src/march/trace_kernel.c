@@ -173,7 +173,7 @@ static int meet_one(workspace *w, const nebel_snapshot *snapshot, size_t index)
 /* Meets all media the packet can touch. 0 when memory is out. */
 static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
 {
-    march *m = &w->m;
+    packet_state *m = &w->m;
     m->contact_count = 0;
     m->span_count = 0;
     m->all_ends = no_ends();
@@ -196,11 +196,11 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
 
 /* ---- light out ------------------------------------------------------------------------------- */
 
-static gathered nothing_gathered(void)
+static gathered_light nothing_gathered(void)
 {
     const nb_real zero = NB_F(0.0), one = NB_F(1.0);
-    return (gathered){{zero, zero, zero}, {one, one, one},    {zero, zero, zero}, {zero, zero, zero},
-                      {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
+    return (gathered_light){{zero, zero, zero}, {one, one, one},    {zero, zero, zero}, {zero, zero, zero},
+                            {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
 }
 
 static void select_reals(nb_mask mask, nb_real to[3], const nb_real from[3])
@@ -209,7 +209,7 @@ static void select_reals(nb_mask mask, nb_real to[3], const nb_real from[3])
 }
 
 /* The fog before the first large doubt, as far as it is in the piece. A lane without fog in it would not come here alone. */
-static void note_clear(const march *m, const piece *p, gathered *g)
+static void note_clear(const packet_state *m, const ray_segment *p, gathered_light *g)
 {
     nb_mask foggy = nb_mask_false;
     for (size_t i = m->present_first; i < m->present_end; i++) foggy = nb_or(foggy, present(m, i)->inside);
@@ -232,7 +232,7 @@ static void note_clear(const march *m, const piece *p, gathered *g)
 #include "trace_lit_crowd.h"
 
 /* Sunlight that is found while voxels are crossed anyway. Returns the lanes that it is still to be added in. */
-static nb_mask cross_sunlit_voxels(march *m, const piece *p, gathered *g, nb_estimate *along)
+static nb_mask cross_sunlit_voxels(packet_state *m, const ray_segment *p, gathered_light *g, nb_estimate *along)
 {
     if (m->sun == NULL || m->sun->snapshot->is_lit_crowd) return nb_mask_false;
 #if !defined(NB_DOUBLE)
@@ -246,7 +246,8 @@ static nb_mask cross_sunlit_voxels(march *m, const piece *p, gathered *g, nb_est
     return sunlit_lanes(m, p);
 }
 
-static void gather_piece(march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
+static void gather_piece(packet_state *m, const ray_segment *p, const allowance *may, gathered_light *g,
+                         nb_mask *unbounded)
 {
     nb_estimate along;
     const nb_mask sunlit = cross_sunlit_voxels(m, p, g, &along);
@@ -263,7 +264,7 @@ static void gather_piece(march *m, const piece *p, const allowance *may, gathere
     const nb_mask mixed = nb_and(p->lanes, sum.mixed);
     if (nb_any(closed)) gather_closed(g, &sum, closed);
     if (nb_any(mixed)) {
-        gathered within = *g;
+        gathered_light within = *g;
         gather_mixed(m, p, &sum, mixed, may, &within);
         for (int c = 0; c < 3; c++) g->radiance[c] = within.radiance[c];
         g->radiance_error = within.radiance_error;
@@ -272,11 +273,11 @@ static void gather_piece(march *m, const piece *p, const allowance *may, gathere
 }
 
 /* One leaf of fog is one piece: the walk below would find the same. */
-static void gather_single(march *m, const allowance *may, gathered *g, nb_mask *unbounded)
+static void gather_single(packet_state *m, const allowance *may, gathered_light *g, nb_mask *unbounded)
 {
     const leaf_span *span = &m->spans[0];
     const nb_mask lanes = nb_narrow_mask(span->enter < span->leave);
-    const piece p = {span->enter, span->leave, nb_narrow(span->leave - span->enter), lanes};
+    const ray_segment p = {span->enter, span->leave, nb_narrow(span->leave - span->enter), lanes};
     m->contacts[0].inside = lanes;
     m->window_count = 1;
     m->window[0] = 0;
@@ -287,16 +288,16 @@ static void gather_single(march *m, const allowance *may, gathered *g, nb_mask *
     gather_piece(m, &p, may, g, unbounded);
 }
 
-static int is_single(const march *m)
+static int is_single(const packet_state *m)
 {
     return m->contact_count == 1 && m->span_count == 1 && nb_volume_has_fog(&m->contacts[0].medium->body) &&
            !nb_any(ends_matter(m));
 }
 
 /* From event to event along the rays of some lanes at once. */
-static gathered walk_lanes(march *m, const allowance *may, nb_mask which, nb_mask *unbounded)
+static gathered_light walk_lanes(packet_state *m, const allowance *may, nb_mask which, nb_mask *unbounded)
 {
-    gathered g = nothing_gathered();
+    gathered_light g = nothing_gathered();
     nb_wide t = NB_W(0.0);
     nb_wmask lanes = nb_wand(m->rays.t_max > NB_W(0.0), nb_widen_mask(which));
     const nb_mask watched = nb_and(ends_matter(m), which);
@@ -309,7 +310,7 @@ static gathered walk_lanes(march *m, const allowance *may, nb_mask which, nb_mas
     open_window(m, nb_any(watched));
     if (nb_any(watched)) pass_ends(m, &g, t, watched);                  /* of fog that the ray may start in */
     const nb_wmask to_the_end = nb_wand(lanes, nb_widen_mask(watched)); /* also where an end may lie much nearer */
-    piece p;
+    ray_segment p;
     while (next_piece(m, t, nb_wor(lanes, to_the_end), &p)) {
         const nb_mask here = p.lanes;
         p.lanes = nb_and(here, nb_narrow_mask(lanes));
@@ -328,7 +329,7 @@ static gathered walk_lanes(march *m, const allowance *may, nb_mask which, nb_mas
 }
 
 /* *to = *from in the lanes of the mask. */
-static void select_gathered(nb_mask mask, gathered *to, const gathered *from)
+static void select_gathered(nb_mask mask, gathered_light *to, const gathered_light *from)
 {
     select_reals(mask, to->depth, from->depth);
     select_reals(mask, to->transmittance, from->transmittance);
@@ -341,27 +342,27 @@ static void select_gathered(nb_mask mask, gathered *to, const gathered *from)
 }
 
 /* Lanes that are crowded and those that are not, each kind by itself. */
-static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
+static gathered_light gather_light(packet_state *m, const allowance *may, nb_mask *unbounded)
 {
     const nb_mask crowded = m->crowd.lanes;
     if (!nb_any(crowded)) return walk_lanes(m, may, nb_mask_true, unbounded);
     m->crowd.is_walking = 1;
-    gathered g = walk_lanes(m, may, crowded, unbounded);
+    gathered_light g = walk_lanes(m, may, crowded, unbounded);
     m->crowd.is_walking = 0;
     if (nb_all(crowded)) return g;
     nb_mask others_unbounded;
-    const gathered others = walk_lanes(m, may, nb_not(crowded), &others_unbounded);
+    const gathered_light others = walk_lanes(m, may, nb_not(crowded), &others_unbounded);
     select_gathered(nb_not(crowded), &g, &others);
     *unbounded = nb_or(*unbounded, others_unbounded);
     return g;
 }
 
 /* The radiance of the brightest fog on the ray: what any answer is below, unless something shines by itself. */
-static nb_real most_radiance(const march *m, int c)
+static nb_real most_radiance(const packet_state *m, int c)
 {
     nb_real most = NB_F(0.0);
     for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+        const medium_hit *k = &m->contacts[i];
         const nb_mask met = nb_narrow_mask(k->hull_enter < k->hull_leave);
         const nb_real radiance = k->radiance[c] + k->glow[c] / nb_max(k->extinction[c], NB_TINY);
         const int has_limit = !k->medium->emits && !k->medium->is_lamplit;
@@ -371,7 +372,7 @@ static nb_real most_radiance(const march *m, int c)
 }
 
 /* Rounding may lift opaque fog above its own source; the truth never is, so this only mends. */
-static void limit_radiance(const march *m, gathered *g)
+static void limit_radiance(const packet_state *m, gathered_light *g)
 {
     for (int c = 0; c < 3; c++) g->radiance[c] = nb_min(g->radiance[c], most_radiance(m, c));
 }
@@ -390,18 +391,18 @@ static inline void limit_opacity(const nebel_snapshot *snapshot, nb_real transmi
 }
 
 /* Bounds of the absolute error: of transmittance, of radiance. */
-typedef struct bounds {
+typedef struct packet_bounds {
     nb_real transmittance, radiance;
-} bounds;
+} packet_bounds;
 
 /* Where fog may be or not over a length that matters, light is what any fog there gives where it is opaque, at most. */
-static nb_real doubtful_light(const march *m, const gathered *g, int c)
+static nb_real doubtful_light(const packet_state *m, const gathered_light *g, int c)
 {
     const nb_mask in_doubt = nb_narrow_mask(m->doubt_from <= NB_WFAR);
     if (m->total != NULL || !nb_any(in_doubt)) return NB_F(0.0);
     nb_real most = m->doubtful_radiance[c];
     for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+        const medium_hit *k = &m->contacts[i];
         if (!nb_volume_has_fog(&k->medium->body)) continue;
         const nb_mask met = nb_narrow_mask(k->hull_enter < k->hull_leave);
         most = nb_max(most, nb_select(met, opaque_radiance(k, c), NB_F(0.0)));
@@ -411,12 +412,12 @@ static nb_real doubtful_light(const march *m, const gathered *g, int c)
 }
 
 /* Transmittance below the smallest normal number is 0: this is what fog behind that may still shine. */
-static nb_real flushed_light(const march *m, const gathered *g, int c)
+static nb_real flushed_light(const packet_state *m, const gathered_light *g, int c)
 {
     const nb_mask flushed = g->transmittance[c] < SMALLEST;
     nb_real light = NB_F(0.0);
     for (size_t i = 0; i < m->contact_count && nb_any(flushed); i++) {
-        const contact *k = &m->contacts[i];
+        const medium_hit *k = &m->contacts[i];
         const nebel_density *density = &k->medium->body.density;
         const nb_real length = nb_narrow(nb_wmax(k->hull_leave - k->hull_enter, NB_W(0.0)));
         const nb_real reach = grows_without_bound(density) ? nb_min(length * NB_HUGE, NB_HUGE) : length;
@@ -427,7 +428,7 @@ static nb_real flushed_light(const march *m, const gathered *g, int c)
 
 /* exp(-depth) is steepest on the thin side, so the transmittance errs most where the optical depth is less by its
  * error. Ends that are watched have been counted on the way. */
-static bounds bound_errors(const march *m, const gathered *g)
+static packet_bounds bound_errors(const packet_state *m, const gathered_light *g)
 {
     const nb_mask watched = ends_matter(m);
     const nb_real pieces = m->event_count + NB_F(4.0);
@@ -448,19 +449,20 @@ static bounds bound_errors(const march *m, const gathered *g)
     const nb_mask grazes = largest(m->grazing_ends.light) > NB_F(0.0);
     const nb_real met = nb_max(nb_max(most_radiance(m, 0), most_radiance(m, 1)), most_radiance(m, 2));
     const nb_real most = nb_select(grazes, NB_HUGE, met);
-    return (bounds){transmittance, nb_min(radiance + g->radiance_error, most * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON))};
+    return (packet_bounds){transmittance,
+                           nb_min(radiance + g->radiance_error, most * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON))};
 }
 
 /* Another bound, which holds whatever the ends and the integration do: all light comes from media that give between the
  * least and the most light per extinction, so that the radiance is between these two times 1 - T. */
-static nb_real bound_by_range(const march *m, const gathered *g, nb_real transmittance_error)
+static nb_real bound_by_range(const packet_state *m, const gathered_light *g, nb_real transmittance_error)
 {
     const nb_mask grazes = largest(m->grazing_ends.light) + largest(m->grazing_ends.depth) > NB_F(0.0);
     nb_real bound = transmittance_error;
     for (int c = 0; c < 3; c++) {
         nb_real least = NB_HUGE, most = NB_F(0.0);
         for (size_t i = 0; i < m->contact_count; i++) {
-            const contact *k = &m->contacts[i];
+            const medium_hit *k = &m->contacts[i];
             if (!nb_volume_has_fog(&k->medium->body)) continue;
             const nb_mask counts =
                 nb_and(nb_narrow_mask(k->hull_enter < k->hull_leave), k->extinction[c] + k->light[c] > NB_F(0.0));
@@ -478,7 +480,7 @@ static nb_real bound_by_range(const march *m, const gathered *g, nb_real transmi
 
 /* What limited opacity adds to the error of radiance S: most / (1 - T) is off by most / (1 - T)^2 times the error of T,
  * where it is below 1; but what it leaves is never more than S. That of T grows by the rounding of the limit alone. */
-static bounds limit_errors(const nebel_snapshot *snapshot, const gathered *g, bounds b)
+static packet_bounds limit_errors(const nebel_snapshot *snapshot, const gathered_light *g, packet_bounds b)
 {
     if (!(snapshot->max_opacity < 1)) return b;
     const nb_real most = REAL(snapshot->max_opacity);
@@ -490,14 +492,14 @@ static bounds limit_errors(const nebel_snapshot *snapshot, const gathered *g, bo
         const nb_mask never = opacity + b.transmittance < most * (NB_F(1.0) - NB_F(4.0) * NB_EPSILON);
         radiance = nb_max(radiance, b.radiance + nb_select(never, NB_F(0.0), g->radiance[c] * steepness));
     }
-    return (bounds){b.transmittance + NB_F(2.0) * NB_EPSILON, radiance};
+    return (packet_bounds){b.transmittance + NB_F(2.0) * NB_EPSILON, radiance};
 }
 
 /* The bound of the absolute error of all six numbers, with room for the rounding of its own arithmetic. */
-static nb_real reported_error(const nb_trace_job *job, const march *m, const gathered *g)
+static nb_real reported_error(const nb_trace_job *job, const packet_state *m, const gathered_light *g)
 {
     const nb_real own_rounding = NB_F(1.0) + NB_F(16.0) * NB_EPSILON;
-    bounds b = bound_errors(m, g);
+    packet_bounds b = bound_errors(m, g);
     if (job->transmittance_only) return limit_errors(job->snapshot, g, b).transmittance * own_rounding;
     const nb_mask doubtful = nb_not(b.radiance <= REAL(job->promised));
     if (nb_any(doubtful))
@@ -506,7 +508,7 @@ static nb_real reported_error(const nb_trace_job *job, const march *m, const gat
     return nb_max(b.transmittance, b.radiance) * own_rounding;
 }
 
-static void store_light(const nb_trace_job *job, const gathered *g, nb_real error, size_t first, size_t count)
+static void store_light(const nb_trace_job *job, const gathered_light *g, nb_real error, size_t first, size_t count)
 {
     nb_scalar lane[7][NB_WIDTH];
     for (int c = 0; c < 3; c++) {
@@ -547,7 +549,7 @@ static allowance share_budget(const nb_trace_job *job)
 /* The light along the rays of w->m before its opacity is limited, of which `count` count, the first of them by the
  * number `first`. */
 static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first, size_t count,
-                                  gathered *g)
+                                  gathered_light *g)
 {
     job->failed = first;
     w->m.wants_error = job->wants_error;
@@ -578,7 +580,7 @@ static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowanc
 {
     const size_t count = packet_size(job, first);
     const nebel_ray *rays = nb_stride_from(job->rays, job->ray_stride, first);
-    gathered g;
+    gathered_light g;
     w->m.rays = load_packet(rays, job->ray_stride, count);
     const nebel_result result = answer_packet(job, w, may, first, count, &g);
 #if defined(ASKS_QUAD)

@@ -6,20 +6,20 @@
 #define FAINT_SHARE 0.05
 
 /* A lamp that is passed by a packet of rays. */
-typedef struct lamp_pass {
-    const nb_lamp *lamp;
-    nb_wvec3 foot;         /* from the lamp to the place closest to it on the line of a ray */
-    nb_wide closest;       /* where that is, m along the ray */
-    nb_wide aside2, aside; /* its distance squared; its distance, at least the lamp's radius */
-    shade *shade;          /* NULL: no surface keeps its light away */
-    double share;          /* what its steps may add to the error */
-    nb_real scatter;       /* radiance per irradiance that fog of the piece gives at most, where it is opaque */
-} lamp_pass;
+typedef struct light_pass {
+    const nb_light *lamp;
+    nb_wvec3 foot;          /* from the lamp to the place closest to it on the line of a ray */
+    nb_wide closest;        /* where that is, m along the ray */
+    nb_wide aside2, aside;  /* its distance squared; its distance, at least the lamp's radius */
+    sun_attenuation *shade; /* NULL: no surface keeps its light away */
+    double share;           /* what its steps may add to the error */
+    nb_real scatter;        /* radiance per irradiance that fog of the piece gives at most, where it is opaque */
+} light_pass;
 
 /* ---- a lamp ---------------------------------------------------------------------------------- */
 
 /* The cone (v.axis)^2 = cosine^2 v.v about foot + x direction; its mirror image does no harm. */
-static void note_cone(sunlight *sun, const lamp_pass *pass, nb_wvec3 direction, double cosine)
+static void note_cone(sunlight *sun, const light_pass *pass, nb_wvec3 direction, double cosine)
 {
     const nb_wvec3 axis = wide_vector(pass->lamp->axis);
     const nb_wide square = WIDE(cosine * cosine), f = nb_wdot3(pass->foot, axis), d = nb_wdot3(direction, axis);
@@ -28,9 +28,9 @@ static void note_cone(sunlight *sun, const lamp_pass *pass, nb_wvec3 direction, 
 
 /* Turns of the lamp itself: its surface and its cones; and where a ray passes through it the place closest to its centre, beyond
  * which light comes from behind. */
-static void note_lamp(sunlight *sun, const march *m, const lamp_pass *pass)
+static void note_lamp(sunlight *sun, const packet_state *m, const light_pass *pass)
 {
-    const nb_lamp *lamp = pass->lamp;
+    const nb_light *lamp = pass->lamp;
     note_turn(sun, pass->closest, pass->aside2 < WIDE(lamp->radius2));
     note_roots(sun, pass->closest, NB_W(1.0), NB_W(0.0), pass->aside2 - WIDE(lamp->radius2));
     if (!lamp->is_spot) return;
@@ -39,15 +39,15 @@ static void note_lamp(sunlight *sun, const march *m, const lamp_pass *pass)
 }
 
 /* Those of the media, too. */
-static void find_lamp_turns(sunlight *sun, const march *m, const lamp_pass *pass)
+static void find_lamp_turns(sunlight *sun, const packet_state *m, const light_pass *pass)
 {
     if (find_turns(sun, &m->rays, pass->lamp)) note_lamp(sun, m, pass);
 }
 
-static lamp_pass pass_lamp(const march *m, const nb_lamp *lamp)
+static light_pass pass_lamp(const packet_state *m, const nb_light *lamp)
 {
     const nb_wvec3 apart = nb_wsub3(m->rays.origin, wide_vector(lamp->place)), d = m->rays.direction;
-    lamp_pass pass = {.lamp = lamp, .closest = -nb_wdot3(apart, d)};
+    light_pass pass = {.lamp = lamp, .closest = -nb_wdot3(apart, d)};
     pass.foot = nb_wadd3(apart, nb_wscale3(d, pass.closest));
     pass.aside2 = nb_wdot3(pass.foot, pass.foot);
     pass.aside = nb_wsqrt(nb_wmax(pass.aside2, WIDE(lamp->radius2)));
@@ -55,7 +55,7 @@ static lamp_pass pass_lamp(const march *m, const nb_lamp *lamp)
 }
 
 /* The most irradiance between two places. */
-static nb_real most_fluence(const lamp_pass *pass, nb_wide start, nb_wide end)
+static nb_real most_fluence(const light_pass *pass, nb_wide start, nb_wide end)
 {
     const nb_wide nearest = nb_wmax(nb_wmin(pass->closest, end), start) - pass->closest;
     const nb_real fluence = nb_narrow(nb_lamp_fluence(pass->aside2 + nearest * nearest, WIDE(pass->lamp->radius2)));
@@ -64,18 +64,18 @@ static nb_real most_fluence(const lamp_pass *pass, nb_wide start, nb_wide end)
 }
 
 /* Radiance of the brightest fog between two places, opaque and with nothing before the lamp. */
-static nb_real most_of_lamp(const lamp_pass *pass, nb_wide start, nb_wide end)
+static nb_real most_of_lamp(const light_pass *pass, nb_wide start, nb_wide end)
 {
     return most_fluence(pass, start, end) * pass->scatter;
 }
 
 /* The most irradiance of all lamps anywhere on the rays. */
-static nb_real most_of_lamps(const march *m)
+static nb_real most_of_lamps(const packet_state *m)
 {
     const nebel_snapshot *snapshot = m->sun->snapshot;
     nb_real most = NB_F(0.0);
     for (size_t i = 0; i < snapshot->lamp_count; i++) {
-        const lamp_pass pass = pass_lamp(m, &snapshot->lamps[i]);
+        const light_pass pass = pass_lamp(m, &snapshot->lamps[i]);
         most = most + most_fluence(&pass, NB_W(0.0), m->rays.t_max);
     }
     return most;
@@ -84,7 +84,7 @@ static nb_real most_of_lamps(const march *m)
 /* ---- a node ---------------------------------------------------------------------------------- */
 
 /* Optical depth from t to the lamp. */
-static light_depth way_to_lamp(sunlight *sun, const march *m, const lamp_pass *pass, nb_wide t, nb_wmask lanes)
+static light_depth way_to_lamp(sunlight *sun, const packet_state *m, const light_pass *pass, nb_wide t, nb_wmask lanes)
 {
     const nb_wvec3 apart = nb_wadd3(pass->foot, nb_wscale3(m->rays.direction, t - pass->closest));
     const nb_wide distance = nb_wsqrt(nb_wdot3(apart, apart));
@@ -97,16 +97,16 @@ static light_depth way_to_lamp(sunlight *sun, const march *m, const lamp_pass *p
 
 /* What part of its light a spot sends away from the direction in which it is seen. At the edge of a hard cone the rounding
  * of a float cosine would decide, so that the difference is taken before. */
-static nb_real part_in_cone(const nb_lamp *lamp, nb_wvec3 towards)
+static nb_real part_in_cone(const nb_light *lamp, nb_wvec3 towards)
 {
     const nb_wide within = -nb_wdot3(towards, wide_vector(lamp->axis)) - WIDE(lamp->edge);
     return nb_lamp_cone(nb_narrow(within), NB_F(0.0), REAL(lamp->rise));
 }
 
 /* What fog at t makes of the lamp's irradiance there. */
-static lit_fog lamplit_fog(const march *m, const lamp_pass *pass, nb_wide t)
+static lit_fog lamplit_fog(const packet_state *m, const light_pass *pass, nb_wide t)
 {
-    const nb_lamp *lamp = pass->lamp;
+    const nb_light *lamp = pass->lamp;
     const nb_real zero = NB_F(0.0);
     const nb_wvec3 apart = nb_wadd3(pass->foot, nb_wscale3(m->rays.direction, t - pass->closest));
     const nb_wide square = nb_wdot3(apart, apart);
@@ -116,7 +116,7 @@ static lit_fog lamplit_fog(const march *m, const lamp_pass *pass, nb_wide t)
     if (lamp->is_spot) fluence = fluence * part_in_cone(lamp, towards);
     lit_fog fog = {{zero, zero, zero}, {zero, zero, zero}, zero};
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         const nb_volume *body = &k->medium->body;
         const nb_real density = nb_select(k->inside, contact_density(k, t), zero);
         const nb_real value = k->medium->is_lamplit ? scattered(&body->phase, turn) * fluence : zero;
@@ -142,14 +142,14 @@ static nb_real length_past_lamp(const sun_step *s, nb_wide t, int n)
 /* ---- steps ----------------------------------------------------------------------------------- */
 
 /* As limit_step, by the most that the lamp brings to the step. */
-static void limit_lamp_step(const lamp_pass *pass, const nb_real before[3], nb_wide end, sun_step *s)
+static void limit_lamp_step(const light_pass *pass, const nb_real before[3], nb_wide end, sun_step *s)
 {
     const nb_real most = most_of_lamp(pass, s->start, end);
     limit_light(before, (nb_real[3]){most, most, most}, s);
 }
 
-static void step_past_lamp(sunlight *sun, const march *m, const lamp_pass *pass, const sun_piece *along, sun_walk *w,
-                           gathered *g)
+static void step_past_lamp(sunlight *sun, const packet_state *m, const light_pass *pass, const sun_piece *along,
+                           sun_walk *w, gathered_light *g)
 {
     const nb_mask last = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
     const nb_wide bright = pass->shade != NULL ? nb_wmin(pass->shade->toggle, along->p->end) : along->p->end;
@@ -179,8 +179,8 @@ static void step_past_lamp(sunlight *sun, const march *m, const lamp_pass *pass,
     w->left = w->left - NB_F(1.0);
 }
 
-static void walk_past_lamp(sunlight *sun, const march *m, const lamp_pass *pass, const sun_piece *s, nb_mask lanes,
-                           gathered *g)
+static void walk_past_lamp(sunlight *sun, const packet_state *m, const light_pass *pass, const sun_piece *s,
+                           nb_mask lanes, gathered_light *g)
 {
     find_lamp_turns(sun, m, pass);
     sun_walk w = begin_walk(m, s->p, &s->before, lanes);
@@ -210,12 +210,12 @@ static double most_scattered(const nb_volume *body)
 }
 
 /* The lanes that are inside fog which lamps light, and what it makes of their light at most. */
-static nb_mask lamplit_lanes(const march *m, const piece *p, nb_real *scatter)
+static nb_mask lamplit_lanes(const packet_state *m, const ray_segment *p, nb_real *scatter)
 {
     nb_mask lit = nb_mask_false;
     *scatter = NB_F(0.0);
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         if (!k->medium->is_lamplit) continue;
         lit = nb_or(lit, k->inside);
         *scatter = nb_select(k->inside, nb_max(*scatter, REAL(most_scattered(&k->medium->body))), *scatter);
@@ -225,7 +225,7 @@ static nb_mask lamplit_lanes(const march *m, const piece *p, nb_real *scatter)
 
 /* Adds the light of all lamps in a piece; `g` is what was gathered before it. Lamps that no one would miss only add to
  * the error. */
-static void gather_lamplight(sunlight *sun, const march *m, const piece *p, gathered *g)
+static void gather_lamplight(sunlight *sun, const packet_state *m, const ray_segment *p, gathered_light *g)
 {
     nb_real scatter, behind[3];
     const nb_mask lit = lamplit_lanes(m, p, &scatter);
@@ -236,7 +236,7 @@ static void gather_lamplight(sunlight *sun, const march *m, const piece *p, gath
     nb_real drop = NB_F(0.0);
     for (int c = 0; c < 3; c++) drop = nb_max(drop, s.before.transmittance[c] - behind[c]);
     for (size_t i = 0; i < snapshot->lamp_count; i++) {
-        lamp_pass pass = pass_lamp(m, &snapshot->lamps[i]);
+        light_pass pass = pass_lamp(m, &snapshot->lamps[i]);
         pass.shade = sun->lamp_shades != NULL ? &sun->lamp_shades[i] : NULL;
         pass.share = sun->share / (double)snapshot->lamp_count;
         pass.scatter = scatter;
@@ -253,7 +253,7 @@ static void gather_lamplight(sunlight *sun, const march *m, const piece *p, gath
 /* ---- all lights ------------------------------------------------------------------------------ */
 
 /* `sunlit`: the lanes in which the sun's light is still to be added. */
-static void gather_lights(sunlight *sun, const march *m, const piece *p, nb_mask sunlit, gathered *g)
+static void gather_lights(sunlight *sun, const packet_state *m, const ray_segment *p, nb_mask sunlit, gathered_light *g)
 {
     if (sun->snapshot->is_sunlit) gather_sunlight(sun, m, p, sunlit, g);
     if (sun->snapshot->is_lamplit) gather_lamplight(sun, m, p, g);
@@ -265,10 +265,10 @@ static int open_lamp_shades(sunlight *sun, const nb_trace_job *job)
     const nebel_snapshot *snapshot = sun->snapshot;
     if (!snapshot->is_lamplit || job->lamplit == NULL) return 1;
     char *raw = nb_allocate(&snapshot->allocator, snapshot->lamp_count + 1,
-                            sizeof(shade) > ALIGNMENT ? sizeof(shade) : ALIGNMENT);
+                            sizeof(sun_attenuation) > ALIGNMENT ? sizeof(sun_attenuation) : ALIGNMENT);
     if (raw == NULL) return 0;
     sun->shade_memory = raw;
-    sun->lamp_shades = (shade *)(void *)(raw + (ALIGNMENT - (uintptr_t)raw % ALIGNMENT) % ALIGNMENT);
+    sun->lamp_shades = (sun_attenuation *)(void *)(raw + (ALIGNMENT - (uintptr_t)raw % ALIGNMENT) % ALIGNMENT);
     return 1;
 }
 

@@ -2,7 +2,7 @@
  * known. Included by trace_sun.h. */
 
 static int meet_fog(workspace *w, const nebel_snapshot *snapshot);
-static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded);
+static gathered_light gather_light(packet_state *m, const allowance *may, nb_mask *unbounded);
 
 /* Optical depth from a place on each ray to a light, and by how much it may be off. */
 typedef struct light_depth {
@@ -18,10 +18,10 @@ static light_depth no_depth(void)
 
 /* As far as `reach` into the direction. A march that has run out of memory is not to be used again; the walk of the rays
  * ends in its own time. */
-static light_depth depth_by_march(sunlight *sun, const march *m, nb_wide t, nb_wvec3 direction, nb_wide reach)
+static light_depth depth_by_march(sunlight *sun, const packet_state *m, nb_wide t, nb_wvec3 direction, nb_wide reach)
 {
     const allowance may = {.transmittance_only = 1};
-    march *way = &sun->way->m;
+    packet_state *way = &sun->way->m;
     nb_mask unbounded;
     way->rays.origin = nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t));
     way->rays.direction = direction;
@@ -33,7 +33,7 @@ static light_depth depth_by_march(sunlight *sun, const march *m, nb_wide t, nb_w
     light_depth to_light = no_depth();
     sun->out_of_memory = sun->out_of_memory || !meet_fog(sun->way, sun->snapshot);
     if (sun->out_of_memory) return to_light;
-    const gathered g = gather_light(way, &may, &unbounded);
+    const gathered_light g = gather_light(way, &may, &unbounded);
     const nb_mask watched = ends_matter(way);
     for (int c = 0; c < 3; c++) {
         to_light.depth[c] = g.depth[c];
@@ -44,9 +44,9 @@ static light_depth depth_by_march(sunlight *sun, const march *m, nb_wide t, nb_w
 }
 
 /* The integral of the density from y up is that at y times the scale height. */
-static light_depth depth_of_height(const sunlight *sun, const march *m, nb_wide t)
+static light_depth depth_of_height(const sunlight *sun, const packet_state *m, nb_wide t)
 {
-    const contact *k = present(m, m->present_first);
+    const medium_hit *k = present(m, m->present_first);
     const nb_real rise = nb_narrow(WIDE(k->medium->body.density.scale_height) / sun->direction.y);
     const nb_real length = contact_density(k, t) * rise;
     light_depth to_sun = no_depth();
@@ -57,11 +57,11 @@ static light_depth depth_of_height(const sunlight *sun, const march *m, nb_wide 
     return to_sun;
 }
 
-static light_depth depth_of_altitude(const sunlight *sun, const march *m, nb_wide t)
+static light_depth depth_of_altitude(const sunlight *sun, const packet_state *m, nb_wide t)
 {
     const nb_medium *medium = &sun->snapshot->media[0];
     const packet way = {nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t)), sun->direction, NB_WFAR};
-    contact k = {.medium = medium};
+    medium_hit k = {.medium = medium};
     altitude_contact(&k, &way, &medium->body.density);
     const nb_estimate along = altitude_integral(&k, NB_W(0.0), NB_WFAR);
     light_depth to_sun = no_depth();
@@ -81,23 +81,23 @@ static nb_real longest_way(const nb_volume *body)
 }
 
 /* What of a leaf's interval is ahead, and by how much that may be longer or shorter. */
-typedef struct stretch_ahead {
+typedef struct next_interval {
     nb_wide enter, leave;
     nb_real error;
-} stretch_ahead;
+} next_interval;
 
 /* An end that may lie on the way counts with its slack. Where a tree is asked, bodies count within their bounds alone:
  * bits would depend on whether a lane's company brought them here. */
-static stretch_ahead ahead_in(const packet *way, const nb_volume *body, int by_tree)
+static next_interval ahead_in(const packet *way, const nb_volume *body, int by_tree)
 {
     const nb_interval raw = leaf_interval(way, body, &body->leaves[0]);
     nb_wmask near = nb_wand(raw.leave + raw.leave_slack >= NB_W(0.0), raw.enter - raw.enter_slack <= way->t_max);
     if (by_tree) {
-        const part whole = {NB_W(0.0), way->t_max}, bounds = part_in_bounds(way, body, &whole);
+        const packet_part whole = {NB_W(0.0), way->t_max}, bounds = part_in_bounds(way, body, &whole);
         near = nb_wand(near, bounds.enter <= bounds.leave);
     }
     const nb_real slack = nb_min(nb_narrow(raw.enter_slack + raw.leave_slack), longest_way(body));
-    return (stretch_ahead){nb_wmax(raw.enter, NB_W(0.0)), nb_wmin(raw.leave, way->t_max),
+    return (next_interval){nb_wmax(raw.enter, NB_W(0.0)), nb_wmin(raw.leave, way->t_max),
                            nb_select(nb_narrow_mask(near), slack, NB_F(0.0))};
 }
 
@@ -120,7 +120,7 @@ static inline __attribute__((always_inline)) nb_real length_in_body(const packet
 static inline __attribute__((always_inline)) nb_real length_error(const packet *way, const nb_volume *body, int by_tree,
                                                                   nb_real noise)
 {
-    const stretch_ahead s = ahead_in(way, body, by_tree);
+    const next_interval s = ahead_in(way, body, by_tree);
     return s.error + nb_narrow(nb_wmax(s.leave - s.enter, NB_W(0.0))) * noise;
 }
 
@@ -140,7 +140,7 @@ static void add_body_error(light_depth *sum, const packet *way, const nb_volume 
 #define MOST_ASKED 64
 
 /* Convex bodies that add: each cuts one stretch out of the way, and the order of its ends does not count. */
-static light_depth depth_of_bodies(sunlight *sun, const march *m, nb_wide t, nb_wvec3 direction, nb_wide reach)
+static light_depth depth_of_bodies(sunlight *sun, const packet_state *m, nb_wide t, nb_wvec3 direction, nb_wide reach)
 {
     const nebel_snapshot *snapshot = sun->snapshot;
     const int by_tree = snapshot->medium_count > MOST_ASKED;
@@ -160,13 +160,13 @@ static light_depth depth_of_bodies(sunlight *sun, const march *m, nb_wide t, nb_
 }
 
 /* Voxels of one box alone, up to where the integral of their density is `enough`. */
-static light_depth depth_of_grid(const sunlight *sun, const march *m, nb_wide t, nb_mask lanes, nb_real enough)
+static light_depth depth_of_grid(const sunlight *sun, const packet_state *m, nb_wide t, nb_mask lanes, nb_real enough)
 {
     const nb_medium *medium = &sun->snapshot->media[0];
     const nb_volume *body = &medium->body;
     const packet way = {nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t)), sun->direction, NB_WFAR};
-    const stretch_ahead s = ahead_in(&way, body, 0);
-    contact k = {.medium = medium, .inside = nb_and(lanes, nb_narrow_mask(s.enter < s.leave))};
+    const next_interval s = ahead_in(&way, body, 0);
+    medium_hit k = {.medium = medium, .inside = nb_and(lanes, nb_narrow_mask(s.enter < s.leave))};
     grid_contact(&k, &way, &body->leaves[0]);
     const nb_estimate along = grid_integral(&k, s.enter, s.leave, enough);
     const nb_real error = along.error + s.error * REAL(nb_grid_peak(body->density.grid));
@@ -178,7 +178,7 @@ static light_depth depth_of_grid(const sunlight *sun, const march *m, nb_wide t,
     return to_sun;
 }
 
-static light_depth depth_to_sun(sunlight *sun, const march *m, nb_wide t, nb_wmask lanes)
+static light_depth depth_to_sun(sunlight *sun, const packet_state *m, nb_wide t, nb_wmask lanes)
 {
     const nb_wide reach = nb_wselect(lanes, NB_WFAR, NB_W(0.0));
     switch (sun->snapshot->way_to_sun) {

@@ -34,7 +34,7 @@
 /* ---- places ---------------------------------------------------------------------------------- */
 
 /* A place on each ray: optical depth up to it, and what light comes from it to the eye where it is scattered alike from everywhere. */
-typedef struct lit_place {
+typedef struct lit_point {
     nb_wide t;
     nb_real depth[3], depth_error[3];
     nb_real behind[3];          /* e^-depth */
@@ -46,13 +46,13 @@ typedef struct lit_place {
     nb_real seen[3];
     nb_real doubt;    /* by what factor that may be off */
     nb_mask has_edge; /* a shadow begins or ends between the place before and this */
-} lit_place;
+} lit_point;
 
 /* Where a ray starts, with no light. */
-static lit_place no_place(void)
+static lit_point no_place(void)
 {
     const nb_real zero = NB_F(0.0);
-    lit_place place = {
+    lit_point place = {
         .t = NB_W(0.0), .arrives = zero, .cut = zero, .cut_depth = zero, .doubt = zero, .has_edge = nb_mask_false};
     for (int c = 0; c < 3; c++) {
         place.depth[c] = place.depth_error[c] = place.behind[c] = zero;
@@ -61,17 +61,17 @@ static lit_place no_place(void)
     return place;
 }
 
-static nb_wvec3 apart_from_lamp(const march *m, const lamp_pass *pass, nb_wide t)
+static nb_wvec3 apart_from_lamp(const packet_state *m, const light_pass *pass, nb_wide t)
 {
     return nb_wadd3(pass->foot, nb_wscale3(m->rays.direction, t - pass->closest));
 }
 
 /* What a lamp brings to t, and from where; how far it is. Light jumps at the edge of a hard cone, where steps begin and
  * end: whether t is in the cone is asked at `beside`, within the step. */
-static nb_real lamp_arrives(const march *m, const lamp_pass *pass, const nb_phase *phase, nb_wide t, nb_wide beside,
-                            nb_wvec3 *towards, nb_wide *reach)
+static nb_real lamp_arrives(const packet_state *m, const light_pass *pass, const nb_phase *phase, nb_wide t,
+                            nb_wide beside, nb_wvec3 *towards, nb_wide *reach)
 {
-    const nb_lamp *lamp = pass->lamp;
+    const nb_light *lamp = pass->lamp;
     const nb_wvec3 apart = apart_from_lamp(m, pass, t);
     const nb_wide square = nb_wdot3(apart, apart), distance = nb_wsqrt(square);
     *towards = nb_wscale3(apart, -nb_wrcp_bounded(distance));
@@ -84,15 +84,15 @@ static nb_real lamp_arrives(const march *m, const lamp_pass *pass, const nb_phas
 }
 
 /* The light that is scattered: of the sun where `pass` is NULL. */
-typedef struct crowd_light {
-    const lamp_pass *pass;
+typedef struct overlap_light {
+    const light_pass *pass;
     const nb_phase *phase; /* of a lamp: all media that it lights have this one */
     nb_real most;          /* radiance of fog that is opaque, at most */
     double share;          /* what its steps may add to the error */
-} crowd_light;
+} overlap_light;
 
 /* What is seen of a place that has its depths and what arrives there. */
-static void set_seen(const sunlight *sun, const crowd_light *light, lit_place *at)
+static void set_seen(const sunlight *sun, const overlap_light *light, lit_point *at)
 {
     nb_real through[3];
     map_channels(sun->snapshot, transmitted, at->way, through);
@@ -104,8 +104,8 @@ static void set_seen(const sunlight *sun, const crowd_light *light, lit_place *a
 }
 
 /* `beside`: see lamp_arrives. */
-static void look_from(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *before,
-                      nb_wide beside, lit_place *at)
+static void look_from(const sunlight *sun, const packet_state *m, const overlap_light *light, const lit_point *before,
+                      nb_wide beside, lit_point *at)
 {
     nb_wvec3 towards = sun->direction;
     nb_wide reach = NB_WFAR;
@@ -139,7 +139,7 @@ typedef struct lit_half {
 } lit_half;
 
 /* Of the sun its radiance per metre; of a lamp what scatters. */
-static nb_real glow_in(const contact *k, const crowd_light *light, int c)
+static nb_real glow_in(const medium_hit *k, const overlap_light *light, int c)
 {
     if (light->pass == NULL) return k->glow[c];
     return k->medium->is_lamplit ? k->extinction[c] * REAL(k->medium->body.albedo[c]) : NB_F(0.0);
@@ -147,7 +147,7 @@ static nb_real glow_in(const contact *k, const crowd_light *light, int c)
 
 /* The mean place and the mean of its square within a part from s on, of length l. Densities are linear from end to end of it: what that
  * misses is in the moments alone. */
-static void find_moments_of(const contact *k, nb_wide enter, nb_wide leave, nb_real s, nb_real l, nb_real *first,
+static void find_moments_of(const medium_hit *k, nb_wide enter, nb_wide leave, nb_real s, nb_real l, nb_real *first,
                             nb_real *second)
 {
     nb_real last = NB_F(0.5);
@@ -167,7 +167,7 @@ typedef struct lit_between {
 } lit_between;
 
 /* Adds what a body gives from `from` to `to`, which has the places from `place` to place + 1 of its half. */
-static void add_part(const contact *k, const leaf_span *span, const crowd_light *light, const lit_place *from,
+static void add_part(const medium_hit *k, const leaf_span *span, const overlap_light *light, const lit_point *from,
                      nb_wide to, int place, nb_real quarter, lit_half *half, lit_between *sum)
 {
     const nb_wide enter = nb_wmin(nb_wmax(span->enter, from->t), to);
@@ -208,13 +208,13 @@ static void add_part(const contact *k, const leaf_span *span, const crowd_light 
 }
 
 /* All of them. */
-static void add_parts(const march *m, const crowd_light *light, const lit_place *from, lit_place *to, int place,
-                      nb_real quarter, lit_half *half, nb_real *unresolved)
+static void add_parts(const packet_state *m, const overlap_light *light, const lit_point *from, lit_point *to,
+                      int place, nb_real quarter, lit_half *half, nb_real *unresolved)
 {
     const nb_real zero = NB_F(0.0);
     lit_between sum = {{zero, zero, zero}, {zero, zero, zero}, NB_F(2.0), zero, zero, zero};
     for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+        const medium_hit *k = &m->contacts[i];
         add_part(k, &m->spans[k->first_span], light, from, to->t, place, quarter, half, &sum);
     }
     for (int c = 0; c < 3; c++) {
@@ -249,11 +249,11 @@ static nb_real doubt_of_half(const lit_half *half, int c, nb_real a, nb_real b, 
 
 /* ---- steps ----------------------------------------------------------------------------------- */
 
-typedef struct crowd_step {
-    lit_place end;
+typedef struct overlap_step {
+    lit_point end;
     nb_real light[3], error, rounding, drop;
     nb_mask has_edge; /* a shadow begins or ends in it */
-} crowd_step;
+} overlap_step;
 
 /* What shadows may do that the places of a step do not show, as a part of its light: all of them that are too narrow, and where
  * they begin or end, which is as steep as a root. The root of x - a, x and a from 0 to 1, is integrated here to 0.042, in the mean over a to 0.015;
@@ -280,13 +280,13 @@ static nb_real hidden_in_shadows(const sunlight *sun, nb_wide start, nb_wide end
 }
 
 /* What places do not show between two of them: see unseen_light of trace_lit_rule.h. */
-static nb_real unseen_between_places(const lit_place at[5], int c, const crowd_light *light)
+static nb_real unseen_between_places(const lit_point at[5], int c, const overlap_light *light)
 {
     const nb_real most = light->pass != NULL ? NB_F(1.0) : light->most;
     const double intensity = light->pass != NULL ? light->pass->lamp->intensity[c] : 1;
     nb_real unseen = NB_F(0.0);
     for (int i = 0; i < 4; i++) {
-        const lit_place *from = &at[i], *to = &at[i + 1];
+        const lit_point *from = &at[i], *to = &at[i + 1];
         const nb_real cover = nb_min(to->before[c], to->here[c]);
         const nb_real dip = nb_max(nb_min(from->way[c], to->way[c]) - cover, NB_F(0.0));
         const nb_real change = nb_abs((to->depth[c] - from->depth[c]) + (to->way[c] - from->way[c])) + dip;
@@ -307,11 +307,11 @@ static nb_real unseen_between_places(const lit_place at[5], int c, const crowd_l
 }
 
 /* What depths and shadows that begin or end between two places do to the light of bodies that do so, too. */
-static nb_real light_of_cut_bodies(const lit_place at[5], int c)
+static nb_real light_of_cut_bodies(const lit_point at[5], int c)
 {
     nb_real light = NB_F(0.0);
     for (int i = 0; i < 4; i++) {
-        const lit_place *from = &at[i], *to = &at[i + 1];
+        const lit_point *from = &at[i], *to = &at[i + 1];
         const nb_real shadows =
             to->cut_depth + nb_max(from->way[c] + to->way[c] - (to->before[c] + to->here[c]), NB_F(0.0));
         light = light + to->cut * nb_max(from->seen[c], to->seen[c]) * nb_min(shadows, NB_F(1.0));
@@ -323,10 +323,10 @@ static nb_real light_of_cut_bodies(const lit_place at[5], int c)
 #define CONE_MARGIN 1e-6
 
 /* A step that starts at a cone's edge has the other side's light than the step that ended there. */
-static lit_place look_ahead_from(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *start,
-                                 nb_wide margin)
+static lit_point look_ahead_from(const sunlight *sun, const packet_state *m, const overlap_light *light,
+                                 const lit_point *start, nb_wide margin)
 {
-    lit_place at = *start;
+    lit_point at = *start;
     nb_wvec3 towards;
     nb_wide reach;
     if (light->pass == NULL || !light->pass->lamp->is_spot) return at;
@@ -335,12 +335,12 @@ static lit_place look_ahead_from(const sunlight *sun, const march *m, const crow
     return at;
 }
 
-static crowd_step try_crowd_step(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *start,
-                                 nb_real length, nb_wide end)
+static overlap_step try_crowd_step(const sunlight *sun, const packet_state *m, const overlap_light *light,
+                                   const lit_point *start, nb_real length, nb_wide end)
 {
     const nb_real quarter = NB_F(0.25) * length;
     const nb_wide margin = (end - start->t) * WIDE(CONE_MARGIN);
-    lit_place at[5] = {look_ahead_from(sun, m, light, start, margin)};
+    lit_point at[5] = {look_ahead_from(sun, m, light, start, margin)};
     lit_half half[2] = {nothing_scattered(), nothing_scattered()};
     nb_real unresolved = NB_F(0.0);
     for (int i = 1; i < 5; i++) {
@@ -348,11 +348,11 @@ static crowd_step try_crowd_step(const sunlight *sun, const march *m, const crow
         add_parts(m, light, &at[i - 1], &at[i], (i - 1) % 2, quarter, &half[(i - 1) / 2], &unresolved);
         look_from(sun, m, light, &at[i - 1], i == 4 ? end - margin : at[i].t, &at[i]);
     }
-    crowd_step s = {.end = at[4],
-                    .error = NB_F(0.0),
-                    .rounding = NB_F(0.0),
-                    .drop = NB_F(0.0),
-                    .has_edge = nb_or(nb_or(at[1].has_edge, at[2].has_edge), nb_or(at[3].has_edge, at[4].has_edge))};
+    overlap_step s = {.end = at[4],
+                      .error = NB_F(0.0),
+                      .rounding = NB_F(0.0),
+                      .drop = NB_F(0.0),
+                      .has_edge = nb_or(nb_or(at[1].has_edge, at[2].has_edge), nb_or(at[3].has_edge, at[4].has_edge))};
     nb_real doubt = NB_F(0.0), full = NB_F(0.0), unseen = NB_F(0.0);
     for (int i = 0; i < 5; i++) doubt = nb_max(doubt, at[i].doubt);
     for (int c = 0; c < 3; c++) {
@@ -376,14 +376,14 @@ static crowd_step try_crowd_step(const sunlight *sun, const march *m, const crow
 }
 
 /* Where a lane has come to. */
-typedef struct crowd_walk {
-    lit_place at;
+typedef struct overlap_walk {
+    lit_point at;
     nb_wide last;
     nb_wmask lanes;
     nb_real guess, left, whole; /* length of the next step; steps that may still be tried; of all */
-} crowd_walk;
+} overlap_walk;
 
-static void select_place(nb_mask mask, lit_place *to, const lit_place *from)
+static void select_place(nb_mask mask, lit_point *to, const lit_point *from)
 {
     to->t = nb_wselect(nb_widen_mask(mask), from->t, to->t);
     select_reals(mask, to->depth, from->depth);
@@ -397,12 +397,12 @@ static void select_place(nb_mask mask, lit_place *to, const lit_place *from)
 }
 
 /* The place at t behind one that is known. */
-static lit_place place_behind(sunlight *sun, const march *m, const crowd_light *light, const lit_place *from, nb_wide t,
-                              nb_wmask lanes)
+static lit_point place_behind(sunlight *sun, const packet_state *m, const overlap_light *light, const lit_point *from,
+                              nb_wide t, nb_wmask lanes)
 {
     lit_half none = nothing_scattered();
     nb_real unresolved = NB_F(0.0);
-    lit_place at = {.t = t};
+    lit_point at = {.t = t};
     list_shadows_of_step(sun, from->t, t, lanes);
     add_parts(m, light, from, &at, 0, NB_F(1.0), &none, &unresolved);
     look_from(sun, m, light, from, t, &at);
@@ -418,15 +418,15 @@ static nb_real next_length(nb_real length, nb_real error, nb_real allowed)
     return length * nb_select(error <= allowed, next, half);
 }
 
-static void step_through_crowd(sunlight *sun, const march *m, const crowd_light *light, nb_wide bright, crowd_walk *w,
-                               gathered *g)
+static void step_through_crowd(sunlight *sun, const packet_state *m, const overlap_light *light, nb_wide bright,
+                               overlap_walk *w, gathered_light *g)
 {
     const nb_mask final = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
     const nb_real rest = nb_narrow(bright - w->at.t);
     const nb_real length = nb_select(final, rest, nb_min(w->guess, rest));
     const nb_wide end = nb_wselect(nb_widen_mask(length >= rest), bright, w->at.t + nb_widen(length));
     list_shadows_of_step(sun, w->at.t, end, w->lanes);
-    const crowd_step s = try_crowd_step(sun, m, light, &w->at, length, end);
+    const overlap_step s = try_crowd_step(sun, m, light, &w->at, length, end);
     const nb_real least = NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
     const nb_real steady = REAL(0.5 * (1 - EDGE_SHARE)) * (s.drop + length * nb_rcp_bounded(w->whole));
     const nb_real at_edge =
@@ -449,12 +449,12 @@ static void step_through_crowd(sunlight *sun, const march *m, const crowd_light 
 /* ---- the walk -------------------------------------------------------------------------------- */
 
 /* From the first lit body of each ray to the last. */
-static nb_mask find_lit_stretch(const march *m, int by_lamp, nb_wide *first, nb_wide *last)
+static nb_mask find_lit_stretch(const packet_state *m, int by_lamp, nb_wide *first, nb_wide *last)
 {
     *first = NB_WFAR;
     *last = NB_W(0.0);
     for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+        const medium_hit *k = &m->contacts[i];
         if (!(by_lamp ? k->medium->is_lamplit : k->medium->is_sunlit)) continue;
         const nb_wmask met = k->hull_enter < k->hull_leave;
         *first = nb_wselect(met, nb_wmin(*first, k->hull_enter), *first);
@@ -463,11 +463,11 @@ static nb_mask find_lit_stretch(const march *m, int by_lamp, nb_wide *first, nb_
     return nb_narrow_mask(*first < *last);
 }
 
-static void transmittance_at(const march *m, nb_wide t, nb_real behind[3])
+static void transmittance_at(const packet_state *m, nb_wide t, nb_real behind[3])
 {
     nb_real depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+        const medium_hit *k = &m->contacts[i];
         const leaf_span *span = &m->spans[k->first_span];
         const nb_wide leave = nb_wmax(nb_wmin(span->leave, t), span->enter);
         const nb_mask some = nb_narrow_mask(span->enter < leave);
@@ -479,7 +479,7 @@ static void transmittance_at(const march *m, nb_wide t, nb_real behind[3])
 }
 
 /* What fog between two places may give at most. */
-static nb_real most_between(const march *m, const crowd_light *light, nb_wide start, nb_wide end)
+static nb_real most_between(const packet_state *m, const overlap_light *light, nb_wide start, nb_wide end)
 {
     nb_real before[3], behind[3], drop = NB_F(0.0);
     transmittance_at(m, start, before);
@@ -490,7 +490,8 @@ static nb_real most_between(const march *m, const crowd_light *light, nb_wide st
 }
 
 /* The least `last` behind which nothing matters, but for a factor of 2: rays without an end would have steps that are halved for ever. */
-static nb_wide trim_stretch(const march *m, const crowd_light *light, nb_wide first, nb_wide last, nb_real allowed)
+static nb_wide trim_stretch(const packet_state *m, const overlap_light *light, nb_wide first, nb_wide last,
+                            nb_real allowed)
 {
     nb_wmask lanes = first < last;
     for (int i = 0; i < 64 && nb_wany(lanes); i++) {
@@ -502,11 +503,12 @@ static nb_wide trim_stretch(const march *m, const crowd_light *light, nb_wide fi
 }
 
 /* Steps end where a surface's shadow begins or ends, and pass over it. */
-static void walk_through_crowd(sunlight *sun, const march *m, const crowd_light *light, shade *shadows, nb_mask lanes,
-                               nb_wide first, nb_wide last, gathered *g)
+static void walk_through_crowd(sunlight *sun, const packet_state *m, const overlap_light *light,
+                               sun_attenuation *shadows, nb_mask lanes, nb_wide first, nb_wide last, gathered_light *g)
 {
-    const lit_place origin = no_place();
-    crowd_walk w = {.last = last, .lanes = nb_wand(nb_widen_mask(lanes), first < last), .left = REAL(MOST_CROWD_STEPS)};
+    const lit_point origin = no_place();
+    overlap_walk w = {
+        .last = last, .lanes = nb_wand(nb_widen_mask(lanes), first < last), .left = REAL(MOST_CROWD_STEPS)};
     w.at = place_behind(sun, m, light, &origin, nb_wselect(w.lanes, first, NB_W(0.0)), w.lanes);
     start_from_last(sun, nb_mask_true);
     w.whole = nb_max(nb_narrow(last - first), NB_TINY);
@@ -516,7 +518,7 @@ static void walk_through_crowd(sunlight *sun, const march *m, const crowd_light 
         const nb_wide bright = shadows != NULL ? nb_wmin(shadows->toggle, last) : last;
         const nb_wmask dark = shadows != NULL ? nb_wand(w.lanes, shadows->is_dark) : nb_wmask_false;
         if (nb_wany(dark)) {
-            const lit_place behind = place_behind(sun, m, light, &w.at, nb_wselect(dark, bright, w.at.t), w.lanes);
+            const lit_point behind = place_behind(sun, m, light, &w.at, nb_wselect(dark, bright, w.at.t), w.lanes);
             select_place(nb_narrow_mask(dark), &w.at, &behind);
             start_from_last(sun, nb_narrow_mask(dark));
             w.left = nb_select(nb_narrow_mask(dark), REAL(MOST_CROWD_STEPS), w.left);
@@ -527,7 +529,8 @@ static void walk_through_crowd(sunlight *sun, const march *m, const crowd_light 
     }
 }
 
-static void gather_light_of_crowd(sunlight *sun, const march *m, const crowd_light *light, shade *shadows, gathered *g)
+static void gather_light_of_crowd(sunlight *sun, const packet_state *m, const overlap_light *light,
+                                  sun_attenuation *shadows, gathered_light *g)
 {
     nb_wide first, last;
     const nb_mask lit = find_lit_stretch(m, light->pass != NULL, &first, &last);
@@ -551,11 +554,11 @@ static void gather_light_of_crowd(sunlight *sun, const march *m, const crowd_lig
 
 /* ---- all lights ------------------------------------------------------------------------------ */
 
-static nb_real most_sunlight(const march *m)
+static nb_real most_sunlight(const packet_state *m)
 {
     nb_real most = NB_F(0.0);
     for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+        const medium_hit *k = &m->contacts[i];
         const nb_mask met = is_met(k);
         for (int c = 0; c < 3; c++) {
             const nb_real radiance = k->glow[c] / nb_max(k->extinction[c], NB_TINY);
@@ -566,24 +569,24 @@ static nb_real most_sunlight(const march *m)
 }
 
 /* Adds what all lights give along the rays. */
-static void gather_crowd_lights(sunlight *sun, const march *m, gathered *g)
+static void gather_crowd_lights(sunlight *sun, const packet_state *m, gathered_light *g)
 {
     const nebel_snapshot *snapshot = sun->snapshot;
     if (snapshot->is_sunlit) {
-        const crowd_light light = {.most = most_sunlight(m), .share = sun->share};
+        const overlap_light light = {.most = most_sunlight(m), .share = sun->share};
         gather_light_of_crowd(sun, m, &light, sun->shade.toggles != NULL ? &sun->shade : NULL, g);
     }
     nb_real most = NB_F(0.0);
     const nb_phase *phase = NULL;
     for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+        const medium_hit *k = &m->contacts[i];
         if (!k->medium->is_lamplit) continue;
         phase = &k->medium->body.phase;
         most = nb_max(most, nb_select(is_met(k), REAL(most_scattered(&k->medium->body)), NB_F(0.0)));
     }
     for (size_t i = 0; i < snapshot->lamp_count && phase != NULL; i++) {
-        lamp_pass pass = pass_lamp(m, &snapshot->lamps[i]);
-        const crowd_light light = {&pass, phase, most, sun->share / (double)snapshot->lamp_count};
+        light_pass pass = pass_lamp(m, &snapshot->lamps[i]);
+        const overlap_light light = {&pass, phase, most, sun->share / (double)snapshot->lamp_count};
         gather_light_of_crowd(sun, m, &light, sun->lamp_shades != NULL ? &sun->lamp_shades[i] : NULL, g);
     }
 }

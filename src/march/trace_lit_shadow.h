@@ -201,7 +201,7 @@ static void set_narrow_shadow(lit_shadow *s, const packet *rays, nb_wvec3 light,
     set_flat_shadow(s, &f);
 }
 
-static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_lamp *lamp, const nb_medium *medium)
+static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_light *lamp, const nb_medium *medium)
 {
     const nb_volume *body = &medium->body;
     lit_shadow s = {NB_W(0.0), NB_WFAR, most_depth(body), NB_F(0.0), NB_F(0.0), medium, 0};
@@ -220,7 +220,7 @@ static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_la
 }
 
 /* Those that lie on the rays; `lamp` NULL: in the sun. */
-static void list_shadows(sunlight *sun, const packet *rays, const nb_lamp *lamp)
+static void list_shadows(sunlight *sun, const packet *rays, const nb_light *lamp)
 {
     const nebel_snapshot *snapshot = sun->snapshot;
     sun->shadow_count = 0;
@@ -241,16 +241,16 @@ static void list_shadows(sunlight *sun, const packet *rays, const nb_lamp *lamp)
 /* The integral of a body's density along the way, of any profile, and by how much it may be off. */
 static nb_estimate profile_along(const packet *way, const nb_medium *medium)
 {
-    const stretch_ahead s = ahead_in(way, &medium->body, 0);
+    const next_interval s = ahead_in(way, &medium->body, 0);
     const nb_wide leave = nb_wmax(s.leave, s.enter);
-    contact k = {.medium = medium, .inside = nb_narrow_mask(s.enter < leave)};
+    medium_hit k = {.medium = medium, .inside = nb_narrow_mask(s.enter < leave)};
     profile_contact(&k, way);
     const nb_estimate along = contact_integral(&k, s.enter, leave, nb_narrow(leave - s.enter));
     return (nb_estimate){nb_select(k.inside, along.value, NB_F(0.0)),
                          nb_select(k.inside, along.error, NB_F(0.0)) + s.error};
 }
 
-static nb_estimate length_along(const march *m, const packet *way, const nb_volume *body)
+static nb_estimate length_along(const packet_state *m, const packet *way, const nb_volume *body)
 {
     nb_estimate along = {length_in_body(way, body), NB_F(0.0)};
     if (m->wants_error) along.error = length_error(way, body, 0, NB_F(4.0) * NB_EPSILON);
@@ -276,7 +276,7 @@ static void note_covering(shadowed_way *sum, const nb_volume *body, nb_mask near
 
 /* From t of each ray; of the bodies in whose shadow that is, lane by lane: slack beside them depends on no company.
  * `before`: the last place that was asked. */
-static shadowed_way way_through_shadows(const sunlight *sun, const march *m, nb_wide before, nb_wide t,
+static shadowed_way way_through_shadows(const sunlight *sun, const packet_state *m, nb_wide before, nb_wide t,
                                         nb_wvec3 direction, nb_wide reach)
 {
     const packet way = {nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t)), direction, reach};

@@ -1,7 +1,7 @@
 /* Meeting the fog: which media any ray of a packet meets, the intervals of all their leaves, and what the ends that may
  * be off can do. Included by trace_kernel.c after trace_packet.h. */
 
-static nb_real end_altitude_density(const contact *k, nb_wide t, nb_real slack)
+static nb_real end_altitude_density(const medium_hit *k, nb_wide t, nb_real slack)
 {
     const nb_real u = altitude_coordinate(k, t);
     const nb_real reach = nb_narrow(k->slope.x) * slack + k->noise + nb_abs(u) * (NB_F(4.0) * NB_EPSILON);
@@ -9,7 +9,7 @@ static nb_real end_altitude_density(const contact *k, nb_wide t, nb_real slack)
 }
 
 /* How dense a medium may be within slack of t, for what an uncertain end there may do. */
-static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
+static nb_real end_density(const medium_hit *k, nb_wide t, nb_real slack)
 {
     const nebel_density *density = &k->medium->body.density;
     if (density->type == NEBEL_DENSITY_ALTITUDE) return end_altitude_density(k, t, slack);
@@ -36,13 +36,13 @@ static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
     }
 }
 
-static ends no_ends(void)
+static interval_ends no_ends(void)
 {
     const nb_real zero = NB_F(0.0);
-    return (ends){{zero, zero, zero}, {zero, zero, zero}};
+    return (interval_ends){{zero, zero, zero}, {zero, zero, zero}};
 }
 
-static void add_end_of(ends *sum, const contact *k, nb_wide t, nb_real slack)
+static void add_end_of(interval_ends *sum, const medium_hit *k, nb_wide t, nb_real slack)
 {
     const nb_real weight = slack * end_density(k, t, slack);
     for (int c = 0; c < 3; c++) {
@@ -54,7 +54,7 @@ static void add_end_of(ends *sum, const contact *k, nb_wide t, nb_real slack)
 }
 
 /* Whether the ray is in a medium's hull within slack of t. */
-static nb_mask is_hull_near(const contact *k, nb_wide t, nb_wide slack)
+static nb_mask is_hull_near(const medium_hit *k, nb_wide t, nb_wide slack)
 {
     const nb_wmask near = nb_wand(t + slack >= k->hull_enter, t - slack <= k->hull_leave);
     return nb_narrow_mask(nb_wand(near, k->hull_enter < k->hull_leave));
@@ -62,12 +62,12 @@ static nb_mask is_hull_near(const contact *k, nb_wide t, nb_wide slack)
 
 /* An end of a leaf may be off by slack. The end of a medium that covers moves the fog of every medium of a lower rank
  * that is there, too; those were met before, as ranks ascend. */
-static void add_end(const march *m, ends *sum, const contact *k, nb_wide t, nb_real slack)
+static void add_end(const packet_state *m, interval_ends *sum, const medium_hit *k, nb_wide t, nb_real slack)
 {
     if (nb_volume_has_fog(&k->medium->body)) add_end_of(sum, k, t, slack);
     if (!nb_volume_covers(&k->medium->body)) return;
     for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *other = &m->contacts[i];
+        const medium_hit *other = &m->contacts[i];
         if (other->medium->body.rank >= k->medium->body.rank) break;
         if (!nb_volume_has_fog(&other->medium->body)) continue;
         add_end_of(sum, other, t, nb_select(is_hull_near(other, t, nb_widen(slack)), slack, NB_F(0.0)));
@@ -75,14 +75,14 @@ static void add_end(const march *m, ends *sum, const contact *k, nb_wide t, nb_r
 }
 
 /* The part of the rays on which a medium acts. */
-typedef struct part {
+typedef struct packet_part {
     nb_wide enter, leave;
-} part;
+} packet_part;
 
-static part part_of_rays(const march *m, const nb_volume *body)
+static packet_part part_of_rays(const packet_state *m, const nb_volume *body)
 {
-    if (m->ignores_distances) return (part){NB_W(0.0), m->rays.t_max};
-    return (part){WIDE(body->start), nb_wmin(m->rays.t_max, WIDE(body->cutoff))};
+    if (m->ignores_distances) return (packet_part){NB_W(0.0), m->rays.t_max};
+    return (packet_part){WIDE(body->start), nb_wmin(m->rays.t_max, WIDE(body->cutoff))};
 }
 
 /* The bounds from the rays' origins; NB_WFAR stands for endless, as arithmetic with infinity is slow. */
@@ -104,24 +104,24 @@ static nb_wide reach_of_bound(nb_wvec3 bound)
 
 /* Where lanes can meet a body, by its bounds, with a margin for rounding within that of the tree. What a leaf does
  * outside them must not count: bits would depend on whether a lane's company brought the body here. */
-static part part_in_bounds(const packet *rays, const nb_volume *body, const part *acts)
+static packet_part part_in_bounds(const packet *rays, const nb_volume *body, const packet_part *acts)
 {
     const nb_wvec3 low = bound_from(rays, body->low), high = bound_from(rays, body->high);
     const nb_wide margin = nb_wmax(reach_of_bound(low), reach_of_bound(high)) * (NB_W(8.0) * NB_WEPSILON);
     const nb_wvec3 widened = nb_wvec3(margin, margin, margin), here = nb_wvec3(NB_W(0.0), NB_W(0.0), NB_W(0.0));
     const nb_interval span =
         nb_interval_box(here, rays->direction, nb_wsub3(low, widened), nb_wadd3(high, widened), NB_W(0.0));
-    return (part){nb_wmax(span.enter, acts->enter), nb_wmin(span.leave, acts->leave)};
+    return (packet_part){nb_wmax(span.enter, acts->enter), nb_wmin(span.leave, acts->leave)};
 }
 
 /* Where an end counts: on the ray. */
-static nb_wide place_on_ray(const march *m, nb_wide end)
+static nb_wide place_on_ray(const packet_state *m, nb_wide end)
 {
     return nb_wclamp(end, NB_W(0.0), m->rays.t_max);
 }
 
 /* How far an end with slack may be from its place, where it is within the bounds: at least that. */
-static nb_real slack_within(nb_wide place, nb_wide end, nb_wide slack, const part *bounds, nb_wmask counts)
+static nb_real slack_within(nb_wide place, nb_wide end, nb_wide slack, const packet_part *bounds, nb_wmask counts)
 {
     const nb_wide first = end - slack, last = end + slack;
     const nb_wmask reaches = nb_wand(nb_wand(first <= bounds->leave, last >= bounds->enter), slack > NB_W(0.0));
@@ -136,7 +136,7 @@ static nb_real slack_within(nb_wide place, nb_wide end, nb_wide slack, const par
 #define LEAST_DOUBT (NB_F(0.015625) * NB_EPSILON)
 
 /* The slack of an end where it may matter: nearly never in float, whose ends are doubles. */
-static nb_wide slack_that_matters(const contact *k, nb_wide slack)
+static nb_wide slack_that_matters(const medium_hit *k, nb_wide slack)
 {
     if (grows_without_bound(&k->medium->body.density)) return slack;
     const nb_wide least = nb_widen(LEAST_DOUBT) * WIDE(nb_volume_covers(&k->medium->body) ? 0 : k->least_slack);
@@ -145,8 +145,8 @@ static nb_wide slack_that_matters(const contact *k, nb_wide slack)
 
 /* Clips a leaf's interval to where the medium acts. Ends have slack as far as they may move where the ray and the body
  * are. A leaf of several does not split the ray outside the body's bounds. */
-static leaf_span clip_interval(const march *m, const contact *k, const nb_interval *raw, const part *acts,
-                               const part *bounds)
+static leaf_span clip_interval(const packet_state *m, const medium_hit *k, const nb_interval *raw,
+                               const packet_part *acts, const packet_part *bounds)
 {
     const nb_wide first = slack_that_matters(k, raw->enter_slack), last = slack_that_matters(k, raw->leave_slack);
     const nb_wmask some = raw->enter - first <= raw->leave + last;
@@ -154,7 +154,7 @@ static leaf_span clip_interval(const march *m, const contact *k, const nb_interv
     leaf_span span = {nb_wmax(raw->enter, acts->enter), nb_wselect(counts, nb_wmin(raw->leave, acts->leave), NB_W(0.0)),
                       NB_F(0.0), NB_F(0.0)};
     if (!nb_wany(first + last > NB_W(0.0))) return span;
-    part within = *bounds;
+    packet_part within = *bounds;
 #if !defined(NB_DOUBLE) /* double has no company */
     if (k->medium->body.leaf_count == 1) within = part_in_bounds(&m->rays, &k->medium->body, acts);
 #endif
@@ -167,19 +167,19 @@ static leaf_span clip_interval(const march *m, const contact *k, const nb_interv
     return span;
 }
 
-static nb_real per_extinction(const contact *k, int c, nb_real light)
+static nb_real per_extinction(const medium_hit *k, int c, nb_real light)
 {
     return nb_select(k->extinction[c] > NB_F(0.0), light / nb_max(k->extinction[c], NB_TINY), light * NB_HUGE);
 }
 
 /* Light per extinction of a medium: the radiance it has where it is opaque, in full sunlight and without any; that of
  * lamps at most. */
-static nb_real opaque_radiance(const contact *k, int c)
+static nb_real opaque_radiance(const medium_hit *k, int c)
 {
     return per_extinction(k, c, k->light[c] + k->glow[c]) + k->lamps;
 }
 
-static nb_real shaded_radiance(const contact *k, int c)
+static nb_real shaded_radiance(const medium_hit *k, int c)
 {
     return per_extinction(k, c, k->light[c]);
 }
@@ -187,12 +187,12 @@ static nb_real shaded_radiance(const contact *k, int c)
 /* Up to this optical depth what an end may do is as good as proportional to its slack. */
 #define LARGEST_DOUBT NB_F(0.0009765625)
 
-static void count_end(march *m, const contact *k, nb_wide end, nb_real slack, nb_mask grazes)
+static void count_end(packet_state *m, const medium_hit *k, nb_wide end, nb_real slack, nb_mask grazes)
 {
     if (!nb_any(slack > NB_F(0.0))) return;
     const nb_wide place = place_on_ray(m, end);
     const int has_fog = nb_volume_has_fog(&k->medium->body), covers = nb_volume_covers(&k->medium->body);
-    ends may = no_ends();
+    interval_ends may = no_ends();
     add_end(m, &may, k, place, slack);
     nb_mask large = nb_mask_false;
     for (int c = 0; c < 3; c++) {
@@ -210,7 +210,7 @@ static void count_end(march *m, const contact *k, nb_wide end, nb_real slack, nb
     m->doubt_from = nb_wselect(nb_widen_mask(large), from, m->doubt_from);
 }
 
-static void count_ends(march *m, const contact *k, const leaf_span *span)
+static void count_ends(packet_state *m, const medium_hit *k, const leaf_span *span)
 {
     if (!nb_any(span->enter_slack + span->leave_slack > NB_F(0.0))) return;
     const nb_mask grazes = nb_narrow_mask(span->enter >= span->leave);
@@ -219,11 +219,11 @@ static void count_ends(march *m, const contact *k, const leaf_span *span)
 }
 
 /* Intervals of all leaves of one medium. Returns whether any lane is inside any of them. */
-static int meet_leaves(march *m, contact *k)
+static int meet_leaves(packet_state *m, medium_hit *k)
 {
     const nb_volume *body = &k->medium->body;
-    const part acts = part_of_rays(m, body);
-    const part bounds = body->leaf_count == 1 ? acts : part_in_bounds(&m->rays, body, &acts);
+    const packet_part acts = part_of_rays(m, body);
+    const packet_part bounds = body->leaf_count == 1 ? acts : part_in_bounds(&m->rays, body, &acts);
     int hit = 0;
     k->hull_enter = NB_WFAR;
     k->hull_leave = NB_W(0.0);
@@ -243,7 +243,7 @@ static int meet_leaves(march *m, contact *k)
 
 #if defined(ASKS_QUAD)
 /* What the noise of a ray's lean does to the integral of a density that follows planes, over h metres from start. */
-static nb_real drift_within(const contact *k, nb_wide start, nb_real h)
+static nb_real drift_within(const medium_hit *k, nb_wide start, nb_real h)
 {
     const nb_volume *body = &k->medium->body;
     if (body->density.type == NEBEL_DENSITY_LINEAR) return blur_linear(nb_estimate_of(h, NB_F(0.0)), k, start, h).error;
@@ -252,7 +252,7 @@ static nb_real drift_within(const contact *k, nb_wide start, nb_real h)
     return nb_max(edge.error - edge.value * (NB_F(17.0) * NB_EPSILON), NB_F(0.0));
 }
 
-static void count_drift(march *m, const contact *k)
+static void count_drift(packet_state *m, const medium_hit *k)
 {
     const nb_real length = nb_narrow(nb_wmax(k->hull_leave - k->hull_enter, NB_W(0.0)));
     const nb_real blurred = drift_within(k, k->hull_enter, length);
@@ -261,7 +261,7 @@ static void count_drift(march *m, const contact *k)
 #endif
 
 /* Skies are looked up one lane after the other, in double, so that lanes agree with rays alone. */
-static void look_at_sky(march *m, const nb_skylight *sky)
+static void look_at_sky(packet_state *m, const nb_environment_light *sky)
 {
     double direction[3][NB_WIDTH];
     nb_scalar light[3][NB_WIDTH];
@@ -277,7 +277,7 @@ static void look_at_sky(march *m, const nb_skylight *sky)
     m->sky = sky;
 }
 
-static void set_skylight(march *m, contact *k, const nb_medium *medium)
+static void set_skylight(packet_state *m, medium_hit *k, const nb_medium *medium)
 {
     const nb_volume *body = &medium->body;
     if (m->sky != medium->sky) look_at_sky(m, medium->sky);
@@ -288,13 +288,13 @@ static void set_skylight(march *m, contact *k, const nb_medium *medium)
 }
 
 struct sunlight;
-static void set_glow(contact *k, const packet *rays, const struct sunlight *sun);
+static void set_glow(medium_hit *k, const packet *rays, const struct sunlight *sun);
 static double most_scattered(const nb_volume *body);
 
 /* Adds a medium to the march when any ray meets it. */
-static void meet_medium(march *m, const nb_medium *medium)
+static void meet_medium(packet_state *m, const nb_medium *medium)
 {
-    contact *k = &m->contacts[m->contact_count];
+    medium_hit *k = &m->contacts[m->contact_count];
     k->medium = medium;
     k->first_span = m->span_count;
     k->noise = NB_F(0.0);

@@ -81,7 +81,7 @@ static nb_wide quadratic_ceiling(nb_wide value, nb_wide slope, nb_wide bend, nb_
     return nb_wselect(value >= NB_W(1.0), NB_W(1.0), most);
 }
 
-static nb_wide round_edge_ceiling(const contact *k, nb_wide middle, nb_wide along)
+static nb_wide round_edge_ceiling(const medium_hit *k, nb_wide middle, nb_wide along)
 {
     const nb_wvec3 q = nb_wadd3(k->offset, nb_wscale3(k->slope, middle)), side = k->side;
     const nb_wide depth = side.x + q.x * (side.y + side.z * q.x), slope = side.y + NB_W(2.0) * side.z * q.x;
@@ -93,13 +93,13 @@ static nb_wide round_edge_ceiling(const contact *k, nb_wide middle, nb_wide alon
     return quadratic_ceiling(depth - past * past, nb_wabs(slope) + falls, nb_wabs(side.z) + bends, along);
 }
 
-static nb_wide planes_edge_ceiling(const contact *k, nb_wide middle, nb_wide along)
+static nb_wide planes_edge_ceiling(const medium_hit *k, nb_wide middle, nb_wide along)
 {
     const edge_line lowest = lowest_line(k, middle);
     return nb_wmax(lowest.depth, NB_W(0.0)) + nb_wabs(lowest.slope) * along;
 }
 
-static nb_wide box_edge_ceiling(const contact *k, nb_wide middle, nb_wide along)
+static nb_wide box_edge_ceiling(const medium_hit *k, nb_wide middle, nb_wide along)
 {
     const nb_wvec3 q = nb_wadd3(k->offset, nb_wscale3(k->slope, middle));
     return soft_axis_ceiling(nb_soft_axis(q.x, k->size.x), nb_wabs(k->slope.x) * along) *
@@ -107,14 +107,14 @@ static nb_wide box_edge_ceiling(const contact *k, nb_wide middle, nb_wide along)
            soft_axis_ceiling(nb_soft_axis(q.z, k->size.z), nb_wabs(k->slope.z) * along);
 }
 
-static nb_wide soft_edge_ceiling(const contact *k, nb_wide middle, nb_wide along)
+static nb_wide soft_edge_ceiling(const medium_hit *k, nb_wide middle, nb_wide along)
 {
     const nb_leaf *leaf = edge_leaf(k);
     if (leaf->type == NB_LEAF_PLANES) return planes_edge_ceiling(k, middle, along);
     return is_round(leaf) ? round_edge_ceiling(k, middle, along) : box_edge_ceiling(k, middle, along);
 }
 
-static nb_real grid_ceiling(const contact *k, nb_wide middle, nb_real along)
+static nb_real grid_ceiling(const medium_hit *k, nb_wide middle, nb_real along)
 {
     const grid_lines lines = lines_from(k, middle);
     nb_scalar value[NB_WIDTH], width[NB_WIDTH];
@@ -130,7 +130,7 @@ static nb_real grid_ceiling(const contact *k, nb_wide middle, nb_real along)
 
 /* The real part of the distance from the centre, sqrt(lowest^2 + z^2), is at least that with z its real part and `across`^2 taken
  * off. Where z may be imaginary and as far as the lowest place from the centre the root has no one branch. */
-static nb_real altitude_ceiling(const contact *k, nb_wide middle, nb_wide along, nb_wide across)
+static nb_real altitude_ceiling(const medium_hit *k, nb_wide middle, nb_wide along, nb_wide across)
 {
     const nebel_density *density = &k->medium->body.density;
     const nb_wide nearest = nb_wclamp(-k->arc.rise, middle - along, middle + along);
@@ -147,7 +147,7 @@ static nb_real altitude_ceiling(const contact *k, nb_wide middle, nb_wide along,
 
 /* A bound of |density| on the ellipse around `middle`, `along` and `across` metres wide. Between kinks a profile that
  * stays level is the same number on all of it. */
-static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, nb_real across)
+static nb_real density_ceiling(const medium_hit *k, nb_wide middle, nb_real along, nb_real across)
 {
     const nebel_density *density = &k->medium->body.density;
     const nb_real u = coordinate(k, middle);
@@ -184,20 +184,20 @@ static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, 
 }
 
 /* Light per extinction of the media of a piece: the least and the most. */
-typedef struct range {
+typedef struct optical_range {
     nb_real least[3], most[3];
     nb_mask emits; /* some medium shines without that quotient meaning anything */
-} range;
+} optical_range;
 
-static range find_range(const march *m)
+static optical_range find_range(const packet_state *m)
 {
-    range r = {.emits = nb_mask_false};
+    optical_range r = {.emits = nb_mask_false};
     for (int c = 0; c < 3; c++) {
         r.least[c] = NB_HUGE;
         r.most[c] = NB_F(0.0);
     }
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         if (k->medium->emits) r.emits = nb_or(r.emits, k->inside);
         for (int c = 0; c < 3; c++) {
             r.least[c] = nb_select(k->inside, nb_min(k->radiance[c], r.least[c]), r.least[c]);
@@ -221,7 +221,7 @@ typedef struct step {
 /* The bound of Gauss's rule: M of the integrand, from the ceilings of the densities. Or twice the largest value that
  * the integrand has on the step, which both the integral and the rule stay below: through fog so dense that M is beyond
  * all numbers. */
-static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_real ellipse)
+static nb_real bound_gauss(const packet_state *m, const step *s, const gathered_light *g, nb_real ellipse)
 {
     const nb_real radius = NB_F(0.5) * s->length;
     const nb_wide middle = s->start + nb_widen(radius);
@@ -229,7 +229,7 @@ static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_
     const nb_real across = NB_F(0.5) * (ellipse - NB_F(1.0) / ellipse) * radius;
     nb_real depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, light[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         const nb_real ceiling = nb_select(k->inside, density_ceiling(k, middle, along, across), NB_F(0.0));
         for (int c = 0; c < 3; c++) {
             depth[c] = depth[c] + k->extinction[c] * ceiling;
@@ -248,33 +248,33 @@ static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_
 }
 
 /* What is taken for the light between two transmittances if it is known by its range alone may be off by this. */
-static nb_real spread_over(const range *r, nb_real drop, int c)
+static nb_real spread_over(const optical_range *r, nb_real drop, int c)
 {
     return nb_select(r->emits, NB_HUGE, NB_F(0.5) * (r->most[c] - r->least[c]) * drop);
 }
 
 /* A crude rule in one channel: the radiance is within `off` of `middle`. */
-typedef struct crude_rule {
+typedef struct coarse_rule {
     nb_real middle, off;
-} crude_rule;
+} coarse_rule;
 
 /* All light attenuated by something between the transmittances at both ends. */
-static crude_rule attenuated_light(const step *s, const gathered *g, int c)
+static coarse_rule attenuated_light(const step *s, const gathered_light *g, int c)
 {
     const nb_real half = NB_F(0.5) * s->sum.light[c];
     const nb_real drop = (g->transmittance[c] - s->behind[c]) + g->transmittance[c] * (NB_F(4.0) * NB_EPSILON);
-    return (crude_rule){half * (g->transmittance[c] + s->behind[c]), half * drop};
+    return (coarse_rule){half * (g->transmittance[c] + s->behind[c]), half * drop};
 }
 
 /* Light per extinction between that of the least and of the most radiant medium, where nothing shines without
  * absorbing. */
-static crude_rule light_between(const range *r, const step *s, const gathered *g, int c)
+static coarse_rule light_between(const optical_range *r, const step *s, const gathered_light *g, int c)
 {
     const nb_real drop = g->transmittance[c] * nb_medium_gather(s->sum.depth[c], s->sum.depth[c]);
-    return (crude_rule){NB_F(0.5) * (r->least[c] + r->most[c]) * drop, spread_over(r, drop, c)};
+    return (coarse_rule){NB_F(0.5) * (r->least[c] + r->most[c]) * drop, spread_over(r, drop, c)};
 }
 
-static void bound_crude(const range *r, step *s, const gathered *g)
+static void bound_crude(const optical_range *r, step *s, const gathered_light *g)
 {
     s->crude_bound[0] = s->crude_bound[1] = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
@@ -283,14 +283,15 @@ static void bound_crude(const range *r, step *s, const gathered *g)
     }
 }
 
-static piece_sum sum_step(const march *m, nb_wide start, nb_wide end, nb_real length)
+static piece_sum sum_step(const packet_state *m, nb_wide start, nb_wide end, nb_real length)
 {
     piece_sum sum = no_sum();
     for (size_t i = m->present_first; i < m->present_end; i++) add_contact(&sum, present(m, i), start, end, length);
     return sum;
 }
 
-static step consider(const range *r, const gathered *g, nb_wide start, nb_real length, const piece_sum *sum)
+static step consider(const optical_range *r, const gathered_light *g, nb_wide start, nb_real length,
+                     const piece_sum *sum)
 {
     step s = {.start = start, .length = length, .sum = *sum, .drop = NB_F(0.0), .gauss_bound = NB_HUGE};
     for (int c = 0; c < 3; c++) {
@@ -326,7 +327,7 @@ typedef struct node {
     nb_real light[3], depth[3], extinction[3];
 } node;
 
-static void add_to_node(node *n, const contact *k, const step *s)
+static void add_to_node(node *n, const medium_hit *k, const step *s)
 {
     const nb_real density = nb_select(k->inside, contact_density_within(k, s->start, s->length, n->share), NB_F(0.0));
     for (int c = 0; c < 3; c++) n->light[c] = n->light[c] + k->light[c] * density;
@@ -348,7 +349,7 @@ static nb_real depth_of_polynomials(const node nodes[NODE_COUNT], int n, int c, 
 }
 
 /* Six nodes with exact optical depth at each. */
-static void sum_nodes(const march *m, const step *s, const gathered *g, nb_real radiance[3])
+static void sum_nodes(const packet_state *m, const step *s, const gathered_light *g, nb_real radiance[3])
 {
     const nb_real shares[NODE_COUNT] = NODES, weights[NODE_COUNT] = WEIGHTS;
     node nodes[NODE_COUNT];
@@ -373,8 +374,8 @@ static void sum_nodes(const march *m, const step *s, const gathered *g, nb_real 
 
 /* The radiance of a step; returns the bound of its error. Gauss's rule is by far better than the proof of it: where a
  * crude rule proves more, it says between which limits the result of the nodes is taken. */
-static nb_real sum_step_light(const march *m, const range *r, const step *s, const gathered *g, nb_mask lanes,
-                              nb_real radiance[3])
+static nb_real sum_step_light(const packet_state *m, const optical_range *r, const step *s, const gathered_light *g,
+                              nb_mask lanes, nb_real radiance[3])
 {
     const nb_mask between_media = s->crude_bound[1] < s->crude_bound[0];
     const nb_real crude = nb_min(s->crude_bound[0], s->crude_bound[1]);
@@ -383,7 +384,7 @@ static nb_real sum_step_light(const march *m, const range *r, const step *s, con
     nb_real by_nodes[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, apart = NB_F(0.0);
     if (nb_any(nb_and(lanes, fine))) sum_nodes(m, s, g, by_nodes);
     for (int c = 0; c < 3; c++) {
-        const crude_rule attenuated = attenuated_light(s, g, c), between = light_between(r, s, g, c);
+        const coarse_rule attenuated = attenuated_light(s, g, c), between = light_between(r, s, g, c);
         const nb_real middle = nb_select(between_media, between.middle, attenuated.middle);
         const nb_real off = nb_select(between_media, between.off, attenuated.off);
         const nb_real limited = nb_max(nb_min(by_nodes[c], middle + off), middle - off);
@@ -394,7 +395,7 @@ static nb_real sum_step_light(const march *m, const range *r, const step *s, con
 }
 
 /* Adds an accepted step in `lanes`. */
-static void take_step(const march *m, const range *r, const step *s, gathered *g, nb_mask lanes)
+static void take_step(const packet_state *m, const optical_range *r, const step *s, gathered_light *g, nb_mask lanes)
 {
     nb_real radiance[3], most = NB_F(0.0);
     const nb_real bound = sum_step_light(m, r, s, g, lanes, radiance);
@@ -419,11 +420,11 @@ typedef struct allowance {
     nb_real ellipse;
 } allowance;
 
-static nb_wide nearest_kink(const march *m, nb_wide t, nb_wide end)
+static nb_wide nearest_kink(const packet_state *m, nb_wide t, nb_wide end)
 {
     nb_wide nearest = end;
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         const nb_wide kink = contact_kink(k, t);
         nearest = nb_wselect(nb_wand(nb_widen_mask(k->inside), kink < nearest), kink, nearest);
     }
@@ -438,18 +439,18 @@ static nb_wide end_of_step(nb_wide t, nb_real length, nb_wide stop)
 
 /* What the walk through a piece keeps from step to step. It adapts from where a step has not fit that was as long as it
  * can be. */
-typedef struct pace {
+typedef struct step_control {
     nb_mask adapts;
     nb_real length; /* of the next step, unless a kink or the end is nearer */
     nb_real reach;
-} pace;
+} step_control;
 
 /* How far the integrand hardly grows, to start the search for the best ellipse with. */
-static nb_real first_reach(const march *m, nb_wide t)
+static nb_real first_reach(const packet_state *m, nb_wide t)
 {
     nb_real growth = NB_F(0.0);
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         nb_real here = largest(k->extinction) * contact_density(k, t);
         if (k->medium->body.density.type != NEBEL_DENSITY_CONSTANT) here = here + nb_abs(nb_narrow(k->slope.x));
         growth = growth + nb_select(k->inside, here, NB_F(0.0));
@@ -458,8 +459,8 @@ static nb_real first_reach(const march *m, nb_wide t)
 }
 
 /* The bound of a step; where the pace adapts with the better of two ellipses, towards which the reach moves. */
-static nb_real try_ellipses(const march *m, const step *s, const gathered *g, const allowance *may, const pace *now,
-                            nb_real *reach)
+static nb_real try_ellipses(const packet_state *m, const step *s, const gathered_light *g, const allowance *may,
+                            const step_control *now, nb_real *reach)
 {
     const nb_real first = nb_select(now->adapts, ellipse_of(now->reach, s->length), may->ellipse);
     const nb_real wide = bound_gauss(m, s, g, first);
@@ -485,8 +486,8 @@ static nb_real change_of_length(nb_real allowed, nb_real bound)
 }
 
 /* After a step of `length` that does not fit. */
-static void slow_down(const march *m, nb_wide t, nb_real length, nb_mask lanes, nb_real change, nb_real reach,
-                      pace *now)
+static void slow_down(const packet_state *m, nb_wide t, nb_real length, nb_mask lanes, nb_real change, nb_real reach,
+                      step_control *now)
 {
     const nb_mask begins = nb_and(lanes, nb_not(now->adapts));
     const nb_real shorter = length * nb_min(change, NB_F(0.75));
@@ -503,8 +504,9 @@ static void slow_down(const march *m, nb_wide t, nb_real length, nb_mask lanes, 
 #define CRUDE_WEIGHT NB_F(32.0)
 
 /* Shortens the step in every lane until its bound fits. `whole` is the sum of the piece. */
-static step fit_step(const march *m, const gathered *g, const allowance *may, const piece *p, const range *r,
-                     nb_wide start, nb_wide stop, nb_mask pending, pace *now, const piece_sum *whole)
+static step fit_step(const packet_state *m, const gathered_light *g, const allowance *may, const ray_segment *p,
+                     const optical_range *r, nb_wide start, nb_wide stop, nb_mask pending, step_control *now,
+                     const piece_sum *whole)
 {
     const nb_real longest = nb_narrow(stop - start);
     for (;;) {
@@ -532,7 +534,7 @@ static step fit_step(const march *m, const gathered *g, const allowance *may, co
 }
 
 /* Lanes in which the rest of the piece, up to the optical depth `depth`, may be one crude step. */
-static nb_mask rest_fits(const range *r, const gathered *g, const nb_real depth[3], const allowance *may)
+static nb_mask rest_fits(const optical_range *r, const gathered_light *g, const nb_real depth[3], const allowance *may)
 {
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) most = nb_max(most, spread_over(r, g->transmittance[c] - nb_exp(-depth[c]), c));
@@ -542,14 +544,14 @@ static nb_mask rest_fits(const range *r, const gathered *g, const nb_real depth[
 /* Integrates a piece in its mixed lanes; depth and transmittance of *g are used up on the way. As soon as the rest of
  * the piece matters little it is one crude step, across whatever kinks are left. So is what steps that never fit leave
  * (their number is bounded), whose honest bound the error then shows. */
-static void gather_mixed(const march *m, const piece *p, const piece_sum *whole, nb_mask lanes, const allowance *may,
-                         gathered *g)
+static void gather_mixed(const packet_state *m, const ray_segment *p, const piece_sum *whole, nb_mask lanes,
+                         const allowance *may, gathered_light *g)
 {
-    const range r = find_range(m);
+    const optical_range r = find_range(m);
     nb_real depth[3];
     for (int c = 0; c < 3; c++) depth[c] = g->depth[c] + whole->depth[c];
     nb_wide t = p->start;
-    pace now = {nb_mask_false, p->length, p->length};
+    step_control now = {nb_mask_false, p->length, p->length};
     for (int i = 0; i < MOST_STEPS; i++) {
         nb_mask going = lanes;
         if (nb_any(now.adapts)) going = nb_and(lanes, nb_not(nb_and(now.adapts, rest_fits(&r, g, depth, may))));

@@ -31,7 +31,7 @@ typedef struct leaf_span {
 } leaf_span;
 
 /* A medium as the packet meets it. */
-typedef struct contact {
+typedef struct medium_hit {
     const nb_medium *medium;
     size_t first_span;
     nb_wide hull_enter, hull_leave; /* from the first entry to the last exit */
@@ -49,56 +49,56 @@ typedef struct contact {
     double steepest;        /* soft edge: density per metre at most */
     nb_arc arc;             /* altitude; slope.x is the most that its coordinate changes by per metre */
     nb_chord deep;          /* the same: where the density is at its most */
-} contact;
+} medium_hit;
 
 /* What ends that may be off can do to optical depth and to radiance. */
-typedef struct ends {
+typedef struct interval_ends {
     nb_real depth[3], light[3];
-} ends;
+} interval_ends;
 
 /* See trace_crowd.h. */
-typedef struct crowd_event crowd_event;
-typedef struct crowd_sum crowd_sum;
+typedef struct overlap_event overlap_event;
+typedef struct overlap_sum overlap_sum;
 
-typedef struct crowd {
+typedef struct overlap_set {
     nb_mask lanes;                                             /* that are crowded */
     int is_walking;                                            /* whether the walk is that of the crowded lanes */
     int64_t rank;                                              /* of all its media */
     nb_mask is_even;                                           /* all have one radiance, */
     nb_real radiance[3];                                       /* this one */
     size_t seats;                                              /* of each lane, a power of two */
-    crowd_event *events;                                       /* 2 seats for each lane, sorted */
-    crowd_sum *sums;                                           /* 2 seats for each lane: [1] is the root */
+    overlap_event *events;                                     /* 2 seats for each lane, sorted */
+    overlap_sum *sums;                                         /* 2 seats for each lane: [1] is the root */
     size_t count[NB_WIDTH], next[NB_WIDTH], present[NB_WIDTH]; /* events, those passed, media that are there */
     void *memory;
     size_t capacity; /* seats that there is memory for */
-} crowd;
+} overlap_set;
 
 /* The light of the whole ray, as a march has found it before. */
-typedef struct known {
+typedef struct known_interval {
     nb_real radiance[3], error;
-} known;
+} known_interval;
 
-typedef struct march {
+typedef struct packet_state {
     packet rays;
-    int wants_error;        /* 0: media that no ray comes near may be left out */
-    const known *total;     /* NULL the first time */
-    struct sunlight *sun;   /* NULL where sunlight is not asked for, or none is there */
-    nb_real lamps;          /* irradiance of all lamps on the rays, at most */
-    int wants_sky;          /* 0: light is not asked for, and the sky's may be taken for its most */
-    const nb_skylight *sky; /* the last that a medium had, NULL: none yet, */
-    nb_real sky_light[3];   /* and what comes of it along the rays */
+    int wants_error;                 /* 0: media that no ray comes near may be left out */
+    const known_interval *total;     /* NULL the first time */
+    struct sunlight *sun;            /* NULL where sunlight is not asked for, or none is there */
+    nb_real lamps;                   /* irradiance of all lamps on the rays, at most */
+    int wants_sky;                   /* 0: light is not asked for, and the sky's may be taken for its most */
+    const nb_environment_light *sky; /* the last that a medium had, NULL: none yet, */
+    nb_real sky_light[3];            /* and what comes of it along the rays */
     int ignores_distances;
     int wants_signature;
     nb_real signature; /* see sign_piece */
     size_t contact_count, span_count;
-    contact *contacts;
+    medium_hit *contacts;
     leaf_span *spans;
-    nb_real event_count; /* two for every leaf that the lane's ray meets, whatever its company meets */
-    ends all_ends;       /* what the ends may do if nothing attenuates it, */
-    ends grazing_ends;   /* and those of them that are no events */
-    nb_real revealed[3]; /* optical depth that covers may take away which are no events */
-    nb_wide doubt_from;  /* from here on fog may be or not, more than a first order tells; NB_WFAR * 2: nowhere */
+    nb_real event_count;        /* two for every leaf that the lane's ray meets, whatever its company meets */
+    interval_ends all_ends;     /* what the ends may do if nothing attenuates it, */
+    interval_ends grazing_ends; /* and those of them that are no events */
+    nb_real revealed[3];        /* optical depth that covers may take away which are no events */
+    nb_wide doubt_from; /* from here on fog may be or not, more than a first order tells; NB_WFAR * 2: nowhere */
     nb_real doubtful_radiance[3]; /* of the brightest medium whose ends have slack */
     nb_real drift;                /* what drift of densities along planes may do to optical depth and to radiance */
 
@@ -107,15 +107,15 @@ typedef struct march {
     uint32_t *
         present; /* the contacts within the current piece in any lane: of the window from present_first on, the crowd */
     size_t present_first, present_end;
-    double window_end;         /* up to here they are all there are */
-    struct stretch *stretches; /* of all contacts, by their first places */
-    double *lasts;             /* of all contacts */
+    double window_end;                 /* up to here they are all there are */
+    struct active_interval *stretches; /* of all contacts, by their first places */
+    double *lasts;                     /* of all contacts */
     size_t stretch_count;
     size_t entered; /* how many of the stretches the window has had */
-    crowd crowd;
+    overlap_set crowd;
     const nb_estimate
         *whole; /* the integral of the density of the only medium of the piece at hand, where it is known */
-} march;
+} packet_state;
 
 /* What the rounding of a dot product is relative to. */
 static nb_wide products(nb_wvec3 a, nb_wvec3 b)

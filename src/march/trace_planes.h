@@ -195,7 +195,7 @@ static nebel_result march_planes(nb_trace_job *job, workspace *w, const allowanc
     const nebel_result valid = load_rays(job, s, first, count, &p);
     if (valid != NEBEL_OK) return valid;
     w->m.rays = (packet){p.start, s->has_directions ? normalized(p.way) : p.way, p.t_max};
-    gathered g;
+    gathered_light g;
     const nebel_result result = answer_packet(job, w, may, first, count, &g);
     if (result != NEBEL_OK) return result;
     const nb_real error = job->wants_error ? reported_error(job, &w->m, &g) : NB_F(0.0);

@@ -3,7 +3,7 @@
 
 /* ---- coordinates ----------------------------------------------------------------------------- */
 
-static void height_contact(contact *k, const packet *rays, const nebel_density *density)
+static void height_contact(medium_hit *k, const packet *rays, const nebel_density *density)
 {
     const nb_wide inverse = NB_W(1.0) / WIDE(density->scale_height);
     k->offset.x = (rays->origin.y - WIDE(density->base)) * inverse;
@@ -23,7 +23,7 @@ static nb_real most_of_altitude(const nebel_density *density)
 }
 
 /* Rounding moves the ray and the surface by parts of their distances from the centre. */
-static void altitude_contact(contact *k, const packet *rays, const nebel_density *density)
+static void altitude_contact(medium_hit *k, const packet *rays, const nebel_density *density)
 {
     const nb_wvec3 p = nb_wsub3(rays->origin, wide_vector(density->center));
     const nb_wide inverse = NB_W(1.0) / WIDE(density->scale_height), ground = WIDE(density->radius);
@@ -35,7 +35,7 @@ static void altitude_contact(contact *k, const packet *rays, const nebel_density
     k->noise = nb_narrow((k->arc.radius + ground) * inverse * (NB_W(32.0) * NB_WEPSILON));
 }
 
-static void linear_contact(contact *k, const packet *rays, const nebel_density *density)
+static void linear_contact(medium_hit *k, const packet *rays, const nebel_density *density)
 {
     const nb_wvec3 from = wide_vector(density->from);
     const nb_wvec3 axis = nb_wsub3(wide_vector(density->to), from);
@@ -49,7 +49,7 @@ static void linear_contact(contact *k, const packet *rays, const nebel_density *
 }
 
 /* x = (t - closest approach) / (sqrt(2) sigma) */
-static void gaussian_contact(contact *k, const packet *rays, const nebel_density *density)
+static void gaussian_contact(medium_hit *k, const packet *rays, const nebel_density *density)
 {
     const nb_wvec3 p = nb_wsub3(rays->origin, wide_vector(density->center));
     const nb_wide inverse = NB_W(0.70710678118654752440084436210485) / WIDE(density->sigma);
@@ -62,7 +62,7 @@ static void gaussian_contact(contact *k, const packet *rays, const nebel_density
 }
 
 /* x = (t - closest approach) |d| / radius, c = 1 - (closest distance / radius)^2 */
-static void radial_contact(contact *k, const packet *rays, const nb_leaf *leaf)
+static void radial_contact(medium_hit *k, const packet *rays, const nb_leaf *leaf)
 {
     const local_ray local = localize(rays, leaf);
     const nb_wide inverse = NB_W(1.0) / WIDE(FRAME(leaf, radius));
@@ -76,7 +76,7 @@ static void radial_contact(contact *k, const packet *rays, const nb_leaf *leaf)
 }
 
 /* Soft edges are made in one way for boxes, in one for round bodies, in one for planes. */
-static const nb_leaf *edge_leaf(const contact *k)
+static const nb_leaf *edge_leaf(const medium_hit *k)
 {
     return &k->medium->body.leaves[0];
 }
@@ -91,16 +91,16 @@ static int is_round(const nb_leaf *leaf)
 
 /* The slopes of an edge along the axes of the leaf's frame come to at most `steepest`; what rounds in that frame is off
  * by `reach` along each. */
-static void set_steepest(contact *k, const nb_leaf *leaf, const local_ray *local, double steepest)
+static void set_steepest(medium_hit *k, const nb_leaf *leaf, const local_ray *local, double steepest)
 {
     k->steepest = steepest * leaf->scale;
     k->noise = nb_narrow(local->reach * WIDE(4 * steepest)) + NB_F(64.0) * nb_narrow(WIDE(1 + steepest) * NB_WEPSILON);
 }
 
-static void round_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf)
+static void round_edge_contact(medium_hit *k, const packet *rays, const nb_leaf *leaf)
 {
     const local_ray local = localize(rays, leaf);
-    const nb_edge *made = &k->medium->body.edge;
+    const nb_soft_edge *made = &k->medium->body.edge;
     const int ball = leaf->type == NB_LEAF_BALL, capsule = leaf->type == NB_LEAF_CAPSULE;
     const nb_wide unit = ball ? NB_W(1.0) / WIDE(FRAME(leaf, radius)) : NB_W(1.0);
     const nb_wide one = NB_W(1.0);
@@ -117,7 +117,7 @@ static void round_edge_contact(contact *k, const packet *rays, const nb_leaf *le
 }
 
 /* The ray in the leaf's frame; size.x: 1 / distance. */
-static void planes_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf, double width)
+static void planes_edge_contact(medium_hit *k, const packet *rays, const nb_leaf *leaf, double width)
 {
     const local_ray local = localize(rays, leaf);
     k->offset = local.p;
@@ -132,7 +132,7 @@ static void planes_edge_contact(contact *k, const packet *rays, const nb_leaf *l
     k->noise = k->noise + nb_narrow(WIDE(8 * farthest / width) * NB_WEPSILON);
 }
 
-static void box_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf, double width)
+static void box_edge_contact(medium_hit *k, const packet *rays, const nb_leaf *leaf, double width)
 {
     const local_ray local = localize(rays, leaf);
     const nb_wide inverse = NB_W(1.0) / WIDE(width);
@@ -145,7 +145,7 @@ static void box_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf
                NB_F(64.0) * nb_narrow(NB_WEPSILON * (k->size.x + k->size.y + k->size.z));
 }
 
-static void soft_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf, double width)
+static void soft_edge_contact(medium_hit *k, const packet *rays, const nb_leaf *leaf, double width)
 {
     if (leaf->type == NB_LEAF_BOX)
         box_edge_contact(k, rays, leaf, width);
@@ -156,7 +156,7 @@ static void soft_edge_contact(contact *k, const packet *rays, const nb_leaf *lea
 }
 
 /* The ray in cells of the grid. */
-static void grid_contact(contact *k, const packet *rays, const nb_leaf *leaf)
+static void grid_contact(medium_hit *k, const packet *rays, const nb_leaf *leaf)
 {
     double rate[3];
     const nebel_grid *grid = k->medium->body.density.grid;
@@ -169,7 +169,7 @@ static void grid_contact(contact *k, const packet *rays, const nb_leaf *leaf)
     k->noise = nb_narrow(local.reach * WIDE(fmin(fmax(fmax(rate[0], rate[1]), rate[2]), 1e18)));
 }
 
-static void profile_contact(contact *k, const packet *rays)
+static void profile_contact(medium_hit *k, const packet *rays)
 {
     const nb_volume *body = &k->medium->body;
     switch (body->density.type) {
@@ -212,7 +212,7 @@ typedef struct edge_line {
     nb_wide depth, slope;
 } edge_line;
 
-static edge_line face_line(const contact *k, size_t i, nb_wide t)
+static edge_line face_line(const medium_hit *k, size_t i, nb_wide t)
 {
     const nb_volume *body = &k->medium->body;
     const nb_face *face = &body->faces[body->leaves[0].first_face + i];
@@ -223,14 +223,14 @@ static edge_line face_line(const contact *k, size_t i, nb_wide t)
 }
 
 /* What rounding may do to a depth: the farther a ray has come, the more its direction counts. */
-static nb_wide plane_noise(const contact *k, nb_wide t)
+static nb_wide plane_noise(const medium_hit *k, nb_wide t)
 {
     return nb_widen(k->noise) + nb_wabs(t) * (WIDE(8 * k->steepest) * NB_WEPSILON);
 }
 
 /* The lowest just behind t; where several are as low but for their noise, the one that falls fastest. The first is the
  * plateau. */
-static edge_line lowest_line(const contact *k, nb_wide t)
+static edge_line lowest_line(const medium_hit *k, nb_wide t)
 {
     const size_t count = edge_leaf(k)->face_count;
     nb_wide least = NB_W(1.0);
@@ -256,7 +256,7 @@ static nb_wide crossing_of(const edge_line *lowest, const edge_line *other, nb_w
     return nb_wselect(nb_wand(other->slope < lowest->slope, crossing < next), crossing, next);
 }
 
-static nb_wide planes_edge_kink(const contact *k, nb_wide t)
+static nb_wide planes_edge_kink(const medium_hit *k, nb_wide t)
 {
     const edge_line lowest = lowest_line(k, t), plateau = {NB_W(1.0), NB_W(0.0)};
     nb_wide next = crossing_of(&lowest, &plateau, t, NB_WFAR);
@@ -268,7 +268,7 @@ static nb_wide planes_edge_kink(const contact *k, nb_wide t)
 }
 
 /* How deep a place is behind the nearest face. */
-static nb_wide planes_depth(const contact *k, nb_wide t)
+static nb_wide planes_depth(const medium_hit *k, nb_wide t)
 {
     nb_wide least = NB_WFAR;
     for (size_t i = 0; i < edge_leaf(k)->face_count; i++) least = nb_wmin(face_line(k, i, t).depth, least);
@@ -281,7 +281,7 @@ static nb_real density_of_depth(nb_wide depth)
 }
 
 /* What noise may do to the density: nothing on the plateau. */
-static nb_real noise_of_depth(const contact *k, nb_wide t, nb_wide depth)
+static nb_real noise_of_depth(const medium_hit *k, nb_wide t, nb_wide depth)
 {
     const nb_wide noise = plane_noise(k, t);
     return nb_narrow(nb_wselect(depth >= NB_W(1.0) + noise, NB_W(0.0), nb_wmin(noise, NB_W(1.0))));
@@ -289,7 +289,7 @@ static nb_real noise_of_depth(const contact *k, nb_wide t, nb_wide depth)
 
 /* Trapezoids from kink to kink: the least of linear functions is concave, so that there are no more kinks than faces
  * and one. Noise grows linearly along a trapezoid, and at its start kinks within the noise are passed over. */
-static nb_estimate planes_edge_integral(const contact *k, nb_wide start, nb_real h)
+static nb_estimate planes_edge_integral(const medium_hit *k, nb_wide start, nb_real h)
 {
     const size_t most = 2 * edge_leaf(k)->face_count + 4;
     const nb_wide stop = start + nb_widen(h);
@@ -314,7 +314,7 @@ typedef struct grid_lines {
     double from[3][NB_WIDTH], slope[3][NB_WIDTH];
 } grid_lines;
 
-static grid_lines lines_from(const contact *k, nb_wide t)
+static grid_lines lines_from(const medium_hit *k, nb_wide t)
 {
     grid_lines lines;
     nb_wstore_lanes(lines.from[0], k->offset.x + k->slope.x * t);
@@ -333,7 +333,7 @@ static nb_grid_line line_of_lane(const grid_lines *lines, size_t i)
 }
 
 /* Lane by lane, up to `enough` [m]: see nb_grid_integral. */
-static nb_estimate lanes_integral(const contact *k, nb_wide start, nb_wide end, nb_real enough)
+static nb_estimate lanes_integral(const medium_hit *k, nb_wide start, nb_wide end, nb_real enough)
 {
     const grid_lines lines = lines_from(k, start);
     double length[NB_WIDTH];
@@ -354,7 +354,7 @@ static nb_estimate lanes_integral(const contact *k, nb_wide start, nb_wide end, 
     return nb_estimate_of(rounded, nb_load_lanes(error) + rounded * (NB_F(4.0) * NB_EPSILON));
 }
 
-static nb_real grid_density(const contact *k, nb_wide t)
+static nb_real grid_density(const medium_hit *k, nb_wide t)
 {
     const grid_lines lines = lines_from(k, t);
     nb_scalar value[NB_WIDTH];
@@ -368,7 +368,7 @@ static nb_real grid_density(const contact *k, nb_wide t)
 typedef double grid_distance(const nebel_grid *grid, const nb_grid_line *line, double least);
 
 /* The next place after t that a distance says. */
-static nb_wide next_in_grid(const contact *k, nb_wide t, grid_distance *next)
+static nb_wide next_in_grid(const medium_hit *k, nb_wide t, grid_distance *next)
 {
     const grid_lines lines = lines_from(k, t);
     double distance[NB_WIDTH], place[NB_WIDTH];
@@ -387,7 +387,7 @@ static nb_wide next_in_grid(const contact *k, nb_wide t, grid_distance *next)
 #include "trace_voxels.h"
 #endif
 
-static nb_estimate grid_integral(const contact *k, nb_wide start, nb_wide end, nb_real enough)
+static nb_estimate grid_integral(const medium_hit *k, nb_wide start, nb_wide end, nb_real enough)
 {
 #if !defined(NB_DOUBLE)
     if (walks_voxels(k)) return voxels_integral(k, start, end, enough);
@@ -397,7 +397,7 @@ static nb_estimate grid_integral(const contact *k, nb_wide start, nb_wide end, n
 
 /* ---- any profile ---------------------------------------------------------------------------- */
 
-static nb_real soft_edge_density(const contact *k, nb_wide t)
+static nb_real soft_edge_density(const medium_hit *k, nb_wide t)
 {
     const nb_leaf *leaf = edge_leaf(k);
     if (leaf->type == NB_LEAF_PLANES) return density_of_depth(planes_depth(k, t));
@@ -406,7 +406,7 @@ static nb_real soft_edge_density(const contact *k, nb_wide t)
     return nb_soft_edge_density(q, k->size);
 }
 
-static nb_estimate soft_edge_integral(const contact *k, nb_wide start, nb_real h)
+static nb_estimate soft_edge_integral(const medium_hit *k, nb_wide start, nb_real h)
 {
     const nb_leaf *leaf = edge_leaf(k);
     if (leaf->type == NB_LEAF_PLANES) return planes_edge_integral(k, start, h);
@@ -416,7 +416,7 @@ static nb_estimate soft_edge_integral(const contact *k, nb_wide start, nb_real h
                 h);
 }
 
-static nb_wide soft_edge_kink(const contact *k, nb_wide t)
+static nb_wide soft_edge_kink(const medium_hit *k, nb_wide t)
 {
     const nb_leaf *leaf = edge_leaf(k);
     if (leaf->type == NB_LEAF_PLANES) return planes_edge_kink(k, t);
@@ -424,25 +424,25 @@ static nb_wide soft_edge_kink(const contact *k, nb_wide t)
     return nb_soft_edge_kink(k->offset, k->slope, k->size, t);
 }
 
-static nb_real soft_edge_noise(const contact *k, nb_wide t)
+static nb_real soft_edge_noise(const medium_hit *k, nb_wide t)
 {
     return edge_leaf(k)->type == NB_LEAF_PLANES ? nb_narrow(plane_noise(k, t)) : k->noise;
 }
 
 /* How much a soft edge may rise over h metres. */
-static nb_real soft_edge_rise(const contact *k, nb_real h)
+static nb_real soft_edge_rise(const medium_hit *k, nb_real h)
 {
     if (edge_leaf(k)->type != NB_LEAF_BOX) return REAL(k->steepest) * h;
     return nb_narrow(nb_wabs(k->slope.x) + nb_wabs(k->slope.y) + nb_wabs(k->slope.z)) * h;
 }
 
 /* Coordinates at t, narrowed only here, where they are small again for a shape that is far away. */
-static nb_real coordinate(const contact *k, nb_wide t)
+static nb_real coordinate(const medium_hit *k, nb_wide t)
 {
     return nb_narrow(k->offset.x + k->slope.x * t);
 }
 
-static nb_real altitude_coordinate(const contact *k, nb_wide t)
+static nb_real altitude_coordinate(const medium_hit *k, nb_wide t)
 {
     return nb_narrow(nb_arc_height(k->arc, t) * k->slope.x);
 }
@@ -453,7 +453,7 @@ static nb_real density_of_height(const nebel_density *density, nb_real u)
     return density->below == NEBEL_BELOW_GROW ? nb_height_density(u) : nb_height_capped_density(u);
 }
 
-static nb_real contact_density(const contact *k, nb_wide t)
+static nb_real contact_density(const medium_hit *k, nb_wide t)
 {
     const nebel_density *density = &k->medium->body.density;
     switch (density->type) {
@@ -478,7 +478,7 @@ static nb_real contact_density(const contact *k, nb_wide t)
 
 /* The density a part `share` of the way through a step: in float, which the coordinates of a step are small enough for.
  */
-static nb_real contact_density_within(const contact *k, nb_wide start, nb_real length, nb_real share)
+static nb_real contact_density_within(const medium_hit *k, nb_wide start, nb_real length, nb_real share)
 {
     const nebel_density *density = &k->medium->body.density;
     if (density->type == NEBEL_DENSITY_CONSTANT) return NB_F(1.0);
@@ -489,7 +489,7 @@ static nb_real contact_density_within(const contact *k, nb_wide start, nb_real l
 
 /* How far the density of a ray that is nearly level may be off, over how many metres: as long as it may be between its
  * limits. A ray that surely leaves them has done so where it meets the farther one, at its least steepness. */
-static nb_estimate blur_linear(nb_estimate estimate, const contact *k, nb_wide start, nb_real h)
+static nb_estimate blur_linear(nb_estimate estimate, const medium_hit *k, nb_wide start, nb_real h)
 {
     const nb_real end = nb_narrow(start) + h, offset = nb_narrow(k->offset.x);
     const nb_real flattest = nb_rcp_bounded(nb_max(nb_abs(nb_narrow(k->slope.x)) - k->drift, NB_F(0.0)));
@@ -501,7 +501,7 @@ static nb_estimate blur_linear(nb_estimate estimate, const contact *k, nb_wide s
     return blur(estimate, nb_select(varies, nb_min(noise, NB_F(1.0)), NB_F(0.0)), length);
 }
 
-static nb_estimate altitude_integral(const contact *k, nb_wide start, nb_wide end)
+static nb_estimate altitude_integral(const medium_hit *k, nb_wide start, nb_wide end)
 {
     const nebel_density *density = &k->medium->body.density;
     const nb_estimate along =
@@ -512,7 +512,7 @@ static nb_estimate altitude_integral(const contact *k, nb_wide start, nb_wide en
 /* Where fog of an altitude begins to count, 45 scale heights above its base: behind 1e19 times thinner fog. */
 #define ALTITUDE_COUNTS 45.0
 
-static nb_wide altitude_kink(const contact *k, nb_wide t)
+static nb_wide altitude_kink(const medium_hit *k, nb_wide t)
 {
     const nebel_density *density = &k->medium->body.density;
     const nb_chord counts = nb_arc_chord(k->arc, WIDE(ALTITUDE_COUNTS * density->scale_height));
@@ -524,8 +524,8 @@ static nb_wide altitude_kink(const contact *k, nb_wide t)
 
 /* The density integrated from start to end, h metres, of profiles that no polynomial of a low degree describes. In
  * line, so that a caller who does not ask for the error does not pay for it. */
-static inline __attribute__((always_inline)) nb_estimate curved_integral(const contact *k, nb_wide start, nb_wide end,
-                                                                         nb_real h)
+static inline __attribute__((always_inline)) nb_estimate curved_integral(const medium_hit *k, nb_wide start,
+                                                                         nb_wide end, nb_real h)
 {
     const nebel_density *density = &k->medium->body.density;
     if (density->type == NEBEL_DENSITY_ALTITUDE) return altitude_integral(k, start, end);
@@ -545,7 +545,7 @@ static inline __attribute__((always_inline)) nb_estimate curved_integral(const c
 }
 
 /* From the end that is nearer to the limits: see nb_linear_integral. */
-static nb_estimate linear_integral(const contact *k, nb_wide start, nb_wide end, nb_real h)
+static nb_estimate linear_integral(const medium_hit *k, nb_wide start, nb_wide end, nb_real h)
 {
     const nb_real u = coordinate(k, start), u_end = coordinate(k, end), slope = nb_narrow(k->slope.x);
     const nb_mask backwards = nb_abs(u_end) < nb_abs(u);
@@ -555,7 +555,7 @@ static nb_estimate linear_integral(const contact *k, nb_wide start, nb_wide end,
 
 /* The same of any profile. The end counts by its place: h has lost digits of it where fog is far from where the piece
  * starts. */
-static nb_estimate contact_integral(const contact *k, nb_wide start, nb_wide end, nb_real h)
+static nb_estimate contact_integral(const medium_hit *k, nb_wide start, nb_wide end, nb_real h)
 {
     switch (k->medium->body.density.type) {
     case NEBEL_DENSITY_HEIGHT:
@@ -575,7 +575,7 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_wide end
 }
 
 /* The next place after t where the profile is not smooth; NB_WFAR where there is none. */
-static nb_wide contact_kink(const contact *k, nb_wide t)
+static nb_wide contact_kink(const medium_hit *k, nb_wide t)
 {
     const nebel_density *density = &k->medium->body.density;
     if (density->type == NEBEL_DENSITY_SOFT_EDGE) return soft_edge_kink(k, t);
@@ -598,7 +598,7 @@ static int grows_without_bound(const nebel_density *density)
 }
 
 /* The least coordinate between two places, of fog that grows without bound. */
-static nb_real lowest_coordinate(const contact *k, nb_wide start, nb_wide end)
+static nb_real lowest_coordinate(const medium_hit *k, nb_wide start, nb_wide end)
 {
     if (k->medium->body.density.type == NEBEL_DENSITY_ALTITUDE)
         return altitude_coordinate(k, nb_wmin(nb_wmax(-k->arc.rise, start), end));

@@ -18,13 +18,13 @@
 #define STACK_TURNS 64
 
 /* Where surfaces keep the sun away, lane by lane. A lane passes its toggles once, as its pieces come along the ray. */
-typedef struct shade {
+typedef struct sun_attenuation {
     const float *toggles; /* NULL: the sun reaches all */
     size_t next[NB_WIDTH], end[NB_WIDTH];
     nb_scalar dark[NB_WIDTH]; /* 1 where the sun is kept away before the next toggle */
     nb_wide toggle;           /* the next one of each lane */
     nb_wmask is_dark;
-} shade;
+} sun_attenuation;
 
 /* What sunlight needs besides the march of the rays. */
 typedef struct sunlight {
@@ -33,14 +33,14 @@ typedef struct sunlight {
     workspace *way;     /* from places on the rays to the sun */
     nb_wide *turns;     /* of all media in all lanes, in any order; NB_WFAR and more: none */
     size_t turn_count, turn_capacity;
-    int has_turns;          /* of the packet at hand */
-    const nb_lamp *turning; /* they are this lamp's; NULL: the sun's */
+    int has_turns;           /* of the packet at hand */
+    const nb_light *turning; /* they are this lamp's; NULL: the sun's */
     void *turn_memory;
     struct lit_shadow *shadows; /* see trace_lit_shadow.h */
     size_t shadow_count, shadow_capacity, first_shadow;
     void *shadow_memory;
-    shade shade;
-    shade *lamp_shades; /* of each lamp; NULL: surfaces keep none away */
+    sun_attenuation shade;
+    sun_attenuation *lamp_shades; /* of each lamp; NULL: surfaces keep none away */
     void *shade_memory;
     double share; /* what steps may add to the error of radiance, all together: of the sun, of all lamps */
     int out_of_memory;
@@ -57,7 +57,7 @@ static nb_real scattered(const nb_phase *phase, nb_turn turn)
     return value;
 }
 
-static void set_glow(contact *k, const packet *rays, const sunlight *sun)
+static void set_glow(medium_hit *k, const packet *rays, const sunlight *sun)
 {
     const nb_medium *medium = k->medium;
     const nb_real value = scattered(&medium->body.phase, nb_turn_between(rays->direction, sun->direction));
@@ -78,7 +78,7 @@ static int is_ball_alone(const sunlight *sun)
 }
 
 /* Those of the lamp, or of the sun where it is NULL. Returns whether they were not there yet. */
-static int find_turns(sunlight *sun, const packet *rays, const nb_lamp *lamp)
+static int find_turns(sunlight *sun, const packet *rays, const nb_light *lamp)
 {
     if (sun->has_turns && sun->turning == lamp) return 0;
     sun->turn_count = 0;
@@ -100,7 +100,7 @@ static nb_wide next_turn(const sunlight *sun, nb_wide t, nb_wide end)
 
 /* ---- shade ----------------------------------------------------------------------------------- */
 
-static void look_ahead(shade *s)
+static void look_ahead(sun_attenuation *s)
 {
     lane_place lane[NB_WIDTH];
     for (int i = 0; i < NB_WIDTH; i++)
@@ -110,9 +110,9 @@ static void look_ahead(shade *s)
 }
 
 /* Of `count` rays, of which `first` are the toggles' first; NULL: light reaches all. */
-static void begin_shade(shade *s, const uint32_t *first, const float *toggles, size_t count)
+static void begin_shade(sun_attenuation *s, const uint32_t *first, const float *toggles, size_t count)
 {
-    *s = (shade){.toggles = toggles};
+    *s = (sun_attenuation){.toggles = toggles};
     for (size_t i = 0; first != NULL && i < count; i++) {
         s->next[i] = first[i];
         s->end[i] = first[i + 1];
@@ -121,7 +121,7 @@ static void begin_shade(shade *s, const uint32_t *first, const float *toggles, s
 }
 
 /* Passes the toggles up to t. */
-static void pass_toggles(shade *s, nb_wide t, nb_wmask lanes)
+static void pass_toggles(sun_attenuation *s, nb_wide t, nb_wmask lanes)
 {
     const nb_wmask passes = nb_wand(lanes, s->toggle <= t);
     if (!nb_wany(passes)) return;
@@ -138,10 +138,10 @@ static void pass_toggles(shade *s, nb_wide t, nb_wmask lanes)
 
 /* ---- steps ----------------------------------------------------------------------------------- */
 
-struct lamp_pass;
+struct light_pass;
 
 typedef struct sun_step {
-    const struct lamp_pass *lamp; /* NULL: of the sun */
+    const struct light_pass *lamp; /* NULL: of the sun */
     nb_wide start;
     nb_swing swing;                                      /* of a lamp alone */
     nb_real length;                                      /* m; of a lamp in the counting of its swing */
@@ -165,8 +165,8 @@ typedef struct sun_step {
 } sun_step;
 
 /* From where the ray meets the piece to `end`, of all media there: optical depth and its error. */
-static void depth_until(const march *m, const piece *p, const gathered *g, nb_wide end, nb_real depth[3],
-                        nb_real error[3])
+static void depth_until(const packet_state *m, const ray_segment *p, const gathered_light *g, nb_wide end,
+                        nb_real depth[3], nb_real error[3])
 {
     for (int c = 0; c < 3; c++) {
         depth[c] = g->depth[c];
@@ -174,7 +174,7 @@ static void depth_until(const march *m, const piece *p, const gathered *g, nb_wi
     }
     const nb_real h = nb_narrow(end - p->start);
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         const nb_estimate along = contact_integral(k, p->start, end, h);
         for (int c = 0; c < 3; c++) {
             depth[c] = depth[c] + nb_select(k->inside, k->extinction[c] * along.value, NB_F(0.0));
@@ -198,7 +198,8 @@ static inline __attribute__((always_inline)) void map_channels(const nebel_snaps
     for (int c = 1; c < 3 && !snapshot->is_gray; c++) out[c] = f(x[c]);
 }
 
-static void transmittance_until(const march *m, const piece *p, const gathered *g, nb_wide end, nb_real behind[3])
+static void transmittance_until(const packet_state *m, const ray_segment *p, const gathered_light *g, nb_wide end,
+                                nb_real behind[3])
 {
     nb_real depth[3], error[3];
     depth_until(m, p, g, end, depth, error);
@@ -244,12 +245,12 @@ typedef struct lit_fog {
     nb_real extinction[3], glow[3], most;
 } lit_fog;
 
-static lit_fog sunlit_fog(const march *m, nb_wide t)
+static lit_fog sunlit_fog(const packet_state *m, nb_wide t)
 {
     const nb_real zero = NB_F(0.0);
     lit_fog fog = {{zero, zero, zero}, {zero, zero, zero}, zero};
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         const nb_real density = nb_select(k->inside, contact_density(k, t), zero);
         for (int c = 0; c < 3; c++) {
             fog.glow[c] = fog.glow[c] + k->glow[c] * density;
@@ -262,8 +263,8 @@ static lit_fog sunlit_fog(const march *m, nb_wide t)
 }
 
 /* The depths up to both ends are known. */
-static void depth_of_node(const sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_step *s,
-                          nb_wide t, int n, sun_node *at, nb_real error[3])
+static void depth_of_node(const sunlight *sun, const packet_state *m, const ray_segment *p, const gathered_light *g,
+                          const sun_step *s, nb_wide t, int n, sun_node *at, nb_real error[3])
 {
     if (n > 0 && n < SUN_NODES - 1) {
         depth_until(m, p, g, t, at->depth, error);
@@ -292,14 +293,15 @@ static void fill_node(const sunlight *sun, sun_node *at, const lit_fog *fog, nb_
     at->most = fog->most;
 }
 
-static light_depth way_to_lamp(sunlight *sun, const march *m, const struct lamp_pass *pass, nb_wide t, nb_wmask lanes);
-static lit_fog lamplit_fog(const march *m, const struct lamp_pass *pass, nb_wide t);
-static nb_real most_of_lamp(const struct lamp_pass *pass, nb_wide start, nb_wide end);
+static light_depth way_to_lamp(sunlight *sun, const packet_state *m, const struct light_pass *pass, nb_wide t,
+                               nb_wmask lanes);
+static lit_fog lamplit_fog(const packet_state *m, const struct light_pass *pass, nb_wide t);
+static nb_real most_of_lamp(const struct light_pass *pass, nb_wide start, nb_wide end);
 static nb_real length_past_lamp(const sun_step *s, nb_wide t, int n);
 
 /* What node n of a step stands for; `way` is known at a start that the step knows. */
-static sun_node find_node(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_step *s,
-                          nb_wide end, int n, const light_depth *way)
+static sun_node find_node(sunlight *sun, const packet_state *m, const ray_segment *p, const gathered_light *g,
+                          const sun_step *s, nb_wide end, int n, const light_depth *way)
 {
     const nb_wide t = place_of_node(s, end, n);
     const int by_lamp = s->lamp != NULL;
@@ -328,7 +330,7 @@ static void take_sum(sun_step *s, const lit_sum *sum)
     s->steepness = sum->steepness;
 }
 
-static nb_real count_media(const march *m)
+static nb_real count_media(const packet_state *m)
 {
     nb_real count = NB_F(0.0);
     for (size_t i = m->present_first; i < m->present_end; i++)
@@ -337,7 +339,7 @@ static nb_real count_media(const march *m)
 }
 
 /* Lane by lane: what a ray becomes must not depend on its company. */
-static nb_mask lanes_in_voxels(const march *m)
+static nb_mask lanes_in_voxels(const packet_state *m)
 {
     nb_mask lanes = nb_mask_false;
     for (size_t i = m->present_first; i < m->present_end; i++)
@@ -345,14 +347,14 @@ static nb_mask lanes_in_voxels(const march *m)
     return lanes;
 }
 
-static light_depth way_from(sunlight *sun, const march *m, const sun_step *s, nb_wide end, int n, nb_wmask lanes)
+static light_depth way_from(sunlight *sun, const packet_state *m, const sun_step *s, nb_wide end, int n, nb_wmask lanes)
 {
     const nb_wide t = place_of_node(s, end, n);
     return s->lamp != NULL ? way_to_lamp(sun, m, s->lamp, t, lanes) : depth_to_sun(sun, m, t, lanes);
 }
 
-static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const gathered *g, nb_wmask lanes,
-                            nb_wide end, sun_step *s)
+static void sum_light_nodes(sunlight *sun, const packet_state *m, const ray_segment *p, const gathered_light *g,
+                            nb_wmask lanes, nb_wide end, sun_step *s)
 {
     sun_node at[SUN_NODES];
     nb_mask kinked = nb_mask_false;
@@ -397,11 +399,11 @@ static void limit_light(const nb_real before[3], const nb_real most[3], sun_step
     s->most = crude;
 }
 
-static void limit_step(const march *m, const nb_real before[3], sun_step *s)
+static void limit_step(const packet_state *m, const nb_real before[3], sun_step *s)
 {
     nb_real most[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         for (int c = 0; c < 3; c++) {
             const nb_real radiance = k->glow[c] / nb_max(k->extinction[c], NB_TINY);
             most[c] = nb_select(k->inside, nb_max(most[c], radiance), most[c]);
@@ -424,21 +426,21 @@ typedef struct sun_walk {
 
 /* What steps of a piece share. */
 typedef struct sun_piece {
-    const piece *p;
-    gathered before;       /* what was gathered before it */
+    const ray_segment *p;
+    gathered_light before; /* what was gathered before it */
     nb_real whole, pieces; /* its length; how many there may be */
     nb_mask rough; /* lanes in voxels, which are integrated from step to step: a walk to every node would be long */
 } sun_piece;
 
-static sun_piece sun_piece_of(const march *m, const piece *p, const gathered *g, nb_mask rough)
+static sun_piece sun_piece_of(const packet_state *m, const ray_segment *p, const gathered_light *g, nb_mask rough)
 {
     return (sun_piece){p, *g, nb_max(p->length, NB_TINY), m->event_count + NB_F(1.0), rough};
 }
 
 /* From where depth is integrated, and what there is before that. */
 typedef struct sun_origin {
-    piece p;
-    gathered before;
+    ray_segment p;
+    gathered_light before;
 } sun_origin;
 
 static sun_origin origin_of(const sun_piece *s, const sun_walk *w)
@@ -473,7 +475,7 @@ static sun_step begin_step(const sun_walk *w, nb_real length, nb_wmask stops)
     return s;
 }
 
-static void end_step(const march *m, const piece *p, const gathered *g, nb_wide end, sun_step *s)
+static void end_step(const packet_state *m, const ray_segment *p, const gathered_light *g, nb_wide end, sun_step *s)
 {
     depth_until(m, p, g, end, s->depth, s->depth_error);
     map_channels(m->sun->snapshot, transmitted, s->depth, s->behind);
@@ -483,8 +485,8 @@ static void end_step(const march *m, const piece *p, const gathered *g, nb_wide 
 #include "trace_sun_closed.h"
 #include "trace_sun_grid.h"
 
-static sun_step try_step(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_walk *w,
-                         nb_real length, nb_wide end, nb_wmask turns, nb_wmask stops)
+static sun_step try_step(sunlight *sun, const packet_state *m, const ray_segment *p, const gathered_light *g,
+                         const sun_walk *w, nb_real length, nb_wide end, nb_wmask turns, nb_wmask stops)
 {
     if (is_grid_alone(sun)) return try_grid_step(sun, m, g, w, length, end);
     if (is_ball_alone(sun)) {
@@ -501,7 +503,7 @@ static sun_step try_step(sunlight *sun, const march *m, const piece *p, const ga
 }
 
 /* The lanes that are inside fog which the sun lights. */
-static nb_mask sunlit_lanes(const march *m, const piece *p)
+static nb_mask sunlit_lanes(const packet_state *m, const ray_segment *p)
 {
     nb_mask lit = nb_mask_false;
     for (size_t i = m->present_first; i < m->present_end; i++)
@@ -515,7 +517,7 @@ static nb_mask sunlit_lanes(const march *m, const piece *p)
 
 /* A first step of a few optical depths: endless pieces would be halved for ever. By their mean, and by the density where
  * they begin: light in dense fog comes from there. */
-static nb_real first_guess(const march *m, const piece *p, const gathered *g)
+static nb_real first_guess(const packet_state *m, const ray_segment *p, const gathered_light *g)
 {
     const nb_real few = NB_F(2.0);
     nb_real depth[3], error[3];
@@ -524,7 +526,7 @@ static nb_real first_guess(const march *m, const piece *p, const gathered *g)
     return nb_min(mean, few * nb_rcp_bounded(largest(sunlit_fog(m, p->start).extinction)));
 }
 
-static sun_walk begin_walk(const march *m, const piece *p, const gathered *g, nb_mask lanes)
+static sun_walk begin_walk(const packet_state *m, const ray_segment *p, const gathered_light *g, nb_mask lanes)
 {
     sun_walk w = {.t = p->start,
                   .lanes = nb_widen_mask(lanes),
@@ -565,7 +567,7 @@ static nb_real length_of_next(const sun_step *s, nb_real guess, nb_mask taken, n
  * part of what a step may add. */
 #define GAP_SHARE REAL(1.0 / 3)
 
-static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide end, nb_wmask turns, nb_mask taken,
+static void take_sun_step(gathered_light *g, sun_walk *w, const sun_step *s, nb_wide end, nb_wmask turns, nb_mask taken,
                           nb_real allowed)
 {
     for (int c = 0; c < 3; c++) {
@@ -590,7 +592,7 @@ static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide e
     w->guess = length_of_next(s, w->guess, taken, allowed);
 }
 
-static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_walk *w, gathered *g)
+static void step_along(sunlight *sun, const packet_state *m, const sun_piece *s, sun_walk *w, gathered_light *g)
 {
     const nb_mask last = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
     const nb_wide bright = nb_wmin(sun->shade.toggle, s->p->end);
@@ -616,7 +618,8 @@ static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_wa
 #define FACE_SHARE 0.01
 
 /* To where the sun comes back. */
-static void pass_shadow(const shade *shadow, const march *m, const sun_piece *s, sun_walk *w, nb_wmask dark)
+static void pass_shadow(const sun_attenuation *shadow, const packet_state *m, const sun_piece *s, sun_walk *w,
+                        nb_wmask dark)
 {
     const nb_wide end = nb_wmin(shadow->toggle, s->p->end);
     const nb_mask lanes = nb_narrow_mask(dark);
@@ -636,8 +639,8 @@ static void pass_shadow(const shade *shadow, const march *m, const sun_piece *s,
 
 /* Light may run along the face in which a piece begins or ends: within the rounding of places there a way is inside or beside
  * it. What that does to light of `most` at t, in the lanes where fog is so dense that it matters. `pass` NULL: of the sun. */
-static nb_real doubt_at_face(sunlight *sun, const march *m, const struct lamp_pass *pass, nb_wide t, nb_real most,
-                             nb_mask lanes)
+static nb_real doubt_at_face(sunlight *sun, const packet_state *m, const struct light_pass *pass, nb_wide t,
+                             nb_real most, nb_mask lanes)
 {
     const nb_wide off = (sum_of_sizes(m->rays.origin) + nb_wabs(t)) * (NB_W(8.0) * NB_WEPSILON);
     const nb_real skin = largest(sunlit_fog(m, t).extinction) * nb_narrow(off);
@@ -657,8 +660,8 @@ static nb_real doubt_at_face(sunlight *sun, const march *m, const struct lamp_pa
 }
 
 /* At both ends of a piece. */
-static nb_real doubt_at_faces(sunlight *sun, const march *m, const struct lamp_pass *pass, const piece *p, nb_real most,
-                              nb_mask lanes)
+static nb_real doubt_at_faces(sunlight *sun, const packet_state *m, const struct light_pass *pass, const ray_segment *p,
+                              nb_real most, nb_mask lanes)
 {
     const nb_mask bounded = nb_and(lanes, nb_narrow_mask(p->end < NB_W(0.5) * NB_WFAR));
     return doubt_at_face(sun, m, pass, p->start, most, lanes) + doubt_at_face(sun, m, pass, p->end, most, bounded);
@@ -666,7 +669,7 @@ static nb_real doubt_at_faces(sunlight *sun, const march *m, const struct lamp_p
 
 /* Adds the sunlight of a piece in the lanes that are lit; `g` is what was gathered before it. A lane's steps are its own.
  */
-static void gather_sunlight(sunlight *sun, const march *m, const piece *p, nb_mask lit, gathered *g)
+static void gather_sunlight(sunlight *sun, const packet_state *m, const ray_segment *p, nb_mask lit, gathered_light *g)
 {
     if (!nb_any(lit)) return;
     (void)find_turns(sun, &m->rays, NULL);

@@ -7,33 +7,33 @@
  * are no turns. Included by trace_sun.h. */
 
 /* From where a step begins. */
-typedef struct ball_ways {
+typedef struct sphere_chords {
     nb_wide h, h_rate, c, c_rate, c_curve;
     nb_real square, inverse; /* v.v, and 1 by it */
     nb_real h_noise, c_noise;
-} ball_ways;
+} sphere_chords;
 
-static ball_ways find_ball_ways(const sunlight *sun, const march *m, nb_wide t)
+static sphere_chords find_ball_ways(const sunlight *sun, const packet_state *m, nb_wide t)
 {
     const nb_leaf *leaf = &sun->snapshot->media[0].body.leaves[0];
     const local_ray local = localize(&m->rays, leaf);
     const nb_wvec3 q = nb_wadd3(local.p, nb_wscale3(local.d, t)), v = in_frame(leaf, sun->direction);
     const nb_wide radius = WIDE(FRAME(leaf, radius)), square = nb_wdot3(v, v);
     const nb_real reach = nb_narrow(local.reach), size = nb_narrow(radius + local.reach);
-    return (ball_ways){.h = nb_wdot3(q, v),
-                       .h_rate = nb_wdot3(local.d, v),
-                       .c = radius * radius - nb_wdot3(q, q),
-                       .c_rate = NB_W(-2.0) * nb_wdot3(q, local.d),
-                       .c_curve = -nb_wdot3(local.d, local.d),
-                       .square = nb_narrow(square),
-                       .inverse = nb_narrow(NB_W(1.0) / square),
-                       .h_noise = NB_F(4.0) * reach * nb_narrow(nb_wsqrt(square)),
-                       .c_noise = NB_F(8.0) * size * reach};
+    return (sphere_chords){.h = nb_wdot3(q, v),
+                           .h_rate = nb_wdot3(local.d, v),
+                           .c = radius * radius - nb_wdot3(q, q),
+                           .c_rate = NB_W(-2.0) * nb_wdot3(q, local.d),
+                           .c_curve = -nb_wdot3(local.d, local.d),
+                           .square = nb_narrow(square),
+                           .inverse = nb_narrow(NB_W(1.0) / square),
+                           .h_noise = NB_F(4.0) * reach * nb_narrow(nb_wsqrt(square)),
+                           .c_noise = NB_F(8.0) * size * reach};
 }
 
 /* The length of the way from a place x m into the step, and by how much it may be off where that is asked. Of both roots of the quadratic the
  * one that loses no digits. */
-static nb_real ball_way(const ball_ways *b, nb_wide x, nb_real *error)
+static nb_real ball_way(const sphere_chords *b, nb_wide x, nb_real *error)
 {
     const nb_real zero = NB_F(0.0);
     const nb_real h = nb_narrow(b->h + x * b->h_rate);
@@ -48,14 +48,14 @@ static nb_real ball_way(const ball_ways *b, nb_wide x, nb_real *error)
 
 /* What the rule makes of one channel. Within the body the way to the sun is concave along the ray, so that light is
  * nowhere more than at the nodes beside. */
-typedef struct ball_sum {
+typedef struct sphere_sum {
     nb_real light, error, steepness;
     nb_real depth; /* mean, by light */
-} ball_sum;
+} sphere_sum;
 
-static ball_sum sum_ball(const nb_real depth[SUN_NODES])
+static sphere_sum sum_ball(const nb_real depth[SUN_NODES])
 {
-    ball_sum sum = {NB_F(0.0), NB_F(0.0), nb_abs(depth[1] - depth[0]), NB_F(0.0)};
+    sphere_sum sum = {NB_F(0.0), NB_F(0.0), nb_abs(depth[1] - depth[0]), NB_F(0.0)};
     nb_real seen[SUN_NODES];
     for (int n = 0; n < SUN_NODES; n++) {
         seen[n] = nb_exp(-depth[n]);
@@ -70,11 +70,11 @@ static ball_sum sum_ball(const nb_real depth[SUN_NODES])
     return sum;
 }
 
-static sun_step try_ball_step(const sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_walk *w,
-                              nb_real length, nb_wide end)
+static sun_step try_ball_step(const sunlight *sun, const packet_state *m, const ray_segment *p, const gathered_light *g,
+                              const sun_walk *w, nb_real length, nb_wide end)
 {
-    const contact *k = present(m, m->present_first);
-    const ball_ways b = find_ball_ways(sun, m, w->t);
+    const medium_hit *k = present(m, m->present_first);
+    const sphere_chords b = find_ball_ways(sun, m, w->t);
     nb_real way[SUN_NODES], depth[SUN_NODES], worst = NB_F(0.0);
     sun_step s = begin_step(w, length, nb_wmask_false);
     end_step(m, p, g, end, &s);
@@ -85,7 +85,7 @@ static sun_step try_ball_step(const sunlight *sun, const march *m, const piece *
         worst = nb_max(worst, off);
     }
     s.error = s.rounding = s.noise = s.steepness = NB_F(0.0);
-    ball_sum sum = {NB_F(0.0), NB_F(0.0), NB_F(0.0), NB_F(0.0)};
+    sphere_sum sum = {NB_F(0.0), NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (int c = 0; c < 3; c++) {
         if (c == 0 || !sun->snapshot->is_gray) {
             for (int n = 0; n < SUN_NODES; n++) depth[n] = s.depth_before[c] + k->extinction[c] * way[n];

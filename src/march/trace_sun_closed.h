@@ -10,7 +10,7 @@ static int has_closed_steps(const sunlight *sun)
 /* By how much the whole depth changes over a length of `length` at density 1. In height fog that is known without the
  * difference, also where its densities are beyond all numbers: the way to the sun loses direction.y / sun.y of what
  * the ray gains. */
-static nb_real change_of_depth(const sunlight *sun, const march *m, const contact *k, int c, nb_real length,
+static nb_real change_of_depth(const sunlight *sun, const packet_state *m, const medium_hit *k, int c, nb_real length,
                                nb_real difference)
 {
     if (sun->snapshot->way_to_sun != NB_WAY_HEIGHT) return nb_abs(difference);
@@ -33,16 +33,16 @@ typedef struct sun_place {
 } sun_place;
 
 /* Between two places: optical depth, the longest of extinction 1, and what full sunlight would add. */
-typedef struct sun_stretch {
+typedef struct sun_interval {
     nb_real depth[3], depth_error[3], light[3], light_error[3], length;
-} sun_stretch;
+} sun_interval;
 
-static sun_stretch stretch_between(const march *m, nb_wide start, nb_wide end)
+static sun_interval stretch_between(const packet_state *m, nb_wide start, nb_wide end)
 {
     const nb_real zero = NB_F(0.0), h = nb_narrow(end - start);
-    sun_stretch s = {{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
+    sun_interval s = {{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         const nb_estimate along = contact_integral(k, start, end, h);
         const nb_real value = nb_select(k->inside, along.value, zero), error = nb_select(k->inside, along.error, zero);
         s.length = nb_max(s.length, value);
@@ -76,7 +76,7 @@ static void extend_to_ends(light_depth *first, light_depth *last, nb_wide start,
     }
 }
 
-static sun_place first_place(const piece *p, const gathered *g)
+static sun_place first_place(const ray_segment *p, const gathered_light *g)
 {
     sun_place place = {.t = p->start};
     for (int c = 0; c < 3; c++) {
@@ -86,7 +86,7 @@ static sun_place first_place(const piece *p, const gathered *g)
     return place;
 }
 
-static sun_place next_place(const sun_place *from, const sun_stretch *s, nb_wide t)
+static sun_place next_place(const sun_place *from, const sun_interval *s, nb_wide t)
 {
     sun_place place = {.t = t};
     for (int c = 0; c < 3; c++) {
@@ -97,7 +97,7 @@ static sun_place next_place(const sun_place *from, const sun_stretch *s, nb_wide
 }
 
 /* The depths to the sun from both places. */
-static void look_at_sun(sunlight *sun, const march *m, sun_place *from, sun_place *to, nb_wmask lanes)
+static void look_at_sun(sunlight *sun, const packet_state *m, sun_place *from, sun_place *to, nb_wmask lanes)
 {
     if (sun->snapshot->way_to_sun == NB_WAY_HEIGHT) {
         to->to_sun = depth_to_sun(sun, m, to->t, lanes); /* there are no faces: the depth at `from` is known */
@@ -109,8 +109,8 @@ static void look_at_sun(sunlight *sun, const march *m, sun_place *from, sun_plac
 }
 
 /* Adds what is scattered between two places. */
-static void add_closed_step(const sunlight *sun, const march *m, const sun_place *from, const sun_place *to,
-                            const sun_stretch *s, nb_mask lanes, gathered *g)
+static void add_closed_step(const sunlight *sun, const packet_state *m, const sun_place *from, const sun_place *to,
+                            const sun_interval *s, nb_mask lanes, gathered_light *g)
 {
     nb_real least[3], change[3], most_seen[3], ratio[3], rounding = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
@@ -135,7 +135,7 @@ static void add_closed_step(const sunlight *sun, const march *m, const sun_place
 
 /* Where constant densities let no light through any more: from deep in endless fog the way to the sun is longer than
  * NB_WFAR, where ways end, and the depth is not linear. */
-static nb_wide end_of_light(const sunlight *sun, const march *m, const piece *p)
+static nb_wide end_of_light(const sunlight *sun, const packet_state *m, const ray_segment *p)
 {
     if (sun->snapshot->way_to_sun != NB_WAY_FLAT) return p->end;
     const lit_fog fog = sunlit_fog(m, p->start);
@@ -144,7 +144,8 @@ static nb_wide end_of_light(const sunlight *sun, const march *m, const piece *p)
 }
 
 /* From toggle to toggle, and where the sun shines from turn to turn; all lanes go on at once, those in shadow, too. */
-static void gather_in_closed_form(sunlight *sun, const march *m, const piece *p, nb_mask lit, gathered *g)
+static void gather_in_closed_form(sunlight *sun, const packet_state *m, const ray_segment *p, nb_mask lit,
+                                  gathered_light *g)
 {
     const nb_wide last = end_of_light(sun, m, p);
     nb_wmask lanes = nb_wand(nb_widen_mask(lit), p->start < last);
@@ -156,7 +157,7 @@ static void gather_in_closed_form(sunlight *sun, const march *m, const piece *p,
         const nb_wide bright = nb_wmin(sun->shade.toggle, last);
         const nb_wide turn = nb_wmin(next_turn(sun, from.t, bright), nearest_kink(m, from.t, bright));
         const nb_wide end = nb_wselect(lanes, nb_wselect(dark, bright, turn), from.t);
-        const sun_stretch between = stretch_between(m, from.t, end);
+        const sun_interval between = stretch_between(m, from.t, end);
         sun_place to = next_place(&from, &between, end);
         look_at_sun(sun, m, &from, &to, lanes);
         const nb_mask shines = nb_narrow_mask(nb_wand(lanes, nb_wnot(dark)));

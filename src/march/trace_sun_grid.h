@@ -23,7 +23,7 @@ typedef struct grid_nodes {
     nb_real amount, error; /* the density's integral over the step */
 } grid_nodes;
 
-static grid_nodes place_nodes(const contact *k, nb_wide start, nb_wide end, nb_mask lanes)
+static grid_nodes place_nodes(const medium_hit *k, nb_wide start, nb_wide end, nb_mask lanes)
 {
     const nebel_grid *grid = k->medium->body.density.grid;
     const grid_lines lines = lines_from(k, start);
@@ -48,14 +48,14 @@ static grid_nodes place_nodes(const contact *k, nb_wide start, nb_wide end, nb_m
 }
 
 /* Optical depth of the ray up to a place, where the density's integral over the piece has come to `along`. */
-static void depth_after(const contact *k, const gathered *g, nb_wide along, nb_real depth[3])
+static void depth_after(const medium_hit *k, const gathered_light *g, nb_wide along, nb_real depth[3])
 {
     for (int c = 0; c < 3; c++) depth[c] = g->depth[c] + k->extinction[c] * nb_narrow(along);
 }
 
 /* The integral of the density behind which no sunlight matters, in any channel: less than `least` of what steps may add
  * to the error. */
-static nb_real amount_that_hides(const sunlight *sun, const contact *k, const nb_real depth[3], double least)
+static nb_real amount_that_hides(const sunlight *sun, const medium_hit *k, const nb_real depth[3], double least)
 {
     const nb_real dark = -nb_log(nb_max(REAL(least * sun->share), NB_TINY));
     nb_real most = NB_F(0.0);
@@ -69,10 +69,10 @@ static nb_real amount_that_hides(const sunlight *sun, const contact *k, const nb
 /* What a node leaves out, which it tells. */
 #define HIDDEN_PART 0.0033
 
-static sun_node grid_node(sunlight *sun, const march *m, const gathered *g, const sun_walk *w, const grid_nodes *nodes,
-                          nb_mask lanes, int n)
+static sun_node grid_node(sunlight *sun, const packet_state *m, const gathered_light *g, const sun_walk *w,
+                          const grid_nodes *nodes, nb_mask lanes, int n)
 {
-    const contact *k = present(m, m->present_first);
+    const medium_hit *k = present(m, m->present_first);
     const nb_real own = nb_narrow(w->along_error) + nodes->error;
     sun_node at;
     lit_fog fog = {.most = NB_F(0.0)};
@@ -92,10 +92,10 @@ static sun_node grid_node(sunlight *sun, const march *m, const gathered *g, cons
 }
 
 /* Empty steps have no nodes. */
-static sun_step try_grid_step(sunlight *sun, const march *m, const gathered *g, const sun_walk *w, nb_real length,
-                              nb_wide end)
+static sun_step try_grid_step(sunlight *sun, const packet_state *m, const gathered_light *g, const sun_walk *w,
+                              nb_real length, nb_wide end)
 {
-    const contact *k = present(m, m->present_first);
+    const medium_hit *k = present(m, m->present_first);
     const nb_mask lanes = nb_and(nb_narrow_mask(w->lanes), k->inside);
     const grid_nodes nodes = place_nodes(k, w->t, end, lanes);
     const nb_mask filled = nb_and(lanes, nodes.amount > NB_F(0.0));
@@ -121,7 +121,8 @@ static sun_step try_grid_step(sunlight *sun, const march *m, const gathered *g, 
 }
 
 /* The voxels in the shadow of a surface. */
-static void pass_voxels(const shade *shadow, const march *m, const piece *p, sun_walk *w, nb_wmask dark)
+static void pass_voxels(const sun_attenuation *shadow, const packet_state *m, const ray_segment *p, sun_walk *w,
+                        nb_wmask dark)
 {
     const nb_estimate along =
         grid_integral(present(m, m->present_first), p->start, nb_wmin(shadow->toggle, p->end), NB_HUGE);
@@ -130,8 +131,8 @@ static void pass_voxels(const shade *shadow, const march *m, const piece *p, sun
 }
 
 /* The end of the longest step from t on. */
-static nb_wide nearest_border(const march *m, nb_wide t, nb_wide end)
+static nb_wide nearest_border(const packet_state *m, nb_wide t, nb_wide end)
 {
-    const contact *k = present(m, m->present_first);
+    const medium_hit *k = present(m, m->present_first);
     return nb_wselect(nb_widen_mask(k->inside), nb_wmin(next_in_grid(k, t, nb_grid_border), end), end);
 }

@@ -11,7 +11,7 @@
 /* The rays in nodes of the lattice; in which layer the ways from them to the sun leave the box by both sides; and where
  * along the rays these are two faces at once. */
 typedef struct lattice_rays {
-    const nb_grid_lattice *lattice;
+    const nb_sun_lattice *lattice;
     nb_wide from[3], slope[3];
     nb_wide end_from[2], end_slope[2];
     nb_wide edge[3];
@@ -22,7 +22,7 @@ typedef struct lattice_rays {
 
 static void set_side(lattice_rays *rays, const voxel_rays *r, int s)
 {
-    const nb_grid_lattice *l = rays->lattice;
+    const nb_sun_lattice *l = rays->lattice;
     const double never = l->up ? 1e30 : -1e30;
     const int leans = fabs(l->lean[s]) >= LEAST_LEAN;
     const nb_wide lean = WIDE(l->lean[s]), per_cell = WIDE(l->per_cell);
@@ -35,7 +35,7 @@ static void set_side(lattice_rays *rays, const voxel_rays *r, int s)
     rays->end_slope[s] = -(slope * layers);
 }
 
-static lattice_rays lattice_rays_of(const nb_grid_lattice *l, const voxel_rays *r)
+static lattice_rays lattice_rays_of(const nb_sun_lattice *l, const voxel_rays *r)
 {
     lattice_rays rays = {.lattice = l};
     for (int s = 0; s < 2; s++) set_side(&rays, r, s);
@@ -78,7 +78,7 @@ typedef struct lattice_column {
 } lattice_column;
 
 /* Between nodes along an axis. */
-static inline nb_wide first_node(const nb_grid_lattice *l, int axis, nb_wide at, nb_real *share)
+static inline nb_wide first_node(const nb_sun_lattice *l, int axis, nb_wide at, nb_real *share)
 {
     const nb_wide place = clamp_wide(at, NB_W(0.0), WIDE(l->count[axis] - 1));
     const nb_wide first = nb_wmin(whole_below(place), WIDE(l->count[axis] - 2));
@@ -93,7 +93,7 @@ static inline nb_wide block_of(nb_wide at)
 
 static inline lattice_column column_at(const lattice_rays *r, nb_wide t)
 {
-    const nb_grid_lattice *l = r->lattice;
+    const nb_sun_lattice *l = r->lattice;
     lattice_column c;
     const nb_wide u = first_node(l, 0, r->from[0] + r->slope[0] * t, &c.share[0]);
     const nb_wide v = first_node(l, 1, r->from[1] + r->slope[1] * t, &c.share[1]);
@@ -103,7 +103,7 @@ static inline lattice_column column_at(const lattice_rays *r, nb_wide t)
 }
 
 /* To the last layer. */
-static inline way_sum way_in_column(const nb_grid_lattice *l, const lattice_column *c, nb_wide layer)
+static inline way_sum way_in_column(const nb_sun_lattice *l, const lattice_column *c, nb_wide layer)
 {
     const nb_wide across = WIDE(l->count[0]), whole = WIDE((double)l->count[0] * l->count[1]);
     nb_real v[8], share[3] = {c->share[0], c->share[1]};
@@ -159,8 +159,8 @@ typedef struct lattice_light {
     nb_estimate along; /* the density's integral over the piece */
 } lattice_light;
 
-static inline void look_up(const sunlight *sun, const contact *k, const gathered *g, nb_real amount, nb_real depth[3],
-                           nb_real seen[3])
+static inline void look_up(const sunlight *sun, const medium_hit *k, const gathered_light *g, nb_real amount,
+                           nb_real depth[3], nb_real seen[3])
 {
     for (int c = 0; c < 3; c++) depth[c] = g->depth[c] + k->extinction[c] * amount;
     map_channels(sun->snapshot, transmitted, depth, seen);
@@ -182,7 +182,7 @@ static inline void set_way(way_sum *to, const way_sum *from, nb_mask lanes)
 }
 
 /* Where a lane comes upon fog; what the depth to the sun did before is that of a cell's length. */
-static void enter_voxels(const sunlight *sun, const contact *k, const gathered *g, const lattice_rays *to_sun,
+static void enter_voxels(const sunlight *sun, const medium_hit *k, const gathered_light *g, const lattice_rays *to_sun,
                          nb_wide t, nb_mask lanes, lattice_walk *w)
 {
     const way_sum here = way_of_lattice(to_sun, t);
@@ -262,7 +262,7 @@ static inline channel_light light_of_channel(const cell_shape *h, nb_real extinc
     return (channel_light){flat * (NB_F(1.0) + nb_min(nb_max(shift, NB_F(-0.5)), NB_F(0.5))), change + flat * next};
 }
 
-static inline void light_cell(const sunlight *sun, const contact *k, const gathered *g, const lit_cell *s,
+static inline void light_cell(const sunlight *sun, const medium_hit *k, const gathered_light *g, const lit_cell *s,
                               lattice_walk *w, lattice_light *sum)
 {
     const cell_shape h = shape_of_cell(s, w);
@@ -317,7 +317,7 @@ typedef struct lit_walk {
 
 /* The next cell, or part of a cell, in the lanes that are `going`; of those the sun counts in the `bright` ones. Light is
  * asked for where there is fog. */
-static void cross_lit_cell(sunlight *sun, const contact *k, const gathered *g, const voxel_rays *rays,
+static void cross_lit_cell(sunlight *sun, const medium_hit *k, const gathered_light *g, const voxel_rays *rays,
                            const lattice_rays *to_sun, nb_wide last, nb_wmask going, nb_wmask bright, lit_walk *w,
                            lattice_light *light)
 {
@@ -350,7 +350,8 @@ static void cross_lit_cell(sunlight *sun, const contact *k, const gathered *g, c
 }
 
 /* The density's integral over the rest of the piece, too. */
-static nb_estimate finish_voxels(const contact *k, const piece *p, const voxel_rays *rays, nb_wmask lanes, lit_walk *w)
+static nb_estimate finish_voxels(const medium_hit *k, const ray_segment *p, const voxel_rays *rays, nb_wmask lanes,
+                                 lit_walk *w)
 {
     if (nb_wany(w->is_cut)) return voxels_integral(k, p->start, p->end, NB_HUGE);
     for (;;) {
@@ -363,9 +364,10 @@ static nb_estimate finish_voxels(const contact *k, const piece *p, const voxel_r
     }
 }
 
-static lattice_light light_of_lattice(sunlight *sun, const march *m, const piece *p, const gathered *g, nb_mask lit)
+static lattice_light light_of_lattice(sunlight *sun, const packet_state *m, const ray_segment *p,
+                                      const gathered_light *g, nb_mask lit)
 {
-    const contact *k = present(m, m->present_first);
+    const medium_hit *k = present(m, m->present_first);
     const voxel_rays rays = voxel_rays_of(k);
     const lattice_rays to_sun = lattice_rays_of(k->medium->lattice, &rays);
     const nb_real zero = NB_F(0.0), hidden = amount_that_hides(sun, k, g->depth, LEFT_OUT);
@@ -393,7 +395,7 @@ static lattice_light light_of_lattice(sunlight *sun, const march *m, const piece
     return light;
 }
 
-static int has_lattice(const march *m)
+static int has_lattice(const packet_state *m)
 {
     return m->present_end - m->present_first == 1 && present(m, m->present_first)->medium->lattice != NULL;
 }
@@ -419,9 +421,10 @@ static nb_real usual_doubt_of(const lattice_light *found)
 
 /* Adds the light of the lanes that it is good enough for; the others are left. `along` becomes the integral of the
  * density over the piece. */
-static nb_mask gather_by_lattice(sunlight *sun, const march *m, const piece *p, gathered *g, nb_estimate *along)
+static nb_mask gather_by_lattice(sunlight *sun, const packet_state *m, const ray_segment *p, gathered_light *g,
+                                 nb_estimate *along)
 {
-    const shade before = sun->shade;
+    const sun_attenuation before = sun->shade;
     const nb_mask lit = sunlit_lanes(m, p);
     const lattice_light found = light_of_lattice(sun, m, p, g, lit);
     const nb_real doubt = doubt_of(&found) + found.left_out;

@@ -29,13 +29,13 @@ static void note_roots(sunlight *sun, nb_wide start, nb_wide a, nb_wide b, nb_wi
 /* ---- ways ------------------------------------------------------------------------------------ */
 
 /* In a leaf's frame. */
-typedef struct ways {
+typedef struct breakpoint_lines {
     nb_wvec3 base, base_rate;   /* b, b' */
     nb_wvec3 along, along_rate; /* v, v' */
-} ways;
+} breakpoint_lines;
 
 /* Where the ways touch the ball of a radius about `center`: |(b - center) x v| = radius |v|. */
-static void note_ball(sunlight *sun, const ways *s, nb_wvec3 center, nb_wide radius)
+static void note_ball(sunlight *sun, const breakpoint_lines *s, nb_wvec3 center, nb_wide radius)
 {
     const nb_wvec3 apart = nb_wsub3(s->base, center), moment = nb_wcross3(apart, s->along);
     const nb_wvec3 rate = nb_wadd3(nb_wcross3(s->base_rate, s->along), nb_wcross3(apart, s->along_rate));
@@ -52,7 +52,7 @@ static nb_wide mantle_form(nb_wvec3 a, nb_wide wa, nb_wvec3 b, nb_wide wb)
 }
 
 /* The mantle x^2 + y^2 = (radius + slope z)^2 without end: where the quadratic in u has a double root. */
-static void note_mantle(sunlight *sun, const ways *s, nb_wide radius, nb_wide slope)
+static void note_mantle(sunlight *sun, const breakpoint_lines *s, nb_wide radius, nb_wide slope)
 {
     const nb_wvec3 b = s->base, db = s->base_rate, v = s->along, dv = s->along_rate;
     const nb_wide wb = radius + slope * b.z, wdb = slope * db.z, wv = slope * v.z, wdv = slope * dv.z;
@@ -64,7 +64,7 @@ static void note_mantle(sunlight *sun, const ways *s, nb_wide radius, nb_wide sl
 }
 
 /* The rim where the mantle ends at this z, which ways meet at u = (z - b.z) / v.z: multiplied by v.z. */
-static void note_rim(sunlight *sun, const ways *s, nb_wide z, nb_wide radius)
+static void note_rim(sunlight *sun, const breakpoint_lines *s, nb_wide z, nb_wide radius)
 {
     const nb_wvec3 b = s->base, db = s->base_rate, v = s->along, dv = s->along_rate;
     const nb_wide up = z - b.z;
@@ -76,18 +76,18 @@ static void note_rim(sunlight *sun, const ways *s, nb_wide z, nb_wide radius)
 }
 
 /* A face n.x = distance: off + t off_rate + u (rise + t rise_rate) = 0 */
-typedef struct face_ways {
+typedef struct breakpoint_faces {
     nb_wide off, off_rate, rise, rise_rate;
-} face_ways;
+} breakpoint_faces;
 
-static face_ways ways_to_face(const ways *s, nb_wvec3 n, nb_wide distance)
+static breakpoint_faces ways_to_face(const breakpoint_lines *s, nb_wvec3 n, nb_wide distance)
 {
-    return (face_ways){nb_wdot3(n, s->base) - distance, nb_wdot3(n, s->base_rate), nb_wdot3(n, s->along),
-                       nb_wdot3(n, s->along_rate)};
+    return (breakpoint_faces){nb_wdot3(n, s->base) - distance, nb_wdot3(n, s->base_rate), nb_wdot3(n, s->along),
+                              nb_wdot3(n, s->along_rate)};
 }
 
 /* An edge: where ways meet both faces at once. */
-static void note_edge(sunlight *sun, const face_ways *a, const face_ways *b)
+static void note_edge(sunlight *sun, const breakpoint_faces *a, const breakpoint_faces *b)
 {
     const nb_wide value = a->off * b->rise - b->off * a->rise;
     const nb_wide rate =
@@ -97,9 +97,9 @@ static void note_edge(sunlight *sun, const face_ways *a, const face_ways *b)
 
 /* ---- bodies ---------------------------------------------------------------------------------- */
 
-static void note_box(sunlight *sun, const nb_leaf *leaf, const ways *s)
+static void note_box(sunlight *sun, const nb_leaf *leaf, const breakpoint_lines *s)
 {
-    face_ways faces[3][2];
+    breakpoint_faces faces[3][2];
     for (int i = 0; i < 3; i++) {
         const nb_wvec3 n = nb_wvec3(WIDE(i == 0), WIDE(i == 1), WIDE(i == 2));
         faces[i][0] = ways_to_face(s, n, WIDE(leaf->low[i]));
@@ -109,9 +109,9 @@ static void note_box(sunlight *sun, const nb_leaf *leaf, const ways *s)
         for (int k = 0; k < 4; k++) note_edge(sun, &faces[i][k & 1], &faces[(i + 1) % 3][k >> 1]);
 }
 
-static void note_planes(sunlight *sun, const nb_volume *body, const nb_leaf *leaf, const ways *s)
+static void note_planes(sunlight *sun, const nb_volume *body, const nb_leaf *leaf, const breakpoint_lines *s)
 {
-    face_ways faces[NB_MOST_EDGED_FACES];
+    breakpoint_faces faces[NB_MOST_EDGED_FACES];
     if (leaf->face_count > NB_MOST_EDGED_FACES) return;
     for (size_t i = 0; i < leaf->face_count; i++) {
         const nb_face *face = &body->faces[leaf->first_face + i];
@@ -120,7 +120,7 @@ static void note_planes(sunlight *sun, const nb_volume *body, const nb_leaf *lea
     }
 }
 
-static void note_round(sunlight *sun, const nb_leaf *leaf, const ways *s)
+static void note_round(sunlight *sun, const nb_leaf *leaf, const breakpoint_lines *s)
 {
     const nb_wvec3 zero = nb_wvec3(NB_W(0.0), NB_W(0.0), NB_W(0.0));
     const nb_wide one = NB_W(1.0);
@@ -146,18 +146,18 @@ static void note_round(sunlight *sun, const nb_leaf *leaf, const ways *s)
 /* ---- all of them ----------------------------------------------------------------------------- */
 
 /* Of a ray p + t d to a light in the direction `towards`, or as far from p; all in one frame. */
-static ways make_ways(nb_wvec3 p, nb_wvec3 d, nb_wvec3 towards, int is_lamp)
+static breakpoint_lines make_ways(nb_wvec3 p, nb_wvec3 d, nb_wvec3 towards, int is_lamp)
 {
     const nb_wvec3 zero = nb_wvec3(NB_W(0.0), NB_W(0.0), NB_W(0.0));
-    if (!is_lamp) return (ways){p, d, towards, zero};
-    return (ways){nb_wadd3(p, towards), zero, nb_wsub3(zero, towards), d};
+    if (!is_lamp) return (breakpoint_lines){p, d, towards, zero};
+    return (breakpoint_lines){nb_wadd3(p, towards), zero, nb_wsub3(zero, towards), d};
 }
 
 /* The shadow of a gaussian has no edge: its steep parts and its middle. */
 static void note_gaussian(sunlight *sun, const packet *rays, const nebel_density *density, nb_wvec3 towards,
                           int is_lamp)
 {
-    const ways s = make_ways(rays->origin, rays->direction, towards, is_lamp);
+    const breakpoint_lines s = make_ways(rays->origin, rays->direction, towards, is_lamp);
     const nb_wvec3 center = wide_vector(density->center);
     note_ball(sun, &s, center, WIDE(density->sigma));
     note_ball(sun, &s, center, WIDE(4 * density->sigma));
@@ -167,14 +167,14 @@ static void note_gaussian(sunlight *sun, const packet *rays, const nebel_density
 static void note_altitude(sunlight *sun, const packet *rays, const nebel_density *density, nb_wvec3 towards,
                           int is_lamp)
 {
-    const ways s = make_ways(rays->origin, rays->direction, towards, is_lamp);
+    const breakpoint_lines s = make_ways(rays->origin, rays->direction, towards, is_lamp);
     note_ball(sun, &s, wide_vector(density->center), WIDE(density->radius + density->base));
 }
 
 /* Across this plane a density has a kink. So has the depth of ways that run along it, as all of them pass it at once. */
-static void note_level(sunlight *sun, const ways *s, nb_wvec3 n, nb_wide level)
+static void note_level(sunlight *sun, const breakpoint_lines *s, nb_wvec3 n, nb_wide level)
 {
-    const face_ways f = ways_to_face(s, n, level);
+    const breakpoint_faces f = ways_to_face(s, n, level);
     const nb_wide most = nb_wsqrt(nb_wdot3(n, n) * nb_wdot3(s->along, s->along)) * NB_W(1e-9);
     note_turn(sun, -f.off * nb_wrcp_bounded(f.off_rate), nb_wand(nb_wabs(f.rise) <= most, nb_wabs(f.off_rate) > most));
 }
@@ -184,7 +184,7 @@ static void note_soft_edges(sunlight *sun, const packet *rays, const nb_volume *
 {
     const nb_leaf *leaf = &body->leaves[0];
     const local_ray local = localize(rays, leaf);
-    const ways s = make_ways(local.p, local.d, in_frame(leaf, sun->direction), 0);
+    const breakpoint_lines s = make_ways(local.p, local.d, in_frame(leaf, sun->direction), 0);
     const double distance = body->density.edge_width;
     for (int i = 0; i < 3 && leaf->type == NB_LEAF_BOX; i++) {
         const nb_wvec3 n = nb_wvec3(WIDE(i == 0), WIDE(i == 1), WIDE(i == 2));
@@ -202,7 +202,7 @@ static void note_soft_edges(sunlight *sun, const packet *rays, const nb_volume *
 static void note_levels(sunlight *sun, const packet *rays, const nb_volume *body)
 {
     const nebel_density *density = &body->density;
-    const ways s = make_ways(rays->origin, rays->direction, sun->direction, 0);
+    const breakpoint_lines s = make_ways(rays->origin, rays->direction, sun->direction, 0);
     if (density->type == NEBEL_DENSITY_SOFT_EDGE) note_soft_edges(sun, rays, body);
     if (density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_CONSTANT)
         note_level(sun, &s, nb_wvec3(NB_W(0.0), NB_W(1.0), NB_W(0.0)), WIDE(density->base));
@@ -217,7 +217,7 @@ static void note_leaf(sunlight *sun, const packet *rays, const nb_volume *body, 
 {
     if (leaf->type == NB_LEAF_WORLD) return;
     const local_ray local = localize(rays, leaf);
-    const ways s = make_ways(local.p, local.d, in_frame(leaf, towards), is_lamp);
+    const breakpoint_lines s = make_ways(local.p, local.d, in_frame(leaf, towards), is_lamp);
     if (leaf->type == NB_LEAF_BOX)
         note_box(sun, leaf, &s);
     else if (leaf->type == NB_LEAF_PLANES)
@@ -227,7 +227,7 @@ static void note_leaf(sunlight *sun, const packet *rays, const nb_volume *body, 
 }
 
 /* Of all media, whether the rays meet them or not: their shadows may. `lamp` NULL: in the light of the sun. */
-static void note_media(sunlight *sun, const packet *rays, const nb_lamp *lamp)
+static void note_media(sunlight *sun, const packet *rays, const nb_light *lamp)
 {
     const nebel_snapshot *snapshot = sun->snapshot;
     const nb_wvec3 towards = lamp != NULL ? nb_wsub3(wide_vector(lamp->place), rays->origin) : sun->direction;

@@ -12,7 +12,7 @@ typedef struct voxel_rays {
 /* Slopes below this cross no face along any ray. */
 #define LEAST_VOXEL_SLOPE NB_W(1e-250)
 
-static voxel_rays voxel_rays_of(const contact *k)
+static voxel_rays voxel_rays_of(const medium_hit *k)
 {
     voxel_rays r = {.grid = k->medium->body.density.grid,
                     .from = {k->offset.x, k->offset.y, k->offset.z},
@@ -231,7 +231,7 @@ static inline nb_wide amount_of_voxels(const nebel_grid *grid, const voxel_sum *
 
 /* Shares are off by rounding, and by the noise of the coordinates along each axis; the density is as steep as its range
  * per cell. */
-static nb_real error_of_voxels(const contact *k, nb_real amount, nb_real length)
+static nb_real error_of_voxels(const medium_hit *k, nb_real amount, nb_real length)
 {
     const nebel_grid *grid = k->medium->body.density.grid;
     const nb_real steep = REAL(grid->most - grid->least) * (NB_F(3.0) * k->noise + NB_F(6.0) * NB_EPSILON);
@@ -239,7 +239,7 @@ static nb_real error_of_voxels(const contact *k, nb_real amount, nb_real length)
 }
 
 /* Whether the packet may walk: between nearest voxels noise moves whole steps of the density. */
-static int walks_voxels(const contact *k)
+static int walks_voxels(const medium_hit *k)
 {
     return k->medium->body.density.grid->filter == NEBEL_GRID_FILTER_LINEAR;
 }
@@ -262,14 +262,14 @@ static inline void add_voxel(voxel_sum *sum, nb_wide length, nb_real mean)
     sum->voxels = sum->voxels + length * nb_widen(mean);
 }
 
-static nb_estimate estimate_of_voxels(const contact *k, const voxel_sum *sum)
+static nb_estimate estimate_of_voxels(const medium_hit *k, const voxel_sum *sum)
 {
     const nb_real amount = nb_narrow(amount_of_voxels(k->medium->body.density.grid, sum));
     return nb_estimate_of(amount, error_of_voxels(k, amount, nb_narrow(sum->length)));
 }
 
 /* Up to `enough` [m], behind which the rest may be left out: see nb_grid_integral. */
-static nb_estimate voxels_integral(const contact *k, nb_wide start, nb_wide end, nb_real enough)
+static nb_estimate voxels_integral(const medium_hit *k, nb_wide start, nb_wide end, nb_real enough)
 {
     const voxel_rays rays = voxel_rays_of(k);
     const nb_wide most = nb_widen(enough);

@@ -1,7 +1,7 @@
 /* The partition of the rays: from event to event, which media are there, and what they do to the light. */
 
 /* Light gathered so far, and what may be wrong with it. */
-typedef struct gathered {
+typedef struct gathered_light {
     nb_real depth[3];         /* optical depth from the camera */
     nb_real transmittance[3]; /* exp(-depth) */
     nb_real radiance[3];
@@ -10,14 +10,14 @@ typedef struct gathered {
     nb_real least_depth[3]; /* what the optical depth is at least, in spite of ends farther on, */
     nb_real clear_depth[3]; /* and up to where no end is in large doubt */
     nb_real radiance_error; /* rounding, ends and the bound of adaptive integration; the worst channel of each piece */
-} gathered;
+} gathered_light;
 
 /* A piece between two neighbouring events. */
-typedef struct piece {
+typedef struct ray_segment {
     nb_wide start, end;
     nb_real length;
     nb_mask lanes; /* that have this piece */
-} piece;
+} ray_segment;
 
 /* What the media of a piece add up to. */
 typedef struct piece_sum {
@@ -30,11 +30,11 @@ typedef struct piece_sum {
 } piece_sum;
 
 /* The next event after t, NB_WFAR * 2 where there is none: the sentinel must lie beyond an endless ray's end. */
-static nb_wide next_event(const march *m, nb_wide t)
+static nb_wide next_event(const packet_state *m, nb_wide t)
 {
     nb_wide next = NB_W(2.0) * NB_WFAR;
     for (size_t i = 0; i < m->window_count; i++) {
-        const contact *k = in_window(m, i);
+        const medium_hit *k = in_window(m, i);
         for (size_t j = 0; j < k->medium->body.leaf_count; j++) {
             const leaf_span *span = &m->spans[k->first_span + j];
             const nb_wmask some = span->enter < span->leave;
@@ -46,7 +46,7 @@ static nb_wide next_event(const march *m, nb_wide t)
 }
 
 /* ANY or ALL of a body's program: the two topmost masks become one. Returns the new height. */
-static int fold_step(nb_step step, nb_mask *stack, int top)
+static int fold_step(nb_shape_op step, nb_mask *stack, int top)
 {
     const nb_mask a = stack[top - 2], b = stack[top - 1];
     stack[top - 2] = step == NB_STEP_ANY ? nb_or(a, b) : nb_and(a, b);
@@ -55,14 +55,14 @@ static int fold_step(nb_step step, nb_mask *stack, int top)
 
 /* The next piece of each lane that is in `lanes`; those whose next event lies beyond the window wait for it to move.
  * Returns 0 when no lane has a piece left. */
-static int next_piece(march *m, nb_wide t, nb_wmask lanes, piece *p)
+static int next_piece(packet_state *m, nb_wide t, nb_wmask lanes, ray_segment *p)
 {
     if (m->crowd.is_walking) advance_crowd(m, t);
     for (;;) {
         const nb_wide next = next_event(m, t);
         const nb_wmask within = nb_wand(lanes, nb_wand(next <= NB_WFAR, next <= WIDE(m->window_end)));
         if (nb_wany(within)) {
-            *p = (piece){t, next, nb_narrow(next - t), nb_narrow_mask(within)};
+            *p = (ray_segment){t, next, nb_narrow(next - t), nb_narrow_mask(within)};
             return 1;
         }
         if (m->entered == m->stretch_count || !nb_wany(lanes)) return 0;
@@ -71,7 +71,7 @@ static int next_piece(march *m, nb_wide t, nb_wmask lanes, piece *p)
 }
 
 /* Membership of a leaf needs no midpoint: between neighbouring events a span is either all there or not at all. */
-static nb_mask is_inside(const march *m, const contact *k, nb_wide start)
+static nb_mask is_inside(const packet_state *m, const medium_hit *k, nb_wide start)
 {
     const nb_volume *body = &k->medium->body;
     nb_mask stack[NB_STEP_STACK];
@@ -90,13 +90,13 @@ static nb_mask is_inside(const march *m, const contact *k, nb_wide start)
 
 /* Marks which media's fog is there. Returns whether any is. From the highest rank down: what covers takes away what
  * ranks below it. */
-static int mark_inside(march *m, const piece *p)
+static int mark_inside(packet_state *m, const ray_segment *p)
 {
     nb_mask covered = nb_not(p->lanes), covered_below = covered, crowd_covered = covered;
     int64_t rank = INT64_MAX;
     size_t first = m->window_count;
     for (size_t i = m->window_count; i-- > 0;) {
-        contact *k = in_window(m, i);
+        medium_hit *k = in_window(m, i);
         const nb_volume *body = &k->medium->body;
         if (body->rank < rank) covered = covered_below;
         rank = body->rank;
@@ -123,11 +123,11 @@ static double number_of_leaf(const nb_medium *medium, size_t leaf)
 
 /* The signature of a way says in which leaves it is from piece to piece. Where it changes from place to place along a ray, the
  * optical depth of the ways may have a kink or begin to rise like a root: as they pass where surfaces of two leaves cross. */
-static void sign_piece(march *m, nb_wide start, nb_mask lanes)
+static void sign_piece(packet_state *m, nb_wide start, nb_mask lanes)
 {
     nb_real sum = NB_F(0.0);
     for (size_t i = 0; i < m->window_count; i++) {
-        const contact *k = in_window(m, i);
+        const medium_hit *k = in_window(m, i);
         for (size_t j = 0; j < k->medium->body.leaf_count; j++) {
             const leaf_span *span = &m->spans[k->first_span + j];
             const nb_mask inside = nb_narrow_mask(nb_wand(span->enter <= start, span->leave > start));
@@ -143,7 +143,7 @@ static nb_real largest(const nb_real v[3])
 }
 
 /* Adds one medium's optical depth and light to the sum, where its density has this integral. */
-static void add_estimate(piece_sum *sum, const contact *k, const nb_estimate *along)
+static void add_estimate(piece_sum *sum, const medium_hit *k, const nb_estimate *along)
 {
     const nb_real length = nb_select(k->inside, along->value, NB_F(0.0));
     const nb_real error = nb_select(k->inside, along->error, NB_F(0.0));
@@ -157,7 +157,7 @@ static void add_estimate(piece_sum *sum, const contact *k, const nb_estimate *al
 }
 
 /* From `start` to `end`, h metres. */
-static void add_contact(piece_sum *sum, const contact *k, nb_wide start, nb_wide end, nb_real h)
+static void add_contact(piece_sum *sum, const medium_hit *k, nb_wide start, nb_wide end, nb_real h)
 {
     const nb_estimate along = contact_integral(k, start, end, h);
     add_estimate(sum, k, &along);
@@ -171,13 +171,13 @@ static piece_sum no_sum(void)
 }
 
 /* A piece is mixed where some density varies and not all media give the same light per extinction. */
-static piece_sum sum_piece(const march *m, const piece *p)
+static piece_sum sum_piece(const packet_state *m, const ray_segment *p)
 {
     piece_sum sum = no_sum();
     nb_mask seen = nb_mask_false, uneven = nb_mask_false, emits = nb_mask_false, varies = nb_mask_false;
     nb_real first[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         if (m->whole != NULL)
             add_estimate(&sum, k, m->whole);
         else
@@ -201,7 +201,7 @@ static piece_sum sum_piece(const march *m, const piece *p)
 
 /* By what factor the light of a piece may be off through the optical depth before it and in it; where all is opaque
  * only the relative error of the latter counts. */
-static nb_real attenuation_error(const gathered *g, const piece_sum *sum, int c)
+static nb_real attenuation_error(const gathered_light *g, const piece_sum *sum, int c)
 {
     return nb_min(g->depth_error[c] + nb_min(sum->depth_error[c], sum->relative_error), NB_F(1.0)) +
            NB_F(32.0) * NB_EPSILON;
@@ -209,7 +209,7 @@ static nb_real attenuation_error(const gathered *g, const piece_sum *sum, int c)
 
 /* Where light is radiance times extinction a piece adds radiance (1 - e^-depth), which does not change where all is
  * opaque; e^-y <= 1 / (1 + y + y^2 / 2). */
-static nb_real even_error(const gathered *g, const piece_sum *sum, int c)
+static nb_real even_error(const gathered_light *g, const piece_sum *sum, int c)
 {
     const nb_real radiance = sum->light[c] / nb_max(sum->depth[c], NB_TINY);
     const nb_real least = nb_max(sum->depth[c] - sum->depth_error[c], NB_F(0.0));
@@ -218,7 +218,7 @@ static nb_real even_error(const gathered *g, const piece_sum *sum, int c)
 }
 
 /* The closed form: light (1 - e^-depth) / depth, seen through what lies before. */
-static void gather_closed(gathered *g, const piece_sum *sum, nb_mask lanes)
+static void gather_closed(gathered_light *g, const piece_sum *sum, nb_mask lanes)
 {
     const nb_mask loose = nb_and(nb_and(lanes, sum->even), sum->relative_error > NB_F(1024.0) * NB_EPSILON);
     nb_real most = NB_F(0.0);
@@ -239,10 +239,10 @@ static void gather_closed(gathered *g, const piece_sum *sum, nb_mask lanes)
 
 /* The density of fog that grows without bound ends to grow at 1e18: see nb_height_density. Where a piece of fog so
  * dense lets light through, nothing is known of the light: it may be beyond all numbers. */
-static void note_overflow(const march *m, const piece *p, gathered *g)
+static void note_overflow(const packet_state *m, const ray_segment *p, gathered_light *g)
 {
     for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         if (!grows_without_bound(&k->medium->body.density)) continue;
         const nb_real lowest = lowest_coordinate(k, p->start, p->end);
         const nb_mask overflows = nb_and(nb_and(p->lanes, k->inside), lowest < NB_F(-41.0));
@@ -259,7 +259,7 @@ static void note_overflow(const march *m, const piece *p, gathered *g)
 }
 
 /* Moves behind the piece. */
-static void pass_piece(gathered *g, const piece_sum *sum)
+static void pass_piece(gathered_light *g, const piece_sum *sum)
 {
     for (int c = 0; c < 3; c++) {
         g->depth[c] = g->depth[c] + sum->depth[c];
@@ -271,21 +271,21 @@ static void pass_piece(gathered *g, const piece_sum *sum)
 
 /* Lanes in which the ends may matter: there they are counted where they are, seen through the fog before them;
  * elsewhere their plain sum is small enough to report. */
-static nb_mask ends_matter(const march *m)
+static nb_mask ends_matter(const packet_state *m)
 {
     return largest(m->all_ends.depth) + largest(m->all_ends.light) > NB_F(16.0) * NB_EPSILON;
 }
 
 /* Within slack of t, whatever ends with slack of their own do: where the body may be somewhere, and where it is
  * everywhere. */
-typedef struct presence {
+typedef struct active_mask {
     nb_mask may, must;
-} presence;
+} active_mask;
 
 /* The leaf `which` may be or not; NO_LEAF: none. */
 #define NO_LEAF SIZE_MAX
 
-static presence body_near(const march *m, const contact *k, size_t which, nb_wide t, nb_wide slack)
+static active_mask body_near(const packet_state *m, const medium_hit *k, size_t which, nb_wide t, nb_wide slack)
 {
     const nb_volume *body = &k->medium->body;
     const nb_wide from = nb_wmax(t - slack, NB_W(0.0)), to = nb_wmin(t + slack, m->rays.t_max);
@@ -308,23 +308,23 @@ static presence body_near(const march *m, const contact *k, size_t which, nb_wid
         top++;
         leaf++;
     }
-    return (presence){most[0], least[0]};
+    return (active_mask){most[0], least[0]};
 }
 
 /* Whether an end of a leaf within slack of t may be an end of the body: not where other leaves hold the body together
  * there, or leave it out. */
-static nb_mask may_end_body(const march *m, const contact *k, size_t which, nb_wide t, nb_wide slack)
+static nb_mask may_end_body(const packet_state *m, const medium_hit *k, size_t which, nb_wide t, nb_wide slack)
 {
-    const presence near = body_near(m, k, which, t, slack);
+    const active_mask near = body_near(m, k, which, t, slack);
     return nb_and(near.may, nb_not(near.must));
 }
 
 /* Whether something that ranks higher takes a medium's fog away all about t, so that its ends there do nothing. */
-static nb_mask is_covered_near(const march *m, const contact *k, nb_wide t, nb_wide slack)
+static nb_mask is_covered_near(const packet_state *m, const medium_hit *k, nb_wide t, nb_wide slack)
 {
     nb_mask covered = nb_mask_false;
     for (size_t i = m->window_count; i-- > 0;) {
-        const contact *other = in_window(m, i);
+        const medium_hit *other = in_window(m, i);
         if (other->medium->body.rank <= k->medium->body.rank) break;
         if (nb_volume_covers(&other->medium->body))
             covered = nb_or(covered, body_near(m, other, NO_LEAF, t, slack).must);
@@ -334,25 +334,26 @@ static nb_mask is_covered_near(const march *m, const contact *k, nb_wide t, nb_w
 
 /* Ends at t, and what those that may already lie before t may take from the fog there: where fog begins it can only be
  * more. */
-typedef struct passing {
+typedef struct segment_pass {
     nb_wide t;
     nb_mask lanes;
-    ends here, less;
+    interval_ends here, less;
     nb_real weighed[3];
-} passing;
+} segment_pass;
 
 /* Moving an end brings light and takes as much from the light behind, which is all the same where fog begins that is
  * opaque further on. Where the radiance is known but for its error, so is what lies behind: ends are moved one by one,
  * the farthest first, and each changes the radiance by no more than |light T - depth (S - S before)|, depth times the
  * error, and what others do to that within the slack. */
-static void weigh_end(const march *m, const gathered *g, passing *p, const contact *k, nb_wide end, nb_real slack)
+static void weigh_end(const packet_state *m, const gathered_light *g, segment_pass *p, const medium_hit *k, nb_wide end,
+                      nb_real slack)
 {
     const nb_wide wide_slack = nb_widen(slack);
     const int adds = !nb_volume_covers(&k->medium->body);
-    ends others = no_ends();
+    interval_ends others = no_ends();
     nb_real moved[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *fog = &m->contacts[i];
+        const medium_hit *fog = &m->contacts[i];
         if (!nb_volume_has_fog(&fog->medium->body)) continue;
         const nb_wmask near = nb_wand(end + wide_slack >= fog->hull_enter, end - wide_slack <= fog->hull_leave);
         const nb_real weight = nb_select(nb_narrow_mask(near), slack * end_density(fog, end, slack), NB_F(0.0));
@@ -376,8 +377,8 @@ static void weigh_end(const march *m, const gathered *g, passing *p, const conta
     }
 }
 
-static void pass_end(const march *m, const gathered *g, passing *p, const contact *k, size_t leaf, nb_wide end,
-                     nb_real slack, int fog_ends)
+static void pass_end(const packet_state *m, const gathered_light *g, segment_pass *p, const medium_hit *k, size_t leaf,
+                     nb_wide end, nb_real slack, int fog_ends)
 {
     if (!nb_any(slack > NB_F(0.0))) return;
     const nb_wide wide_slack = nb_widen(slack);
@@ -394,7 +395,8 @@ static void pass_end(const march *m, const gathered *g, passing *p, const contac
     if (fog_ends && nb_any(may_be_before)) add_end(m, &p->less, k, end, nb_select(may_be_before, slack, NB_F(0.0)));
 }
 
-static void pass_ends_of(const march *m, const gathered *g, passing *p, const contact *k, nb_mask lanes)
+static void pass_ends_of(const packet_state *m, const gathered_light *g, segment_pass *p, const medium_hit *k,
+                         nb_mask lanes)
 {
     const int covers = nb_volume_covers(&k->medium->body), has_fog = nb_volume_has_fog(&k->medium->body);
     for (size_t j = 0; j < k->medium->body.leaf_count; j++) {
@@ -406,16 +408,16 @@ static void pass_ends_of(const march *m, const gathered *g, passing *p, const co
 }
 
 /* Ends of the crowd that may be at t, of those not passed yet. */
-static void pass_ends_of_crowd(const march *m, const gathered *g, passing *p, nb_mask lanes)
+static void pass_ends_of_crowd(const packet_state *m, const gathered_light *g, segment_pass *p, nb_mask lanes)
 {
-    const crowd *c = &m->crowd;
+    const overlap_set *c = &m->crowd;
     for (int i = 0; i < NB_WIDTH; i++) {
         if (!nb_lane(lanes, i)) continue;
-        const crowd_event *events = &c->events[2 * c->seats * (size_t)i];
+        const overlap_event *events = &c->events[2 * c->seats * (size_t)i];
         const lane_place here = nb_lane(p->t, i);
         p->lanes = one_lane(i);
         for (size_t j = c->next[i]; j < c->count[i] && events[j].reach <= here; j++) {
-            const contact *k = &m->contacts[events[j].contact];
+            const medium_hit *k = &m->contacts[events[j].contact];
             const leaf_span *span = &m->spans[k->first_span];
             if (events[j].enters)
                 pass_end(m, g, p, k, 0, span->enter, span->enter_slack, 0);
@@ -426,11 +428,11 @@ static void pass_ends_of_crowd(const march *m, const gathered *g, passing *p, nb
 }
 
 /* Window and crowd hold all media where ends are watched. */
-static void pass_ends(const march *m, gathered *g, nb_wide t, nb_mask lanes)
+static void pass_ends(const packet_state *m, gathered_light *g, nb_wide t, nb_mask lanes)
 {
-    passing p = {t, lanes, no_ends(), no_ends(), {NB_F(0.0), NB_F(0.0), NB_F(0.0)}};
+    segment_pass p = {t, lanes, no_ends(), no_ends(), {NB_F(0.0), NB_F(0.0), NB_F(0.0)}};
     for (size_t i = 0; i < m->window_count; i++) {
-        const contact *k = in_window(m, i);
+        const medium_hit *k = in_window(m, i);
         pass_ends_of(m, g, &p, k, lanes);
     }
     if (m->crowd.is_walking) pass_ends_of_crowd(m, g, &p, lanes);
@@ -447,12 +449,12 @@ static void pass_ends(const march *m, gathered *g, nb_wide t, nb_mask lanes)
 }
 
 /* Endless light: the piece has no end, something in it shines, and nothing in it absorbs. */
-static nb_mask is_unbounded(const march *m, const piece *p, const piece_sum *sum)
+static nb_mask is_unbounded(const packet_state *m, const ray_segment *p, const piece_sum *sum)
 {
     nb_mask endless = nb_mask_false;
     const nb_mask open = nb_and(p->lanes, p->length >= NB_F(0.5) * NB_FAR);
     for (size_t i = m->present_first; i < m->present_end && nb_any(open); i++) {
-        const contact *k = present(m, i);
+        const medium_hit *k = present(m, i);
         if (!k->medium->emits) continue;
         const nb_mask here = nb_and(
             open, nb_and(k->inside, contact_integral(k, p->start, p->end, p->length).value >= NB_F(0.5) * NB_FAR));

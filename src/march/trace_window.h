@@ -12,28 +12,28 @@
 #define WINDOW_STEP 8
 
 /* Where any lane is within a medium: not inside (first, last) of the whole packet. */
-typedef struct stretch {
+typedef struct active_interval {
     double first, last;
     uint32_t contact;
-} stretch;
+} active_interval;
 
-static contact *in_window(const march *m, size_t i)
+static medium_hit *in_window(const packet_state *m, size_t i)
 {
     return &m->contacts[m->window[i]];
 }
 
-static contact *present(const march *m, size_t i)
+static medium_hit *present(const packet_state *m, size_t i)
 {
     return &m->contacts[m->present[i]];
 }
 
-static stretch stretch_of(const march *m, uint32_t index)
+static active_interval stretch_of(const packet_state *m, uint32_t index)
 {
-    const contact *k = &m->contacts[index];
+    const medium_hit *k = &m->contacts[index];
     double enter[NB_WIDTH], leave[NB_WIDTH];
     nb_wstore_lanes(enter, k->hull_enter);
     nb_wstore_lanes(leave, k->hull_leave);
-    stretch r = {enter[0], leave[0], index};
+    active_interval r = {enter[0], leave[0], index};
     for (int i = 1; i < NB_WIDTH; i++) {
         r.first = enter[i] < r.first ? enter[i] : r.first;
         r.last = leave[i] > r.last ? leave[i] : r.last;
@@ -45,13 +45,13 @@ static stretch stretch_of(const march *m, uint32_t index)
 
 static int compare_stretches(const void *a, const void *b)
 {
-    const stretch *x = a, *y = b;
+    const active_interval *x = a, *y = b;
     if (x->first != y->first) return x->first < y->first ? -1 : 1;
     return (x->contact > y->contact) - (x->contact < y->contact);
 }
 
 /* All media at once: where there are few of them, or where ends of one may lie beyond its reach. */
-static void look_at_all(march *m)
+static void look_at_all(packet_state *m)
 {
     m->window_count = 0;
     for (uint32_t i = 0; i < m->contact_count; i++)
@@ -61,7 +61,7 @@ static void look_at_all(march *m)
 }
 
 /* Takes the next media in, and lets go of those that end before `behind`. */
-static void move_window(march *m, double behind)
+static void move_window(packet_state *m, double behind)
 {
     size_t kept = 0;
     for (size_t i = 0; i < m->window_count; i++)
@@ -77,7 +77,7 @@ static void move_window(march *m, double behind)
     m->window_end = m->entered < m->stretch_count ? m->stretches[m->entered].first : HUGE_VAL;
 }
 
-static void open_window(march *m, int at_all)
+static void open_window(packet_state *m, int at_all)
 {
     if (at_all || m->contact_count <= FEW_CONTACTS) {
         look_at_all(m);
@@ -86,7 +86,7 @@ static void open_window(march *m, int at_all)
     m->stretch_count = 0;
     for (uint32_t i = 0; i < m->contact_count; i++) {
         if (is_in_crowd(m, i)) continue;
-        const stretch s = stretch_of(m, i);
+        const active_interval s = stretch_of(m, i);
         m->stretches[m->stretch_count++] = s;
         m->lasts[i] = s.last;
     }

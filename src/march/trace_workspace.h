@@ -4,16 +4,16 @@
 #define ALIGNMENT 64
 
 typedef struct workspace {
-    contact contacts[STACK_CONTACTS];
+    medium_hit contacts[STACK_CONTACTS];
     leaf_span spans[2 * STACK_CONTACTS];
     uint32_t window[STACK_CONTACTS], present[STACK_CONTACTS];
-    stretch stretches[STACK_CONTACTS];
+    active_interval stretches[STACK_CONTACTS];
     double lasts[STACK_CONTACTS];
     size_t contact_capacity, span_capacity;
     void *contact_memory, *window_memory, *span_memory; /* as allocated; NULL while the stack suffices */
     uint32_t *found;                                    /* media that the packet may meet, by index */
     size_t found_count, found_capacity;
-    march m;
+    packet_state m;
 } workspace;
 
 /* Moves `used` of an array of `size` bytes per element to a larger aligned one. NULL when memory is out. */
@@ -35,7 +35,7 @@ static void *grow_aligned(const nebel_allocator *allocator, const void *old, siz
 /* Room for a window of `capacity` contacts, which are not known yet. 0 when memory is out. */
 static int reserve_window(workspace *w, const nebel_allocator *allocator, size_t capacity)
 {
-    march *m = &w->m;
+    packet_state *m = &w->m;
     nb_release(allocator, w->window_memory);
     w->window_memory =
         nb_allocate(allocator, capacity, sizeof *m->stretches + sizeof *m->lasts + 2 * sizeof *m->window);
@@ -50,11 +50,11 @@ static int reserve_window(workspace *w, const nebel_allocator *allocator, size_t
 /* Room for one more contact and its leaves. 0 when memory is out. */
 static int reserve(workspace *w, const nebel_allocator *allocator, size_t leaves)
 {
-    march *m = &w->m;
+    packet_state *m = &w->m;
     const size_t contacts = m->contact_count + 2; /* and one for the crowd */
     if (contacts > w->contact_capacity) {
-        contact *moved = grow_aligned(allocator, m->contacts, m->contact_count, sizeof *moved, &w->contact_capacity,
-                                      contacts, &w->contact_memory);
+        medium_hit *moved = grow_aligned(allocator, m->contacts, m->contact_count, sizeof *moved, &w->contact_capacity,
+                                         contacts, &w->contact_memory);
         if (moved == NULL) return 0;
         m->contacts = moved;
         if (!reserve_window(w, allocator, w->contact_capacity)) return 0;

@@ -9,39 +9,39 @@
 #include <math.h>
 
 /* world = matrix local + offset; the matrix row by row */
-typedef struct nb_affine {
+typedef struct nb_affine_quad {
     nb_quad matrix[9], offset[3];
-} nb_affine;
+} nb_affine_quad;
 
-static inline nb_affine nb_affine_identity(void)
+static inline nb_affine_quad nb_affine_identity(void)
 {
-    return (nb_affine){{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
+    return (nb_affine_quad){{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
 }
 
 /* Neither turns nor scales. */
-static inline int nb_affine_is_shift(const nb_affine *a)
+static inline int nb_affine_is_shift(const nb_affine_quad *a)
 {
     for (int i = 0; i < 9; i++)
         if (a->matrix[i] != (i % 4 == 0 ? 1 : 0)) return 0;
     return 1;
 }
 
-static inline void nb_affine_direction(const nb_affine *a, const nb_quad v[3], nb_quad out[3])
+static inline void nb_affine_direction(const nb_affine_quad *a, const nb_quad v[3], nb_quad out[3])
 {
     for (int i = 0; i < 3; i++)
         out[i] = a->matrix[3 * i] * v[0] + a->matrix[3 * i + 1] * v[1] + a->matrix[3 * i + 2] * v[2];
 }
 
-static inline void nb_affine_point(const nb_affine *a, const nb_quad p[3], nb_quad out[3])
+static inline void nb_affine_point(const nb_affine_quad *a, const nb_quad p[3], nb_quad out[3])
 {
     nb_affine_direction(a, p, out);
     for (int i = 0; i < 3; i++) out[i] += a->offset[i];
 }
 
 /* scale first, then rotation, then position; zero rotation or scale mean none */
-static inline nb_affine nb_affine_from_transform(const nebel_transform *t)
+static inline nb_affine_quad nb_affine_from_transform(const nebel_transform *t)
 {
-    nb_affine a = nb_affine_identity();
+    nb_affine_quad a = nb_affine_identity();
     const nb_quad x = (nb_quad)t->rotation[0], y = (nb_quad)t->rotation[1];
     const nb_quad z = (nb_quad)t->rotation[2], w = (nb_quad)t->rotation[3];
     const nb_quad n = x * x + y * y + z * z + w * w;
@@ -59,9 +59,9 @@ static inline nb_affine nb_affine_from_transform(const nebel_transform *t)
 }
 
 /* outer after inner */
-static inline nb_affine nb_affine_compose(const nb_affine *outer, const nb_affine *inner)
+static inline nb_affine_quad nb_affine_compose(const nb_affine_quad *outer, const nb_affine_quad *inner)
 {
-    nb_affine out = *inner;
+    nb_affine_quad out = *inner;
     for (int i = 0; i < 3; i++) out.offset[i] += outer->offset[i];
     if (nb_affine_is_shift(outer)) return out;
     for (int i = 0; i < 3; i++)
@@ -75,7 +75,7 @@ static inline nb_affine nb_affine_compose(const nb_affine *outer, const nb_affin
 }
 
 /* The inverse of the matrix by its cofactors; 0 where it is singular. */
-static inline int nb_affine_invert_matrix(const nb_affine *a, nb_quad out[9])
+static inline int nb_affine_invert_matrix(const nb_affine_quad *a, nb_quad out[9])
 {
     const nb_quad *m = a->matrix;
     for (int i = 0; i < 3; i++)

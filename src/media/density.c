@@ -119,7 +119,7 @@ static double soft_edge_density(const nb_volume *volume, const double place[3])
 static double round_edge_density(const nb_volume *volume, const double place[3])
 {
     const nb_leaf *leaf = &volume->leaves[0];
-    const nb_edge *edge = &volume->edge;
+    const nb_soft_edge *edge = &volume->edge;
     const int ball = leaf->type == NB_LEAF_BALL;
     const nb_wvec3 p = nb_wscale3(to_leaf(leaf, place), ball ? 1 / (nb_wide)leaf->radius : 1);
     const nb_round_edge at =

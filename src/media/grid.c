@@ -74,20 +74,21 @@ static uint64_t hash_bytes(const char *bytes, size_t count)
 }
 
 /* Voxels along an axis. */
-typedef struct pair {
+typedef struct nb_voxel_pair {
     int low, high;
-} pair;
+} nb_voxel_pair;
 
 /* The voxels from `low` to `high` of an axis that cells of a brick need, whichever the filter. */
-static pair voxels_of_brick(const nebel_grid *grid, int axis, int index)
+static nb_voxel_pair voxels_of_brick(const nebel_grid *grid, int axis, int index)
 {
     const int first = index * BRICK - 1, last = index * BRICK + BRICK - 1, end = grid->size[axis] - 1;
-    return (pair){first < 0 ? 0 : first < end ? first : end, last < end ? last : end};
+    return (nb_voxel_pair){first < 0 ? 0 : first < end ? first : end, last < end ? last : end};
 }
 
 static brick measure_brick(const nebel_grid *grid, int x, int y, int z)
 {
-    const pair i = voxels_of_brick(grid, 0, x), j = voxels_of_brick(grid, 1, y), k = voxels_of_brick(grid, 2, z);
+    const nb_voxel_pair i = voxels_of_brick(grid, 0, x), j = voxels_of_brick(grid, 1, y),
+                        k = voxels_of_brick(grid, 2, z);
     brick b = {HUGE_VAL, -HUGE_VAL};
     for (int c = k.low; c <= k.high; c++)
         for (int r = j.low; r <= j.high; r++)

@@ -9,7 +9,7 @@
 
 /* A lattice and what keeps it. */
 typedef struct body {
-    nb_grid_lattice lattice;
+    nb_sun_lattice lattice;
     nebel_allocator allocator;
     atomic_size_t owners;
     nebel_grid *grid;
@@ -26,7 +26,7 @@ static int steepest_axis(const double to_sun[3])
     return axis;
 }
 
-static void set_axes(nb_grid_lattice *l, int axis, const double to_sun[3])
+static void set_axes(nb_sun_lattice *l, int axis, const double to_sun[3])
 {
     l->axis = axis;
     for (int s = 0; s < 2; s++) {
@@ -36,7 +36,7 @@ static void set_axes(nb_grid_lattice *l, int axis, const double to_sun[3])
 }
 
 /* Columns enough for all ways that meet the cells, and one more on either side. */
-static void set_counts(nb_grid_lattice *l, const nebel_grid *grid)
+static void set_counts(nb_sun_lattice *l, const nebel_grid *grid)
 {
     const double layers = nb_grid_cells(grid, l->axis);
     for (int s = 0; s < 2; s++) {
@@ -50,18 +50,18 @@ static void set_counts(nb_grid_lattice *l, const nebel_grid *grid)
     for (int i = 0; i < 3; i++) l->blocks[i] = (l->count[i] + NB_LATTICE_BLOCK - 1) / NB_LATTICE_BLOCK;
 }
 
-static size_t node_count(const nb_grid_lattice *l)
+static size_t node_count(const nb_sun_lattice *l)
 {
     return (size_t)l->count[0] * (size_t)l->count[1] * (size_t)l->count[2];
 }
 
-static size_t block_count(const nb_grid_lattice *l)
+static size_t block_count(const nb_sun_lattice *l)
 {
     return (size_t)l->blocks[0] * (size_t)l->blocks[1] * (size_t)l->blocks[2];
 }
 
-static void lay_along(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], int axis,
-                      nb_lattice_limit limit)
+static void lay_along(nb_sun_lattice *l, const nebel_grid *grid, const double to_sun[3], int axis,
+                      nb_sun_lattice_limit limit)
 {
     set_axes(l, axis, to_sun);
     l->per_cell = limit.per_cell;
@@ -69,13 +69,13 @@ static void lay_along(nb_grid_lattice *l, const nebel_grid *grid, const double t
     set_counts(l, grid);
 }
 
-void nb_grid_lattice_lay(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], nb_lattice_limit limit)
+void nb_grid_lattice_lay(nb_sun_lattice *l, const nebel_grid *grid, const double to_sun[3], nb_sun_lattice_limit limit)
 {
     const int steepest = steepest_axis(to_sun);
     lay_along(l, grid, to_sun, steepest, limit);
     /* Too many nodes: flat grids have fewer layers across, in which columns lean more. */
     for (int axis = 0; axis < 3 && node_count(l) > limit.most_nodes; axis++) {
-        nb_grid_lattice other = *l;
+        nb_sun_lattice other = *l;
         if (2 * fabs(to_sun[axis]) < fabs(to_sun[steepest])) continue;
         lay_along(&other, grid, to_sun, axis, limit);
         if (node_count(&other) < node_count(l)) *l = other;
@@ -93,13 +93,13 @@ void nb_grid_lattice_lay(nb_grid_lattice *l, const nebel_grid *grid, const doubl
 #define HELD 0.25
 
 /* Layers, in cells. */
-static double cells_along(const nb_grid_lattice *l)
+static double cells_along(const nb_sun_lattice *l)
 {
     return (l->count[2] - 1) / l->per_layer;
 }
 
 /* Along a side, of a column so many cells along the axis. */
-static double place_of(const nb_grid_lattice *l, int s, double column, double layer)
+static double place_of(const nb_sun_lattice *l, int s, double column, double layer)
 {
     return (l->first[s] + column) / l->per_cell + l->lean[s] * layer;
 }
@@ -108,7 +108,7 @@ static double place_of(const nb_grid_lattice *l, int s, double column, double la
 enum { MOST_PARTS = 5 };
 
 /* Places along the axis at which parts of a column begin and end, ascending; returns how many parts there are. */
-static int part_column(const nb_grid_lattice *l, const nebel_grid *grid, const double column[2],
+static int part_column(const nb_sun_lattice *l, const nebel_grid *grid, const double column[2],
                        double layer[MOST_PARTS + 1])
 {
     const double last = cells_along(l);
@@ -137,7 +137,7 @@ typedef struct column_space {
 
 /* The line from layer `start` towards `end`, away from the sun. Returns 0 where it is beside a box without fog at its
  * sides. */
-static int set_line(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], const double column[2],
+static int set_line(const nb_sun_lattice *l, const nebel_grid *grid, const double to_sun[3], const double column[2],
                     double start, double end, nb_grid_line *line)
 {
     int is_beside = 0;
@@ -156,8 +156,8 @@ static int set_line(const nb_grid_lattice *l, const nebel_grid *grid, const doub
 }
 
 /* From the sun down, so that the integral from a place to the sun is that of the walk so far. */
-static void walk_column(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3],
-                        const double column[2], const column_space *space)
+static void walk_column(const nb_sun_lattice *l, const nebel_grid *grid, const double to_sun[3], const double column[2],
+                        const column_space *space)
 {
     double layer[MOST_PARTS + 1];
     const int parts = part_column(l, grid, column, layer);
@@ -182,7 +182,7 @@ static uint16_t number_of(double amount)
     return (uint16_t)fmin(fmax(amount + 0.5, 0), UINT16_MAX);
 }
 
-static void fill_column(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], const int column[2],
+static void fill_column(nb_sun_lattice *l, const nebel_grid *grid, const double to_sun[3], const int column[2],
                         const column_space *space)
 {
     uint16_t *node = l->amount + (size_t)column[1] * (size_t)l->count[0] + (size_t)column[0];
@@ -194,7 +194,7 @@ static void fill_column(nb_grid_lattice *l, const nebel_grid *grid, const double
     }
 }
 
-static int fill_columns(nb_grid_lattice *l, const nebel_grid *grid, const nebel_allocator *allocator,
+static int fill_columns(nb_sun_lattice *l, const nebel_grid *grid, const nebel_allocator *allocator,
                         const double to_sun[3])
 {
     const size_t nodes = (size_t)l->count[2];
@@ -207,7 +207,7 @@ static int fill_columns(nb_grid_lattice *l, const nebel_grid *grid, const nebel_
     return 1;
 }
 
-static double longest_amount(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3])
+static double longest_amount(const nb_sun_lattice *l, const nebel_grid *grid, const double to_sun[3])
 {
     return fmax(cells_along(l) / fabs(to_sun[l->axis]) * nb_grid_peak(grid), 1e-30);
 }
@@ -228,7 +228,7 @@ static int has_fog_at(const nebel_grid *grid, int across)
     return 0;
 }
 
-static void set_ends(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3])
+static void set_ends(nb_sun_lattice *l, const nebel_grid *grid, const double to_sun[3])
 {
     l->up = to_sun[l->axis] > 0;
     l->ends_in_fog = !nb_grid_is_linear(grid) || has_fog_at(grid, 0) || has_fog_at(grid, 1) || has_fog_at(grid, 2);
@@ -247,7 +247,7 @@ static int bend_of(int before, int here, int behind, int index, int count)
 }
 
 /* Blocks that have the node, or whose last cells it bounds. */
-static void note_deviation(nb_grid_lattice *l, int i, int j, int k, uint16_t off)
+static void note_deviation(nb_sun_lattice *l, int i, int j, int k, uint16_t off)
 {
     const int at[3] = {i, j, k};
     int low[3], high[3];
@@ -266,7 +266,7 @@ static void note_deviation(nb_grid_lattice *l, int i, int j, int k, uint16_t off
 
 /* Half way between nodes linear interpolation is off by an eighth of the second difference, on the average by a twelfth.
  * `below` and `here` are copies of layers as they were filled. */
-static void finish_layer(nb_grid_lattice *l, int k, const uint16_t *below, const uint16_t *here)
+static void finish_layer(nb_sun_lattice *l, int k, const uint16_t *below, const uint16_t *here)
 {
     const int across = l->count[0];
     const size_t layer = (size_t)across * (size_t)l->count[1];
@@ -285,7 +285,7 @@ static void finish_layer(nb_grid_lattice *l, int k, const uint16_t *below, const
         }
 }
 
-static int finish_layers(nb_grid_lattice *l, const nebel_allocator *allocator)
+static int finish_layers(nb_sun_lattice *l, const nebel_allocator *allocator)
 {
     const size_t layer = (size_t)l->count[0] * (size_t)l->count[1];
     uint16_t *memory = nb_allocate(allocator, 2 * layer, sizeof *memory);
@@ -307,7 +307,7 @@ static int finish_layers(nb_grid_lattice *l, const nebel_allocator *allocator)
 /* ---- flaws ----------------------------------------------------------------------------------- */
 
 /* The sum of a cell's eight nodes, and the least of them. */
-static double sum_corners(const nb_grid_lattice *l, int i, int j, int k, double *least)
+static double sum_corners(const nb_sun_lattice *l, int i, int j, int k, double *least)
 {
     const size_t row = (size_t)l->count[0], layer = row * (size_t)l->count[1];
     double sum = 0;
@@ -323,7 +323,7 @@ static double sum_corners(const nb_grid_lattice *l, int i, int j, int k, double 
 
 /* Steps from where the way to the sun leaves the box to the last layer, at most, of the columns of a cell: they are no part of that
  * way, where columns go on beside the box. */
-static double most_outside(const nb_grid_lattice *l, int i, int j)
+static double most_outside(const nb_sun_lattice *l, int i, int j)
 {
     const size_t row = (size_t)l->count[0], layer = row * (size_t)l->count[1];
     double most = 0;
@@ -343,7 +343,7 @@ static double most_outside(const nb_grid_lattice *l, int i, int j)
 
 /* Of one cell, `true_middle` steps in its middle. Second differences alone do not see what changes from cell to cell and back, nor
  * does the middle alone where bends along two axes cancel there. */
-static int is_flawed(const nb_grid_lattice *l, const int cell[3], double true_middle, double outside,
+static int is_flawed(const nb_sun_lattice *l, const int cell[3], double true_middle, double outside,
                      const nb_lattice_demand *demand)
 {
     double least;
@@ -355,7 +355,7 @@ static int is_flawed(const nb_grid_lattice *l, const int cell[3], double true_mi
     return -expm1(-off * unit) * exp(-fmax(least - outside - off, 0) * unit) > demand->tolerance;
 }
 
-int nb_grid_lattice_find_flaws(const nb_grid_lattice *l, const nb_lattice_demand *demand, uint8_t *flawed)
+int nb_grid_lattice_find_flaws(const nb_sun_lattice *l, const nb_lattice_demand *demand, uint8_t *flawed)
 {
     const body *b = (const body *)(const void *)l;
     const size_t cells = (size_t)l->count[2] - 1;
@@ -388,7 +388,7 @@ static void free_body(body *b)
     nb_release(&allocator, b);
 }
 
-static int fill_lattice(nb_grid_lattice *l, const nebel_grid *grid, const nebel_allocator *allocator,
+static int fill_lattice(nb_sun_lattice *l, const nebel_grid *grid, const nebel_allocator *allocator,
                         const double to_sun[3])
 {
     set_ends(l, grid, to_sun);
@@ -400,8 +400,8 @@ static int fill_lattice(nb_grid_lattice *l, const nebel_grid *grid, const nebel_
     return finish_layers(l, allocator);
 }
 
-nb_grid_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *allocator, const double to_sun[3],
-                                      nb_lattice_limit limit)
+nb_sun_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *allocator, const double to_sun[3],
+                                     nb_sun_lattice_limit limit)
 {
     body *b = nb_allocate_zero(allocator, 1, sizeof *b);
     if (b == NULL) return NULL;
@@ -415,19 +415,19 @@ nb_grid_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *a
     return NULL;
 }
 
-nb_grid_lattice *nb_grid_lattice_retain(nb_grid_lattice *lattice)
+nb_sun_lattice *nb_grid_lattice_retain(nb_sun_lattice *lattice)
 {
     if (lattice != NULL) atomic_fetch_add_explicit(&((body *)(void *)lattice)->owners, 1, memory_order_relaxed);
     return lattice;
 }
 
-void nb_grid_lattice_release(nb_grid_lattice *lattice)
+void nb_grid_lattice_release(nb_sun_lattice *lattice)
 {
     body *b = (body *)(void *)lattice;
     if (b != NULL && atomic_fetch_sub_explicit(&b->owners, 1, memory_order_acq_rel) == 1) free_body(b);
 }
 
-int nb_grid_lattice_is_of(const nb_grid_lattice *lattice, const nebel_grid *grid, const double to_sun[3])
+int nb_grid_lattice_is_of(const nb_sun_lattice *lattice, const nebel_grid *grid, const double to_sun[3])
 {
     const body *b = (const body *)(const void *)lattice;
     return b->grid == grid && memcmp(b->to_sun, to_sun, sizeof b->to_sun) == 0;

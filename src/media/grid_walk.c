@@ -6,14 +6,14 @@
 /* ---- in a cell ------------------------------------------------------------------------------- */
 
 /* The voxels that a cell interpolates between along an axis; two that are the same at the rim, and where nearest. */
-typedef struct pair {
+typedef struct nb_cell_pair {
     int low, high;
-} pair;
+} nb_cell_pair;
 
-INLINE pair pair_of(const nebel_grid *grid, int axis, int cell)
+INLINE nb_cell_pair pair_of(const nebel_grid *grid, int axis, int cell)
 {
-    if (grid->filter == NEBEL_GRID_FILTER_NEAREST) return (pair){cell, cell};
-    return (pair){cell > 0 ? cell - 1 : 0, cell < grid->size[axis] ? cell : cell - 1};
+    if (grid->filter == NEBEL_GRID_FILTER_NEAREST) return (nb_cell_pair){cell, cell};
+    return (nb_cell_pair){cell > 0 ? cell - 1 : 0, cell < grid->size[axis] ? cell : cell - 1};
 }
 
 /* The eight voxels of a cell, x fastest. */
@@ -28,7 +28,7 @@ typedef struct corner_steps {
 
 INLINE void find_steps(corner_steps *steps, const nebel_grid *grid, int axis, int cell)
 {
-    const pair p = pair_of(grid, axis, cell);
+    const nb_cell_pair p = pair_of(grid, axis, cell);
     steps->low[axis] = (size_t)p.low * grid->stride[axis];
     steps->high[axis] = (size_t)p.high * grid->stride[axis];
 }
@@ -85,15 +85,15 @@ INLINE double share_of(double place, int cell)
 
 /* A walk from one block of cells to the next, for bricks and for the cells in one: where the ray crosses the next face
  * of each axis. Faces are counted in cells; crossings are computed from their numbers, so that errors do not add up. */
-typedef struct walk {
+typedef struct nb_grid_traversal {
     int block[3], first[3], last[3]; /* within first and last */
     int width;                       /* cells of a block along an axis */
     int way[3];                      /* -1, 0, 1: to the next block */
     double inverse[3];               /* of the slope */
     double next[3];                  /* t at which the ray leaves the block, HUGE_VAL where it does not */
-} walk;
+} nb_grid_traversal;
 
-INLINE double crossing(const nb_grid_line *line, const walk *w, int axis)
+INLINE double crossing(const nb_grid_line *line, const nb_grid_traversal *w, int axis)
 {
     const int forward = w->way[axis] > 0;
     if (w->way[axis] == 0 || w->block[axis] == (forward ? w->last[axis] : w->first[axis])) return HUGE_VAL;
@@ -101,7 +101,7 @@ INLINE double crossing(const nb_grid_line *line, const walk *w, int axis)
 }
 
 /* At a face the ray is in the block that it enters. */
-INLINE int block_at(const nb_grid_line *line, const walk *w, int axis, double t)
+INLINE int block_at(const nb_grid_line *line, const nb_grid_traversal *w, int axis, double t)
 {
     const double place = (line->from[axis] + line->slope[axis] * t) / w->width;
     const int block = (int)smaller(larger(place, 0), 1 << 24);
@@ -109,7 +109,7 @@ INLINE int block_at(const nb_grid_line *line, const walk *w, int axis, double t)
     return at < w->first[axis] ? w->first[axis] : at > w->last[axis] ? w->last[axis] : at;
 }
 
-INLINE void start_walk(walk *w, const nb_grid_line *line, double t)
+INLINE void start_walk(nb_grid_traversal *w, const nb_grid_line *line, double t)
 {
     for (int i = 0; i < 3; i++) {
         w->block[i] = block_at(line, w, i, t);
@@ -117,13 +117,13 @@ INLINE void start_walk(walk *w, const nb_grid_line *line, double t)
     }
 }
 
-static inline int nearest_axis(const walk *w)
+static inline int nearest_axis(const nb_grid_traversal *w)
 {
     const int a = w->next[0] <= w->next[1] ? 0 : 1;
     return w->next[a] <= w->next[2] ? a : 2;
 }
 
-INLINE void step_walk(walk *w, const nb_grid_line *line, int axis)
+INLINE void step_walk(nb_grid_traversal *w, const nb_grid_line *line, int axis)
 {
     w->block[axis] += w->way[axis];
     w->next[axis] = crossing(line, w, axis);
@@ -133,19 +133,19 @@ INLINE void step_walk(walk *w, const nb_grid_line *line, int axis)
 #define GAUSS_HALF 0.28867513459481288
 
 /* Where a ray is in a cell. */
-typedef struct spot {
+typedef struct nb_grid_position {
     double share[3];
-} spot;
+} nb_grid_position;
 
-INLINE spot spot_at(const nb_grid_line *line, const int cell[3], double t)
+INLINE nb_grid_position spot_at(const nb_grid_line *line, const int cell[3], double t)
 {
-    return (spot){{share_of(line->from[0] + line->slope[0] * t, cell[0]),
-                   share_of(line->from[1] + line->slope[1] * t, cell[1]),
-                   share_of(line->from[2] + line->slope[2] * t, cell[2])}};
+    return (nb_grid_position){{share_of(line->from[0] + line->slope[0] * t, cell[0]),
+                               share_of(line->from[1] + line->slope[1] * t, cell[1]),
+                               share_of(line->from[2] + line->slope[2] * t, cell[2])}};
 }
 
 /* The mean along the line from one spot to another. */
-INLINE double mean_between(const corners *c, const spot *a, const spot *b)
+INLINE double mean_between(const corners *c, const nb_grid_position *a, const nb_grid_position *b)
 {
     const double near = 0.5 - GAUSS_HALF, far = 0.5 + GAUSS_HALF;
     const double x = b->share[0] - a->share[0], y = b->share[1] - a->share[1], z = b->share[2] - a->share[2];
@@ -156,13 +156,13 @@ INLINE double mean_between(const corners *c, const spot *a, const spot *b)
 
 INLINE double voxel_within(const corners *c, const nb_grid_line *line, const int cell[3], double t)
 {
-    const spot at = spot_at(line, cell, t);
+    const nb_grid_position at = spot_at(line, cell, t);
     return interpolate(c, at.share);
 }
 
 INLINE double between_corners(const corners *c, const nb_grid_line *line, const int cell[3], double start, double end)
 {
-    const spot from = spot_at(line, cell, start), to = spot_at(line, cell, end);
+    const nb_grid_position from = spot_at(line, cell, start), to = spot_at(line, cell, end);
     return (end - start) * mean_between(c, &from, &to);
 }
 
@@ -178,9 +178,10 @@ typedef struct brick_sum {
 } brick_sum;
 
 /* The cells of the brick where `bricks` is. */
-INLINE walk walk_cells(const nebel_grid *grid, const nb_grid_line *line, const walk *bricks, double start)
+INLINE nb_grid_traversal walk_cells(const nebel_grid *grid, const nb_grid_line *line, const nb_grid_traversal *bricks,
+                                    double start)
 {
-    walk w;
+    nb_grid_traversal w;
     w.width = 1;
     for (int i = 0; i < 3; i++) {
         w.way[i] = bricks->way[i];
@@ -194,10 +195,10 @@ INLINE walk walk_cells(const nebel_grid *grid, const nb_grid_line *line, const w
 }
 
 INLINE brick_sum walk_nearest(const nebel_grid *grid, nebel_voxel_type type, const nb_grid_line *line,
-                              const walk *bricks, double start, double end)
+                              const nb_grid_traversal *bricks, double start, double end)
 {
     brick_sum sum = {0, 0};
-    walk w = walk_cells(grid, line, bricks, start);
+    nb_grid_traversal w = walk_cells(grid, line, bricks, start);
     for (double t = start;;) {
         const int axis = nearest_axis(&w);
         const double until = larger(smaller(w.next[axis], end), t);
@@ -211,17 +212,17 @@ INLINE brick_sum walk_nearest(const nebel_grid *grid, nebel_voxel_type type, con
 
 /* A cell begins where the one before it ends. */
 INLINE brick_sum walk_linear(const nebel_grid *grid, nebel_voxel_type type, const nb_grid_line *line,
-                             const walk *bricks, double start, double end)
+                             const nb_grid_traversal *bricks, double start, double end)
 {
     brick_sum sum = {0, 0};
-    walk w = walk_cells(grid, line, bricks, start);
-    spot from = spot_at(line, w.block, start);
+    nb_grid_traversal w = walk_cells(grid, line, bricks, start);
+    nb_grid_position from = spot_at(line, w.block, start);
     corner_steps steps = steps_to(grid, w.block);
     for (double t = start;;) {
         const int axis = nearest_axis(&w);
         const double until = larger(smaller(w.next[axis], end), t);
         const corners c = corners_at(grid, type, &steps);
-        const spot to = spot_at(line, w.block, until);
+        const nb_grid_position to = spot_at(line, w.block, until);
         sum.value += (until - t) * mean_between(&c, &from, &to);
         sum.cells++;
         if (w.next[axis] >= end) return sum;
@@ -233,16 +234,16 @@ INLINE brick_sum walk_linear(const nebel_grid *grid, nebel_voxel_type type, cons
     }
 }
 
-INLINE brick_sum walk_brick(const nebel_grid *grid, nebel_voxel_type type, const nb_grid_line *line, const walk *bricks,
-                            double start, double end)
+INLINE brick_sum walk_brick(const nebel_grid *grid, nebel_voxel_type type, const nb_grid_line *line,
+                            const nb_grid_traversal *bricks, double start, double end)
 {
     return grid->filter == NEBEL_GRID_FILTER_NEAREST ? walk_nearest(grid, type, line, bricks, start, end)
                                                      : walk_linear(grid, type, line, bricks, start, end);
 }
 
 /* One copy for each type, so that the innermost loop asks for none. */
-static brick_sum sum_brick(const nebel_grid *grid, const nb_grid_line *line, const walk *bricks, double start,
-                           double end)
+static brick_sum sum_brick(const nebel_grid *grid, const nb_grid_line *line, const nb_grid_traversal *bricks,
+                           double start, double end)
 {
     switch (grid->type) {
     case NEBEL_VOXEL_UINT8:
@@ -260,9 +261,9 @@ static const brick *brick_at(const nebel_grid *grid, const int block[3])
     return &grid->brick[((size_t)block[2] * bricks[1] + (size_t)block[1]) * bricks[0] + (size_t)block[0]];
 }
 
-static walk walk_bricks(const nebel_grid *grid, const nb_grid_line *line)
+static nb_grid_traversal walk_bricks(const nebel_grid *grid, const nb_grid_line *line)
 {
-    walk w;
+    nb_grid_traversal w;
     w.width = BRICK;
     for (int i = 0; i < 3; i++) {
         const double slope = line->slope[i];
@@ -312,7 +313,7 @@ nb_grid_sum nb_grid_integral(const nebel_grid *grid, const nb_grid_line *line, d
                              double enough)
 {
     if (!(length > 0)) return (nb_grid_sum){0, 0};
-    walk w = walk_bricks(grid, line);
+    nb_grid_traversal w = walk_bricks(grid, line);
     double voxels = 0;
     double terms = 0;
     for (double t = 0;;) {
@@ -342,24 +343,24 @@ nb_grid_sum nb_grid_integral(const nebel_grid *grid, const nb_grid_line *line, d
 /* ---- where parts of the integral are reached ------------------------------------------------- */
 
 /* A stretch of the ray in one cell, or in a brick of one density. */
-typedef struct stretch {
+typedef struct nb_brick_interval {
     double start, end;
     double amount; /* the integral of the density over it */
     double level;  /* the density where it is the same all along, else a NaN */
     int cell[3];   /* otherwise */
-} stretch;
+} nb_brick_interval;
 
 /* Stretch after stretch along a ray. */
 typedef struct cursor {
     const nebel_grid *grid;
     const nb_grid_line *line;
     double length, t, brick_end;
-    walk bricks, cells;
+    nb_grid_traversal bricks, cells;
     int within; /* a brick, of which cells are walked */
 } cursor;
 
 /* To the block behind w's, or to the end; returns whether that is reached. */
-static int pass_block(walk *w, const nb_grid_line *line, double end)
+static int pass_block(nb_grid_traversal *w, const nb_grid_line *line, double end)
 {
     const int axis = nearest_axis(w);
     if (w->next[axis] >= end) return 1;
@@ -367,24 +368,25 @@ static int pass_block(walk *w, const nb_grid_line *line, double end)
     return 0;
 }
 
-static stretch even_stretch(const cursor *c, double end, double voxel)
+static nb_brick_interval even_stretch(const cursor *c, double end, double voxel)
 {
     const double level = larger(density_of(c->grid, voxel), 0);
-    return (stretch){.start = c->t, .end = end, .amount = level * (end - c->t), .level = level};
+    return (nb_brick_interval){.start = c->t, .end = end, .amount = level * (end - c->t), .level = level};
 }
 
-static stretch cell_stretch(cursor *c)
+static nb_brick_interval cell_stretch(cursor *c)
 {
     const nebel_grid *grid = c->grid;
     const int *cell = c->cells.block;
     const double end = larger(smaller(c->cells.next[nearest_axis(&c->cells)], c->brick_end), c->t);
-    stretch s;
+    nb_brick_interval s;
     if (grid->filter == NEBEL_GRID_FILTER_NEAREST) {
         s = even_stretch(c, end, nearest_voxel(grid, grid->type, cell));
     } else {
         const corners corner = corners_of(grid, grid->type, cell);
         const double voxels = between_corners(&corner, c->line, cell, c->t, end);
-        s = (stretch){c->t, end, amount_of(grid, voxels, end - c->t), (double)NAN, {cell[0], cell[1], cell[2]}};
+        s = (nb_brick_interval){
+            c->t, end, amount_of(grid, voxels, end - c->t), (double)NAN, {cell[0], cell[1], cell[2]}};
     }
     c->t = end;
     if (pass_block(&c->cells, c->line, c->brick_end)) c->within = 0;
@@ -392,7 +394,7 @@ static stretch cell_stretch(cursor *c)
 }
 
 /* At the end of the ray it gives stretches of no length. */
-static stretch next_stretch(cursor *c)
+static nb_brick_interval next_stretch(cursor *c)
 {
     if (c->within) return cell_stretch(c);
     const brick *b = brick_at(c->grid, c->bricks.block);
@@ -402,13 +404,13 @@ static stretch next_stretch(cursor *c)
     if (c->within) c->cells = walk_cells(c->grid, c->line, &c->bricks, c->t);
     (void)pass_block(&c->bricks, c->line, c->length);
     if (c->within) return cell_stretch(c);
-    const stretch s = even_stretch(c, end, b->most);
+    const nb_brick_interval s = even_stretch(c, end, b->most);
     c->t = end;
     return s;
 }
 
 /* Where `amount` of a stretch is reached: Newton's steps, or halves where they would leave what is known. */
-static double solve_stretch(const cursor *c, const stretch *s, double amount)
+static double solve_stretch(const cursor *c, const nb_brick_interval *s, double amount)
 {
     const nebel_grid *grid = c->grid;
     if (!(amount > 0)) return s->start;
@@ -438,7 +440,7 @@ void nb_grid_places(const nebel_grid *grid, const nb_grid_line *line, double len
     cursor c = {.grid = grid, .line = line, .length = length, .bricks = walk_bricks(grid, line)};
     double before = 0;
     for (int i = 0; i < count;) {
-        const stretch s = next_stretch(&c);
+        const nb_brick_interval s = next_stretch(&c);
         const int last = c.t >= length && !c.within;
         for (; i < count && (last || share[i] * amount <= before + s.amount); i++)
             place[i] = solve_stretch(&c, &s, share[i] * amount - before);
@@ -447,7 +449,7 @@ void nb_grid_places(const nebel_grid *grid, const nb_grid_line *line, double len
 }
 
 /* From the start of a stretch to a place on it. */
-static double amount_up_to(const cursor *c, const stretch *s, double place)
+static double amount_up_to(const cursor *c, const nb_brick_interval *s, double place)
 {
     if (!(place > s->start)) return 0;
     if (!(place < s->end)) return s->amount;
@@ -462,7 +464,7 @@ void nb_grid_sums(const nebel_grid *grid, const nb_grid_line *line, double lengt
     cursor c = {.grid = grid, .line = line, .length = length, .bricks = walk_bricks(grid, line)};
     double before = 0;
     for (int i = 0; i < count;) {
-        const stretch s = next_stretch(&c);
+        const nb_brick_interval s = next_stretch(&c);
         const int last = c.t >= length && !c.within;
         for (; i < count && (last || place[i] <= s.end); i++) sum[i] = before + amount_up_to(&c, &s, place[i]);
         before += s.amount;

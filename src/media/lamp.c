@@ -55,7 +55,7 @@ nebel_result nb_check_lamps(const nebel_log *log, size_t count, const nebel_ligh
 }
 
 /* Adding +0 makes every zero positive, as the march does with directions of its own. */
-static void set_cone(const nebel_light *lamp, nb_lamp *made)
+static void set_cone(const nebel_light *lamp, nb_light *made)
 {
     const double length = length_of(lamp->direction);
     for (int i = 0; i < 3; i++) made->axis[i] = lamp->direction[i] / length + 0;
@@ -65,10 +65,10 @@ static void set_cone(const nebel_light *lamp, nb_lamp *made)
     made->rise = fmin(1 / (made->inner - made->edge), 1e30);
 }
 
-nb_lamp nb_lamp_resolve(const nebel_light *lamp)
+nb_light nb_lamp_resolve(const nebel_light *lamp)
 {
     const double radius = nb_bulb(lamp->radius);
-    nb_lamp made = {.radius2 = radius * radius, .clear = lamp->radius};
+    nb_light made = {.radius2 = radius * radius, .clear = lamp->radius};
     for (int i = 0; i < 3; i++) {
         made.place[i] = lamp->position[i] + 0;
         made.intensity[i] = lamp->intensity[i] + 0;

@@ -6,19 +6,19 @@
 
 #include <nebel/nebel.h>
 
-typedef struct nb_lamp {
+typedef struct nb_light {
     double place[3], intensity[3];
     double radius2; /* > 0 */
     double clear;   /* m from its centre that light does not pass through fog; 0 where no radius was given */
     int is_spot;
     double axis[3];           /* of length 1 */
     double edge, inner, rise; /* cosines of the outer and the inner angle; what nb_lamp_cone takes */
-} nb_lamp;
+} nb_light;
 
 /* Says through the log which of the lamps is not in order, and why. */
 nebel_result nb_check_lamps(const nebel_log *log, size_t count, const nebel_light *lamps);
 
 /* Of a lamp that is in order. */
-nb_lamp nb_lamp_resolve(const nebel_light *lamp);
+nb_light nb_lamp_resolve(const nebel_light *lamp);
 
 #endif

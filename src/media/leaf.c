@@ -13,7 +13,7 @@ static void widen_point(const double v[3], nb_quad out[3])
 
 /* `local` after the world's matrix, plus its offset. A turned point is rounded to a few units of its last digit, the
  * sum by what it leaves (Knuth's two-sum), an offset only where it is no double as the caller gave it. */
-static void set_origin(nb_leaf *leaf, const nb_affine *world, const nb_quad local[3])
+static void set_origin(nb_leaf *leaf, const nb_affine_quad *world, const nb_quad local[3])
 {
     nb_quad turned[3] = {local[0], local[1], local[2]};
     const int unturned = nb_affine_is_shift(world);
@@ -38,22 +38,22 @@ static void set_origin(nb_leaf *leaf, const nb_affine *world, const nb_quad loca
 }
 
 /* shaping after the inverse of the world's matrix; 0 where there is none. */
-static int invert_frame(const nb_affine *world, const nb_quad shaping[9], nb_quad matrix[9])
+static int invert_frame(const nb_affine_quad *world, const nb_quad shaping[9], nb_quad matrix[9])
 {
-    nb_affine back = nb_affine_identity();
-    const nb_affine shape = {
+    nb_affine_quad back = nb_affine_identity();
+    const nb_affine_quad shape = {
         {shaping[0], shaping[1], shaping[2], shaping[3], shaping[4], shaping[5], shaping[6], shaping[7], shaping[8]},
         {0, 0, 0}};
     memcpy(matrix, shaping, sizeof shape.matrix);
     if (nb_affine_is_shift(world)) return 1;
     if (!nb_affine_invert_matrix(world, back.matrix)) return 0;
-    const nb_affine frame = nb_affine_compose(&shape, &back);
+    const nb_affine_quad frame = nb_affine_compose(&shape, &back);
     memcpy(matrix, frame.matrix, sizeof frame.matrix);
     return 1;
 }
 
 /* The frame whose origin is `center` and whose axes are normalised by `shaping` (rows, in the shape's coordinates). */
-static int set_frame(nb_leaf *leaf, const nb_affine *world, const nb_quad center[3], const nb_quad shaping[9])
+static int set_frame(nb_leaf *leaf, const nb_affine_quad *world, const nb_quad center[3], const nb_quad shaping[9])
 {
     if (!invert_frame(world, shaping, leaf->quad_matrix)) return 0;
     set_origin(leaf, world, center);
@@ -80,7 +80,7 @@ typedef struct rough_affine {
     long double matrix[9], offset[3];
 } rough_affine;
 
-static rough_affine round_affine(const nb_affine *world)
+static rough_affine round_affine(const nb_affine_quad *world)
 {
     rough_affine rough;
     for (int i = 0; i < 9; i++) rough.matrix[i] = (long double)world->matrix[i];
@@ -111,7 +111,7 @@ static void enclose_ball(const rough_affine *world, const long double center[3],
     }
 }
 
-static int set_ball(nb_leaf *leaf, const nebel_shape *shape, const nb_affine *world, double low[3], double high[3])
+static int set_ball(nb_leaf *leaf, const nebel_shape *shape, const nb_affine_quad *world, double low[3], double high[3])
 {
     const int sphere = shape->type == NEBEL_SHAPE_SPHERE;
     const rough_affine rough = round_affine(world);
@@ -132,7 +132,7 @@ static int set_ball(nb_leaf *leaf, const nebel_shape *shape, const nb_affine *wo
     return set_frame(leaf, world, center, shaping);
 }
 
-static void enclose_box(const nb_affine *world, const nebel_shape *shape, double low[3], double high[3])
+static void enclose_box(const nb_affine_quad *world, const nebel_shape *shape, double low[3], double high[3])
 {
     const rough_affine rough = round_affine(world);
     for (int corner = 0; corner < 8; corner++) {
@@ -142,7 +142,7 @@ static void enclose_box(const nb_affine *world, const nebel_shape *shape, double
     }
 }
 
-static int set_box(nb_leaf *leaf, const nebel_shape *shape, const nb_affine *world, double low[3], double high[3])
+static int set_box(nb_leaf *leaf, const nebel_shape *shape, const nb_affine_quad *world, double low[3], double high[3])
 {
     leaf->type = NB_LEAF_BOX;
     for (int i = 0; i < 3; i++) {
@@ -168,8 +168,8 @@ static void across(const nb_quad axis[3], nb_quad u[3], nb_quad v[3])
 }
 
 /* Encloses the two end discs (or balls, for a capsule) of a body around an axis. */
-static void enclose_ends(const nebel_shape *shape, const nb_affine *world, nb_quad basis[3][3], const nb_quad radii[2],
-                         double low[3], double high[3])
+static void enclose_ends(const nebel_shape *shape, const nb_affine_quad *world, nb_quad basis[3][3],
+                         const nb_quad radii[2], double low[3], double high[3])
 {
     const rough_affine rough = round_affine(world);
     for (int end = 0; end < 2; end++) {
@@ -199,7 +199,8 @@ static void set_profile_of_axis(nb_leaf *leaf, const nebel_shape *shape, nb_quad
     leaf->slope = (double)leaf->quad_slope;
 }
 
-static int set_axis_body(nb_leaf *leaf, const nebel_shape *shape, const nb_affine *world, double low[3], double high[3])
+static int set_axis_body(nb_leaf *leaf, const nebel_shape *shape, const nb_affine_quad *world, double low[3],
+                         double high[3])
 {
     const int cone = shape->type == NEBEL_SHAPE_CONE;
     const nb_quad radii[2] = {(nb_quad)(cone ? shape->radius_from : shape->radius),
@@ -283,8 +284,8 @@ static int bound_faces(const nb_leaf *leaf, const nb_face *faces, int side, doub
     return 1;
 }
 
-static nebel_result set_planes(const nebel_log *log, nb_leaf *leaf, const nebel_shape *shape, const nb_affine *world,
-                               nb_face *faces, double low[3], double high[3])
+static nebel_result set_planes(const nebel_log *log, nb_leaf *leaf, const nebel_shape *shape,
+                               const nb_affine_quad *world, nb_face *faces, double low[3], double high[3])
 {
     const int half_space = shape->type == NEBEL_SHAPE_HALF_SPACE;
     nb_quad center[3] = {0, 0, 0};
@@ -313,8 +314,8 @@ static double size_of(const nb_leaf *leaf, const double low[3], const double hig
     return 1 + leaf->radius + leaf->length + (isfinite(world) ? leaf->scale * world : 0);
 }
 
-nebel_result nb_leaf_resolve(const nebel_log *log, const nebel_shape *shape, const nb_affine *world, nb_face *faces,
-                             size_t first_face, nb_leaf *leaf, double low[3], double high[3])
+nebel_result nb_leaf_resolve(const nebel_log *log, const nebel_shape *shape, const nb_affine_quad *world,
+                             nb_face *faces, size_t first_face, nb_leaf *leaf, double low[3], double high[3])
 {
     *leaf = (nb_leaf){.first_face = first_face};
     for (int i = 0; i < 3; i++) {

@@ -102,15 +102,15 @@ static reach find_reach(const nb_volume *volume, const nb_leaf *leaf, const nb_l
     return r;
 }
 
-static nb_presence presence_in(const reach *r, double from, double to)
+static nb_overlap presence_in(const reach *r, double from, double to)
 {
     if (r->outer[0] >= r->outer[1] || to <= r->outer[0] || from >= r->outer[1]) return NB_ABSENT;
     return from >= r->inner[0] && to <= r->inner[1] ? NB_PRESENT : NB_UNSURE;
 }
 
-nb_presence nb_volume_presence(const nb_volume *volume, const nb_line *line, double from, double to)
+nb_overlap nb_volume_presence(const nb_volume *volume, const nb_line *line, double from, double to)
 {
-    nb_presence stack[NB_STEP_STACK];
+    nb_overlap stack[NB_STEP_STACK];
     int top = 0;
     size_t leaf = 0;
     for (size_t i = 0; i < volume->step_count; i++) {
@@ -120,7 +120,7 @@ nb_presence nb_volume_presence(const nb_volume *volume, const nb_line *line, dou
             continue;
         }
         top--;
-        const nb_presence a = stack[top - 1], b = stack[top];
+        const nb_overlap a = stack[top - 1], b = stack[top];
         stack[top - 1] = volume->steps[i] == NB_STEP_ANY ? (a > b ? a : b) : (a < b ? a : b);
     }
     return stack[0];

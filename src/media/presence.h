@@ -4,7 +4,7 @@
 
 #include "volume.h"
 
-typedef enum nb_presence { NB_ABSENT, NB_UNSURE, NB_PRESENT } nb_presence;
+typedef enum nb_overlap { NB_ABSENT, NB_UNSURE, NB_PRESENT } nb_overlap;
 
 /* A ray whose direction has length 1. */
 typedef struct nb_line {
@@ -14,7 +14,7 @@ typedef struct nb_line {
 /* What of the body is on the open piece from `from` to `to` [m], which may be infinite. ABSENT and PRESENT hold in
  * spite of rounding. Round leaves are never PRESENT, but a piece that leaves no body any more, or never enters one, is
  * always decided. */
-nb_presence nb_volume_presence(const nb_volume *volume, const nb_line *line, double from, double to);
+nb_overlap nb_volume_presence(const nb_volume *volume, const nb_line *line, double from, double to);
 
 /* The first place behind `from` at which the answer may change; HUGE_VAL: there is none. */
 double nb_volume_next_change(const nb_volume *volume, const nb_line *line, double from);

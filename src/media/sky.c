@@ -71,14 +71,14 @@ void nb_sky_most(const nebel_environment *sky, double most[3])
 
 /* ---- directions ------------------------------------------------------------------------------ */
 
-static nb_sky_turn turn_of(const nebel_environment *sky)
+static nb_environment_rotation turn_of(const nebel_environment *sky)
 {
     const double angle = sky->rotation * (PI / 180);
-    return (nb_sky_turn){cos(angle), sin(angle)};
+    return (nb_environment_rotation){cos(angle), sin(angle)};
 }
 
 /* Into the map's own frame. */
-static void turn_to_map(nb_sky_turn turn, const double direction[3], double turned[3])
+static void turn_to_map(nb_environment_rotation turn, const double direction[3], double turned[3])
 {
     turned[0] = direction[0] * turn.cosine - direction[2] * turn.sine;
     turned[1] = direction[1];
@@ -150,7 +150,7 @@ static double integrate_lobe(const nb_lobe *lobe, double u)
 }
 
 /* Knots are dense where |y| has its edge, as wide as the sharpest lobe: equal steps of log(1 + u / width). */
-static void fill_gradient(nb_sky_filter *filter)
+static void fill_gradient(nb_environment_filter *filter)
 {
     double sharpest = 0;
     for (int i = 0; i < filter->phase.lobe_count; i++) sharpest = fmax(sharpest, fabs(filter->phase.lobes[i].g));
@@ -166,7 +166,7 @@ static void fill_gradient(nb_sky_filter *filter)
 }
 
 /* The cubic through the four nearest knots. */
-static double rectified_at(const nb_sky_filter *filter, double u)
+static double rectified_at(const nb_environment_filter *filter, double u)
 {
     const double place = (NB_SKY_KNOTS - 1) * (nb_log1p(u / filter->width) / nb_log1p(1 / filter->width));
     int first = (int)place - 1;
@@ -185,9 +185,9 @@ static double rectified_by_cosine(double u)
 
 /* ---- filters --------------------------------------------------------------------------------- */
 
-nb_sky_filter *nb_sky_filter_create(const nebel_allocator *allocator, const nb_phase *phase)
+nb_environment_filter *nb_sky_filter_create(const nebel_allocator *allocator, const nb_phase *phase)
 {
-    nb_sky_filter *filter = nb_allocate_zero(allocator, 1, sizeof *filter);
+    nb_environment_filter *filter = nb_allocate_zero(allocator, 1, sizeof *filter);
     if (filter == NULL) return NULL;
     filter->allocator = *allocator;
     filter->phase = *phase;
@@ -195,7 +195,7 @@ nb_sky_filter *nb_sky_filter_create(const nebel_allocator *allocator, const nb_p
     return filter;
 }
 
-void nb_sky_filter_release(nb_sky_filter *filter)
+void nb_sky_filter_release(nb_environment_filter *filter)
 {
     if (filter == NULL || atomic_fetch_sub_explicit(&filter->owners, 1, memory_order_acq_rel) != 1) return;
     const nebel_allocator allocator = filter->allocator;
@@ -203,27 +203,28 @@ void nb_sky_filter_release(nb_sky_filter *filter)
     nb_release(&allocator, filter);
 }
 
-nb_sky_filter *nb_sky_filter_make(const nebel_allocator *allocator, const nebel_environment *sky, const nb_phase *phase)
+nb_environment_filter *nb_sky_filter_make(const nebel_allocator *allocator, const nebel_environment *sky,
+                                          const nb_phase *phase)
 {
     if (sky->type == NEBEL_ENVIRONMENT_MAP) return nb_sky_map_filter(sky->map, phase);
-    nb_sky_filter *filter = nb_sky_filter_create(allocator, phase);
+    nb_environment_filter *filter = nb_sky_filter_create(allocator, phase);
     if (filter != NULL) fill_gradient(filter);
     return filter;
 }
 
-const nb_phase *nb_sky_filter_phase(const nb_sky_filter *filter)
+const nb_phase *nb_sky_filter_phase(const nb_environment_filter *filter)
 {
     return &filter->phase;
 }
 
-nb_skylight nb_skylight_of(const nebel_environment *sky, nb_sky_filter *filter)
+nb_environment_light nb_skylight_of(const nebel_environment *sky, nb_environment_filter *filter)
 {
-    return (nb_skylight){sky, filter, turn_of(sky)};
+    return (nb_environment_light){sky, filter, turn_of(sky)};
 }
 
-void nb_sky_scattered(const nb_skylight *light, const double direction[3], double radiance[3])
+void nb_sky_scattered(const nb_environment_light *light, const double direction[3], double radiance[3])
 {
-    const nb_sky_filter *filter = light->filter;
+    const nb_environment_filter *filter = light->filter;
     if (light->sky->type == NEBEL_ENVIRONMENT_MAP) {
         double turned[3];
         turn_to_map(light->turn, direction, turned);

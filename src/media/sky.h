@@ -9,19 +9,19 @@
 
 /* What a phase function makes of a sky: of a gradient the mean of |sine of elevation| about a direction, of a map
  * a table of the radiance that is scattered. Never changes; counted by its owners. */
-typedef struct nb_sky_filter nb_sky_filter;
+typedef struct nb_environment_filter nb_environment_filter;
 
 /* Of a map's frame about the vertical. */
-typedef struct nb_sky_turn {
+typedef struct nb_environment_rotation {
     double cosine, sine;
-} nb_sky_turn;
+} nb_environment_rotation;
 
 /* A sky and a filter of it, both of which it needs. */
-typedef struct nb_skylight {
+typedef struct nb_environment_light {
     const nebel_environment *sky;
-    nb_sky_filter *filter;
-    nb_sky_turn turn;
-} nb_skylight;
+    nb_environment_filter *filter;
+    nb_environment_rotation turn;
+} nb_environment_light;
 
 /* Errors: ARGUMENT, VALUE. */
 nebel_result nb_check_sky(const nebel_log *log, const nebel_environment *sky);
@@ -31,16 +31,16 @@ void nb_sky_most(const nebel_environment *sky, double most[3]);
 
 /* Of a gradient or a map that is in order, with one owner. Filters of maps are shared. NULL when memory is
  * out. */
-nb_sky_filter *nb_sky_filter_make(const nebel_allocator *allocator, const nebel_environment *sky,
-                                  const nb_phase *phase);
-void nb_sky_filter_release(nb_sky_filter *filter); /* NULL is fine */
+nb_environment_filter *nb_sky_filter_make(const nebel_allocator *allocator, const nebel_environment *sky,
+                                          const nb_phase *phase);
+void nb_sky_filter_release(nb_environment_filter *filter); /* NULL is fine */
 
-nb_skylight nb_skylight_of(const nebel_environment *sky, nb_sky_filter *filter);
+nb_environment_light nb_skylight_of(const nebel_environment *sky, nb_environment_filter *filter);
 
 /* The phase function of a filter. */
-const nb_phase *nb_sky_filter_phase(const nb_sky_filter *filter);
+const nb_phase *nb_sky_filter_phase(const nb_environment_filter *filter);
 
 /* What fog scatters of the sky along a ray of a direction of unit length, at albedo 1, where it is opaque. */
-void nb_sky_scattered(const nb_skylight *light, const double direction[3], double radiance[3]);
+void nb_sky_scattered(const nb_environment_light *light, const double direction[3], double radiance[3]);
 
 #endif

@@ -33,9 +33,9 @@ struct nebel_environment_map {
     float *pixels;
     double most[3];
     term *terms;
-    nb_sky_table reflected;
+    nb_environment_table reflected;
     atomic_flag lock; /* of what follows; held for a few instructions */
-    nb_sky_filter *filters[MOST_FILTERS];
+    nb_environment_filter *filters[MOST_FILTERS];
     size_t next_filter;
 };
 
@@ -265,7 +265,7 @@ static void find_knots(double *values, size_t count)
 
 /* Knots along every circle of latitude, then along every great circle through the poles: down one column and up the
  * opposite one. */
-static void make_splines(nb_sky_table *table, double *circle)
+static void make_splines(nb_environment_table *table, double *circle)
 {
     const size_t columns = table->columns, rows = table->rows;
     for (int c = 0; c < 3; c++) {
@@ -323,7 +323,7 @@ static int last_of(const double factors[ORDERS])
 
 /* 0 when memory is out. */
 static int fill_table(const nebel_environment_map *map, const double factors[ORDERS], const recurrence *r,
-                      nb_sky_table *table)
+                      nb_environment_table *table)
 {
     const int last = last_of(factors);
     const nebel_allocator *a = &map->allocator;
@@ -386,12 +386,12 @@ static void blur(double factors[ORDERS])
     for (int l = 0; l <= LAST; l++) factors[l] *= exp(-l * (l + 1.0) * half_square);
 }
 
-static nb_sky_filter *make_filter(const nebel_environment_map *map, const nb_phase *phase)
+static nb_environment_filter *make_filter(const nebel_environment_map *map, const nb_phase *phase)
 {
     double factors[ORDERS] = {0};
     for (int i = 0; i < phase->lobe_count; i++) add_lobe(&phase->lobes[i], factors);
     blur(factors);
-    nb_sky_filter *filter = nb_sky_filter_create(&map->allocator, phase);
+    nb_environment_filter *filter = nb_sky_filter_create(&map->allocator, phase);
     recurrence *r = nb_allocate(&map->allocator, 1, sizeof *r);
     if (r != NULL) fill_recurrence(r);
     if (filter != NULL && (r == NULL || !fill_table(map, factors, r, &filter->table))) {
@@ -413,9 +413,9 @@ static void unlock(nebel_environment_map *map)
 }
 
 /* One more owner of the filter that the map has kept for a phase function, if it has one. */
-static nb_sky_filter *find_filter(nebel_environment_map *map, const nb_phase *phase)
+static nb_environment_filter *find_filter(nebel_environment_map *map, const nb_phase *phase)
 {
-    nb_sky_filter *found = NULL;
+    nb_environment_filter *found = NULL;
     lock(map);
     for (int i = 0; i < MOST_FILTERS && found == NULL; i++)
         if (map->filters[i] != NULL && nb_phase_compare(&map->filters[i]->phase, phase) == 0) found = map->filters[i];
@@ -425,20 +425,20 @@ static nb_sky_filter *find_filter(nebel_environment_map *map, const nb_phase *ph
 }
 
 /* In place of the one that was kept first, where there are many. */
-static void keep_filter(nebel_environment_map *map, nb_sky_filter *filter)
+static void keep_filter(nebel_environment_map *map, nb_environment_filter *filter)
 {
     atomic_fetch_add_explicit(&filter->owners, 1, memory_order_relaxed);
     lock(map);
-    nb_sky_filter *replaced = map->filters[map->next_filter];
+    nb_environment_filter *replaced = map->filters[map->next_filter];
     map->filters[map->next_filter] = filter;
     map->next_filter = (map->next_filter + 1) % MOST_FILTERS;
     unlock(map);
     nb_sky_filter_release(replaced);
 }
 
-nb_sky_filter *nb_sky_map_filter(nebel_environment_map *map, const nb_phase *phase)
+nb_environment_filter *nb_sky_map_filter(nebel_environment_map *map, const nb_phase *phase)
 {
-    nb_sky_filter *filter = find_filter(map, phase);
+    nb_environment_filter *filter = find_filter(map, phase);
     if (filter != NULL) return filter;
     filter = make_filter(map, phase);
     if (filter != NULL) keep_filter(map, filter);
@@ -469,7 +469,7 @@ static void spline_weights(double x, double weights[4])
 }
 
 /* A row beyond a pole is the one as far on the other side, half way round. */
-static const float *row_beyond(const nb_sky_table *table, ptrdiff_t row, size_t *turn)
+static const float *row_beyond(const nb_environment_table *table, ptrdiff_t row, size_t *turn)
 {
     const ptrdiff_t rows = (ptrdiff_t)table->rows;
     const ptrdiff_t inside = row < 0 ? -1 - row : row >= rows ? 2 * rows - 1 - row : row;
@@ -477,7 +477,7 @@ static const float *row_beyond(const nb_sky_table *table, ptrdiff_t row, size_t 
     return &table->coefficients[3 * (size_t)inside * table->columns];
 }
 
-void nb_sky_map_scattered(const nb_sky_table *table, const double direction[3], double radiance[3])
+void nb_sky_map_scattered(const nb_environment_table *table, const double direction[3], double radiance[3])
 {
     const sky_place place = place_of(direction);
     const double x = place.across * (double)table->columns - 0.5, y = place.down * (double)table->rows - 0.5;
@@ -518,7 +518,7 @@ void nb_sky_map_radiance(const nebel_environment_map *map, const double directio
     }
 }
 
-const nb_sky_table *nb_sky_map_reflection(const nebel_environment_map *map)
+const nb_environment_table *nb_sky_map_reflection(const nebel_environment_map *map)
 {
     return &map->reflected;
 }

@@ -35,25 +35,25 @@ static void count_shape(const nebel_shape *shape, nb_counts *counts)
 static int allocate_arrays(const nebel_allocator *allocator, nb_volume *volume)
 {
     const size_t leaves = volume->leaf_count * sizeof(nb_leaf), faces = volume->face_count * sizeof(nb_face);
-    char *memory = nb_allocate_zero(allocator, leaves + faces + volume->step_count * sizeof(nb_step), 1);
+    char *memory = nb_allocate_zero(allocator, leaves + faces + volume->step_count * sizeof(nb_shape_op), 1);
     if (memory == NULL) return 0;
     volume->leaves = (nb_leaf *)(void *)memory;
     volume->faces = (nb_face *)(void *)(memory + leaves);
-    volume->steps = (nb_step *)(void *)(memory + leaves + faces);
+    volume->steps = (nb_shape_op *)(void *)(memory + leaves + faces);
     return 1;
 }
 
 /* How far resolving has come, and where messages go. */
-typedef struct builder {
+typedef struct nb_volume_builder {
     const nebel_log *log;
     nb_volume *volume;
     nb_counts used;
-} builder;
+} nb_volume_builder;
 
-static nebel_result add_shape(builder *b, const nebel_shape *shape, const nb_affine *above, double low[3],
-                              double high[3]);
+static nebel_result add_shape(nb_volume_builder *b, const nebel_shape *shape, const nb_affine_quad *above,
+                              double low[3], double high[3]);
 
-static nebel_result add_leaf(builder *b, const nebel_shape *shape, const nb_affine *world, double low[3],
+static nebel_result add_leaf(nb_volume_builder *b, const nebel_shape *shape, const nb_affine_quad *world, double low[3],
                              double high[3])
 {
     nb_leaf *leaf = &b->volume->leaves[b->used.leaves++];
@@ -64,8 +64,8 @@ static nebel_result add_leaf(builder *b, const nebel_shape *shape, const nb_affi
     return result;
 }
 
-static nebel_result add_group(builder *b, const nebel_shape *shape, const nb_affine *world, double low[3],
-                              double high[3])
+static nebel_result add_group(nb_volume_builder *b, const nebel_shape *shape, const nb_affine_quad *world,
+                              double low[3], double high[3])
 {
     const int any = shape->type == NEBEL_SHAPE_UNION;
     for (size_t i = 0; i < shape->part_count; i++) {
@@ -88,12 +88,12 @@ static int is_moved(const nebel_transform *t)
     return t->rotation[3] != 0;
 }
 
-static nebel_result add_shape(builder *b, const nebel_shape *shape, const nb_affine *above, double low[3],
-                              double high[3])
+static nebel_result add_shape(nb_volume_builder *b, const nebel_shape *shape, const nb_affine_quad *above,
+                              double low[3], double high[3])
 {
-    nb_affine world = *above;
+    nb_affine_quad world = *above;
     if (is_moved(&shape->transform)) {
-        const nb_affine own = nb_affine_from_transform(&shape->transform);
+        const nb_affine_quad own = nb_affine_from_transform(&shape->transform);
         world = nb_affine_compose(above, &own);
     }
     return is_group(shape) ? add_group(b, shape, &world, low, high) : add_leaf(b, shape, &world, low, high);
@@ -143,13 +143,13 @@ static double distance_between(const double a[3], const double b[3])
     return sqrt(x * x + y * y + z * z);
 }
 
-static nb_edge resolve_edge(const nebel_shape *shape, double distance)
+static nb_soft_edge resolve_edge(const nebel_shape *shape, double distance)
 {
     double radius = shape->radius;
     if (shape->type == NEBEL_SHAPE_ELLIPSOID) radius = fmin(fmin(shape->radii[0], shape->radii[1]), shape->radii[2]);
     if (shape->type == NEBEL_SHAPE_CONE) radius = fmax(shape->radius_from, shape->radius_to);
     const double depth = fmin(distance / radius, 1);
-    return (nb_edge){1 / (depth * (2 - depth)), distance_between(shape->from, shape->to) / distance, 1 - depth};
+    return (nb_soft_edge){1 / (depth * (2 - depth)), distance_between(shape->from, shape->to) / distance, 1 - depth};
 }
 
 static int is_round(const nebel_shape *shape)
@@ -198,8 +198,8 @@ nebel_result nb_volume_resolve(const nebel_allocator *allocator, const nebel_log
             volume->edge = resolve_edge(&desc->shape, desc->density.edge_width);
         resolve_light(desc, volume);
     }
-    builder b = {log, volume, {0, 0, 0}};
-    const nb_affine world = nb_affine_identity();
+    nb_volume_builder b = {log, volume, {0, 0, 0}};
+    const nb_affine_quad world = nb_affine_identity();
     const unsigned precision = nb_full_precision();
     const nebel_result result = add_shape(&b, &desc->shape, &world, volume->low, volume->high);
     nb_restore_precision(precision);

@@ -56,15 +56,15 @@ typedef struct nb_leaf {
 
 /* A postfix program over leaf membership: LEAF pushes the next leaf, the others fold the two topmost results into one.
  */
-typedef enum nb_step { NB_STEP_LEAF, NB_STEP_ANY, NB_STEP_ALL } nb_step;
+typedef enum nb_shape_op { NB_STEP_LEAF, NB_STEP_ANY, NB_STEP_ALL } nb_shape_op;
 
 /* The deepest stack a program needs. */
 #define NB_STEP_STACK (NEBEL_MAX_SHAPE_NESTING + 2)
 
 /* The numbers of a soft edge, see nb_round_edge in formulas/profiles.inc. */
-typedef struct nb_edge {
+typedef struct nb_soft_edge {
     double gain, steepness, inner;
-} nb_edge;
+} nb_soft_edge;
 
 /* How far under its base fog that thins out with the altitude is as thick as it gets, 1e18, in scale heights. */
 #define NB_GROWTH_DEPTH 41.446531673892822
@@ -73,7 +73,7 @@ typedef struct nb_volume {
     nebel_operation operation;
     int64_t rank; /* one that covers takes away the fog of every lower rank: see nb_volume_covers */
     nebel_density density;
-    nb_edge edge; /* soft edges of round bodies */
+    nb_soft_edge edge; /* soft edges of round bodies */
     double extinction[3], source[3], albedo[3], emission[3];
     int lit; /* albedo rather than source */
     nb_phase phase;
@@ -81,7 +81,7 @@ typedef struct nb_volume {
     size_t leaf_count, face_count, step_count;
     nb_leaf *leaves;
     nb_face *faces;
-    nb_step *steps;
+    nb_shape_op *steps;
     double low[3], high[3]; /* world bounds, infinite where unbounded */
     double start, cutoff;   /* m along a ray; cutoff is infinite where there is none */
 } nb_volume;

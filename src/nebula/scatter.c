@@ -23,13 +23,13 @@ enum { STREAM_PLACE, STREAM_SIZE, STREAM_COLOR, STREAM_COLOR_FIELD, STREAM_EDDIE
 /* How much of a particle's place in the colours is its own; the rest belongs to where it is. */
 #define OWN_COLOR 0.3
 
-typedef struct cloud {
+typedef struct nb_nebula_state {
     const nebel_nebula_desc *desc;
     nebel_allocator allocator;
     nb_volume volume; /* unless there are points */
     double size[2];
     double eddy; /* m */
-} cloud;
+} nb_nebula_state;
 
 nebel_volume_desc nebel_volume_from_particle(const nebel_particle *particle)
 {
@@ -112,7 +112,7 @@ static double find_extent(const double low[3], const double high[3])
 }
 
 /* *extent [m] is the longest side of the shape's bounds. */
-static nebel_result open_shape(cloud *made, double *extent)
+static nebel_result open_shape(nb_nebula_state *made, double *extent)
 {
     const nebel_volume_desc body = {.shape = made->desc->shape, .density = made->desc->density};
     const nebel_result result = nb_volume_resolve(&made->allocator, &made->desc->log, &body, &made->volume);
@@ -138,13 +138,13 @@ static nebel_result measure_points(const nebel_nebula_desc *desc, double *extent
     return NEBEL_OK;
 }
 
-static nebel_result open_cloud(const nebel_nebula_desc *desc, cloud *made)
+static nebel_result open_cloud(const nebel_nebula_desc *desc, nb_nebula_state *made)
 {
     double extent = 0;
-    *made = (cloud){.desc = desc,
-                    .allocator = nb_resolve_allocator(&desc->allocator),
-                    .size = {desc->radius_range[0], desc->radius_range[1]},
-                    .eddy = desc->turbulence_scale};
+    *made = (nb_nebula_state){.desc = desc,
+                              .allocator = nb_resolve_allocator(&desc->allocator),
+                              .size = {desc->radius_range[0], desc->radius_range[1]},
+                              .eddy = desc->turbulence_scale};
     const nebel_result result = desc->points != NULL ? measure_points(desc, &extent) : open_shape(made, &extent);
     if (result != NEBEL_OK) return result;
     if (made->size[1] == 0) made->size[0] = 0.05, made->size[1] = 0.2;
@@ -154,7 +154,7 @@ static nebel_result open_cloud(const nebel_nebula_desc *desc, cloud *made)
 
 /* ---- one particle ---------------------------------------------------------------------------- */
 
-static double chance(const cloud *from, int stream, size_t particle, uint64_t i)
+static double chance(const nb_nebula_state *from, int stream, size_t particle, uint64_t i)
 {
     const uint64_t seed = from->desc->seed + UINT64_C(0x100000001b3) * (uint64_t)stream;
     return nb_chance(seed, (uint64_t)particle * (MOST_TRIES * 4) + i);
@@ -169,7 +169,7 @@ static double power(double density, double exponent)
 
 /* A point of the caller's; or tries places in the bounding box, each taken with the chance that the density there says.
  * *share: what the particle has of its amounts. */
-static int find_place(const cloud *from, size_t particle, double place[3], double *share)
+static int find_place(const nb_nebula_state *from, size_t particle, double place[3], double *share)
 {
     const double *low = from->volume.low, *high = from->volume.high;
     if (from->desc->points != NULL) {
@@ -187,7 +187,7 @@ static int find_place(const cloud *from, size_t particle, double place[3], doubl
     return 0;
 }
 
-static void stir(const cloud *from, const double place[3], double stirred[3])
+static void stir(const nb_nebula_state *from, const double place[3], double stirred[3])
 {
     const double p[3] = {place[0] / from->eddy, place[1] / from->eddy, place[2] / from->eddy};
     for (int i = 0; i < 3; i++) {
@@ -196,14 +196,14 @@ static void stir(const cloud *from, const double place[3], double stirred[3])
     }
 }
 
-static double pick_size(const cloud *from, size_t particle)
+static double pick_size(const nb_nebula_state *from, size_t particle)
 {
     const double octaves = nb_log(from->size[1] / from->size[0]);
     return fmin(from->size[0] * nb_exp(octaves * chance(from, STREAM_SIZE, particle, 0)), from->size[1]);
 }
 
 /* Eddies rarely reach their limits: three times their value, clamped, uses all colours. */
-static void pick_color(const cloud *from, size_t particle, const double place[3], double color[3])
+static void pick_color(const nb_nebula_state *from, size_t particle, const double place[3], double color[3])
 {
     const nebel_nebula_desc *desc = from->desc;
     color[0] = color[1] = color[2] = 1;
@@ -220,7 +220,7 @@ static void pick_color(const cloud *from, size_t particle, const double place[3]
     }
 }
 
-static int make_particle(const cloud *from, size_t number, nebel_particle *particle)
+static int make_particle(const nb_nebula_state *from, size_t number, nebel_particle *particle)
 {
     double place[3], color[3], share;
     if (!find_place(from, number, place, &share)) return 0;
@@ -238,7 +238,7 @@ nebel_result nebel_generate_nebula(const nebel_nebula_desc *desc, nebel_particle
 {
     if (desc == NULL || (particles == NULL && desc->count > 0) || (desc->colors == NULL && desc->color_count > 0))
         return NEBEL_ERROR_ARGUMENT;
-    cloud from;
+    nb_nebula_state from;
     nebel_result result = check_desc(desc);
     if (result == NEBEL_OK) result = open_cloud(desc, &from);
     if (result != NEBEL_OK) return result;

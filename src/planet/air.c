@@ -10,12 +10,12 @@
 
 #include "depth.h"
 
-double nb_air_density(const nb_air *air, double height)
+double nb_air_density(const nb_air_component *air, double height)
 {
     return nb_density_of(air, height);
 }
 
-int nb_airs_are_empty(const nb_airs *airs)
+int nb_airs_are_empty(const nb_air_components *airs)
 {
     for (int k = 0; k < airs->count; k++)
         for (int c = 0; c < 3; c++)
@@ -24,7 +24,7 @@ int nb_airs_are_empty(const nb_airs *airs)
 }
 
 /* What is scattered straight up, of the color of which it is the most. */
-static double scattering_depth(const nb_airs *airs, const nb_air *air)
+static double scattering_depth(const nb_air_components *airs, const nb_air_component *air)
 {
     const double height = airs->top - airs->radius;
     const double met = air->scale > 0 ? air->scale * (1 - nb_exp(-height / air->scale)) : air->width;
@@ -36,22 +36,22 @@ static double scattering_depth(const nb_airs *airs, const nb_air *air)
  * horizon and none of it up to 4 % too little. Hazes of 0.1 and more need it all. */
 #define THIN_DEPTH 0.01
 
-static void set_peaks(nb_airs *airs, int orders)
+static void set_peaks(nb_air_components *airs, int orders)
 {
     for (int k = 0; k < airs->count; k++) {
-        nb_air *air = &airs->airs[k];
+        nb_air_component *air = &airs->airs[k];
         const double depth = scattering_depth(airs, air);
         air->peak = depth > 0 ? fmax(0, air->moments[orders]) * depth / (depth + THIN_DEPTH) : 0;
     }
 }
 
-void nb_airs_smooth(nb_airs *airs, int orders, nb_airs *smooth)
+void nb_airs_smooth(nb_air_components *airs, int orders, nb_air_components *smooth)
 {
     set_peaks(airs, orders);
     *smooth = *airs;
     smooth->is_smooth = 1;
     for (int k = 0; k < airs->count; k++) {
-        nb_air *air = &smooth->airs[k];
+        nb_air_component *air = &smooth->airs[k];
         const double peak = airs->airs[k].peak;
         for (int c = 0; c < 3; c++) {
             air->scattering[c] = (1 - peak) * airs->airs[k].scattering[c];
@@ -65,7 +65,7 @@ void nb_airs_smooth(nb_airs *airs, int orders, nb_airs *smooth)
 
 /* ---- shells ---------------------------------------------------------------------------------- */
 
-static int has_shell(const nb_airs *airs, double low, double high)
+static int has_shell(const nb_air_components *airs, double low, double high)
 {
     for (int i = 0; i < airs->shell_count; i++) {
         const double height = airs->shells[i] - airs->radius;
@@ -74,13 +74,13 @@ static int has_shell(const nb_airs *airs, double low, double high)
     return 0;
 }
 
-static void add_shell(nb_airs *airs, double height)
+static void add_shell(nb_air_components *airs, double height)
 {
     if (height > 0 && height < airs->top - airs->radius) airs->shells[airs->shell_count++] = airs->radius + height;
 }
 
 /* Of air that is as thick as others shells are as good. */
-static void cut_exponential(nb_airs *airs, double scale)
+static void cut_exponential(nb_air_components *airs, double scale)
 {
     if (!has_shell(airs, 0.5 * scale, 4 * scale)) add_shell(airs, 2 * scale);
     if (!has_shell(airs, 3 * scale, 12 * scale)) add_shell(airs, 6 * scale);
@@ -88,11 +88,11 @@ static void cut_exponential(nb_airs *airs, double scale)
 
 /* The edges of layers; else shells are thin near the ground, where the air changes most. Nodes between two of them see no layer that is
  * thin beside their distance. */
-void nb_airs_cut(nb_airs *airs)
+void nb_airs_cut(nb_air_components *airs)
 {
     airs->shell_count = 0;
     for (int i = 0; i < airs->count; i++) {
-        const nb_air *air = &airs->airs[i];
+        const nb_air_component *air = &airs->airs[i];
         for (int k = -1; k <= 1 && !(air->scale > 0); k++) {
             const double edge = air->center + k * air->width, near = 0.01 * air->width;
             if (!has_shell(airs, edge - near, edge + near)) add_shell(airs, edge);
@@ -108,50 +108,50 @@ void nb_airs_cut(nb_airs *airs)
 
 /* ---- where rays go --------------------------------------------------------------------------- */
 
-nb_track nb_track_ahead(nb_track track, double length)
+nb_atmosphere_ray nb_track_ahead(nb_atmosphere_ray track, double length)
 {
-    const nb_tracks ahead = nb_tracks_ahead((nb_tracks){track.radius, track.rise}, length);
-    return (nb_track){ahead.radius, ahead.rise};
+    const nb_atmosphere_ray_lanes ahead = nb_tracks_ahead((nb_atmosphere_ray_lanes){track.radius, track.rise}, length);
+    return (nb_atmosphere_ray){ahead.radius, ahead.rise};
 }
 
-double nb_track_leave(nb_track track, double sphere)
+double nb_track_leave(nb_atmosphere_ray track, double sphere)
 {
-    return nb_tracks_leave((nb_tracks){track.radius, track.rise}, sphere);
+    return nb_tracks_leave((nb_atmosphere_ray_lanes){track.radius, track.rise}, sphere);
 }
 
-double nb_track_enter(nb_track track, double sphere)
+double nb_track_enter(nb_atmosphere_ray track, double sphere)
 {
-    const double square = nb_half_chord_square((nb_tracks){track.radius, track.rise}, sphere);
+    const double square = nb_half_chord_square((nb_atmosphere_ray_lanes){track.radius, track.rise}, sphere);
     if (!(track.rise < 0 && square > 0)) return HUGE_VAL;
     return fmax(0, (track.radius - sphere) * (track.radius + sphere) / (sqrt(square) - track.rise));
 }
 
 /* ---- optical depth --------------------------------------------------------------------------- */
 
-static void add_rising(const nb_airs *airs, nb_track track, double length, double depth[3])
+static void add_rising(const nb_air_components *airs, nb_atmosphere_ray track, double length, double depth[3])
 {
     double met[NEBEL_MAX_COMPONENTS] = {0};
-    nb_add_rising(airs, (nb_tracks){track.radius, track.rise}, length, met);
+    nb_add_rising(airs, (nb_atmosphere_ray_lanes){track.radius, track.rise}, length, met);
     for (int c = 0; c < 3; c++) depth[c] += nb_depth_of(airs, met, c);
 }
 
 /* From the lowest place on, up on both sides. */
-void nb_track_depth(const nb_airs *airs, nb_track track, double length, double depth[3])
+void nb_track_depth(const nb_air_components *airs, nb_atmosphere_ray track, double length, double depth[3])
 {
     for (int c = 0; c < 3; c++) depth[c] = 0;
     if (track.rise >= 0) {
         add_rising(airs, track, length, depth);
     } else if (length <= -track.rise) {
-        const nb_track end = nb_track_ahead(track, length);
-        add_rising(airs, (nb_track){end.radius, -end.rise}, length, depth);
+        const nb_atmosphere_ray end = nb_track_ahead(track, length);
+        add_rising(airs, (nb_atmosphere_ray){end.radius, -end.rise}, length, depth);
     } else {
-        const nb_track lowest = {nb_track_ahead(track, -track.rise).radius, 0};
+        const nb_atmosphere_ray lowest = {nb_track_ahead(track, -track.rise).radius, 0};
         add_rising(airs, lowest, -track.rise, depth);
         add_rising(airs, lowest, length + track.rise, depth);
     }
 }
 
-void nb_track_sunlight(const nb_airs *airs, nb_track track, double light[3])
+void nb_track_sunlight(const nb_air_components *airs, nb_atmosphere_ray track, double light[3])
 {
-    nb_tracks_sunlight(airs, (nb_tracks){track.radius, track.rise}, light);
+    nb_tracks_sunlight(airs, (nb_atmosphere_ray_lanes){track.radius, track.rise}, light);
 }

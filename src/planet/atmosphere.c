@@ -18,7 +18,7 @@ static double lobe_moment(const nb_lobe *lobe, int order)
     return (pow(g, l) + lobe->alpha * square) / (1 + lobe->alpha * (1 + 2 * g * g) / 3);
 }
 
-static void resolve_air(const nebel_atmosphere_component *desc, nb_air *air)
+static void resolve_air(const nebel_atmosphere_component *desc, nb_air_component *air)
 {
     air->phase = nb_phase_resolve(&desc->phase);
     air->scale = desc->profile == NEBEL_COMPONENT_EXPONENTIAL ? desc->scale_height : 0;
@@ -63,7 +63,7 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
     nb_vector_ball_middle(whole.ground_point, whole.radius, made->center);
     made->rule = nb_rule_make(NB_RULE_MOST);
     made->gather = nb_gather_choose(NEBEL_ISA_DEFAULT);
-    const nb_parts parts = {whole.run, whole.run_user};
+    const nb_parallel parts = {whole.run, whole.run_user};
     nb_airs_smooth(&made->airs, whole.quality == NEBEL_ATMOSPHERE_PRECISE ? NB_MOMENTS : NB_FEW_MOMENTS, &made->smooth);
     result = nb_scatter_make(&allocator, &parts, &made->airs, &made->smooth, whole.quality, whole.ground_albedo,
                              &made->scatter);

@@ -8,16 +8,16 @@
 struct nebel_atmosphere {
     nebel_allocator allocator;
     double center[3];
-    nb_airs airs, smooth; /* smooth: that by which light scattered often is found */
+    nb_air_components airs, smooth; /* smooth: that by which light scattered often is found */
     double ground_albedo[3];
-    nb_rule rule;
-    nb_scatter scatter;
+    nb_gauss_rule rule;
+    nb_scattering_table scatter;
     nb_gather_fn *gather;
     double share_off; /* how much of light that was scattered often may be wrong for want of entries and directions */
 };
 
 /* NULL where no air has a peak. */
-static inline const nb_airs *nb_atmosphere_smooth(const nebel_atmosphere *atmosphere)
+static inline const nb_air_components *nb_atmosphere_smooth(const nebel_atmosphere *atmosphere)
 {
     return atmosphere->smooth.is_smooth ? NULL : &atmosphere->smooth;
 }
@@ -30,27 +30,28 @@ static inline const nb_airs *nb_atmosphere_smooth(const nebel_atmosphere *atmosp
 
 /* What a ray gathers for a sun of irradiance 1: scattered once, by each kind of air, for phase functions of 1; more
  * often; and about how much of that is missing for want of moments, and in twilight for want of entries. */
-typedef struct nb_gathered {
+typedef struct nb_in_scattered {
     double once[NEBEL_MAX_COMPONENTS][3], often[3], missing[3];
-} nb_gathered;
+} nb_in_scattered;
 
 /* Where the ray enters and leaves the shadow of the planet, in any order; below 0 where it does not. */
-void nb_find_shadow(const nb_airs *airs, nb_track track, nb_aspect aspect, double cuts[2]);
+void nb_find_shadow(const nb_air_components *airs, nb_atmosphere_ray track, nb_moment_basis aspect, double cuts[2]);
 
 /* Over the nodes of a path, up to each of `count` ends, ascending; the last one is the path's, where it leaves the air or meets the
  * ground. Returns what is scattered just where the ray begins, per metre. `aspect` is that of the ray's direction there. */
-nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path *path,
-                           int count, const double ends[], nb_gathered gathered[]);
+nb_in_scattered nb_gather_path(const nebel_atmosphere *atmosphere, nb_atmosphere_ray track, nb_moment_basis aspect,
+                               const nb_ray_nodes *path, int count, const double ends[], nb_in_scattered gathered[]);
 
 /* Along a ray that stays within the air up to the last end, as above; at most NB_PATH_CUTS - 2 of them. */
-nb_gathered nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, nb_track track, nb_aspect aspect,
-                      int count, const double ends[], nb_gathered gathered[]);
+nb_in_scattered nb_gather(const nebel_atmosphere *atmosphere, const nb_gauss_rule *rule, nb_atmosphere_ray track,
+                          nb_moment_basis aspect, int count, const double ends[], nb_in_scattered gathered[]);
 
 /* What was scattered once by phase functions as they are; `sun` is the cosine between ray and sun. */
-void nb_gathered_once(const nebel_atmosphere *atmosphere, const nb_gathered *gathered, double sun, double once[3]);
+void nb_gathered_once(const nebel_atmosphere *atmosphere, const nb_in_scattered *gathered, double sun, double once[3]);
 
 /* What of gathered light may be wrong: `once` is that of nb_gathered_once. */
-double nb_gathered_off(const nebel_atmosphere *atmosphere, const nb_gathered *gathered, const double once[3], int c);
+double nb_gathered_off(const nebel_atmosphere *atmosphere, const nb_in_scattered *gathered, const double once[3],
+                       int c);
 
 /* The sun as all rays see it, its direction made a unit one; NULL: none. A sun without light may come from nowhere. 0
  * where it is not in order. */

@@ -19,12 +19,12 @@ nebel_atmosphere_desc nb_atmosphere_resolve(const nebel_atmosphere_desc *desc)
 }
 
 /* What is said of: "airs[2]." or "" where it is no kind of air. */
-typedef struct subject {
+typedef struct nb_atmosphere_subject {
     const nebel_log *log;
     char name[24];
-} subject;
+} nb_atmosphere_subject;
 
-static nebel_result refuse(const subject *of, const char *what, const char *fault)
+static nebel_result refuse(const nb_atmosphere_subject *of, const char *what, const char *fault)
 {
     return nb_fail(of->log, NEBEL_ERROR_VALUE, "atmosphere: %s%s: %s", of->name, what, fault);
 }
@@ -36,7 +36,7 @@ typedef struct meaning {
 
 static const meaning pure = {"", "", ""}, per_metre = {" per m", "", ""}, length = {" m", "", ""};
 
-static nebel_result check(const subject *of, const char *what, double number, double least, double most,
+static nebel_result check(const nb_atmosphere_subject *of, const char *what, double number, double least, double most,
                           const meaning *is)
 {
     if (number >= least && number <= most) return NEBEL_OK;
@@ -44,15 +44,16 @@ static nebel_result check(const subject *of, const char *what, double number, do
                    what, number, is->unit, least, is->unit, is->least, most, is->unit, is->most);
 }
 
-static nebel_result check_all(const subject *of, const char *what, const double numbers[3], double least, double most,
-                              const meaning *is)
+static nebel_result check_all(const nb_atmosphere_subject *of, const char *what, const double numbers[3], double least,
+                              double most, const meaning *is)
 {
     nebel_result result = NEBEL_OK;
     for (int c = 0; c < 3 && result == NEBEL_OK; c++) result = check(of, what, numbers[c], least, most, is);
     return result;
 }
 
-static nebel_result check_profile(const subject *of, const nebel_atmosphere_component *air, double thickness)
+static nebel_result check_profile(const nb_atmosphere_subject *of, const nebel_atmosphere_component *air,
+                                  double thickness)
 {
     static const meaning at_least = {" m", " (a thousandth of the thickness)", ""},
                          within = {" m", "", " (the thickness)"};
@@ -69,7 +70,7 @@ static nebel_result check_profile(const subject *of, const nebel_atmosphere_comp
     }
 }
 
-static nebel_result check_air(const subject *of, const nebel_atmosphere_component *air, double thickness)
+static nebel_result check_air(const nb_atmosphere_subject *of, const nebel_atmosphere_component *air, double thickness)
 {
     const double most = NEBEL_MAX_COMPONENT_EXTINCTION;
     nebel_result result = check_all(of, "scattering", air->scattering, 0, most, &per_metre);
@@ -83,7 +84,7 @@ static nebel_result check_air(const subject *of, const nebel_atmosphere_componen
 nebel_result nb_atmosphere_check(const nebel_atmosphere_desc *desc)
 {
     static const meaning at_least = {" m", " (a millionth of the radius)", ""};
-    subject of = {&desc->log, ""};
+    nb_atmosphere_subject of = {&desc->log, ""};
     nebel_result result = check_all(&of, "ground", desc->ground_point, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH, &length);
     if (result == NEBEL_OK) result = check(&of, "radius", desc->radius, 1, 1e12, &length);
     if (result == NEBEL_OK) result = check(&of, "thickness", desc->thickness, desc->radius / 1e6, 1e12, &at_least);

@@ -97,7 +97,7 @@ static inline nb_four read_cell(nebel_cloud_workspace *workspace, int layer, con
 }
 
 /* First all cells are sent for, which caches seldom have, so that one does not wait for the other. */
-static void find_columns(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *looks)
+static void find_columns(nebel_cloud_workspace *workspace, int layer, nb_cloud_density_query *looks)
 {
     for (int i = 0; i < looks->count; i++) {
         __builtin_prefetch(&workspace->patches[looks->cells[0].hash[i] & (NB_CLOUD_PATCHES - 1)]);
@@ -115,7 +115,7 @@ static void find_columns(nebel_cloud_workspace *workspace, int layer, nb_cloud_l
     }
 }
 
-void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *looks)
+void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_density_query *looks)
 {
     const nb_cloud_kernel *kernel = workspace->view->kernel;
     const nebel_clouds *clouds = workspace->view->clouds;
@@ -139,13 +139,13 @@ static float most_of(const nb_cloud_column *column)
 }
 
 static int is_above(nebel_cloud_workspace *workspace, const nb_grid *grid, int size, int x, int y, float least,
-                    nb_cloud_block *known);
+                    nb_cloud_column_block *known);
 
 /* Part i of a block: a rank above `least`, or in *most the largest one. */
 static int is_part_above(nebel_cloud_workspace *workspace, const nb_grid *grid, int size, int x, int y, int i,
                          float least, float *most)
 {
-    nb_cloud_block part;
+    nb_cloud_column_block part;
     int is;
     if (size == 0) {
         *most = most_of(point_at(workspace, grid, x * POINTS + i % (POINTS + 1), y * POINTS + i / (POINTS + 1)));
@@ -159,13 +159,14 @@ static int is_part_above(nebel_cloud_workspace *workspace, const nb_grid *grid, 
 /* Whether a column of a block has a rank above `least`. The first one that has is enough: where clouds are, most of a block need not be
  * found. */
 static int is_above(nebel_cloud_workspace *workspace, const nb_grid *grid, int size, int x, int y, float least,
-                    nb_cloud_block *known)
+                    nb_cloud_column_block *known)
 {
     const uint32_t key = grid->key ^ (uint32_t)size << 29;
     const int parts = size == 0 ? (POINTS + 1) * (POINTS + 1) : BLOCKS * BLOCKS;
-    nb_cloud_block *block = &workspace->blocks[nb_cloud_grid_hash(key, x, y) & (NB_CLOUD_BLOCKS - 1)];
+    nb_cloud_column_block *block = &workspace->blocks[nb_cloud_grid_hash(key, x, y) & (NB_CLOUD_BLOCKS - 1)];
     const int is_there = block->key == key && block->at[0] == x && block->at[1] == y;
-    *known = is_there ? *block : (nb_cloud_block){.key = key, .at = {x, y}, .above = -HUGE_VALF, .highest = HUGE_VALF};
+    *known = is_there ? *block
+                      : (nb_cloud_column_block){.key = key, .at = {x, y}, .above = -HUGE_VALF, .highest = HUGE_VALF};
     if (known->above > least) return 1;
     if (known->highest <= least) return 0;
     float highest = -HUGE_VALF;
@@ -184,13 +185,13 @@ static int is_above(nebel_cloud_workspace *workspace, const nb_grid *grid, int s
 }
 
 /* Beyond a face's edge there are points, too: blocks that lie across need no more than others. */
-nb_cloud_outlook nb_cloud_look_out(const nebel_cloud_workspace *workspace, int layer, const double place[3],
-                                   const double direction[3], float width)
+nb_cloud_column_cursor nb_cloud_look_out(const nebel_cloud_workspace *workspace, int layer, const double place[3],
+                                         const double direction[3], float width)
 {
     const nb_cube_place at = cube_of(place);
     const int axis = at.face / 2, across[2] = {axis == 0, axis == 2 ? 1 : 2};
     const double sign = at.face & 1 ? -1 : 1;
-    nb_cloud_outlook out = {
+    nb_cloud_column_cursor out = {
         .layer = layer, .face = at.face, .over = sign * place[axis], .rise = sign * direction[axis]};
     const float level = nb_cloud_grid_level(workspace->view->clouds->layers[layer].grid, width);
     out.level = (int)level;
@@ -206,12 +207,12 @@ nb_cloud_outlook nb_cloud_look_out(const nebel_cloud_workspace *workspace, int l
 }
 
 /* Of the two grids between which columns are mixed: those that count. */
-static int first_grid(const nb_cloud_outlook *out)
+static int first_grid(const nb_cloud_column_cursor *out)
 {
     return out->part < 1 ? 0 : 1;
 }
 
-static int last_grid(const nb_cloud_outlook *out)
+static int last_grid(const nb_cloud_column_cursor *out)
 {
     return out->part > 0 ? 1 : 0;
 }
@@ -222,7 +223,7 @@ static const double per_sides[3] = {1.0 / POINTS, 1.0 / (POINTS * BLOCKS), 1.0 /
 /* From the edge of a block rays go on into the next one. In sides of blocks, more than rounding and nothing to ranks. */
 #define ONWARD 1e-9
 
-double nb_cloud_way_in_block(const nebel_cloud_workspace *workspace, nb_cloud_outlook *out, int size)
+double nb_cloud_way_in_block(const nebel_cloud_workspace *workspace, nb_cloud_column_cursor *out, int size)
 {
     const nb_cloud_grid *grids = &workspace->view->clouds->layers[out->layer].grids[out->level];
     double way = HUGE_VAL;
@@ -239,9 +240,9 @@ double nb_cloud_way_in_block(const nebel_cloud_workspace *workspace, nb_cloud_ou
     return way;
 }
 
-int nb_cloud_is_block_above(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, float least)
+int nb_cloud_is_block_above(nebel_cloud_workspace *workspace, const nb_cloud_column_cursor *out, int size, float least)
 {
-    nb_cloud_block known;
+    nb_cloud_column_block known;
     for (int k = first_grid(out); k <= last_grid(out); k++) {
         const nb_grid grid = grid_of(workspace->view->clouds, out->layer, out->level + k, out->face);
         if (is_above(workspace, &grid, size, out->block[k][0], out->block[k][1], least, &known)) return 1;

@@ -58,13 +58,13 @@ static void spread(int i, double unit[3], double *height, double *turn)
     *turn = 2 * PI * parts[3];
 }
 
-static void find_places(const nebel_cloud_lighting *view, int k, nb_cloud_crowd *crowd)
+static void find_places(const nebel_cloud_lighting *view, int k, nb_cloud_prefilter *crowd)
 {
     const nb_cloud_layer *layer = &view->clouds->layers[k];
-    const nb_cloud_pose *pose = &view->poses[k];
-    nb_cloud_looks looks = {.count = 0, .are_of_rays = 0};
+    const nb_cloud_rotation *pose = &view->poses[k];
+    nb_cloud_density_query looks = {.count = 0, .are_of_rays = 0};
     for (int first = 0; first < TRIES && crowd->count < NB_CROWD_PLACES; first += NB_CLOUD_LANES) {
-        nb_crowd_place places[NB_CLOUD_LANES];
+        nb_prefilter_point places[NB_CLOUD_LANES];
         float extinction[NB_CLOUD_LANES];
         for (int i = 0; i < NB_CLOUD_LANES; i++) {
             double own[3], height;
@@ -82,12 +82,12 @@ static void find_places(const nebel_cloud_lighting *view, int k, nb_cloud_crowd 
     }
 }
 
-static void set_places(nebel_cloud_workspace *workspace, int k, nb_cloud_crowd *crowd)
+static void set_places(nebel_cloud_workspace *workspace, int k, nb_cloud_prefilter *crowd)
 {
     const float wide = (float)(AROUND_PART / (double)workspace->view->clouds->layers[k].per_thickness);
     find_places(workspace->view, k, crowd);
     for (int i = 0; i < crowd->count; i++) {
-        nb_crowd_place *place = &crowd->places[i];
+        nb_prefilter_point *place = &crowd->places[i];
         double up[3], down[3];
         const double radius = nb_vector_length(place->from);
         for (int c = 0; c < 3; c++) up[c] = place->from[c] / radius, down[c] = -up[c];
@@ -100,7 +100,7 @@ static void set_places(nebel_cloud_workspace *workspace, int k, nb_cloud_crowd *
 /* ---- entries --------------------------------------------------------------------------------- */
 
 /* A direction of such a cosine to straight up, turned so far about it. */
-static void direct(const nb_crowd_place *place, double cosine, double turn, double direction[3])
+static void direct(const nb_prefilter_point *place, double cosine, double turn, double direction[3])
 {
     double up[3], east[3], north[3];
     const double radius = nb_vector_length(place->from), sine = sqrt(1 - cosine * cosine);
@@ -120,14 +120,14 @@ static nb_fine fine_of(const nb_cloud_layer *layer)
     return (nb_fine){width, first};
 }
 
-static const nb_cloud_depths *depths_under(nebel_cloud_workspace *workspace, int k, nb_cloud_crowd *crowd, int sun)
+static const nb_cloud_depths *depths_under(nebel_cloud_workspace *workspace, int k, nb_cloud_prefilter *crowd, int sun)
 {
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
     const nb_fine fine = fine_of(layer);
     const float wide = (float)(AROUND_PART / (double)layer->per_thickness);
     if (crowd->has_depths[sun]) return crowd->depths[sun];
     for (int i = 0; i < crowd->count; i++) {
-        const nb_crowd_place *place = &crowd->places[i];
+        const nb_prefilter_point *place = &crowd->places[i];
         double to[3], away[3];
         direct(place, (double)suns[sun], place->turn, to);
         for (int c = 0; c < 3; c++) away[c] = -to[c];
@@ -145,23 +145,24 @@ static const nb_cloud_depths *depths_under(nebel_cloud_workspace *workspace, int
 /* No ray from below a layer is flatter than one that just passes its base. */
 #define PAST_BASE 1.02
 
-static double steepness_of(const nb_cloud_layer *layer, const nb_crowd_place *place, int view)
+static double steepness_of(const nb_cloud_layer *layer, const nb_prefilter_point *place, int view)
 {
     const double part = layer->low / nb_vector_length(place->from), least = sqrt(fmax(0, 1 - part * part));
     return views[view] < 0 ? (double)views[view] : fmin(1, fmax((double)views[view], PAST_BASE * least));
 }
 
 /* What counts is how places differ: where none is seen, too, some are seen more than others. */
-static const nb_crowd_seen *seen_by(nebel_cloud_workspace *workspace, int k, nb_cloud_crowd *crowd, int view, int turn)
+static const nb_prefilter_weight *seen_by(nebel_cloud_workspace *workspace, int k, nb_cloud_prefilter *crowd, int view,
+                                          int turn)
 {
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
     const nb_fine fine = fine_of(layer);
     const float apart = layer->apart;
-    nb_crowd_seen *seen = crowd->seen[view][turn];
+    nb_prefilter_weight *seen = crowd->seen[view][turn];
     float least = HUGE_VALF;
     if (crowd->has_seen[view][turn]) return seen;
     for (int i = 0; i < crowd->count; i++) {
-        const nb_crowd_place *place = &crowd->places[i];
+        const nb_prefilter_point *place = &crowd->places[i];
         double ray[3];
         direct(place, steepness_of(layer, place, view), place->turn + acos((double)turns[turn]), ray);
         for (int c = 0; c < 3; c++) ray[c] = -ray[c];
@@ -177,7 +178,7 @@ static const nb_crowd_seen *seen_by(nebel_cloud_workspace *workspace, int k, nb_
     return seen;
 }
 
-static void add_parts(nb_cloud_parts *sum, const nb_cloud_parts *parts, float whole, float apart)
+static void add_parts(nb_cloud_irradiance *sum, const nb_cloud_irradiance *parts, float whole, float apart)
 {
     sum->left += whole * parts->left;
     sum->above += whole * parts->above;
@@ -186,20 +187,21 @@ static void add_parts(nb_cloud_parts *sum, const nb_cloud_parts *parts, float wh
     sum->often += apart * parts->often;
 }
 
-static const nb_cloud_parts *entry_of(nebel_cloud_workspace *workspace, int k, const int at[3])
+static const nb_cloud_irradiance *entry_of(nebel_cloud_workspace *workspace, int k, const int at[3])
 {
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
-    nb_cloud_crowd *crowd = &workspace->crowds[k];
-    nb_cloud_parts *mean = &crowd->means[at[0]][at[1]][at[2]];
+    nb_cloud_prefilter *crowd = &workspace->crowds[k];
+    nb_cloud_irradiance *mean = &crowd->means[at[0]][at[1]][at[2]];
     if (crowd->has_mean[at[0]][at[1]][at[2]]) return mean;
     const nb_cloud_depths *depths = depths_under(workspace, k, crowd, at[2]);
-    const nb_crowd_seen *seen = seen_by(workspace, k, crowd, at[0], at[1]);
-    nb_crowd_seen sum = {0, 0};
-    for (int i = 0; i < crowd->count; i++) sum = (nb_crowd_seen){sum.whole + seen[i].whole, sum.apart + seen[i].apart};
+    const nb_prefilter_weight *seen = seen_by(workspace, k, crowd, at[0], at[1]);
+    nb_prefilter_weight sum = {0, 0};
+    for (int i = 0; i < crowd->count; i++)
+        sum = (nb_prefilter_weight){sum.whole + seen[i].whole, sum.apart + seen[i].apart};
     for (int i = 0; i < crowd->count; i++) {
         const float sun = suns[at[2]], rise = (float)steepness_of(layer, &crowd->places[i], at[0]);
         const float ahead = sun * rise + turns[at[1]] * sqrtf((1 - sun * sun) * (1 - rise * rise));
-        const nb_cloud_parts parts = nb_cloud_parts_of(layer, &depths[i], &(nb_cloud_sight){sun, rise, ahead});
+        const nb_cloud_irradiance parts = nb_cloud_parts_of(layer, &depths[i], &(nb_cloud_sight){sun, rise, ahead});
         add_parts(mean, &parts, seen[i].whole / sum.whole, seen[i].apart / sum.apart);
     }
     crowd->has_mean[at[0]][at[1]][at[2]] = 1;
@@ -221,7 +223,7 @@ float nb_cloud_crowd_part(nebel_cloud_workspace *workspace, int k, float width)
 {
     const float size = workspace->view->clouds->layers[k].size;
     const float part = nb_larger(0, nb_smaller(1, (width / size - NEAR_PART) / (FAR_PART - NEAR_PART)));
-    nb_cloud_crowd *crowd = &workspace->crowds[k];
+    nb_cloud_prefilter *crowd = &workspace->crowds[k];
     if (part > 0 && !crowd->is_set) set_places(workspace, k, crowd);
     return crowd->count > 0 ? part : 0;
 }
@@ -234,8 +236,8 @@ static float part_below(float view, float entered)
     return nb_larger(0, nb_smaller(1, 0.5f + 0.5f * steep + below * (1 - fabsf(steep))));
 }
 
-nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int k, const double up[3], const double ray[3],
-                                 float entered)
+nb_cloud_irradiance nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int k, const double up[3], const double ray[3],
+                                      float entered)
 {
     const double *to_sun = workspace->view->sun.direction;
     const double sun = nb_vector_dot(up, to_sun), view = nb_vector_dot(up, ray);
@@ -246,7 +248,7 @@ nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int k, const 
                      place_among(turns, NB_CROWD_TURNS, (float)turn, &low[1]),
                      place_among(suns, NB_CROWD_SUNS, (float)sun, &low[2])};
     if (low[0] == NB_CROWD_VIEWS / 2 - 1) part[0] = part_below((float)view, entered);
-    nb_cloud_parts sum = {0, 0, 0, 0, 0};
+    nb_cloud_irradiance sum = {0, 0, 0, 0, 0};
     for (int corner = 0; corner < 8; corner++) {
         float weight = 1;
         int at[3];
@@ -259,9 +261,9 @@ nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int k, const 
     return sum;
 }
 
-nb_cloud_parts nb_cloud_mix_parts(const nb_cloud_parts *a, const nb_cloud_parts *b, float part)
+nb_cloud_irradiance nb_cloud_mix_parts(const nb_cloud_irradiance *a, const nb_cloud_irradiance *b, float part)
 {
-    nb_cloud_parts sum = {0, 0, 0, 0, 0};
+    nb_cloud_irradiance sum = {0, 0, 0, 0, 0};
     add_parts(&sum, a, 1 - part, 1 - part);
     add_parts(&sum, b, part, part);
     return sum;

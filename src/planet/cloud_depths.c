@@ -56,10 +56,10 @@ double nb_cloud_to_ground(double radius, const double from[3], const double unit
 
 /* Steps along a way: how long the first is, how much longer each is than the one before, and how many there are at most, of which
  * the last one goes to the way's end. What is narrower than a width is seen as a mean. */
-typedef struct nb_steps {
+typedef struct nb_cloud_steps {
     float first, growth, width;
     int most;
-} nb_steps;
+} nb_cloud_steps;
 
 enum { OWN_STEPS = 7, MOST_STEPS = 128 };
 
@@ -78,16 +78,16 @@ enum { OWN_STEPS = 7, MOST_STEPS = 128 };
 #define HEAP_PART 0.45f
 
 /* A way from a place, and its optical depth. */
-typedef struct nb_way {
+typedef struct nb_depth_ray {
     double from[3], unit[3], reach;
-    nb_steps steps;
+    nb_cloud_steps steps;
     double depth;
-} nb_way;
+} nb_depth_ray;
 
 /* The pieces of a way in a layer. Just below the horizon it may leave the layer over the planet's bulge and enter it again
  * behind; but not through the ground: who looks down from below a layer sees none of its clouds, not those on the planet's other
  * side. */
-static int stays_of(const nebel_cloud_lighting *view, int k, const nb_way *way, double pieces[2][2])
+static int stays_of(const nebel_cloud_lighting *view, int k, const nb_depth_ray *way, double pieces[2][2])
 {
     const nb_cloud_layer *layer = &view->clouds->layers[k];
     const int count = nb_cloud_pieces(layer->low, layer->high, way->from, way->unit, way->reach, pieces);
@@ -97,18 +97,18 @@ static int stays_of(const nebel_cloud_lighting *view, int k, const nb_way *way, 
 }
 
 /* Steps of several ways in a layer whose places are asked at once, and whose depths they are. */
-typedef struct nb_stride {
+typedef struct nb_depth_step {
     nebel_cloud_workspace *workspace;
     int layer, is_alone;
-    nb_cloud_looks looks;
+    nb_cloud_density_query looks;
     double lengths[NB_CLOUD_LANES], *depths[NB_CLOUD_LANES];
-} nb_stride;
+} nb_depth_step;
 
 /* Begins anew. */
-static void stride(nb_stride *steps)
+static void stride(nb_depth_step *steps)
 {
     const nebel_cloud_lighting *view = steps->workspace->view;
-    nb_cloud_looks *looks = &steps->looks;
+    nb_cloud_density_query *looks = &steps->looks;
     if (looks->count == 0) return;
     if (steps->is_alone)
         nb_cloud_look_alone(view->kernel, &view->clouds->noise, &view->clouds->layers[steps->layer], looks);
@@ -119,14 +119,14 @@ static void stride(nb_stride *steps)
 }
 
 /* Each step takes the mean over its length. */
-static void march(nb_way *way, nb_stride *steps)
+static void march(nb_depth_ray *way, nb_depth_step *steps)
 {
     const nebel_cloud_lighting *view = steps->workspace->view;
     const nb_cloud_layer *layer = &view->clouds->layers[steps->layer];
     const float most_hidden = nb_smaller(layer->hidden_height, layer->hidden_width);
     double pieces[2][2], own[3], unit[3], step = (double)way->steps.first;
     const int count = stays_of(view, steps->layer, way, pieces);
-    nb_cloud_looks *looks = &steps->looks;
+    nb_cloud_density_query *looks = &steps->looks;
     int left = way->steps.most;
     for (int c = 0; c < 3; c++) {
         own[c] = nb_vector_dot(view->poses[steps->layer].turn[c], way->from);
@@ -152,9 +152,9 @@ static void march(nb_way *way, nb_stride *steps)
 }
 
 /* Depths of all layers along ways. is_alone: of places that have no neighbours. */
-static void find_ways(nebel_cloud_workspace *workspace, int is_alone, int n, nb_way *ways)
+static void find_ways(nebel_cloud_workspace *workspace, int is_alone, int n, nb_depth_ray *ways)
 {
-    nb_stride steps;
+    nb_depth_step steps;
     steps.workspace = workspace;
     steps.is_alone = is_alone;
     steps.looks.count = steps.looks.are_of_rays = 0;
@@ -165,9 +165,9 @@ static void find_ways(nebel_cloud_workspace *workspace, int is_alone, int n, nb_
     for (int i = 0; i < n; i++) ways[i].depth = nb_min(ways[i].depth, 1e6);
 }
 
-static nb_way way_of(const double from[3], const double unit[3], const nb_steps *steps)
+static nb_depth_ray way_of(const double from[3], const double unit[3], const nb_cloud_steps *steps)
 {
-    nb_way way = {.reach = HUGE_VAL, .steps = *steps};
+    nb_depth_ray way = {.reach = HUGE_VAL, .steps = *steps};
     memcpy(way.from, from, sizeof way.from);
     memcpy(way.unit, unit, sizeof way.unit);
     return way;
@@ -176,7 +176,7 @@ static nb_way way_of(const double from[3], const double unit[3], const nb_steps 
 float nb_cloud_depth_along(nebel_cloud_workspace *workspace, const double from[3], const double unit[3], float first,
                            float width, int is_alone)
 {
-    nb_way way = way_of(from, unit, &(nb_steps){first, OTHER_GROWTH, width, MOST_STEPS});
+    nb_depth_ray way = way_of(from, unit, &(nb_cloud_steps){first, OTHER_GROWTH, width, MOST_STEPS});
     find_ways(workspace, is_alone, 1, &way);
     return (float)way.depth;
 }
@@ -199,8 +199,8 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
     nb_vector_cross(place, across[0], across[1]);
     nb_vector_make_unit(across[1]);
     const int is_alone = width > MOST_COLUMNS * layer->size;
-    const nb_steps to_sun = {first, is_alone ? OTHER_GROWTH : SHARED_GROWTH, fine, MOST_STEPS};
-    const nb_steps to_up = {first, OTHER_GROWTH, fine, MOST_STEPS};
+    const nb_cloud_steps to_sun = {first, is_alone ? OTHER_GROWTH : SHARED_GROWTH, fine, MOST_STEPS};
+    const nb_cloud_steps to_up = {first, OTHER_GROWTH, fine, MOST_STEPS};
     parts[0] = parts[1] = parts[2] = 0;
     for (int i = 0; i < count * count; i++) {
         const double u = ((i % count + 0.5) / count - 0.5) * (double)width,
@@ -210,7 +210,7 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
         nb_vector_make_unit(up);
         for (int c = 0; c < 3; c++) base[c] = layer->low * up[c];
         const double cosines[2] = {nb_vector_dot(up, workspace->view->sun.direction), 1};
-        nb_way ways[2] = {way_of(base, workspace->view->sun.direction, &to_sun), way_of(base, up, &to_up)};
+        nb_depth_ray ways[2] = {way_of(base, workspace->view->sun.direction, &to_sun), way_of(base, up, &to_up)};
         find_ways(workspace, is_alone, 2, ways);
         for (int w = 0; w < 2; w++)
             parts[w] += nb_cloud_part_through(layer, (float)ways[w].depth, cosines[w]) / (float)(count * count);
@@ -218,8 +218,8 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
 }
 
 /* Away from the sun, up and down. */
-static void set_around(const nebel_cloud_workspace *workspace, const double place[3], const nb_steps *steps,
-                       nb_way ways[3])
+static void set_around(const nebel_cloud_workspace *workspace, const double place[3], const nb_cloud_steps *steps,
+                       nb_depth_ray ways[3])
 {
     const double radius = nb_max(1, nb_vector_length(place));
     double away[3], up[3], down[3];
@@ -235,20 +235,21 @@ static void set_around(const nebel_cloud_workspace *workspace, const double plac
 
 static void find_around(nebel_cloud_workspace *workspace, const double place[3], float width, float depth[3])
 {
-    nb_way ways[3];
-    set_around(workspace, place, &(nb_steps){width, OTHER_GROWTH, width, MOST_STEPS}, ways);
+    nb_depth_ray ways[3];
+    set_around(workspace, place, &(nb_cloud_steps){width, OTHER_GROWTH, width, MOST_STEPS}, ways);
     find_ways(workspace, 0, 3, ways);
     for (int i = 0; i < 3; i++) depth[i] = (float)ways[i].depth;
 }
 
 static void find_to_sun(nebel_cloud_workspace *workspace, const double place[3], float width, float depth[1])
 {
-    nb_way way = way_of(place, workspace->view->sun.direction, &(nb_steps){width, SHARED_GROWTH, width, MOST_STEPS});
+    nb_depth_ray way =
+        way_of(place, workspace->view->sun.direction, &(nb_cloud_steps){width, SHARED_GROWTH, width, MOST_STEPS});
     find_ways(workspace, 0, 1, &way);
     depth[0] = (float)way.depth;
 }
 
-static void find_node(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const int32_t at[3], int level,
+static void find_node(nebel_cloud_workspace *workspace, nb_cloud_depth_axis ways, const int32_t at[3], int level,
                       float depth[3])
 {
     const float width = (float)ldexp(1, level);
@@ -272,12 +273,12 @@ static uint32_t hash_of(const int32_t at[3], int level)
 }
 
 /* What is found on the way may take the node's place. */
-static void read_node(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const int32_t at[3], int level,
+static void read_node(nebel_cloud_workspace *workspace, nb_cloud_depth_axis ways, const int32_t at[3], int level,
                       float depth[3])
 {
-    nb_cloud_node *node = &workspace->lattices[ways].nodes[hash_of(at, level) & (NB_CLOUD_NODES - 1)];
+    nb_cloud_lattice_node *node = &workspace->lattices[ways].nodes[hash_of(at, level) & (NB_CLOUD_NODES - 1)];
     if (!(node->is_set && node->level == level && memcmp(node->at, at, sizeof node->at) == 0)) {
-        nb_cloud_node found = {.at = {at[0], at[1], at[2]}, .level = (int16_t)level, .is_set = 1};
+        nb_cloud_lattice_node found = {.at = {at[0], at[1], at[2]}, .level = (int16_t)level, .is_set = 1};
         find_node(workspace, ways, at, level, found.depth);
         *node = found;
     }
@@ -294,12 +295,12 @@ typedef struct nb_in_cell {
 
 /* The cells around a place of up to two levels. */
 typedef struct nb_in_lattice {
-    nb_cloud_ways ways;
+    nb_cloud_depth_axis ways;
     int count;
     nb_in_cell cells[2];
 } nb_in_lattice;
 
-static const nb_cloud_cell *cell_at(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const nb_in_cell *in)
+static const nb_cloud_cell *cell_at(nebel_cloud_workspace *workspace, nb_cloud_depth_axis ways, const nb_in_cell *in)
 {
     nb_cloud_cell *cell = &workspace->lattices[ways].cells[in->hash];
     if (cell->is_set && cell->level == in->level && memcmp(cell->low, in->low, sizeof cell->low) == 0) return cell;
@@ -315,7 +316,7 @@ static const nb_cloud_cell *cell_at(nebel_cloud_workspace *workspace, nb_cloud_w
 }
 
 /* Sends for the cell, which caches seldom have. */
-static nb_in_cell find_cell(const nebel_cloud_workspace *workspace, nb_cloud_ways ways, const double place[3],
+static nb_in_cell find_cell(const nebel_cloud_workspace *workspace, nb_cloud_depth_axis ways, const double place[3],
                             int level, float weight)
 {
     const double per = nb_scale_pow2(1, -level);
@@ -338,8 +339,8 @@ static nb_in_cell find_cell(const nebel_cloud_workspace *workspace, nb_cloud_way
 #define BLEND 0.125
 #define ROOFS_BLEND 0.25
 
-static nb_in_lattice find_in_lattice(const nebel_cloud_workspace *workspace, nb_cloud_ways ways, const double place[3],
-                                     float width)
+static nb_in_lattice find_in_lattice(const nebel_cloud_workspace *workspace, nb_cloud_depth_axis ways,
+                                     const double place[3], float width)
 {
     int level;
     /* Numbers of nodes must be whole. */
@@ -378,20 +379,21 @@ float nb_cloud_sun_depth_at(nebel_cloud_workspace *workspace, const double place
 /* Nodes farther apart than that would lie deep in the planet. */
 #define WIDEST_ROOF 0.125f
 
-nb_cloud_roof nb_cloud_roof_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width)
+nb_cloud_cover_transmittance nb_cloud_roof_at(nebel_cloud_workspace *workspace, int layer, const double place[3],
+                                              float width)
 {
     float parts[3];
     const nb_in_lattice in =
-        find_in_lattice(workspace, (nb_cloud_ways)(NB_CLOUD_ROOFS + layer), place,
+        find_in_lattice(workspace, (nb_cloud_depth_axis)(NB_CLOUD_ROOFS + layer), place,
                         nb_smaller(width, WIDEST_ROOF * (float)workspace->view->clouds->layers[layer].low));
     read_lattice(workspace, &in, parts);
-    return (nb_cloud_roof){parts[0], parts[1]};
+    return (nb_cloud_cover_transmittance){parts[0], parts[1]};
 }
 
 /* ---- places ---------------------------------------------------------------------------------- */
 
 /* What is behind a place's own steps towards the sun. */
-static nb_in_lattice find_behind(const nebel_cloud_workspace *workspace, const nb_way *own)
+static nb_in_lattice find_behind(const nebel_cloud_workspace *workspace, const nb_depth_ray *own)
 {
     const double *sun = workspace->view->sun.direction;
     const float width = NODES_STEP * OWN_GROWTH * own->steps.first;
@@ -408,18 +410,19 @@ enum { FIRST_STEPS, BEHIND, AROUND, PLACE_WAYS = AROUND + 3 };
 
 /* Where a place's depths come from. */
 typedef struct nb_origin {
-    nb_cloud_asked *asked;
-    const nb_way *ways;
+    nb_cloud_depth_query *asked;
+    const nb_depth_ray *ways;
     nb_in_lattice behind, around;
 } nb_origin;
 
 /* Returns how many ways there are. */
-static int set_ways(const nebel_cloud_workspace *workspace, const nb_cloud_asked *asked, nb_way ways[PLACE_WAYS])
+static int set_ways(const nebel_cloud_workspace *workspace, const nb_cloud_depth_query *asked,
+                    nb_depth_ray ways[PLACE_WAYS])
 {
-    const nb_cloud_grain *grain = &asked->grain;
+    const nb_cloud_resolution *grain = &asked->grain;
     const double *sun = workspace->view->sun.direction;
-    nb_way *first = &ways[FIRST_STEPS];
-    nb_steps steps = {grain->first, GROWTH, grain->width, OWN_STEPS};
+    nb_depth_ray *first = &ways[FIRST_STEPS];
+    nb_cloud_steps steps = {grain->first, GROWTH, grain->width, OWN_STEPS};
     *first = way_of(asked->place, sun, &steps);
     first->reach = (double)((OWN_GROWTH - 1) / (GROWTH - 1) * grain->first);
     if (!(grain->own > 0)) return 1;
@@ -432,7 +435,7 @@ static int set_ways(const nebel_cloud_workspace *workspace, const nb_cloud_asked
     return PLACE_WAYS;
 }
 
-static void find_origin(const nebel_cloud_workspace *workspace, nb_cloud_asked *asked, const nb_way *ways,
+static void find_origin(const nebel_cloud_workspace *workspace, nb_cloud_depth_query *asked, const nb_depth_ray *ways,
                         nb_origin *origin)
 {
     origin->asked = asked;
@@ -445,7 +448,7 @@ static void find_origin(const nebel_cloud_workspace *workspace, nb_cloud_asked *
 
 static void take_depths(nebel_cloud_workspace *workspace, const nb_origin *origin)
 {
-    const nb_way *ways = origin->ways;
+    const nb_depth_ray *ways = origin->ways;
     const float own = origin->asked->grain.own;
     float sun[3], around[3];
     read_lattice(workspace, &origin->behind, sun);
@@ -457,13 +460,13 @@ static void take_depths(nebel_cloud_workspace *workspace, const nb_origin *origi
     origin->asked->depths = (nb_cloud_depths){(float)ways[FIRST_STEPS].depth + sun[0], around[0], around[1], around[2]};
 }
 
-void nb_cloud_find_depths(nebel_cloud_workspace *workspace, int n, nb_cloud_asked asked[])
+void nb_cloud_find_depths(nebel_cloud_workspace *workspace, int n, nb_cloud_depth_query asked[])
 {
-    nb_way ways[NB_CLOUD_ASKED * PLACE_WAYS];
+    nb_depth_ray ways[NB_CLOUD_ASKED * PLACE_WAYS];
     nb_origin origins[NB_CLOUD_ASKED];
     int count = 0, way_count = 0;
     for (int i = 0; i < n; i++) {
-        nb_way *of_place = &ways[way_count];
+        nb_depth_ray *of_place = &ways[way_count];
         asked[i].depths = (nb_cloud_depths){0, 0, 0, 0};
         if (asked[i].is_alike) continue;
         way_count += set_ways(workspace, &asked[i], of_place);

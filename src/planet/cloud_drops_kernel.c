@@ -130,14 +130,14 @@ static inline nb_real deepest(const nb_cloud_layer *layer, nb_real height)
 /* Extinction at a place is `most` times `part` held within 0 and 1; where a width hides some of it, all within `spread` of
  * `part` is as likely. missing[n]: by how much the rank is at least too low, whatever billows behind the first n scales do; below
  * 0 where it may not be. */
-typedef struct nb_drops {
+typedef struct nb_density_lanes {
     nb_real most, part, spread, missing[NB_CLOUD_BILLOWS + 1];
-} nb_drops;
+} nb_density_lanes;
 
 /* Billows cut one minus the weighted sum of their scales. From the largest scale on they are read only until what is
  * left of them can neither make cloud nor thin it. */
-static inline nb_drops drops_of(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_looks *looks,
-                                int p)
+static inline nb_density_lanes drops_of(const nb_cloud_noise *noise, const nb_cloud_layer *layer,
+                                        const nb_cloud_density_query *looks, int p)
 {
     const nb_real height = load(looks->height, p), variance = load(looks->variance, p),
                   softness = nb_splat(layer->softness);
@@ -146,7 +146,7 @@ static inline nb_drops drops_of(const nb_cloud_noise *noise, const nb_cloud_laye
     /* What is far within is whole. */
     nb_mask is_open = nb_and(nb_and(missing<NB_F(0.0), deep> NB_F(0.0)), whole - deep < softness + spread);
     nb_table tables[NB_CLOUD_BILLOWS];
-    nb_drops drops;
+    nb_density_lanes drops;
     for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) drops.missing[n] = missing;
     if (nb_any(is_open)) {
         const nb_real lost = choose_tables(noise, layer, load(looks->width, p), tables);
@@ -190,7 +190,7 @@ static inline nb_real mean_ramp(nb_real x, nb_real wide)
 }
 
 /* Where a part is full and another clear, between them evenly all that lies between: mean of 1 - exp(-depth x). */
-static inline nb_real mean_lost(const nb_drops *drops, nb_real depth)
+static inline nb_real mean_lost(const nb_density_lanes *drops, nb_real depth)
 {
     const nb_real low = drops->part - drops->spread, high = drops->part + drops->spread;
     const nb_real from = nb_clamp(low, NB_F(0.0), NB_F(1.0)), to = nb_clamp(high, NB_F(0.0), NB_F(1.0));
@@ -201,13 +201,13 @@ static inline nb_real mean_lost(const nb_drops *drops, nb_real depth)
 }
 
 /* Never more than the mean, whatever is too little for a number. */
-static inline nb_real through(const nb_drops *drops, nb_real depth, nb_real length, nb_real mean)
+static inline nb_real through(const nb_density_lanes *drops, nb_real depth, nb_real length, nb_real mean)
 {
     return nb_clamp(-nb_log1p(-mean_lost(drops, depth)) / length, NB_F(0.0), mean);
 }
 
 /* The mean of extinction, weighted by what it lets through: of the same. Never more than what lets as much through. */
-static inline nb_real passed_by(const nb_drops *drops, nb_real depth, nb_real most)
+static inline nb_real passed_by(const nb_density_lanes *drops, nb_real depth, nb_real most)
 {
     const nb_real low = drops->part - drops->spread, high = drops->part + drops->spread;
     const nb_real from = nb_clamp(low, NB_F(0.0), NB_F(1.0)), to = nb_clamp(high, NB_F(0.0), NB_F(1.0));
@@ -223,8 +223,8 @@ static inline nb_real passed_by(const nb_drops *drops, nb_real depth, nb_real mo
 }
 
 /* Stores what lets as much through as drops do. */
-static inline void see_through(const nb_cloud_layer *layer, const nb_drops *drops, nb_mask is_cloud, int p,
-                               nb_cloud_looks *looks)
+static inline void see_through(const nb_cloud_layer *layer, const nb_density_lanes *drops, nb_mask is_cloud, int p,
+                               nb_cloud_density_query *looks)
 {
     const nb_real length = load(looks->hidden, p), depth = drops->most * length, spread = drops->spread;
     const nb_real mean = nb_select(is_cloud, drops->most * mean_ramp(drops->part, drops->spread), NB_F(0.0));
@@ -248,7 +248,8 @@ static inline void see_through(const nb_cloud_layer *layer, const nb_drops *drop
 }
 
 /* Of billows, the slope of the first scales counts, whatever the others do. */
-static inline nb_real clear_of(const nb_cloud_layer *layer, const nb_cloud_looks *looks, const nb_real missing[], int p)
+static inline nb_real clear_of(const nb_cloud_layer *layer, const nb_cloud_density_query *looks,
+                               const nb_real missing[], int p)
 {
     nb_real slope = nb_splat(layer->slope) * load(looks->scale, p) +
                     nb_splat(NB_CLOUD_RANK_SLOPE * layer->per_thickness) * nb_abs(load(looks->climb, p));
@@ -261,18 +262,19 @@ static inline nb_real clear_of(const nb_cloud_layer *layer, const nb_cloud_looks
 }
 
 static inline void find_in_packet(const nb_cloud_noise *noise, const nb_cloud_layer *layer, int p,
-                                  nb_cloud_looks *looks)
+                                  nb_cloud_density_query *looks)
 {
     const nb_real height = load(looks->height, p);
     const nb_mask is_in = nb_and(height > NB_F(0.0), height < NB_F(1.0));
-    const nb_drops drops = drops_of(noise, layer, looks, p);
+    const nb_density_lanes drops = drops_of(noise, layer, looks, p);
     const nb_mask is_cloud = nb_and(is_in, drops.missing[NB_CLOUD_BILLOWS] < NB_F(0.0));
     see_through(layer, &drops, is_cloud, p, looks);
     if (looks->are_of_rays)
         nb_store_lanes(looks->clear + p, nb_select(is_in, clear_of(layer, looks, drops.missing, p), NB_F(0.0)));
 }
 
-void NB_SUFFIXED(nb_cloud_find_drops_)(const nb_cloud_noise *noise, const nb_cloud_layer *layer, nb_cloud_looks *looks)
+void NB_SUFFIXED(nb_cloud_find_drops_)(const nb_cloud_noise *noise, const nb_cloud_layer *layer,
+                                       nb_cloud_density_query *looks)
 {
     for (int p = 0; p < looks->count; p += NB_WIDTH) find_in_packet(noise, layer, p, looks);
 }

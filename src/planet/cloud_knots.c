@@ -16,48 +16,48 @@ enum { MOST = NEBEL_MAX_CLOUD_NODES };
 /* Gaps between clouds are long from this part of the way to their end on. */
 #define LONG_GAP 0.1
 
-static nb_cloud_knot knot_here(const nb_cloud_tally *tally, double t)
+static nb_cloud_node knot_here(const nb_cloud_node_builder *tally, double t)
 {
-    nb_cloud_knot knot = {.t = t, .left = tally->left, .left_apart = tally->left_apart, .stretches = tally->asked};
+    nb_cloud_node knot = {.t = t, .left = tally->left, .left_apart = tally->left_apart, .stretches = tally->asked};
     memcpy(knot.light, tally->light, sizeof knot.light);
     memcpy(knot.ahead, tally->ahead, sizeof knot.ahead);
     return knot;
 }
 
 /* There is one. */
-static const nb_cloud_knot *last_of(const nb_cloud_tally *tally)
+static const nb_cloud_node *last_of(const nb_cloud_node_builder *tally)
 {
     return &tally->knots[tally->count - 1];
 }
 
-static void write_knot(nb_cloud_tally *tally, const nb_cloud_knot *knot)
+static void write_knot(nb_cloud_node_builder *tally, const nb_cloud_node *knot)
 {
     tally->knots[tally->count++] = *knot;
 }
 
 /* The end of a gap that no knot lies behind. */
-static int has_gap(const nb_cloud_tally *tally)
+static int has_gap(const nb_cloud_node_builder *tally)
 {
     return tally->count > 0 && tally->gap_end.t > last_of(tally)->t;
 }
 
 /* What light must have fallen for a knot to be worth its place: the more there are the more. */
-static double least_fall(const nb_cloud_tally *tally)
+static double least_fall(const nb_cloud_node_builder *tally)
 {
     return MOST_FALL * tally->count / MOST;
 }
 
 /* Before it the end of the gap that clouds lie behind, if they have taken something. The last place may stay free until the end. */
-static void add_knot(nb_cloud_tally *tally, double t)
+static void add_knot(nb_cloud_node_builder *tally, double t)
 {
-    const nb_cloud_knot here = knot_here(tally, t);
+    const nb_cloud_node here = knot_here(tally, t);
     if (has_gap(tally) && tally->gap_end.left_apart - here.left_apart > least_fall(tally) && tally->count + 2 < MOST)
         write_knot(tally, &tally->gap_end);
     if (tally->count + 1 < MOST) write_knot(tally, &here);
 }
 
 /* A long gap is full of air, and clouds leave as much of its light at both ends: a knot between two clouds would have the mean of both. */
-void nb_cloud_tally_enter(nb_cloud_tally *tally, double t)
+void nb_cloud_tally_enter(nb_cloud_node_builder *tally, double t)
 {
     if (tally->count == 0) {
         add_knot(tally, t);
@@ -68,7 +68,7 @@ void nb_cloud_tally_enter(nb_cloud_tally *tally, double t)
     tally->gap_end = knot_here(tally, t);
 }
 
-void nb_cloud_tally_pass(nb_cloud_tally *tally, double t, double depth, double apart)
+void nb_cloud_tally_pass(nb_cloud_node_builder *tally, double t, double depth, double apart)
 {
     tally->end = t;
     tally->depth += depth;
@@ -78,13 +78,13 @@ void nb_cloud_tally_pass(nb_cloud_tally *tally, double t, double depth, double a
 }
 
 /* Where the clouds' transmittance has fallen, or the ray is far from the last knot. */
-void nb_cloud_tally_leave(nb_cloud_tally *tally, double t)
+void nb_cloud_tally_leave(nb_cloud_node_builder *tally, double t)
 {
     const double fallen = last_of(tally)->left - tally->left;
     if (fallen > MOST_FALL || (fallen > 0.02 && t > 1.5 * last_of(tally)->t)) add_knot(tally, t);
 }
 
-static void add_to_knot(nb_cloud_knot *knot, const double light[3], const double ahead[3])
+static void add_to_knot(nb_cloud_node *knot, const double light[3], const double ahead[3])
 {
     for (int c = 0; c < 3; c++) {
         knot->light[c] += light[c];
@@ -92,7 +92,7 @@ static void add_to_knot(nb_cloud_knot *knot, const double light[3], const double
     }
 }
 
-void nb_cloud_tally_light(nb_cloud_tally *tally, const double light[3], const double ahead[3])
+void nb_cloud_tally_light(nb_cloud_node_builder *tally, const double light[3], const double ahead[3])
 {
     const int number = ++tally->lit;
     for (int c = 0; c < 3; c++) {
@@ -106,16 +106,16 @@ void nb_cloud_tally_light(nb_cloud_tally *tally, const double light[3], const do
 
 /* The last cloud's end is the last knot, not that of the stay in its layer, which may be beyond the horizon: the last light would come
  * through all air before that. It takes the place of a knot that is there already. */
-static void add_end(nb_cloud_tally *tally)
+static void add_end(nb_cloud_node_builder *tally)
 {
-    const nb_cloud_knot end = knot_here(tally, tally->end);
+    const nb_cloud_node end = knot_here(tally, tally->end);
     if (tally->count == 0) return;
     if (tally->count > 1 && last_of(tally)->t >= tally->end) tally->count--;
     if (has_gap(tally) && tally->count + 1 < MOST) write_knot(tally, &tally->gap_end);
     write_knot(tally, &end);
 }
 
-void nb_cloud_tally_end(nb_cloud_tally *tally, double through, nebel_cloud_transfer *knots)
+void nb_cloud_tally_end(nb_cloud_node_builder *tally, double through, nebel_cloud_transfer *knots)
 {
     add_end(tally);
     knots->count = tally->count;

@@ -29,11 +29,11 @@ static float falling(float depth)
 static nb_cloud_light clear_light(const nebel_cloud_lighting *view, double radius, double sun)
 {
     const nebel_atmosphere *atmosphere = view->clouds->atmosphere;
-    const nb_field field = nb_scatter_look_up(&atmosphere->scatter, &atmosphere->airs, radius, sun);
+    const nb_radiance_moments field = nb_scatter_look_up(&atmosphere->scatter, &atmosphere->airs, radius, sun);
     nb_cloud_light light = {.sun = {0}};
     double direct[3];
     const double aside = sqrt(fmax(0, 1 - sun * sun));
-    nb_track_sunlight(&atmosphere->smooth, (nb_track){radius, radius * sun}, direct);
+    nb_track_sunlight(&atmosphere->smooth, (nb_atmosphere_ray){radius, radius * sun}, direct);
     for (int c = 0; c < 3; c++) {
         const double mean = field.moments[0][c] / (4 * 3.14159265358979323846), e = view->sun.irradiance[c];
         const double down = sun * field.moments[1][c] + aside * field.moments[2][c];
@@ -56,24 +56,24 @@ nebel_result nb_cloud_light_make(nebel_cloud_lighting *view)
     return NEBEL_OK;
 }
 
-typedef struct nb_between {
+typedef struct nb_cloud_slab_fit {
     int low;
     float part;
-} nb_between;
+} nb_cloud_slab_fit;
 
-static nb_between between(double place, int count)
+static nb_cloud_slab_fit between(double place, int count)
 {
     const double bounded = nb_max(0, nb_min(count - 1, place));
     const int low = bounded < count - 2 ? (int)bounded : count - 2;
-    return (nb_between){low, (float)(bounded - low)};
+    return (nb_cloud_slab_fit){low, (float)(bounded - low)};
 }
 
 nb_cloud_light nb_cloud_clear_light(const nebel_cloud_lighting *view, const double place[3], double radius)
 {
     const double sun = nb_vector_dot(place, view->sun.direction) / radius;
-    const nb_between h =
+    const nb_cloud_slab_fit h =
         between((radius - view->low) / (view->high - view->low) * (NB_CLOUD_HEIGHTS - 1), NB_CLOUD_HEIGHTS);
-    const nb_between s =
+    const nb_cloud_slab_fit s =
         between((sun - view->lowest_sun) / (1 - view->lowest_sun) * (NB_CLOUD_SUNS - 1), NB_CLOUD_SUNS);
     nb_cloud_light light = {.sun = {0}};
     for (int k = 0; k < 4; k++) {
@@ -240,8 +240,8 @@ static nb_slab_place slab_of(const nb_cloud_layer *layer, const nb_cloud_depths 
     return place;
 }
 
-nb_cloud_parts nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths,
-                                 const nb_cloud_sight *sight)
+nb_cloud_irradiance nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths,
+                                      const nb_cloud_sight *sight)
 {
     const float g = (float)layer->phase.moments[1];
     const nb_slab_place place = slab_of(layer, depths, sight);
@@ -249,7 +249,7 @@ nb_cloud_parts nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_dep
     const float from_above = (0.5f + 0.75f * (whole - over)) / (1 + 0.75f * whole);
     /* Half of the ground that is seen lies in this cloud's shadow. */
     const float ground = 0.5f + 0.5f * nb_slab_through(layer->slab, depths->up + depths->down, 1);
-    return (nb_cloud_parts){
+    return (nb_cloud_irradiance){
         .left = falling(depths->sun),
         .left_wide = falling(layer->apart * depths->sun),
         .often = nb_slab_source(layer->slab, &place),
@@ -258,7 +258,7 @@ nb_cloud_parts nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_dep
     };
 }
 
-nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_parts *parts,
+nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_irradiance *parts,
                                    const nb_cloud_light *light)
 {
     nb_cloud_source source;

@@ -48,7 +48,7 @@ typedef struct nb_cloud_cells {
 } nb_cloud_cells;
 
 /* Places, and what is there; behind `count` are places that do not matter. */
-struct nb_cloud_looks {
+struct nb_cloud_density_query {
     int count;
     int are_of_rays;                 /* then `way` is asked, too, and `hidden` is found */
     double place[3][NB_CLOUD_LANES]; /* from the planet's centre, in the layer's axes */
@@ -77,8 +77,8 @@ struct nb_cloud_looks {
 
 /* In this order, with the columns between; number: of the layer. The same bits for every instruction set, and for every place
  * whatever the others are. */
-typedef void nb_cloud_places_fn(const nb_cloud_layer *layer, int number, nb_cloud_looks *looks);
-typedef void nb_cloud_drops_fn(const nb_cloud_noise *noise, const nb_cloud_layer *layer, nb_cloud_looks *looks);
+typedef void nb_cloud_places_fn(const nb_cloud_layer *layer, int number, nb_cloud_density_query *looks);
+typedef void nb_cloud_drops_fn(const nb_cloud_noise *noise, const nb_cloud_layer *layer, nb_cloud_density_query *looks);
 
 nb_cloud_places_fn nb_cloud_find_places_scalar, nb_cloud_find_places_sse2, nb_cloud_find_places_avx2,
     nb_cloud_find_places_avx512, nb_cloud_find_places_neon;
@@ -94,7 +94,7 @@ struct nb_cloud_kernel {
 const nb_cloud_kernel *nb_cloud_kernel_choose(nebel_isa isa);
 
 /* Makes places behind `count` like the first, so that all are places. */
-static inline void nb_cloud_fill_lanes(nb_cloud_looks *looks)
+static inline void nb_cloud_fill_lanes(nb_cloud_density_query *looks)
 {
     for (int i = looks->count; i < NB_CLOUD_LANES; i++) {
         for (int c = 0; c < 3; c++) looks->place[c][i] = looks->place[c][0];
@@ -105,13 +105,13 @@ static inline void nb_cloud_fill_lanes(nb_cloud_looks *looks)
 }
 
 /* Outside of a layer there is no cloud. */
-static inline int nb_cloud_is_in_layer(const nb_cloud_looks *looks, int lane)
+static inline int nb_cloud_is_in_layer(const nb_cloud_density_query *looks, int lane)
 {
     return looks->height[lane] > 0 && looks->height[lane] < 1;
 }
 
 /* What counts where no column is asked: no cloud. */
-static inline void nb_cloud_set_no_columns(nb_cloud_looks *looks)
+static inline void nb_cloud_set_no_columns(nb_cloud_density_query *looks)
 {
     for (int i = 0; i < NB_CLOUD_LANES; i++) {
         looks->rank[i] = -1;

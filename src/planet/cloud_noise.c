@@ -30,15 +30,15 @@ static void fill_directions(float (*directions)[4])
     }
 }
 
-typedef struct nb_spot {
+typedef struct nb_noise_spot {
     int at[3];
     float part[3];
-} nb_spot;
+} nb_noise_spot;
 
 /* The lattice repeats at powers of two. */
-static inline nb_spot spot_of(const double place[3], int size)
+static inline nb_noise_spot spot_of(const double place[3], int size)
 {
-    nb_spot spot;
+    nb_noise_spot spot;
     for (int i = 0; i < 3; i++) {
         const int64_t toward_zero = (int64_t)place[i], low = toward_zero - (place[i] < (double)toward_zero);
         spot.at[i] = (int)(low & (size - 1));
@@ -66,7 +66,7 @@ static inline float slope_at(const nb_cloud_noise *noise, int place, float x, fl
 float nb_gradient_noise(const nb_cloud_noise *noise, const double place[3])
 {
     enum { N = NB_CLOUD_LATTICE };
-    const nb_spot spot = spot_of(place, N);
+    const nb_noise_spot spot = spot_of(place, N);
     const int x0 = spot.at[0], x1 = (x0 + 1) & (N - 1);
     const int y0 = spot.at[1] * N, y1 = ((spot.at[1] + 1) & (N - 1)) * N;
     const int z0 = spot.at[2] * N * N, z1 = ((spot.at[2] + 1) & (N - 1)) * N * N;

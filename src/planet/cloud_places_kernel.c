@@ -68,7 +68,7 @@ static inline void find_in_grid(const nb_faces *faces, nb_real level, double per
 
 /* nb_cloud_grid_level and nb_cloud_next_part. */
 static inline void find_cells(const nb_cloud_layer *layer, int number, const nb_faces *faces, int p,
-                              nb_cloud_looks *looks)
+                              nb_cloud_density_query *looks)
 {
     const nb_real widest = nb_splat((float)(1U << (NB_CLOUD_GRIDS - 2)));
     const nb_real numbers = nb_min(NB_F(2.0) * nb_load_lanes(looks->width + p) / nb_splat(layer->grid), widest);
@@ -84,7 +84,7 @@ static inline void find_cells(const nb_cloud_layer *layer, int number, const nb_
 /* ---- billows --------------------------------------------------------------------------------- */
 
 /* Where places are in a period of each scale, as parts of it; of wisps, places are drawn together along the wind. */
-static inline void find_parts(const nb_cloud_layer *layer, const nb_wide place[3], int p, nb_cloud_looks *looks)
+static inline void find_parts(const nb_cloud_layer *layer, const nb_wide place[3], int p, nb_cloud_density_query *looks)
 {
     nb_wide drawn[3] = {place[0], place[1], place[2]};
     if (layer->kind == NEBEL_CLOUD_CIRRUS) {
@@ -109,7 +109,7 @@ static inline void find_parts(const nb_cloud_layer *layer, const nb_wide place[3
 
 /* How fast a ray climbs, and what a width hides along it: no more than a ball of cloud is wide. */
 static inline void find_climb(const nb_cloud_layer *layer, const nb_wide place[3], nb_wide radius, int p,
-                              nb_cloud_looks *looks)
+                              nb_cloud_density_query *looks)
 {
     nb_wide along = NB_W(0.0);
     for (int c = 0; c < 3; c++) along += place[c] * nb_wload_lanes(looks->way[c] + p);
@@ -128,7 +128,7 @@ static inline void find_climb(const nb_cloud_layer *layer, const nb_wide place[3
 /* Drops are found eight at a time at most, or twice as many as places. */
 enum { TOGETHER = NB_WIDTH < 4 ? 2 * NB_WIDTH : 8 };
 
-void NB_SUFFIXED(nb_cloud_find_places_)(const nb_cloud_layer *layer, int number, nb_cloud_looks *looks)
+void NB_SUFFIXED(nb_cloud_find_places_)(const nb_cloud_layer *layer, int number, nb_cloud_density_query *looks)
 {
     const nb_wide low = nb_wsplat(layer->low);
     const nb_real per = nb_splat(layer->per_thickness);

@@ -31,28 +31,28 @@ static int layer_over(const nebel_clouds *clouds, double radius)
 }
 
 /* Under a layer: light enters it from where the way to the sun meets its base; the sky's from as wide a place as is far above. */
-static nb_cloud_roof roof_under(nebel_cloud_workspace *workspace, int k, const double place[3], double radius,
-                                float width)
+static nb_cloud_cover_transmittance roof_under(nebel_cloud_workspace *workspace, int k, const double place[3],
+                                               double radius, float width)
 {
     const double *sun = workspace->view->sun.direction, low = workspace->view->clouds->layers[k].low;
     const double along = nb_vector_dot(place, sun), below = low - radius;
     const double way = sqrt(along * along + below * (low + radius)) - along;
     double entry[3];
     for (int c = 0; c < 3; c++) entry[c] = place[c] + way * sun[c];
-    return (nb_cloud_roof){nb_cloud_roof_at(workspace, k, entry, width).sun,
-                           nb_cloud_roof_at(workspace, k, place, nb_larger(width, (float)below)).up};
+    return (nb_cloud_cover_transmittance){nb_cloud_roof_at(workspace, k, entry, width).sun,
+                                          nb_cloud_roof_at(workspace, k, place, nb_larger(width, (float)below)).up};
 }
 
 /* Within a layer light fades evenly from its top to its base. */
-static nb_cloud_roof roof_over(nebel_cloud_workspace *workspace, int k, const double place[3], double radius,
-                               float width)
+static nb_cloud_cover_transmittance roof_over(nebel_cloud_workspace *workspace, int k, const double place[3],
+                                              double radius, float width)
 {
     const nebel_clouds *clouds = workspace->view->clouds;
     const nb_cloud_layer *layer = &clouds->layers[k];
     if (radius <= layer->low) return roof_under(workspace, k, place, radius, width);
     const int next = layer_over(clouds, layer->high);
     const float part = (float)(layer->high - radius) * layer->per_thickness;
-    nb_cloud_roof roof = nb_cloud_roof_at(workspace, k, place, width), above = {1, 1};
+    nb_cloud_cover_transmittance roof = nb_cloud_roof_at(workspace, k, place, width), above = {1, 1};
     if (next >= 0) above = roof_under(workspace, next, place, radius, width);
     roof.sun = above.sun + part * (roof.sun - above.sun);
     roof.up = above.up + part * (roof.up - above.up);
@@ -67,7 +67,7 @@ static void find_parts(nebel_cloud_workspace *workspace, const double place[3], 
     const int k = layer_over(view->clouds, radius);
     part[0] = part[1] = part[2] = 1;
     if (k < 0) return;
-    const nb_cloud_roof roof = roof_over(workspace, k, place, radius, width);
+    const nb_cloud_cover_transmittance roof = roof_over(workspace, k, place, radius, width);
     if (!(roof.sun < 1 || roof.up < 1)) return;
     const nb_cloud_light light = nb_cloud_clear_light(view, place, radius);
     for (int c = 0; c < 3; c++) {
@@ -196,7 +196,7 @@ static void shade_piece(nebel_cloud_workspace *workspace, const double place[3],
 {
     const double radius = nb_vector_length(place);
     const int k = layer_over(workspace->view->clouds, radius);
-    nb_cloud_roof roof = {1, 1}, wide = roof;
+    nb_cloud_cover_transmittance roof = {1, 1}, wide = roof;
     if (k >= 0) {
         roof = roof_over(workspace, k, place, radius, width);
         wide = roof_over(workspace, k, place, radius, 2 * width);

@@ -31,19 +31,19 @@ struct nebel_cloud_lighting {
     const nb_cloud_kernel *kernel;
     nebel_sun sun;
     double tolerance;
-    nb_cloud_pose poses[NEBEL_MAX_CLOUD_LAYERS];
+    nb_cloud_rotation poses[NEBEL_MAX_CLOUD_LAYERS];
     double low, high;                        /* of all layers, m from the centre */
     double lowest_sun;                       /* cosine to the zenith */
     nb_cloud_light (*lights)[NB_CLOUD_SUNS]; /* [height][sun] */
 };
 
 /* A node of the lattice on which optical depths are kept: towards the sun; or away from it, up and down. */
-typedef struct nb_cloud_node {
+typedef struct nb_cloud_lattice_node {
     int32_t at[3];
     int16_t level; /* nodes are 2^level m apart */
     int16_t is_set;
     float depth[3]; /* of a roof: not depths but parts of light */
-} nb_cloud_node;
+} nb_cloud_lattice_node;
 
 /* The eight nodes around a cell of that lattice: of each depth those at its low x, and those at its high x; y first. */
 typedef struct nb_cloud_cell {
@@ -53,15 +53,15 @@ typedef struct nb_cloud_cell {
 } nb_cloud_cell;
 
 /* Which ways a lattice is of: to the sun; away from it, up and down; or through a roof to the sun, and up. */
-typedef enum nb_cloud_ways {
+typedef enum nb_cloud_depth_axis {
     NB_CLOUD_TO_SUN,
     NB_CLOUD_AROUND,
     NB_CLOUD_ROOFS, /* and so on: of each layer */
     NB_CLOUD_WAYS = NB_CLOUD_ROOFS + NEBEL_MAX_CLOUD_LAYERS
-} nb_cloud_ways;
+} nb_cloud_depth_axis;
 
 typedef struct nb_cloud_lattice {
-    nb_cloud_node *nodes;
+    nb_cloud_lattice_node *nodes;
     nb_cloud_cell *cells;
 } nb_cloud_lattice;
 
@@ -80,17 +80,17 @@ typedef struct nb_cloud_patch {
 } nb_cloud_patch;
 
 /* Ranks, with all that a width hides, of a block of that grid: one that there is, and what none is above, as far as they are known. */
-typedef struct nb_cloud_block {
+typedef struct nb_cloud_column_block {
     uint32_t key;
     int32_t at[2];
     float above, highest;
-} nb_cloud_block;
+} nb_cloud_column_block;
 
 /* What a place has of light: of the sun's, what was not scattered, or hardly turned, and what scattering more often sends towards the
  * eye; of the sky's two halves. */
-typedef struct nb_cloud_parts {
+typedef struct nb_cloud_irradiance {
     float left, left_wide, often, above, below;
-} nb_cloud_parts;
+} nb_cloud_irradiance;
 
 /* Optical depths at a place. */
 typedef struct nb_cloud_depths {
@@ -103,15 +103,15 @@ typedef struct nb_cloud_sight {
 } nb_cloud_sight;
 
 /* A place in clouds; with a direction along the ground, and optical depths. */
-typedef struct nb_crowd_place {
+typedef struct nb_prefilter_point {
     double from[3], turn;
     float extinction, up, down;
-} nb_crowd_place;
+} nb_prefilter_point;
 
 /* How much of a place is seen: of all scattering, and of what leads away. */
-typedef struct nb_crowd_seen {
+typedef struct nb_prefilter_weight {
     float whole, apart;
-} nb_crowd_seen;
+} nb_prefilter_weight;
 
 enum {
     NB_CROWD_VIEWS = 14,
@@ -121,23 +121,23 @@ enum {
 };
 
 /* Places in a layer, and what they are in the mean; what was not asked for is not there. */
-typedef struct nb_cloud_crowd {
+typedef struct nb_cloud_prefilter {
     int is_set, count;
-    nb_crowd_place places[NB_CROWD_PLACES];
+    nb_prefilter_point places[NB_CROWD_PLACES];
     nb_cloud_depths depths[NB_CROWD_SUNS][NB_CROWD_PLACES];
-    nb_crowd_seen seen[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_PLACES];
-    nb_cloud_parts means[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_SUNS];
+    nb_prefilter_weight seen[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_PLACES];
+    nb_cloud_irradiance means[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_SUNS];
     uint8_t has_depths[NB_CROWD_SUNS], has_seen[NB_CROWD_VIEWS][NB_CROWD_TURNS],
         has_mean[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_SUNS];
-} nb_cloud_crowd;
+} nb_cloud_prefilter;
 
 struct nebel_cloud_workspace {
     const nebel_cloud_lighting *view;
-    nb_cloud_lattice lattices[NB_CLOUD_WAYS]; /* nb_cloud_ways; those of layers that are */
+    nb_cloud_lattice lattices[NB_CLOUD_WAYS]; /* nb_cloud_depth_axis; those of layers that are */
     nb_cloud_point *points;
     nb_cloud_patch *patches;
-    nb_cloud_block *blocks;
-    nb_cloud_crowd *crowds; /* of each layer */
+    nb_cloud_column_block *blocks;
+    nb_cloud_prefilter *crowds; /* of each layer */
 };
 
 /* Where a ray is within a shell: at most two pieces, before and behind what lies below it. Returns how many. */
@@ -145,25 +145,25 @@ int nb_cloud_pieces(double low, double high, const double from[3], const double 
                     double pieces[2][2]);
 
 /* Finds drops at places in a layer, from columns that are found once and linear between. */
-void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *looks);
+void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_density_query *looks);
 
 /* A place of a ray on a face of the cube, on which blocks of columns are. */
-typedef struct nb_cloud_outlook {
+typedef struct nb_cloud_column_cursor {
     int layer, face, level;
     float part;                  /* of the next level */
     double over, rise;           /* along the face's axis: of the place, of the direction */
     nb_two at, place, direction; /* across; at: on the face */
     nb_two grows;                /* whether that does: 0, 1 */
     int block[2][2];             /* of each grid, of the size that was asked last */
-} nb_cloud_outlook;
+} nb_cloud_column_cursor;
 
 /* Place and direction in the layer's axes. */
-nb_cloud_outlook nb_cloud_look_out(const nebel_cloud_workspace *workspace, int layer, const double place[3],
-                                   const double direction[3], float width);
+nb_cloud_column_cursor nb_cloud_look_out(const nebel_cloud_workspace *workspace, int layer, const double place[3],
+                                         const double direction[3], float width);
 /* How far the ray stays within a block of size 0, 1 or 2, m. */
-double nb_cloud_way_in_block(const nebel_cloud_workspace *workspace, nb_cloud_outlook *out, int size);
+double nb_cloud_way_in_block(const nebel_cloud_workspace *workspace, nb_cloud_column_cursor *out, int size);
 /* Whether the rank of any column there is above `least`, with all that a width hides. */
-int nb_cloud_is_block_above(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, float least);
+int nb_cloud_is_block_above(nebel_cloud_workspace *workspace, const nb_cloud_column_cursor *out, int size, float least);
 
 nebel_result nb_cloud_light_make(nebel_cloud_lighting *view);
 
@@ -176,33 +176,34 @@ float nb_cloud_depth_along(nebel_cloud_workspace *workspace, const double from[3
                            float width, int is_alone);
 
 /* How finely they are found: what is narrower than a width is seen as a mean. */
-typedef struct nb_cloud_grain {
+typedef struct nb_cloud_resolution {
     float width, first; /* first: length of the first step towards the sun */
     float wide;         /* between nodes of the other ways */
     float own;          /* part of what lattices give that comes from ways of the place's own: 0 to 1 */
-} nb_cloud_grain;
+} nb_cloud_resolution;
 
 /* A place in clouds, and what is found there: nothing where all places are alike, as a pixel hides all of the layer. */
-typedef struct nb_cloud_asked {
+typedef struct nb_cloud_depth_query {
     double place[3];
-    nb_cloud_grain grain;
+    nb_cloud_resolution grain;
     int is_alike;
     nb_cloud_depths depths;
-} nb_cloud_asked;
+} nb_cloud_depth_query;
 
 /* Of so many at most, whose first steps towards the sun fill the lanes of a look. */
 enum { NB_CLOUD_ASKED = 3 };
-void nb_cloud_find_depths(nebel_cloud_workspace *workspace, int n, nb_cloud_asked asked[]);
+void nb_cloud_find_depths(nebel_cloud_workspace *workspace, int n, nb_cloud_depth_query asked[]);
 /* That to the sun, from nodes that are about `width` apart. */
 float nb_cloud_sun_depth_at(nebel_cloud_workspace *workspace, const double place[3], float width);
 
 /* What part of light comes through a layer and those above to its base straight over or under a place, as a mean over a width:
  * of the sun's, and from straight above. */
-typedef struct nb_cloud_roof {
+typedef struct nb_cloud_cover_transmittance {
     float sun, up;
-} nb_cloud_roof;
+} nb_cloud_cover_transmittance;
 
-nb_cloud_roof nb_cloud_roof_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width);
+nb_cloud_cover_transmittance nb_cloud_roof_at(nebel_cloud_workspace *workspace, int layer, const double place[3],
+                                              float width);
 
 /* Where a ray meets the ground; HUGE_VAL: nowhere. */
 double nb_cloud_to_ground(double radius, const double from[3], const double unit[3]);
@@ -215,8 +216,8 @@ float nb_cloud_part_through(const nb_cloud_layer *layer, float depth, double sun
 nb_cloud_depths nb_cloud_bound_depths(const nebel_cloud_lighting *view, int layer, double radius,
                                       const nb_cloud_depths *depths);
 
-nb_cloud_parts nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths,
-                                 const nb_cloud_sight *sight);
+nb_cloud_irradiance nb_cloud_parts_of(const nb_cloud_layer *layer, const nb_cloud_depths *depths,
+                                      const nb_cloud_sight *sight);
 
 /* What a layer's drops send towards the eye, per unit of extinction. */
 typedef struct nb_cloud_source {
@@ -243,15 +244,15 @@ typedef struct nb_cloud_ray {
 /* Of a pixel, so wide at a distance of 1. */
 nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_lighting *view, const double direction[3], double spread);
 
-nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_parts *parts,
+nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_irradiance *parts,
                                    const nb_cloud_light *light);
 
 /* How much of light is of clouds that a pixel so wide hides: 0 to 1. Always 0 where hardly any cloud is in the layer. */
 float nb_cloud_crowd_part(nebel_cloud_workspace *workspace, int layer, float width);
 
 /* Mean of places in a layer, by how much of each a ray sees that came into it, or began in it, at a part of its height. */
-nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int layer, const double up[3], const double ray[3],
-                                 float entered);
-nb_cloud_parts nb_cloud_mix_parts(const nb_cloud_parts *a, const nb_cloud_parts *b, float part);
+nb_cloud_irradiance nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int layer, const double up[3],
+                                      const double ray[3], float entered);
+nb_cloud_irradiance nb_cloud_mix_parts(const nb_cloud_irradiance *a, const nb_cloud_irradiance *b, float part);
 
 #endif

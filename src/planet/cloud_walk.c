@@ -86,80 +86,86 @@
 enum { MOST_PIECES = 4096, WALKS = 32 };
 
 /* Pieces one behind the other that have the same light. */
-typedef struct nb_stretch {
+typedef struct nb_cloud_segment {
     double end, most;        /* most: how deep it gets */
     double spent;            /* part of it that it has come to */
     double seen, seen_apart; /* of all scattering, and of what leads away */
     double passed;           /* optical depth of what light that goes on along the ray is scattered by */
     double weight, moment;   /* of places by what is seen */
-} nb_stretch;
+} nb_cloud_segment;
 
 /* A ray in a layer's axes. */
-typedef struct nb_turned {
+typedef struct nb_scattered_part {
     double from[3], direction[3];
-} nb_turned;
+} nb_scattered_part;
 
 /* A place of the ray in a layer's axes, and a part of its height. */
-typedef struct nb_spot {
+typedef struct nb_cloud_sample {
     double place[3], radius;
     float height, width, climb; /* climb: cosine to straight up */
-} nb_spot;
+} nb_cloud_sample;
 
 /* Where a ray is in a layer. */
-typedef struct nb_stay {
+typedef struct nb_empty_interval {
     int layer;
     double begin, end;
-} nb_stay;
+} nb_empty_interval;
 
 /* What a walk waits for. */
-typedef enum nb_wait { NB_WAIT_NOTHING, NB_WAIT_ENTRY, NB_WAIT_STEP, NB_WAIT_PIECE, NB_WAIT_LIGHT } nb_wait;
+typedef enum nb_pending_light {
+    NB_WAIT_NOTHING,
+    NB_WAIT_ENTRY,
+    NB_WAIT_STEP,
+    NB_WAIT_PIECE,
+    NB_WAIT_LIGHT
+} nb_pending_light;
 
-typedef struct nb_party nb_party;
+typedef struct nb_cloud_ray_group nb_cloud_ray_group;
 
-typedef struct nb_walk {
+typedef struct nb_cloud_walk {
     const nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
-    nb_party *party;
+    nb_cloud_ray_group *party;
     double from[3], unit[3], spread; /* from the planet's centre */
     double t_max;                    /* up to a surface; HUGE_VAL: to none */
     nb_cloud_ray ray;
-    nb_turned turned[NEBEL_MAX_CLOUD_LAYERS];
-    nb_stay stays[2 * NEBEL_MAX_CLOUD_LAYERS];
+    nb_scattered_part turned[NEBEL_MAX_CLOUD_LAYERS];
+    nb_empty_interval stays[2 * NEBEL_MAX_CLOUD_LAYERS];
     int stay, stay_count;
 
     /* In a stay. A piece lies from t to t + length. */
     double least; /* m, of pieces that are not yet known to be smooth */
     double t, length;
     int pieces, has_far;
-    nb_cloud_seen here, middle, far; /* at its beginning; far: has_far */
+    nb_cloud_filter here, middle, far; /* at its beginning; far: has_far */
 
     /* In search of cloud. clear: there is none ahead, as far as slopes of noise say. unknown: up to where blocks of columns do not
      * say whether there is, by size; they are not asked again before that. */
     int is_searching;
     double clear, unknown[3];
-    nb_spot spot;
+    nb_cloud_sample spot;
 
-    nb_wait wait;
+    nb_pending_light wait;
     int unanswered;
     uint32_t looks; /* with questions */
 
     double missed;
-    nb_stretch stretch;
-    nb_cloud_tally tally;
+    nb_cloud_segment stretch;
+    nb_cloud_node_builder tally;
     nebel_cloud_transfer *knots;
-} nb_walk;
+} nb_cloud_walk;
 
-static double radius_at(const nb_walk *walk, double t, double place[3])
+static double radius_at(const nb_cloud_walk *walk, double t, double place[3])
 {
     for (int c = 0; c < 3; c++) place[c] = walk->from[c] + t * walk->unit[c];
     return nb_vector_length(place);
 }
 
-static nb_spot spot_at(const nb_walk *walk, int k, double t)
+static nb_cloud_sample spot_at(const nb_cloud_walk *walk, int k, double t)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
-    const nb_turned *turned = &walk->turned[k];
-    nb_spot spot = {.width = (float)(walk->spread * t)};
+    const nb_scattered_part *turned = &walk->turned[k];
+    nb_cloud_sample spot = {.width = (float)(walk->spread * t)};
     for (int i = 0; i < 3; i++) spot.place[i] = turned->from[i] + t * turned->direction[i];
     spot.radius = nb_vector_length(spot.place);
     spot.height = (float)(spot.radius - layer->low) * layer->per_thickness;
@@ -175,7 +181,7 @@ static double hidden_way(const nb_cloud_layer *layer, double length, double widt
     return nb_min(width, length * nb_max(soft, STEEPNESS * width / (double)layer->size));
 }
 
-static double hidden_of_stay(const nb_walk *walk, const nb_stay *stay)
+static double hidden_of_stay(const nb_cloud_walk *walk, const nb_empty_interval *stay)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[stay->layer];
     return hidden_way(layer, nb_max(layer->high - layer->low, stay->end - stay->begin), walk->spread * walk->t);
@@ -185,15 +191,15 @@ static double hidden_of_stay(const nb_walk *walk, const nb_stay *stay)
 
 /* Places of many walks that are looked at together. What is seen goes to where *seen is. */
 typedef struct nb_queue {
-    nb_cloud_looks looks;
-    nb_walk *walks[NB_CLOUD_LANES];
-    nb_cloud_seen *seen[NB_CLOUD_LANES];
+    nb_cloud_density_query looks;
+    nb_cloud_walk *walks[NB_CLOUD_LANES];
+    nb_cloud_filter *seen[NB_CLOUD_LANES];
 } nb_queue;
 
-static void ask(nb_queue *queue, nb_walk *walk, int k, double t, nb_cloud_seen *seen)
+static void ask(nb_queue *queue, nb_cloud_walk *walk, int k, double t, nb_cloud_filter *seen)
 {
     const int i = queue->looks.count++;
-    const nb_turned *turned = &walk->turned[k];
+    const nb_scattered_part *turned = &walk->turned[k];
     for (int c = 0; c < 3; c++) {
         queue->looks.place[c][i] = turned->from[c] + t * turned->direction[c];
         queue->looks.way[c][i] = turned->direction[c];
@@ -206,12 +212,12 @@ static void ask(nb_queue *queue, nb_walk *walk, int k, double t, nb_cloud_seen *
 
 static void see(const nb_queue *queue, int i)
 {
-    const nb_cloud_looks *looks = &queue->looks;
-    nb_walk *walk = queue->walks[i];
-    *queue->seen[i] = (nb_cloud_seen){looks->whole[i], looks->apart[i], looks->passed[i]};
+    const nb_cloud_density_query *looks = &queue->looks;
+    nb_cloud_walk *walk = queue->walks[i];
+    *queue->seen[i] = (nb_cloud_filter){looks->whole[i], looks->apart[i], looks->passed[i]};
     walk->unanswered--;
     if (walk->wait != NB_WAIT_STEP || looks->whole[i] > 0) return;
-    walk->spot = (nb_spot){
+    walk->spot = (nb_cloud_sample){
         .radius = looks->radius[i], .height = looks->height[i], .width = looks->width[i], .climb = looks->climb[i]};
     for (int c = 0; c < 3; c++) walk->spot.place[c] = looks->place[c][i];
     walk->clear = (double)looks->clear[i];
@@ -220,7 +226,7 @@ static void see(const nb_queue *queue, int i)
 /* ---- where no cloud is ----------------------------------------------------------------------- */
 
 /* The least rank on the way between two places: curves of rays sag below the line between their heights. */
-static float least_between(const nb_walk *walk, int k, const nb_spot *a, double way)
+static float least_between(const nb_cloud_walk *walk, int k, const nb_cloud_sample *a, double way)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
     const double sag = way * way / a->radius;
@@ -232,10 +238,11 @@ static float least_between(const nb_walk *walk, int k, const nb_spot *a, double 
 }
 
 /* How far ahead there is no cloud for sure; 0 where that is not known. */
-static double clear_way(nb_walk *walk, int k)
+static double clear_way(nb_cloud_walk *walk, int k)
 {
-    const nb_spot *spot = &walk->spot;
-    nb_cloud_outlook out = nb_cloud_look_out(walk->workspace, k, spot->place, walk->turned[k].direction, spot->width);
+    const nb_cloud_sample *spot = &walk->spot;
+    nb_cloud_column_cursor out =
+        nb_cloud_look_out(walk->workspace, k, spot->place, walk->turned[k].direction, spot->width);
     for (int size = 2; size >= 0; size--) {
         if (walk->t < walk->unknown[size]) continue;
         const double way = nb_cloud_way_in_block(walk->workspace, &out, size) + 1e-3 * walk->least;
@@ -246,7 +253,7 @@ static double clear_way(nb_walk *walk, int k)
 }
 
 /* What pixels hide makes the least step longer, but no more than a part of the stay. */
-static double least_step(const nb_walk *walk, const nb_stay *stay)
+static double least_step(const nb_cloud_walk *walk, const nb_empty_interval *stay)
 {
     const double width = hidden_of_stay(walk, stay),
                  near = nb_max(LEAST_STEP * walk->least, nb_min(2 * width, FAR_STEP * walk->least));
@@ -262,7 +269,7 @@ static double step_before_end(double left, double step, double least)
 
 /* Goes on until there may be cloud, by as much as there can be none, or by the least step. Returns 0 at the stay's end, else 1 and
  * the step is from t as long as length. */
-static int find_step(nb_walk *walk, const nb_stay *stay)
+static int find_step(nb_cloud_walk *walk, const nb_empty_interval *stay)
 {
     const int k = stay->layer;
     while (walk->t < stay->end) {
@@ -289,30 +296,30 @@ static int find_step(nb_walk *walk, const nb_stay *stay)
 /* Stretches whose light is found together. */
 typedef struct nb_lights {
     int count;
-    nb_walk *walks[NB_CLOUD_ASKED];
+    nb_cloud_walk *walks[NB_CLOUD_ASKED];
     int layers[NB_CLOUD_ASKED];
-    nb_stretch stretches[NB_CLOUD_ASKED];
+    nb_cloud_segment stretches[NB_CLOUD_ASKED];
     double radius[NB_CLOUD_ASKED];
     float crowd[NB_CLOUD_ASKED];   /* part of a mean of the layer */
     float entered[NB_CLOUD_ASKED]; /* of that: part of its height where the ray came into it */
-    nb_cloud_asked asked[NB_CLOUD_ASKED];
+    nb_cloud_depth_query asked[NB_CLOUD_ASKED];
 } nb_lights;
 
 /* Walks, those of them that have something to ask or are at their end, and what they ask: of each layer, and of light. */
-struct nb_party {
-    nb_walk walks[WALKS], *ready[WALKS];
+struct nb_cloud_ray_group {
+    nb_cloud_walk walks[WALKS], *ready[WALKS];
     int ready_count;
     nb_queue queues[NEBEL_MAX_CLOUD_LAYERS];
     nb_lights lights;
 };
 
 /* How finely light is found: in sheets it changes within less of their height than in cumulus. */
-static nb_cloud_grain grain_of(const nb_walk *walk, int k, double width)
+static nb_cloud_resolution grain_of(const nb_cloud_walk *walk, int k, double width)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
     const double thickness = 1 / (double)layer->per_thickness, hidden = hidden_way(layer, thickness, width),
                  flatness = hidden > 0 ? width / hidden : 1, nodes = NODES_PART * thickness;
-    return (nb_cloud_grain){
+    return (nb_cloud_resolution){
         .width = (float)width,
         .first =
             (float)nb_max(nb_min((layer->kind == NEBEL_CLOUD_CUMULUS ? 0.03 : 0.02) * thickness, 2 * hidden),
@@ -327,9 +334,9 @@ static nb_cloud_grain grain_of(const nb_walk *walk, int k, double width)
 
 static void light_stretch(nb_lights *lights, int i)
 {
-    nb_walk *walk = lights->walks[i];
+    nb_cloud_walk *walk = lights->walks[i];
     const int k = lights->layers[i];
-    const nb_cloud_asked *asked = &lights->asked[i];
+    const nb_cloud_depth_query *asked = &lights->asked[i];
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
     const float crowd = lights->crowd[i];
     const nb_cloud_depths depths = nb_cloud_bound_depths(walk->view, k, lights->radius[i], &asked->depths);
@@ -337,16 +344,16 @@ static void light_stretch(nb_lights *lights, int i)
     for (int c = 0; c < 3; c++) up[c] = asked->place[c] / lights->radius[i];
     const nb_cloud_sight sight = {(float)nb_vector_dot(up, walk->view->sun.direction),
                                   (float)nb_vector_dot(up, walk->unit), (float)walk->ray.sun};
-    nb_cloud_parts parts = nb_cloud_parts_of(layer, &depths, &sight);
+    nb_cloud_irradiance parts = nb_cloud_parts_of(layer, &depths, &sight);
     if (crowd > 0) {
-        const nb_cloud_parts mean = nb_cloud_crowd_at(walk->workspace, k, up, walk->unit, lights->entered[i]);
+        const nb_cloud_irradiance mean = nb_cloud_crowd_at(walk->workspace, k, up, walk->unit, lights->entered[i]);
         const float left = parts.left + crowd * (1 - walk->ray.own) * (mean.left - parts.left);
         parts = nb_cloud_mix_parts(&parts, &mean, crowd);
         parts.left = left;
     }
     const nb_cloud_light light = nb_cloud_clear_light(walk->view, asked->place, lights->radius[i]);
     const nb_cloud_source source = nb_cloud_source_of(&walk->ray, k, &parts, &light);
-    const nb_stretch *stretch = &lights->stretches[i];
+    const nb_cloud_segment *stretch = &lights->stretches[i];
     double sent[3], ahead[3];
     for (int c = 0; c < 3; c++) {
         sent[c] = stretch->seen * (double)(source.once[c] + source.ambient[c]) +
@@ -357,12 +364,12 @@ static void light_stretch(nb_lights *lights, int i)
 }
 
 /* A walk that waited for its last light is ready. */
-static void find_lights(nb_party *party)
+static void find_lights(nb_cloud_ray_group *party)
 {
     nb_lights *lights = &party->lights;
     nb_cloud_find_depths(lights->walks[0]->workspace, lights->count, lights->asked);
     for (int i = 0; i < lights->count; i++) {
-        nb_walk *walk = lights->walks[i];
+        nb_cloud_walk *walk = lights->walks[i];
         light_stretch(lights, i);
         if (walk->wait != NB_WAIT_LIGHT || walk->tally.lit < walk->tally.asked) continue;
         walk->wait = NB_WAIT_NOTHING;
@@ -372,7 +379,7 @@ static void find_lights(nb_party *party)
 }
 
 /* Part of a layer's height where the ray came into it, or began. */
-static float height_entered(const nb_walk *walk, int k)
+static float height_entered(const nb_cloud_walk *walk, int k)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
     double place[3];
@@ -381,11 +388,11 @@ static float height_entered(const nb_walk *walk, int k)
 }
 
 /* Light of a stretch as of its middle, weighted by how much of it is seen: that is right where it changes evenly. */
-static void add_light(nb_walk *walk, int k)
+static void add_light(nb_cloud_walk *walk, int k)
 {
     nb_lights *lights = &walk->party->lights;
-    const nb_stretch stretch = walk->stretch;
-    walk->stretch = (nb_stretch){.weight = 0};
+    const nb_cloud_segment stretch = walk->stretch;
+    walk->stretch = (nb_cloud_segment){.weight = 0};
     if (!(stretch.weight > FAINT)) return;
     const double t = stretch.moment / stretch.weight;
     const int i = lights->count++;
@@ -411,7 +418,7 @@ static double visible(double left)
 }
 
 /* How deep the next stretch gets: where nothing more is seen it has no end. */
-static double deepest_stretch(const nb_walk *walk)
+static double deepest_stretch(const nb_cloud_walk *walk)
 {
     return walk->tally.left_apart > UNSEEN ? STRETCH_DEPTH / (0.15 + walk->tally.left) : HUGE_VAL;
 }
@@ -427,9 +434,9 @@ static nb_piece part_of(const nb_piece *piece, double part)
 }
 
 /* Part of a piece that lies in one stretch. */
-static void take_part(nb_walk *walk, int k, double t, double length, nb_piece depth)
+static void take_part(nb_cloud_walk *walk, int k, double t, double length, nb_piece depth)
 {
-    nb_stretch *stretch = &walk->stretch;
+    nb_cloud_segment *stretch = &walk->stretch;
     const double apart = (double)walk->ray.apart[k], left = walk->tally.left, visibly = visible(walk->tally.left_apart);
     stretch->end = t + length;
     nb_cloud_tally_pass(&walk->tally, t + length, depth.whole, depth.apart);
@@ -442,27 +449,27 @@ static void take_part(nb_walk *walk, int k, double t, double length, nb_piece de
 }
 
 /* What part of a stretch such cloud is. */
-static double part_of_stretch(const nb_walk *walk, int k, double length, double depth)
+static double part_of_stretch(const nb_cloud_walk *walk, int k, double length, double depth)
 {
-    const nb_stretch *stretch = &walk->stretch;
+    const nb_cloud_segment *stretch = &walk->stretch;
     const double whole = (double)walk->view->clouds->layers[k].extinction * length;
     const double seen = stretch->seen + (double)walk->ray.apart[k] * stretch->seen_apart;
     return depth / stretch->most + LOSS * seen * nb_max(0, whole - depth);
 }
 
 /* The gap before t is part of a stretch, too. */
-static void take_gap(nb_walk *walk, int k, double t)
+static void take_gap(nb_cloud_walk *walk, int k, double t)
 {
-    nb_stretch *stretch = &walk->stretch;
+    nb_cloud_segment *stretch = &walk->stretch;
     if (stretch->weight > 0) stretch->spent += part_of_stretch(walk, k, t - stretch->end, 0);
     if (stretch->spent >= 1 || t - stretch->end > WIDE_GAP * walk->least) add_light(walk, k);
 }
 
 /* Stretches end where they have come to so much, wherever pieces end: neighbouring rays, whose pieces may be others, have their light
  * from neighbouring places. */
-static void take_piece(nb_walk *walk, int k, double t, double length, nb_piece depth)
+static void take_piece(nb_cloud_walk *walk, int k, double t, double length, nb_piece depth)
 {
-    nb_stretch *stretch = &walk->stretch;
+    nb_cloud_segment *stretch = &walk->stretch;
     if (!(depth.whole > 0)) return;
     take_gap(walk, k, t);
     nb_cloud_tally_enter(&walk->tally, t);
@@ -483,20 +490,20 @@ static void take_piece(nb_walk *walk, int k, double t, double length, nb_piece d
 
 /* What Simpson's rule may miss of a piece's extinction, times six by its length. Where cloud begins or ends within the piece three
  * values may lie on a line by chance, and a wisp would be drawn along all places where they do. */
-static double curve_of(const nb_cloud_seen *here, const nb_cloud_seen *middle, const nb_cloud_seen *far)
+static double curve_of(const nb_cloud_filter *here, const nb_cloud_filter *middle, const nb_cloud_filter *far)
 {
     const double a = (double)here->whole, b = (double)middle->whole, c = (double)far->whole;
     const double curve = fabs(a - 2 * b + c);
     return a > 0 && b > 0 && c > 0 ? curve : nb_max(curve, nb_max(a, nb_max(b, c)));
 }
 
-static double least_piece(const nb_walk *walk, const nb_stay *stay)
+static double least_piece(const nb_cloud_walk *walk, const nb_empty_interval *stay)
 {
     return nb_max(nb_min(0.5 * hidden_of_stay(walk, stay), STAY_PIECE * (stay->end - stay->begin)), 1e-3 * walk->least);
 }
 
 /* What part of a piece's depth lies in its first half: by the parabola through its three values, but no more than either half can have. */
-static double part_before(const nb_walk *walk, const nb_stay *stay, double depth)
+static double part_before(const nb_cloud_walk *walk, const nb_empty_interval *stay, double depth)
 {
     const double most = 0.5 * walk->length * (double)walk->view->clouds->layers[stay->layer].extinction;
     const double first = walk->length / 24 * (double)(5 * walk->here.whole + 8 * walk->middle.whole - walk->far.whole);
@@ -504,7 +511,7 @@ static double part_before(const nb_walk *walk, const nb_stay *stay, double depth
 }
 
 /* Light is that of where cloud is: a piece that is thin at one end counts as two. */
-static void take_halves(nb_walk *walk, const nb_stay *stay, const nb_piece *depth)
+static void take_halves(nb_cloud_walk *walk, const nb_empty_interval *stay, const nb_piece *depth)
 {
     const double half = 0.5 * walk->length, before = depth->whole > 0 ? part_before(walk, stay, depth->whole) : 0.5;
     if (fabs(before - 0.5) < EVEN) {
@@ -516,9 +523,9 @@ static void take_halves(nb_walk *walk, const nb_stay *stay, const nb_piece *dept
 }
 
 /* By Simpson's rule. */
-static nb_piece piece_of(const nb_walk *walk)
+static nb_piece piece_of(const nb_cloud_walk *walk)
 {
-    const nb_cloud_seen *a = &walk->here, *b = &walk->middle, *c = &walk->far;
+    const nb_cloud_filter *a = &walk->here, *b = &walk->middle, *c = &walk->far;
     const double sixth = walk->length / 6;
     return (nb_piece){.whole = sixth * (double)(a->whole + 4 * b->whole + c->whole),
                       .apart = sixth * (double)(a->apart + 4 * b->apart + c->apart),
@@ -526,10 +533,10 @@ static nb_piece piece_of(const nb_walk *walk)
 }
 
 /* Takes a piece whose three values are known, or halves it. */
-static void judge_piece(nb_walk *walk, const nb_stay *stay)
+static void judge_piece(nb_cloud_walk *walk, const nb_empty_interval *stay)
 {
     const double tolerance = PIECES * walk->view->tolerance, length = walk->length;
-    const nb_cloud_seen *here = &walk->here, *middle = &walk->middle, *far = &walk->far;
+    const nb_cloud_filter *here = &walk->here, *middle = &walk->middle, *far = &walk->far;
     const nb_piece depth = piece_of(walk);
     const double missed = walk->tally.left * length / 6 * curve_of(here, middle, far);
     if ((missed > tolerance || depth.whole > MOST_DEPTH / (0.15 + walk->tally.left)) &&
@@ -551,7 +558,7 @@ static void judge_piece(nb_walk *walk, const nb_stay *stay)
 /* ---- walks ----------------------------------------------------------------------------------- */
 
 /* What a walk waits for next in a stay; nothing at its end. */
-static nb_wait find_next(nb_walk *walk, const nb_stay *stay)
+static nb_pending_light find_next(nb_cloud_walk *walk, const nb_empty_interval *stay)
 {
     if (walk->is_searching) return find_step(walk, stay) ? NB_WAIT_STEP : NB_WAIT_NOTHING;
     if (walk->pieces++ >= MOST_PIECES || !(walk->t < stay->end) || walk->tally.left_apart <= UNSEEN)
@@ -566,7 +573,7 @@ static nb_wait find_next(nb_walk *walk, const nb_stay *stay)
     return NB_WAIT_PIECE;
 }
 
-static void enter(nb_walk *walk, const nb_stay *stay)
+static void enter(nb_cloud_walk *walk, const nb_empty_interval *stay)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[stay->layer];
     walk->least = (double)layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 16;
@@ -577,7 +584,7 @@ static void enter(nb_walk *walk, const nb_stay *stay)
 }
 
 /* From stay to stay, as far as something is seen; layers do not overlap. At the end it waits for nothing. */
-static void go_on(nb_walk *walk)
+static void go_on(nb_cloud_walk *walk)
 {
     walk->wait = find_next(walk, &walk->stays[walk->stay]);
     if (walk->wait != NB_WAIT_NOTHING) return;
@@ -586,7 +593,7 @@ static void go_on(nb_walk *walk)
 }
 
 /* What it waited for has come. */
-static void take_answer(nb_walk *walk)
+static void take_answer(nb_cloud_walk *walk)
 {
     if (walk->wait == NB_WAIT_PIECE) judge_piece(walk, &walk->stays[walk->stay]);
     if (walk->wait == NB_WAIT_STEP) {
@@ -597,7 +604,7 @@ static void take_answer(nb_walk *walk)
     go_on(walk);
 }
 
-static void put_questions(nb_walk *walk, nb_queue *queue)
+static void put_questions(nb_cloud_walk *walk, nb_queue *queue)
 {
     const int k = walk->stays[walk->stay].layer;
     if (walk->wait == NB_WAIT_ENTRY) {
@@ -609,17 +616,17 @@ static void put_questions(nb_walk *walk, nb_queue *queue)
     if (!walk->has_far) ask(queue, walk, k, walk->t + walk->length, &walk->far);
 }
 
-static void find_stays(nb_walk *walk, double t_max)
+static void find_stays(nb_cloud_walk *walk, double t_max)
 {
     const nebel_clouds *clouds = walk->view->clouds;
-    nb_stay *stays = walk->stays;
+    nb_empty_interval *stays = walk->stays;
     walk->stay_count = 0;
     for (int k = 0; k < clouds->layer_count; k++) {
         double pieces[2][2];
         const int found =
             nb_cloud_pieces(clouds->layers[k].low, clouds->layers[k].high, walk->from, walk->unit, t_max, pieces);
         for (int i = 0; i < found; i++) {
-            const nb_stay stay = {k, pieces[i][0], pieces[i][1]};
+            const nb_empty_interval stay = {k, pieces[i][0], pieces[i][1]};
             int at = walk->stay_count++;
             for (; at > 0 && stays[at - 1].begin > stay.begin; at--) stays[at] = stays[at - 1];
             stays[at] = stay;
@@ -629,9 +636,9 @@ static void find_stays(nb_walk *walk, double t_max)
 
 /* Of the sun's light what comes through all clouds on the ray and, where that ends before them, through what is behind that; it fades out as all
  * that is seen does. */
-static double through_all(nb_walk *walk)
+static double through_all(nb_cloud_walk *walk)
 {
-    const nb_cloud_tally *tally = &walk->tally;
+    const nb_cloud_node_builder *tally = &walk->tally;
     const double visibly = visible(tally->left_apart),
                  seen = visibly > 0 ? tally->left * visibly / tally->left_apart : 0;
     double end[3], pieces[2][2];
@@ -644,16 +651,16 @@ static double through_all(nb_walk *walk)
     return seen * nb_exp(-(double)nb_cloud_sun_depth_at(walk->workspace, end, (float)width));
 }
 
-static void begin(nebel_cloud_workspace *workspace, nb_party *party, const nebel_ray *ray, const double unit[3],
-                  double spread, nebel_cloud_transfer *knots, nb_walk *walk)
+static void begin(nebel_cloud_workspace *workspace, nb_cloud_ray_group *party, const nebel_ray *ray,
+                  const double unit[3], double spread, nebel_cloud_transfer *knots, nb_cloud_walk *walk)
 {
     const nebel_atmosphere *atmosphere = workspace->view->clouds->atmosphere;
-    *walk = (nb_walk){.view = workspace->view,
-                      .workspace = workspace,
-                      .party = party,
-                      .spread = spread,
-                      .knots = knots,
-                      .tally = {.left = 1, .left_apart = 1}};
+    *walk = (nb_cloud_walk){.view = workspace->view,
+                            .workspace = workspace,
+                            .party = party,
+                            .spread = spread,
+                            .knots = knots,
+                            .tally = {.left = 1, .left_apart = 1}};
     nb_air_from_center(atmosphere, ray->origin, walk->from);
     nb_air_raise(atmosphere->airs.radius, walk->from);
     memcpy(walk->unit, unit, sizeof walk->unit);
@@ -671,26 +678,26 @@ static void begin(nebel_cloud_workspace *workspace, nb_party *party, const nebel
 
 /* ---- many walks ------------------------------------------------------------------------------ */
 
-typedef struct nb_rays {
+typedef struct nb_cloud_rays {
     nebel_cloud_workspace *workspace;
     size_t n, next;
     const nebel_ray *rays;
     const double *spreads;
     nebel_cloud_transfer *knots;
     size_t ray_stride, spread_stride, knot_stride;
-} nb_rays;
+} nb_cloud_rays;
 
-static const nebel_ray *ray_at(const nb_rays *rays, size_t i)
+static const nebel_ray *ray_at(const nb_cloud_rays *rays, size_t i)
 {
     return nb_stride_from(rays->rays, rays->ray_stride, i);
 }
 
-static double spread_at(const nb_rays *rays, size_t i)
+static double spread_at(const nb_cloud_rays *rays, size_t i)
 {
     return *(const double *)nb_stride_from(rays->spreads, rays->spread_stride, i);
 }
 
-static void begin_next(nb_rays *rays, nb_walk *walk, nb_party *party)
+static void begin_next(nb_cloud_rays *rays, nb_cloud_walk *walk, nb_cloud_ray_group *party)
 {
     const size_t i = rays->next++;
     double unit[3];
@@ -701,13 +708,13 @@ static void begin_next(nb_rays *rays, nb_walk *walk, nb_party *party)
     party->ready[party->ready_count++] = walk;
 }
 
-static void look(const nb_rays *rays, int k, nb_party *party)
+static void look(const nb_cloud_rays *rays, int k, nb_cloud_ray_group *party)
 {
     nb_queue *queue = &party->queues[k];
     nb_cloud_look(rays->workspace, k, &queue->looks);
     for (int i = 0; i < queue->looks.count; i++) see(queue, i);
     for (int i = 0; i < queue->looks.count; i++) {
-        nb_walk *walk = queue->walks[i];
+        nb_cloud_walk *walk = queue->walks[i];
         if (walk->unanswered != 0 || walk->wait == NB_WAIT_NOTHING) continue;
         take_answer(walk);
         walk->unanswered = -1;
@@ -717,7 +724,7 @@ static void look(const nb_rays *rays, int k, nb_party *party)
 }
 
 /* The layer of which most is asked; -1: of none. */
-static int find_asked(const nb_rays *rays, const nb_party *party)
+static int find_asked(const nb_cloud_rays *rays, const nb_cloud_ray_group *party)
 {
     int most = -1, count = 0;
     for (int k = 0; k < rays->workspace->view->clouds->layer_count; k++)
@@ -730,7 +737,7 @@ static int find_asked(const nb_rays *rays, const nb_party *party)
 
 /* A walk that is ready has questions, for which there must be room, or waits for its last light, or is at its end: then the next ray
  * takes its place. */
-static void attend(nb_rays *rays, nb_walk *walk, nb_party *party)
+static void attend(nb_cloud_rays *rays, nb_cloud_walk *walk, nb_cloud_ray_group *party)
 {
     if (walk->wait != NB_WAIT_NOTHING) {
         const int k = walk->stays[walk->stay].layer;
@@ -750,7 +757,7 @@ static void attend(nb_rays *rays, nb_walk *walk, nb_party *party)
 }
 
 /* When no walk is ready: questions about one layer, or, where nobody has any, of light. Returns 0 where there are none either. */
-static int answer(const nb_rays *rays, nb_party *party)
+static int answer(const nb_cloud_rays *rays, nb_cloud_ray_group *party)
 {
     const int k = find_asked(rays, party);
     if (k < 0 && party->lights.count == 0) return 0;
@@ -761,9 +768,9 @@ static int answer(const nb_rays *rays, nb_party *party)
     return 1;
 }
 
-static void trace(nb_rays *rays)
+static void trace(nb_cloud_rays *rays)
 {
-    nb_party party;
+    nb_cloud_ray_group party;
     party.ready_count = party.lights.count = 0;
     for (int k = 0; k < NEBEL_MAX_CLOUD_LAYERS; k++) {
         party.queues[k].looks.count = 0;
@@ -781,14 +788,14 @@ nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, cons
                                 const double *spreads, size_t spread_stride, nebel_cloud_transfer *knots,
                                 size_t knot_stride)
 {
-    nb_rays all = {.workspace = workspace,
-                   .n = n,
-                   .rays = rays,
-                   .spreads = spreads,
-                   .knots = knots,
-                   .ray_stride = ray_stride,
-                   .spread_stride = spread_stride,
-                   .knot_stride = knot_stride};
+    nb_cloud_rays all = {.workspace = workspace,
+                         .n = n,
+                         .rays = rays,
+                         .spreads = spreads,
+                         .knots = knots,
+                         .ray_stride = ray_stride,
+                         .spread_stride = spread_stride,
+                         .knot_stride = knot_stride};
     if (workspace == NULL || (n > 0 && (rays == NULL || spreads == NULL || knots == NULL))) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
         double unit[3];

@@ -24,12 +24,12 @@ static const float hidden_heights[] = {0.37f, 0.75f}, hidden_widths[] = {0.42f, 
 
 /* ---- places ---------------------------------------------------------------------------------- */
 
-nb_cloud_pose nb_cloud_pose_at(const nb_cloud_layer *layer, double time)
+nb_cloud_rotation nb_cloud_pose_at(const nb_cloud_layer *layer, double time)
 {
     const double angle = -fmod(layer->per_time * time, 2 * PI), c = cos(angle), s = sin(angle);
     const double *a = layer->axis;
     const double skew[3][3] = {{0, -a[2], a[1]}, {a[2], 0, -a[0]}, {-a[1], a[0], 0}};
-    nb_cloud_pose pose;
+    nb_cloud_rotation pose;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) pose.turn[i][j] = (i == j ? c : 0) + (1 - c) * a[i] * a[j] + s * skew[i][j];
     return pose;
@@ -160,7 +160,7 @@ const nb_cloud_kernel *nb_cloud_kernel_choose(nebel_isa isa)
     return chosen != NEBEL_ISA_COUNT ? &kernels[chosen] : NULL;
 }
 
-void nb_cloud_ask(nb_cloud_looks *looks, const nb_cloud_pose *pose, const double place[3], float width)
+void nb_cloud_ask(nb_cloud_density_query *looks, const nb_cloud_rotation *pose, const double place[3], float width)
 {
     const int i = looks->count++;
     for (int c = 0; c < 3; c++) looks->place[c][i] = nb_vector_dot(pose->turn[c], place);
@@ -169,7 +169,7 @@ void nb_cloud_ask(nb_cloud_looks *looks, const nb_cloud_pose *pose, const double
 }
 
 void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *noise, const nb_cloud_layer *layer,
-                         nb_cloud_looks *looks)
+                         nb_cloud_density_query *looks)
 {
     nb_cloud_fill_lanes(looks);
     kernel->find_places(layer, 0, looks);
@@ -186,7 +186,7 @@ void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *no
     kernel->find_drops(noise, layer, looks);
 }
 
-void nb_cloud_find_means(const nebel_clouds *clouds, int layer, nb_cloud_looks *looks, float extinction[])
+void nb_cloud_find_means(const nebel_clouds *clouds, int layer, nb_cloud_density_query *looks, float extinction[])
 {
     nb_cloud_look_alone(clouds->kernel, &clouds->noise, &clouds->layers[layer], looks);
     memcpy(extinction, looks->whole, (size_t)looks->count * sizeof *extinction);
@@ -452,7 +452,7 @@ static int overlap(const nebel_cloud_layer *a, const nebel_cloud_layer *b)
 /* Layers that overlap would have to be walked together; none of the kinds do. */
 static nebel_result check(const nebel_clouds_desc *desc, nebel_cloud_layer *layers)
 {
-    const nb_airs *airs = &desc->atmosphere->airs;
+    const nb_air_components *airs = &desc->atmosphere->airs;
     if (desc->layer_count > NEBEL_MAX_CLOUD_LAYERS)
         return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "clouds: %u layers; at most %d are possible",
                        (unsigned)desc->layer_count, NEBEL_MAX_CLOUD_LAYERS);
@@ -521,8 +521,8 @@ void nebel_destroy_clouds(nebel_clouds *clouds)
 static void add_layer(const nebel_clouds *clouds, int k, double time, float width, size_t n, const double (*places)[3],
                       size_t stride, float *extinction)
 {
-    const nb_cloud_pose pose = nb_cloud_pose_at(&clouds->layers[k], time);
-    nb_cloud_looks looks = {.count = 0, .are_of_rays = 0};
+    const nb_cloud_rotation pose = nb_cloud_pose_at(&clouds->layers[k], time);
+    nb_cloud_density_query looks = {.count = 0, .are_of_rays = 0};
     for (size_t first = 0; first < n; first += NB_CLOUD_LANES) {
         const size_t count = n - first < NB_CLOUD_LANES ? n - first : NB_CLOUD_LANES;
         float means[NB_CLOUD_LANES];

@@ -52,8 +52,8 @@ typedef struct nb_cloud_layer {
     float grid;                  /* m, between columns that are kept */
     nb_cloud_grid grids[NB_CLOUD_GRIDS];
     float coverage;
-    nb_layer_map weather; /* level_count 0: none */
-    float apart;          /* what part of scattering leads away */
+    nb_planet_map weather; /* level_count 0: none */
+    float apart;           /* what part of scattering leads away */
     float shallow; /* optical depth up to which a place counts as one of a level slab, however the way to the sun is */
     /* Of layers whose clouds end aside (cloud_light.c), all 0 where they are closed: how little a cloud is like a level slab, to 1; what
      * part of light leaves it aside per unit of optical depth; what part of light that a slab would send up goes down there. */
@@ -75,11 +75,11 @@ struct nebel_clouds {
 };
 
 /* From the planet's axes to those of a layer at a time. */
-typedef struct nb_cloud_pose {
+typedef struct nb_cloud_rotation {
     double turn[3][3];
-} nb_cloud_pose;
+} nb_cloud_rotation;
 
-nb_cloud_pose nb_cloud_pose_at(const nb_cloud_layer *layer, double time);
+nb_cloud_rotation nb_cloud_pose_at(const nb_cloud_layer *layer, double time);
 
 /* How much cloud is about a column: 0 is its border, 1 the middle of a heap. */
 typedef struct nb_cloud_column {
@@ -119,20 +119,20 @@ static inline float nb_cloud_least_rank(nebel_cloud_type kind, float height)
 /* ---- drops ----------------------------------------------------------------------------------- */
 
 /* How much of extinction is seen: of all; of that part of scattering which leads away; of all where light comes through. */
-typedef struct nb_cloud_seen {
+typedef struct nb_cloud_filter {
     float whole, apart, passed;
-} nb_cloud_seen;
+} nb_cloud_filter;
 
 /* Places that are asked at once (cloud_looks.h). */
-typedef struct nb_cloud_looks nb_cloud_looks;
+typedef struct nb_cloud_density_query nb_cloud_density_query;
 
 /* Puts a place from the planet's centre behind those whose mean is asked. */
-void nb_cloud_ask(nb_cloud_looks *looks, const nb_cloud_pose *pose, const double place[3], float width);
+void nb_cloud_ask(nb_cloud_density_query *looks, const nb_cloud_rotation *pose, const double place[3], float width);
 /* Finds drops; no column next to the places is asked, so that none is kept. */
 void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *noise, const nb_cloud_layer *layer,
-                         nb_cloud_looks *looks);
+                         nb_cloud_density_query *looks);
 /* Mean extinction at all places that were asked; begins anew. */
-void nb_cloud_find_means(const nebel_clouds *clouds, int layer, nb_cloud_looks *looks,
+void nb_cloud_find_means(const nebel_clouds *clouds, int layer, nb_cloud_density_query *looks,
                          float extinction[/* NB_CLOUD_LANES */]);
 
 #endif

@@ -7,10 +7,10 @@
 
 #include "moments.h"
 
-void nb_field_add(nb_field *field, int orders, nb_aspect from, const double light[3])
+void nb_field_add(nb_radiance_moments *field, int orders, nb_moment_basis from, const double light[3])
 {
     double values[NB_FIELD];
-    nb_basis_of(orders, (nb_aspects){from.zenith, from.sun, from.height_of_sun}, values);
+    nb_basis_of(orders, (nb_moment_basis_lanes){from.zenith, from.sun, from.height_of_sun}, values);
     for (int i = 0; i < orders * (orders + 1) / 2; i++)
         for (int c = 0; c < 3; c++) field->moments[i][c] += values[i] * light[c];
 }

@@ -10,16 +10,16 @@ enum { NB_FIELD = NB_MOMENTS * (NB_MOMENTS + 1) / 2 };
 
 /* The frame of a field has z towards the sun and x towards the zenith. Air asks for the orders 0 to 2, dust for those that its phase
  * function has: `orders` says how many are kept. */
-typedef struct nb_field {
+typedef struct nb_radiance_moments {
     double moments[NB_FIELD][3];
-} nb_field;
+} nb_radiance_moments;
 
 /* The cosines of a direction to the zenith and to the sun, and of the sun to the zenith. */
-typedef struct nb_aspect {
+typedef struct nb_moment_basis {
     double zenith, sun, height_of_sun;
-} nb_aspect;
+} nb_moment_basis;
 
 /* Adds light (radiance times solid angle) that comes from a direction. */
-void nb_field_add(nb_field *field, int orders, nb_aspect from, const double light[3]);
+void nb_field_add(nb_radiance_moments *field, int orders, nb_moment_basis from, const double light[3]);
 
 #endif

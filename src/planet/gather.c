@@ -12,7 +12,7 @@
 
 /* Phase functions fall from order to order by about the same ratio, and light that was scattered once has it, too. No less than the first
  * order that is left out counts, as others may come from any side. Peaks have their own light: what is left out is not missing. */
-static double rest_of(const nb_air *air, int orders, double cosine)
+static double rest_of(const nb_air_component *air, int orders, double cosine)
 {
     const double ratio = nb_peak_ratio(air, orders), next = air->moments[orders];
     return (next > 0 ? 1 - air->peak / next : 1) *

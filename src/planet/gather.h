@@ -20,14 +20,14 @@ typedef struct nb_node_light {
 } nb_node_light;
 
 typedef struct nb_gather_job {
-    const nb_airs *airs;
-    const nb_airs *smooth;     /* what light scattered often is scattered by, if it is not `airs`; else NULL */
-    const nb_scatter *scatter; /* NULL: sunlight alone */
+    const nb_air_components *airs;
+    const nb_air_components *smooth;    /* what light scattered often is scattered by, if it is not `airs`; else NULL */
+    const nb_scattering_table *scatter; /* NULL: sunlight alone */
     int wants_sun;
-    nb_track track;
-    nb_aspect aspect;                  /* of the ray's direction, where it starts */
+    nb_atmosphere_ray track;
+    nb_moment_basis aspect;            /* of the ray's direction, where it starts */
     double rest[NEBEL_MAX_COMPONENTS]; /* by nb_gather_aim, else 0: nothing is missing */
-    const nb_path *path;
+    const nb_ray_nodes *path;
     int first, count; /* nodes; first: a multiple of NB_PATH_LANES */
 } nb_gather_job;
 

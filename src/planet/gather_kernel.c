@@ -34,7 +34,7 @@ NB_MOMENTS_INLINE nb_real left_of(const nb_nodes *nodes, const double transmitta
 
 static inline nb_nodes nodes_at(const nb_gather_job *job, int at)
 {
-    const nb_path *path = job->path;
+    const nb_ray_nodes *path = job->path;
     const nb_real s = nb_load_lanes(path->s + at), radius = nb_load_lanes(path->radius + at);
     const nb_real up = nb_splat(job->track.radius * job->aspect.height_of_sun) + s * nb_splat(job->aspect.sun);
     return (nb_nodes){.at = at,
@@ -59,7 +59,8 @@ static void add_sun(const nb_gather_job *job, const nb_nodes *nodes, nb_node_lig
 {
     const int to = nodes->at - job->first;
     nb_real met[NEBEL_MAX_COMPONENTS];
-    const nb_mask dark = nb_tracks_meet(job->airs, (nb_tracks){nodes->radius, nodes->radius * nodes->sun}, met);
+    const nb_mask dark =
+        nb_tracks_meet(job->airs, (nb_atmosphere_ray_lanes){nodes->radius, nodes->radius * nodes->sun}, met);
     for (int c = 0; c < 3; c++) {
         const nb_real sun = nb_select(dark, NB_F(0.0), nb_exp(-nb_depth_of(job->airs, met, c)));
         const nb_real straight = left_of(nodes, job->path->transmittance[c]) * sun;
@@ -79,7 +80,7 @@ NB_MOMENTS_INLINE nb_real weigh_rest(const nb_gather_job *job, int at, int c)
 {
     nb_real sum = NB_F(0.0);
     for (int k = 0; k < job->airs->count; k++) {
-        const nb_air *air = &job->airs->airs[k];
+        const nb_air_component *air = &job->airs->airs[k];
         const double times = job->rest[k] / NB_FOUR_PI * air->scattering[c] * air->moments[job->scatter->orders];
         if (air->scattering[c] > 0) sum = sum + nb_splat(times) * nb_load_lanes(job->path->density[k] + at);
     }
@@ -89,10 +90,10 @@ NB_MOMENTS_INLINE nb_real weigh_rest(const nb_gather_job *job, int at, int c)
 /* What air gives of the moments of one order, 1/m. */
 NB_MOMENTS_INLINE nb_real weigh(const nb_gather_job *job, int at, int order, int c)
 {
-    const nb_airs *airs = job->smooth != NULL ? job->smooth : job->airs;
+    const nb_air_components *airs = job->smooth != NULL ? job->smooth : job->airs;
     nb_real sum = NB_F(0.0);
     for (int k = 0; k < airs->count; k++) {
-        const nb_air *air = &airs->airs[k];
+        const nb_air_component *air = &airs->airs[k];
         const double times = (2 * order + 1) / NB_FOUR_PI * air->scattering[c] * air->moments[order];
         if (air->scattering[c] > 0) sum = sum + nb_splat(times) * nb_load_lanes(job->path->density[k] + at);
     }
@@ -104,7 +105,7 @@ NB_MOMENTS_INLINE nb_real peak_part(const nb_gather_job *job, int at, int c)
 {
     nb_real peaks = NB_F(0.0), all = NB_F(1e-300);
     for (int k = 0; k < job->airs->count; k++) {
-        const nb_air *air = &job->airs->airs[k];
+        const nb_air_component *air = &job->airs->airs[k];
         const nb_real scattered = nb_splat(air->scattering[c]) * nb_load_lanes(job->path->density[k] + at);
         all = all + scattered;
         peaks = peaks + scattered * nb_splat(air->peak);
@@ -114,7 +115,7 @@ NB_MOMENTS_INLINE nb_real peak_part(const nb_gather_job *job, int at, int c)
 
 /* For a first moment of 1: what the field of the spots gives towards a direction, and about what it would give more or
  * less if all orders were kept, as if the next one's moments were as large as those of the last one. radiance: of the field itself. */
-NB_MOMENTS_INLINE nb_scattered scatter(const nb_gather_job *job, int orders, const nb_spots *spots, int at,
+NB_MOMENTS_INLINE nb_scattered scatter(const nb_gather_job *job, int orders, const nb_moment_samples *spots, int at,
                                        const nb_real basis[NB_FIELD], int c, nb_real *radiance)
 {
     nb_real sum = weigh(job, at, 0, c) * basis[0], square = NB_F(1.0), seen = basis[0];
@@ -139,10 +140,10 @@ NB_MOMENTS_INLINE nb_scattered scatter(const nb_gather_job *job, int orders, con
 NB_MOMENTS_INLINE void add_often(const nb_gather_job *job, int orders, const nb_nodes *nodes, nb_node_light *light)
 {
     const int to = nodes->at - job->first;
-    const nb_spots spots = nb_spots_of(job->scatter, job->airs, nodes->radius, nodes->sun);
+    const nb_moment_samples spots = nb_spots_of(job->scatter, job->airs, nodes->radius, nodes->sun);
     const nb_real dark = NB_F(TWILIGHT_OFF) * nb_max(NB_F(0.0), -nodes->sun);
     nb_real basis[NB_FIELD];
-    nb_basis_of(orders, (nb_aspects){nodes->zenith, nb_splat(job->aspect.sun), nodes->sun}, basis);
+    nb_basis_of(orders, (nb_moment_basis_lanes){nodes->zenith, nb_splat(job->aspect.sun), nodes->sun}, basis);
     for (int c = 0; c < 3; c++) {
         const double(*left)[NB_PATH_MOST] = job->smooth != NULL ? job->path->smooth : job->path->transmittance;
         const nb_real mean = nb_exp(nb_moment_at(&spots, 0, c)), all = left_of(nodes, left[c]) * mean;

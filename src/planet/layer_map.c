@@ -29,30 +29,30 @@ static size_t half_of(size_t size)
 }
 
 /* Texels of the finer level that one of the coarser covers: of odd sizes some in part. */
-typedef struct nb_span {
+typedef struct nb_map_span {
     size_t first, last;
     double head, tail; /* parts of the first and of the last */
-} nb_span;
+} nb_map_span;
 
-static nb_span span_of(size_t i, size_t coarse, size_t fine)
+static nb_map_span span_of(size_t i, size_t coarse, size_t fine)
 {
     const double low = (double)(i * fine) / (double)coarse, high = (double)((i + 1) * fine) / (double)coarse;
     const size_t first = (size_t)low, last = (size_t)ceil(high) - 1;
-    return (nb_span){first, last, (double)(first + 1) - low, high - (double)last};
+    return (nb_map_span){first, last, (double)(first + 1) - low, high - (double)last};
 }
 
-static double part_of(const nb_span *span, size_t i)
+static double part_of(const nb_map_span *span, size_t i)
 {
     if (span->first == span->last) return 1;
     if (i == span->first) return span->head;
     return i == span->last ? span->tail : 1;
 }
 
-static void halve_texel(const nb_layer_map *map, int level, size_t x, size_t y)
+static void halve_texel(const nb_planet_map *map, int level, size_t x, size_t y)
 {
     const size_t width = map->width[level - 1], channels = (size_t)map->channels;
-    const nb_span columns = span_of(x, map->width[level], width);
-    const nb_span rows = span_of(y, map->height[level], map->height[level - 1]);
+    const nb_map_span columns = span_of(x, map->width[level], width);
+    const nb_map_span rows = span_of(y, map->height[level], map->height[level - 1]);
     for (size_t c = 0; c < channels; c++) {
         double sum = 0, all = 0;
         for (size_t i = rows.first; i <= rows.last; i++) {
@@ -66,13 +66,13 @@ static void halve_texel(const nb_layer_map *map, int level, size_t x, size_t y)
     }
 }
 
-static size_t count_texels(const nb_layer_map *map, int level)
+static size_t count_texels(const nb_planet_map *map, int level)
 {
     return map->width[level] * map->height[level] * (size_t)map->channels;
 }
 
 /* Sizes of all levels; their texels in all. */
-static size_t set_sizes(const nebel_planet_map *desc, nb_layer_map *map)
+static size_t set_sizes(const nebel_planet_map *desc, nb_planet_map *map)
 {
     map->channels = desc->channels;
     map->width[0] = desc->width;
@@ -88,7 +88,7 @@ static size_t set_sizes(const nebel_planet_map *desc, nb_layer_map *map)
     return all;
 }
 
-nebel_result nb_layer_map_make(const nebel_allocator *allocator, const nebel_planet_map *desc, nb_layer_map *map)
+nebel_result nb_layer_map_make(const nebel_allocator *allocator, const nebel_planet_map *desc, nb_planet_map *map)
 {
     const size_t all = set_sizes(desc, map);
     float *texels = nb_allocate(allocator, all, sizeof *texels);
@@ -104,13 +104,13 @@ nebel_result nb_layer_map_make(const nebel_allocator *allocator, const nebel_pla
     return NEBEL_OK;
 }
 
-void nb_layer_map_free(const nebel_allocator *allocator, nb_layer_map *map)
+void nb_layer_map_free(const nebel_allocator *allocator, nb_planet_map *map)
 {
     nb_release(allocator, map->levels[0]);
-    *map = (nb_layer_map){.channels = 0};
+    *map = (nb_planet_map){.channels = 0};
 }
 
-nebel_planet_map nb_layer_map_level(const nb_layer_map *map, int level)
+nebel_planet_map nb_layer_map_level(const nb_planet_map *map, int level)
 {
     return (nebel_planet_map){map->width[level], map->height[level], map->channels, map->levels[level]};
 }
@@ -130,7 +130,7 @@ static nb_pair pair_at(double place, size_t size, int repeats)
     return (nb_pair){first, next, x - low};
 }
 
-static void read_level(const nb_layer_map *map, int level, double u, double v, int repeats, double *values)
+static void read_level(const nb_planet_map *map, int level, double u, double v, int repeats, double *values)
 {
     const nb_pair x = pair_at(u, map->width[level], 1), y = pair_at(v, map->height[level], repeats);
     const size_t width = map->width[level], channels = (size_t)map->channels;
@@ -145,7 +145,7 @@ static void read_level(const nb_layer_map *map, int level, double u, double v, i
     }
 }
 
-void nb_layer_map_read(const nb_layer_map *map, double u, double v, double level, int repeats, double *values)
+void nb_layer_map_read(const nb_planet_map *map, double u, double v, double level, int repeats, double *values)
 {
     double coarse[3];
     const double most = (double)(map->level_count - 1), at = level > 0 ? fmin(level, most) : 0, low = floor(at);

@@ -16,13 +16,13 @@
 #define PI 3.14159265358979323846
 
 typedef struct nb_shell {
-    nb_layer_map map, detail; /* detail without levels: it is the map */
+    nb_planet_map map, detail; /* detail without levels: it is the map */
 } nb_shell;
 
 struct nebel_textured_planet {
     nebel_textured_planet_desc desc; /* completed; its maps are the first levels of those here, its log is none */
     double frame[3][3];              /* the planet's axes in the scene */
-    nb_layer_map ground;
+    nb_planet_map ground;
     nb_shell shells[NEBEL_MAX_CLOUD_SHELLS];
 };
 
@@ -70,18 +70,18 @@ static nebel_textured_planet_desc resolve(const nebel_textured_planet_desc *desc
 }
 
 /* What is said of: "clouds[2]: ", or "" where it is the planet. */
-typedef struct subject {
+typedef struct nb_textured_subject {
     const nebel_log *log;
     char name[24];
-} subject;
+} nb_textured_subject;
 
-static nebel_result refuse(const subject *of, const char *what, const char *fault)
+static nebel_result refuse(const nb_textured_subject *of, const char *what, const char *fault)
 {
     return nb_fail(of->log, NEBEL_ERROR_VALUE, "planet: %s%s: %s", of->name, what, fault);
 }
 
-static nebel_result check_all(const subject *of, const char *what, const double *numbers, int count, double least,
-                              double most)
+static nebel_result check_all(const nb_textured_subject *of, const char *what, const double *numbers, int count,
+                              double least, double most)
 {
     for (int i = 0; i < count; i++)
         if (!all_within(&numbers[i], 1, least, most))
@@ -90,25 +90,26 @@ static nebel_result check_all(const subject *of, const char *what, const double 
     return NEBEL_OK;
 }
 
-static nebel_result check_one(const subject *of, const char *what, double number, double least, double most)
+static nebel_result check_one(const nb_textured_subject *of, const char *what, double number, double least, double most)
 {
     return check_all(of, what, &number, 1, least, most);
 }
 
-static nebel_result check_height(const subject *of, const char *what, double height)
+static nebel_result check_height(const nb_textured_subject *of, const char *what, double height)
 {
     if (height > 0 && height <= 1e12) return NEBEL_OK;
     return nb_fail(of->log, NEBEL_ERROR_VALUE, "planet: %s%s: is %g; must be more than 0, at most 1e12", of->name, what,
                    height);
 }
 
-static nebel_result check_map(const subject *of, const char *what, const nebel_planet_map *map, int channels)
+static nebel_result check_map(const nb_textured_subject *of, const char *what, const nebel_planet_map *map,
+                              int channels)
 {
     const char *fault = nb_map_fault(map, channels);
     return fault == NULL ? NEBEL_OK : refuse(of, what, fault);
 }
 
-static nebel_result check_shell(const subject *of, const nebel_cloud_shell *shell)
+static nebel_result check_shell(const nb_textured_subject *of, const nebel_cloud_shell *shell)
 {
     nebel_result result = check_map(of, "map", &shell->coverage_map, 1);
     if (result == NEBEL_OK) result = check_map(of, "detail", &shell->detail_map, 1);
@@ -120,7 +121,7 @@ static nebel_result check_shell(const subject *of, const nebel_cloud_shell *shel
     return result == NEBEL_OK ? check_one(of, "coverage", shell->coverage, 0, 1) : result;
 }
 
-static nebel_result check_air(const subject *of, const nebel_atmosphere_shell *air)
+static nebel_result check_air(const nb_textured_subject *of, const nebel_atmosphere_shell *air)
 {
     nebel_result result = check_height(of, "air.height", air->height);
     if (result == NEBEL_OK) result = check_one(of, "air.brightness", air->brightness, 0, 1e6);
@@ -131,7 +132,7 @@ static nebel_result check_air(const subject *of, const nebel_atmosphere_shell *a
     return result;
 }
 
-static nebel_result check_ball(const subject *of, const nebel_textured_planet_desc *desc)
+static nebel_result check_ball(const nb_textured_subject *of, const nebel_textured_planet_desc *desc)
 {
     nebel_result result = check_all(of, "center", desc->center, 3, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH);
     if (result == NEBEL_OK) result = check_one(of, "radius", desc->radius, 1, 1e12);
@@ -145,7 +146,7 @@ static nebel_result check_ball(const subject *of, const nebel_textured_planet_de
 
 static nebel_result check(const nebel_textured_planet_desc *desc)
 {
-    subject of = {&desc->log, ""};
+    nb_textured_subject of = {&desc->log, ""};
     nebel_result result = check_ball(&of, desc);
     if (result == NEBEL_OK && !desc->atmosphere.is_disabled) result = check_air(&of, &desc->atmosphere);
     for (uint32_t i = 0; result == NEBEL_OK && i < desc->cloud_shell_count; i++) {
@@ -157,7 +158,7 @@ static nebel_result check(const nebel_textured_planet_desc *desc)
 
 /* ---- making ---------------------------------------------------------------------------------- */
 
-static nebel_result paint_map(const nebel_allocator *allocator, const nebel_planet_map_desc *desc, nb_layer_map *map)
+static nebel_result paint_map(const nebel_allocator *allocator, const nebel_planet_map_desc *desc, nb_planet_map *map)
 {
     nebel_planet_map painted = {.width = 0};
     nebel_result result = nebel_get_planet_map_size(desc, &painted);
@@ -172,7 +173,7 @@ static nebel_result paint_map(const nebel_allocator *allocator, const nebel_plan
 }
 
 static nebel_result make_map(const nebel_allocator *allocator, const nebel_planet_map *given,
-                             const nebel_planet_map_desc *desc, nb_layer_map *map)
+                             const nebel_planet_map_desc *desc, nb_planet_map *map)
 {
     return given->texels != NULL ? nb_layer_map_make(allocator, given, map) : paint_map(allocator, desc, map);
 }
@@ -245,7 +246,7 @@ const nebel_textured_planet_desc *nebel_get_textured_planet_desc(const nebel_tex
     return layers != NULL ? &layers->desc : NULL;
 }
 
-static const nb_layer_map *find_map(const nebel_textured_planet *layers, const float *texels)
+static const nb_planet_map *find_map(const nebel_textured_planet *layers, const float *texels)
 {
     if (texels == layers->ground.levels[0]) return &layers->ground;
     for (uint32_t i = 0; i < layers->desc.cloud_shell_count; i++) {
@@ -261,7 +262,7 @@ nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *layers, const
 {
     if (coarser != NULL) *coarser = (nebel_planet_map){0};
     if (layers == NULL || map == NULL || map->texels == NULL || coarser == NULL) return NEBEL_ERROR_ARGUMENT;
-    const nb_layer_map *const found = find_map(layers, map->texels);
+    const nb_planet_map *const found = find_map(layers, map->texels);
     if (found == NULL || level >= (uint32_t)found->level_count) return NEBEL_ERROR_ARGUMENT;
     *coarser = nb_layer_map_level(found, (int)level);
     return NEBEL_OK;
@@ -270,7 +271,7 @@ nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *layers, const
 /* ---- what a ray meets ------------------------------------------------------------------------ */
 
 /* A ray from a planet's middle, and its light. */
-typedef struct nb_sight {
+typedef struct nb_shell_ray {
     const nebel_textured_planet *layers;
     double from[3], to[3]; /* to: of length 1 */
     double far;            /* m, from the middle */
@@ -278,10 +279,10 @@ typedef struct nb_sight {
     double aside;          /* square of how far it is there */
     double t_max, time, spread;
     double sun[3], ambient[3], irradiance[3];
-} nb_sight;
+} nb_shell_ray;
 
 /* The first side of a ball that is met; less than 0: none. From outside only what lies ahead is. */
-static double meet(const nb_sight *s, double radius)
+static double meet(const nb_shell_ray *s, double radius)
 {
     const double square = radius * radius - s->aside;
     if (!(square >= 0)) return -1;
@@ -291,11 +292,11 @@ static double meet(const nb_sight *s, double radius)
 }
 
 /* A place on a ball. */
-typedef struct nb_spot {
+typedef struct nb_shell_sample {
     double normal[3], sun, view; /* cosines; view from either side */
     double u, v, pole;           /* pole: the normal along the axis */
     double level;                /* of a map that is as wide as the ball is around */
-} nb_spot;
+} nb_shell_sample;
 
 static double turn(double u, double day, double time)
 {
@@ -303,9 +304,9 @@ static double turn(double u, double day, double time)
 }
 
 /* `days` are what the ball turns by: a shell of clouds turns with the ground, and against it. */
-static nb_spot spot_at(const nb_sight *s, double radius, double t, const double days[2])
+static nb_shell_sample spot_at(const nb_shell_ray *s, double radius, double t, const double days[2])
 {
-    nb_spot spot;
+    nb_shell_sample spot;
     double place[3], local[3];
     for (int i = 0; i < 3; i++) place[i] = s->from[i] + t * s->to[i];
     const double length = nb_vector_length(place);
@@ -321,7 +322,7 @@ static nb_spot spot_at(const nb_sight *s, double radius, double t, const double 
     return spot;
 }
 
-static double read_map(const nb_layer_map *map, const nb_spot *spot, double wrap, int repeats)
+static double read_map(const nb_planet_map *map, const nb_shell_sample *spot, double wrap, int repeats)
 {
     double value = 0;
     const double texels = spot->level * fabs(wrap) * (double)map->width[0];
@@ -329,15 +330,15 @@ static double read_map(const nb_layer_map *map, const nb_spot *spot, double wrap
     return value;
 }
 
-static double cover_at(const nb_shell *shell, const nebel_cloud_shell *desc, const nb_spot *spot)
+static double cover_at(const nb_shell *shell, const nebel_cloud_shell *desc, const nb_shell_sample *spot)
 {
-    const nb_layer_map *detail = shell->detail.level_count > 0 ? &shell->detail : &shell->map;
+    const nb_planet_map *detail = shell->detail.level_count > 0 ? &shell->detail : &shell->map;
     double parts[3];
     for (int i = 0; i < 3; i++) parts[i] = read_map(detail, spot, desc->uv_tiling[i], 1);
     return nb_cloud_cover(read_map(&shell->map, spot, 1, 0), parts[0], parts[1], parts[2], spot->pole, desc->gain);
 }
 
-static void reflect(const nb_sight *s, double sun, const double color[3], double cover, double radiance[3])
+static void reflect(const nb_shell_ray *s, double sun, const double color[3], double cover, double radiance[3])
 {
     for (int c = 0; c < 3; c++) radiance[c] = cover * color[c] * (s->irradiance[c] * fmax(sun, 0) / PI + s->ambient[c]);
 }
@@ -349,11 +350,11 @@ static void insert(nebel_shell_hits *hits, const nebel_shell_hit *hit)
     hits->hits[i] = *hit;
 }
 
-static void add_ground(const nb_sight *s, double t, nebel_shell_hits *hits)
+static void add_ground(const nb_shell_ray *s, double t, nebel_shell_hits *hits)
 {
     const double days[2] = {s->layers->desc.rotation_period, 0};
-    const nb_spot spot = spot_at(s, s->layers->desc.radius, t, days);
-    const nb_layer_map *map = &s->layers->ground;
+    const nb_shell_sample spot = spot_at(s, s->layers->desc.radius, t, days);
+    const nb_planet_map *map = &s->layers->ground;
     const double texels = spot.level * (double)map->width[0];
     nebel_shell_hit hit = {.t = t, .opacity = 1, .is_ground = 1};
     double color[3];
@@ -367,22 +368,22 @@ static double radius_of(const nebel_textured_planet_desc *desc, uint32_t shell)
     return desc->radius + desc->cloud_shells[shell].height;
 }
 
-static void add_clouds(const nb_sight *s, uint32_t number, double t, nebel_shell_hits *hits)
+static void add_clouds(const nb_shell_ray *s, uint32_t number, double t, nebel_shell_hits *hits)
 {
     const nebel_textured_planet_desc *const desc = &s->layers->desc;
     const nebel_cloud_shell *const shell = &desc->cloud_shells[number];
     const double days[2] = {desc->rotation_period, shell->rotation_period};
-    const nb_spot spot = spot_at(s, radius_of(desc, number), t, days);
+    const nb_shell_sample spot = spot_at(s, radius_of(desc, number), t, days);
     nebel_shell_hit hit = {.t = t, .opacity = cover_at(&s->layers->shells[number], shell, &spot)};
     reflect(s, spot.sun, shell->color, hit.opacity, hit.radiance);
     insert(hits, &hit);
 }
 
-static void add_air(const nb_sight *s, double t, nebel_shell_hits *hits)
+static void add_air(const nb_shell_ray *s, double t, nebel_shell_hits *hits)
 {
     static const double days[2] = {0, 0};
     const nebel_atmosphere_shell *air = &s->layers->desc.atmosphere;
-    const nb_spot spot = spot_at(s, s->layers->desc.radius + air->height, t, days);
+    const nb_shell_sample spot = spot_at(s, s->layers->desc.radius + air->height, t, days);
     const nb_glow glow = nb_air_glow(spot.sun, spot.view);
     const double place = glow.place * (double)(air->ramp_count - 1);
     const uint32_t low = (uint32_t)place, high = low + 1 < air->ramp_count ? low + 1 : low;
@@ -394,7 +395,7 @@ static void add_air(const nb_sight *s, double t, nebel_shell_hits *hits)
     insert(hits, &hit);
 }
 
-static void look(const nb_sight *s, nebel_shell_hits *hits)
+static void look(const nb_shell_ray *s, nebel_shell_hits *hits)
 {
     const nebel_textured_planet_desc *desc = &s->layers->desc;
     const double ground = meet(s, desc->radius), end = ground >= 0 ? fmin(ground, s->t_max) : s->t_max;
@@ -410,9 +411,9 @@ static void look(const nb_sight *s, nebel_shell_hits *hits)
 
 /* ---- the face -------------------------------------------------------------------------------- */
 
-static int set_view(const nebel_textured_planet *layers, const nebel_textured_planet_query *view, nb_sight *s)
+static int set_view(const nebel_textured_planet *layers, const nebel_textured_planet_query *view, nb_shell_ray *s)
 {
-    *s = (nb_sight){.layers = layers, .time = view->time, .spread = view->pixel_spread};
+    *s = (nb_shell_ray){.layers = layers, .time = view->time, .spread = view->pixel_spread};
     if (!(fabs(view->time) <= 1e12 && view->pixel_spread >= 0 && view->pixel_spread <= 1e12)) return 0;
     if (!all_within(view->ambient, 3, 0, 1e9) || !all_within(view->sun.irradiance, 3, 0, 1e9)) return 0;
     memcpy(s->ambient, view->ambient, sizeof s->ambient);
@@ -421,7 +422,7 @@ static int set_view(const nebel_textured_planet *layers, const nebel_textured_pl
     return is_zero(s->sun, 3) || nb_vector_make_unit(s->sun);
 }
 
-static int set_ray(const nebel_ray *ray, nb_sight *s)
+static int set_ray(const nebel_ray *ray, nb_shell_ray *s)
 {
     if (!(ray->t_max >= 0)) return 0;
     for (int i = 0; i < 3; i++) {
@@ -443,7 +444,7 @@ nebel_result nebel_trace_textured_planet(const nebel_textured_planet *layers, co
                                          size_t n, const nebel_ray *rays, size_t ray_stride, nebel_shell_hits *hits,
                                          size_t hit_stride)
 {
-    nb_sight s;
+    nb_shell_ray s;
     if (layers == NULL || view == NULL || (n > 0 && (rays == NULL || hits == NULL))) return NEBEL_ERROR_ARGUMENT;
     if (!set_view(layers, view, &s)) return NEBEL_ERROR_ARGUMENT;
     if (ray_stride == 0) ray_stride = sizeof *rays;

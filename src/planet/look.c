@@ -9,38 +9,38 @@
 #define LEAST_OFF 2e-4
 
 #define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = &nb_look_kernel_##suffix,
-static const nb_look_kernel *const kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(KERNEL)};
+static const nb_sky_view_kernel *const kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(KERNEL)};
 
-const nb_look_kernel *nb_look_choose(nebel_isa isa)
+const nb_sky_view_kernel *nb_look_choose(nebel_isa isa)
 {
     return kernels[nb_cpu_choose(isa)];
 }
 
-static nb_look_table table_of(const nebel_sky_view *view)
+static nb_sky_view_table table_of(const nebel_sky_view *view)
 {
     const nb_outlook *outlook = &view->outlook;
-    nb_look_table table = {.radius = outlook->radius,
-                           .ground = outlook->ground,
-                           .thickness = outlook->thickness,
-                           .height = outlook->height,
-                           .dip = outlook->dip,
-                           .ratio = outlook->ratio,
-                           .horizon = outlook->horizon,
-                           .half_arc = outlook->half_arc,
-                           .sun_cosine = view->sun_slope.cosine,
-                           .sun_sine = view->sun_slope.sine,
-                           .falling = NB_VIEW_FALLING,
-                           .rising = NB_VIEW_RISING,
-                           .columns = view->columns,
-                           .levels = view->levels,
-                           .size = view->size,
-                           .suns = NB_VIEW_SUNS,
-                           .entries = view->entries,
-                           .extinction = (const double(*)[4])view->extinction,
-                           .sunlight = view->sunlight,
-                           .scatterer_count = view->scatterer_count,
-                           .least_off = LEAST_OFF * view->brightest,
-                           .scatter = &view->atmosphere->scatter};
+    nb_sky_view_table table = {.radius = outlook->radius,
+                               .ground = outlook->ground,
+                               .thickness = outlook->thickness,
+                               .height = outlook->height,
+                               .dip = outlook->dip,
+                               .ratio = outlook->ratio,
+                               .horizon = outlook->horizon,
+                               .half_arc = outlook->half_arc,
+                               .sun_cosine = view->sun_slope.cosine,
+                               .sun_sine = view->sun_slope.sine,
+                               .falling = NB_VIEW_FALLING,
+                               .rising = NB_VIEW_RISING,
+                               .columns = view->columns,
+                               .levels = view->levels,
+                               .size = view->size,
+                               .suns = NB_VIEW_SUNS,
+                               .entries = view->entries,
+                               .extinction = (const double(*)[4])view->extinction,
+                               .sunlight = view->sunlight,
+                               .scatterer_count = view->scatterer_count,
+                               .least_off = LEAST_OFF * view->brightest,
+                               .scatter = &view->atmosphere->scatter};
     for (int c = 0; c < 3; c++) {
         table.up[c] = view->up[c];
         table.ahead[c] = view->ahead[c];
@@ -61,12 +61,12 @@ nebel_result nebel_trace_sky_view(const nebel_sky_view *view, size_t n, const do
                                   const float *t_max, const nebel_transfer_planes *transfers)
 {
     if (view == NULL || !has_directions(direction) || transfers == NULL) return NEBEL_ERROR_ARGUMENT;
-    const nb_look_table table = table_of(view);
-    const nb_look_job job = {.table = &table,
-                             .count = n,
-                             .direction = {direction[0], direction[1], direction[2]},
-                             .t_max = t_max,
-                             .transfers = *transfers};
+    const nb_sky_view_table table = table_of(view);
+    const nb_sky_view_job job = {.table = &table,
+                                 .count = n,
+                                 .direction = {direction[0], direction[1], direction[2]},
+                                 .t_max = t_max,
+                                 .transfers = *transfers};
     view->look->along(&job);
     return NEBEL_OK;
 }
@@ -75,8 +75,8 @@ nebel_result nebel_trace_ground(const nebel_sky_view *view, size_t n, const doub
                                 const nebel_ground_planes *planes)
 {
     if (view == NULL || !has_directions(direction) || planes == NULL) return NEBEL_ERROR_ARGUMENT;
-    const nb_look_table table = table_of(view);
-    const nb_look_job job = {
+    const nb_sky_view_table table = table_of(view);
+    const nb_sky_view_job job = {
         .table = &table, .count = n, .direction = {direction[0], direction[1], direction[2]}, .ground = *planes};
     view->look->down(&job);
     return NEBEL_OK;

@@ -8,7 +8,7 @@
 enum { NB_VIEW_SIZE = 3 * NEBEL_MAX_COMPONENTS + 8 };
 
 /* A view in plain numbers: kernels have the structures of formulas in lanes. */
-typedef struct nb_look_table {
+typedef struct nb_sky_view_table {
     double radius, ground, thickness, height, dip, ratio, horizon, half_arc; /* an nb_outlook */
     double up[3], ahead[3], aside[3], sun_cosine, sun_sine;
     int falling, rising, columns, levels, size, suns;
@@ -17,28 +17,28 @@ typedef struct nb_look_table {
     int scatterer_count;
     const nb_phase *phases[NEBEL_MAX_COMPONENTS]; /* of those that scatter */
     double irradiance[3], least_off;
-    const nb_scatter *scatter;
-} nb_look_table;
+    const nb_scattering_table *scatter;
+} nb_sky_view_table;
 
-typedef struct nb_look_job {
-    const nb_look_table *table;
+typedef struct nb_sky_view_job {
+    const nb_sky_view_table *table;
     size_t count;
     const double *direction[3];
     const float *t_max; /* NULL: as far as they go */
     nebel_transfer_planes transfers;
     nebel_ground_planes ground;
-} nb_look_job;
+} nb_sky_view_job;
 
 /* Of an instruction set: light along rays, and the ground that they meet. */
-typedef struct nb_look_kernel {
-    void (*along)(const nb_look_job *job);
-    void (*down)(const nb_look_job *job);
-} nb_look_kernel;
+typedef struct nb_sky_view_kernel {
+    void (*along)(const nb_sky_view_job *job);
+    void (*down)(const nb_sky_view_job *job);
+} nb_sky_view_kernel;
 
-extern const nb_look_kernel nb_look_kernel_scalar, nb_look_kernel_sse2, nb_look_kernel_avx2, nb_look_kernel_avx512,
+extern const nb_sky_view_kernel nb_look_kernel_scalar, nb_look_kernel_sse2, nb_look_kernel_avx2, nb_look_kernel_avx512,
     nb_look_kernel_neon;
 
 /* For DEFAULT that of the best one; NULL where this build or processor has not got it. */
-const nb_look_kernel *nb_look_choose(nebel_isa isa);
+const nb_sky_view_kernel *nb_look_choose(nebel_isa isa);
 
 #endif

@@ -21,17 +21,17 @@
 /* ---- lanes ----------------------------------------------------------------------------------- */
 
 /* Lanes of a job: `count` rays from `first` on, which the last one fills up. */
-typedef struct nb_part {
+typedef struct nb_sky_view_part {
     size_t first, count;
-} nb_part;
+} nb_sky_view_part;
 
-static inline nb_part part_from(const nb_look_job *job, size_t first)
+static inline nb_sky_view_part part_from(const nb_sky_view_job *job, size_t first)
 {
     const size_t left = job->count - first;
-    return (nb_part){first, left < NB_WIDTH ? left : NB_WIDTH};
+    return (nb_sky_view_part){first, left < NB_WIDTH ? left : NB_WIDTH};
 }
 
-static inline nb_real load_doubles(nb_part part, const double *from)
+static inline nb_real load_doubles(nb_sky_view_part part, const double *from)
 {
     if (part.count == NB_WIDTH) return nb_load_lanes(from + part.first);
     double lanes[NB_WIDTH];
@@ -39,7 +39,7 @@ static inline nb_real load_doubles(nb_part part, const double *from)
     return nb_load_lanes(lanes);
 }
 
-static inline nb_real load_floats(nb_part part, const float *from)
+static inline nb_real load_floats(nb_sky_view_part part, const float *from)
 {
     if (part.count == NB_WIDTH) return nb_load_floats(from + part.first);
     float lanes[NB_WIDTH];
@@ -48,7 +48,7 @@ static inline nb_real load_floats(nb_part part, const float *from)
 }
 
 /* NULL: not wanted. */
-static inline void store_floats(nb_part part, nb_real x, float *to)
+static inline void store_floats(nb_sky_view_part part, nb_real x, float *to)
 {
     if (to == NULL) return;
     if (part.count == NB_WIDTH) {
@@ -73,9 +73,9 @@ static inline nb_real along(const double axis[3], const nb_real direction[3])
     return direction[0] * nb_splat(axis[0]) + direction[1] * nb_splat(axis[1]) + direction[2] * nb_splat(axis[2]);
 }
 
-static inline nb_bearings bearings_of(const nb_look_job *job, nb_part part)
+static inline nb_bearings bearings_of(const nb_sky_view_job *job, nb_sky_view_part part)
 {
-    const nb_look_table *table = job->table;
+    const nb_sky_view_table *table = job->table;
     nb_real d[3], square = NB_F(0.0);
     nb_bearings b;
     for (int c = 0; c < 3; c++) {
@@ -98,12 +98,12 @@ static inline nb_real bound_cosine(nb_real x)
 }
 
 /* The cosine of the angle between a direction and the sun. */
-static inline nb_real sun_along(const nb_look_table *table, const nb_bearings *b)
+static inline nb_real sun_along(const nb_sky_view_table *table, const nb_bearings *b)
 {
     return bound_cosine(b->up * nb_splat(table->sun_cosine) + b->ahead * nb_splat(table->sun_sine));
 }
 
-static inline nb_outlook outlook_of(const nb_look_table *table)
+static inline nb_outlook outlook_of(const nb_sky_view_table *table)
 {
     return (nb_outlook){.radius = nb_splat(table->radius),
                         .ground = nb_splat(table->ground),
@@ -138,11 +138,11 @@ static inline nb_reach reach_of(const nb_outlook *outlook, const nb_bearings *b)
 /* ---- places in the table --------------------------------------------------------------------- */
 
 /* Rays in the terms of the table. */
-typedef struct nb_looks {
+typedef struct nb_sky_view_lookups {
     nb_real along; /* m in the air; 0: none, and the rest means nothing */
     nb_real sun;   /* cosine of the angle to it */
     nb_real row, column, level, row_part, column_part, level_part;
-} nb_looks;
+} nb_sky_view_lookups;
 
 static inline nb_real place_in(nb_real place, nb_real most, nb_real *part)
 {
@@ -152,20 +152,20 @@ static inline nb_real place_in(nb_real place, nb_real most, nb_real *part)
 }
 
 /* Distances have float's digits: what they do not tell from the end, such as the ground under thin air, is there. */
-static inline nb_real length_in(const nb_look_job *job, nb_part part, const nb_reach *reach)
+static inline nb_real length_in(const nb_sky_view_job *job, nb_sky_view_part part, const nb_reach *reach)
 {
     if (job->t_max == NULL) return reach->span;
     const nb_real t_max = load_floats(part, job->t_max), way = t_max - reach->begin;
     return nb_select(way > reach->span - NB_F(0x1p-22) * t_max, reach->span, way);
 }
 
-static inline nb_looks looks_along(const nb_look_job *job, nb_part part)
+static inline nb_sky_view_lookups looks_along(const nb_sky_view_job *job, nb_sky_view_part part)
 {
-    const nb_look_table *table = job->table;
+    const nb_sky_view_table *table = job->table;
     const nb_outlook outlook = outlook_of(table);
     const nb_bearings b = bearings_of(job, part);
     const nb_reach reach = reach_of(&outlook, &b);
-    nb_looks l;
+    nb_sky_view_lookups l;
     l.along = nb_select(b.is_direction, nb_max(length_in(job, part, &reach), NB_F(0.0)), NB_F(0.0));
     l.sun = sun_along(table, &b);
     const nb_real cosine = b.ahead / nb_select(b.level > NB_F(0.0), b.level, NB_F(1.0));
@@ -205,28 +205,29 @@ typedef struct nb_read {
 } nb_read;
 
 /* One ray's place in the table. */
-typedef struct nb_spot {
+typedef struct nb_sky_view_sample {
     size_t row, column, level;
     double row_part, column_part, level_part;
-} nb_spot;
+} nb_sky_view_sample;
 
 /* Four neighbours of one level, and their weights. */
-typedef struct nb_corners {
+typedef struct nb_sky_view_corners {
     const float *entries[4];
     float weights[4];
-} nb_corners;
+} nb_sky_view_corners;
 
-static inline nb_corners corners_of(const nb_look_table *table, const nb_spot *spot, size_t level, double weight)
+static inline nb_sky_view_corners corners_of(const nb_sky_view_table *table, const nb_sky_view_sample *spot,
+                                             size_t level, double weight)
 {
     const size_t next = (size_t)table->size * ((size_t)table->levels + 1), below = next * (size_t)table->columns;
     const float *entry = table->entries + spot->row * below + spot->column * next + level * (size_t)table->size;
     const double upper = weight * (1 - spot->row_part), lower = weight * spot->row_part;
-    return (nb_corners){{entry, entry + next, entry + below, entry + below + next},
-                        {(float)(upper * (1 - spot->column_part)), (float)(upper * spot->column_part),
-                         (float)(lower * (1 - spot->column_part)), (float)(lower * spot->column_part)}};
+    return (nb_sky_view_corners){{entry, entry + next, entry + below, entry + below + next},
+                                 {(float)(upper * (1 - spot->column_part)), (float)(upper * spot->column_part),
+                                  (float)(lower * (1 - spot->column_part)), (float)(lower * spot->column_part)}};
 }
 
-static inline four mix(const nb_corners *corners, int i)
+static inline four mix(const nb_sky_view_corners *corners, int i)
 {
     four sum = corners->weights[0] * load_four(corners->entries[0] + i);
     for (int k = 1; k < 4; k++) sum += corners->weights[k] * load_four(corners->entries[k] + i);
@@ -238,18 +239,19 @@ static inline void store_mean(four mean, int i, int lane, nb_read *read)
     for (int j = 0; j < 4; j++) read->mean[i + j][lane] = mean[j];
 }
 
-static inline void read_light(const nb_look_table *table, const nb_spot *spot, int lane, nb_read *read)
+static inline void read_light(const nb_sky_view_table *table, const nb_sky_view_sample *spot, int lane, nb_read *read)
 {
-    const nb_corners far = corners_of(table, spot, spot->level + 1, spot->level_part);
+    const nb_sky_view_corners far = corners_of(table, spot, spot->level + 1, spot->level_part);
     if (spot->level_part == 1) {
         for (int i = 0; i < table->size; i += 4) store_mean(mix(&far, i), i, lane, read);
         return;
     }
-    const nb_corners near = corners_of(table, spot, spot->level, 1 - spot->level_part);
+    const nb_sky_view_corners near = corners_of(table, spot, spot->level, 1 - spot->level_part);
     for (int i = 0; i < table->size; i += 4) store_mean(mix(&near, i) + mix(&far, i), i, lane, read);
 }
 
-static inline void read_extinction(const nb_look_table *table, const nb_spot *spot, int lane, nb_read *read)
+static inline void read_extinction(const nb_sky_view_table *table, const nb_sky_view_sample *spot, int lane,
+                                   nb_read *read)
 {
     const double(*near)[4] = &table->extinction[spot->row * ((size_t)table->levels + 1) + spot->level];
     const double(*below)[4] = near + table->levels + 1, row = spot->row_part, level = spot->level_part;
@@ -260,7 +262,7 @@ static inline void read_extinction(const nb_look_table *table, const nb_spot *sp
     }
 }
 
-static inline void read_table(const nb_look_table *table, const nb_looks *looks, nb_read *read)
+static inline void read_table(const nb_sky_view_table *table, const nb_sky_view_lookups *looks, nb_read *read)
 {
     double row[NB_WIDTH], column[NB_WIDTH], level[NB_WIDTH], parts[3][NB_WIDTH];
     nb_store_lanes(row, looks->row);
@@ -270,8 +272,8 @@ static inline void read_table(const nb_look_table *table, const nb_looks *looks,
     nb_store_lanes(parts[1], looks->column_part);
     nb_store_lanes(parts[2], looks->level_part);
     for (int i = 0; i < NB_WIDTH; i++) {
-        const nb_spot spot = {(size_t)row[i], (size_t)column[i], (size_t)level[i],
-                              parts[0][i],    parts[1][i],       parts[2][i]};
+        const nb_sky_view_sample spot = {(size_t)row[i], (size_t)column[i], (size_t)level[i],
+                                         parts[0][i],    parts[1][i],       parts[2][i]};
         read_light(table, &spot, i, read);
         read_extinction(table, &spot, i, read);
     }
@@ -292,7 +294,8 @@ static inline nb_real phase_at(const nb_phase *phase, nb_real cosine)
 }
 
 /* Light of three colours; returns what may be wrong with it. */
-static inline nb_real light_of(const nb_look_table *table, const nb_looks *looks, const nb_read *read, nb_real light[3])
+static inline nb_real light_of(const nb_sky_view_table *table, const nb_sky_view_lookups *looks, const nb_read *read,
+                               nb_real light[3])
 {
     const int often = 3 * table->scatterer_count;
     nb_real once[3], error = NB_F(0.0), most = NB_F(0.0);
@@ -311,12 +314,12 @@ static inline nb_real light_of(const nb_look_table *table, const nb_looks *looks
            nb_splat(table->least_off);
 }
 
-static void look_along(const nb_look_job *job)
+static void look_along(const nb_sky_view_job *job)
 {
     const nebel_transfer_planes *transfers = &job->transfers;
     for (size_t first = 0; first < job->count; first += NB_WIDTH) {
-        const nb_part part = part_from(job, first);
-        const nb_looks looks = looks_along(job, part);
+        const nb_sky_view_part part = part_from(job, first);
+        const nb_sky_view_lookups looks = looks_along(job, part);
         const nb_mask has_air = looks.along > NB_F(0.0);
         nb_read read;
         nb_real light[3];
@@ -337,7 +340,7 @@ static void look_along(const nb_look_job *job)
 /* ---- the ground ------------------------------------------------------------------------------ */
 
 /* What air leaves of the sun on the ground. */
-static inline void sunlight_at(const nb_look_table *table, nb_real cosine, nb_real light[3])
+static inline void sunlight_at(const nb_sky_view_table *table, nb_real cosine, nb_real light[3])
 {
     nb_real between;
     const nb_real place = nb_sqrt(nb_max(NB_F(0.0), cosine)) * nb_splat(table->suns - 1);
@@ -349,9 +352,9 @@ static inline void sunlight_at(const nb_look_table *table, nb_real cosine, nb_re
     }
 }
 
-static inline void skylight_at(const nb_look_table *table, nb_real cosine, nb_real light[3])
+static inline void skylight_at(const nb_sky_view_table *table, nb_real cosine, nb_real light[3])
 {
-    const nb_between s = nb_between_suns(table->scatter, cosine);
+    const nb_moment_interval s = nb_between_suns(table->scatter, cosine);
     for (int c = 0; c < 3; c++) {
         const double *from = &table->scatter->ground[0][c];
         const nb_real a = nb_pick(from, s.first * NB_F(3.0)), b = nb_pick(from + 3, s.first * NB_F(3.0));
@@ -360,7 +363,7 @@ static inline void skylight_at(const nb_look_table *table, nb_real cosine, nb_re
 }
 
 /* Rays that meet no ground leave what is there. */
-static inline void store_hits(nb_part part, nb_mask hits, nb_real x, float *to)
+static inline void store_hits(nb_sky_view_part part, nb_mask hits, nb_real x, float *to)
 {
     double lanes[NB_WIDTH];
     if (to == NULL) return;
@@ -377,9 +380,10 @@ static inline nb_real way_down(const nb_outlook *outlook, const nb_bearings *b, 
     return nb_select(down, reach.begin + reach.span, nb_splat(HUGE_VAL));
 }
 
-static void store_ground(const nb_look_job *job, nb_part part, const nb_bearings *b, nb_mask down, nb_real way)
+static void store_ground(const nb_sky_view_job *job, nb_sky_view_part part, const nb_bearings *b, nb_mask down,
+                         nb_real way)
 {
-    const nb_look_table *table = job->table;
+    const nb_sky_view_table *table = job->table;
     const nebel_ground_planes *planes = &job->ground;
     const nb_real per = nb_splat(1 / table->ground), r = nb_splat(table->radius);
     const nb_real up = (r + way * b->up) * per, ahead = way * b->ahead * per, aside = way * b->aside * per;
@@ -398,11 +402,11 @@ static void store_ground(const nb_look_job *job, nb_part part, const nb_bearings
     }
 }
 
-static void look_down(const nb_look_job *job)
+static void look_down(const nb_sky_view_job *job)
 {
     const nb_outlook outlook = outlook_of(job->table);
     for (size_t first = 0; first < job->count; first += NB_WIDTH) {
-        const nb_part part = part_from(job, first);
+        const nb_sky_view_part part = part_from(job, first);
         const nb_bearings b = bearings_of(job, part);
         const nb_mask down = nb_and(b.is_direction, falls(&outlook, &b));
         const nb_real way = way_down(&outlook, &b, down);
@@ -411,4 +415,4 @@ static void look_down(const nb_look_job *job)
     }
 }
 
-const nb_look_kernel NB_SUFFIXED(nb_look_kernel_) = {look_along, look_down};
+const nb_sky_view_kernel NB_SUFFIXED(nb_look_kernel_) = {look_along, look_down};

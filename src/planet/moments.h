@@ -12,25 +12,26 @@
 /* ---- places in the table --------------------------------------------------------------------- */
 
 /* Places among entries 0 to count - 1. */
-typedef struct nb_between {
+typedef struct nb_moment_interval {
     nb_real first, part;
-} nb_between;
+} nb_moment_interval;
 
-NB_MOMENTS_INLINE nb_between nb_between_of(nb_real place, int count)
+NB_MOMENTS_INLINE nb_moment_interval nb_between_of(nb_real place, int count)
 {
     const nb_real bounded = nb_max(NB_F(0.0), nb_min(place, nb_splat(count - 1)));
     const nb_real first = nb_min(nb_floor(bounded), nb_splat(count - 2));
-    return (nb_between){first, bounded - first};
+    return (nb_moment_interval){first, bounded - first};
 }
 
-NB_MOMENTS_INLINE nb_between nb_between_heights(const nb_scatter *scatter, const nb_airs *airs, nb_real radius)
+NB_MOMENTS_INLINE nb_moment_interval nb_between_heights(const nb_scattering_table *scatter,
+                                                        const nb_air_components *airs, nb_real radius)
 {
     const double per = 1 / (airs->top - airs->radius);
     const nb_real part = nb_sqrt(nb_max(NB_F(0.0), (radius - nb_splat(airs->radius)) * nb_splat(per)));
     return nb_between_of(part * nb_splat(scatter->heights - 1), scatter->heights);
 }
 
-NB_MOMENTS_INLINE nb_between nb_between_suns(const nb_scatter *scatter, nb_real sun)
+NB_MOMENTS_INLINE nb_moment_interval nb_between_suns(const nb_scattering_table *scatter, nb_real sun)
 {
     const double per = 1 / scatter->sun_scale, times = (scatter->suns - 1) / (scatter->last_sun - scatter->first_sun);
     const nb_real left = nb_sqrt(nb_max(NB_F(0.0), NB_F(1.0) - nb_abs(sun)));
@@ -40,23 +41,24 @@ NB_MOMENTS_INLINE nb_between nb_between_suns(const nb_scatter *scatter, nb_real 
 }
 
 /* Four neighbours in the table. */
-typedef struct nb_spots {
-    const nb_scatter *scatter;
-    nb_between heights, suns;
+typedef struct nb_moment_samples {
+    const nb_scattering_table *scatter;
+    nb_moment_interval heights, suns;
     nb_real index; /* of the first, in numbers */
-} nb_spots;
+} nb_moment_samples;
 
-NB_MOMENTS_INLINE nb_spots nb_spots_of(const nb_scatter *scatter, const nb_airs *airs, nb_real radius, nb_real sun)
+NB_MOMENTS_INLINE nb_moment_samples nb_spots_of(const nb_scattering_table *scatter, const nb_air_components *airs,
+                                                nb_real radius, nb_real sun)
 {
-    nb_spots spots = {.scatter = scatter,
-                      .heights = nb_between_heights(scatter, airs, radius),
-                      .suns = nb_between_suns(scatter, sun)};
+    nb_moment_samples spots = {.scatter = scatter,
+                               .heights = nb_between_heights(scatter, airs, radius),
+                               .suns = nb_between_suns(scatter, sun)};
     spots.index = (spots.heights.first * nb_splat(scatter->suns) + spots.suns.first) * NB_F(3.0 * NB_FIELD);
     return spots;
 }
 
 /* As the table has it: the logarithm of the first moment, and others as parts of it. */
-NB_MOMENTS_INLINE nb_real nb_moment_at(const nb_spots *spots, int moment, int c)
+NB_MOMENTS_INLINE nb_real nb_moment_at(const nb_moment_samples *spots, int moment, int c)
 {
     const double *low = &spots->scatter->fields->moments[moment][c];
     const double *high = low + (size_t)(3 * NB_FIELD * spots->scatter->suns);
@@ -69,9 +71,9 @@ NB_MOMENTS_INLINE nb_real nb_moment_at(const nb_spots *spots, int moment, int c)
 /* ---- directions ------------------------------------------------------------------------------ */
 
 /* Aspects in lanes. */
-typedef struct nb_aspects {
+typedef struct nb_moment_basis_lanes {
     nb_real zenith, sun, height_of_sun;
-} nb_aspects;
+} nb_moment_basis_lanes;
 
 /* Spherical harmonics of a direction x, y, z that are even in y, as polynomials: those of one order follow each other. The
  * squares of those of one order integrate to 4 pi / (2 order + 1), and the sum of their products for two directions is
@@ -114,7 +116,7 @@ NB_MOMENTS_INLINE void nb_basis(int orders, nb_real x, nb_real level2, nb_real z
 
 /* In a frame with z towards the sun and x towards the zenith, in which light changes little with the sun's height. Where the sun is in
  * the zenith all sides are alike: what tells them apart is 0. */
-NB_MOMENTS_INLINE void nb_basis_of(int orders, nb_aspects aspect, nb_real values[NB_FIELD])
+NB_MOMENTS_INLINE void nb_basis_of(int orders, nb_moment_basis_lanes aspect, nb_real values[NB_FIELD])
 {
     const nb_real side2 = NB_F(1.0) - aspect.height_of_sun * aspect.height_of_sun;
     const nb_mask has_sides = side2 > NB_F(1e-12);

@@ -17,12 +17,12 @@
 /* Of a colour, for two rounds' gains: the mean of their product over all entries, in parts of the light there. */
 typedef double nb_products[NB_MOST_ROUNDS][NB_MOST_ROUNDS];
 
-static double gain(const nb_scatter tables[], int round, size_t entry, int c)
+static double gain(const nb_scattering_table tables[], int round, size_t entry, int c)
 {
     return tables[round + 1].fields[entry].moments[0][c] - tables[round].fields[entry].moments[0][c];
 }
 
-static void multiply(int count, const nb_scatter tables[], int c, nb_products products)
+static void multiply(int count, const nb_scattering_table tables[], int c, nb_products products)
 {
     double most = DBL_MIN;
     memset(products, 0, sizeof(nb_products));
@@ -80,9 +80,10 @@ static void mix(int count, const double numbers[], const double weights[], doubl
 }
 
 /* Where a mix has hardly any light the last round is better. */
-static void mix_field(int count, const nb_scatter tables[], size_t entry, int c, const double weights[], nb_field *all)
+static void mix_field(int count, const nb_scattering_table tables[], size_t entry, int c, const double weights[],
+                      nb_radiance_moments *all)
 {
-    const nb_field *last = &tables[count].fields[entry];
+    const nb_radiance_moments *last = &tables[count].fields[entry];
     double numbers[NB_MOST_ROUNDS];
     for (int m = 0; m < NB_FIELD; m++) {
         for (int i = 0; i < count; i++) numbers[i] = tables[i + 1].fields[entry].moments[m][c];
@@ -92,7 +93,8 @@ static void mix_field(int count, const nb_scatter tables[], size_t entry, int c,
         for (int m = 0; m < NB_FIELD; m++) all->moments[m][c] = last->moments[m][c];
 }
 
-static void mix_ground(int count, const nb_scatter tables[], int sun, int c, const double weights[], double *ground)
+static void mix_ground(int count, const nb_scattering_table tables[], int sun, int c, const double weights[],
+                       double *ground)
 {
     double numbers[NB_MOST_ROUNDS];
     for (int i = 0; i < count; i++) numbers[i] = tables[i + 1].ground[sun][c];
@@ -100,7 +102,7 @@ static void mix_ground(int count, const nb_scatter tables[], int sun, int c, con
     if (!(*ground > 0.5 * numbers[count - 1])) *ground = numbers[count - 1];
 }
 
-double nb_orders_extrapolate(int count, const nb_scatter tables[], double slowest[3], nb_scatter *all)
+double nb_orders_extrapolate(int count, const nb_scattering_table tables[], double slowest[3], nb_scattering_table *all)
 {
     double missing = 0;
     for (int c = 0; c < 3; c++) {

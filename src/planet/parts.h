@@ -4,12 +4,12 @@
 
 #include <nebel/planet.h>
 
-typedef struct nb_parts {
+typedef struct nb_parallel {
     nebel_parallel_for_fn run; /* NULL: one part after the other */
     void *user;
-} nb_parts;
+} nb_parallel;
 
-static inline void nb_parts_run(const nb_parts *parts, size_t count, void (*part)(void *data, size_t i), void *data)
+static inline void nb_parts_run(const nb_parallel *parts, size_t count, void (*part)(void *data, size_t i), void *data)
 {
     if (parts->run != NULL) {
         parts->run(count, part, data, parts->user);

@@ -9,13 +9,13 @@
 
 enum { MOST_ENDS = 2 * NB_MOST_SHELLS + 3 + NB_PATH_CUTS };
 
-typedef struct nb_ends {
+typedef struct nb_quadrature_ends {
     int count;
     double at[MOST_ENDS];
-} nb_ends;
+} nb_quadrature_ends;
 
 /* Keeps the ends in order. */
-static void add_end(nb_ends *ends, double length, double s)
+static void add_end(nb_quadrature_ends *ends, double length, double s)
 {
     if (!(s > 0 && s < length)) return;
     int i = ends->count++;
@@ -23,8 +23,8 @@ static void add_end(nb_ends *ends, double length, double s)
     ends->at[i] = s;
 }
 
-static void find_ends(const nb_airs *airs, nb_track track, double length, int cut_count, const double cuts[],
-                      nb_ends *ends)
+static void find_ends(const nb_air_components *airs, nb_atmosphere_ray track, double length, int cut_count,
+                      const double cuts[], nb_quadrature_ends *ends)
 {
     ends->count = 0;
     ends->at[ends->count++] = 0;
@@ -37,7 +37,8 @@ static void find_ends(const nb_airs *airs, nb_track track, double length, int cu
     ends->at[ends->count++] = length;
 }
 
-static void set_node(const nb_airs *airs, nb_track track, double s, double weight, nb_path *path, int i)
+static void set_node(const nb_air_components *airs, nb_atmosphere_ray track, double s, double weight,
+                     nb_ray_nodes *path, int i)
 {
     path->s[i] = s;
     path->radius[i] = nb_track_ahead(track, s).radius;
@@ -48,8 +49,8 @@ static void set_node(const nb_airs *airs, nb_track track, double s, double weigh
 
 /* What a path leads through, and the rule for its pieces. */
 typedef struct nb_medium {
-    const nb_airs *airs, *smooth;
-    const nb_rule *rule;
+    const nb_air_components *airs, *smooth;
+    const nb_gauss_rule *rule;
 } nb_medium;
 
 /* Optical depth from the start of a ray, of all air and of smooth air. */
@@ -57,7 +58,7 @@ typedef struct nb_depths {
     double all[3], smooth[3];
 } nb_depths;
 
-static double extinction_at(const nb_airs *airs, const nb_path *path, int i, int c)
+static double extinction_at(const nb_air_components *airs, const nb_ray_nodes *path, int i, int c)
 {
     double sum = 0;
     for (int k = 0; k < airs->count; k++) sum += path->density[k][i] * airs->airs[k].extinction[c];
@@ -65,8 +66,8 @@ static double extinction_at(const nb_airs *airs, const nb_path *path, int i, int
 }
 
 /* Sets the transmittance up to each node of a piece. `depth` is the optical depth up to the piece, and becomes that up to its end. */
-static void lose_light(const nb_airs *airs, const nb_rule *rule, double half, const nb_path *path, int c, double *depth,
-                       double left[])
+static void lose_light(const nb_air_components *airs, const nb_gauss_rule *rule, double half, const nb_ray_nodes *path,
+                       int c, double *depth, double left[])
 {
     double extinction[NB_RULE_MOST], whole = 0;
     for (int i = 0; i < rule->count; i++) extinction[i] = extinction_at(airs, path, path->count + i, c);
@@ -80,9 +81,10 @@ static void lose_light(const nb_airs *airs, const nb_rule *rule, double half, co
 }
 
 /* Adds the nodes from a to b; `depth` is that of the ray up to a, and becomes that up to b. */
-static void lay_piece(const nb_medium *medium, nb_track track, double a, double b, nb_depths *depth, nb_path *path)
+static void lay_piece(const nb_medium *medium, nb_atmosphere_ray track, double a, double b, nb_depths *depth,
+                      nb_ray_nodes *path)
 {
-    const nb_rule *rule = medium->rule;
+    const nb_gauss_rule *rule = medium->rule;
     const double half = 0.5 * (b - a);
     for (int i = 0; i < rule->count; i++)
         set_node(medium->airs, track, a + half * (1 + rule->nodes[i]), half * rule->weights[i], path, path->count + i);
@@ -93,7 +95,7 @@ static void lay_piece(const nb_medium *medium, nb_track track, double a, double 
     path->count += rule->count;
 }
 
-static void note_end(double s, const nb_depths *depth, nb_path *path)
+static void note_end(double s, const nb_depths *depth, nb_ray_nodes *path)
 {
     const int i = path->ends++;
     path->end[i] = s;
@@ -123,8 +125,8 @@ static int is_dark(const double depth[3])
 }
 
 /* Adds the nodes from a to b in pieces that are not too deep, as long as there are halvings left. */
-static void lay_pieces(const nb_medium *medium, nb_track track, double a, double b, int *halvings, nb_depths *depth,
-                       nb_path *path)
+static void lay_pieces(const nb_medium *medium, nb_atmosphere_ray track, double a, double b, int *halvings,
+                       nb_depths *depth, nb_ray_nodes *path)
 {
     const int first = path->count;
     nb_depths behind = *depth;
@@ -140,7 +142,7 @@ static void lay_pieces(const nb_medium *medium, nb_track track, double a, double
     if (medium->smooth != NULL) note_end(b, depth, path);
 }
 
-static void add_start(const nb_airs *airs, nb_track track, nb_path *path)
+static void add_start(const nb_air_components *airs, nb_atmosphere_ray track, nb_ray_nodes *path)
 {
     int i = path->count;
     do {
@@ -149,11 +151,11 @@ static void add_start(const nb_airs *airs, nb_track track, nb_path *path)
     } while (++i % NB_PATH_LANES > 0);
 }
 
-void nb_path_lay(const nb_airs *airs, const nb_airs *smooth, const nb_rule *rule, nb_track track, double length,
-                 int cut_count, const double cuts[], nb_path *path)
+void nb_path_lay(const nb_air_components *airs, const nb_air_components *smooth, const nb_gauss_rule *rule,
+                 nb_atmosphere_ray track, double length, int cut_count, const double cuts[], nb_ray_nodes *path)
 {
     const nb_medium medium = {airs, smooth, rule};
-    nb_ends ends;
+    nb_quadrature_ends ends;
     nb_depths depth = {.all = {0}};
     int halvings = NB_PATH_HALVINGS;
     path->count = path->ends = 0;

@@ -15,7 +15,7 @@ enum {
 
 /* Nodes in arrays, for kernels that take several at once. Behind the last one is another at the start of the ray, of weight
  * 1, and copies of that up to a multiple of NB_PATH_LANES. */
-typedef struct nb_path {
+typedef struct nb_ray_nodes {
     int count;
     double s[NB_PATH_MOST];                /* m from the start */
     double radius[NB_PATH_MOST];           /* m from the planet's centre */
@@ -27,11 +27,11 @@ typedef struct nb_path {
     /* Where there is smooth air: the ends of pieces, cuts among them, and transmittance up to there, of all air and of smooth air. */
     int ends;
     double end[NB_PATH_PIECES], end_left[3][NB_PATH_PIECES], end_smooth[3][NB_PATH_PIECES];
-} nb_path;
+} nb_ray_nodes;
 
 /* The ray must stay within the air for `length`. It is cut where it is lowest, where it passes shells of air, and at
  * `cuts`, at most NB_PATH_CUTS places in any order; those outside the ray do not count. smooth: nb_airs_smooth of the airs, or NULL. */
-void nb_path_lay(const nb_airs *airs, const nb_airs *smooth, const nb_rule *rule, nb_track track, double length,
-                 int cut_count, const double cuts[], nb_path *path);
+void nb_path_lay(const nb_air_components *airs, const nb_air_components *smooth, const nb_gauss_rule *rule,
+                 nb_atmosphere_ray track, double length, int cut_count, const double cuts[], nb_ray_nodes *path);
 
 #endif

@@ -21,7 +21,7 @@ double nb_peak_rest(double g, int orders, double cosine)
     return power > 1e-9 ? sum / power : 0;
 }
 
-double nb_peak_ratio(const nb_air *air, int orders)
+double nb_peak_ratio(const nb_air_component *air, int orders)
 {
     const double last = air->moments[orders - 1], next = air->moments[orders];
     return fabs(last) > fabs(next) ? next / last : 0;
@@ -30,7 +30,7 @@ double nb_peak_ratio(const nb_air *air, int orders)
 /* The smooth part of a phase function, and its peak after several scatterings: moments of 1 up to the orders that are kept, behind
  * which they fall, with each scattering by as much again. Small angles add up: moments of phase functions are multiplied (Wang and
  * Guth, Physical Review 84, 1951). */
-static void aim_air(const nb_air *air, int orders, double cosine, nb_peaks *peaks, int k)
+static void aim_air(const nb_air_component *air, int orders, double cosine, nb_peaks *peaks, int k)
 {
     const double peak = air->peak, ratio = nb_peak_ratio(air, orders);
     double low = 0, kept = 0, p = 1, before = 0, power = ratio, share = 1;

@@ -29,7 +29,7 @@ typedef struct nb_peaks {
 double nb_peak_rest(double g, int orders, double cosine);
 
 /* The ratio of the first moment that is not kept to the last one that is; 0 unless it is smaller. */
-double nb_peak_ratio(const nb_air *air, int orders);
+double nb_peak_ratio(const nb_air_component *air, int orders);
 
 /* All 0 where there is no smooth air. */
 nb_peaks nb_peaks_aim(const nb_gather_job *job);

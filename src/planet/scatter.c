@@ -18,14 +18,14 @@
 /* ---- looking up ------------------------------------------------------------------------------ */
 
 /* Entries are denser near the ground, and where the sun is near the horizon. */
-static double height_at(const nb_scatter *scatter, const nb_airs *airs, int i)
+static double height_at(const nb_scattering_table *scatter, const nb_air_components *airs, int i)
 {
     const double part = (double)i / (scatter->heights - 1);
     return (airs->top - airs->radius) * part * part;
 }
 
 /* The sine of the angle at which the horizon lies, seen from the top of the air. */
-static double dip(const nb_airs *airs)
+static double dip(const nb_air_components *airs)
 {
     const double ratio = airs->radius / airs->top;
     return sqrt((1 - ratio) * (1 + ratio));
@@ -37,7 +37,7 @@ static double spread(double sun, double scale)
     return copysign(log(1 + 2 * fabs(sun) / (1 + sqrt(fmax(0, 1 - fabs(sun)))) / scale), sun);
 }
 
-static double sun_at(const nb_scatter *scatter, int i)
+static double sun_at(const nb_scattering_table *scatter, int i)
 {
     const double part = (double)i / (scatter->suns - 1);
     const double place = scatter->first_sun + part * (scatter->last_sun - scatter->first_sun);
@@ -45,10 +45,11 @@ static double sun_at(const nb_scatter *scatter, int i)
     return copysign(1 - left * left, place);
 }
 
-nb_field nb_scatter_look_up(const nb_scatter *scatter, const nb_airs *airs, double radius, double sun)
+nb_radiance_moments nb_scatter_look_up(const nb_scattering_table *scatter, const nb_air_components *airs, double radius,
+                                       double sun)
 {
-    const nb_spots spots = nb_spots_of(scatter, airs, radius, sun);
-    nb_field field;
+    const nb_moment_samples spots = nb_spots_of(scatter, airs, radius, sun);
+    nb_radiance_moments field;
     for (int c = 0; c < 3; c++) {
         const double all = nb_exp(nb_moment_at(&spots, 0, c));
         for (int m = 0; m < scatter->orders * (scatter->orders + 1) / 2; m++)
@@ -57,9 +58,9 @@ nb_field nb_scatter_look_up(const nb_scatter *scatter, const nb_airs *airs, doub
     return field;
 }
 
-void nb_scatter_look_up_ground(const nb_scatter *scatter, double sun, double irradiance[3])
+void nb_scatter_look_up_ground(const nb_scattering_table *scatter, double sun, double irradiance[3])
 {
-    const nb_between s = nb_between_suns(scatter, sun);
+    const nb_moment_interval s = nb_between_suns(scatter, sun);
     const double *a = scatter->ground[(int)s.first], *b = a + 3;
     for (int c = 0; c < 3; c++) irradiance[c] = nb_exp(a[c] + s.part * (b[c] - a[c]));
 }
@@ -97,10 +98,10 @@ static void refine(int count, const double from[], double *to, size_t stride)
 }
 
 /* Of one height and colour: logarithms of the first moment, and parts of it. */
-static void seal_row(const nb_scatter *table, int height, int c, nb_scatter *sealed)
+static void seal_row(const nb_scattering_table *table, int height, int c, nb_scattering_table *sealed)
 {
-    const nb_field *fields = table->fields + height * table->suns;
-    nb_field *to = sealed->fields + height * sealed->suns;
+    const nb_radiance_moments *fields = table->fields + height * table->suns;
+    nb_radiance_moments *to = sealed->fields + height * sealed->suns;
     double numbers[MOST_SUNS];
     for (int m = 0; m < table->orders * (table->orders + 1) / 2; m++) {
         for (int i = 0; i < table->suns; i++) {
@@ -112,7 +113,7 @@ static void seal_row(const nb_scatter *table, int height, int c, nb_scatter *sea
 }
 
 /* Makes a table of moments one that can be looked up. */
-static void seal(const nb_scatter *table, nb_scatter *sealed)
+static void seal(const nb_scattering_table *table, nb_scattering_table *sealed)
 {
     double numbers[MOST_SUNS];
     for (int c = 0; c < 3; c++) {
@@ -123,7 +124,7 @@ static void seal(const nb_scatter *table, nb_scatter *sealed)
 }
 
 /* The table of no air, which can be looked up. */
-static void darken(nb_scatter *sealed)
+static void darken(nb_scattering_table *sealed)
 {
     for (int c = 0; c < 3; c++) {
         for (size_t i = 0; i < nb_scatter_entries(sealed); i++) sealed->fields[i].moments[0][c] = to_power(0);
@@ -142,40 +143,40 @@ enum { MOST_HEIGHTS = 48, MOST_ROUNDS = 32, FEW_ROUNDS = 16 };
 /* Light changes with the slope, near the horizon, far more than with the turn, so that turns are as few as moments bear.
  * Numbers of a quality: entries of the table, directions up and down and around, nodes of a piece of a
  * ray, how often light is scattered before what follows is guessed, and by how many moments it is kept; what part of it may be missing. */
-typedef struct nb_effort {
+typedef struct nb_table_resolution {
     int heights, suns, slopes, turns, nodes, orders, moments;
     double most_missing;
-} nb_effort;
+} nb_table_resolution;
 
-static const nb_effort efforts[NEBEL_ATMOSPHERE_QUALITY_COUNT] = {
+static const nb_table_resolution efforts[NEBEL_ATMOSPHERE_QUALITY_COUNT] = {
     [NEBEL_ATMOSPHERE_FAST] = {12, 32, 8, 3, 3, 4, NB_FEW_MOMENTS, 1e-2},
     [NEBEL_ATMOSPHERE_PRECISE] = {20, 40, 8, 5, 4, 5, NB_MOMENTS, 2e-3},
 };
 
-typedef struct nb_maker {
-    const nb_airs *airs;
-    nb_scatter *sealed; /* of the light to be scattered; in the end of all */
-    nb_scatter *next;
+typedef struct nb_table_builder {
+    const nb_air_components *airs;
+    nb_scattering_table *sealed; /* of the light to be scattered; in the end of all */
+    nb_scattering_table *next;
     const double *albedo;
-    const nb_effort *effort;
-    nb_rule slopes, nodes;
+    const nb_table_resolution *effort;
+    nb_gauss_rule slopes, nodes;
     double turn_cosines[MOST_TURNS];
     int first; /* the light to be scattered is the sun's */
     nb_gather_fn *gather;
-} nb_maker;
+} nb_table_builder;
 
 /* What is shared by all that comes to one height from directions of one slope. */
-typedef struct nb_fan {
-    const nb_maker *maker;
-    nb_track track;
+typedef struct nb_direction_fan {
+    const nb_table_builder *maker;
+    nb_atmosphere_ray track;
     double end;
     int hits_ground;
-    nb_path path;
-} nb_fan;
+    nb_ray_nodes path;
+} nb_direction_fan;
 
 /* Of sunlight the field is Legendre's polynomials of one angle, which is the same along the whole ray: what a kind of
  * air gives of it, as its phase function up to the orders that are kept. */
-static void phases_of(const nb_airs *airs, int orders, double sun, double phases[])
+static void phases_of(const nb_air_components *airs, int orders, double sun, double phases[])
 {
     for (int k = 0; k < airs->count; k++) {
         double p = 1, before = 0, sum = 0;
@@ -190,10 +191,10 @@ static void phases_of(const nb_airs *airs, int orders, double sun, double phases
 }
 
 /* Adds sunlight from `count` nodes, the first of which is `first` of the path. */
-static void add_sunlight(const nb_fan *fan, const double phases[], const nb_node_light *nodes, int first, int count,
-                         double light[3])
+static void add_sunlight(const nb_direction_fan *fan, const double phases[], const nb_node_light *nodes, int first,
+                         int count, double light[3])
 {
-    const nb_airs *airs = fan->maker->airs;
+    const nb_air_components *airs = fan->maker->airs;
     for (int c = 0; c < 3; c++)
         for (int i = 0; i < count; i++) {
             double scattered = 0;
@@ -209,9 +210,9 @@ static void add_last(const nb_node_light *nodes, int count, double light[3])
         for (int c = 0; c < 3; c++) light[c] += nodes->often[c][i];
 }
 
-static void gather_air(const nb_fan *fan, nb_aspect aspect, double light[3])
+static void gather_air(const nb_direction_fan *fan, nb_moment_basis aspect, double light[3])
 {
-    const nb_maker *maker = fan->maker;
+    const nb_table_builder *maker = fan->maker;
     nb_gather_job job = {.airs = maker->airs,
                          .scatter = maker->first ? NULL : maker->sealed,
                          .wants_sun = maker->first,
@@ -232,14 +233,14 @@ static void gather_air(const nb_fan *fan, nb_aspect aspect, double light[3])
     }
 }
 
-static void gather_ground(const nb_fan *fan, nb_aspect aspect, double light[3])
+static void gather_ground(const nb_direction_fan *fan, nb_moment_basis aspect, double light[3])
 {
-    const nb_maker *maker = fan->maker;
-    const nb_airs *airs = maker->airs;
+    const nb_table_builder *maker = fan->maker;
+    const nb_air_components *airs = maker->airs;
     const double sun = (fan->track.radius * aspect.height_of_sun + fan->end * aspect.sun) / airs->radius;
     double irradiance[3];
     if (maker->first) {
-        nb_track_sunlight(airs, (nb_track){airs->radius, airs->radius * sun}, irradiance);
+        nb_track_sunlight(airs, (nb_atmosphere_ray){airs->radius, airs->radius * sun}, irradiance);
         for (int c = 0; c < 3; c++) irradiance[c] *= fmax(0, sun);
     } else {
         nb_scatter_look_up_ground(maker->sealed, sun, irradiance);
@@ -248,7 +249,7 @@ static void gather_ground(const nb_fan *fan, nb_aspect aspect, double light[3])
 }
 
 /* What arrives at a place from one direction, of light scattered once more. */
-static void gather(const nb_fan *fan, nb_aspect aspect, double light[3])
+static void gather(const nb_direction_fan *fan, nb_moment_basis aspect, double light[3])
 {
     for (int c = 0; c < 3; c++) light[c] = 0;
     gather_air(fan, aspect, light);
@@ -256,14 +257,14 @@ static void gather(const nb_fan *fan, nb_aspect aspect, double light[3])
 }
 
 /* Adds what comes to all entries of one height from directions of one slope. */
-static void add_slope(const nb_maker *maker, int height, double zenith, double weight)
+static void add_slope(const nb_table_builder *maker, int height, double zenith, double weight)
 {
-    const nb_airs *airs = maker->airs;
-    const nb_effort *effort = maker->effort;
+    const nb_air_components *airs = maker->airs;
+    const nb_table_resolution *effort = maker->effort;
     const double radius = airs->radius + height_at(maker->next, airs, height);
-    nb_fan fan;
+    nb_direction_fan fan;
     fan.maker = maker;
-    fan.track = (nb_track){radius, radius * zenith};
+    fan.track = (nb_atmosphere_ray){radius, radius * zenith};
     const double ground = nb_track_enter(fan.track, airs->radius), level = sqrt(fmax(0, 1 - zenith * zenith));
     fan.hits_ground = ground < HUGE_VAL;
     fan.end = fan.hits_ground ? ground : nb_track_leave(fan.track, airs->top);
@@ -272,7 +273,7 @@ static void add_slope(const nb_maker *maker, int height, double zenith, double w
         const double sun = sun_at(maker->next, i), side = sqrt(fmax(0, 1 - sun * sun));
         for (int k = 0; k < effort->turns; k++) {
             const double x = level * maker->turn_cosines[k];
-            const nb_aspect aspect = {zenith, x * side + zenith * sun, sun};
+            const nb_moment_basis aspect = {zenith, x * side + zenith * sun, sun};
             double light[3];
             gather(&fan, aspect, light);
             for (int c = 0; c < 3; c++) light[c] *= weight * 2 * PI / effort->turns;
@@ -286,8 +287,8 @@ static void add_slope(const nb_maker *maker, int height, double zenith, double w
 /* All entries of one height. From both sides of the horizon directions are denser near it, where light changes most. */
 static void add_height(void *data, size_t height)
 {
-    const nb_maker *maker = data;
-    const nb_airs *airs = maker->airs;
+    const nb_table_builder *maker = data;
+    const nb_air_components *airs = maker->airs;
     const double ratio = airs->radius / (airs->radius + height_at(maker->next, airs, (int)height));
     const double horizon = -sqrt(fmax(0, 1 - ratio * ratio));
     for (int k = 0; k < maker->slopes.count; k++) {
@@ -298,20 +299,20 @@ static void add_height(void *data, size_t height)
 }
 
 /* Of all air straight up, of the colour of which it is the most. */
-static double deepest(const nb_airs *airs)
+static double deepest(const nb_air_components *airs)
 {
     double depth[3] = {0, 0, 0};
-    nb_track_depth(airs, (nb_track){airs->radius, airs->radius}, airs->top - airs->radius, depth);
+    nb_track_depth(airs, (nb_atmosphere_ray){airs->radius, airs->radius}, airs->top - airs->radius, depth);
     return fmax(depth[0], fmax(depth[1], depth[2]));
 }
 
 /* Light changes within an optical depth or two: deep air has more entries over its height. */
-static int count_heights(const nb_airs *airs, const nb_effort *effort)
+static int count_heights(const nb_air_components *airs, const nb_table_resolution *effort)
 {
     return (int)fmin(MOST_HEIGHTS, effort->heights * fmax(1, sqrt(2 * deepest(airs))));
 }
 
-static void extinction_at(const nb_airs *airs, double height, double extinction[3])
+static void extinction_at(const nb_air_components *airs, double height, double extinction[3])
 {
     for (int c = 0; c < 3; c++) {
         extinction[c] = 0;
@@ -324,13 +325,13 @@ static void extinction_at(const nb_airs *airs, double height, double extinction[
  * of the light may be missing. Of layers and thin air of a depth of 0.5 up to 40 % was (test_dense_air). */
 #define UNRESOLVED 1.2
 
-static double find_unresolved(const nb_airs *airs, const nb_scatter *scatter)
+static double find_unresolved(const nb_air_components *airs, const nb_scattering_table *scatter)
 {
     double off[3] = {0, 0, 0}, whole[3] = {0, 0, 0}, most = 0;
     for (int i = 1; i < scatter->heights; i++) {
         const double low = height_at(scatter, airs, i - 1), high = height_at(scatter, airs, i);
         double depth[3], ends[2][3];
-        nb_track_depth(airs, (nb_track){airs->radius + low, airs->radius + low}, high - low, depth);
+        nb_track_depth(airs, (nb_atmosphere_ray){airs->radius + low, airs->radius + low}, high - low, depth);
         extinction_at(airs, low, ends[0]);
         extinction_at(airs, high, ends[1]);
         for (int c = 0; c < 3; c++) {
@@ -342,16 +343,18 @@ static double find_unresolved(const nb_airs *airs, const nb_scatter *scatter)
     return UNRESOLVED * most;
 }
 
-static nb_scatter layout_of(const nb_airs *airs, const nb_effort *effort)
+static nb_scattering_table layout_of(const nb_air_components *airs, const nb_table_resolution *effort)
 {
-    nb_scatter scatter = {.heights = count_heights(airs, effort), .suns = effort->suns, .orders = effort->moments};
+    nb_scattering_table scatter = {
+        .heights = count_heights(airs, effort), .suns = effort->suns, .orders = effort->moments};
     scatter.sun_scale = 0.25 * dip(airs);
     scatter.first_sun = spread(-fmin(1, 2.5 * dip(airs)), scatter.sun_scale);
     scatter.last_sun = spread(1, scatter.sun_scale);
     return scatter;
 }
 
-static nebel_result allocate(const nebel_allocator *allocator, const nb_scatter *layout, nb_scatter *scatter)
+static nebel_result allocate(const nebel_allocator *allocator, const nb_scattering_table *layout,
+                             nb_scattering_table *scatter)
 {
     *scatter = *layout;
     scatter->fields = nb_allocate_zero(allocator, nb_scatter_entries(scatter), sizeof *scatter->fields);
@@ -359,19 +362,19 @@ static nebel_result allocate(const nebel_allocator *allocator, const nb_scatter 
     return scatter->fields != NULL && scatter->ground != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
 }
 
-void nb_scatter_free(const nebel_allocator *allocator, nb_scatter *scatter)
+void nb_scatter_free(const nebel_allocator *allocator, nb_scattering_table *scatter)
 {
     nb_release(allocator, scatter->fields);
     nb_release(allocator, scatter->ground);
 }
 
-static void copy(const nb_scatter *from, nb_scatter *to)
+static void copy(const nb_scattering_table *from, nb_scattering_table *to)
 {
     memcpy(to->fields, from->fields, nb_scatter_entries(from) * sizeof *from->fields);
     memcpy(to->ground, from->ground, (size_t)from->suns * sizeof *from->ground);
 }
 
-static void add(const nb_scatter *more, nb_scatter *sum)
+static void add(const nb_scattering_table *more, nb_scattering_table *sum)
 {
     for (size_t i = 0; i < nb_scatter_entries(sum); i++)
         for (int m = 0; m < NB_FIELD; m++)
@@ -380,7 +383,7 @@ static void add(const nb_scatter *more, nb_scatter *sum)
         for (int c = 0; c < 3; c++) sum->ground[i][c] += more->ground[i][c];
 }
 
-static void clear(nb_scatter *scatter)
+static void clear(nb_scattering_table *scatter)
 {
     memset(scatter->fields, 0, nb_scatter_entries(scatter) * sizeof *scatter->fields);
     memset(scatter->ground, 0, (size_t)scatter->suns * sizeof *scatter->ground);
@@ -389,13 +392,13 @@ static void clear(nb_scatter *scatter)
 /* ---- rounds ---------------------------------------------------------------------------------- */
 
 /* Tables of a cycle of rounds, one behind the other, the first of which is what it begins with. */
-typedef struct nb_rounds {
-    nb_scatter once, sum, tables[NB_MOST_ROUNDS + 1];
+typedef struct nb_scattering_rounds {
+    nb_scattering_table once, sum, tables[NB_MOST_ROUNDS + 1];
     double slowest[3]; /* by nb_orders_extrapolate */
-} nb_rounds;
+} nb_scattering_rounds;
 
 /* What air and ground make of sunlight, or of all light of the sealed table. */
-static void scatter_again(nb_maker *maker, const nb_parts *parts, int first, nb_scatter *made)
+static void scatter_again(nb_table_builder *maker, const nb_parallel *parts, int first, nb_scattering_table *made)
 {
     maker->first = first;
     maker->next = made;
@@ -404,13 +407,13 @@ static void scatter_again(nb_maker *maker, const nb_parts *parts, int first, nb_
 }
 
 /* Rounds from the first table on, until little may be missing or so many are done. Returns how many those are. */
-static int run_cycle(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds, int done)
+static int run_cycle(nb_table_builder *maker, const nb_parallel *parts, nb_scattering_rounds *rounds, int done)
 {
-    const nb_effort *effort = maker->effort;
-    nb_scatter *sum = &rounds->sum;
+    const nb_table_resolution *effort = maker->effort;
+    nb_scattering_table *sum = &rounds->sum;
     sum->missing = HUGE_VAL;
     for (int i = 0; i < NB_MOST_ROUNDS && sum->missing > effort->most_missing; i++, done++) {
-        nb_scatter *next = &rounds->tables[i + 1];
+        nb_scattering_table *next = &rounds->tables[i + 1];
         if (done > 0) {
             seal(&rounds->tables[i], maker->sealed);
             scatter_again(maker, parts, 0, next);
@@ -425,7 +428,7 @@ static int run_cycle(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds, 
 }
 
 /* Each cycle begins where the one before leads. */
-static void sum_orders(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds)
+static void sum_orders(nb_table_builder *maker, const nb_parallel *parts, nb_scattering_rounds *rounds)
 {
     const int most = deepest(maker->airs) > HOPELESS ? FEW_ROUNDS : MOST_ROUNDS;
     scatter_again(maker, parts, 1, &rounds->once);
@@ -439,11 +442,11 @@ static void sum_orders(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds
 }
 
 /* Light that peaks of phase functions turn was sunlight so far; on the ground it comes from the sky around the sun. */
-static void add_turned(const nb_airs *airs, const nb_airs *smooth, nb_scatter *scatter)
+static void add_turned(const nb_air_components *airs, const nb_air_components *smooth, nb_scattering_table *scatter)
 {
     for (int i = 0; i < scatter->suns; i++) {
         const double sun = sun_at(scatter, i);
-        const nb_track track = {airs->radius, airs->radius * sun};
+        const nb_atmosphere_ray track = {airs->radius, airs->radius * sun};
         double straight[3], ahead[3];
         nb_track_sunlight(airs, track, straight);
         nb_track_sunlight(smooth, track, ahead);
@@ -452,7 +455,8 @@ static void add_turned(const nb_airs *airs, const nb_airs *smooth, nb_scatter *s
     }
 }
 
-static nebel_result allocate_rounds(const nebel_allocator *allocator, const nb_scatter *like, nb_rounds *rounds)
+static nebel_result allocate_rounds(const nebel_allocator *allocator, const nb_scattering_table *like,
+                                    nb_scattering_rounds *rounds)
 {
     nebel_result result = allocate(allocator, like, &rounds->once);
     if (result == NEBEL_OK) result = allocate(allocator, like, &rounds->sum);
@@ -461,29 +465,29 @@ static nebel_result allocate_rounds(const nebel_allocator *allocator, const nb_s
     return result;
 }
 
-static void free_rounds(const nebel_allocator *allocator, nb_rounds *rounds)
+static void free_rounds(const nebel_allocator *allocator, nb_scattering_rounds *rounds)
 {
     nb_scatter_free(allocator, &rounds->once);
     nb_scatter_free(allocator, &rounds->sum);
     for (int i = 0; i <= NB_MOST_ROUNDS; i++) nb_scatter_free(allocator, &rounds->tables[i]);
 }
 
-nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *parts, const nb_airs *airs,
-                             const nb_airs *smooth, nebel_atmosphere_quality quality, const double albedo[3],
-                             nb_scatter *scatter)
+nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parallel *parts, const nb_air_components *airs,
+                             const nb_air_components *smooth, nebel_atmosphere_quality quality, const double albedo[3],
+                             nb_scattering_table *scatter)
 {
-    const nb_effort *effort = &efforts[quality];
-    nb_maker maker = {.airs = smooth,
-                      .albedo = albedo,
-                      .effort = effort,
-                      .sealed = scatter,
-                      .slopes = nb_rule_make(effort->slopes),
-                      .nodes = nb_rule_make(effort->nodes),
-                      .gather = nb_gather_choose(NEBEL_ISA_DEFAULT)};
+    const nb_table_resolution *effort = &efforts[quality];
+    nb_table_builder maker = {.airs = smooth,
+                              .albedo = albedo,
+                              .effort = effort,
+                              .sealed = scatter,
+                              .slopes = nb_rule_make(effort->slopes),
+                              .nodes = nb_rule_make(effort->nodes),
+                              .gather = nb_gather_choose(NEBEL_ISA_DEFAULT)};
     for (int k = 0; k < effort->turns; k++) maker.turn_cosines[k] = cos(PI * (k + 0.5) / effort->turns);
-    const nb_scatter layout = layout_of(smooth, effort);
-    nb_scatter fine = layout;
-    nb_rounds rounds = {.once = {.heights = 0}};
+    const nb_scattering_table layout = layout_of(smooth, effort);
+    nb_scattering_table fine = layout;
+    nb_scattering_rounds rounds = {.once = {.heights = 0}};
     fine.suns = FINE * (layout.suns - 1) + 1;
     nebel_result result = allocate(allocator, &fine, scatter);
     if (result != NEBEL_OK) return result;

@@ -6,28 +6,30 @@
 #include "parts.h"
 #include "rule.h"
 
-typedef struct nb_scatter {
+typedef struct nb_scattering_table {
     int heights, suns;
     double first_sun, last_sun, sun_scale; /* what entries over the sun's height are spread over */
     int orders;                            /* of moments that are kept: NB_MOMENTS or NB_FEW_MOMENTS */
-    nb_field *fields;    /* [height][sun]: of sunlight that was scattered at least once, for a sun of irradiance 1: the
+    nb_radiance_moments
+        *fields;         /* [height][sun]: of sunlight that was scattered at least once, for a sun of irradiance 1: the
                          logarithm of the first moment, and the others as parts of it */
     double (*ground)[3]; /* [sun]: the logarithm of the same light's irradiance on the ground */
     double missing;      /* part of it that may not have been scattered often enough, or lie between entries */
-} nb_scatter;
+} nb_scattering_table;
 
-static inline size_t nb_scatter_entries(const nb_scatter *scatter)
+static inline size_t nb_scatter_entries(const nb_scattering_table *scatter)
 {
     return (size_t)scatter->heights * (size_t)scatter->suns;
 }
 
-nb_field nb_scatter_look_up(const nb_scatter *scatter, const nb_airs *airs, double radius, double sun);
-void nb_scatter_look_up_ground(const nb_scatter *scatter, double sun, double irradiance[3]);
+nb_radiance_moments nb_scatter_look_up(const nb_scattering_table *scatter, const nb_air_components *airs, double radius,
+                                       double sun);
+void nb_scatter_look_up_ground(const nb_scattering_table *scatter, double sun, double irradiance[3]);
 
 /* Makes the table; `albedo` is the ground's; smooth: nb_airs_smooth of the airs. Errors: MEMORY. */
-nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *parts, const nb_airs *airs,
-                             const nb_airs *smooth, nebel_atmosphere_quality quality, const double albedo[3],
-                             nb_scatter *scatter);
-void nb_scatter_free(const nebel_allocator *allocator, nb_scatter *scatter);
+nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parallel *parts, const nb_air_components *airs,
+                             const nb_air_components *smooth, nebel_atmosphere_quality quality, const double albedo[3],
+                             nb_scattering_table *scatter);
+void nb_scatter_free(const nebel_allocator *allocator, nb_scattering_table *scatter);
 
 #endif

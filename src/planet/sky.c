@@ -19,7 +19,7 @@
 /* ---- along a ray ----------------------------------------------------------------------------- */
 
 /* The shadow is a cylinder behind the planet: |p + s d|^2 - ((p + s d) sun)^2 is the square of the radius. */
-void nb_find_shadow(const nb_airs *airs, nb_track track, nb_aspect aspect, double cuts[2])
+void nb_find_shadow(const nb_air_components *airs, nb_atmosphere_ray track, nb_moment_basis aspect, double cuts[2])
 {
     const double up = track.radius * aspect.height_of_sun;
     const double a = 1 - aspect.sun * aspect.sun, b = track.rise - up * aspect.sun;
@@ -67,7 +67,7 @@ static void radiance_at(const nb_gathering *gathering, int node, double radiance
 }
 
 /* The first node from `from` on that is not before `end`. */
-static int node_at(const nb_path *path, int from, double end)
+static int node_at(const nb_ray_nodes *path, int from, double end)
 {
     while (from < path->count && path->s[from] < end) from++;
     return from;
@@ -85,22 +85,22 @@ typedef struct nb_behind {
 } nb_behind;
 
 /* Of the ground, if the path ends there and not where it leaves the air, what comes to the start through smooth air. */
-static void find_ground(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path *path,
-                        double way, double light[3])
+static void find_ground(const nebel_atmosphere *atmosphere, nb_atmosphere_ray track, nb_moment_basis aspect,
+                        const nb_ray_nodes *path, double way, double light[3])
 {
-    const nb_airs *airs = &atmosphere->airs;
+    const nb_air_components *airs = &atmosphere->airs;
     for (int c = 0; c < 3; c++) light[c] = 0;
     if (nb_track_ahead(track, way).radius > 0.5 * (airs->radius + airs->top)) return;
     const double sun = fmax(-1, fmin(1, (track.radius * aspect.height_of_sun + way * aspect.sun) / airs->radius));
     double sky[3], straight[3];
     nb_scatter_look_up_ground(&atmosphere->scatter, sun, sky);
-    nb_track_sunlight(airs, (nb_track){airs->radius, airs->radius * sun}, straight);
+    nb_track_sunlight(airs, (nb_atmosphere_ray){airs->radius, airs->radius * sun}, straight);
     for (int c = 0; c < 3; c++)
         light[c] = path->end_smooth[c][path->ends - 1] * atmosphere->ground_albedo[c] / PI *
                    (sky[c] + fmax(0, sun) * straight[c]);
 }
 
-static nb_behind behind_end(const nb_path *path, double end, const double radiance[3])
+static nb_behind behind_end(const nb_ray_nodes *path, double end, const double radiance[3])
 {
     nb_behind behind;
     int i = 0;
@@ -115,7 +115,7 @@ static nb_behind behind_end(const nb_path *path, double end, const double radian
 
 static nb_behind behind_start(const nb_gathering *gathering)
 {
-    const nb_path *path = gathering->job.path;
+    const nb_ray_nodes *path = gathering->job.path;
     nb_behind behind = {.smooth = {1, 1, 1}};
     for (int k = 0; k < gathering->peaks.air_count; k++)
         for (int c = 0; c < 3; c++)
@@ -133,10 +133,10 @@ static void subtract(const nb_peak_sums *from, const nb_peak_sums *sums, nb_peak
     for (size_t i = 0; i < sizeof *rest / sizeof(double); i++) ((double *)rest)[i] = a[i] - b[i];
 }
 
-static nb_gathered finish(const nb_gathering *gathering, const nb_peak_sums *before)
+static nb_in_scattered finish(const nb_gathering *gathering, const nb_peak_sums *before)
 {
     const nb_peak_light light = nb_peaks_before(&gathering->peaks, before);
-    nb_gathered gathered;
+    nb_in_scattered gathered;
     for (int k = 0; k < NEBEL_MAX_COMPONENTS; k++)
         for (int c = 0; c < 3; c++) gathered.once[k][c] = before->powers[k][c][0];
     memcpy(gathered.often, light.light, sizeof gathered.often);
@@ -146,7 +146,7 @@ static nb_gathered finish(const nb_gathering *gathering, const nb_peak_sums *bef
 
 /* Adds what peaks turn of light from behind an end. `sums` are those of the nodes there. */
 static void add_behind(const nb_gathering *gathering, const nb_behind *behind, const nb_peak_sums *sums,
-                       const double ground[3], nb_gathered *gathered)
+                       const double ground[3], nb_in_scattered *gathered)
 {
     double light[3];
     nb_peaks_behind(&gathering->peaks, sums, ground, light);
@@ -161,7 +161,7 @@ static void add_behind(const nb_gathering *gathering, const nb_behind *behind, c
 #define GROUND_OFF 0.2
 
 /* Adds what peaks turn of the ground's light. */
-static void add_ground(const nb_path *path, const double ground[3], nb_gathered *gathered)
+static void add_ground(const nb_ray_nodes *path, const double ground[3], nb_in_scattered *gathered)
 {
     for (int c = 0; c < 3; c++) {
         const double smooth = path->end_smooth[c][path->ends - 1], left = path->end_left[c][path->ends - 1];
@@ -175,7 +175,7 @@ static void add_ground(const nb_path *path, const double ground[3], nb_gathered 
 static void sum_nodes(nb_gathering *gathering, int count, const double ends[], nb_peak_sums sums[],
                       double radiance[][3])
 {
-    const nb_path *path = gathering->job.path;
+    const nb_ray_nodes *path = gathering->job.path;
     memset(&sums[0], 0, sizeof sums[0]);
     memset(radiance[0], 0, sizeof radiance[0]);
     for (int k = 0, i = 0; k < count; k++) {
@@ -190,8 +190,8 @@ static void sum_nodes(nb_gathering *gathering, int count, const double ends[], n
     }
 }
 
-nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path *path,
-                           int count, const double ends[], nb_gathered gathered[])
+nb_in_scattered nb_gather_path(const nebel_atmosphere *atmosphere, nb_atmosphere_ray track, nb_moment_basis aspect,
+                               const nb_ray_nodes *path, int count, const double ends[], nb_in_scattered gathered[])
 {
     nb_gathering gathering;
     nb_peak_sums sums[NB_PATH_CUTS + 1], start;
@@ -209,7 +209,7 @@ nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, n
     sum_nodes(&gathering, count, ends, sums, radiance);
     memset(&start, 0, sizeof start);
     gather_nodes(&gathering, path->count, path->count + 1, &start);
-    nb_gathered first = finish(&gathering, &start);
+    nb_in_scattered first = finish(&gathering, &start);
     for (int k = 0; k < count; k++) gathered[k] = finish(&gathering, &sums[k]);
     if (gathering.job.smooth == NULL || path->ends == 0) return first;
     find_ground(atmosphere, track, aspect, path, ends[count - 1], ground);
@@ -225,11 +225,11 @@ nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, n
     return first;
 }
 
-nb_gathered nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, nb_track track, nb_aspect aspect,
-                      int count, const double ends[], nb_gathered gathered[])
+nb_in_scattered nb_gather(const nebel_atmosphere *atmosphere, const nb_gauss_rule *rule, nb_atmosphere_ray track,
+                          nb_moment_basis aspect, int count, const double ends[], nb_in_scattered gathered[])
 {
     double cuts[NB_PATH_CUTS];
-    nb_path path;
+    nb_ray_nodes path;
     nb_find_shadow(&atmosphere->airs, track, aspect, cuts);
     memcpy(cuts + 2, ends, (size_t)count * sizeof *ends);
     nb_path_lay(&atmosphere->airs, nb_atmosphere_smooth(atmosphere), rule, track, ends[count - 1], 2 + count, cuts,
@@ -237,7 +237,7 @@ nb_gathered nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, n
     return nb_gather_path(atmosphere, track, aspect, &path, count, ends, gathered);
 }
 
-void nb_gathered_once(const nebel_atmosphere *atmosphere, const nb_gathered *gathered, double sun, double once[3])
+void nb_gathered_once(const nebel_atmosphere *atmosphere, const nb_in_scattered *gathered, double sun, double once[3])
 {
     for (int c = 0; c < 3; c++) once[c] = 0;
     for (int k = 0; k < atmosphere->airs.count; k++) {
@@ -246,7 +246,7 @@ void nb_gathered_once(const nebel_atmosphere *atmosphere, const nb_gathered *gat
     }
 }
 
-double nb_gathered_off(const nebel_atmosphere *atmosphere, const nb_gathered *gathered, const double once[3], int c)
+double nb_gathered_off(const nebel_atmosphere *atmosphere, const nb_in_scattered *gathered, const double once[3], int c)
 {
     return NB_ONCE_OFF * once[c] + atmosphere->share_off * gathered->often[c] + gathered->missing[c];
 }
@@ -292,7 +292,7 @@ static double place_over(const nebel_atmosphere *atmosphere, const double place[
 
 /* A piece of a ray within the air; its length is 0 where there is none. */
 typedef struct nb_inside {
-    nb_track track;
+    nb_atmosphere_ray track;
     double height_of_sun, length;
     double end; /* of the ray in the air, however long it is */
 } nb_inside;
@@ -301,7 +301,7 @@ typedef struct nb_inside {
 static nb_inside find_inside(const nebel_atmosphere *atmosphere, const double start[3], const double unit[3],
                              double t_max, const double sun[3])
 {
-    const nb_airs *airs = &atmosphere->airs;
+    const nb_air_components *airs = &atmosphere->airs;
     double from[3];
     nb_inside inside = {.track = {place_over(atmosphere, start, from), 0}};
     double left = t_max;
@@ -314,7 +314,7 @@ static nb_inside find_inside(const nebel_atmosphere *atmosphere, const double st
         const double half = sqrt(square);
         left -= -inside.track.rise - half;
         for (int c = 0; c < 3; c++) from[c] = closest[c] - half * unit[c];
-        inside.track = (nb_track){airs->top, -half};
+        inside.track = (nb_atmosphere_ray){airs->top, -half};
     }
     inside.height_of_sun = bound_cosine(nb_vector_dot(from, sun) / inside.track.radius);
     inside.end = fmin(nb_track_enter(inside.track, airs->radius), nb_track_leave(inside.track, airs->top));
@@ -335,10 +335,10 @@ static void trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, cons
     for (int c = 0; c < 3; c++) transfer->transmittance[c] = nb_exp(-depth[c]);
     transfer->error = NB_LIGHT_ROUNDING;
     if (!(fmax(sun->irradiance[0], fmax(sun->irradiance[1], sun->irradiance[2])) > 0)) return;
-    nb_gathered gathered[2];
+    nb_in_scattered gathered[2];
     const double ends[2] = {inside.length, inside.end};
-    const nb_aspect aspect = {bound_cosine(inside.track.rise / inside.track.radius),
-                              bound_cosine(nb_vector_dot(unit, sun->direction)), inside.height_of_sun};
+    const nb_moment_basis aspect = {bound_cosine(inside.track.rise / inside.track.radius),
+                                    bound_cosine(nb_vector_dot(unit, sun->direction)), inside.height_of_sun};
     double once[3];
     nb_gather(atmosphere, &atmosphere->rule, inside.track, aspect, inside.length < inside.end ? 2 : 1, ends, gathered);
     nb_gathered_once(atmosphere, &gathered[0], aspect.sun, once);

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-nb_outlook nb_outlook_make(const nb_airs *airs, double radius)
+nb_outlook nb_outlook_make(const nb_air_components *airs, double radius)
 {
     const double height = radius - airs->radius, share = height / radius;
     const double dip = sqrt(share * (1 + airs->radius / radius));
@@ -16,7 +16,7 @@ nb_outlook nb_outlook_make(const nb_airs *airs, double radius)
                         .half_arc = sqrt(0.5 * share)};
 }
 
-static nb_slope fall_slope(const nb_outlook *outlook, double row)
+static nb_view_elevation fall_slope(const nb_outlook *outlook, double row)
 {
     const int outside = outlook->height > outlook->thickness;
     const double left = 1 - row, lacks = outside ? left * left / (left + NB_FALLING_CROWD * row) : left;
@@ -24,23 +24,23 @@ static nb_slope fall_slope(const nb_outlook *outlook, double row)
     const double across = outlook->ground * 2 * half * sqrt((1 - half) * (1 + half));
     const double down = outlook->height + 2 * outlook->ground * half * half;
     const double way = sqrt(across * across + down * down);
-    return way > 0 ? (nb_slope){-down / way, across / way} : (nb_slope){-1, 0};
+    return way > 0 ? (nb_view_elevation){-down / way, across / way} : (nb_view_elevation){-1, 0};
 }
 
-static nb_slope rise_slope(const nb_outlook *outlook, double row)
+static nb_view_elevation rise_slope(const nb_outlook *outlook, double row)
 {
     if (outlook->height > outlook->thickness) {
         const double sine = (outlook->ground + row * row * outlook->thickness) / outlook->radius;
-        return (nb_slope){-sqrt((1 - sine) * (1 + sine)), sine};
+        return (nb_view_elevation){-sqrt((1 - sine) * (1 + sine)), sine};
     }
     const double crowd = nb_row_crowd(*outlook), left = row * row / (crowd - (crowd - 1) * row * row);
     const double half = outlook->horizon * (1 - left);
-    return (nb_slope){1 - 2 * half * half, 2 * half * sqrt((1 - half) * (1 + half))};
+    return (nb_view_elevation){1 - 2 * half * half, 2 * half * sqrt((1 - half) * (1 + half))};
 }
 
-nb_slope nb_outlook_slope(const nb_outlook *outlook, int falls, double row, nb_reach *reach)
+nb_view_elevation nb_outlook_slope(const nb_outlook *outlook, int falls, double row, nb_reach *reach)
 {
-    const nb_slope slope = falls ? fall_slope(outlook, row) : rise_slope(outlook, row);
+    const nb_view_elevation slope = falls ? fall_slope(outlook, row) : rise_slope(outlook, row);
     *reach = falls ? nb_falling_reach(*outlook, slope.cosine, slope.sine)
                    : nb_rising_reach(*outlook, slope.cosine, slope.sine);
     reach->row = row;

@@ -13,14 +13,14 @@
 #include "formulas/planet.inc"
 
 /* `radius` is at least the ground's. */
-nb_outlook nb_outlook_make(const nb_airs *airs, double radius);
+nb_outlook nb_outlook_make(const nb_air_components *airs, double radius);
 
 /* Cosine and sine of the angle to the zenith. */
-typedef struct nb_slope {
+typedef struct nb_view_elevation {
     double cosine, sine;
-} nb_slope;
+} nb_view_elevation;
 
 /* The slope of a row, with its reach. */
-nb_slope nb_outlook_slope(const nb_outlook *outlook, int falls, double row, nb_reach *reach);
+nb_view_elevation nb_outlook_slope(const nb_outlook *outlook, int falls, double row, nb_reach *reach);
 
 #endif

@@ -18,7 +18,7 @@ enum { NODES = 4 }; /* of a piece of a ray: pieces are many */
 #define SAFETY_AMID 2
 
 /* Rows may be asked for between those of the table. */
-static nb_slope row_slope(const nebel_sky_view *view, double row, nb_reach *reach)
+static nb_view_elevation row_slope(const nebel_sky_view *view, double row, nb_reach *reach)
 {
     if (row < NB_VIEW_FALLING) return nb_outlook_slope(&view->outlook, 1, row / (NB_VIEW_FALLING - 1.0), reach);
     return nb_outlook_slope(&view->outlook, 0, (row - NB_VIEW_FALLING) / (NB_VIEW_RISING - 1.0), reach);
@@ -33,7 +33,7 @@ static double column_cosine(const nebel_sky_view *view, double column)
     return 1 - 2 * half * half;
 }
 
-static void write_entry(const nebel_sky_view *view, const nb_gathered *gathered, double per, float *entry)
+static void write_entry(const nebel_sky_view *view, const nb_in_scattered *gathered, double per, float *entry)
 {
     const nebel_atmosphere *atmosphere = view->atmosphere;
     static const double none[3] = {0, 0, 0};
@@ -50,25 +50,25 @@ static void write_entry(const nebel_sky_view *view, const nb_gathered *gathered,
 
 /* What the columns of a row share: the ray, the ends of its levels, and nodes along it where no shadow cuts it. */
 typedef struct nb_row {
-    nb_slope slope;
+    nb_view_elevation slope;
     nb_reach reach;
-    nb_track track;
+    nb_atmosphere_ray track;
     double ends[NB_VIEW_MORE_LEVELS];
-    nb_path path;
+    nb_ray_nodes path;
 } nb_row;
 
-static nb_aspect column_aspect(const nebel_sky_view *view, const nb_row *row, double column)
+static nb_moment_basis column_aspect(const nebel_sky_view *view, const nb_row *row, double column)
 {
-    const nb_slope slope = row->slope, to_sun = view->sun_slope;
+    const nb_view_elevation slope = row->slope, to_sun = view->sun_slope;
     const double sun = slope.cosine * to_sun.cosine + slope.sine * to_sun.sine * column_cosine(view, column);
     const double height_of_sun = (view->outlook.radius * to_sun.cosine + row->reach.begin * sun) / row->track.radius;
-    return (nb_aspect){fmax(-1, fmin(1, row->track.rise / row->track.radius)), fmax(-1, fmin(1, sun)),
-                       fmax(-1, fmin(1, height_of_sun))};
+    return (nb_moment_basis){fmax(-1, fmin(1, row->track.rise / row->track.radius)), fmax(-1, fmin(1, sun)),
+                             fmax(-1, fmin(1, height_of_sun))};
 }
 
 /* Returns what is scattered just where the ray begins. */
-static nb_gathered gather_column(const nebel_sky_view *view, const nb_row *row, nb_aspect aspect,
-                                 nb_gathered gathered[])
+static nb_in_scattered gather_column(const nebel_sky_view *view, const nb_row *row, nb_moment_basis aspect,
+                                     nb_in_scattered gathered[])
 {
     const nebel_atmosphere *atmosphere = view->atmosphere;
     double cuts[2];
@@ -81,17 +81,17 @@ static nb_gathered gather_column(const nebel_sky_view *view, const nb_row *row, 
 
 static void fill_column(nebel_sky_view *view, int number, const nb_row *row, int column)
 {
-    nb_gathered gathered[NB_VIEW_MORE_LEVELS];
-    const nb_gathered start = gather_column(view, row, column_aspect(view, row, column), gathered);
+    nb_in_scattered gathered[NB_VIEW_MORE_LEVELS];
+    const nb_in_scattered start = gather_column(view, row, column_aspect(view, row, column), gathered);
     write_entry(view, &start, 1, nb_view_entry(view, number, column, 0));
     for (int level = 0; level < view->levels; level++)
         write_entry(view, row->reach.span > 0 ? &gathered[level] : &start,
                     row->reach.span > 0 ? 1 / row->ends[level] : 1, nb_view_entry(view, number, column, level + 1));
 }
 
-static void fill_extinction(nebel_sky_view *view, int row, nb_track track, const double ends[])
+static void fill_extinction(nebel_sky_view *view, int row, nb_atmosphere_ray track, const double ends[])
 {
-    const nb_airs *airs = &view->atmosphere->airs;
+    const nb_air_components *airs = &view->atmosphere->airs;
     for (int c = 0; c < 3; c++) nb_view_extinction(view, row, 0)[c] = 0;
     for (int k = 0; k < airs->count; k++)
         for (int c = 0; c < 3; c++)
@@ -111,10 +111,10 @@ static void fill_extinction(nebel_sky_view *view, int row, nb_track track, const
  * linear there. */
 static void set_row(const nebel_sky_view *view, double number, double before, nb_row *row)
 {
-    const nb_airs *airs = &view->atmosphere->airs;
+    const nb_air_components *airs = &view->atmosphere->airs;
     row->slope = row_slope(view, number, &row->reach);
-    row->track = (nb_track){row->reach.begin > 0 ? airs->top : view->outlook.radius,
-                            view->outlook.radius * row->slope.cosine + row->reach.begin};
+    row->track = (nb_atmosphere_ray){row->reach.begin > 0 ? airs->top : view->outlook.radius,
+                                     view->outlook.radius * row->slope.cosine + row->reach.begin};
     for (int level = 0; level < view->levels; level++)
         row->ends[level] =
             row->reach.span * nb_level_end(row->reach.dense, row->reach.soft, (level + 1 - before) / view->levels);
@@ -174,8 +174,8 @@ static double missed_extinction(nebel_sky_view *view, int number, const nb_row *
     return most;
 }
 
-static double missed_light(const nebel_sky_view *view, int number, int column, const nb_gathered *gathered, double end,
-                           int cell)
+static double missed_light(const nebel_sky_view *view, int number, int column, const nb_in_scattered *gathered,
+                           double end, int cell)
 {
     float exact[NB_VIEW_SIZE];
     double worst = 0, brightest = 0;
@@ -200,7 +200,7 @@ static void measure_row(void *data, size_t row_number)
     nebel_sky_view *view = estimates->view;
     const int number = (int)row_number;
     nb_row row;
-    nb_gathered gathered[NB_VIEW_MORE_LEVELS];
+    nb_in_scattered gathered[NB_VIEW_MORE_LEVELS];
     if (number == NB_VIEW_FALLING - 1 || number == NB_VIEW_ROWS - 1) return;
     set_row(view, number + 0.5, view->levels > 1 ? 0.5 : 0, &row);
     if (!(row.ends[0] > 0)) return;
@@ -289,7 +289,7 @@ static void estimate_row(void *data, size_t number)
     }
 }
 
-static void estimate(nebel_sky_view *view, const nb_parts *parts)
+static void estimate(nebel_sky_view *view, const nb_parallel *parts)
 {
     nb_estimates estimates = {.view = view};
     nb_parts_run(parts, NB_VIEW_ROWS, measure_row, &estimates);
@@ -298,10 +298,10 @@ static void estimate(nebel_sky_view *view, const nb_parts *parts)
 
 static void set_sunlight(nebel_sky_view *view)
 {
-    const nb_airs *airs = &view->atmosphere->airs;
+    const nb_air_components *airs = &view->atmosphere->airs;
     for (int i = 0; i < NB_VIEW_SUNS; i++) {
         const double root = i / (NB_VIEW_SUNS - 1.0);
-        nb_track_sunlight(airs, (nb_track){airs->radius, airs->radius * root * root}, view->sunlight[i]);
+        nb_track_sunlight(airs, (nb_atmosphere_ray){airs->radius, airs->radius * root * root}, view->sunlight[i]);
     }
 }
 
@@ -327,7 +327,7 @@ static void set_axes(nebel_sky_view *view, const double place[3])
     const double along = nb_vector_dot(view->up, view->sun.direction);
     for (int c = 0; c < 3; c++) view->ahead[c] = view->sun.direction[c] - along * view->up[c];
     const double sine = nb_vector_length(view->ahead);
-    view->sun_slope = (nb_slope){fmax(-1, fmin(1, along)), fmin(1, sine)};
+    view->sun_slope = (nb_view_elevation){fmax(-1, fmin(1, along)), fmin(1, sine)};
     if (!(sine > 1e-9)) {
         const double x[3] = {fabs(view->up[0]) < 0.5, 0, !(fabs(view->up[0]) < 0.5)};
         nb_vector_cross(view->up, x, view->ahead);
@@ -401,7 +401,7 @@ nebel_result nebel_create_sky_view(const nebel_sky_view_desc *desc, nebel_sky_vi
         nebel_destroy_sky_view(made);
         return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "air: out of memory");
     }
-    const nb_parts parts = {desc->run, desc->run_user};
+    const nb_parallel parts = {desc->run, desc->run_user};
     if (!nb_airs_are_empty(&made->atmosphere->airs)) {
         nb_parts_run(&parts, NB_VIEW_ROWS, fill_row, made);
         estimate(made, &parts);

@@ -23,7 +23,7 @@ struct nebel_sky_view {
     nebel_sun sun;
     nb_outlook outlook;
     double up[3], ahead[3], aside[3]; /* ahead: level, towards the sun */
-    nb_slope sun_slope;
+    nb_view_elevation sun_slope;
     int columns;
     int levels; /* NB_VIEW_LEVELS or NB_VIEW_MORE_LEVELS, or 1: the ends alone */
     int scatterers[NEBEL_MAX_COMPONENTS], scatterer_count;
@@ -31,10 +31,10 @@ struct nebel_sky_view {
     float *entries;          /* [row][column][level 0..levels] */
     double (*extinction)[4]; /* [row][level 0..levels], 1/m, and what interpolation may miss of it */
     double brightest;        /* light of a whole ray, as if all scattered evenly */
-    nb_rule rule;
+    nb_gauss_rule rule;
     double sunlight[NB_VIEW_SUNS][3]; /* what air leaves of the sun on the ground, evenly over the root of the cosine of
                                          its angle to the zenith */
-    const nb_look_kernel *look;
+    const nb_sky_view_kernel *look;
 };
 
 /* In an entry, all per metre and for a sun of irradiance 1 but for the last two: what was scattered once by each kind of

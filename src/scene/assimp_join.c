@@ -15,7 +15,7 @@ enum { LONGEST_SEARCH = 256 };
 enum { KEY_SIZE = 9 };
 
 /* Returns how many of the numbers are used. Adding zero makes -0 to 0. */
-static size_t load_key(const nb_draft *draft, nb_likeness likeness, uint32_t vertex, float key[KEY_SIZE])
+static size_t load_key(const nb_weld_mesh *draft, nb_weld_key likeness, uint32_t vertex, float key[KEY_SIZE])
 {
     const uint32_t origin = nb_draft_origin(draft, vertex);
     const struct aiVector3D *parts[3] = {&draft->positions[origin]};
@@ -44,8 +44,8 @@ static size_t hash_key(const float *key, size_t count)
 }
 
 typedef struct lookup {
-    const nb_draft *draft;
-    nb_likeness likeness;
+    const nb_weld_mesh *draft;
+    nb_weld_key likeness;
     uint32_t *table;
     size_t mask; /* slots - 1 */
 } lookup;
@@ -65,7 +65,7 @@ static uint32_t find_or_add(const lookup *in, uint32_t vertex)
     return vertex;
 }
 
-bool nb_draft_find_like(const nb_draft *draft, nb_likeness likeness, uint32_t begin, uint32_t end, uint32_t *first)
+bool nb_draft_find_like(const nb_weld_mesh *draft, nb_weld_key likeness, uint32_t begin, uint32_t end, uint32_t *first)
 {
     size_t slots = 2;
     while (slots < 2 * (size_t)(end - begin)) slots *= 2;
@@ -78,7 +78,7 @@ bool nb_draft_find_like(const nb_draft *draft, nb_likeness likeness, uint32_t be
 }
 
 /* Vertices keep their order; returns how many the triangles use. */
-static uint32_t number_used(const nb_draft *draft, const uint32_t *first, uint32_t *numbers, uint32_t *kept)
+static uint32_t number_used(const nb_weld_mesh *draft, const uint32_t *first, uint32_t *numbers, uint32_t *kept)
 {
     const uint32_t count = draft->given_count + draft->copy_count;
     uint32_t used = 0;
@@ -92,7 +92,7 @@ static uint32_t number_used(const nb_draft *draft, const uint32_t *first, uint32
     return used;
 }
 
-bool nb_draft_join(const nb_draft *draft, uint32_t begin, uint32_t **kept, uint32_t *kept_count)
+bool nb_draft_join(const nb_weld_mesh *draft, uint32_t begin, uint32_t **kept, uint32_t *kept_count)
 {
     const nebel_allocator *allocator = &draft->allocator;
     const uint32_t count = draft->given_count + draft->copy_count;

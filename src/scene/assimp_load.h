@@ -8,7 +8,7 @@
 #include <assimp/scene.h>
 
 /* What a material says, once it has been looked at. */
-typedef struct nb_surface {
+typedef struct nb_assimp_surface {
     bool known;
     float base_color[3];
     int32_t texture;    /* or -1 */
@@ -18,7 +18,7 @@ typedef struct nb_surface {
     unsigned uv_index;  /* which set of coordinates both take */
     bool has_uv_map;    /* they go through a map, v downwards */
     double uv_map[2][3];
-} nb_surface;
+} nb_assimp_surface;
 
 typedef struct nb_loaded_texture {
     const char *key;
@@ -35,7 +35,7 @@ typedef struct nb_assimp {
     nb_gltf_files made;          /* read in place of some */
     const char *name;            /* of what Assimp reads */
     struct aiFileIO io;          /* opens them */
-    nb_surface *surfaces;        /* one for each material */
+    nb_assimp_surface *surfaces; /* one for each material */
     nb_loaded_texture *textures; /* those already tried */
     size_t loaded_count, loaded_capacity;
     uint64_t left_out_faces, left_out_triangles; /* points and lines; triangles with bad corners */
@@ -61,16 +61,16 @@ nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *mesh, const 
 nebel_result nb_assimp_add_points(nb_assimp *in, const struct aiMesh *mesh, const nb_affine *place);
 
 /* Finds the surface of a material; a texture that cannot be read leaves the plain colour and a note in the log. */
-nebel_result nb_assimp_find_surface(nb_assimp *in, unsigned material, nb_surface *surface);
+nebel_result nb_assimp_find_surface(nb_assimp *in, unsigned material, nb_assimp_surface *surface);
 
 /* Finds the texture of this name. With `of_grey` its alpha is the grey of a picture that has no alpha of its own. */
 nebel_result nb_assimp_find_texture(nb_assimp *in, char *path, bool of_grey, nb_loaded_texture *found);
 
 /* Finds which coordinates a texture of a material takes, and their map. */
 void nb_assimp_find_uvs(const nb_assimp *in, const struct aiMaterial *material, enum aiTextureType type,
-                        unsigned uv_index, nb_surface *surface);
+                        unsigned uv_index, nb_assimp_surface *surface);
 
 /* Finds the mask of a material, in the members of a surface whose texture is known. */
-nebel_result nb_assimp_find_mask(nb_assimp *in, const struct aiMaterial *material, nb_surface *surface);
+nebel_result nb_assimp_find_mask(nb_assimp *in, const struct aiMaterial *material, nb_assimp_surface *surface);
 
 #endif

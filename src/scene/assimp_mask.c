@@ -17,7 +17,7 @@ static bool is_hole(unsigned alpha, double cutoff)
 }
 
 /* Keeps a mask that has both holes and others. */
-static void take_mask(const nb_loaded_texture *mask, double cutoff, nb_surface *surface)
+static void take_mask(const nb_loaded_texture *mask, double cutoff, nb_assimp_surface *surface)
 {
     if (mask->index < 0) return;
     surface->is_clear = is_hole(mask->max_alpha, cutoff);
@@ -27,7 +27,7 @@ static void take_mask(const nb_loaded_texture *mask, double cutoff, nb_surface *
 }
 
 static nebel_result find_in(nb_assimp *in, const struct aiMaterial *material, enum aiTextureType type, bool of_grey,
-                            double cutoff, nb_surface *surface)
+                            double cutoff, nb_assimp_surface *surface)
 {
     struct aiString path;
     unsigned uv_index = 0;
@@ -43,7 +43,7 @@ static nebel_result find_in(nb_assimp *in, const struct aiMaterial *material, en
 
 /* The alpha of a pixel is that of the texture times a factor, which the cutoff takes into itself. */
 static nebel_result find_of_gltf(nb_assimp *in, const struct aiMaterial *material, const char *mode,
-                                 nb_surface *surface)
+                                 nb_assimp_surface *surface)
 {
     struct aiColor4D color = {1, 1, 1, 1};
     ai_real cutoff = (ai_real)half;
@@ -70,7 +70,7 @@ static bool takes_alpha(const struct aiMaterial *material)
            (flags & aiTextureFlags_UseAlpha) != 0;
 }
 
-nebel_result nb_assimp_find_mask(nb_assimp *in, const struct aiMaterial *material, nb_surface *surface)
+nebel_result nb_assimp_find_mask(nb_assimp *in, const struct aiMaterial *material, nb_assimp_surface *surface)
 {
     struct aiString mode;
     if (aiGetMaterialString(material, AI_MATKEY_GLTF_ALPHAMODE, &mode) == aiReturn_SUCCESS)

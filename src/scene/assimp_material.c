@@ -198,7 +198,7 @@ nebel_result nb_assimp_find_texture(nb_assimp *in, char *path, bool of_grey, nb_
  * first two, with the turn negated, and moves the offset so that turns are about the middle and v points up; here
  * that is taken back. */
 void nb_assimp_find_uvs(const nb_assimp *in, const struct aiMaterial *material, enum aiTextureType type,
-                        unsigned uv_index, nb_surface *surface)
+                        unsigned uv_index, nb_assimp_surface *surface)
 {
     struct aiUVTransform map;
     surface->uv_index = uv_index;
@@ -233,7 +233,7 @@ static void read_color(const nb_assimp *in, const struct aiMaterial *material, f
     for (int i = 0; i < 3; i++) color[i] = !(values[i] > 0) ? 0 : values[i] < 1 ? values[i] : 1;
 }
 
-static nebel_result read_texture(nb_assimp *in, const struct aiMaterial *material, nb_surface *surface)
+static nebel_result read_texture(nb_assimp *in, const struct aiMaterial *material, nb_assimp_surface *surface)
 {
     static const enum aiTextureType types[] = {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE};
     for (int i = is_glossy(in, material) ? 1 : 0; i < 2; i++) {
@@ -253,10 +253,10 @@ static nebel_result read_texture(nb_assimp *in, const struct aiMaterial *materia
 
 /* The colour of the scene file replaces the model's own, texture and all, but not its holes. Some exporters leave a
  * textured material black, which would leave its texture black, too. */
-static nebel_result read_surface(nb_assimp *in, unsigned material, nb_surface *surface)
+static nebel_result read_surface(nb_assimp *in, unsigned material, nb_assimp_surface *surface)
 {
     const nb_model_source *source = in->load->source;
-    *surface = (nb_surface){.known = true, .base_color = {0.5f, 0.5f, 0.5f}, .texture = -1, .mask = -1};
+    *surface = (nb_assimp_surface){.known = true, .base_color = {0.5f, 0.5f, 0.5f}, .texture = -1, .mask = -1};
     for (int i = 0; i < 3 && source->has_color; i++) surface->base_color[i] = (float)source->color[i];
     if (material >= in->scene->mNumMaterials) return NEBEL_OK;
     const struct aiMaterial *const found = in->scene->mMaterials[material];
@@ -268,7 +268,7 @@ static nebel_result read_surface(nb_assimp *in, unsigned material, nb_surface *s
     return result == NEBEL_OK ? nb_assimp_find_mask(in, found, surface) : result;
 }
 
-nebel_result nb_assimp_find_surface(nb_assimp *in, unsigned material, nb_surface *surface)
+nebel_result nb_assimp_find_surface(nb_assimp *in, unsigned material, nb_assimp_surface *surface)
 {
     const bool exists = material < in->scene->mNumMaterials;
     if (exists && in->surfaces[material].known) {

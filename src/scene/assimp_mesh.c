@@ -4,17 +4,17 @@
 #include <math.h>
 #include <string.h>
 
-typedef struct builder {
+typedef struct nb_mesh_builder {
     nb_assimp *in;
-    nb_draft draft;
+    nb_weld_mesh draft;
     nb_affine place;
     double normal_matrix[3][3];
     bool mirrored;
-} builder;
+} nb_mesh_builder;
 
 /* Normals turn by the inverse of the transpose. Its direction is that of the cofactors, with the determinant's sign;
  * they exist also where a node is flattened. */
-static void find_normal_matrix(builder *out)
+static void find_normal_matrix(nb_mesh_builder *out)
 {
     const double(*m)[4] = (const double(*)[4])out->place.m;
     double determinant = 0;
@@ -29,7 +29,7 @@ static void find_normal_matrix(builder *out)
         for (int j = 0; j < 3; j++) out->normal_matrix[i][j] = -out->normal_matrix[i][j];
 }
 
-static void place_position(const builder *out, const struct aiVector3D *v, float *position)
+static void place_position(const nb_mesh_builder *out, const struct aiVector3D *v, float *position)
 {
     for (int i = 0; i < 3; i++) {
         const double *row = out->place.m[i];
@@ -44,7 +44,7 @@ static void store_unit(double vector[3], float *result)
 }
 
 /* Leaves 0 where there is no direction. */
-static void place_normal(const builder *out, const struct aiVector3D *n, float *normal)
+static void place_normal(const nb_mesh_builder *out, const struct aiVector3D *n, float *normal)
 {
     double turned[3];
     for (int i = 0; i < 3; i++) {
@@ -64,9 +64,9 @@ static uint32_t number_in_draft(const uint32_t *kept, uint32_t i)
     return kept != NULL ? kept[i] : i;
 }
 
-static void place_vertices(const builder *out, const uint32_t *kept, nebel_mesh *mesh)
+static void place_vertices(const nb_mesh_builder *out, const uint32_t *kept, nebel_mesh *mesh)
 {
-    const nb_draft *draft = &out->draft;
+    const nb_weld_mesh *draft = &out->draft;
     float *positions = (float *)mesh->positions, *normals = (float *)mesh->normals;
     for (uint32_t i = 0; i < mesh->vertex_count; i++) {
         const uint32_t vertex = number_in_draft(kept, i);
@@ -84,7 +84,8 @@ static void map_uv(const double map[2][3], float uv[2])
     }
 }
 
-static void place_uvs(const nb_draft *draft, const nb_surface *surface, const uint32_t *kept, nebel_mesh *mesh)
+static void place_uvs(const nb_weld_mesh *draft, const nb_assimp_surface *surface, const uint32_t *kept,
+                      nebel_mesh *mesh)
 {
     float *uvs = (float *)mesh->uvs;
     for (uint32_t i = 0; i < mesh->vertex_count; i++) {
@@ -107,7 +108,7 @@ static bool is_same(const float *a, const float *b)
 
 /* A mirror turns triangles inside out; two corners change places to undo it. Triangles with two corners at one place
  * are left out, and those with a corner that was taken beyond the floats. */
-static void place_triangles(const builder *out, nebel_mesh *mesh)
+static void place_triangles(const nb_mesh_builder *out, nebel_mesh *mesh)
 {
     uint32_t *indices = (uint32_t *)mesh->indices, count = 0;
     for (size_t i = 0; i < mesh->triangle_count; i++) {
@@ -175,7 +176,7 @@ static uint32_t count_triangles(nb_assimp *in, const struct aiMesh *mesh)
     return count;
 }
 
-static const struct aiVector3D *find_uvs(nb_assimp *in, const struct aiMesh *mesh, nb_surface *surface)
+static const struct aiVector3D *find_uvs(nb_assimp *in, const struct aiMesh *mesh, nb_assimp_surface *surface)
 {
     const bool wanted = surface->texture >= 0 || surface->mask >= 0;
     const struct aiVector3D *uvs =
@@ -197,7 +198,7 @@ static void collect_triangles(const struct aiMesh *mesh, uint32_t *corner)
 
 /* Makes normals where there are none. Then joins vertices: all where no two triangles have one in common, otherwise the
  * copies that sharp edges made. */
-static bool find_vertices(nb_draft *draft, uint32_t **kept, uint32_t *count)
+static bool find_vertices(nb_weld_mesh *draft, uint32_t **kept, uint32_t *count)
 {
     *count = draft->given_count;
     if (draft->normals == NULL && !nb_draft_smooth(draft)) return false;
@@ -206,7 +207,7 @@ static bool find_vertices(nb_draft *draft, uint32_t **kept, uint32_t *count)
     return nb_draft_join(draft, is_indexed ? draft->given_count : 0, kept, count);
 }
 
-static void fill(const builder *out, const nb_surface *surface, const uint32_t *kept, nebel_mesh *mesh)
+static void fill(const nb_mesh_builder *out, const nb_assimp_surface *surface, const uint32_t *kept, nebel_mesh *mesh)
 {
     place_vertices(out, kept, mesh);
     if (out->draft.uvs != NULL) place_uvs(&out->draft, surface, kept, mesh);
@@ -222,9 +223,9 @@ static void fill(const builder *out, const nb_surface *surface, const uint32_t *
     }
 }
 
-static bool build(builder *out, const struct aiMesh *source, const nb_surface *surface, nebel_mesh *mesh)
+static bool build(nb_mesh_builder *out, const struct aiMesh *source, const nb_assimp_surface *surface, nebel_mesh *mesh)
 {
-    nb_draft *draft = &out->draft;
+    nb_weld_mesh *draft = &out->draft;
     uint32_t *kept = NULL, vertex_count = 0;
     draft->corners = nb_allocate(&draft->allocator, draft->triangle_count, 3 * sizeof *draft->corners);
     if (draft->corners == NULL) return false;
@@ -245,7 +246,7 @@ static bool build(builder *out, const struct aiMesh *source, const nb_surface *s
 nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *source, const nb_affine *place)
 {
     const nb_model_load *load = in->load;
-    nb_surface surface;
+    nb_assimp_surface surface;
     nebel_mesh mesh;
     const uint32_t triangle_count = count_triangles(in, source);
     if (triangle_count == 0 || source->mVertices == NULL) return NEBEL_OK;
@@ -255,14 +256,14 @@ nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *source, cons
     if (result != NEBEL_OK) return result;
     in->left_out_clear += surface.is_clear;
     if (surface.is_clear) return NEBEL_OK;
-    builder out = {.in = in,
-                   .draft = {.allocator = load->allocator,
-                             .positions = source->mVertices,
-                             .normals = source->mNormals,
-                             .uvs = find_uvs(in, source, &surface),
-                             .given_count = source->mNumVertices,
-                             .triangle_count = triangle_count},
-                   .place = *place};
+    nb_mesh_builder out = {.in = in,
+                           .draft = {.allocator = load->allocator,
+                                     .positions = source->mVertices,
+                                     .normals = source->mNormals,
+                                     .uvs = find_uvs(in, source, &surface),
+                                     .given_count = source->mNumVertices,
+                                     .triangle_count = triangle_count},
+                           .place = *place};
     find_normal_matrix(&out);
     if (!build(&out, source, &surface, &mesh)) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
     if (mesh.triangle_count > 0) return nb_model_add_mesh(load, &mesh);

@@ -13,7 +13,7 @@ static const float smoothing_cosine = 0.5f, half_cosine = 0.8660254f;
 enum { MOST_AROUND = 1024 };
 
 typedef struct smoother {
-    nb_draft *draft;
+    nb_weld_mesh *draft;
     uint32_t *place;          /* of each given vertex: the first vertex there */
     struct aiVector3D *faces; /* unit normals of triangles; 0 without an area */
     bool *sharp;              /* places with a sharp edge */
@@ -40,7 +40,7 @@ static struct aiVector3D unit(double x, double y, double z)
     return (struct aiVector3D){(float)(x * scale), (float)(y * scale), (float)(z * scale)};
 }
 
-static struct aiVector3D face_normal(const nb_draft *draft, const uint32_t *corner)
+static struct aiVector3D face_normal(const nb_weld_mesh *draft, const uint32_t *corner)
 {
     const struct aiVector3D *a = &draft->positions[corner[0]], *b = &draft->positions[corner[1]],
                             *c = &draft->positions[corner[2]];
@@ -52,7 +52,7 @@ static struct aiVector3D face_normal(const nb_draft *draft, const uint32_t *corn
 /* As if no edge were sharp. */
 static void smooth_all(const smoother *in)
 {
-    const nb_draft *draft = in->draft;
+    const nb_weld_mesh *draft = in->draft;
     struct aiVector3D *normals = draft->made_normals;
     memset(normals, 0, draft->given_count * sizeof *normals);
     for (size_t i = 0; i < draft->triangle_count; i++) {
@@ -69,7 +69,7 @@ static void smooth_all(const smoother *in)
 /* A triangle without an area has no direction, and makes no edge. */
 static void find_sharp_places(const smoother *in)
 {
-    const nb_draft *draft = in->draft;
+    const nb_weld_mesh *draft = in->draft;
     memset(in->sharp, 0, draft->given_count * sizeof *in->sharp);
     for (size_t i = 0; i < 3 * (size_t)draft->triangle_count; i++) {
         const struct aiVector3D *face = &in->faces[i / 3];
@@ -82,7 +82,7 @@ static void find_sharp_places(const smoother *in)
 /* Counts the corners of each sharp place into where those of the next begin. */
 static uint32_t count_around(const smoother *in)
 {
-    const nb_draft *draft = in->draft;
+    const nb_weld_mesh *draft = in->draft;
     uint32_t sum = 0;
     memset(in->ends, 0, draft->given_count * sizeof *in->ends);
     for (size_t i = 0; i < 3 * (size_t)draft->triangle_count; i++) {
@@ -100,7 +100,7 @@ static uint32_t count_around(const smoother *in)
 /* Moves the ends from where the corners of a place begin to where they end. */
 static void collect_around(const smoother *in)
 {
-    const nb_draft *draft = in->draft;
+    const nb_weld_mesh *draft = in->draft;
     for (size_t i = 0; i < 3 * (size_t)draft->triangle_count; i++) {
         const uint32_t place = in->place[draft->corners[i]];
         if (in->sharp[place]) in->around[in->ends[place]++] = (uint32_t)i;
@@ -123,7 +123,7 @@ static struct aiVector3D smooth_corner(const smoother *in, uint32_t first, uint3
 /* Every corner at a sharp place becomes a vertex of its own. */
 static void split_sharp_places(const smoother *in)
 {
-    nb_draft *draft = in->draft;
+    nb_weld_mesh *draft = in->draft;
     uint32_t first = 0;
     for (uint32_t place = 0; place < draft->given_count; place++) {
         const uint32_t end = in->ends[place];
@@ -139,7 +139,7 @@ static void split_sharp_places(const smoother *in)
 
 static bool make_room(smoother *in, uint32_t copy_count)
 {
-    nb_draft *draft = in->draft;
+    nb_weld_mesh *draft = in->draft;
     const nebel_allocator *allocator = &draft->allocator;
     const size_t count = (size_t)draft->given_count + copy_count;
     struct aiVector3D *normals = nb_allocate(allocator, count, sizeof *normals);
@@ -169,7 +169,7 @@ static bool smooth(smoother *in)
     return true;
 }
 
-bool nb_draft_smooth(nb_draft *draft)
+bool nb_draft_smooth(nb_weld_mesh *draft)
 {
     const nebel_allocator *allocator = &draft->allocator;
     const uint32_t count = draft->given_count;

@@ -52,7 +52,7 @@ static nebel_result add_distinct(nb_assimp *in, const struct aiMesh *mesh, const
 nebel_result nb_assimp_add_points(nb_assimp *in, const struct aiMesh *mesh, const nb_affine *place)
 {
     const nb_model_load *load = in->load;
-    const nb_draft draft = {
+    const nb_weld_mesh draft = {
         .allocator = load->allocator, .positions = mesh->mVertices, .given_count = mesh->mNumVertices};
     if (mesh->mVertices == NULL || mesh->mNumVertices == 0) return NEBEL_OK;
     uint32_t *first = nb_allocate(&load->allocator, mesh->mNumVertices, sizeof *first);

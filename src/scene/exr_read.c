@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-typedef struct decoder {
+typedef struct nb_exr_decoder {
     const nb_codec *codec;
     const nb_bytes *bytes;
     exr_context_t exr;
@@ -20,7 +20,7 @@ typedef struct decoder {
     bool pipeline_ready;
     exr_result_t failure; /* the first one; success: none */
     char message[200];
-} decoder;
+} nb_exr_decoder;
 
 bool nb_exr_is(const nb_bytes *bytes)
 {
@@ -34,13 +34,13 @@ static void on_error(exr_const_context_t exr, exr_result_t code, const char *mes
     void *user = NULL;
     (void)code;
     if (exr == NULL || exr_get_user_data(exr, &user) != EXR_ERR_SUCCESS || user == NULL) return;
-    decoder *in = user;
+    nb_exr_decoder *in = user;
     if (in->message[0] == '\0') snprintf(in->message, sizeof in->message, "%s", message);
 }
 
 static int64_t on_size(exr_const_context_t exr, void *user)
 {
-    const decoder *in = user;
+    const nb_exr_decoder *in = user;
     (void)exr;
     return (int64_t)in->bytes->size;
 }
@@ -48,7 +48,7 @@ static int64_t on_size(exr_const_context_t exr, void *user)
 static int64_t on_read(exr_const_context_t exr, void *user, void *buffer, uint64_t size, uint64_t offset,
                        exr_stream_error_func_ptr_t error)
 {
-    const decoder *in = user;
+    const nb_exr_decoder *in = user;
     (void)exr;
     (void)error;
     if (offset >= in->bytes->size) return 0;
@@ -59,17 +59,17 @@ static int64_t on_read(exr_const_context_t exr, void *user, void *buffer, uint64
 
 /* ---- the header ------------------------------------------------------------------------------ */
 
-static nebel_result fail_unsupported(const decoder *in, const char *what);
+static nebel_result fail_unsupported(const nb_exr_decoder *in, const char *what);
 
 /* Whether a call of OpenEXR succeeded; keeps why it did not. */
-static bool is_good(decoder *in, exr_result_t result)
+static bool is_good(nb_exr_decoder *in, exr_result_t result)
 {
     if (result == EXR_ERR_SUCCESS) return true;
     if (in->failure == EXR_ERR_SUCCESS) in->failure = result;
     return false;
 }
 
-static nebel_result fail_format(decoder *in)
+static nebel_result fail_format(nb_exr_decoder *in)
 {
     if (in->failure == EXR_ERR_OUT_OF_MEMORY)
         return nb_fail(&in->codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", in->codec->name);
@@ -79,7 +79,7 @@ static nebel_result fail_format(decoder *in)
                    in->message[0] != '\0' ? in->message : "it breaks the format");
 }
 
-static nebel_result fail_unsupported(const decoder *in, const char *what)
+static nebel_result fail_unsupported(const nb_exr_decoder *in, const char *what)
 {
     return nb_fail(&in->codec->log, NEBEL_ERROR_UNSUPPORTED, "%s: OpenEXR pictures %s are not read; convert it",
                    in->codec->name, what);
@@ -100,7 +100,7 @@ static bool is_empty(const exr_attr_box2i_t *window)
     return window->max.x < window->min.x || window->max.y < window->min.y;
 }
 
-static nebel_result check_header(decoder *in)
+static nebel_result check_header(nb_exr_decoder *in)
 {
     exr_storage_t storage;
     exr_compression_t compression;
@@ -137,7 +137,7 @@ static void order_channels(const exr_attr_chlist_t *channels, int *order, const 
     }
 }
 
-static nebel_result allocate_image(decoder *in)
+static nebel_result allocate_image(nb_exr_decoder *in)
 {
     const size_t count = (size_t)in->channels->num_channels;
     const char **names = nb_allocate(&in->codec->allocator, count, sizeof *names);
@@ -157,7 +157,7 @@ static nebel_result allocate_image(decoder *in)
 /* ---- the pixels ------------------------------------------------------------------------------ */
 
 /* Copies a decoded block, one plane after the other, to where it lies in the display window. */
-static void place_block(const decoder *in, int64_t x0, int64_t y0, const exr_chunk_info_t *chunk)
+static void place_block(const nb_exr_decoder *in, int64_t x0, int64_t y0, const exr_chunk_info_t *chunk)
 {
     const nebel_image *image = in->image;
     const int64_t left = x0 - in->display.min.x, top = y0 - in->display.min.y;
@@ -173,7 +173,7 @@ static void place_block(const decoder *in, int64_t x0, int64_t y0, const exr_chu
     }
 }
 
-static bool grow_block(decoder *in, const exr_chunk_info_t *chunk)
+static bool grow_block(nb_exr_decoder *in, const exr_chunk_info_t *chunk)
 {
     void *block = in->block;
     if (chunk->width <= 0 || chunk->height <= 0) return false;
@@ -184,7 +184,7 @@ static bool grow_block(decoder *in, const exr_chunk_info_t *chunk)
     return grown || is_good(in, EXR_ERR_OUT_OF_MEMORY);
 }
 
-static void aim_channels(decoder *in, const exr_chunk_info_t *chunk)
+static void aim_channels(nb_exr_decoder *in, const exr_chunk_info_t *chunk)
 {
     const size_t plane = (size_t)chunk->width * (size_t)chunk->height;
     for (int c = 0; c < in->pipeline.channel_count; c++) {
@@ -197,7 +197,7 @@ static void aim_channels(decoder *in, const exr_chunk_info_t *chunk)
     }
 }
 
-static bool decode_block(decoder *in, int64_t x0, int64_t y0, const exr_chunk_info_t *chunk)
+static bool decode_block(nb_exr_decoder *in, int64_t x0, int64_t y0, const exr_chunk_info_t *chunk)
 {
     if (!grow_block(in, chunk)) return false;
     const exr_result_t prepared = in->pipeline_ready ? exr_decoding_update(in->exr, 0, chunk, &in->pipeline)
@@ -212,7 +212,7 @@ static bool decode_block(decoder *in, int64_t x0, int64_t y0, const exr_chunk_in
     return true;
 }
 
-static bool decode_lines(decoder *in)
+static bool decode_lines(nb_exr_decoder *in)
 {
     int32_t step = 0;
     exr_chunk_info_t chunk;
@@ -224,7 +224,7 @@ static bool decode_lines(decoder *in)
     return true;
 }
 
-static bool decode_tiles(decoder *in)
+static bool decode_tiles(nb_exr_decoder *in)
 {
     int32_t width = 0, height = 0;
     exr_chunk_info_t chunk;
@@ -240,7 +240,7 @@ static bool decode_tiles(decoder *in)
     return true;
 }
 
-static nebel_result decode_pixels(decoder *in)
+static nebel_result decode_pixels(nb_exr_decoder *in)
 {
     exr_storage_t storage = EXR_STORAGE_SCANLINE;
     exr_get_storage(in->exr, 0, &storage);
@@ -258,7 +258,7 @@ static bool has_parts(const nb_bytes *bytes)
 
 nebel_result nb_exr_read_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image)
 {
-    decoder in = {.codec = codec, .bytes = bytes, .image = image};
+    nb_exr_decoder in = {.codec = codec, .bytes = bytes, .image = image};
     exr_context_initializer_t start = EXR_DEFAULT_CONTEXT_INITIALIZER;
     start.error_handler_fn = on_error;
     start.user_data = &in;

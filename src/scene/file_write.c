@@ -142,18 +142,18 @@ static int check_writing(const char *path)
 }
 
 /* What is at a path, and where its bytes go. */
-typedef struct target {
+typedef struct nb_write_target {
     const char *path; /* symbolic links followed */
     bool exists, is_direct;
     struct stat status; /* where it exists */
-} target;
+} nb_write_target;
 
 struct nb_sink {
     nebel_allocator allocator;
     nebel_log log;
     nb_arena arena;
     const char *path, *temporary; /* as the caller names it; the file beside it, NULL: there is none */
-    target found;
+    nb_write_target found;
     int file;
     uint64_t written; /* bytes in the file before those in `bytes` */
     nb_bytes bytes;   /* not written yet; of a direct target all */
@@ -161,9 +161,9 @@ struct nb_sink {
 };
 
 /* 0 or an error number. */
-static int find_target(nb_arena *arena, const char *path, target *found)
+static int find_target(nb_arena *arena, const char *path, nb_write_target *found)
 {
-    *found = (target){.path = follow_links(arena, path)};
+    *found = (nb_write_target){.path = follow_links(arena, path)};
     if (found->path == NULL) return errno;
     found->exists = stat(found->path, &found->status) == 0;
     if (!found->exists && errno != ENOENT) return errno;
@@ -185,7 +185,7 @@ static int try_directly(const char *path)
 
 static int try_file(nb_arena *arena, const char *path, size_t size)
 {
-    target found;
+    nb_write_target found;
     const char *temporary = NULL;
     const int error = find_target(arena, path, &found);
     if (error != 0) return error;
@@ -288,7 +288,7 @@ uint64_t nb_sink_size(const nb_sink *sink)
 
 static int rename_sink(nb_sink *sink)
 {
-    const target *found = &sink->found;
+    const nb_write_target *found = &sink->found;
     int error = flush_sink(sink);
     if (error == 0 && found->exists && fchmod(sink->file, found->status.st_mode & 0777) != 0) error = errno;
     if (error == 0 && fsync(sink->file) != 0) error = errno;

@@ -19,7 +19,7 @@ bool nb_import_bevy_distance_fog(nb_scene_reader *in, const nb_json_node *node, 
 {
     enum { TYPE, COLOR, DENSITY, EXTINCTION, INSCATTERING, COUNT };
     static const char *const names[] = {"type", "color", "density", "extinction", "inscattering"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a bevy_distance_fog"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a bevy_distance_fog"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     nebel_volume_desc *volume = &fog->volumes[0];
@@ -44,7 +44,7 @@ bool nb_import_bevy_fog_volume(nb_scene_reader *in, const nb_json_node *node, nb
     static const char *const names[] = {
         "type",      "density_factor", "absorption", "scattering", "scattering_asymmetry",
         "fog_color", "translation",    "rotation",   "scale"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a bevy_fog_volume"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a bevy_fog_volume"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     double density = 0.1, absorption = 0.3, scattering = 0.3, color[3] = {1, 1, 1};

@@ -22,7 +22,7 @@ bool nb_import_godot_fog(nb_scene_reader *in, const nb_json_node *node, nb_impor
     enum { TYPE, MODE, DENSITY, COLOR, ENERGY, HEIGHT_DENSITY, COUNT };
     static const char *const names[] = {
         "type", "fog_mode", "fog_density", "fog_light_color", "fog_light_energy", "fog_height_density"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a godot_fog"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a godot_fog"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     double density = 0.01, energy = 1;
@@ -55,7 +55,7 @@ bool nb_import_godot_volumetric_fog(nb_scene_reader *in, const nb_json_node *nod
                                         "volumetric_fog_emission",
                                         "volumetric_fog_emission_energy",
                                         "volumetric_fog_anisotropy"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a godot_volumetric_fog"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a godot_volumetric_fog"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     double density = 0.05, albedo[3] = {1, 1, 1}, emission[3] = {0}, energy = 1;
@@ -148,7 +148,7 @@ bool nb_import_godot_fog_volume(nb_scene_reader *in, const nb_json_node *node, n
     static const char *const names[] = {
         "type",   "shape",    "size",           "transform", "density",
         "albedo", "emission", "height_falloff", "edge_fade", "volumetric_fog_anisotropy"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a godot_fog_volume"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a godot_fog_volume"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     int shape = BOX;

@@ -16,7 +16,7 @@ bool nb_import_hdrp_fog(nb_scene_reader *in, const nb_json_node *node, nb_import
 {
     enum { TYPE, PATH, BASE, TOP, ALBEDO, ANISOTROPY, COUNT };
     static const char *const names[] = {"type", "meanFreePath", "baseHeight", "maximumHeight", "albedo", "anisotropy"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "an hdrp_fog"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "an hdrp_fog"};
     /* Fog.cs: at the maximum height 0.001 of the fog is left, with -1 / ln 0.001 cut to six digits. */
     static const double per_depth = 0.144765, least_depth = 0.01;
     const nb_json_node *found[COUNT];
@@ -136,9 +136,9 @@ bool nb_import_hdrp_local_fog(nb_scene_reader *in, const nb_json_node *node, nb_
                                         "size",        "positiveFade",      "negativeFade",    "invertFade",
                                         "falloffMode", "distanceFadeStart", "distanceFadeEnd", "blendingMode",
                                         "priority",    "localPosition",     "localRotation"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1,
-                                 NB_BIT(SIZE) | NB_BIT(POSITIVE_FADE) | NB_BIT(NEGATIVE_FADE),
-                                 "an hdrp_local_volumetric_fog"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1,
+                                    NB_BIT(SIZE) | NB_BIT(POSITIVE_FADE) | NB_BIT(NEGATIVE_FADE),
+                                    "an hdrp_local_volumetric_fog"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     nebel_volume_desc *volume = &fog->volumes[0];

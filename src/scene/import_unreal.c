@@ -40,7 +40,7 @@ static bool read_second(nb_json *json, const nb_json_node *node, layer *second)
 {
     enum { DENSITY, FALLOFF, OFFSET, COUNT };
     static const char *const names[] = {"FogDensity", "FogHeightFalloff", "FogHeightOffset"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "SecondFogData"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "SecondFogData"};
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
     if (!nb_value_members(json, node, &keys, found) ||
@@ -58,7 +58,7 @@ bool nb_import_unreal_height_fog(nb_scene_reader *in, const nb_json_node *node, 
     static const char *const names[] = {
         "type",          "FogDensity",  "FogHeightFalloff",  "SecondFogData", "FogInscatteringLuminance",
         "StartDistance", "EndDistance", "FogCutoffDistance", "FogMaxOpacity", "RelativeLocation"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "an unreal_height_fog"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "an unreal_height_fog"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     json->unit = centimetre;
@@ -94,7 +94,7 @@ bool nb_import_unreal_local_fog(nb_scene_reader *in, const nb_json_node *node, n
     enum { TYPE, EXTINCTION, ALBEDO, PHASE_G, LOCATION, SCALE, COUNT };
     static const char *const names[] = {"type",      "RadialFogExtinction", "FogAlbedo",
                                         "FogPhaseG", "RelativeLocation",    "RelativeScale3D"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "an unreal_local_fog_volume"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "an unreal_local_fog_volume"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     json->unit = centimetre;

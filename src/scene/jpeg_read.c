@@ -7,7 +7,7 @@
 /* after it */
 #include <jerror.h>
 
-typedef struct decoder {
+typedef struct nb_jpeg_decoder {
     struct jpeg_decompress_struct jpeg;
     struct jpeg_error_mgr errors;
     jmp_buf leave;
@@ -16,7 +16,7 @@ typedef struct decoder {
     unsigned char *pixels;
     nebel_result result;
     char message[JMSG_LENGTH_MAX];
-} decoder;
+} nb_jpeg_decoder;
 
 bool nb_jpeg_is(const nb_bytes *bytes)
 {
@@ -42,7 +42,7 @@ static nebel_result result_of(int code)
 
 static void on_error(j_common_ptr jpeg)
 {
-    decoder *in = jpeg->client_data;
+    nb_jpeg_decoder *in = jpeg->client_data;
     if (in->result == NEBEL_OK) in->result = result_of(jpeg->err->msg_code);
     jpeg->err->format_message(jpeg, in->message);
     longjmp(in->leave, 1);
@@ -54,7 +54,7 @@ static void on_message(j_common_ptr jpeg, int level)
     if (level < 0) on_error(jpeg);
 }
 
-static void read_rows(decoder *in)
+static void read_rows(nb_jpeg_decoder *in)
 {
     struct jpeg_decompress_struct *jpeg = &in->jpeg;
     const size_t row_size = jpeg->output_width * in->channel_count;
@@ -65,7 +65,7 @@ static void read_rows(decoder *in)
     jpeg_finish_decompress(jpeg);
 }
 
-static void run(decoder *in, const nb_bytes *bytes)
+static void run(nb_jpeg_decoder *in, const nb_bytes *bytes)
 {
     if (setjmp(in->leave) != 0) return;
     jpeg_create_decompress(&in->jpeg);
@@ -87,7 +87,7 @@ static void run(decoder *in, const nb_bytes *bytes)
 }
 
 /* The pixels in in->pixels, to be released by the caller. */
-static nebel_result decode(decoder *in, const nb_bytes *bytes)
+static nebel_result decode(nb_jpeg_decoder *in, const nb_bytes *bytes)
 {
     in->jpeg.err = jpeg_std_error(&in->errors);
     in->jpeg.client_data = in;
@@ -107,7 +107,7 @@ static nebel_result decode(decoder *in, const nb_bytes *bytes)
 
 nebel_result nb_jpeg_read_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture)
 {
-    decoder in = {.codec = codec, .channel_count = 4, .message = "out of memory"};
+    nb_jpeg_decoder in = {.codec = codec, .channel_count = 4, .message = "out of memory"};
     *texture = (nebel_texture){0};
     const nebel_result result = decode(&in, bytes);
     if (result == NEBEL_OK) *texture = (nebel_texture){in.jpeg.output_width, in.jpeg.output_height, in.pixels};
@@ -116,7 +116,7 @@ nebel_result nb_jpeg_read_texture(const nb_codec *codec, const nb_bytes *bytes, 
 
 nebel_result nb_jpeg_read_stored(const nb_codec *codec, const nb_bytes *bytes, nb_stored *stored)
 {
-    decoder in = {.codec = codec, .channel_count = 3, .message = "out of memory"};
+    nb_jpeg_decoder in = {.codec = codec, .channel_count = 3, .message = "out of memory"};
     *stored = (nb_stored){0};
     const nebel_result result = decode(&in, bytes);
     if (result == NEBEL_OK) *stored = (nb_stored){in.jpeg.output_width, in.jpeg.output_height, 8, 3, in.pixels};

@@ -9,14 +9,14 @@
 #include <string.h>
 #include <yajl/yajl_parse.h>
 
-typedef struct reader {
+typedef struct nb_json_reader {
     nb_json *json;
     nb_json_memory memory;
     yajl_handle parser;
     locale_t c_locale;
     size_t end;  /* of the last token: where the search for the next one starts */
     bool at_end; /* the whole text has been seen: a number at its very end comes now */
-} reader;
+} nb_json_reader;
 
 /* ---- where tokens are ------------------------------------------------------------------------ */
 
@@ -29,7 +29,7 @@ static size_t find_token(const nb_json *json, size_t at)
     return at;
 }
 
-static uint32_t take_token(reader *in)
+static uint32_t take_token(nb_json_reader *in)
 {
     const size_t start = find_token(in->json, in->end);
     in->end = in->at_end ? in->json->desc.size : yajl_get_bytes_consumed(in->parser);
@@ -58,8 +58,8 @@ static bool is_in_text(const nb_json *json, const char *string)
 
 /* A string with escapes lies in yajl's buffer for a moment only: it is copied, and its escapes looked at once more,
  * since yajl turns half a surrogate pair into a question mark. */
-static bool keep_string(reader *in, nb_arena *arena, const nb_json_node *about, uint32_t start, const char **string,
-                        size_t size)
+static bool keep_string(nb_json_reader *in, nb_arena *arena, const nb_json_node *about, uint32_t start,
+                        const char **string, size_t size)
 {
     nb_json *json = in->json;
     char path[NB_JSON_PATH];
@@ -87,7 +87,7 @@ static void link_child(nb_json *json, uint32_t child)
     json->nodes[child].index = parent->count++;
 }
 
-static nb_json_node *add_node(reader *in, nb_json_type type)
+static nb_json_node *add_node(nb_json_reader *in, nb_json_type type)
 {
     nb_json *json = in->json;
     const uint32_t start = take_token(in);
@@ -153,7 +153,7 @@ static bool close_scalar(nb_json *json, const nb_json_node *node)
     return close_value(json, (uint32_t)(node - json->nodes));
 }
 
-static bool open_container(reader *in, nb_json_type type)
+static bool open_container(nb_json_reader *in, nb_json_type type)
 {
     nb_json *json = in->json;
     if (json->depth == NB_JSON_MAX_DEPTH)
@@ -166,7 +166,7 @@ static bool open_container(reader *in, nb_json_type type)
     return true;
 }
 
-static bool close_container(reader *in)
+static bool close_container(nb_json_reader *in)
 {
     nb_json *json = in->json;
     take_token(in);
@@ -180,14 +180,14 @@ static bool close_container(reader *in)
 
 static int on_null(void *user)
 {
-    reader *in = user;
+    nb_json_reader *in = user;
     const nb_json_node *node = add_node(in, NB_JSON_NULL);
     return node != NULL && close_scalar(in->json, node);
 }
 
 static int on_boolean(void *user, int value)
 {
-    reader *in = user;
+    nb_json_reader *in = user;
     nb_json_node *node = add_node(in, NB_JSON_BOOLEAN);
     if (node == NULL) return 0;
     node->number = value;
@@ -196,7 +196,7 @@ static int on_boolean(void *user, int value)
 
 static int on_number(void *user, const char *text, size_t size)
 {
-    reader *in = user;
+    nb_json_reader *in = user;
     nb_json_node *node = add_node(in, NB_JSON_NUMBER);
     if (node == NULL) return 0;
     if (!nb_number_parse(text, size, in->c_locale, &node->number))
@@ -209,7 +209,7 @@ static int on_number(void *user, const char *text, size_t size)
 
 static int on_string(void *user, const unsigned char *text, size_t size)
 {
-    reader *in = user;
+    nb_json_reader *in = user;
     nb_json_node *node = add_node(in, NB_JSON_STRING);
     if (node == NULL) return 0;
     node->string = (const char *)text;
@@ -219,7 +219,7 @@ static int on_string(void *user, const unsigned char *text, size_t size)
 
 static int on_key(void *user, const unsigned char *text, size_t size)
 {
-    reader *in = user;
+    nb_json_reader *in = user;
     nb_json *json = in->json;
     const uint32_t start = take_token(in);
     json->key = (nb_json_node){.key = (const char *)text, .key_size = (uint32_t)size, .key_offset = start};
@@ -257,7 +257,7 @@ static const yajl_callbacks callbacks = {
 /* ---- reading --------------------------------------------------------------------------------- */
 
 /* Between setjmp and here nothing is held but yajl's memory, which is given back as a whole. */
-static void run_parser(reader *in)
+static void run_parser(nb_json_reader *in)
 {
     nb_json *json = in->json;
     if (setjmp(in->memory.out_of_memory) != 0) {
@@ -276,7 +276,7 @@ static void run_parser(reader *in)
 
 static void read_text(nb_json *json)
 {
-    reader in = {.json = json, .c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0)};
+    nb_json_reader in = {.json = json, .c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0)};
     if (in.c_locale == (locale_t)0) {
         fail_memory(json);
         return;

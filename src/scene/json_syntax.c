@@ -16,7 +16,7 @@ typedef enum expectation {
     SEPARATOR    /* a comma, or the end of what is open */
 } expectation;
 
-typedef struct spot {
+typedef struct nb_syntax_spot {
     nb_json *json;
     const char *text;
     size_t size;
@@ -25,7 +25,7 @@ typedef struct spot {
     size_t comma; /* before it, where one must be */
     expectation expected;
     const nb_json_node *about; /* what messages name; NULL: the innermost of what is open */
-} spot;
+} nb_syntax_spot;
 
 /* ---- the text -------------------------------------------------------------------------------- */
 
@@ -76,7 +76,7 @@ typedef struct word {
 
 enum { WORD_SHOWN = 40 };
 
-static word word_from(const spot *wrong, size_t start)
+static word word_from(const nb_syntax_spot *wrong, size_t start)
 {
     size_t end = start;
     while (end < wrong->size && is_word(wrong->text[end]) && end - start < WORD_SHOWN) end++;
@@ -105,7 +105,7 @@ static const nb_json_node *innermost(const nb_json *json)
     return json->depth > 0 ? &json->nodes[json->open[json->depth - 1]] : NULL;
 }
 
-static void fail(const spot *wrong, size_t at, const char *message)
+static void fail(const nb_syntax_spot *wrong, size_t at, const char *message)
 {
     char path[NB_JSON_PATH] = "";
     const nb_json_node *about = wrong->about != NULL ? wrong->about : innermost(wrong->json);
@@ -121,7 +121,7 @@ static void fail(const spot *wrong, size_t at, const char *message)
     } while (0)
 
 /* "the object that began at line 3, column 5" */
-static void name_innermost(const spot *wrong, char name[96])
+static void name_innermost(const nb_syntax_spot *wrong, char name[96])
 {
     const nb_json_node *node = innermost(wrong->json);
     const nb_text_place place = nb_json_place(wrong->json, node->offset);
@@ -129,12 +129,12 @@ static void name_innermost(const spot *wrong, char name[96])
              place.line, place.column);
 }
 
-static char closing(const spot *wrong)
+static char closing(const nb_syntax_spot *wrong)
 {
     return innermost(wrong->json)->type == NB_JSON_ARRAY ? ']' : '}';
 }
 
-static void explain_end(const spot *wrong)
+static void explain_end(const nb_syntax_spot *wrong)
 {
     char open[96];
     name_innermost(wrong, open);
@@ -142,7 +142,7 @@ static void explain_end(const spot *wrong)
 }
 
 /* The wrong one of } and ]. */
-static void explain_bracket(const spot *wrong)
+static void explain_bracket(const nb_syntax_spot *wrong)
 {
     char open[96];
     name_innermost(wrong, open);
@@ -152,7 +152,7 @@ static void explain_bracket(const spot *wrong)
 
 /* ---- strings --------------------------------------------------------------------------------- */
 
-static void explain_escape(const spot *wrong, size_t at)
+static void explain_escape(const nb_syntax_spot *wrong, size_t at)
 {
     if (wrong->text[at + 1] == 'u')
         FAIL(wrong, at, "\\u needs four hexadecimal digits behind it, as in \\u00e4");
@@ -160,7 +160,7 @@ static void explain_escape(const spot *wrong, size_t at)
         FAIL(wrong, at, "this \\ begins no escape that JSON knows; write \\\\ for a backslash, / in a path");
 }
 
-static void explain_string(const spot *wrong)
+static void explain_string(const nb_syntax_spot *wrong)
 {
     const char *text = wrong->text;
     size_t at = wrong->at + 1;
@@ -185,7 +185,7 @@ static void explain_string(const spot *wrong)
 }
 
 /* UTF-8 of the quotation marks that word processors put in the place of " and '. */
-static bool is_curly_quote(const spot *wrong)
+static bool is_curly_quote(const nb_syntax_spot *wrong)
 {
     static const char *const quotes[] = {"\xE2\x80\x98", "\xE2\x80\x99", "\xE2\x80\x9C", "\xE2\x80\x9D",
                                          "\xE2\x80\x9E", "\xC2\xAB",     "\xC2\xBB"};
@@ -226,7 +226,7 @@ static bool lacks_exponent(word number)
     return at - number.text > 1 && (at[-1] | 0x20) == 'e' && is_digit(at[-2]);
 }
 
-static void explain_number(const spot *wrong, size_t start)
+static void explain_number(const nb_syntax_spot *wrong, size_t start)
 {
     const word number = word_from(wrong, start);
     const char *advice = lacks_exponent(number) ? "digits must follow the e, as in 2e3" : number_advice(number);
@@ -234,7 +234,7 @@ static void explain_number(const spot *wrong, size_t start)
 }
 
 /* What people write behind a number: a word, a percent or a degree sign, but no key, which has a colon. */
-static bool is_unit(const spot *wrong)
+static bool is_unit(const nb_syntax_spot *wrong)
 {
     static const char degree[] = "\xC2\xB0";
     const char *text = wrong->text + wrong->at;
@@ -245,7 +245,7 @@ static bool is_unit(const spot *wrong)
     return end >= wrong->size || wrong->text[end] != ':';
 }
 
-static void explain_word(const spot *wrong, const char *what)
+static void explain_word(const nb_syntax_spot *wrong, const char *what)
 {
     const word given = word_from(wrong, wrong->at);
     const bool is_signed = given.text[0] == '-' || given.text[0] == '+';
@@ -261,13 +261,13 @@ static void explain_word(const spot *wrong, const char *what)
         FAIL(wrong, wrong->at, "%s stand in double quotes; write \"%.*s\"", what, given.size, given.text);
 }
 
-static void explain_unit(const spot *wrong)
+static void explain_unit(const nb_syntax_spot *wrong)
 {
     FAIL(wrong, wrong->at, "a number has no unit behind it; remove this");
 }
 
 /* A character that begins nothing. */
-static void explain_character(const spot *wrong, const char *wanted)
+static void explain_character(const nb_syntax_spot *wrong, const char *wanted)
 {
     const size_t length = nb_text_sequence(wrong->text, wrong->size, wrong->at);
     if (wrong->text[wrong->at] == '\'' || wrong->text[wrong->at] == '`' || is_curly_quote(wrong))
@@ -282,7 +282,7 @@ static void explain_character(const spot *wrong, const char *wanted)
 
 /* ---- what is wrong, by what was expected ----------------------------------------------------- */
 
-static void explain_scene(const spot *wrong)
+static void explain_scene(const nb_syntax_spot *wrong)
 {
     const word found = word_from(wrong, wrong->at);
     if (wrong->text[wrong->at] == '#')
@@ -293,7 +293,7 @@ static void explain_scene(const spot *wrong)
         explain_character(wrong, "a scene is an object and begins with {");
 }
 
-static void explain_rest(const spot *wrong)
+static void explain_rest(const nb_syntax_spot *wrong)
 {
     const nb_text_place place = nb_json_place(wrong->json, wrong->end - 1);
     if (strchr("#'/`", wrong->text[wrong->at]) != NULL)
@@ -304,13 +304,13 @@ static void explain_rest(const spot *wrong)
              place.line, place.column);
 }
 
-static void explain_trailing_comma(const spot *wrong)
+static void explain_trailing_comma(const nb_syntax_spot *wrong)
 {
     FAIL(wrong, wrong->comma, "a comma, and then %c: remove the comma, or write what is missing behind it",
          closing(wrong));
 }
 
-static void explain_key(const spot *wrong)
+static void explain_key(const nb_syntax_spot *wrong)
 {
     const char found = wrong->text[wrong->at];
     if (found == '"')
@@ -330,7 +330,7 @@ static void explain_key(const spot *wrong)
 }
 
 /* The key that waits for its value. */
-static word pending_key(const spot *wrong)
+static word pending_key(const nb_syntax_spot *wrong)
 {
     const nb_json_node *key = &wrong->json->key;
     size_t size = key->key_size < WORD_SHOWN ? key->key_size : WORD_SHOWN;
@@ -338,18 +338,18 @@ static word pending_key(const spot *wrong)
     return (word){key->key, (int)size};
 }
 
-static void explain_colon(const spot *wrong)
+static void explain_colon(const nb_syntax_spot *wrong)
 {
     const word key = pending_key(wrong);
     FAIL(wrong, wrong->at, "the key needs a colon and a value: \"%.*s\": ...", key.size, key.text);
 }
 
-static void explain_missing_value(const spot *wrong)
+static void explain_missing_value(const nb_syntax_spot *wrong)
 {
     FAIL(wrong, wrong->at, "the key has no value; write one before the %c", wrong->text[wrong->at]);
 }
 
-static void explain_wrong_value(const spot *wrong)
+static void explain_wrong_value(const nb_syntax_spot *wrong)
 {
     const char found = wrong->text[wrong->at];
     if (found == '"')
@@ -364,7 +364,7 @@ static void explain_wrong_value(const spot *wrong)
         explain_character(wrong, "a value must stand here: a number, \"text\", [...] or {...}");
 }
 
-static void explain_value(const spot *wrong)
+static void explain_value(const nb_syntax_spot *wrong)
 {
     const char found = wrong->text[wrong->at];
     if (found == ',' && wrong->expected != VALUE) {
@@ -374,7 +374,7 @@ static void explain_value(const spot *wrong)
     } else if ((found == '}' || found == ']') && wrong->expected != VALUE) {
         explain_bracket(wrong);
     } else {
-        spot value = *wrong;
+        nb_syntax_spot value = *wrong;
         nb_json_node missing = wrong->json->key; /* without a key in an array */
         missing.parent = wrong->json->open[wrong->json->depth - 1];
         missing.index = innermost(wrong->json)->count;
@@ -383,7 +383,7 @@ static void explain_value(const spot *wrong)
     }
 }
 
-static void explain_separator(const spot *wrong)
+static void explain_separator(const nb_syntax_spot *wrong)
 {
     const char found = wrong->text[wrong->at], before = wrong->text[wrong->end - 1];
     if (found == '}' || found == ']') {
@@ -393,7 +393,7 @@ static void explain_separator(const spot *wrong)
     } else if (is_digit(before) && is_unit(wrong)) {
         const nb_json *json = wrong->json;
         const uint32_t last = json->last[json->depth - 1]; /* 0: it was a tree of its own, and lies behind the others */
-        spot number = *wrong;
+        nb_syntax_spot number = *wrong;
         number.about = &json->nodes[last != 0 ? last : json->node_count];
         explain_unit(&number);
     } else if (found == ':') {
@@ -407,14 +407,14 @@ static void explain_separator(const spot *wrong)
     }
 }
 
-static bool is_cut_off(const spot *wrong)
+static bool is_cut_off(const nb_syntax_spot *wrong)
 {
     size_t end = wrong->at;
     while (end < wrong->size && is_word(wrong->text[end])) end++;
     return end == wrong->size && wrong->json->depth > 0;
 }
 
-static void explain(const spot *wrong)
+static void explain(const nb_syntax_spot *wrong)
 {
     switch (wrong->expected) {
     case SCENE:
@@ -450,7 +450,7 @@ static expectation expect_after_token(const nb_json *json)
 }
 
 /* Steps over the comma or colon that is as it should be. */
-static bool take_separator(spot *wrong)
+static bool take_separator(nb_syntax_spot *wrong)
 {
     const char found = wrong->at < wrong->size ? wrong->text[wrong->at] : '\0';
     if (wrong->expected == COLON && found == ':') {
@@ -467,7 +467,7 @@ static bool take_separator(spot *wrong)
 bool nb_json_check_number(nb_json *json, const nb_json_node *number)
 {
     const size_t at = number->end;
-    const spot wrong = {json, json->desc.text, json->desc.size, at, at, 0, SEPARATOR, number};
+    const nb_syntax_spot wrong = {json, json->desc.text, json->desc.size, at, at, 0, SEPARATOR, number};
     if (at >= json->desc.size || (!is_word(json->desc.text[at]) && !is_unit(&wrong)) || is_cut_off(&wrong)) return true;
     if (is_word(json->desc.text[at]))
         explain_number(&wrong, number->offset);
@@ -479,7 +479,7 @@ bool nb_json_check_number(nb_json *json, const nb_json_node *number)
 void nb_json_explain(nb_json *json, size_t end)
 {
     size_t comment = 0;
-    spot wrong = {json, json->desc.text, json->desc.size, end, 0, 0, expect_after_token(json), NULL};
+    nb_syntax_spot wrong = {json, json->desc.text, json->desc.size, end, 0, 0, expect_after_token(json), NULL};
     wrong.at = nb_json_skip_blanks(json, end, &comment);
     if (take_separator(&wrong)) wrong.at = nb_json_skip_blanks(json, wrong.at + 1, &comment);
     if (wrong.at > wrong.size)

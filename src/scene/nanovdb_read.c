@@ -36,18 +36,18 @@ typedef struct entry {
     const char *name; /* without a zero byte where the file has none */
 } entry;
 
-typedef struct reader {
+typedef struct nb_nanovdb_reader {
     const nb_codec *codec;
     const nb_bytes *bytes;
     size_t at;
-} reader;
+} nb_nanovdb_reader;
 
-static nebel_result fail(const reader *in, nebel_result result, const char *text)
+static nebel_result fail(const nb_nanovdb_reader *in, nebel_result result, const char *text)
 {
     return nb_fail(&in->codec->log, result, "%s: %s", in->codec->name, text);
 }
 
-static nebel_result fail_short(const reader *in)
+static nebel_result fail_short(const nb_nanovdb_reader *in)
 {
     return nb_fail(&in->codec->log, NEBEL_ERROR_FORMAT, "%s: ends after %zu bytes, in the middle of what it says",
                    in->codec->name, in->bytes->size);
@@ -55,7 +55,7 @@ static nebel_result fail_short(const reader *in)
 
 /* ---- bytes ----------------------------------------------------------------------------------- */
 
-static size_t bytes_left(const reader *in)
+static size_t bytes_left(const nb_nanovdb_reader *in)
 {
     return in->bytes->size - in->at;
 }
@@ -78,7 +78,7 @@ typedef struct segment {
     uint16_t count, codec;
 } segment;
 
-static nebel_result read_segment(reader *in, segment *s)
+static nebel_result read_segment(nb_nanovdb_reader *in, segment *s)
 {
     const unsigned char *header = in->bytes->data + in->at;
     if (bytes_left(in) < HEADER_SIZE)
@@ -95,7 +95,7 @@ static nebel_result read_segment(reader *in, segment *s)
     return NEBEL_OK;
 }
 
-static nebel_result read_entry(reader *in, entry *e)
+static nebel_result read_entry(nb_nanovdb_reader *in, entry *e)
 {
     const unsigned char *from = in->bytes->data + in->at;
     if (bytes_left(in) < ENTRY_SIZE) return fail_short(in);
@@ -119,7 +119,8 @@ static bool is_named(const entry *e, const char *name)
 }
 
 /* Looks for the grid among a segment's entries; behind them in->at is where its bytes are, or the next segment. */
-static nebel_result search_segment(reader *in, const segment *s, const char *name, entry *found, bool *has_found)
+static nebel_result search_segment(nb_nanovdb_reader *in, const segment *s, const char *name, entry *found,
+                                   bool *has_found)
 {
     uint64_t before = 0, all = 0;
     for (unsigned i = 0; i < s->count; i++) {
@@ -140,7 +141,7 @@ static nebel_result search_segment(reader *in, const segment *s, const char *nam
     return NEBEL_OK;
 }
 
-static nebel_result find_grid(reader *in, const char *name, segment *s, entry *found)
+static nebel_result find_grid(nb_nanovdb_reader *in, const char *name, segment *s, entry *found)
 {
     bool has_found = false;
     while (!has_found) {
@@ -157,7 +158,7 @@ static nebel_result find_grid(reader *in, const char *name, segment *s, entry *f
 /* ---- compression ----------------------------------------------------------------------------- */
 
 /* A piece: its size, then itself. */
-static bool take_piece(reader *in, const unsigned char **piece, size_t *size)
+static bool take_piece(nb_nanovdb_reader *in, const unsigned char **piece, size_t *size)
 {
     if (bytes_left(in) < 8) return false;
     const uint64_t wanted = number_at(in->bytes->data + in->at, 8);
@@ -168,7 +169,7 @@ static bool take_piece(reader *in, const unsigned char **piece, size_t *size)
     return true;
 }
 
-static nebel_result unzip(reader *in, unsigned char *to, size_t size)
+static nebel_result unzip(nb_nanovdb_reader *in, unsigned char *to, size_t size)
 {
     const unsigned char *piece;
     size_t piece_size;
@@ -180,7 +181,7 @@ static nebel_result unzip(reader *in, unsigned char *to, size_t size)
     return NEBEL_OK;
 }
 
-static nebel_result unblosc(reader *in, unsigned char *to, size_t size)
+static nebel_result unblosc(nb_nanovdb_reader *in, unsigned char *to, size_t size)
 {
     while (size > 0) {
         const unsigned char *piece;
@@ -196,14 +197,14 @@ static nebel_result unblosc(reader *in, unsigned char *to, size_t size)
     return NEBEL_OK;
 }
 
-static nebel_result copy_plain(const reader *in, unsigned char *to, size_t size)
+static nebel_result copy_plain(const nb_nanovdb_reader *in, unsigned char *to, size_t size)
 {
     if (bytes_left(in) < size) return fail_short(in);
     memcpy(to, in->bytes->data + in->at, size);
     return NEBEL_OK;
 }
 
-static nebel_result decompress(reader *in, uint16_t codec, unsigned char *to, size_t size)
+static nebel_result decompress(nb_nanovdb_reader *in, uint16_t codec, unsigned char *to, size_t size)
 {
     if (codec == CODEC_ZIP) return unzip(in, to, size);
     return codec == CODEC_BLOSC ? unblosc(in, to, size) : copy_plain(in, to, size);
@@ -228,13 +229,13 @@ static bool is_known_type(uint32_t type)
  * anything is unpacked, so that what an entry says must not be more. */
 enum { MOST_EXPANSION = 1032 };
 
-static int may_hold(const reader *in, uint16_t codec, uint64_t size)
+static int may_hold(const nb_nanovdb_reader *in, uint16_t codec, uint64_t size)
 {
     const uint64_t left = bytes_left(in);
     return size <= left || (codec != CODEC_NONE && size / MOST_EXPANSION <= left);
 }
 
-static nebel_result check_entry(const reader *in, uint16_t codec, const entry *e)
+static nebel_result check_entry(const nb_nanovdb_reader *in, uint16_t codec, const entry *e)
 {
     if (!is_known_type(e->type))
         return nb_fail(&in->codec->log, NEBEL_ERROR_UNSUPPORTED,
@@ -250,7 +251,8 @@ static nebel_result check_entry(const reader *in, uint16_t codec, const entry *e
 }
 
 /* The tree's own numbers, against the size of the memory it is in. */
-static nebel_result open_tree(const reader *in, const entry *e, unsigned char *memory, tree *t, nb_voxels *voxels)
+static nebel_result open_tree(const nb_nanovdb_reader *in, const entry *e, unsigned char *memory, tree *t,
+                              nb_voxels *voxels)
 {
     const pnanovdb_grid_handle_t grid = {{0}};
     t->buffer = pnanovdb_make_buf((uint32_t *)(void *)memory, e->grid_size / sizeof(uint32_t));
@@ -305,7 +307,8 @@ static void copy_voxels(const tree *t, nb_voxels *voxels)
                                                    (int32_t)(t->low[2] + (int64_t)z)});
 }
 
-static nebel_result read_tree(reader *in, const segment *s, const entry *e, unsigned char *memory, nb_voxels *voxels)
+static nebel_result read_tree(nb_nanovdb_reader *in, const segment *s, const entry *e, unsigned char *memory,
+                              nb_voxels *voxels)
 {
     tree t = {.type = e->type};
     nebel_result result = decompress(in, s->codec, memory, (size_t)e->grid_size);
@@ -318,7 +321,7 @@ static nebel_result read_tree(reader *in, const segment *s, const entry *e, unsi
 
 nebel_result nb_nanovdb_read(const nb_codec *codec, const nb_bytes *bytes, const char *name, nb_voxels *voxels)
 {
-    reader in = {codec, bytes, 0};
+    nb_nanovdb_reader in = {codec, bytes, 0};
     segment s = {0, 0};
     entry e = {0};
     voxels->data = NULL;

@@ -121,7 +121,7 @@ nebel_result nebel_get_scene_grid(const nebel_scene *scene, nebel_grid *grid, do
         name, offsetof(nebel_scene_noise, member), count, NB_EDIT_EACH                                                 \
     }
 
-static const nb_place places[] = {
+static const nb_key_entry places[] = {
     NOISE_PLACE("cells", desc.frequency, 3),   NOISE_PLACE("gain", desc.gain, 1),
     NOISE_PLACE("coverage", desc.coverage, 1), NOISE_PLACE("edge", desc.falloff, 3),
     NOISE_PLACE("drift", velocity, 3),         NOISE_PLACE("change", evolution, 1),
@@ -141,7 +141,7 @@ void nb_save_noise(nb_edit *edit, const nb_json *json, const nb_edit_object *obj
     nb_edit_numbers(edit, json, object, "seed", 1, &(double){a->seed}, &(double){b->seed}, NB_EDIT_EACH);
 }
 
-void nb_save_noise_grid(nb_save *save, const nb_json *json, const nb_edit_object *object, const nebel_grid *was,
+void nb_save_noise_grid(nb_key_patch *save, const nb_json *json, const nb_edit_object *object, const nebel_grid *was,
                         const nebel_grid *now)
 {
     const nebel_allocator *allocator = &save->edit.arena.allocator;

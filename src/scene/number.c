@@ -6,19 +6,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct decimal {
+typedef struct nb_json_decimal {
     uint64_t digits; /* all digits as one number */
     int digit_count; /* significant ones */
     int exponent;    /* of ten */
     bool negative;
-} decimal;
+} nb_json_decimal;
 
 static bool is_digit(char c)
 {
     return c >= '0' && c <= '9';
 }
 
-static const char *read_digits(const char *at, const char *end, decimal *number, int exponent_step)
+static const char *read_digits(const char *at, const char *end, nb_json_decimal *number, int exponent_step)
 {
     for (; at < end && is_digit(*at); at++) {
         if (number->digits != 0 || *at != '0') number->digit_count++;
@@ -39,9 +39,9 @@ static int read_exponent(const char *at, const char *end)
     return negative ? -exponent : exponent;
 }
 
-static decimal read_decimal(const char *text, size_t size)
+static nb_json_decimal read_decimal(const char *text, size_t size)
 {
-    decimal number = {0};
+    nb_json_decimal number = {0};
     const char *at = text, *end = text + size;
     number.negative = at < end && *at == '-';
     if (number.negative) at++;
@@ -53,7 +53,7 @@ static decimal read_decimal(const char *text, size_t size)
 
 /* W. Clinger, How to read floating point numbers accurately (1990): up to 15 digits and a power of ten up to 22 are
  * doubles exactly, so that one multiplication or division rounds correctly. Needs arithmetic in double, not wider. */
-static bool convert_exactly(const decimal *number, double *value)
+static bool convert_exactly(const nb_json_decimal *number, double *value)
 {
     static const double powers[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                                     1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
@@ -68,7 +68,7 @@ static bool convert_exactly(const decimal *number, double *value)
 bool nb_number_parse(const char *text, size_t size, locale_t c_locale, double *value)
 {
     if (size > NB_NUMBER_LENGTH) return false;
-    const decimal number = read_decimal(text, size);
+    const nb_json_decimal number = read_decimal(text, size);
     if (convert_exactly(&number, value)) return true;
     char copy[NB_NUMBER_LENGTH + 1];
     memcpy(copy, text, size);

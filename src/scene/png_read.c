@@ -5,13 +5,19 @@
 #include <stdio.h>
 #include <string.h>
 
-typedef enum target { TARGET_IMAGE, TARGET_TEXTURE, TARGET_HEIGHTS, TARGET_STORED, TARGET_STORED_COLOR } target;
+typedef enum nb_png_target {
+    TARGET_IMAGE,
+    TARGET_TEXTURE,
+    TARGET_HEIGHTS,
+    TARGET_STORED,
+    TARGET_STORED_COLOR
+} nb_png_target;
 
-typedef struct decoder {
+typedef struct nb_png_decoder {
     const nb_codec *codec;
     const nb_bytes *bytes;
     size_t at;
-    target target;
+    nb_png_target target;
     png_structp png;
     png_infop info;
     png_uint_32 width, height;
@@ -22,7 +28,7 @@ typedef struct decoder {
     bool out_of_memory; /* libpng was refused some: then that is why it fails */
     nebel_result result;
     char message[200];
-} decoder;
+} nb_png_decoder;
 
 bool nb_png_is(const nb_bytes *bytes)
 {
@@ -33,7 +39,7 @@ bool nb_png_is(const nb_bytes *bytes)
 
 static void on_error(png_structp png, png_const_charp message)
 {
-    decoder *in = png_get_error_ptr(png);
+    nb_png_decoder *in = png_get_error_ptr(png);
     if (in->result == NEBEL_OK) in->result = in->out_of_memory ? NEBEL_ERROR_MEMORY : NEBEL_ERROR_FORMAT;
     snprintf(in->message, sizeof in->message, "%s", message);
     png_longjmp(png, 1);
@@ -47,7 +53,7 @@ static void on_warning(png_structp png, png_const_charp message)
 
 static png_voidp on_allocate(png_structp png, png_alloc_size_t size)
 {
-    decoder *in = png_get_mem_ptr(png);
+    nb_png_decoder *in = png_get_mem_ptr(png);
     void *memory = nb_allocate(&in->codec->allocator, size, 1);
     if (memory == NULL) in->out_of_memory = true;
     return memory;
@@ -55,13 +61,13 @@ static png_voidp on_allocate(png_structp png, png_alloc_size_t size)
 
 static void on_release(png_structp png, png_voidp memory)
 {
-    const decoder *in = png_get_mem_ptr(png);
+    const nb_png_decoder *in = png_get_mem_ptr(png);
     nb_release(&in->codec->allocator, memory);
 }
 
 static void on_read(png_structp png, png_bytep target_bytes, size_t size)
 {
-    decoder *in = png_get_io_ptr(png);
+    nb_png_decoder *in = png_get_io_ptr(png);
     if (size > in->bytes->size - in->at) png_error(png, "the file ends too early");
     memcpy(target_bytes, in->bytes->data + in->at, size);
     in->at += size;
@@ -69,14 +75,14 @@ static void on_read(png_structp png, png_bytep target_bytes, size_t size)
 
 /* ---- decoding -------------------------------------------------------------------------------- */
 
-static void stop(decoder *in, nebel_result result, const char *message)
+static void stop(nb_png_decoder *in, nebel_result result, const char *message)
 {
     in->result = result;
     png_error(in->png, message);
 }
 
 /* Of bits that are no samples of a photograph nor of depth. */
-static void choose_stored(decoder *in, int type)
+static void choose_stored(nb_png_decoder *in, int type)
 {
     const int bits = png_get_bit_depth(in->png, in->info);
     if (bits == 1 || (bits < 8 && type != PNG_COLOR_TYPE_PALETTE))
@@ -85,7 +91,7 @@ static void choose_stored(decoder *in, int type)
     if (in->target == TARGET_STORED_COLOR) png_set_gray_to_rgb(in->png);
 }
 
-static void choose_transforms(decoder *in)
+static void choose_transforms(nb_png_decoder *in)
 {
     const int type = png_get_color_type(in->png, in->info);
     if (in->target == TARGET_HEIGHTS && type != PNG_COLOR_TYPE_GRAY) {
@@ -101,7 +107,7 @@ static void choose_transforms(decoder *in)
     png_set_add_alpha(in->png, 0xFF, PNG_FILLER_AFTER);
 }
 
-static void read_header(decoder *in)
+static void read_header(nb_png_decoder *in)
 {
     png_read_info(in->png, in->info);
     in->width = png_get_image_width(in->png, in->info);
@@ -112,7 +118,7 @@ static void read_header(decoder *in)
 }
 
 /* Of what is made of the pixels, and of them where both are there at once. */
-static uint64_t kept_row_size(const decoder *in)
+static uint64_t kept_row_size(const nb_png_decoder *in)
 {
     const uint64_t read = in->row_size, width = in->width;
     if (in->target != TARGET_IMAGE && in->target != TARGET_HEIGHTS) return read;
@@ -120,7 +126,7 @@ static uint64_t kept_row_size(const decoder *in)
                                         : read + width * (unsigned)in->channel_count * sizeof(float);
 }
 
-static void read_pixels(decoder *in)
+static void read_pixels(nb_png_decoder *in)
 {
     const int passes = png_set_interlace_handling(in->png);
     png_read_update_info(in->png, in->info);
@@ -136,7 +142,7 @@ static void read_pixels(decoder *in)
     png_read_end(in->png, NULL);
 }
 
-static void run(decoder *in)
+static void run(nb_png_decoder *in)
 {
     if (setjmp(png_jmpbuf(in->png)) != 0) return;
     png_set_user_limits(in->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
@@ -146,7 +152,7 @@ static void run(decoder *in)
 }
 
 /* The pixels in in->pixels, to be released by the caller. */
-static nebel_result decode(decoder *in)
+static nebel_result decode(nb_png_decoder *in)
 {
     in->png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, in, on_error, on_warning, in, on_allocate, on_release);
     in->info = in->png != NULL ? png_create_info_struct(in->png) : NULL;
@@ -173,7 +179,7 @@ static uint16_t read_16(const unsigned char *at)
     return (uint16_t)(at[0] << 8 | at[1]);
 }
 
-static void convert_row(const decoder *in, const unsigned char *row, float *samples)
+static void convert_row(const nb_png_decoder *in, const unsigned char *row, float *samples)
 {
     const size_t count = (size_t)in->width * (size_t)in->channel_count;
     for (size_t i = 0; i < count; i++)
@@ -183,7 +189,7 @@ static void convert_row(const decoder *in, const unsigned char *row, float *samp
 nebel_result nb_png_read_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image)
 {
     static const char *const names[4][4] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
-    decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_IMAGE};
+    nb_png_decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_IMAGE};
     *image = (nebel_image){0};
     nebel_result result = decode(&in);
     if (result != NEBEL_OK) return result;
@@ -197,7 +203,7 @@ nebel_result nb_png_read_image(const nb_codec *codec, const nb_bytes *bytes, neb
 
 nebel_result nb_png_read_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture)
 {
-    decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_TEXTURE};
+    nb_png_decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_TEXTURE};
     *texture = (nebel_texture){0};
     const nebel_result result = decode(&in);
     if (result == NEBEL_OK) *texture = (nebel_texture){in.width, in.height, in.pixels};
@@ -206,7 +212,7 @@ nebel_result nb_png_read_texture(const nb_codec *codec, const nb_bytes *bytes, n
 
 nebel_result nb_png_read_stored(const nb_codec *codec, const nb_bytes *bytes, bool as_color, nb_stored *stored)
 {
-    decoder in = {.codec = codec, .bytes = bytes, .target = as_color ? TARGET_STORED_COLOR : TARGET_STORED};
+    nb_png_decoder in = {.codec = codec, .bytes = bytes, .target = as_color ? TARGET_STORED_COLOR : TARGET_STORED};
     *stored = (nb_stored){0};
     const nebel_result result = decode(&in);
     if (result == NEBEL_OK) *stored = (nb_stored){in.width, in.height, in.bits, in.channel_count, in.pixels};
@@ -215,7 +221,7 @@ nebel_result nb_png_read_stored(const nb_codec *codec, const nb_bytes *bytes, bo
 
 nebel_result nb_png_read_heights(const nb_codec *codec, const nb_bytes *bytes, const char *what, nb_heights *heights)
 {
-    decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_HEIGHTS, .what = what};
+    nb_png_decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_HEIGHTS, .what = what};
     *heights = (nb_heights){0};
     const nebel_result result = decode(&in);
     if (result != NEBEL_OK) return result;

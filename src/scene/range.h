@@ -5,18 +5,18 @@
 #include <stdbool.h>
 
 /* What a number is times or by: the unit of a file changes its limits there. */
-typedef enum nb_dimension {
+typedef enum nb_key_unit {
     NB_PURE,
     NB_LENGTH,    /* low and high are in metres */
     NB_PER_LENGTH /* and here per metre */
-} nb_dimension;
+} nb_key_unit;
 
 typedef struct nb_range {
     double low, high;
     bool open;     /* without its ends */
     bool or_zero;  /* 0 is good, too */
     bool mirrored; /* so is what is good times -1 */
-    nb_dimension dimension;
+    nb_key_unit dimension;
     const char *text; /* in messages: all of it where it is pure, else "a length", behind which the limits stand */
 } nb_range;
 

@@ -25,7 +25,7 @@ static bool read_gradient(nb_scene_reader *in, const nb_json_node *node, nebel_e
 {
     enum { TYPE, ZENITH, HORIZON, GROUND, COUNT };
     static const char *const names[] = {"type", "zenith", "horizon", "ground"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a gradient"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a gradient"};
     const nb_json_node *found[COUNT];
     environment->type = NEBEL_ENVIRONMENT_GRADIENT;
     return nb_value_members(in->json, node, &keys, found) &&
@@ -114,7 +114,7 @@ static bool read_map(nb_scene_reader *in, const nb_json_node *node, nebel_enviro
 {
     enum { TYPE, FILE_KEY, ROTATION, INTENSITY, COUNT };
     static const char *const names[] = {"type", "file", "rotation", "intensity"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(TYPE) | NB_BIT(FILE_KEY), "an environment"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(TYPE) | NB_BIT(FILE_KEY), "an environment"};
     static const nb_range rotation_range = {.low = -NEBEL_MAX_ENVIRONMENT_ROTATION,
                                             .high = NEBEL_MAX_ENVIRONMENT_ROTATION,
                                             .text = "a number of degrees from -1e6 to 1e6"};

@@ -8,9 +8,9 @@ static const char *const names[] = {"position",   "look_at",   "up",   "vertical
 
 #define VIEW_KEYS (NB_BIT(POSITION) | NB_BIT(LOOK_AT) | NB_BIT(UP) | NB_BIT(VERTICAL_FOV) | NB_BIT(VIEW_HEIGHT))
 
-static const nb_keys camera_keys = {names, CAMERA_KEY_COUNT,
-                                    VIEW_KEYS | NB_BIT(PROJECTION) | NB_BIT(TURNTABLE) | NB_BIT(KEYS), 0, "a camera"};
-static const nb_keys key_keys = {names, CAMERA_KEY_COUNT, VIEW_KEYS | NB_BIT(FRAME), NB_BIT(FRAME), "a camera key"};
+static const nb_key_set camera_keys = {
+    names, CAMERA_KEY_COUNT, VIEW_KEYS | NB_BIT(PROJECTION) | NB_BIT(TURNTABLE) | NB_BIT(KEYS), 0, "a camera"};
+static const nb_key_set key_keys = {names, CAMERA_KEY_COUNT, VIEW_KEYS | NB_BIT(FRAME), NB_BIT(FRAME), "a camera key"};
 
 static const nb_range fov_range = {.low = 0, .high = 180, .open = true, .text = "a number of degrees, > 0 and < 180"};
 
@@ -62,7 +62,7 @@ static bool read_projection(nb_json *json, const nb_json_node *node, nebel_proje
 static bool read_turntable(nb_json *json, const nb_json_node *node, uint32_t *frames)
 {
     static const char *const turntable_names[] = {"frames"};
-    static const nb_keys keys = {turntable_names, 1, 1, 1, "a turntable"};
+    static const nb_key_set keys = {turntable_names, 1, 1, 1, "a turntable"};
     const nb_json_node *found[1];
     int count = 0;
     if (node == NULL) return true;

@@ -12,7 +12,7 @@ static const char *const span_names[] = {"ray", "depth", "faithful"};
 enum { NAME, SHAPE, DENSITY, COLOR, CELL_KEY_COUNT };
 
 static const char *const cell_names[] = {"name", "shape", "density", "color"};
-static const nb_keys cell_keys = {cell_names, CELL_KEY_COUNT, NB_BIT(CELL_KEY_COUNT) - 1, NB_BIT(SHAPE), "a cell"};
+static const nb_key_set cell_keys = {cell_names, CELL_KEY_COUNT, NB_BIT(CELL_KEY_COUNT) - 1, NB_BIT(SHAPE), "a cell"};
 
 /* What the section becomes, in the scene's arena. */
 typedef struct cells_draft {
@@ -126,7 +126,7 @@ static bool read_portal(nb_scene_reader *in, const nb_json_node *node, const cel
 {
     enum { CELLS, POLYGON, COUNT };
     static const char *const portal_names[] = {"cells", "polygon"};
-    static const nb_keys keys = {portal_names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a portal"};
+    static const nb_key_set keys = {portal_names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a portal"};
     const nb_json_node *found[COUNT];
     return nb_value_is(in->json, node, NB_JSON_OBJECT, "a portal {\"cells\": ..., \"polygon\": ...}") &&
            nb_value_members(in->json, node, &keys, found) && read_ends(in, found[CELLS], draft, portal) &&
@@ -212,7 +212,7 @@ bool nb_read_cells(nb_scene_reader *in, const nb_json_node *node)
 {
     enum { CELLS, PORTALS, MODEL, SPAN, GROUPING, COUNT };
     static const char *const section_names[] = {"cells", "portals", "model", "span", "grouping"};
-    static const nb_keys keys = {section_names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(CELLS), "the section \"cells\""};
+    static const nb_key_set keys = {section_names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(CELLS), "the section \"cells\""};
     const nb_json_node *found[COUNT];
     cells_draft draft = {.desc = nb_arena_allocate(&in->scene->arena, 1, sizeof *draft.desc)};
     if (draft.desc == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");

@@ -94,7 +94,7 @@ static bool read_d3d9(nb_scene_reader *in, const nb_json_node *node)
     static const char *const d3d9_names[] = {"fog_vertex_mode",  "fog_table_mode", "fog_start",
                                              "fog_end",          "fog_density",    "fog_color",
                                              "range_fog_enable", "z_near",         "z_far"};
-    static const nb_keys keys = {d3d9_names, COUNT, NB_BIT(COUNT) - 1, 0, "\"d3d9\""};
+    static const nb_key_set keys = {d3d9_names, COUNT, NB_BIT(COUNT) - 1, 0, "\"d3d9\""};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     const double unit = in->space.unit;
@@ -147,7 +147,7 @@ void nb_finish_classic(nb_scene_reader *in)
 
 /* Absent numbers are those of a new OpenGL context, in metres whatever the file's unit. A program's own coordinates have
  * no unit. */
-static void convert(const nb_space *space, const nb_json_node *end, const nb_json_node *density,
+static void convert(const nb_file_units *space, const nb_json_node *end, const nb_json_node *density,
                     nebel_factor_desc *factor)
 {
     if (factor->coordinate == NEBEL_COORDINATE_USER) return;
@@ -161,7 +161,7 @@ bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node)
     enum { START, END, DENSITY, COLOR, COORDINATE, STAGE, CURVE, TABLE, D3D9, COUNT };
     static const char *const section_names[] = {"start", "end",   "density", "color", "coordinate",
                                                 "stage", "curve", "table",   "d3d9"};
-    static const nb_keys keys = {section_names, COUNT, NB_BIT(COUNT) - 1, 0, "the section \"classic\""};
+    static const nb_key_set keys = {section_names, COUNT, NB_BIT(COUNT) - 1, 0, "the section \"classic\""};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     int coordinate = 0, stage = 0;

@@ -8,7 +8,7 @@ enum { KIND, BASE, TOP, COVERAGE, EXTINCTION, SIZE, DETAIL, VARIATION, DIAMETER,
 
 static const char *const names[] = {"kind",   "base",      "top",      "coverage", "extinction", "size",
                                     "detail", "variation", "diameter", "seed",     "wind",       "weather"};
-static const nb_keys keys = {names, KEY_COUNT, NB_BIT(KEY_COUNT) - 1, 0, "a layer of clouds"};
+static const nb_key_set keys = {names, KEY_COUNT, NB_BIT(KEY_COUNT) - 1, 0, "a layer of clouds"};
 
 /* A part that 0 leaves nothing of. */
 static bool read_part(nb_json *json, const nb_json_node *node, double *value)

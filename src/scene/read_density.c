@@ -23,7 +23,7 @@ enum { TYPE_COUNT = sizeof type_names / sizeof *type_names, NOISE = NEBEL_DENSIT
     }
 
 /* In the order of nebel_density_type. */
-static const nb_keys density_keys[NEBEL_DENSITY_COUNT] = {
+static const nb_key_set density_keys[NEBEL_DENSITY_COUNT] = {
     DENSITY_KEYS(0, 0, "a constant density"),
     DENSITY_KEYS(NB_BIT(SCALE_HEIGHT), NB_BIT(BASE) | NB_BIT(BELOW), "a height density"),
     DENSITY_KEYS(NB_BIT(FROM) | NB_BIT(TO), 0, "a linear density"),
@@ -90,7 +90,7 @@ static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_
 /* The ball is that of the first planet, in terms of the file. Where that has no center the ground is at the origin. */
 static bool read_altitude(nb_scene_reader *in, const nb_json_node *const *found, nebel_density *density)
 {
-    const nb_ball *const ball = &in->ball;
+    const nb_ground_sphere *const ball = &in->ball;
     density->radius = ball->radius > 0 ? ball->radius : ball->preset_radius / in->space.unit;
     if (!read_members(in->json, found, density)) return false;
     if (found[CENTER] == NULL && ball->has_center) {
@@ -108,7 +108,7 @@ static bool read_altitude(nb_scene_reader *in, const nb_json_node *const *found,
 bool nb_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
 {
     const nb_json_node *found[DENSITY_KEY_COUNT];
-    nb_keys keys = density_keys[density->type];
+    nb_key_set keys = density_keys[density->type];
     keys.allowed &= ~(NB_BIT(TYPE) | NB_BIT(BELOW) | NB_BIT(POWER));
     keys.required = 0;
     if (node == NULL) return true;
@@ -155,7 +155,7 @@ bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *p
     static const nebel_phase_type types[] = {NEBEL_PHASE_ISOTROPIC, NEBEL_PHASE_HENYEY_GREENSTEIN,
                                              NEBEL_PHASE_RAYLEIGH,  NEBEL_PHASE_CORNETTE_SHANKS,
                                              NEBEL_PHASE_DRAINE,    NEBEL_PHASE_DROPLETS};
-    static const nb_keys keys[] = {
+    static const nb_key_set keys[] = {
         {names, COUNT, NB_BIT(PHASE_TYPE), 0, "an isotropic phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(G), NB_BIT(G), "a henyey_greenstein phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE), 0, "a rayleigh phase function"},

@@ -6,7 +6,7 @@ static bool read_ground(nb_scene_reader *in, const nb_json_node *node, nebel_dif
 {
     enum { HEIGHT, ALBEDO, COUNT };
     static const char *const names[] = {"height", "albedo"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "the ground"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "the ground"};
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
     if (!nb_value_is(in->json, node, NB_JSON_OBJECT, "an object {\"height\": ..., \"albedo\": ...}") ||
@@ -24,7 +24,7 @@ bool nb_read_multiple_scattering(nb_scene_reader *in, const nb_json_node *node)
     enum { MODEL, CELLS, GROUND, COUNT };
     static const char *const names[] = {"model", "cells", "ground"};
     static const char *const model_names[] = {"diffusion"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(MODEL), "multiple scattering"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(MODEL), "multiple scattering"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     int cells = 0;

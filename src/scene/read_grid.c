@@ -14,7 +14,7 @@ static const char *const voxel_names[] = {"float", "uint8", "uint16"};
 #define ANY_FILE (NB_BIT(TYPE) | NB_BIT(FILE_KEY) | NB_BIT(FILTER))
 
 /* In the order of nb_voxel_file. */
-static const nb_keys grid_keys[] = {
+static const nb_key_set grid_keys[] = {
     {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(SIZE) | NB_BIT(VOXELS),
      NB_BIT(FILE_KEY) | NB_BIT(SIZE) | NB_BIT(VOXELS), "a grid of numbers (no .nvdb, .vdb, .png)"},
     {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(GRID), NB_BIT(FILE_KEY), "a grid of NanoVDB"},

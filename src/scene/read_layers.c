@@ -106,7 +106,7 @@ static bool read_cloud(nb_scene_reader *in, const nb_json_node *node, nebel_clou
 {
     enum { HEIGHT, DAY, COLOR, MAP, DETAIL, WRAP, GAIN, COVERAGE, SEED, COUNT };
     static const char *const names[] = {"height", "day", "color", "map", "detail", "wrap", "gain", "coverage", "seed"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a shell of clouds"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a shell of clouds"};
     static const nb_range wrap_range = {.low = -1e3, .high = 1e3, .text = "a number from -1000 to 1000"};
     static const nb_range gain_range = {
         .low = 0, .high = 1e3, .open = true, .text = "a number between 0 and 1000, without them"};
@@ -153,7 +153,7 @@ static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_atmosp
 {
     enum { HEIGHT, BRIGHTNESS, RAMP, COUNT };
     static const char *const names[] = {"height", "brightness", "ramp"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a shell of air"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a shell of air"};
     static const nb_range brightness_range = {.low = 0, .high = 1e6, .text = "a number from 0 to 1e6"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
@@ -183,7 +183,7 @@ bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_texture
     enum { MODEL, CENTER, RADIUS, ROTATION, DAY, MAP, COVERAGE, SEED, CLOUDS, AIR, COUNT };
     static const char *const names[] = {"model", "center",   "radius", "rotation", "day",
                                         "map",   "coverage", "seed",   "clouds",   "air"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(MODEL), "a planet of layers"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(MODEL), "a planet of layers"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     double radius = 6.36e6 / in->space.unit, scale[3] = {1, 1, 1};

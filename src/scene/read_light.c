@@ -23,8 +23,8 @@ static bool read_sunlight(const nb_scene_reader *in, const nb_json_node *const *
 
 static bool read_sun_key(const nb_scene_reader *in, const nb_json_node *node, nebel_sun_key *key)
 {
-    static const nb_keys keys = {sun_names, SUN_KEY_COUNT, NB_BIT(SUN_FRAME) | SUN_LIGHT, NB_BIT(SUN_FRAME),
-                                 "a key of the sun"};
+    static const nb_key_set keys = {sun_names, SUN_KEY_COUNT, NB_BIT(SUN_FRAME) | SUN_LIGHT, NB_BIT(SUN_FRAME),
+                                    "a key of the sun"};
     const nb_json_node *found[SUN_KEY_COUNT];
     return nb_value_members(in->json, node, &keys, found) &&
            nb_value_number(in->json, found[SUN_FRAME], &nb_range_frame, &key->frame) &&
@@ -55,7 +55,7 @@ static bool read_sun_keys(nb_scene_reader *in, const nb_json_node *node, const n
 
 bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node)
 {
-    static const nb_keys keys = {sun_names, SUN_KEY_COUNT, SUN_LIGHT | NB_BIT(SUN_KEYS), SUN_LIGHT, "a sun"};
+    static const nb_key_set keys = {sun_names, SUN_KEY_COUNT, SUN_LIGHT | NB_BIT(SUN_KEYS), SUN_LIGHT, "a sun"};
     const nb_json_node *found[SUN_KEY_COUNT];
     nebel_scene_data *data = &in->scene->data;
     nebel_sun sun;
@@ -77,7 +77,7 @@ static const char *const light_names[] = {"type",   "name",      "position",    
 #define POINT_KEYS (POINT_REQUIRED | NB_BIT(NAME) | NB_BIT(RADIUS))
 #define SPOT_REQUIRED (POINT_REQUIRED | NB_BIT(DIRECTION) | NB_BIT(OUTER_ANGLE))
 
-static const nb_keys light_keys[] = {
+static const nb_key_set light_keys[] = {
     {light_names, LIGHT_KEY_COUNT, POINT_KEYS, POINT_REQUIRED, "a point light"},
     {light_names, LIGHT_KEY_COUNT, SPOT_REQUIRED | POINT_KEYS | NB_BIT(INNER_ANGLE), SPOT_REQUIRED, "a spot light"}};
 

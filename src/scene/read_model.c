@@ -10,7 +10,7 @@ enum { FILE_KEY, UP, UNIT, POSITION, ROTATION, SCALE, FOLDER, HEIGHTFIELD, COLOR
 
 static const char *const model_names[] = {"file",  "up",     "unit",        "position", "rotation",
                                           "scale", "folder", "heightfield", "color"};
-static const nb_keys model_keys = {model_names, MODEL_KEY_COUNT, NB_BIT(MODEL_KEY_COUNT) - 1, 0, "a model"};
+static const nb_key_set model_keys = {model_names, MODEL_KEY_COUNT, NB_BIT(MODEL_KEY_COUNT) - 1, 0, "a model"};
 
 static const nb_model_source unplaced = {.space = {false, 1}, .rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
 
@@ -59,7 +59,7 @@ static bool read_heightfield(nb_scene_reader *in, const nb_json_node *node, nb_m
 {
     enum { HEIGHTFIELD_FILE, SIZE, HEIGHT, COUNT };
     static const char *const names[] = {"file", "size", "height"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a heightfield"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a heightfield"};
     const nb_json_node *found[COUNT];
     model->is_heightfield = true;
     return nb_value_members(in->json, node, &keys, found) && read_file(in, found[HEIGHTFIELD_FILE], model) &&
@@ -80,7 +80,7 @@ static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_no
     return true;
 }
 
-bool nb_read_up(nb_json *json, const nb_json_node *node, nb_space *space)
+bool nb_read_up(nb_json *json, const nb_json_node *node, nb_file_units *space)
 {
     static const char *const names[] = {"y", "z"};
     if (node == NULL) return true;
@@ -89,13 +89,13 @@ bool nb_read_up(nb_json *json, const nb_json_node *node, nb_space *space)
     return choice >= 0;
 }
 
-bool nb_read_unit(nb_json *json, const nb_json_node *node, nb_space *space)
+bool nb_read_unit(nb_json *json, const nb_json_node *node, nb_file_units *space)
 {
     static const nb_range range = {.low = 1e-9, .high = 1e18, .text = "a number of metres from 1e-9 to 1e18"};
     return nb_value_number(json, node, &range, &space->unit);
 }
 
-static void convert_model(const nb_space *space, nb_model_source *model)
+static void convert_model(const nb_file_units *space, nb_model_source *model)
 {
     nb_space_convert_placement(space, model->position, model->rotation, model->scale);
     for (int i = 0; i < 2; i++) model->size[i] *= space->unit;
@@ -163,9 +163,9 @@ bool nb_read_model(nb_scene_reader *in, const nb_json_node *node)
 
 /* ---- points ---------------------------------------------------------------------------------- */
 
-static const nb_keys points_keys = {model_names, MODEL_KEY_COUNT,
-                                    NB_BIT(MODEL_KEY_COUNT) - 1 - NB_BIT(HEIGHTFIELD) - NB_BIT(COLOR), NB_BIT(FILE_KEY),
-                                    "a set of points"};
+static const nb_key_set points_keys = {model_names, MODEL_KEY_COUNT,
+                                       NB_BIT(MODEL_KEY_COUNT) - 1 - NB_BIT(HEIGHTFIELD) - NB_BIT(COLOR),
+                                       NB_BIT(FILE_KEY), "a set of points"};
 
 /* A copy of the points that lives as long as the scene. */
 static bool keep_points(nb_scene_reader *in, const nb_json_node *node, const nb_point_set *points,

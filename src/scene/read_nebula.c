@@ -26,7 +26,7 @@ static const char *const key_names[] = {"name",     "shape",  "points",     "den
                                         "fade",     "seed",   "profile",    "size",           "absorption",
                                         "emission", "colors", "turbulence", "turbulence_size"};
 
-static const nb_keys nebula_keys = {key_names, NEBULA_KEY_COUNT, NB_BIT(NEBULA_KEY_COUNT) - 1, 0, "a nebula"};
+static const nb_key_set nebula_keys = {key_names, NEBULA_KEY_COUNT, NB_BIT(NEBULA_KEY_COUNT) - 1, 0, "a nebula"};
 
 #define MOST_PARTICLES 1000000
 #define MOST_COLORS 64

@@ -180,7 +180,7 @@ static nebel_result read_nodes(nodes_reader *nodes, const nb_bytes *text)
 static nebel_result read_inside(nb_scene_reader *in, nb_model_source *model, const nb_bytes *text)
 {
     nb_json *const outer = in->json;
-    const nb_space space = in->space;
+    const nb_file_units space = in->space;
     nodes_reader nodes = {.in = in, .model = model, .place = nb_model_place(model)};
     in->space = NB_SPACE_OURS;
     const nebel_result result = read_nodes(&nodes, text);

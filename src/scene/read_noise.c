@@ -9,8 +9,8 @@ enum { TYPE, SIZE, CELLS, OCTAVES, GAIN, COVERAGE, EDGE, DRIFT, CHANGE, SEED, NO
 static const char *const key_names[] = {"type",     "size", "cells", "octaves", "gain",
                                         "coverage", "edge", "drift", "change",  "seed"};
 
-static const nb_keys noise_keys = {key_names, NOISE_KEY_COUNT, NB_BIT(NOISE_KEY_COUNT) - 1,
-                                   NB_BIT(SIZE) | NB_BIT(CELLS), "noise"};
+static const nb_key_set noise_keys = {key_names, NOISE_KEY_COUNT, NB_BIT(NOISE_KEY_COUNT) - 1,
+                                      NB_BIT(SIZE) | NB_BIT(CELLS), "noise"};
 
 /* Further than this per frame nothing is left of the frame before. */
 #define MOST_MOTION 1000

@@ -17,7 +17,7 @@ static const char *const air_names[] = {"type", "scattering", "absorption", "pha
 
 #define AIR_KEYS (NB_BIT(TYPE) | NB_BIT(SCATTERING) | NB_BIT(ABSORPTION) | NB_BIT(PHASE))
 
-static const nb_keys air_keys[NEBEL_COMPONENT_PROFILE_COUNT] = {
+static const nb_key_set air_keys[NEBEL_COMPONENT_PROFILE_COUNT] = {
     [NEBEL_COMPONENT_EXPONENTIAL] = {air_names, AIR_KEY_COUNT, AIR_KEYS | NB_BIT(SCALE_HEIGHT),
                                      NB_BIT(TYPE) | NB_BIT(SCALE_HEIGHT), "air that thins out"},
     [NEBEL_COMPONENT_TENT] = {air_names, AIR_KEY_COUNT, AIR_KEYS | NB_BIT(MIDDLE) | NB_BIT(WIDTH),
@@ -85,8 +85,8 @@ enum {
 
 static const char *const planet_names[] = {"model", "preset",        "center",  "radius",       "gravity", "thickness",
                                            "airs",  "ground_albedo", "quality", "sun_diameter", "clouds"};
-static const nb_keys planet_keys = {planet_names, PLANET_KEY_COUNT, NB_BIT(PLANET_KEY_COUNT) - 1, NB_BIT(MODEL),
-                                    "a physical planet"};
+static const nb_key_set planet_keys = {planet_names, PLANET_KEY_COUNT, NB_BIT(PLANET_KEY_COUNT) - 1, NB_BIT(MODEL),
+                                       "a physical planet"};
 
 /* The sun in degrees, as seen from there: Earth's and Mars's mean distances from the sun, whose diameter is 1.3927e9 m. Gravity in
  * m/s^2: NASA's fact sheets; of the toy the Earth's. */
@@ -150,7 +150,7 @@ static bool is_text(const nb_json_node *node, const char *text)
            memcmp(node->string, text, node->string_size) == 0;
 }
 
-static void find_center(const nb_json *json, const nb_json_node *node, nb_ball *ball)
+static void find_center(const nb_json *json, const nb_json_node *node, nb_ground_sphere *ball)
 {
     int i = 0;
     for (const nb_json_node *one = nb_json_first(json, node); one != NULL && i < 3; one = nb_json_next(json, one))
@@ -158,9 +158,9 @@ static void find_center(const nb_json *json, const nb_json_node *node, nb_ball *
     ball->has_center = i == 3;
 }
 
-nb_ball nb_find_ball(const nb_json *json, const nb_json_node *planet)
+nb_ground_sphere nb_find_ball(const nb_json *json, const nb_json_node *planet)
 {
-    nb_ball ball = {.preset_radius = nebel_lookup_atmosphere(presets[0].name)->radius};
+    nb_ground_sphere ball = {.preset_radius = nebel_lookup_atmosphere(presets[0].name)->radius};
     const nb_json_node *const first =
         planet != NULL && planet->type == NB_JSON_ARRAY ? nb_json_first(json, planet) : planet;
     if (first == NULL || first->type != NB_JSON_OBJECT) return ball;

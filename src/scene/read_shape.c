@@ -36,7 +36,7 @@ static const char *const type_names[] = {"world",   "half_space", "box",    "sph
         key_names, SHAPE_KEY_COUNT, (required) | NB_BIT(TYPE) | NB_BIT(TRANSFORM), (required), owner                   \
     }
 
-static const nb_keys shape_keys[NEBEL_SHAPE_COUNT] = {
+static const nb_key_set shape_keys[NEBEL_SHAPE_COUNT] = {
     SHAPE_KEYS(0, "a shape \"world\""),
     SHAPE_KEYS(NB_BIT(POINT) | NB_BIT(NORMAL), "a half space"),
     SHAPE_KEYS(NB_BIT(MIN) | NB_BIT(MAX), "a box"),
@@ -56,7 +56,7 @@ static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transf
 {
     enum { POSITION, ROTATION, SCALE, COUNT };
     static const char *const names[] = {"position", "rotation", "scale"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a transform"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a transform"};
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
     return nb_value_members(json, node, &keys, found) && nb_value_place(json, found[POSITION], transform->position) &&
@@ -235,7 +235,7 @@ bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *s
 bool nb_read_shape_key(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
 {
     const nb_json_node *found[SHAPE_KEY_COUNT];
-    nb_keys keys = shape_keys[shape->type];
+    nb_key_set keys = shape_keys[shape->type];
     keys.allowed &= ~(NB_BIT(TYPE) | NB_BIT(PLANES) | NB_BIT(SHAPES));
     keys.required = 0;
     return node == NULL || (nb_value_members(in->json, node, &keys, found) && read_members(in->json, found, shape) &&

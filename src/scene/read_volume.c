@@ -38,11 +38,11 @@ static const char *const key_names[] = {"name",       "shape",          "operati
 #define MOVING_KEYS (FOG_KEYS - STILL_KEYS + NB_BIT(FRAME))
 
 /* In the order of nebel_operation. */
-static const nb_keys volume_keys[] = {
+static const nb_key_set volume_keys[] = {
     {key_names, VOLUME_KEY_COUNT, FOG_KEYS, NB_BIT(SHAPE), "a volume"},
     {key_names, VOLUME_KEY_COUNT, EXCLUDE_KEYS, NB_BIT(SHAPE), "a volume with \"operation\": \"exclude\""},
     {key_names, VOLUME_KEY_COUNT, FOG_KEYS, NB_BIT(SHAPE), "a volume"}};
-static const nb_keys moving_keys[] = {
+static const nb_key_set moving_keys[] = {
     {key_names, VOLUME_KEY_COUNT, MOVING_KEYS, NB_BIT(FRAME), "a key of fog"},
     {key_names, VOLUME_KEY_COUNT, NB_BIT(FRAME) | NB_BIT(SHAPE), NB_BIT(FRAME), "a key of excluded fog"},
     {key_names, VOLUME_KEY_COUNT, MOVING_KEYS, NB_BIT(FRAME), "a key of fog"}};
@@ -247,7 +247,7 @@ static bool read_key(nb_scene_reader *in, const nb_json_node *node, const nb_jso
 }
 
 /* The parts are those of the volume, which are converted with it, once. */
-static void convert_key(const nb_space *space, nebel_volume_desc *volume)
+static void convert_key(const nb_file_units *space, nebel_volume_desc *volume)
 {
     const size_t planes = volume->shape.plane_count, parts = volume->shape.part_count;
     volume->shape.plane_count = volume->shape.part_count = 0;
@@ -334,7 +334,7 @@ static bool read_members(nb_scene_reader *in, const nb_json_node *node, nebel_vo
     if (!nb_value_is(in->json, node, NB_JSON_OBJECT, "a volume {\"shape\": ...}") ||
         !read_operation(in->json, node, prefix, &volume->operation))
         return false;
-    nb_keys keys = volume_keys[volume->operation];
+    nb_key_set keys = volume_keys[volume->operation];
     if (in->node == NULL)
         return nb_value_members(in->json, node, &keys, found) && nb_read_shape(in, found[SHAPE], &volume->shape);
     keys.allowed &= ~NB_BIT(KEYS);
@@ -379,7 +379,7 @@ static bool keep_opacity(nb_scene_reader *in, const nb_json_node *node, double m
 static bool read_imported(nb_scene_reader *in, const nb_json_node *node)
 {
     static const char *const names[] = {"name", "import", "source"};
-    static const nb_keys keys = {names, 3, 7, 2, "imported fog"};
+    static const nb_key_set keys = {names, 3, 7, 2, "imported fog"};
     const nb_json_node *found[3];
     const char *name = "";
     nb_import fog = {.count = 0};

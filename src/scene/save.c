@@ -13,7 +13,7 @@ static nebel_result write_text(const char *path, const nebel_scene_desc *desc, c
     return result == NEBEL_OK ? nb_file_write(&allocator, &desc->log, path, bytes) : result;
 }
 
-static nebel_result save_text(const char *path, const nebel_scene_desc *desc, nb_save *save)
+static nebel_result save_text(const char *path, const nebel_scene_desc *desc, nb_key_patch *save)
 {
     nebel_scene *scene = NULL;
     nb_bytes bytes;
@@ -26,7 +26,7 @@ static nebel_result save_text(const char *path, const nebel_scene_desc *desc, nb
     return result;
 }
 
-static bool find_targets(nb_save *save)
+static bool find_targets(nb_key_patch *save)
 {
     const size_t before = save->before->volume_count, after = save->changed->volume_count;
     if (save->sources == NULL && before != after) return false;
@@ -41,7 +41,7 @@ static bool find_targets(nb_save *save)
     return true;
 }
 
-static nebel_result save_file(const char *path, const nebel_scene_desc *desc, nb_save *save)
+static nebel_result save_file(const char *path, const nebel_scene_desc *desc, nb_key_patch *save)
 {
     const nebel_allocator *allocator = &save->edit.arena.allocator;
     nb_bytes bytes;
@@ -63,11 +63,11 @@ nebel_result nebel_save_scene(const char *path, const nebel_scene_desc *desc, co
     if (path == NULL || desc == NULL || before == NULL || changed == NULL || !nb_allocator_is_valid(&desc->allocator))
         return NEBEL_ERROR_ARGUMENT;
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
-    nb_save save = {.before = before,
-                    .changed = changed,
-                    .sources = sources,
-                    .targets = nb_allocate(&allocator, before->volume_count, sizeof(size_t)),
-                    .edit = {.arena = {.allocator = allocator}}};
+    nb_key_patch save = {.before = before,
+                         .changed = changed,
+                         .sources = sources,
+                         .targets = nb_allocate(&allocator, before->volume_count, sizeof(size_t)),
+                         .edit = {.arena = {.allocator = allocator}}};
     nebel_result result = NEBEL_ERROR_MEMORY;
     if (save.targets == NULL)
         nb_fail(&desc->log, result, "%s: out of memory", path);

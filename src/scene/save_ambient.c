@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* In the place of the section, or where it would stand. */
-static void put(nb_save *save, const nb_json_node *node, const char *key, const char *words)
+static void put(nb_key_patch *save, const nb_json_node *node, const char *key, const char *words)
 {
     if (node != NULL)
         nb_edit_replace(&save->edit, node, words);
@@ -13,14 +13,14 @@ static void put(nb_save *save, const nb_json_node *node, const char *key, const 
         nb_edit_add(&save->edit, &save->root, key, words);
 }
 
-static void put_color(nb_save *save, const nb_json_node *node, const char *key, const double color[3])
+static void put_color(nb_key_patch *save, const nb_json_node *node, const char *key, const double color[3])
 {
     char words[NB_EDIT_NUMBERS];
     nb_edit_write_numbers(3, color, NB_EDIT_AMOUNT, words);
     put(save, node, key, words);
 }
 
-static void put_gradient(nb_save *save, const nb_json_node *node, const nebel_environment *now)
+static void put_gradient(nb_key_patch *save, const nb_json_node *node, const nebel_environment *now)
 {
     char zenith[NB_EDIT_NUMBERS], horizon[NB_EDIT_NUMBERS], ground[NB_EDIT_NUMBERS], words[4 * NB_EDIT_NUMBERS];
     nb_edit_write_numbers(3, now->zenith, NB_EDIT_AMOUNT, zenith);
@@ -31,7 +31,7 @@ static void put_gradient(nb_save *save, const nb_json_node *node, const nebel_en
     put(save, node, "ambient", words);
 }
 
-static void change_environment(nb_save *save, const nb_json *json, const nb_json_node *node)
+static void change_environment(nb_key_patch *save, const nb_json *json, const nb_json_node *node)
 {
     const nebel_environment *was = &save->before->environment, *now = &save->changed->environment;
     const nb_edit_object object = nb_edit_find(json, node);
@@ -47,7 +47,7 @@ static void change_environment(nb_save *save, const nb_json *json, const nb_json
 }
 
 /* A file whose ambient light has become of another type is refused at its end, as is a map that is new. */
-void nb_save_ambient(nb_save *save, const nb_scene_reader *in, const nb_json_node *node)
+void nb_save_ambient(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
 {
     const nebel_scene_data *was = save->before, *now = save->changed;
     const nebel_environment_type type = now->environment.type;
@@ -62,7 +62,7 @@ void nb_save_ambient(nb_save *save, const nb_scene_reader *in, const nb_json_nod
         put_color(save, node, "ambient", now->ambient);
 }
 
-void nb_save_background(nb_save *save, const nb_scene_reader *in, const nb_json_node *node)
+void nb_save_background(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
 {
     const nebel_scene_data *was = save->before, *now = save->changed;
     if (!was->shows_ambient && !now->shows_ambient)

@@ -10,7 +10,7 @@
 #member, offsetof(nebel_camera, member), count, NB_EDIT_EACH                                                   \
     }
 
-static const nb_place camera_places[] = {
+static const nb_key_entry camera_places[] = {
     CAMERA_PLACE(position, 3),     CAMERA_PLACE(look_at, 3),     CAMERA_PLACE(up, 3),
     CAMERA_PLACE(vertical_fov, 1), CAMERA_PLACE(view_height, 1), {NULL, 0, 0, NB_EDIT_EACH},
 };
@@ -35,7 +35,7 @@ static bool has_same_motion(const nebel_scene_data *a, const nebel_scene_data *b
 }
 
 /* Whole: what a key left out it took from a camera that may be another now. */
-static void write_key(nb_words *out, const nb_space *space, const nebel_camera_key *key)
+static void write_key(nb_json_writer *out, const nb_file_units *space, const nebel_camera_key *key)
 {
     nebel_camera own = key->camera;
     nb_space_restore_camera(space, &own);
@@ -51,7 +51,7 @@ static void write_key(nb_words *out, const nb_space *space, const nebel_camera_k
 }
 
 /* The member that says how the camera moves: its key is `word`; NULL: none, it stands still. */
-static const char *write_motion(nb_words *out, const nb_space *space, const nebel_scene_data *scene)
+static const char *write_motion(nb_json_writer *out, const nb_file_units *space, const nebel_scene_data *scene)
 {
     const double frames = scene->turntable_frames;
     if (scene->turntable_frames > 0) {
@@ -69,12 +69,12 @@ static const char *write_motion(nb_words *out, const nb_space *space, const nebe
     return "keys";
 }
 
-static void save_motion(nb_save *save, const nb_scene_reader *in, const nb_edit_object *camera)
+static void save_motion(nb_key_patch *save, const nb_scene_reader *in, const nb_edit_object *camera)
 {
     const nb_json *json = in->json;
     const nb_json_node *turntable = nb_edit_member(json, camera->node, "turntable");
     const nb_json_node *was = turntable != NULL ? turntable : nb_edit_member(json, camera->node, "keys");
-    nb_words out = {.save = save};
+    nb_json_writer out = {.save = save};
     const char *key = write_motion(&out, &in->space, save->changed), *words = nb_words_end(&out);
     if (words != NULL && key != NULL && was != NULL && nb_json_has_key(was, key))
         nb_edit_replace(&save->edit, was, words);
@@ -89,10 +89,10 @@ static void save_motion(nb_save *save, const nb_scene_reader *in, const nb_edit_
 
 /* In a file without a camera, or with one that says no more than how it moves. Without a look_at it would look ahead
  * from wherever it is. */
-static void write_camera(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, const nebel_camera *was,
-                         const nebel_camera *now)
+static void write_camera(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node,
+                         const nebel_camera *was, const nebel_camera *now)
 {
-    nb_words out = {.save = save}, motion = {.save = save};
+    nb_json_writer out = {.save = save}, motion = {.save = save};
     const char *key = write_motion(&motion, &in->space, save->changed), *words = nb_words_end(&motion);
     nb_words_put(&out, "{ ");
     if (was->projection != now->projection) {
@@ -122,7 +122,7 @@ static void write_camera(nb_save *save, const nb_scene_reader *in, const nb_json
     nb_release(&save->edit.arena.allocator, out.bytes.data);
 }
 
-static void change_camera(nb_save *save, const nb_scene_reader *in, const nb_edit_object *camera,
+static void change_camera(nb_key_patch *save, const nb_scene_reader *in, const nb_edit_object *camera,
                           const nebel_camera *was, const nebel_camera *now, bool has_moved)
 {
     nb_save_places(save, in->json, camera, camera_places, NB_ALL_PLACES, was, now);
@@ -139,7 +139,7 @@ static bool has_motion_alone(const nb_json *json, const nb_json_node *camera)
     return camera->count == 1 && (nb_json_has_key(first, "turntable") || nb_json_has_key(first, "keys"));
 }
 
-void nb_save_camera(nb_save *save, const nb_scene_reader *in)
+void nb_save_camera(nb_key_patch *save, const nb_scene_reader *in)
 {
     const nb_json_node *node = nb_edit_member(in->json, save->root.node, "camera");
     const nb_edit_object camera = nb_edit_find(in->json, node);

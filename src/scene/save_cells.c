@@ -13,7 +13,7 @@ static bool are_same_cells(const nebel_cells_desc *a, const nebel_cells_desc *b)
     return true;
 }
 
-static void change_cell(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, nebel_cell was,
+static void change_cell(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, nebel_cell was,
                         nebel_cell now)
 {
     const nb_edit_object cell = nb_edit_find(in->json, node);
@@ -38,7 +38,8 @@ static bool has_same_portals(const nebel_cells_desc *a, const nebel_cells_desc *
     return true;
 }
 
-static void write_portal(nb_words *out, const nb_space *space, const nebel_portal *portal, const char *const *names)
+static void write_portal(nb_json_writer *out, const nb_file_units *space, const nebel_portal *portal,
+                         const char *const *names)
 {
     nb_words_put(out, "{ \"cells\": [");
     nb_words_put_text(out, names[portal->cells[0]]);
@@ -54,11 +55,11 @@ static void write_portal(nb_words *out, const nb_space *space, const nebel_porta
     nb_words_put(out, "] }");
 }
 
-static void write_portals(nb_save *save, const nb_scene_reader *in, const nb_edit_object *section)
+static void write_portals(nb_key_patch *save, const nb_scene_reader *in, const nb_edit_object *section)
 {
     const nebel_cells_desc *now = save->changed->cells;
     const nb_json_node *node = nb_edit_member(in->json, section->node, "portals");
-    nb_words out = {.save = save};
+    nb_json_writer out = {.save = save};
     nb_words_put(&out, now->portals == NULL ? "\"derived\"" : "[");
     for (size_t i = 0; i < now->portal_count; i++) {
         if (i > 0) nb_words_put(&out, ", ");
@@ -74,14 +75,14 @@ static void write_portals(nb_save *save, const nb_scene_reader *in, const nb_edi
 }
 
 /* Portals name their cells: those of cells that are called otherwise now do, too. */
-static void rename_ends(nb_save *save, const nb_scene_reader *in, const nb_json_node *portals)
+static void rename_ends(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *portals)
 {
     const nb_json_node *portal = nb_json_first(in->json, portals);
     for (size_t i = 0; portal != NULL; portal = nb_json_next(in->json, portal), i++) {
         const nb_json_node *end = nb_json_first(in->json, nb_edit_member(in->json, portal, "cells"));
         for (int k = 0; k < 2; k++, end = nb_json_next(in->json, end)) {
             const size_t cell = save->changed->cells->portals[i].cells[k];
-            nb_words out = {.save = save};
+            nb_json_writer out = {.save = save};
             if (strcmp(save->before->cell_names[cell], save->changed->cell_names[cell]) == 0) continue;
             nb_words_put_text(&out, save->changed->cell_names[cell]);
             const char *words = nb_words_end(&out);
@@ -91,7 +92,7 @@ static void rename_ends(nb_save *save, const nb_scene_reader *in, const nb_json_
     }
 }
 
-static void save_portals(nb_save *save, const nb_scene_reader *in, const nb_edit_object *section)
+static void save_portals(nb_key_patch *save, const nb_scene_reader *in, const nb_edit_object *section)
 {
     const nb_json_node *node = nb_edit_member(in->json, section->node, "portals");
     if (!has_same_portals(save->before->cells, save->changed->cells))
@@ -102,14 +103,14 @@ static void save_portals(nb_save *save, const nb_scene_reader *in, const nb_edit
 
 /* ---- the section ----------------------------------------------------------------------------- */
 
-static void save_name(nb_save *save, const nb_json *json, const nb_json_node *node, size_t index)
+static void save_name(nb_key_patch *save, const nb_json *json, const nb_json_node *node, size_t index)
 {
     const nb_edit_object cell = nb_edit_find(json, node);
     const char *name = save->changed->cell_names[index];
     if (strcmp(save->before->cell_names[index], name) != 0) nb_edit_word(&save->edit, json, &cell, "name", name);
 }
 
-static void save_grouping(nb_save *save, const nb_json *json, const nb_edit_object *section, bool grouped)
+static void save_grouping(nb_key_patch *save, const nb_json *json, const nb_edit_object *section, bool grouped)
 {
     const nb_json_node *grouping = nb_edit_member(json, section->node, "grouping");
     const char *word = grouped ? "true" : "false";
@@ -119,7 +120,7 @@ static void save_grouping(nb_save *save, const nb_json *json, const nb_edit_obje
         nb_edit_add(&save->edit, section, "grouping", word);
 }
 
-bool nb_save_cells(nb_save *save, nb_scene_reader *in, const nb_json_node *node)
+bool nb_save_cells(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node)
 {
     const nebel_cells_desc *was = save->before->cells, *now = save->changed->cells;
     const nb_edit_object section = nb_edit_find(in->json, node);

@@ -11,12 +11,12 @@
 #member, offsetof(nebel_factor_desc, member), count, style                                                     \
     }
 
-static const nb_place factor_places[] = {
+static const nb_key_entry factor_places[] = {
     FACTOR_PLACE(start, 1, NB_EDIT_EACH),   FACTOR_PLACE(end, 1, NB_EDIT_EACH), FACTOR_PLACE(density, 1, NB_EDIT_EACH),
     FACTOR_PLACE(color, 3, NB_EDIT_AMOUNT), {NULL, 0, 0, NB_EDIT_EACH},
 };
 
-static nebel_factor_desc restore_factor(const nb_space *space, const nebel_factor_desc *factor)
+static nebel_factor_desc restore_factor(const nb_file_units *space, const nebel_factor_desc *factor)
 {
     nebel_factor_desc own = *factor;
     if (own.coordinate == NEBEL_COORDINATE_USER) return own;
@@ -26,7 +26,7 @@ static nebel_factor_desc restore_factor(const nb_space *space, const nebel_facto
     return own;
 }
 
-static void save_factor(nb_save *save, const nb_scene_reader *in, const nb_edit_object *section)
+static void save_factor(nb_key_patch *save, const nb_scene_reader *in, const nb_edit_object *section)
 {
     nebel_factor_desc was = restore_factor(&in->space, save->before->classic);
     const nebel_factor_desc now = restore_factor(&in->space, save->changed->classic);
@@ -39,7 +39,7 @@ static void save_factor(nb_save *save, const nb_scene_reader *in, const nb_edit_
     if (was.stage != now.stage) nb_edit_word(&save->edit, in->json, section, "stage", nb_stage_names[now.stage]);
 }
 
-static void put_factor(nb_words *out, const nebel_factor_desc *own)
+static void put_factor(nb_json_writer *out, const nebel_factor_desc *own)
 {
     for (size_t i = 0; factor_places[i].key != NULL; i++) {
         nb_words_put_text(out, factor_places[i].key);
@@ -56,7 +56,7 @@ static void put_factor(nb_words *out, const nebel_factor_desc *own)
 
 /* ---- response curves ------------------------------------------------------------------------- */
 
-static void put_table(nb_words *out, const float *table)
+static void put_table(nb_json_writer *out, const float *table)
 {
     for (size_t i = 0; i < NEBEL_CURVE_ENTRIES; i++) {
         const double weight = (double)table[i];
@@ -75,7 +75,7 @@ static int has_same_curve(const nebel_scene_data *a, const nebel_scene_data *b)
 
 /* ---- Direct3D 9 ------------------------------------------------------------------------------ */
 
-static void put_number(nb_words *out, const char *key, double number)
+static void put_number(nb_json_writer *out, const char *key, double number)
 {
     nb_words_put(out, ", ");
     nb_words_put_text(out, key);
@@ -83,7 +83,7 @@ static void put_number(nb_words *out, const char *key, double number)
     nb_words_put_numbers(out, 1, &number, NB_EDIT_EACH);
 }
 
-static void put_d3d9(nb_words *out, const nb_space *space, const nebel_scene_data *scene)
+static void put_d3d9(nb_json_writer *out, const nb_file_units *space, const nebel_scene_data *scene)
 {
     const nebel_d3d9_fog *const d3d9 = scene->classic_d3d9;
     const double unit = nb_device_unit(scene, d3d9, space->unit);
@@ -115,8 +115,8 @@ static int has_same_d3d9(const nebel_scene_data *a, const nebel_scene_data *b)
 
 /* ---- the section ----------------------------------------------------------------------------- */
 
-static void set_member(nb_save *save, const nb_json *json, const nb_edit_object *section, const char *key,
-                       nb_words *value)
+static void set_member(nb_key_patch *save, const nb_json *json, const nb_edit_object *section, const char *key,
+                       nb_json_writer *value)
 {
     const nb_json_node *node = nb_edit_member(json, section->node, key);
     const char *words = nb_words_end(value);
@@ -126,10 +126,10 @@ static void set_member(nb_save *save, const nb_json *json, const nb_edit_object 
 }
 
 /* A new curve, and whether there is a table, which excludes the other key. */
-static void save_curve(nb_save *save, const nb_json *json, const nb_edit_object *section, nb_lost_keys *lost)
+static void save_curve(nb_key_patch *save, const nb_json *json, const nb_edit_object *section, nb_removed_keys *lost)
 {
     const nebel_scene_data *now = save->changed;
-    nb_words words = {.save = save};
+    nb_json_writer words = {.save = save};
     if (has_same_curve(save->before, now)) return;
     nb_save_lose(lost, now->classic_curve == NEBEL_CURVE_TABLE ? "curve" : "table");
     if (now->classic_curve != NEBEL_CURVE_TABLE) {
@@ -140,9 +140,10 @@ static void save_curve(nb_save *save, const nb_json *json, const nb_edit_object 
     set_member(save, json, section, "table", &words);
 }
 
-static void save_d3d9(nb_save *save, const nb_scene_reader *in, const nb_edit_object *section, nb_lost_keys *lost)
+static void save_d3d9(nb_key_patch *save, const nb_scene_reader *in, const nb_edit_object *section,
+                      nb_removed_keys *lost)
 {
-    nb_words words = {.save = save};
+    nb_json_writer words = {.save = save};
     if (has_same_d3d9(save->before, save->changed)) return;
     if (save->changed->classic_d3d9 == NULL) {
         nb_save_lose(lost, "d3d9");
@@ -153,7 +154,7 @@ static void save_d3d9(nb_save *save, const nb_scene_reader *in, const nb_edit_ob
 }
 
 /* All of it, where there was nothing to be changed. */
-static void put_section(nb_words *out, const nb_space *space, const nebel_scene_data *now)
+static void put_section(nb_json_writer *out, const nb_file_units *space, const nebel_scene_data *now)
 {
     const nebel_factor_desc own = restore_factor(space, now->classic);
     nb_words_put(out, "{ ");
@@ -172,12 +173,12 @@ static void put_section(nb_words *out, const nb_space *space, const nebel_scene_
     nb_words_put(out, " }");
 }
 
-void nb_save_classic(nb_save *save, const nb_scene_reader *in, const nb_json_node *node)
+void nb_save_classic(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
 {
     const nb_edit_object section = nb_edit_find(in->json, node);
-    nb_lost_keys lost = {{NULL}};
+    nb_removed_keys lost = {{NULL}};
     if (section.last_end == 0) {
-        nb_words words = {.save = save};
+        nb_json_writer words = {.save = save};
         put_section(&words, &in->space, save->changed);
         const char *text = nb_words_end(&words);
         if (text != NULL) nb_edit_replace(&save->edit, node, text);
@@ -190,9 +191,9 @@ void nb_save_classic(nb_save *save, const nb_scene_reader *in, const nb_json_nod
     nb_edit_remove_members(&save->edit, in->json, node, lost.names);
 }
 
-void nb_save_add_classic(nb_save *save, const nb_space *space)
+void nb_save_add_classic(nb_key_patch *save, const nb_file_units *space)
 {
-    nb_words words = {.save = save};
+    nb_json_writer words = {.save = save};
     put_section(&words, space, save->changed);
     const char *text = nb_words_end(&words);
     if (text != NULL) nb_edit_add(&save->edit, &save->root, "classic", text);

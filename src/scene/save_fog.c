@@ -16,7 +16,7 @@ static bool is_clear(const double extinction[3])
 }
 
 /* In the place of another word for the amount. */
-static void replace_amount(nb_save *save, const nb_json_node *was, const char *key, const double numbers[3])
+static void replace_amount(nb_key_patch *save, const nb_json_node *was, const char *key, const double numbers[3])
 {
     char words[NB_EDIT_NUMBERS + 32], *const text = words + snprintf(words, 32, "\"%s\": ", key);
     nb_edit_write_numbers(3, numbers, NB_EDIT_AMOUNT, text);
@@ -29,8 +29,8 @@ static void find_lengths(double scale, const double extinction[3], double length
 }
 
 /* Visibility, whose meaning its contrast is. */
-static void save_visibility(nb_save *save, const nb_json *json, const nb_edit_object *volume, const nb_json_node *word,
-                            const nb_written_volume *was, const nb_written_volume *now)
+static void save_visibility(nb_key_patch *save, const nb_json *json, const nb_edit_object *volume,
+                            const nb_json_node *word, const nb_written_volume *was, const nb_written_volume *now)
 {
     double from[3], to[3];
     find_lengths(-log(was->entry.contrast), was->volume.extinction, from);
@@ -45,7 +45,7 @@ static void save_visibility(nb_save *save, const nb_json *json, const nb_edit_ob
 }
 
 /* Where the file leaves the amount to a preset. */
-static void add_amount(nb_save *save, const nb_edit_object *volume, const nb_written_volume *now)
+static void add_amount(nb_key_patch *save, const nb_edit_object *volume, const nb_written_volume *now)
 {
     const double *extinction = now->volume.extinction;
     const bool is_plain = now->entry.contrast == nb_volume_entry_default().contrast || is_clear(extinction);
@@ -60,8 +60,8 @@ static void add_amount(nb_save *save, const nb_edit_object *volume, const nb_wri
 }
 
 /* The file's own word for the amount stays, unless it has none for an extinction of 0 or for a contrast. */
-static void save_amount(nb_save *save, const nb_json *json, const nb_edit_object *volume, const nb_written_volume *was,
-                        const nb_written_volume *now)
+static void save_amount(nb_key_patch *save, const nb_json *json, const nb_edit_object *volume,
+                        const nb_written_volume *was, const nb_written_volume *now)
 {
     const nb_json_node *visibility = nb_edit_member(json, volume->node, "visibility");
     const nb_json_node *path = nb_edit_member(json, volume->node, "mean_free_path");
@@ -100,10 +100,10 @@ static bool has_changed_to(const double was[3], const double now[3])
 }
 
 /* What the volume is now needs no such key, and the file may have it. */
-static nb_lost_keys find_lost_keys(const nb_written_volume *was, const nb_written_volume *now)
+static nb_removed_keys find_lost_keys(const nb_written_volume *was, const nb_written_volume *now)
 {
     const nebel_volume_desc *a = &was->volume, *b = &now->volume;
-    nb_lost_keys lost = {{NULL}};
+    nb_removed_keys lost = {{NULL}};
     if (b->cutoff == 0 && a->cutoff != 0) nb_save_lose(&lost, "cutoff");
     if (is_clear(b->extinction) && memcmp(a->extinction, b->extinction, sizeof a->extinction) != 0)
         nb_save_lose(&lost, "contrast");
@@ -116,7 +116,7 @@ static nb_lost_keys find_lost_keys(const nb_written_volume *was, const nb_writte
     return lost;
 }
 
-static unsigned find_mask(const nb_lost_keys *lost)
+static unsigned find_mask(const nb_removed_keys *lost)
 {
     unsigned mask = NB_ALL_PLACES;
     for (size_t i = 0; lost->names[i] != NULL; i++)
@@ -130,8 +130,8 @@ static bool is_same_phase(const nebel_phase *a, const nebel_phase *b)
     return a->type == b->type && a->g == b->g && a->alpha == b->alpha && a->diameter == b->diameter;
 }
 
-static void save_phase(nb_save *save, const nb_json *json, const nb_edit_object *volume, const nb_written_volume *was,
-                       const nb_written_volume *now)
+static void save_phase(nb_key_patch *save, const nb_json *json, const nb_edit_object *volume,
+                       const nb_written_volume *was, const nb_written_volume *now)
 {
     const nebel_phase *to = &now->volume.phase;
     const nb_json_node *node = nb_edit_member(json, volume->node, "phase");
@@ -149,7 +149,7 @@ static void save_phase(nb_save *save, const nb_json *json, const nb_edit_object 
 }
 
 /* Numbers of the volume alone; false where any of them is another one. */
-static bool has_same_places(const nb_place *places, unsigned mask, const void *a, const void *b)
+static bool has_same_places(const nb_key_entry *places, unsigned mask, const void *a, const void *b)
 {
     for (size_t i = 0; places[i].key != NULL; i++)
         if ((mask >> i & 1) != 0 && nb_place_differs(a, b, &places[i])) return false;
@@ -183,7 +183,7 @@ static void find_gap(const nb_edit *edit, const nb_json *json, const nb_json_nod
 }
 
 /* Keys that are as they were keep their words, as long as what they leave out is what it was. */
-static void find_kept_keys(const nb_save *save, const nb_json *json, const nb_json_node *array,
+static void find_kept_keys(const nb_key_patch *save, const nb_json *json, const nb_json_node *array,
                            const nb_written_volume *was, const nb_written_volume *now, nb_bytes *kept)
 {
     const nb_json_node *node = array != NULL ? nb_json_first(json, array) : NULL;
@@ -204,7 +204,7 @@ static bool has_same_keys(const nb_written_volume *was, const nb_written_volume 
 }
 
 /* `was` and `now` are in metres. */
-static void save_keys(nb_save *save, const nb_scene_reader *in, const nb_edit_object *volume,
+static void save_keys(nb_key_patch *save, const nb_scene_reader *in, const nb_edit_object *volume,
                       const nb_written_volume *was, const nb_written_volume *now)
 {
     const nb_json_node *node = nb_edit_member(in->json, volume->node, "keys");
@@ -229,7 +229,7 @@ static void save_keys(nb_save *save, const nb_scene_reader *in, const nb_edit_ob
 }
 
 /* A key may have an albedo where the volume says that it has one, be it 0. */
-static void save_lit_keys(nb_save *save, const nb_json *json, const nb_edit_object *volume,
+static void save_lit_keys(nb_key_patch *save, const nb_json *json, const nb_edit_object *volume,
                           const nb_written_volume *now)
 {
     if (is_zero(now->volume.albedo) && nb_save_has_lit_key(&now->entry) &&
@@ -238,11 +238,11 @@ static void save_lit_keys(nb_save *save, const nb_json *json, const nb_edit_obje
 }
 
 /* In the file's numbers. */
-static void save_fog(nb_save *save, const nb_json *json, const nb_edit_object *volume, const nb_written_volume *was,
-                     const nb_written_volume *now)
+static void save_fog(nb_key_patch *save, const nb_json *json, const nb_edit_object *volume,
+                     const nb_written_volume *was, const nb_written_volume *now)
 {
     const nebel_volume_desc *a = &was->volume, *b = &now->volume;
-    const nb_lost_keys lost = find_lost_keys(was, now);
+    const nb_removed_keys lost = find_lost_keys(was, now);
     nb_save_density(save, json, volume->node, &a->density, &b->density);
     nb_save_integer(save, json, volume, "priority", a->priority, b->priority);
     nb_save_places(save, json, volume, nb_volume_places, find_mask(&lost), a, b);
@@ -264,7 +264,7 @@ static nb_written_volume find_written(const nebel_scene_data *scene, size_t inde
 }
 
 /* Without entries of its own a volume has those that it had. */
-static nb_written_volume find_wanted(const nb_save *save, size_t index, size_t target)
+static nb_written_volume find_wanted(const nb_key_patch *save, size_t index, size_t target)
 {
     nb_written_volume wanted = find_written(save->changed, target);
     if (save->changed->volume_tracks != NULL) return wanted;
@@ -274,7 +274,7 @@ static nb_written_volume find_wanted(const nb_save *save, size_t index, size_t t
     return wanted;
 }
 
-static void change_volume(nb_save *save, const nb_scene_reader *in, const nb_json_node *node,
+static void change_volume(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node,
                           const nb_written_volume *from, const nb_written_volume *to)
 {
     const nb_json *json = in->json;
@@ -289,7 +289,7 @@ static void change_volume(nb_save *save, const nb_scene_reader *in, const nb_jso
 }
 
 /* The words of a whole volume; NULL, with a note in the edit, when memory is out. */
-static char *write_volume(nb_save *save, const nb_scene_reader *in, const nb_written_volume *volume)
+static char *write_volume(nb_key_patch *save, const nb_scene_reader *in, const nb_written_volume *volume)
 {
     nb_bytes text;
     if (nb_save_write_volume(&save->edit.arena.allocator, &in->space, volume, &text)) return (char *)text.data;
@@ -297,7 +297,7 @@ static char *write_volume(nb_save *save, const nb_scene_reader *in, const nb_wri
     return NULL;
 }
 
-static void replace_volume(nb_save *save, const nb_scene_reader *in, const nb_json_node *node,
+static void replace_volume(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node,
                            const nb_written_volume *volume)
 {
     char *words = write_volume(save, in, volume);
@@ -306,7 +306,7 @@ static void replace_volume(nb_save *save, const nb_scene_reader *in, const nb_js
 }
 
 /* An entry that stands for itself: what other programs' settings become stays. */
-static bool save_entry(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
+static bool save_entry(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
     const size_t target = save->targets[index];
     const nebel_volume_origin origin = in->scene->volume_origins[index];
@@ -321,7 +321,7 @@ static bool save_entry(nb_save *save, nb_scene_reader *in, const nb_json_node *n
     return nb_save_keep_span(save, in, &save->volumes, node, goes && origin != NEBEL_VOLUME_IMPORTED);
 }
 
-bool nb_save_volume(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t first)
+bool nb_save_volume(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t first)
 {
     for (size_t i = first; i < in->scene->data.volume_count; i++)
         if (i >= save->before->volume_count || !is_same_kind(&in->scene->volumes[i], &save->before->volumes[i]))
@@ -331,7 +331,7 @@ bool nb_save_volume(nb_save *save, nb_scene_reader *in, const nb_json_node *node
     return save_entry(save, in, node, first);
 }
 
-bool nb_save_check_removed(const nb_save *save, const nb_scene_reader *in, const nb_json_node *root)
+bool nb_save_check_removed(const nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *root)
 {
     for (size_t i = 0; i < in->scene->data.volume_count; i++) {
         const nebel_volume_origin origin = in->scene->volume_origins[i];
@@ -347,7 +347,7 @@ bool nb_save_check_removed(const nb_save *save, const nb_scene_reader *in, const
 /* ---- new fog --------------------------------------------------------------------------------- */
 
 /* Behind the last entry that stays, on a line of its own where that one is; in an empty array behind its bracket. */
-static void add_entry(nb_save *save, const nb_json_node *array, const char *words)
+static void add_entry(nb_key_patch *save, const nb_json_node *array, const char *words)
 {
     const nb_edit_span *last = NULL;
     char gap[64] = " ";
@@ -368,7 +368,7 @@ static void add_entry(nb_save *save, const nb_json_node *array, const char *word
     nb_edit_put(&save->edit, last->end, 0, words);
 }
 
-void nb_save_entries(nb_save *save, const nb_scene_reader *in, const nb_json_node *array)
+void nb_save_entries(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *array)
 {
     const nebel_allocator *allocator = &save->edit.arena.allocator;
     for (size_t i = 0; i < save->changed->volume_count; i++) {

@@ -11,7 +11,8 @@ static bool is_same_nebula(const nebel_nebula_desc *a, const nebel_nebula_desc *
 }
 
 /* Text of its own for any number of them: some twenty bytes for each number. */
-static void write_colors(nb_save *save, const nb_json *json, const nb_edit_object *nebula, const nebel_nebula_desc *now)
+static void write_colors(nb_key_patch *save, const nb_json *json, const nb_edit_object *nebula,
+                         const nebel_nebula_desc *now)
 {
     const nebel_allocator *allocator = &save->edit.arena.allocator;
     const nb_json_node *node = nb_edit_member(json, nebula->node, "colors");
@@ -35,8 +36,8 @@ static void write_colors(nb_save *save, const nb_json *json, const nb_edit_objec
     nb_release(allocator, words);
 }
 
-static void save_colors(nb_save *save, const nb_json *json, const nb_edit_object *nebula, const nebel_nebula_desc *was,
-                        const nebel_nebula_desc *now)
+static void save_colors(nb_key_patch *save, const nb_json *json, const nb_edit_object *nebula,
+                        const nebel_nebula_desc *was, const nebel_nebula_desc *now)
 {
     if (now->color_count == 0) return;
     if (was->color_count != now->color_count) {
@@ -52,7 +53,7 @@ static void save_colors(nb_save *save, const nb_json *json, const nb_edit_object
     }
 }
 
-static void save_points(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, nebel_transform was,
+static void save_points(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, nebel_transform was,
                         nebel_transform now)
 {
     const nb_edit_object points = nb_edit_find(in->json, nb_edit_member(in->json, node, "points"));
@@ -62,13 +63,13 @@ static void save_points(nb_save *save, const nb_scene_reader *in, const nb_json_
     nb_save_places(save, in->json, &points, nb_transform_places, NB_ALL_PLACES, &was, &now);
 }
 
-static void change_nebula(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, size_t index)
+static void change_nebula(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
     const nb_json *json = in->json;
     nebel_nebula_desc was = save->before->nebulae[index], now = save->changed->nebulae[index];
     const nb_edit_object nebula = nb_edit_find(json, node);
     const bool loses_size = now.turbulence_scale == 0;
-    nb_lost_keys lost = {{NULL}};
+    nb_removed_keys lost = {{NULL}};
     if (loses_size) nb_save_lose(&lost, "turbulence_size");
     if (now.color_count == 0) nb_save_lose(&lost, "colors");
     nb_save_shape(save, in, nb_edit_member(json, node, "shape"), &was.shape, &now.shape);
@@ -90,7 +91,7 @@ static void change_nebula(nb_save *save, const nb_scene_reader *in, const nb_jso
     nb_edit_remove_members(&save->edit, json, node, lost.names);
 }
 
-bool nb_save_nebula(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
+bool nb_save_nebula(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
     if (index >= save->before->nebula_count ||
         !is_same_nebula(&in->scene->nebulae[index], &save->before->nebulae[index]))

@@ -12,7 +12,7 @@
         NULL, 0, 0, NB_EDIT_EACH                                                                                       \
     }
 
-const nb_place nb_volume_places[] = {
+const nb_key_entry nb_volume_places[] = {
     PLACE(nebel_volume_desc, source, 3, NB_EDIT_AMOUNT),   PLACE(nebel_volume_desc, albedo, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_volume_desc, emission, 3, NB_EDIT_AMOUNT), PLACE(nebel_volume_desc, start, 1, NB_EDIT_EACH),
     PLACE(nebel_volume_desc, cutoff, 1, NB_EDIT_EACH),     END,
@@ -21,7 +21,7 @@ const nb_place nb_volume_places[] = {
 enum { MIN = 1, MAX = 2, CENTER = 4, RADIUS = 8, RADII = 16, FROM = 32, TO = 64, RADIUS_FROM = 128, RADIUS_TO = 256 };
 enum { POINT = 512, NORMAL = 1024 };
 
-const nb_place nb_shape_places[] = {
+const nb_key_entry nb_shape_places[] = {
     PLACE(nebel_shape, min, 3, NB_EDIT_EACH),       PLACE(nebel_shape, max, 3, NB_EDIT_EACH),
     PLACE(nebel_shape, center, 3, NB_EDIT_EACH),    PLACE(nebel_shape, radius, 1, NB_EDIT_EACH),
     PLACE(nebel_shape, radii, 3, NB_EDIT_EACH),     PLACE(nebel_shape, from, 3, NB_EDIT_EACH),
@@ -40,7 +40,7 @@ const unsigned nb_shape_masks[NEBEL_SHAPE_COUNT] = {
     [NEBEL_SHAPE_CONE] = FROM | TO | RADIUS_FROM | RADIUS_TO,
 };
 
-const nb_place nb_transform_places[] = {
+const nb_key_entry nb_transform_places[] = {
     PLACE(nebel_transform, position, 3, NB_EDIT_EACH),
     PLACE(nebel_transform, rotation, 4, NB_EDIT_WHOLE),
     PLACE(nebel_transform, scale, 3, NB_EDIT_AMOUNT),
@@ -49,7 +49,7 @@ const nb_place nb_transform_places[] = {
 
 const nebel_transform nb_plain_transform = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
 
-const nb_place nb_density_places[] = {
+const nb_key_entry nb_density_places[] = {
     PLACE(nebel_density, base, 1, NB_EDIT_EACH),
     PLACE(nebel_density, scale_height, 1, NB_EDIT_EACH),
     PLACE(nebel_density, from, 3, NB_EDIT_EACH),
@@ -69,7 +69,7 @@ const unsigned nb_density_masks[NEBEL_DENSITY_COUNT] = {
     [NEBEL_DENSITY_ALTITUDE] = 1 | 2 | 16 | 128,
 };
 
-const nb_place nb_nebula_places[] = {
+const nb_key_entry nb_nebula_places[] = {
     NAMED(nebel_nebula_desc, "size", radius_range, 2, NB_EDIT_EACH),
     PLACE(nebel_nebula_desc, absorption, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_nebula_desc, emission, 3, NB_EDIT_AMOUNT),
@@ -78,26 +78,26 @@ const nb_place nb_nebula_places[] = {
     END,
 };
 
-const nb_place nb_strewn_places[] = {
+const nb_key_entry nb_strewn_places[] = {
     NAMED(nebel_nebula_desc, "fade", dimming, 1, NB_EDIT_EACH),
     END,
 };
 
-const nb_place nb_cell_places[] = {
+const nb_key_entry nb_cell_places[] = {
     PLACE(nebel_cell, density, 1, NB_EDIT_EACH),
     PLACE(nebel_cell, color, 3, NB_EDIT_AMOUNT),
     END,
 };
 
 /* Of models from files; height fields have the first one. */
-const nb_place nb_model_places[] = {
+const nb_key_entry nb_model_places[] = {
     PLACE(nebel_scene_model, position, 3, NB_EDIT_EACH),
     PLACE(nebel_scene_model, rotation, 4, NB_EDIT_WHOLE),
     PLACE(nebel_scene_model, scale, 3, NB_EDIT_AMOUNT),
     END,
 };
 
-const nb_place nb_lamp_places[] = {
+const nb_key_entry nb_lamp_places[] = {
     PLACE(nebel_light, position, 3, NB_EDIT_EACH),
     PLACE(nebel_light, intensity, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_light, radius, 1, NB_EDIT_EACH),
@@ -107,7 +107,7 @@ const nb_place nb_lamp_places[] = {
     END,
 };
 
-const nb_place nb_height_field_places[] = {
+const nb_key_entry nb_height_field_places[] = {
     PLACE(nebel_scene_model, size, 2, NB_EDIT_EACH),
     PLACE(nebel_scene_model, height, 1, NB_EDIT_EACH),
     END,
@@ -128,12 +128,12 @@ const char *const nb_phase_names[NEBEL_PHASE_COUNT] = {"isotropic",       "rayle
 const char *const nb_cell_model_names[NEBEL_CELL_MODEL_COUNT] = {"linear", "exponential"};
 const char *const nb_cell_span_names[NEBEL_SPAN_COUNT] = {"ray", "depth", "faithful"};
 
-const double *nb_place_numbers(const void *structure, const nb_place *place)
+const double *nb_place_numbers(const void *structure, const nb_key_entry *place)
 {
     return (const double *)((const char *)structure + place->offset);
 }
 
-bool nb_place_differs(const void *was, const void *now, const nb_place *place)
+bool nb_place_differs(const void *was, const void *now, const nb_key_entry *place)
 {
     return memcmp(nb_place_numbers(was, place), nb_place_numbers(now, place), place->count * sizeof(double)) != 0;
 }

@@ -6,14 +6,14 @@
 
 #include <nebel/scene.h>
 
-typedef struct nb_place {
+typedef struct nb_key_entry {
     const char *key;
     size_t offset, count; /* in its structure; of doubles */
     nb_edit_style style;
-} nb_place;
+} nb_key_entry;
 
 /* Tables of places, which end in one without a key; masks say which places a type has, bit i for places[i]. */
-extern const nb_place nb_volume_places[], nb_shape_places[], nb_transform_places[], nb_density_places[],
+extern const nb_key_entry nb_volume_places[], nb_shape_places[], nb_transform_places[], nb_density_places[],
     nb_nebula_places[], nb_strewn_places[], nb_cell_places[], nb_model_places[], nb_height_field_places[],
     nb_lamp_places[];
 extern const unsigned nb_shape_masks[NEBEL_SHAPE_COUNT], nb_density_masks[NEBEL_DENSITY_COUNT];
@@ -28,10 +28,10 @@ extern const char *const nb_shape_names[NEBEL_SHAPE_COUNT],
 
 #define NB_ALL_PLACES (~0u)
 
-const double *nb_place_numbers(const void *structure, const nb_place *place);
+const double *nb_place_numbers(const void *structure, const nb_key_entry *place);
 
 /* Whether any bit differs: nothing is lost in a comparison. */
-bool nb_place_differs(const void *was, const void *now, const nb_place *place);
+bool nb_place_differs(const void *was, const void *now, const nb_key_entry *place);
 
 /* The transform that does nothing. */
 extern const nebel_transform nb_plain_transform;

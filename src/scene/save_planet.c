@@ -13,13 +13,13 @@
         NULL, 0, 0, NB_EDIT_EACH                                                                                       \
     }
 
-static const nb_place physical_places[] = {
+static const nb_key_entry physical_places[] = {
     PLACE(nebel_planet, "ground_albedo", atmosphere_desc.ground_albedo, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_planet, "sun_diameter", sun_angular_diameter, 1, NB_EDIT_EACH),
     END,
 };
 
-static const nb_place air_places[] = {
+static const nb_key_entry air_places[] = {
     PLACE(nebel_atmosphere_component, "scattering", scattering, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_atmosphere_component, "absorption", absorption, 3, NB_EDIT_AMOUNT),
     NUMBER(nebel_atmosphere_component, scale_height),
@@ -33,7 +33,7 @@ static const unsigned air_masks[NEBEL_COMPONENT_PROFILE_COUNT] = {
     [NEBEL_COMPONENT_TENT] = 1 | 2 | 8 | 16,
 };
 
-static const nb_place cloud_places[] = {
+static const nb_key_entry cloud_places[] = {
     NUMBER(nebel_cloud_layer, base),
     NUMBER(nebel_cloud_layer, top),
     NUMBER(nebel_cloud_layer, coverage),
@@ -46,13 +46,13 @@ static const nb_place cloud_places[] = {
     END,
 };
 
-static const nb_place layers_places[] = {
+static const nb_key_entry layers_places[] = {
     PLACE(nebel_textured_planet_desc, "day", rotation_period, 1, NB_EDIT_EACH),
     PLACE(nebel_textured_planet_desc, "coverage", land_coverage, 1, NB_EDIT_EACH),
     END,
 };
 
-static const nb_place shell_places[] = {
+static const nb_key_entry shell_places[] = {
     NUMBER(nebel_cloud_shell, height),
     PLACE(nebel_cloud_shell, "day", rotation_period, 1, NB_EDIT_EACH),
     PLACE(nebel_cloud_shell, "color", color, 3, NB_EDIT_AMOUNT),
@@ -62,7 +62,7 @@ static const nb_place shell_places[] = {
     END,
 };
 
-static const nb_place air_shell_places[] = {
+static const nb_key_entry air_shell_places[] = {
     NUMBER(nebel_atmosphere_shell, height),
     NUMBER(nebel_atmosphere_shell, brightness),
     END,
@@ -70,7 +70,7 @@ static const nb_place air_shell_places[] = {
 
 /* ---- in the file's numbers ------------------------------------------------------------------- */
 
-static void restore_air(const nb_space *space, nebel_atmosphere_component *air)
+static void restore_air(const nb_file_units *space, nebel_atmosphere_component *air)
 {
     for (int c = 0; c < 3; c++) {
         air->scattering[c] *= space->unit;
@@ -82,7 +82,7 @@ static void restore_air(const nb_space *space, nebel_atmosphere_component *air)
 }
 
 /* With the numbers of its kind in the place of zeros, which mean others in the file. */
-static void restore_cloud(const nb_space *space, double thickness, nebel_cloud_layer *layer)
+static void restore_cloud(const nb_file_units *space, double thickness, nebel_cloud_layer *layer)
 {
     (void)nebel_resolve_cloud_layer(thickness, layer, NULL, layer);
     layer->base /= space->unit;
@@ -94,7 +94,7 @@ static void restore_cloud(const nb_space *space, double thickness, nebel_cloud_l
     for (int i = 0; i < 2; i++) layer->wind[i] /= i == 1 && space->z_up ? -space->unit : space->unit;
 }
 
-static void restore_layers(const nb_space *space, nebel_textured_planet_desc *desc)
+static void restore_layers(const nb_file_units *space, nebel_textured_planet_desc *desc)
 {
     nebel_atmosphere_shell *air = &desc->atmosphere;
     for (uint32_t i = 0; i < desc->cloud_shell_count; i++) desc->cloud_shells[i].height /= space->unit;
@@ -105,7 +105,7 @@ static void restore_layers(const nb_space *space, nebel_textured_planet_desc *de
         air->brightness = 1;
 }
 
-static nebel_planet restore(const nb_space *space, const nebel_planet *planet)
+static nebel_planet restore(const nb_file_units *space, const nebel_planet *planet)
 {
     nebel_planet own = *planet;
     if (own.model == NEBEL_PLANET_TEXTURED) {
@@ -136,7 +136,7 @@ static bool are_same_airs(const nebel_atmosphere_desc *a, const nebel_atmosphere
     return true;
 }
 
-static void change_air(nb_save *save, const nb_json *json, const nb_json_node *node,
+static void change_air(nb_key_patch *save, const nb_json *json, const nb_json_node *node,
                        const nebel_atmosphere_component *was, const nebel_atmosphere_component *now)
 {
     const nb_edit_object air = nb_edit_find(json, node);
@@ -151,7 +151,7 @@ static void change_air(nb_save *save, const nb_json *json, const nb_json_node *n
         nb_edit_add(&save->edit, &air, "phase", text);
 }
 
-static void put_air(nb_words *out, const nebel_atmosphere_component *air)
+static void put_air(nb_json_writer *out, const nebel_atmosphere_component *air)
 {
     char phase[NB_EDIT_NUMBERS];
     nb_save_write_phase(&air->phase, phase);
@@ -170,10 +170,10 @@ static void put_air(nb_words *out, const nebel_atmosphere_component *air)
 }
 
 /* All of a preset's. `array`: the place of an empty one; NULL: there is none. */
-static void write_airs(nb_save *save, const nb_edit_object *planet, const nb_json_node *array,
+static void write_airs(nb_key_patch *save, const nb_edit_object *planet, const nb_json_node *array,
                        const nebel_atmosphere_desc *now)
 {
-    nb_words out = {.save = save};
+    nb_json_writer out = {.save = save};
     nb_words_put(&out, "[");
     for (uint32_t i = 0; i < now->component_count; i++) {
         if (i > 0) nb_words_put(&out, ", ");
@@ -188,7 +188,7 @@ static void write_airs(nb_save *save, const nb_edit_object *planet, const nb_jso
     nb_release(&save->edit.arena.allocator, out.bytes.data);
 }
 
-static void save_airs(nb_save *save, const nb_json *json, const nb_edit_object *planet,
+static void save_airs(nb_key_patch *save, const nb_json *json, const nb_edit_object *planet,
                       const nebel_atmosphere_desc *was, const nebel_atmosphere_desc *now)
 {
     const nb_json_node *array = nb_edit_member(json, planet->node, "airs");
@@ -214,7 +214,7 @@ static const nb_json_node *skip_layers(const nb_json *json, const nb_json_node *
     return node;
 }
 
-static void save_clouds(nb_save *save, const nb_json *json, const nb_json_node *planet, const nebel_planet *was,
+static void save_clouds(nb_key_patch *save, const nb_json *json, const nb_json_node *planet, const nebel_planet *was,
                         const nebel_planet *now)
 {
     if (now->cloud_layer_count == 0) return;
@@ -225,7 +225,7 @@ static void save_clouds(nb_save *save, const nb_json *json, const nb_json_node *
     }
 }
 
-static void save_shells(nb_save *save, const nb_json *json, const nb_edit_object *planet,
+static void save_shells(nb_key_patch *save, const nb_json *json, const nb_edit_object *planet,
                         const nebel_textured_planet_desc *was, const nebel_textured_planet_desc *now)
 {
     nb_save_places(save, json, planet, layers_places, NB_ALL_PLACES, was, now);
@@ -257,7 +257,7 @@ bool nb_save_has_same_planets(const nebel_scene_data *a, const nebel_scene_data 
     return true;
 }
 
-static void save_planet(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, size_t index)
+static void save_planet(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
     const nb_edit_object planet = nb_edit_find(in->json, node);
     const nebel_planet was = restore(&in->space, &save->before->planets[index]),
@@ -271,7 +271,7 @@ static void save_planet(nb_save *save, const nb_scene_reader *in, const nb_json_
     save_clouds(save, in->json, node, &was, &now);
 }
 
-bool nb_save_planets(nb_save *save, nb_scene_reader *in, const nb_json_node *node)
+bool nb_save_planets(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node)
 {
     if (!nb_save_has_same_planets(save->before, &in->scene->data) ||
         !nb_save_has_same_planets(save->before, save->changed))

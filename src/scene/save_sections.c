@@ -7,13 +7,13 @@
 
 /* ---- light ----------------------------------------------------------------------------------- */
 
-static void restore_sun(const nb_space *space, const nebel_scene_data *scene, double direction[3])
+static void restore_sun(const nb_file_units *space, const nebel_scene_data *scene, double direction[3])
 {
     memcpy(direction, scene->sun_direction, sizeof scene->sun_direction);
     nb_space_restore_direction(space, direction);
 }
 
-static void save_sun(nb_save *save, const nb_scene_reader *in, const nb_json_node *node)
+static void save_sun(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
 {
     const nebel_scene_data *before = save->before, *changed = save->changed;
     const nb_edit_object sun = nb_edit_find(in->json, node);
@@ -25,7 +25,7 @@ static void save_sun(nb_save *save, const nb_scene_reader *in, const nb_json_nod
                     NB_EDIT_AMOUNT);
 }
 
-static void add_sun(nb_save *save, const nb_space *space)
+static void add_sun(nb_key_patch *save, const nb_file_units *space)
 {
     char direction[NB_EDIT_NUMBERS], irradiance[NB_EDIT_NUMBERS], words[3 * NB_EDIT_NUMBERS];
     double now[3];
@@ -38,14 +38,14 @@ static void add_sun(nb_save *save, const nb_space *space)
 
 /* ---- lamps ----------------------------------------------------------------------------------- */
 
-static void restore_lamp(const nb_space *space, nebel_light *lamp)
+static void restore_lamp(const nb_file_units *space, nebel_light *lamp)
 {
     nb_space_restore_place(space, lamp->position);
     nb_space_restore_direction(space, lamp->direction);
     lamp->radius /= space->unit;
 }
 
-static void change_lamp(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, nebel_light was,
+static void change_lamp(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, nebel_light was,
                         nebel_light now)
 {
     const nb_edit_object object = nb_edit_find(in->json, node);
@@ -54,7 +54,7 @@ static void change_lamp(nb_save *save, const nb_scene_reader *in, const nb_json_
     nb_save_places(save, in->json, &object, nb_lamp_places, NB_ALL_PLACES, &was, &now);
 }
 
-bool nb_save_lamp(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
+bool nb_save_lamp(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
     const nebel_scene_data *before = save->before;
     if (index >= before->light_count || in->scene->lamps[index].type != before->lights[index].type)
@@ -73,14 +73,14 @@ static const nebel_scene_model *find_model(const nebel_scene_data *scene, size_t
     return NULL;
 }
 
-static void restore_model(const nb_space *space, nebel_scene_model *model)
+static void restore_model(const nb_file_units *space, nebel_scene_model *model)
 {
     nb_space_restore_placement(space, model->position, model->rotation, model->scale);
     for (int i = 0; i < 2; i++) model->size[i] /= space->unit;
     model->height /= space->unit;
 }
 
-static void save_model_color(nb_save *save, const nb_json *json, const nb_edit_object *object,
+static void save_model_color(nb_key_patch *save, const nb_json *json, const nb_edit_object *object,
                              const nebel_scene_model *was, const nebel_scene_model *now)
 {
     double from[3];
@@ -91,7 +91,7 @@ static void save_model_color(nb_save *save, const nb_json *json, const nb_edit_o
         nb_edit_remove_members(&save->edit, json, object->node, (const char *const[]){"color", NULL});
 }
 
-static void change_model(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, nebel_scene_model was,
+static void change_model(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, nebel_scene_model was,
                          nebel_scene_model now)
 {
     const nb_edit_object object = nb_edit_find(in->json, node);
@@ -103,7 +103,7 @@ static void change_model(nb_save *save, const nb_scene_reader *in, const nb_json
     save_model_color(save, in->json, &object, &was, &now);
 }
 
-bool nb_save_model(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
+bool nb_save_model(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
     const nebel_scene_data *before = save->before;
     if (index >= before->model_count || strcmp(in->scene->models[index].file, before->models[index].path) != 0)
@@ -129,7 +129,7 @@ static bool is_there(const nebel_scene_data *scene, int section)
 }
 
 /* `node`: where it stands; NULL: it is not in the file. */
-static void save_light(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, int section)
+static void save_light(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, int section)
 {
     if (section == AMBIENT)
         nb_save_ambient(save, in, node);
@@ -141,7 +141,7 @@ static void save_light(nb_save *save, const nb_scene_reader *in, const nb_json_n
 }
 
 /* One that is in the file, and stays there. */
-static void save_section(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, int section)
+static void save_section(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, int section)
 {
     switch (section) {
     case CAMERA:
@@ -164,7 +164,7 @@ static void save_section(nb_save *save, const nb_scene_reader *in, const nb_json
     }
 }
 
-void nb_save_section(nb_save *save, const nb_scene_reader *in, const nb_json_node *node)
+void nb_save_section(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
 {
     int section = 0;
     while (section < SECTIONS && !nb_json_has_key(node, section_names[section])) section++;
@@ -179,7 +179,7 @@ void nb_save_section(nb_save *save, const nb_scene_reader *in, const nb_json_nod
 }
 
 /* One that is not in the file. */
-static void add_section(nb_save *save, const nb_scene_reader *in, int section)
+static void add_section(nb_key_patch *save, const nb_scene_reader *in, int section)
 {
     if (section == CAMERA)
         nb_save_camera(save, in);
@@ -191,7 +191,7 @@ static void add_section(nb_save *save, const nb_scene_reader *in, int section)
         nb_save_add_classic(save, &in->space);
 }
 
-static bool check_counts(const nb_scene_reader *in, const nb_save *save, const nb_json_node *root)
+static bool check_counts(const nb_scene_reader *in, const nb_key_patch *save, const nb_json_node *root)
 {
     const nebel_scene_data *before = save->before, *changed = save->changed;
     const nebel_scene_data *now = &in->scene->data;
@@ -223,7 +223,7 @@ static bool check_counts(const nb_scene_reader *in, const nb_save *save, const n
                         "has not the sections that it had; the file has changed, load it again");
 }
 
-bool nb_save_rest(nb_save *save, const nb_scene_reader *in, const nb_json_node *root)
+bool nb_save_rest(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *root)
 {
     if (!check_counts(in, save, root) || !nb_save_check_removed(save, in, root)) return false;
     save->root.node = root;

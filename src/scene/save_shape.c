@@ -6,7 +6,7 @@
 
 /* ---- numbers --------------------------------------------------------------------------------- */
 
-void nb_save_places(nb_save *save, const nb_json *json, const nb_edit_object *object, const nb_place *places,
+void nb_save_places(nb_key_patch *save, const nb_json *json, const nb_edit_object *object, const nb_key_entry *places,
                     unsigned mask, const void *was, const void *now)
 {
     for (size_t i = 0; places[i].key != NULL; i++)
@@ -16,7 +16,7 @@ void nb_save_places(nb_save *save, const nb_json *json, const nb_edit_object *ob
 }
 
 /* What differs, as an object; false: nothing does. */
-static bool write_members(const nb_place *places, const void *was, const void *now, char *words, size_t size)
+static bool write_members(const nb_key_entry *places, const void *was, const void *now, char *words, size_t size)
 {
     size_t used = (size_t)snprintf(words, size, "{");
     for (size_t i = 0; places[i].key != NULL; i++) {
@@ -30,7 +30,7 @@ static bool write_members(const nb_place *places, const void *was, const void *n
     return used > 1;
 }
 
-void nb_save_entry(nb_save *save, const nb_json *json, const nb_json_node *node, const nb_place *places,
+void nb_save_entry(nb_key_patch *save, const nb_json *json, const nb_json_node *node, const nb_key_entry *places,
                    const void *was, const void *now)
 {
     const nb_edit_object object = nb_edit_find(json, node);
@@ -41,8 +41,8 @@ void nb_save_entry(nb_save *save, const nb_json *json, const nb_json_node *node,
         nb_edit_replace(&save->edit, node, words);
 }
 
-void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *owner, const char *key,
-                    const nb_place *places, const void *was, const void *now)
+void nb_save_object(nb_key_patch *save, const nb_json *json, const nb_edit_object *owner, const char *key,
+                    const nb_key_entry *places, const void *was, const void *now)
 {
     const nb_json_node *node = nb_edit_member(json, owner->node, key);
     char words[10 * NB_EDIT_NUMBERS];
@@ -52,14 +52,14 @@ void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *ow
         nb_edit_add(&save->edit, owner, key, words);
 }
 
-void nb_save_lose(nb_lost_keys *lost, const char *key)
+void nb_save_lose(nb_removed_keys *lost, const char *key)
 {
     size_t count = 0;
     while (lost->names[count] != NULL) count++;
     lost->names[count] = key;
 }
 
-bool nb_save_keep_span(nb_save *save, const nb_scene_reader *in, nb_span_list *list, const nb_json_node *node,
+bool nb_save_keep_span(nb_key_patch *save, const nb_scene_reader *in, nb_span_list *list, const nb_json_node *node,
                        bool goes)
 {
     void *spans = list->spans;
@@ -71,7 +71,7 @@ bool nb_save_keep_span(nb_save *save, const nb_scene_reader *in, nb_span_list *l
     return true;
 }
 
-void nb_save_integer(nb_save *save, const nb_json *json, const nb_edit_object *object, const char *key, double was,
+void nb_save_integer(nb_key_patch *save, const nb_json *json, const nb_edit_object *object, const char *key, double was,
                      double now)
 {
     nb_edit_numbers(&save->edit, json, object, key, 1, &was, &now, NB_EDIT_EACH);
@@ -79,33 +79,33 @@ void nb_save_integer(nb_save *save, const nb_json *json, const nb_edit_object *o
 
 /* ---- words ----------------------------------------------------------------------------------- */
 
-static void add_bytes(nb_words *out, const char *words, size_t size)
+static void add_bytes(nb_json_writer *out, const char *words, size_t size)
 {
     nb_edit *edit = &out->save->edit;
     if (!edit->out_of_memory && !nb_bytes_write(&edit->arena.allocator, &out->bytes, out->bytes.size, words, size))
         edit->out_of_memory = true;
 }
 
-void nb_words_put(nb_words *out, const char *words)
+void nb_words_put(nb_json_writer *out, const char *words)
 {
     add_bytes(out, words, strlen(words));
 }
 
-void nb_words_put_text(nb_words *out, const char *text)
+void nb_words_put_text(nb_json_writer *out, const char *text)
 {
     nb_edit *edit = &out->save->edit;
     if (!edit->out_of_memory && !nb_edit_write_text(&edit->arena.allocator, &out->bytes, text))
         edit->out_of_memory = true;
 }
 
-void nb_words_put_numbers(nb_words *out, size_t count, const double *numbers, nb_edit_style style)
+void nb_words_put_numbers(nb_json_writer *out, size_t count, const double *numbers, nb_edit_style style)
 {
     char text[NB_EDIT_NUMBERS];
     nb_edit_write_numbers(count, numbers, style, text);
     nb_words_put(out, text);
 }
 
-const char *nb_words_end(nb_words *out)
+const char *nb_words_end(nb_json_writer *out)
 {
     add_bytes(out, "", 1);
     return out->save->edit.out_of_memory ? NULL : (const char *)out->bytes.data;
@@ -113,7 +113,7 @@ const char *nb_words_end(nb_words *out)
 
 /* ---- shapes ---------------------------------------------------------------------------------- */
 
-void nb_save_density(nb_save *save, const nb_json *json, const nb_json_node *node, const nebel_density *was,
+void nb_save_density(nb_key_patch *save, const nb_json *json, const nb_json_node *node, const nebel_density *was,
                      const nebel_density *now)
 {
     const nb_edit_object density = nb_edit_find(json, nb_edit_member(json, node, "density"));
@@ -125,8 +125,8 @@ void nb_save_density(nb_save *save, const nb_json *json, const nb_json_node *nod
         nb_edit_word(&save->edit, json, &density, "below", nb_below_names[now->below]);
 }
 
-static void save_planes(nb_save *save, const nb_scene_reader *in, const nb_json_node *array, const nebel_shape *was,
-                        const nebel_shape *now)
+static void save_planes(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *array,
+                        const nebel_shape *was, const nebel_shape *now)
 {
     const nb_json_node *node = array != NULL ? nb_json_first(in->json, array) : NULL;
     for (size_t i = 0; i < now->plane_count && node != NULL; i++, node = nb_json_next(in->json, node)) {
@@ -140,7 +140,7 @@ static void save_planes(nb_save *save, const nb_scene_reader *in, const nb_json_
 }
 
 /* `was` and `now` are in metres. The depth is that of shapes in a file. */
-void nb_save_shape(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, const nebel_shape *was,
+void nb_save_shape(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, const nebel_shape *was,
                    const nebel_shape *now)
 {
     const nb_edit_object shape = nb_edit_find(in->json, node);

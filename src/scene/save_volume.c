@@ -8,7 +8,7 @@
 /* Text that grows. Once memory is out nothing more is added. */
 typedef struct writer {
     const nebel_allocator *allocator;
-    const nb_space *space;
+    const nb_file_units *space;
     nb_bytes text;
     bool good, is_first; /* whether a comma is due before the next member */
 } writer;
@@ -53,7 +53,8 @@ static void close_object(writer *out)
 }
 
 /* Numbers of the type, and of those only what is not the default, where there is one. */
-static void put_places(writer *out, const nb_place *places, unsigned mask, const void *structure, const void *defaults)
+static void put_places(writer *out, const nb_key_entry *places, unsigned mask, const void *structure,
+                       const void *defaults)
 {
     for (size_t i = 0; places[i].key != NULL; i++) {
         if ((mask >> i & 1) == 0) continue;
@@ -197,7 +198,7 @@ static void put_phase(writer *out, const nebel_phase *phase)
 
 /* ---- keys ------------------------------------------------------------------------------------ */
 
-static bool has_difference(const nb_place *places, unsigned mask, const void *was, const void *now)
+static bool has_difference(const nb_key_entry *places, unsigned mask, const void *was, const void *now)
 {
     for (size_t i = 0; places[i].key != NULL; i++)
         if ((mask >> i & 1) != 0 && nb_place_differs(was, now, &places[i])) return true;
@@ -281,7 +282,7 @@ static bool finish(writer *out, nb_bytes *text)
     return out->good;
 }
 
-bool nb_save_write_keys(const nebel_allocator *allocator, const nb_space *space, const nb_written_volume *volume,
+bool nb_save_write_keys(const nebel_allocator *allocator, const nb_file_units *space, const nb_written_volume *volume,
                         const nb_bytes *kept, const char *gap, nb_bytes *text)
 {
     writer out = {.allocator = allocator, .space = space, .good = true};
@@ -317,7 +318,7 @@ static void put_members(writer *out, const nebel_volume_desc *own, const nb_writ
     put_keys(out, written, NULL, " ");
 }
 
-bool nb_save_write_volume(const nebel_allocator *allocator, const nb_space *space, const nb_written_volume *volume,
+bool nb_save_write_volume(const nebel_allocator *allocator, const nb_file_units *space, const nb_written_volume *volume,
                           nb_bytes *text)
 {
     nebel_volume_desc own = volume->volume;

@@ -35,8 +35,8 @@ static const char *const section_names[] = {
     "nebel", "up",     "unit",  "camera",  "background",          "sun",   "ambient", "max_opacity", "lights", "models",
     "fog",   "nebula", "cells", "classic", "multiple_scattering", "planet"};
 static const char *const streamed_names[] = {"lights", "models", "fog", "nebula", NULL};
-static const nb_keys section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
-                                     NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
+static const nb_key_set section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
+                                        NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
 
 /* ---- reading --------------------------------------------------------------------------------- */
 
@@ -159,7 +159,7 @@ void nb_read_keep_message(nebel_result result, const char *message, void *user)
 static bool take_space(nb_json *json, const nb_json_node *value, void *user)
 {
     nb_scene_reader *in = user;
-    nb_space *space = &in->space, wanted = *space;
+    nb_file_units *space = &in->space, wanted = *space;
     const nb_json_node *parent = nb_json_parent(json, value);
     if (parent == NULL) return true;
     if (nb_json_parent(json, parent) != NULL) return nb_scene_count_noise(in, value);
@@ -183,7 +183,7 @@ static nebel_result find_space(const nb_json_desc *whole, nb_scene_reader *in)
     return result == NEBEL_ERROR_MEMORY || (result == NEBEL_ERROR_LIMIT && in->over_budget) ? result : NEBEL_OK;
 }
 
-static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size, const char *name, nb_save *save)
+static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size, const char *name, nb_key_patch *save)
 {
     nb_json json;
     nb_scene_reader in = {
@@ -254,7 +254,7 @@ static nebel_result check_arguments(const char *name, const void *text, size_t s
 }
 
 nebel_result nb_scene_parse(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
-                            nb_save *save, nebel_scene **scene)
+                            nb_key_patch *save, nebel_scene **scene)
 {
     nebel_result result = check_arguments(name, text, size, desc, scene);
     if (result != NEBEL_OK) return result;

@@ -16,7 +16,7 @@ typedef struct nb_model_source {
     const char *where;  /* "FILE:LINE:COLUMN: models[0].file", for messages; NULL: none */
     const char *folder; /* which its references may not leave, as `file`; NULL: that of the file */
     bool is_heightfield;
-    nb_space space; /* of the file's own numbers */
+    nb_file_units space; /* of the file's own numbers */
     double position[3], rotation[4], scale[3];
     double size[2], height; /* height field */
     bool has_color;
@@ -57,8 +57,8 @@ struct nebel_scene {
     nebel_parallel_for_fn run; /* NULL: none */
     void *run_user;
     nb_arena arena;
-    const char *folder; /* of the file, ending in a slash; "" is the current one */
-    nb_space space;     /* of the file's numbers */
+    const char *folder;  /* of the file, ending in a slash; "" is the current one */
+    nb_file_units space; /* of the file's numbers */
     nebel_scene_data data;
     nebel_diffusion_desc diffusion; /* that of nebel_set_scene_diffusion */
 
@@ -115,7 +115,7 @@ enum { NB_SCENE_SECTIONS = 16 };
 /* The longest scene file. */
 #define NB_SCENE_TEXT_LIMIT ((size_t)1 << 30)
 
-typedef struct nb_save nb_save;
+typedef struct nb_key_patch nb_key_patch;
 
 /* Moments beyond leave no digits of motion. */
 #define NB_MOST_FRAME 1e12
@@ -125,18 +125,18 @@ bool nb_scene_is_frame(const nebel_scene *scene, double frame);
 
 /* What reading needs beside the scene itself. */
 /* The ground of the scene's first planet as the file has it, for fog over it. */
-typedef struct nb_ball {
+typedef struct nb_ground_sphere {
     double preset_radius;     /* m */
     double radius, center[3]; /* in terms of the file; 0: the preset's */
     bool has_center;
-} nb_ball;
+} nb_ground_sphere;
 
 typedef struct nb_scene_reader {
     nb_json *json;
     nebel_scene *scene;
-    nb_save *save;  /* what is to be written in the file; NULL: nothing */
-    nb_space space; /* of the file's numbers */
-    nb_ball ball;
+    nb_key_patch *save;  /* what is to be written in the file; NULL: nothing */
+    nb_file_units space; /* of the file's numbers */
+    nb_ground_sphere ball;
     const nb_fog_node *node;                   /* of a model, whose fog is being read; NULL: the scene's own */
     nebel_fog *trial;                          /* takes every volume once, for the core's own checks */
     char core_message[512];                    /* what the core said about the last one */
@@ -177,7 +177,7 @@ double nb_scene_most_seconds(const nebel_scene *scene);
 
 /* nebel_parse_scene; with `save`, notes what is to be changed in the text. */
 nebel_result nb_scene_parse(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
-                            nb_save *save, nebel_scene **scene);
+                            nb_key_patch *save, nebel_scene **scene);
 
 bool nb_read_camera(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_background(nb_scene_reader *in, const nb_json_node *node);
@@ -186,7 +186,7 @@ bool nb_read_ambient(nb_scene_reader *in, const nb_json_node *node);
 nebel_result nb_planet_light(nebel_scene *scene);
 
 /* Without a planet that of the preset `earth`. What is wrong is left for nb_read_planet to say. */
-nb_ball nb_find_ball(const nb_json *json, const nb_json_node *planet);
+nb_ground_sphere nb_find_ball(const nb_json *json, const nb_json_node *planet);
 
 bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_light(nb_scene_reader *in, const nb_json_node *node);
@@ -281,8 +281,8 @@ bool nb_camera_is_apart(const nebel_camera *camera);
 bool nb_camera_is_upright(const nebel_camera *camera);
 
 /* The keys "up" and "unit" of a scene or a model. */
-bool nb_read_up(nb_json *json, const nb_json_node *node, nb_space *space);
-bool nb_read_unit(nb_json *json, const nb_json_node *node, nb_space *space);
+bool nb_read_up(nb_json *json, const nb_json_node *node, nb_file_units *space);
+bool nb_read_unit(nb_json *json, const nb_json_node *node, nb_file_units *space);
 
 /* Where a model's numbers are in the world. */
 nb_affine nb_model_place(const nb_model_source *model);

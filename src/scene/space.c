@@ -7,7 +7,7 @@ static void scale_all(double factor, double *numbers, size_t count)
     for (size_t i = 0; i < count; i++) numbers[i] *= factor;
 }
 
-static void convert_inverse_lengths(const nb_space *space, double rgb[3])
+static void convert_inverse_lengths(const nb_file_units *space, double rgb[3])
 {
     for (int c = 0; c < 3; c++) rgb[c] /= space->unit;
 }
@@ -19,28 +19,28 @@ static void swap_y_and_z(double vector[3])
     vector[2] = y;
 }
 
-void nb_space_convert_direction(const nb_space *space, double direction[3])
+void nb_space_convert_direction(const nb_file_units *space, double direction[3])
 {
     if (!space->z_up) return;
     swap_y_and_z(direction);
     direction[2] = -direction[2];
 }
 
-void nb_space_convert_place(const nb_space *space, double place[3])
+void nb_space_convert_place(const nb_file_units *space, double place[3])
 {
     nb_space_convert_direction(space, place);
     scale_all(space->unit, place, 3);
 }
 
 /* Lengths along the axes, and scales: without signs. */
-static void convert_extents(const nb_space *space, double unit, double extents[3])
+static void convert_extents(const nb_file_units *space, double unit, double extents[3])
 {
     if (space->z_up) swap_y_and_z(extents);
     scale_all(unit, extents, 3);
 }
 
 /* A rotation turns about the same axis by the same angle in either convention. */
-void nb_space_convert_placement(const nb_space *space, double position[3], double rotation[4], double scale[3])
+void nb_space_convert_placement(const nb_file_units *space, double position[3], double rotation[4], double scale[3])
 {
     nb_space_convert_place(space, position);
     nb_space_convert_direction(space, rotation);
@@ -50,7 +50,7 @@ void nb_space_convert_placement(const nb_space *space, double position[3], doubl
 /* ---- fog ------------------------------------------------------------------------------------- */
 
 /* What was the least y is the largest z. */
-static void convert_box(const nb_space *space, double min[3], double max[3])
+static void convert_box(const nb_file_units *space, double min[3], double max[3])
 {
     nb_space_convert_place(space, min);
     nb_space_convert_place(space, max);
@@ -60,7 +60,7 @@ static void convert_box(const nb_space *space, double min[3], double max[3])
     max[2] = near;
 }
 
-static void convert_shape(const nb_space *space, nebel_shape *shape)
+static void convert_shape(const nb_file_units *space, nebel_shape *shape)
 {
     nebel_transform *transform = &shape->transform;
     nb_space_convert_placement(space, transform->position, transform->rotation, transform->scale);
@@ -82,7 +82,7 @@ static void convert_shape(const nb_space *space, nebel_shape *shape)
     for (size_t i = 0; i < shape->part_count; i++) convert_shape(space, (nebel_shape *)&shape->parts[i]);
 }
 
-static void convert_density(const nb_space *space, nebel_density *density)
+static void convert_density(const nb_file_units *space, nebel_density *density)
 {
     nb_space_convert_place(space, density->from);
     nb_space_convert_place(space, density->to);
@@ -94,7 +94,7 @@ static void convert_density(const nb_space *space, nebel_density *density)
     density->radius *= space->unit;
 }
 
-void nb_space_convert_volume(const nb_space *space, nebel_volume_desc *volume)
+void nb_space_convert_volume(const nb_file_units *space, nebel_volume_desc *volume)
 {
     convert_shape(space, &volume->shape);
     convert_density(space, &volume->density);
@@ -104,7 +104,7 @@ void nb_space_convert_volume(const nb_space *space, nebel_volume_desc *volume)
     volume->cutoff *= space->unit;
 }
 
-void nb_space_convert_nebula(const nb_space *space, nebel_nebula_desc *nebula)
+void nb_space_convert_nebula(const nb_file_units *space, nebel_nebula_desc *nebula)
 {
     convert_shape(space, &nebula->shape);
     convert_density(space, &nebula->density);
@@ -115,14 +115,14 @@ void nb_space_convert_nebula(const nb_space *space, nebel_nebula_desc *nebula)
     nebula->turbulence_scale *= space->unit;
 }
 
-void nb_space_convert_cell(const nb_space *space, nebel_cell *cell)
+void nb_space_convert_cell(const nb_file_units *space, nebel_cell *cell)
 {
     convert_shape(space, &cell->shape);
     cell->density /= space->unit;
 }
 
 /* Which axis of a box is which: the same both ways. */
-static void exchange_axes(const nb_space *space, nebel_noise_desc *noise)
+static void exchange_axes(const nb_file_units *space, nebel_noise_desc *noise)
 {
     const size_t size = noise->size[1];
     if (!space->z_up) return;
@@ -132,7 +132,7 @@ static void exchange_axes(const nb_space *space, nebel_noise_desc *noise)
     swap_y_and_z(noise->falloff);
 }
 
-void nb_space_convert_noise(const nb_space *space, nebel_scene_noise *noise)
+void nb_space_convert_noise(const nb_file_units *space, nebel_scene_noise *noise)
 {
     exchange_axes(space, &noise->desc);
     nb_space_convert_direction(space, noise->velocity);
@@ -140,7 +140,7 @@ void nb_space_convert_noise(const nb_space *space, nebel_scene_noise *noise)
 
 /* ---- camera ---------------------------------------------------------------------------------- */
 
-void nb_space_convert_camera(const nb_space *space, nebel_camera *camera)
+void nb_space_convert_camera(const nb_file_units *space, nebel_camera *camera)
 {
     nb_space_convert_place(space, camera->position);
     nb_space_convert_place(space, camera->look_at);
@@ -150,27 +150,27 @@ void nb_space_convert_camera(const nb_space *space, nebel_camera *camera)
 
 /* ---- the other way --------------------------------------------------------------------------- */
 
-void nb_space_restore_direction(const nb_space *space, double direction[3])
+void nb_space_restore_direction(const nb_file_units *space, double direction[3])
 {
     if (!space->z_up) return;
     direction[2] = -direction[2];
     swap_y_and_z(direction);
 }
 
-void nb_space_restore_place(const nb_space *space, double place[3])
+void nb_space_restore_place(const nb_file_units *space, double place[3])
 {
     nb_space_restore_direction(space, place);
     for (int i = 0; i < 3; i++) place[i] /= space->unit;
 }
 
-void nb_space_restore_placement(const nb_space *space, double position[3], double rotation[4], double scale[3])
+void nb_space_restore_placement(const nb_file_units *space, double position[3], double rotation[4], double scale[3])
 {
     nb_space_restore_place(space, position);
     nb_space_restore_direction(space, rotation);
     convert_extents(space, 1, scale);
 }
 
-void nb_space_restore_camera(const nb_space *space, nebel_camera *camera)
+void nb_space_restore_camera(const nb_file_units *space, nebel_camera *camera)
 {
     nb_space_restore_place(space, camera->position);
     nb_space_restore_place(space, camera->look_at);
@@ -178,7 +178,7 @@ void nb_space_restore_camera(const nb_space *space, nebel_camera *camera)
     camera->view_height /= space->unit;
 }
 
-void nb_space_restore_shape(const nb_space *space, nebel_shape *shape)
+void nb_space_restore_shape(const nb_file_units *space, nebel_shape *shape)
 {
     nebel_transform *transform = &shape->transform;
     const double back = 1 / space->unit, near = shape->min[2];
@@ -196,13 +196,13 @@ void nb_space_restore_shape(const nb_space *space, nebel_shape *shape)
     shape->radius_to *= back;
 }
 
-void nb_space_restore_plane(const nb_space *space, nebel_plane *plane)
+void nb_space_restore_plane(const nb_file_units *space, nebel_plane *plane)
 {
     nb_space_restore_direction(space, plane->normal);
     plane->distance /= space->unit;
 }
 
-static void restore_density(const nb_space *space, nebel_density *density)
+static void restore_density(const nb_file_units *space, nebel_density *density)
 {
     const double back = 1 / space->unit;
     nb_space_restore_place(space, density->from);
@@ -215,7 +215,7 @@ static void restore_density(const nb_space *space, nebel_density *density)
     density->radius *= back;
 }
 
-void nb_space_restore_volume(const nb_space *space, nebel_volume_desc *volume)
+void nb_space_restore_volume(const nb_file_units *space, nebel_volume_desc *volume)
 {
     nb_space_restore_shape(space, &volume->shape);
     restore_density(space, &volume->density);
@@ -225,7 +225,7 @@ void nb_space_restore_volume(const nb_space *space, nebel_volume_desc *volume)
     scale_all(space->unit, volume->emission, 3);
 }
 
-void nb_space_restore_nebula(const nb_space *space, nebel_nebula_desc *nebula)
+void nb_space_restore_nebula(const nb_file_units *space, nebel_nebula_desc *nebula)
 {
     nb_space_restore_shape(space, &nebula->shape);
     restore_density(space, &nebula->density);
@@ -236,13 +236,13 @@ void nb_space_restore_nebula(const nb_space *space, nebel_nebula_desc *nebula)
     nebula->turbulence_scale /= space->unit;
 }
 
-void nb_space_restore_noise(const nb_space *space, nebel_scene_noise *noise)
+void nb_space_restore_noise(const nb_file_units *space, nebel_scene_noise *noise)
 {
     exchange_axes(space, &noise->desc);
     nb_space_restore_direction(space, noise->velocity);
 }
 
-void nb_space_restore_cell(const nb_space *space, nebel_cell *cell)
+void nb_space_restore_cell(const nb_file_units *space, nebel_cell *cell)
 {
     nb_space_restore_shape(space, &cell->shape);
     cell->density *= space->unit;

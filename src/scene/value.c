@@ -9,12 +9,12 @@
 /* Lists in messages are cut at this size. */
 enum { LIST_SIZE = 480 };
 
-typedef struct list {
+typedef struct nb_text_list {
     char text[LIST_SIZE];
     size_t size;
-} list;
+} nb_text_list;
 
-static void append(list *names, const char *prefix, const char *name)
+static void append(nb_text_list *names, const char *prefix, const char *name)
 {
     const size_t room = sizeof names->text - names->size;
     const int length = snprintf(names->text + names->size, room, "%s%s%s", names->size > 0 ? ", " : "", prefix, name);
@@ -42,9 +42,9 @@ static void suggest(const char *word, size_t size, const char *prefix, const cha
     }
 }
 
-static void fail_unknown_key(nb_json *json, const nb_json_node *node, const char *prefix, const nb_keys *keys)
+static void fail_unknown_key(nb_json *json, const nb_json_node *node, const char *prefix, const nb_key_set *keys)
 {
-    list allowed = {.size = 0};
+    nb_text_list allowed = {.size = 0};
     char suggestion[64];
     for (uint32_t i = 0; i < keys->count; i++)
         if ((keys->allowed & NB_BIT(i)) != 0) append(&allowed, prefix, keys->names[i]);
@@ -67,7 +67,7 @@ bool nb_value_is_key(const nb_json_node *node, const char *prefix, const char *n
            memcmp(node->key + skipped, name, size) == 0;
 }
 
-static int find_key(nb_json *json, const nb_json_node *node, const char *prefix, const nb_keys *keys)
+static int find_key(nb_json *json, const nb_json_node *node, const char *prefix, const nb_key_set *keys)
 {
     for (uint32_t i = 0; i < keys->count; i++)
         if ((keys->allowed & NB_BIT(i)) != 0 && nb_value_is_key(node, prefix, keys->names[i])) return (int)i;
@@ -75,12 +75,12 @@ static int find_key(nb_json *json, const nb_json_node *node, const char *prefix,
     return -1;
 }
 
-int nb_value_find_key(nb_json *json, const nb_json_node *node, const nb_keys *keys)
+int nb_value_find_key(nb_json *json, const nb_json_node *node, const nb_key_set *keys)
 {
     return find_key(json, node, "", keys);
 }
 
-static bool fail_missing(nb_json *json, const nb_json_node *object, const nb_keys *keys, uint32_t missing)
+static bool fail_missing(nb_json *json, const nb_json_node *object, const nb_key_set *keys, uint32_t missing)
 {
     uint32_t i = 0;
     while ((missing & NB_BIT(i)) == 0) i++;
@@ -96,7 +96,7 @@ bool nb_value_fail_repeated(nb_json *json, const nb_json_node *node, size_t firs
                             place.column);
 }
 
-bool nb_value_members_after(nb_json *json, const nb_json_node *object, const char *prefix, const nb_keys *keys,
+bool nb_value_members_after(nb_json *json, const nb_json_node *object, const char *prefix, const nb_key_set *keys,
                             const nb_json_node **found)
 {
     uint32_t seen = 0;
@@ -114,14 +114,14 @@ bool nb_value_members_after(nb_json *json, const nb_json_node *object, const cha
     return missing == 0 || fail_missing(json, object, keys, missing);
 }
 
-bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_keys *keys, const nb_json_node **found)
+bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_key_set *keys, const nb_json_node **found)
 {
     return nb_value_members_after(json, object, "", keys, found);
 }
 
 int nb_value_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count)
 {
-    list allowed = {.size = 0};
+    nb_text_list allowed = {.size = 0};
     char suggestion[64];
     for (int i = 0; i < count; i++) {
         const size_t size = strlen(names[i]);
@@ -140,7 +140,7 @@ int nb_value_choice(nb_json *json, const nb_json_node *node, const char *const *
 
 int nb_value_type(nb_json *json, const nb_json_node *object, const char *const *names, int count)
 {
-    list allowed = {.size = 0};
+    nb_text_list allowed = {.size = 0};
     if (!nb_value_is(json, object, NB_JSON_OBJECT, "an object {\"type\": ...}")) return -1;
     for (const nb_json_node *node = nb_json_first(json, object); node != NULL; node = nb_json_next(json, node))
         if (nb_json_has_key(node, "type")) return nb_value_choice(json, node, names, count);

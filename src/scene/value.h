@@ -7,21 +7,21 @@
 #include "scene/range.h"
 
 /* The keys an object may have, at most 32; bit i of a mask stands for names[i]. */
-typedef struct nb_keys {
+typedef struct nb_key_set {
     const char *const *names;
     uint32_t count;
     uint32_t allowed, required;
     const char *owner; /* "a sphere": whose keys they are, in messages */
-} nb_keys;
+} nb_key_set;
 
 #define NB_BIT(i) ((uint32_t)1 << (i))
 
 /* Sorts the members of an object into found[0..count), NULL where absent. Unknown, repeated and missing keys are
  * errors. */
-bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_keys *keys, const nb_json_node **found);
+bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_key_set *keys, const nb_json_node **found);
 
 /* The same where keys have a prefix in the file ("": none): members without it are none of ours. */
-bool nb_value_members_after(nb_json *json, const nb_json_node *object, const char *prefix, const nb_keys *keys,
+bool nb_value_members_after(nb_json *json, const nb_json_node *object, const char *prefix, const nb_key_set *keys,
                             const nb_json_node **found);
 
 /* Whether the member's key is the name, with the prefix ("": none) before it. */
@@ -31,7 +31,7 @@ bool nb_value_is_key(const nb_json_node *node, const char *prefix, const char *n
 bool nb_value_fail_repeated(nb_json *json, const nb_json_node *node, size_t first);
 
 /* Where `key` is among names: its index; otherwise an error at the key that lists the allowed ones and returns -1. */
-int nb_value_find_key(nb_json *json, const nb_json_node *node, const nb_keys *keys);
+int nb_value_find_key(nb_json *json, const nb_json_node *node, const nb_key_set *keys);
 
 /* The type of an object's tree: the value of its member "type", as an index into names; -1 after an error. */
 int nb_value_type(nb_json *json, const nb_json_node *object, const char *const *names, int count);

@@ -7,17 +7,17 @@
 
 /* Which numbers of a volume move, and whether they have a range to keep. A box moves by its centre and its half
  * extents, which stand in for min and max, so that it never turns inside out. */
-typedef struct moving {
+typedef struct nb_track_state {
     size_t offset, count;
     bool limited;
-} moving;
+} nb_track_state;
 
 #define MOVING(member, count, limited)                                                                                 \
     {                                                                                                                  \
         offsetof(nebel_volume_desc, member), count, limited                                                            \
     }
 
-static const moving numbers[] = {
+static const nb_track_state numbers[] = {
     MOVING(shape.transform.position, 3, false),
     MOVING(shape.transform.rotation, 4, false),
     MOVING(shape.transform.scale, 3, true),

@@ -178,7 +178,7 @@ static nebel_result read_slices(const nb_codec *codec, const nebel_grid_file *fi
 /* ---- axes ------------------------------------------------------------------------------------ */
 
 /* From z up to y up: (x, y, z) becomes (x, z, -y), row by row. */
-static nebel_result turn(const nb_codec *codec, const nb_space *space, nb_voxels *voxels)
+static nebel_result turn(const nb_codec *codec, const nb_file_units *space, nb_voxels *voxels)
 {
     const size_t *const size = voxels->size, row = size[0] * size_of_voxel(voxels->type);
     nb_voxels turned = {.size = {size[0], size[2], size[1]}, .type = voxels->type};
@@ -224,20 +224,20 @@ static nebel_result read_voxels(const nb_codec *codec, const nebel_grid_file *fi
 }
 
 /* The core names the voxel that is wrong; the file comes from here. */
-typedef struct whose {
+typedef struct nb_slice_owner {
     const nb_codec *codec;
-} whose;
+} nb_slice_owner;
 
 static void tell_file(nebel_result result, const char *message, void *user)
 {
-    const nb_codec *codec = ((const whose *)user)->codec;
+    const nb_codec *codec = ((const nb_slice_owner *)user)->codec;
     nb_fail(&codec->log, result, "%s: %s", codec->name, message);
 }
 
 static nebel_result make_grid(const nb_codec *codec, const nebel_grid_file *file, const nb_voxels *voxels,
                               nebel_grid **grid)
 {
-    whose user = {codec};
+    nb_slice_owner user = {codec};
     nebel_grid_desc desc = {.allocator = codec->allocator,
                             .log = {tell_file, &user},
                             .type = voxels->type,
@@ -248,7 +248,7 @@ static nebel_result make_grid(const nb_codec *codec, const nebel_grid_file *file
     return nebel_create_grid(&desc, grid);
 }
 
-nebel_result nb_voxels_load(const nebel_grid_file *file, const nebel_scene_desc *desc, const nb_space *space,
+nebel_result nb_voxels_load(const nebel_grid_file *file, const nebel_scene_desc *desc, const nb_file_units *space,
                             nebel_grid **grid, uint64_t *bytes)
 {
     *bytes = 0;

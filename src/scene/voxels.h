@@ -21,7 +21,7 @@ nb_voxel_file nb_voxel_file_kind(const char *path, size_t size);
 nebel_result nb_voxels_allocate(const nb_codec *codec, nb_voxels *voxels);
 
 /* nebel_load_grid, whose voxels lie along the axes of a file in `space`, and what they take. */
-nebel_result nb_voxels_load(const nebel_grid_file *file, const nebel_scene_desc *desc, const nb_space *space,
+nebel_result nb_voxels_load(const nebel_grid_file *file, const nebel_scene_desc *desc, const nb_file_units *space,
                             nebel_grid **grid, uint64_t *bytes);
 
 /* The grid named `name`, NULL: the first, of a NanoVDB file. On an error voxels->data is NULL. Errors: FORMAT, LIMIT,

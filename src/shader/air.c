@@ -53,7 +53,7 @@ static void pack_lobes(const nebel_sky_view *view, nebel_texel_f32 *words)
 static void pack_head(const nebel_sky_view *view, const nb_air_parts *parts, nebel_texel_f32 *words)
 {
     const nb_outlook *o = &view->outlook;
-    const nb_scatter *scatter = &view->atmosphere->scatter;
+    const nb_scattering_table *scatter = &view->atmosphere->scatter;
     const double steps = (scatter->suns - 1) / (scatter->last_sun - scatter->first_sun);
     memset(words, 0, NB_AIR_WORDS * sizeof *words);
     words[NB_AIR_OUTLOOK] = word_of_four(o->radius, o->ground, o->thickness, o->height);
@@ -84,7 +84,7 @@ static void pack_entries(const nebel_sky_view *view, nebel_texel_f32 *word)
 
 static void pack_words(const nebel_sky_view *view, const nb_air_parts *parts, nebel_texel_f32 *words)
 {
-    const nb_scatter *scatter = &view->atmosphere->scatter;
+    const nb_scattering_table *scatter = &view->atmosphere->scatter;
     pack_head(view, parts, words);
     pack_entries(view, words + parts->entries);
     for (size_t i = 0; i < parts->suns - parts->extinction; i++)

@@ -85,17 +85,17 @@ nb_two_depths nb_depths_between(nb_ray ray, nb_media media, float from, float to
 
 /* ---- the lattice ----------------------------------------------------------------------------- */
 
-struct nb_lattice {
+struct nb_diffusion_lattice {
     nb_vec3 low, spacing, cells; /* relative to the packed eye [m] */
     int word, texel, channels, flags;
 };
 
-nb_lattice nb_lattice_of(int word)
+nb_diffusion_lattice nb_lattice_of(int word)
 {
     nb_vec4 low = NEBEL_FOG_TEXEL(word);
     nb_vec4 spacing = NEBEL_FOG_TEXEL(word + 1);
     nb_vec4 cells = NEBEL_FOG_TEXEL(word + 2);
-    nb_lattice l;
+    nb_diffusion_lattice l;
     l.low = low.xyz;
     l.spacing = spacing.xyz;
     l.cells = cells.xyz;
@@ -107,16 +107,16 @@ nb_lattice nb_lattice_of(int word)
 }
 
 /* Whether fog goes on beyond the low end along an axis, of the high one for high = 1. */
-bool nb_goes_on(nb_lattice l, int axis, int high) { return (l.flags >> (2 * axis + high) & 1) != 0; }
+bool nb_goes_on(nb_diffusion_lattice l, int axis, int high) { return (l.flags >> (2 * axis + high) & 1) != 0; }
 
-bool nb_dims_sky(nb_lattice l) { return (l.flags & NB_LATTICE_SKY) != 0; }
+bool nb_dims_sky(nb_diffusion_lattice l) { return (l.flags & NB_LATTICE_SKY) != 0; }
 
-bool nb_is_own(nb_lattice l) { return (l.flags & NB_LATTICE_OWN) != 0; }
+bool nb_is_own(nb_diffusion_lattice l) { return (l.flags & NB_LATTICE_OWN) != 0; }
 
 bool nb_is_beside(float place, float low, float extent) { return place < low || place > low + extent; }
 
 /* Where fog goes on beside a lattice, bodies in it are not seen any more. */
-nb_lattice nb_lattice_at(nb_lattice l, nb_vec3 place)
+nb_diffusion_lattice nb_lattice_at(nb_diffusion_lattice l, nb_vec3 place)
 {
     nb_vec3 extent = l.spacing * l.cells;
     bool beside = (nb_goes_on(l, 0, 0) && nb_is_beside(place.x, l.low.x, extent.x)) ||
@@ -137,7 +137,7 @@ void nb_clip_axis(inout nb_vec2 span, float from, float d, float extent, bool lo
     if (!still && !(up ? high_goes_on : low_goes_on)) span.y = min(span.y, (up ? extent - from : -from) * inverse);
 }
 
-nb_vec2 nb_clip_to_lattice(nb_lattice l, nb_ray ray)
+nb_vec2 nb_clip_to_lattice(nb_diffusion_lattice l, nb_ray ray)
 {
     nb_vec2 span = nb_vec2(0.0, ray.t_max);
     nb_vec3 from = ray.origin - l.low;
@@ -165,7 +165,7 @@ float nb_step_along(float at, float d, float spacing, float cells)
     return step;
 }
 
-float nb_lattice_step(nb_lattice l, nb_ray ray, float t)
+float nb_lattice_step(nb_diffusion_lattice l, nb_ray ray, float t)
 {
     nb_vec3 at = ray.origin + ray.direction * t - l.low;
     float step = nb_step_along(at.x, ray.direction.x, l.spacing.x, l.cells.x);
@@ -192,7 +192,7 @@ float nb_diffuse_source(nb_vec4 numbers, float most, nb_vec3 direction)
 }
 
 /* How much more of what is diffuse there is than nodes say, in light of this direction. */
-nb_vec3 nb_lattice_gain(nb_lattice l, nb_vec3 d)
+nb_vec3 nb_lattice_gain(nb_diffusion_lattice l, nb_vec3 d)
 {
     int word = l.word + 3;
     return d.x * d.x * NEBEL_FOG_TEXEL(word + (d.x < 0.0 ? 1 : 0)).xyz + d.y * d.y * NEBEL_FOG_TEXEL(word + (d.y < 0.0 ? 3 : 2)).xyz +
@@ -221,7 +221,7 @@ struct nb_nodes {
     nb_vec3 share;
 };
 
-nb_nodes nb_nodes_around(nb_lattice l, nb_vec3 place)
+nb_nodes nb_nodes_around(nb_diffusion_lattice l, nb_vec3 place)
 {
     nb_vec3 at = clamp((place - l.low) / l.spacing, nb_splat3(0.0), l.cells);
     nb_vec3 base = min(floor(at), l.cells - nb_splat3(1.0));
@@ -249,7 +249,7 @@ nb_vec4 nb_mix_nodes(nb_nodes n, int number)
     return near * (1.0 - n.share.z) + far * n.share.z;
 }
 
-nb_node_light nb_look_at_nodes(nb_lattice l, nb_ray ray, float t, nb_turn to_sun)
+nb_node_light nb_look_at_nodes(nb_diffusion_lattice l, nb_ray ray, float t, nb_turn to_sun)
 {
     nb_nodes n = nb_nodes_around(l, ray.origin + ray.direction * t);
     float g = nb_mix_nodes(n, 2 * l.channels).x;
@@ -296,7 +296,7 @@ nb_vec3 nb_light_between(nb_vec3 first, nb_vec3 last, nb_vec3 depth)
 #define NB_TURNS_OF_PIECE 8
 
 /* A piece is in one lattice; where it is another one than that of the piece before, and at first, an empty piece looks at it. */
-nb_vec3 nb_gather_in_lattice(nb_lattice l, nb_ray ray, nb_media media, inout int turns)
+nb_vec3 nb_gather_in_lattice(nb_diffusion_lattice l, nb_ray ray, nb_media media, inout int turns)
 {
     nb_turn to_sun = nb_turn_between(ray.direction, nb_to_sun());
     nb_vec2 span = nb_clip_to_lattice(l, ray);
@@ -310,7 +310,7 @@ nb_vec3 nb_gather_in_lattice(nb_lattice l, nb_ray ray, nb_media media, inout int
     nb_node_light here = nb_no_node_light();
     while (t < span.y && nb_smallest(before.scaled) < NB_DARK_DEPTH && !nb_is_tired(turns)) {
         float step = max(smaller * min(nb_lattice_step(l, ray, t), span.y - t), t * (2.0 * NB_EPSILON));
-        nb_lattice within = nb_lattice_at(l, ray.origin + ray.direction * (t + 0.5 * step));
+        nb_diffusion_lattice within = nb_lattice_at(l, ray.origin + ray.direction * (t + 0.5 * step));
         float end = within.word == word ? min(t + step, span.y) : t;
         word = within.word;
         nb_two_depths depth = nb_depths_between(ray, media, t, end, turns);

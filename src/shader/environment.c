@@ -20,7 +20,7 @@ _Static_assert(NB_ENVIRONMENT_CONSTANT == (int)NEBEL_ENVIRONMENT_CONSTANT &&
 
 /* ---- sizes ----------------------------------------------------------------------------------- */
 
-static size_t table_words(const nb_sky_table *table)
+static size_t table_words(const nb_environment_table *table)
 {
     return 1 + table->rows * table->columns;
 }
@@ -71,7 +71,7 @@ nebel_result nb_check_environment(const nebel_snapshot *snapshot)
 void nb_place_filters(const nebel_snapshot *snapshot, nebel_texel_f32 *words)
 {
     for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const nb_skylight *sky = snapshot->media[i].sky;
+        const nb_environment_light *sky = snapshot->media[i].sky;
         if (sky == NULL) continue;
         words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS + NB_MEDIUM_FILTER].v[3] =
             (float)filter_place(snapshot, (size_t)(sky - snapshot->skylights));
@@ -87,7 +87,7 @@ static nebel_texel_f32 color_word(const double color[3])
 
 static void pack_head(const nebel_environment *sky, size_t surfaces, nebel_texel_f32 *words)
 {
-    const nb_skylight light = nb_skylight_of(sky, NULL);
+    const nb_environment_light light = nb_skylight_of(sky, NULL);
     memset(words, 0, NB_ENVIRONMENT_WORDS * sizeof *words);
     words[0].v[0] = (float)sky->type;
     switch (sky->type) {
@@ -117,7 +117,7 @@ static nebel_texel_f32 *pack_rgb(const float *rgb, size_t columns, size_t rows, 
     return word;
 }
 
-static void pack_gradient_filter(const nb_sky_filter *filter, nebel_texel_f32 *word)
+static void pack_gradient_filter(const nb_environment_filter *filter, nebel_texel_f32 *word)
 {
     const double steps = (NB_SKY_KNOTS - 1) / log1p(1 / filter->width);
     *word++ = (nebel_texel_f32){{(float)filter->mean_cosine, (float)(1 / filter->width), (float)steps, 0}};
@@ -127,7 +127,7 @@ static void pack_gradient_filter(const nb_sky_filter *filter, nebel_texel_f32 *w
 
 static void pack_filter(const nebel_snapshot *snapshot, size_t number, nebel_texel_f32 *words)
 {
-    const nb_sky_filter *filter = snapshot->skylights[number].filter;
+    const nb_environment_filter *filter = snapshot->skylights[number].filter;
     nebel_texel_f32 *word = &words[filter_place(snapshot, number)];
     if (snapshot->sky.type == NEBEL_ENVIRONMENT_MAP)
         (void)pack_rgb(filter->table.coefficients, filter->table.columns, filter->table.rows, word);
@@ -138,7 +138,7 @@ static void pack_filter(const nebel_snapshot *snapshot, size_t number, nebel_tex
 static void pack_surfaces(const nebel_environment_map *map, nebel_texel_f32 *word)
 {
     size_t width, height;
-    const nb_sky_table *table = nb_sky_map_reflection(map);
+    const nb_environment_table *table = nb_sky_map_reflection(map);
     const float *pixels = nb_sky_map_pixels(map, &width, &height);
     (void)pack_rgb(pixels, width, height, pack_rgb(table->coefficients, table->columns, table->rows, word));
 }

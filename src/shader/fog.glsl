@@ -241,7 +241,7 @@ nb_piece nb_cover_piece(nb_piece piece, int used)
 {
     int floor = piece.floor;
     for (int k = 0; k < used; k++) {
-        nb_vec3 slot = nb_slot(k);
+        nb_vec3 slot = nb_fog_slot(k);
         int flags = int(NEBEL_FOG_TEXEL(int(slot.z) + 1).w);
         if ((flags & NB_LIGHT_COVERS) != 0 && nb_is_inside(slot, piece.start)) floor = max(floor, flags / NB_LIGHT_RANK);
     }
@@ -256,7 +256,7 @@ nb_piece nb_cover_piece(nb_piece piece, int used)
 /* `by_cells`: one grid may be walked from cell to cell within the piece. */
 nb_piece nb_note_slot(nb_piece piece, int k, nb_ray ray, bool by_cells)
 {
-    nb_vec3 slot = nb_slot(k);
+    nb_vec3 slot = nb_fog_slot(k);
     if (slot.x > piece.start) piece.end = min(piece.end, slot.x);
     if (slot.y > piece.start) piece.end = min(piece.end, slot.y);
     if (nb_is_there(slot, piece)) {
@@ -371,7 +371,7 @@ void nb_add_grid(inout nb_leg leg, nb_profile profile, nb_vec3 extinction, nb_ve
 
 void nb_add_slot(inout nb_leg leg, nb_piece piece, int k, nb_ray ray)
 {
-    int at = int(nb_slot(k).z);
+    int at = int(nb_fog_slot(k).z);
     nb_vec4 extinction = NEBEL_FOG_TEXEL(at);
     nb_vec3 light = nb_light_per_metre(at, nb_slot_radiance(k, at));
     nb_vec3 glow = nb_splat3(0.0);

@@ -149,7 +149,7 @@ int nb_lamp_medium(nb_ray ray, int first, bool listed, nb_lamp_piece piece, int 
 {
     int at = 0;
     if (!piece.crowd) {
-        at = int(nb_slot(i).z);
+        at = int(nb_fog_slot(i).z);
     } else {
         int asked = nb_medium_at(first + i, listed);
         int leaves = int(NEBEL_FOG_TEXEL(asked + 2).w);
@@ -166,7 +166,7 @@ int nb_drop_covered(int used, int floor)
 {
     int kept = 0;
     for (int i = 0; i < used; i++) {
-        nb_vec3 slot = nb_slot(i);
+        nb_vec3 slot = nb_fog_slot(i);
         int at = int(slot.z);
         if (nb_is_covered(at, floor) || int(NEBEL_FOG_TEXEL(at).w) == NB_KIND_EXCLUDE) continue;
         nb_set_slot(kept, at, nb_stretch_of(slot.x, slot.y));

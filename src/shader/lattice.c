@@ -67,7 +67,7 @@ static int flags_of(const nb_diffusion *d)
 
 static void pack_lattice(const nb_diffusion *d, const long double eye[3], size_t first, nebel_texel_f32 *word)
 {
-    const nb_lattice *l = &d->lattice;
+    const nb_diffusion_lattice *l = &d->lattice;
     for (int a = 0; a < 3; a++) {
         word[0].v[a] = (float)((long double)l->low[a] - eye[a]);
         word[1].v[a] = (float)l->spacing[a];

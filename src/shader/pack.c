@@ -303,13 +303,13 @@ static void pack_sun(const nebel_snapshot *snapshot, nebel_texel_f32 word[2])
 {
     memset(word, 0, 2 * sizeof *word);
     if (!snapshot->is_sunlit) return;
-    const nb_way_to_sun way = snapshot->way_to_sun;
+    const nb_sun_depth_method way = snapshot->way_to_sun;
     const int form = way == NB_WAY_FLAT ? NB_SUN_FLAT : way == NB_WAY_HEIGHT ? NB_SUN_HEIGHT : NB_SUN_STEPS;
     set_color(&word[0], snapshot->to_sun, form);
     set_color(&word[1], snapshot->irradiance, 0);
 }
 
-static void pack_lamp(const packer *p, const nb_lamp *lamp, nebel_texel_f32 word[NB_LAMP_WORDS])
+static void pack_lamp(const packer *p, const nb_light *lamp, nebel_texel_f32 word[NB_LAMP_WORDS])
 {
     long double place[3];
     for (int i = 0; i < 3; i++) place[i] = (long double)lamp->place[i] - p->eye[i];

@@ -24,7 +24,7 @@ bool nb_is_covered(int medium, int floor)
 #endif
 NB_GLOBAL nb_vec3 nb_slots[NEBEL_MEDIUM_SLOTS];
 
-nb_vec3 nb_slot(int k) { return nb_slots[k & (NEBEL_MEDIUM_SLOTS - 1)]; }
+nb_vec3 nb_fog_slot(int k) { return nb_slots[k & (NEBEL_MEDIUM_SLOTS - 1)]; }
 void nb_set_slot(int k, int medium, nb_stretch s) { nb_slots[k & (NEBEL_MEDIUM_SLOTS - 1)] = nb_vec3(s.enter, s.leave, float(medium)); }
 
 /* What opaque fog of their media gives; kept where an environment lights fog, which is dear to look up. */
@@ -47,9 +47,9 @@ bool nb_is_inside(nb_vec3 slot, float t) { return slot.x <= t && slot.y > t; }
 int nb_farthest_slot(int used)
 {
     int farthest = 0;
-    float most = nb_slot(0).x;
+    float most = nb_fog_slot(0).x;
     for (int k = 1; k < used; k++) {
-        float enter = nb_slot(k).x;
+        float enter = nb_fog_slot(k).x;
         if (enter > most) {
             most = enter;
             farthest = k;
@@ -140,7 +140,7 @@ nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin
             if (!crowd && window.used == NEBEL_MEDIUM_SLOTS) farthest = nb_farthest_slot(window.used);
             continue;
         }
-        float dropped = max(s.enter, nb_slot(farthest).x);
+        float dropped = max(s.enter, nb_fog_slot(farthest).x);
         window.end = min(window.end, dropped);
         if (s.enter < dropped) {
             nb_set_slot(farthest, at, s);

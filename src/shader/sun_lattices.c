@@ -81,14 +81,14 @@ static double layers_wanted(const nebel_snapshot *snapshot, size_t medium, const
     return layers;
 }
 
-static int is_within(const nebel_snapshot *snapshot, size_t medium, const double way[3], nb_lattice_limit limit)
+static int is_within(const nebel_snapshot *snapshot, size_t medium, const double way[3], nb_sun_lattice_limit limit)
 {
-    nb_grid_lattice lattice = {0};
+    nb_sun_lattice lattice = {0};
     nb_grid_lattice_lay(&lattice, grid_of(snapshot, medium), way, limit);
     return lattice.per_cell >= limit.per_cell;
 }
 
-static nb_lattice_limit limit_of(const nebel_snapshot *snapshot, size_t medium, size_t room)
+static nb_sun_lattice_limit limit_of(const nebel_snapshot *snapshot, size_t medium, size_t room)
 {
     const size_t share = room / count_lattices(snapshot);
     double way[3];
@@ -97,21 +97,21 @@ static nb_lattice_limit limit_of(const nebel_snapshot *snapshot, size_t medium, 
     for (double layers = layers_wanted(snapshot, medium, way); layers >= 1; layers /= 2) {
         const double most = is_linear ? 2 * layers : 2 * MOST_LAYERS;
         for (double columns = most; columns > 2 || columns >= most; columns /= 2) {
-            const nb_lattice_limit limit = {columns, share < MOST_FINE_TEXELS ? share : MOST_FINE_TEXELS, layers};
+            const nb_sun_lattice_limit limit = {columns, share < MOST_FINE_TEXELS ? share : MOST_FINE_TEXELS, layers};
             if (is_within(snapshot, medium, way, limit)) return limit;
         }
     }
-    return (nb_lattice_limit){2, share < MOST_TEXELS ? share : MOST_TEXELS, 1};
+    return (nb_sun_lattice_limit){2, share < MOST_TEXELS ? share : MOST_TEXELS, 1};
 }
 
-static size_t cells_of(const nb_grid_lattice *l, int axis)
+static size_t cells_of(const nb_sun_lattice *l, int axis)
 {
     return (size_t)l->count[axis] - 1;
 }
 
 static size_t texels_of(const nebel_snapshot *snapshot, size_t medium, size_t room)
 {
-    nb_grid_lattice lattice = {0};
+    nb_sun_lattice lattice = {0};
     double way[3];
     nb_way_in_cells(snapshot, &snapshot->media[medium].body, way);
     nb_grid_lattice_lay(&lattice, grid_of(snapshot, medium), way, limit_of(snapshot, medium, room));
@@ -158,7 +158,7 @@ static uint32_t bits_of(double x)
     return bits;
 }
 
-static void pack_head(const nb_grid_lattice *l, nebel_texel_u32 *head)
+static void pack_head(const nb_sun_lattice *l, nebel_texel_u32 *head)
 {
     for (int i = 0; i < 3; i++) head[0].v[i] = (uint32_t)cells_of(l, i);
     head[0].v[3] = (uint32_t)l->axis;
@@ -174,7 +174,7 @@ static void pack_head(const nb_grid_lattice *l, nebel_texel_u32 *head)
 /* A cell that shaders walk through. No eight nodes are as far from the sun as can be. */
 static const nebel_texel_u32 flaw = {{UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX}};
 
-static nebel_result mark_flaws(const nebel_snapshot *snapshot, size_t medium, const nb_grid_lattice *l,
+static nebel_result mark_flaws(const nebel_snapshot *snapshot, size_t medium, const nb_sun_lattice *l,
                                nebel_texel_u32 *texel)
 {
     const size_t count = cells_of(l, 0) * cells_of(l, 1) * cells_of(l, 2);
@@ -189,7 +189,7 @@ static nebel_result mark_flaws(const nebel_snapshot *snapshot, size_t medium, co
 }
 
 /* Returns the texel behind the last. */
-static nebel_texel_u32 *pack_lattice(const nb_grid_lattice *l, nebel_texel_u32 *texel)
+static nebel_texel_u32 *pack_lattice(const nb_sun_lattice *l, nebel_texel_u32 *texel)
 {
     const size_t row = (size_t)l->count[0], layer = row * (size_t)l->count[1];
     pack_head(l, texel);
@@ -209,7 +209,7 @@ nebel_result nb_pack_sun_lattices(const nebel_snapshot *snapshot, size_t room, n
     for (size_t i = next_lattice(snapshot, 0); i < snapshot->medium_count; i = next_lattice(snapshot, i + 1)) {
         double way[3];
         nb_way_in_cells(snapshot, &snapshot->media[i].body, way);
-        nb_grid_lattice *lattice =
+        nb_sun_lattice *lattice =
             nb_grid_lattice_make(grid_of(snapshot, i), &snapshot->allocator, way, limit_of(snapshot, i, room));
         nebel_result result = lattice != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
         if (result == NEBEL_OK) {

@@ -29,14 +29,14 @@ typedef struct hull {
     int edges[2 * (CUTS + CUTS * (CUTS - 1) / 2)], edge_count;
 } hull;
 
-typedef struct range {
+typedef struct nb_tile_range {
     double low, high;
-} range;
+} nb_tile_range;
 
 /* Columns of tiles in one row, first to last. */
-typedef struct span {
+typedef struct nb_tile_span {
     uint16_t first, last;
-} span;
+} nb_tile_span;
 
 /* A volume's spans, one for each row from `row`; a row without any has first > last. */
 typedef struct footprint {
@@ -133,13 +133,13 @@ static void make_hull(const screen *s, const double low[3], const double high[3]
 
 /* ---- ranges ---------------------------------------------------------------------------------- */
 
-static range nothing(void)
+static nb_tile_range nothing(void)
 {
-    return (range){HUGE_VAL, -HUGE_VAL};
+    return (nb_tile_range){HUGE_VAL, -HUGE_VAL};
 }
 
 /* value / w, in all directions where both vanish */
-static void include(range *r, double value, double w)
+static void include(nb_tile_range *r, double value, double w)
 {
     const double low = w > 0 ? value / w : value > 0 ? HUGE_VAL : -HUGE_VAL;
     const double high = w > 0 ? value / w : value < 0 ? -HUGE_VAL : HUGE_VAL;
@@ -156,9 +156,9 @@ static void clip(double a, double b, double *from, double *to)
 }
 
 /* Where the hull lies between two heights, in x. */
-static range range_between(const hull *h, double bottom, double top)
+static nb_tile_range range_between(const hull *h, double bottom, double top)
 {
-    range r = nothing();
+    nb_tile_range r = nothing();
     for (int i = 0; i < h->edge_count; i++) {
         const vertex *a = &h->vertices[h->edges[2 * i]], *b = &h->vertices[h->edges[2 * i + 1]];
         double from = 0, to = 1;
@@ -171,15 +171,16 @@ static range range_between(const hull *h, double bottom, double top)
     return r;
 }
 
-static range range_of(const hull *h, int vertical)
+static nb_tile_range range_of(const hull *h, int vertical)
 {
-    range r = nothing();
+    nb_tile_range r = nothing();
     for (int i = 0; i < h->count; i++) include(&r, vertical ? h->vertices[i].y : h->vertices[i].x, h->vertices[i].w);
     return r;
 }
 
 /* The tiles that a range of pixels touches. 0 where it is off the screen. */
-static int tiles_in(const screen *s, const range *r, uint32_t pixels, uint32_t tiles, uint32_t *first, uint32_t *last)
+static int tiles_in(const screen *s, const nb_tile_range *r, uint32_t pixels, uint32_t tiles, uint32_t *first,
+                    uint32_t *last)
 {
     const double low = r->low - MARGIN, high = r->high + MARGIN;
     if (!(high >= 0 && low <= pixels)) return 0;
@@ -195,29 +196,29 @@ typedef struct tiler {
     screen screen;
     const nebel_snapshot *snapshot;
     footprint *footprints; /* of the bounded volumes */
-    span *spans;
+    nb_tile_span *spans;
     size_t span_count, span_capacity;
     uint32_t *ends; /* of the tiles' volumes, then of those written */
 } tiler;
 
-static span whole_row(const screen *s)
+static nb_tile_span whole_row(const screen *s)
 {
-    return (span){0, (uint16_t)(s->columns - 1)};
+    return (nb_tile_span){0, (uint16_t)(s->columns - 1)};
 }
 
-static span span_in_row(const screen *s, const hull *h, uint32_t row)
+static nb_tile_span span_in_row(const screen *s, const hull *h, uint32_t row)
 {
-    const range r = range_between(h, row * s->size - MARGIN, (row + 1) * s->size + MARGIN);
+    const nb_tile_range r = range_between(h, row * s->size - MARGIN, (row + 1) * s->size + MARGIN);
     uint32_t first = 1, last = 0;
-    if (!tiles_in(s, &r, s->width, s->columns, &first, &last)) return (span){1, 0};
-    return (span){(uint16_t)first, (uint16_t)last};
+    if (!tiles_in(s, &r, s->width, s->columns, &first, &last)) return (nb_tile_span){1, 0};
+    return (nb_tile_span){(uint16_t)first, (uint16_t)last};
 }
 
 /* A hull within two tiles either way gains nothing from a look at each row. */
 static int add_spans(tiler *t, const hull *h, uint32_t first_row, uint32_t last_row, footprint *f)
 {
     const screen *s = &t->screen;
-    const range across = range_of(h, 0);
+    const nb_tile_range across = range_of(h, 0);
     uint32_t first, last;
     if (!tiles_in(s, &across, s->width, s->columns, &first, &last)) return 1;
     void *spans = t->spans;
@@ -227,7 +228,7 @@ static int add_spans(tiler *t, const hull *h, uint32_t first_row, uint32_t last_
     *f = (footprint){t->span_count, first_row, last_row - first_row + 1};
     const int small = last - first <= 1 && last_row - first_row <= 1;
     for (uint32_t row = first_row; row <= last_row; row++)
-        t->spans[t->span_count++] = small ? (span){(uint16_t)first, (uint16_t)last} : span_in_row(s, h, row);
+        t->spans[t->span_count++] = small ? (nb_tile_span){(uint16_t)first, (uint16_t)last} : span_in_row(s, h, row);
     return 1;
 }
 
@@ -239,7 +240,7 @@ static int find_footprint(tiler *t, const nb_volume *body, footprint *f)
     *f = (footprint){0, 0, 0};
     make_hull(&t->screen, body->low, body->high, &h);
     if (h.count == 0) return 1;
-    const range up = range_of(&h, 1);
+    const nb_tile_range up = range_of(&h, 1);
     if (!tiles_in(&t->screen, &up, t->screen.height, t->screen.rows, &first_row, &last_row)) return 1;
     return add_spans(t, &h, first_row, last_row, f);
 }
@@ -265,7 +266,7 @@ static int find_footprints(tiler *t)
     return 1;
 }
 
-static span span_at(const tiler *t, const footprint *f, uint32_t row)
+static nb_tile_span span_at(const tiler *t, const footprint *f, uint32_t row)
 {
     return f->spans == SIZE_MAX ? whole_row(&t->screen) : t->spans[f->spans + row];
 }
@@ -279,7 +280,7 @@ static size_t count_entries(tiler *t)
     for (size_t i = 0; i < t->snapshot->medium_count; i++) {
         const footprint *f = &t->footprints[i];
         for (uint32_t row = 0; row < f->row_count; row++) {
-            const span s = span_at(t, f, row);
+            const nb_tile_span s = span_at(t, f, row);
             uint32_t *ends = &t->ends[(size_t)(f->row + row) * t->screen.columns];
             for (uint32_t column = s.first; column <= s.last; column++) ends[column]++;
             if (s.first <= s.last) total += (size_t)s.last - s.first + 1;
@@ -302,7 +303,7 @@ static void write_entries(tiler *t, uint32_t *entries)
     for (size_t i = 0; i < t->snapshot->medium_count; i++) {
         const footprint *f = &t->footprints[i];
         for (uint32_t row = 0; row < f->row_count; row++) {
-            const span s = span_at(t, f, row);
+            const nb_tile_span s = span_at(t, f, row);
             uint32_t *ends = &t->ends[(size_t)(f->row + row) * t->screen.columns];
             for (uint32_t column = s.first; column <= s.last; column++) entries[ends[column]++] = (uint32_t)i;
         }

@@ -222,20 +222,20 @@ static fraction plane_fraction(const bundle *rays, int rising, double end, doubl
 /* ---- depth ----------------------------------------------------------------------------------- */
 
 /* Normalized and stored depth at the ends of the range. */
-typedef struct ends {
+typedef struct nb_depth_ends {
     int rising; /* normalized depth grows along the rays; otherwise depth is reversed */
     double near, far, stored_near, stored_far;
-} ends;
+} nb_depth_ends;
 
 /* Normalized depth comes from infinity at the centre, where w is 0 and z is z0. */
-static ends find_ends(const bundle *rays, const nebel_depth_desc *depth)
+static nb_depth_ends find_ends(const bundle *rays, const nebel_depth_desc *depth)
 {
     const int rising = rays->parallel ? rays->z1.middle > 0 : rays->z0.middle < 0;
     const double low = depth->zero_to_one ? 0 : -1;
     const int given = depth->range[0] != 0 || depth->range[1] != 0;
     const double first = given ? depth->range[0] : 0, last = given ? depth->range[1] : 1;
-    if (rising) return (ends){1, low, 1, first, last};
-    return (ends){0, 1, low, last, first};
+    if (rising) return (nb_depth_ends){1, low, 1, first, last};
+    return (nb_depth_ends){0, 1, low, last, first};
 }
 
 static fraction axis_fraction(const bundle *rays)
@@ -244,7 +244,7 @@ static fraction axis_fraction(const bundle *rays)
     return (fraction){.above = scaled(along(axis, &rays->o), -1), .below = along(axis, &rays->d), .above_growth = 1};
 }
 
-static fraction surface_fraction(const bundle *rays, const nebel_depth_desc *depth, const ends *e)
+static fraction surface_fraction(const bundle *rays, const nebel_depth_desc *depth, const nb_depth_ends *e)
 {
     switch (depth->encoding) {
     case NEBEL_DEPTH_ENCODING_LOGARITHMIC:
@@ -256,14 +256,14 @@ static fraction surface_fraction(const bundle *rays, const nebel_depth_desc *dep
     }
 }
 
-static fraction start_fraction(const bundle *rays, const nebel_depth_desc *depth, const ends *e)
+static fraction start_fraction(const bundle *rays, const nebel_depth_desc *depth, const nb_depth_ends *e)
 {
     if (depth->ray_start == NEBEL_RAY_START_NEAR) return plane_fraction(rays, e->rising, e->near, 0);
     return (fraction){.below = {1, 0, 0}};
 }
 
 /* The last components of the words: what the kind of depth needs, and how sky is told. */
-static void put_kind(const nebel_depth_desc *depth, const ends *e, nebel_texel_f32 *words)
+static void put_kind(const nebel_depth_desc *depth, const nb_depth_ends *e, nebel_texel_f32 *words)
 {
     const int window = depth->encoding == NEBEL_DEPTH_ENCODING_WINDOW,
               logarithm = depth->encoding == NEBEL_DEPTH_ENCODING_LOGARITHMIC;
@@ -319,7 +319,7 @@ nebel_result nebel_compute_view_rays(const nebel_view *view, const nebel_depth_d
     }
     if (!is_convention(depth, &b)) return NEBEL_ERROR_ARGUMENT;
     scale_bundle(&b, 1 / nb_vector_length(b.d.middle));
-    const ends e = find_ends(&b, depth);
+    const nb_depth_ends e = find_ends(&b, depth);
     const fraction surface = surface_fraction(&b, depth, &e), start = start_fraction(&b, depth, &e);
     put_fraction(view, &surface, &rays->texels[6], &rays->texels[7]);
     put_fraction(view, &start, &rays->texels[8], &rays->texels[9]);

@@ -70,7 +70,7 @@ float nb_density_beside(nb_profile profile, float s)
 void nb_add_others_at_points(inout nb_two_points sum, nb_piece piece, nb_ray ray, int used, float first, float second)
 {
     for (int k = 0; k < used; k++) {
-        nb_vec3 slot = nb_slot(k);
+        nb_vec3 slot = nb_fog_slot(k);
         int at = int(slot.z);
         int kind = int(NEBEL_FOG_TEXEL(at).w);
         if (at == piece.voxels || kind == NB_KIND_EXCLUDE || !nb_is_there(slot, piece)) continue;

@@ -122,7 +122,7 @@ void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed,
             for (int k = 0; k < window.used; k++) {
                 if (!on_leg)
                     piece = nb_note_slot(piece, k, ray, lit && !crowd && nb_is_day());
-                else if (nb_is_there(nb_slot(k), piece))
+                else if (nb_is_there(nb_fog_slot(k), piece))
                     nb_add_slot(leg, piece, k, ray);
             }
         }

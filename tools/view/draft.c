@@ -13,7 +13,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-static nebel_result fail_memory(const nb_draft *draft)
+static nebel_result fail_memory(const nb_document *draft)
 {
     draft->log.write(NEBEL_ERROR_MEMORY, "out of memory for the scene", draft->log.user);
     return NEBEL_ERROR_MEMORY;
@@ -24,13 +24,13 @@ static nebel_result fail_memory(const nb_draft *draft)
  */
 
 /* The sky, as light_scene has made it. */
-static const nebel_scene_data *find_light(const nb_draft *draft)
+static const nebel_scene_data *find_light(const nb_document *draft)
 {
     return nebel_get_scene_data(draft->scene);
 }
 
 /* Keys are the file's alone. */
-static nebel_sun find_sun(const nb_draft *draft, const nb_edition *edition)
+static nebel_sun find_sun(const nb_document *draft, const nb_document_state *edition)
 {
     const nebel_scene_data *const data = &draft->data;
     nebel_sun sun = {{0}, {0}};
@@ -51,7 +51,7 @@ static int is_lit_by(const nebel_scene_data *scene, int has_sun, const nebel_sun
 }
 
 /* Before the fog is made or changed. Nobody may render the scene meanwhile. */
-static nebel_result light_scene(nb_draft *draft, const nb_edition *edition)
+static nebel_result light_scene(nb_document *draft, const nb_document_state *edition)
 {
     const nebel_sun sun = find_sun(draft, edition);
     if (is_lit_by(find_light(draft), edition->has_sun, &sun)) return NEBEL_OK;
@@ -71,7 +71,7 @@ static int does_planet_move(const nebel_planet *planet)
 }
 
 /* What the file has that moves without end, or noise and planets that do so now. */
-static int moves_on(const nb_draft *draft)
+static int moves_on(const nb_document *draft)
 {
     int result = nebel_get_scene_data(draft->file)->has_endless_motion;
     for (size_t i = 0; i < draft->now.planet_count; i++) result |= does_planet_move(&draft->now.planets[i]);
@@ -83,7 +83,7 @@ static int moves_on(const nb_draft *draft)
     return result;
 }
 
-void nb_draft_show(nb_draft *draft)
+void nb_draft_show(nb_document *draft)
 {
     nebel_scene_data *const data = &draft->data;
     nb_edition_show(&draft->now, data);
@@ -96,7 +96,7 @@ void nb_draft_show(nb_draft *draft)
 }
 
 /* What fog has of the sun, and of ambient light, which is the edition's. */
-static nebel_result find_fog_light(const nb_draft *draft, const nb_edition *edition, nebel_sun *sun,
+static nebel_result find_fog_light(const nb_document *draft, const nb_document_state *edition, nebel_sun *sun,
                                    nebel_environment *ambient)
 {
     nebel_environment sky;
@@ -108,7 +108,7 @@ static nebel_result find_fog_light(const nb_draft *draft, const nb_edition *edit
 }
 
 /* Also where it fails the fog is the caller's. */
-static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition, nebel_fog **fog)
+static nebel_result create_fog(const nb_document *draft, const nb_document_state *edition, nebel_fog **fog)
 {
     nebel_fog_desc desc = {.log = draft->log, .max_opacity = edition->max_opacity};
     const nebel_scene_data *const file = nebel_get_scene_data(draft->file);
@@ -122,7 +122,7 @@ static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition,
 }
 
 /* A volume as it is at the present frame; its grid has one more owner, also where this fails. */
-static nebel_result find_volume(const nb_draft *draft, const nb_edition *edition, size_t index,
+static nebel_result find_volume(const nb_document *draft, const nb_document_state *edition, size_t index,
                                 nebel_volume_desc *volume)
 {
     *volume = edition->volumes[index];
@@ -130,7 +130,7 @@ static nebel_result find_volume(const nb_draft *draft, const nb_edition *edition
     return nebel_get_scene_grid(draft->scene, grid, draft->frame, &volume->density.grid);
 }
 
-static nebel_result add_volume(const nb_draft *draft, const nb_edition *edition, size_t index, nebel_fog *fog,
+static nebel_result add_volume(const nb_document *draft, const nb_document_state *edition, size_t index, nebel_fog *fog,
                                nebel_volume_id *id)
 {
     nebel_volume_desc volume;
@@ -140,7 +140,7 @@ static nebel_result add_volume(const nb_draft *draft, const nb_edition *edition,
     return result;
 }
 
-static nebel_result change_volume(const nb_draft *draft, const nb_edition *edition, size_t index)
+static nebel_result change_volume(const nb_document *draft, const nb_document_state *edition, size_t index)
 {
     nebel_volume_desc volume;
     nebel_result result = find_volume(draft, edition, index, &volume);
@@ -149,7 +149,7 @@ static nebel_result change_volume(const nb_draft *draft, const nb_edition *editi
     return result;
 }
 
-static nebel_result commit_fog(nb_draft *draft)
+static nebel_result commit_fog(nb_document *draft)
 {
     nebel_snapshot *fresh = NULL;
     const nebel_result result = nebel_commit_fog(draft->fog, &fresh);
@@ -163,7 +163,7 @@ static nebel_result commit_fog(nb_draft *draft)
 }
 
 /* As exact fog, each for itself. */
-static nebel_result add_cells(nebel_fog *fog, const nb_edition *edition)
+static nebel_result add_cells(nebel_fog *fog, const nb_document_state *edition)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < edition->cells_desc.cell_count && result == NEBEL_OK; i++) {
@@ -174,7 +174,7 @@ static nebel_result add_cells(nebel_fog *fog, const nb_edition *edition)
 }
 
 /* Cells that overlap are no scene. */
-static nebel_result make_cells(nb_draft *draft, const nb_edition *edition)
+static nebel_result make_cells(nb_document *draft, const nb_document_state *edition)
 {
     nebel_cells_desc desc = edition->cells_desc;
     nebel_cells *cells = NULL;
@@ -188,7 +188,7 @@ static nebel_result make_cells(nb_draft *draft, const nb_edition *edition)
 }
 
 /* In place of the fog that is there. On an error that one stays. */
-static nebel_result fill_fog(nb_draft *draft, const nb_edition *edition)
+static nebel_result fill_fog(nb_document *draft, const nb_document_state *edition)
 {
     nebel_fog *fog = NULL;
     nebel_volume_id *const ids = calloc(edition->count + 1, sizeof *ids);
@@ -209,14 +209,14 @@ static nebel_result fill_fog(nb_draft *draft, const nb_edition *edition)
     return commit_fog(draft);
 }
 
-static int has_changed(const nb_draft *draft, const nebel_volume_desc *was, const nebel_volume_desc *now)
+static int has_changed(const nb_document *draft, const nebel_volume_desc *was, const nebel_volume_desc *now)
 {
     const int may_move = draft->data.has_endless_motion && now->density.type == NEBEL_DENSITY_GRID;
     return !nb_edition_is_same_volume(now, was) || (may_move && draft->frame != draft->fog_frame);
 }
 
 /* Only numbers of the edition are not as they were. */
-static nebel_result change_fog(nb_draft *draft, const nb_edition *was, const nb_edition *now)
+static nebel_result change_fog(nb_document *draft, const nb_document_state *was, const nb_document_state *now)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < now->count && result == NEBEL_OK; i++)
@@ -257,7 +257,7 @@ static void move_point(const nebel_transform *from, const nebel_transform *to, d
 }
 
 /* The scene's points, where the edition has put them: to be freed. */
-static double (*place_points(const nb_draft *draft, const nb_edition *edition, size_t index))[3]
+static double (*place_points(const nb_document *draft, const nb_document_state *edition, size_t index))[3]
 {
     const nebel_nebula_desc *const nebula = &edition->nebulae[index];
     const nebel_transform *const from = &nebel_get_scene_data(draft->scene)->nebula_transforms[index];
@@ -269,7 +269,7 @@ static double (*place_points(const nb_draft *draft, const nb_edition *edition, s
     return points;
 }
 
-static nebel_result scatter_nebula(const nb_draft *draft, const nb_edition *edition, size_t index,
+static nebel_result scatter_nebula(const nb_document *draft, const nb_document_state *edition, size_t index,
                                    nebel_particle *particles)
 {
     nebel_nebula_desc desc = edition->nebulae[index];
@@ -285,7 +285,7 @@ static nebel_result scatter_nebula(const nb_draft *draft, const nb_edition *edit
     return result;
 }
 
-static nebel_result scatter(const nb_draft *draft, const nb_edition *edition, nebel_particle *particles)
+static nebel_result scatter(const nb_document *draft, const nb_document_state *edition, nebel_particle *particles)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < edition->nebula_count && result == NEBEL_OK; i++) {
@@ -296,7 +296,7 @@ static nebel_result scatter(const nb_draft *draft, const nb_edition *edition, ne
 }
 
 /* In place of those that are there. On an error they stay. */
-static nebel_result strew(nb_draft *draft, const nb_edition *edition)
+static nebel_result strew(nb_document *draft, const nb_document_state *edition)
 {
     size_t count = 0;
     for (size_t i = 0; i < edition->nebula_count; i++) count += edition->nebulae[i].count;
@@ -315,7 +315,7 @@ static nebel_result strew(nb_draft *draft, const nb_edition *edition)
     return NEBEL_OK;
 }
 
-static nebel_result add_all(const nb_draft *draft, nebel_fog *fog)
+static nebel_result add_all(const nb_document *draft, nebel_fog *fog)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < draft->good.count && result == NEBEL_OK; i++)
@@ -328,7 +328,7 @@ static nebel_result add_all(const nb_draft *draft, nebel_fog *fog)
     return result;
 }
 
-nebel_result nb_draft_whole(nb_draft *draft, nebel_snapshot **whole)
+nebel_result nb_draft_whole(nb_document *draft, nebel_snapshot **whole)
 {
     nebel_fog *fog = NULL;
     nebel_result result = NEBEL_OK;
@@ -348,7 +348,7 @@ nebel_result nb_draft_whole(nb_draft *draft, nebel_snapshot **whole)
  * ------------------------------------------------------------------------------------------------------
  */
 
-nebel_volume_origin nb_draft_origin(const nb_draft *draft, size_t volume)
+nebel_volume_origin nb_draft_origin(const nb_document *draft, size_t volume)
 {
     const size_t source = draft->now.sources[volume];
     if (draft->now.entries[volume].key_count > 0) return NEBEL_VOLUME_ANIMATED;
@@ -358,7 +358,7 @@ nebel_volume_origin nb_draft_origin(const nb_draft *draft, size_t volume)
 }
 
 /* Whether the file could hold its changes. */
-static int is_saved(const nb_draft *draft, size_t volume)
+static int is_saved(const nb_document *draft, size_t volume)
 {
     const nebel_volume_origin origin = nb_draft_origin(draft, volume);
     return origin == NEBEL_VOLUME_STATIC || origin == NEBEL_VOLUME_ANIMATED;
@@ -375,7 +375,7 @@ static int widen(double range[2], int has_range, double first, double last)
     return 1;
 }
 
-int nb_draft_find_frames(const nb_draft *draft, double range[2])
+int nb_draft_find_frames(const nb_document *draft, double range[2])
 {
     const nebel_scene_data *const data = &draft->data;
     const size_t suns = data->sun_key_count;
@@ -386,15 +386,15 @@ int nb_draft_find_frames(const nb_draft *draft, double range[2])
 }
 
 /* What the file says stands at the same frame, to be compared. */
-static void place_volumes(nb_draft *draft)
+static void place_volumes(nb_document *draft)
 {
     nb_keys_place(&draft->now, draft->frame);
     nb_keys_place(&draft->written, draft->frame);
 }
 
-static void place_camera(nb_draft *draft)
+static void place_camera(nb_document *draft)
 {
-    const nb_edition *const now = &draft->now;
+    const nb_document_state *const now = &draft->now;
     if (now->camera_key_count > 0)
         draft->data.camera = nebel_interpolate_camera(now->camera_keys, now->camera_key_count, draft->frame);
     else if (draft->data.turntable_frames > 0)
@@ -405,7 +405,7 @@ static void place_camera(nb_draft *draft)
  * --------------------------------------------------------------------------------------------------
  */
 
-static nebel_result make_editions(nb_draft *draft)
+static nebel_result make_editions(nb_document *draft)
 {
     const nebel_scene_data *const scene = nebel_get_scene_data(draft->scene);
     if (nb_edition_make(scene, &draft->written) != 0 || nb_edition_make(scene, &draft->now) != 0)
@@ -427,11 +427,11 @@ static nebel_result load(const char *path, const nebel_scene_desc *desc, nebel_s
     return NEBEL_ERROR_FILE;
 }
 
-nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log, nb_draft *draft)
+nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log, nb_document *draft)
 {
     const nebel_scene_desc desc = {
         .log = *log, .run = nebel_parallel_for_openmp, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
-    *draft = (nb_draft){.log = *log, .frame = frame};
+    *draft = (nb_document){.log = *log, .frame = frame};
     nebel_result result = load(path, &desc, &draft->scene);
     if (result == NEBEL_OK) result = nebel_load_scene_models(draft->scene);
     if (result == NEBEL_OK) result = nebel_load_scene_planets(draft->scene);
@@ -449,7 +449,7 @@ nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log,
     return result;
 }
 
-void nb_draft_close(nb_draft *draft)
+void nb_draft_close(nb_document *draft)
 {
     nebel_release_snapshot(draft->volumes);
     nebel_release_snapshot(draft->whole);
@@ -463,7 +463,7 @@ void nb_draft_close(nb_draft *draft)
     nb_edition_free(&draft->written);
     if (draft->file != draft->scene) nebel_destroy_scene(draft->file);
     nebel_destroy_scene(draft->scene);
-    *draft = (nb_draft){.scene = NULL};
+    *draft = (nb_document){.scene = NULL};
 }
 
 /* ---- changes
@@ -471,7 +471,7 @@ void nb_draft_close(nb_draft *draft)
  */
 
 /* Nobody may render the scene meanwhile. */
-static nebel_result make_planets(nb_draft *draft, const nb_edition *edition)
+static nebel_result make_planets(nb_document *draft, const nb_document_state *edition)
 {
     const nebel_result result = nebel_update_scene_planets(draft->scene, edition->planets);
     if (result != NEBEL_OK) return result;
@@ -480,9 +480,9 @@ static nebel_result make_planets(nb_draft *draft, const nb_edition *edition)
     return NEBEL_OK;
 }
 
-static nebel_result apply(nb_draft *draft)
+static nebel_result apply(nb_document *draft)
 {
-    const nb_edition *const now = &draft->now, *const was = &draft->good;
+    const nb_document_state *const now = &draft->now, *const was = &draft->good;
     nebel_result result = light_scene(draft, now);
     if (result == NEBEL_OK && !nb_edition_has_same_planets(now, was)) result = make_planets(draft, now);
     if (result == NEBEL_OK && !nb_edition_has_same_nebulae(now, was)) result = strew(draft, now);
@@ -494,9 +494,9 @@ static nebel_result apply(nb_draft *draft)
 }
 
 /* The same the other way, from whatever has been reached. */
-static void revert(nb_draft *draft)
+static void revert(nb_document *draft)
 {
-    nb_edition back;
+    nb_document_state back;
     if (nb_edition_copy(&draft->good, &back) != 0) return;
     if (draft->planets_are_new && !nb_edition_has_same_planets(&draft->now, &draft->good))
         (void)make_planets(draft, &draft->good);
@@ -509,9 +509,9 @@ static void revert(nb_draft *draft)
 }
 
 /* `good` becomes what `now` is. */
-static nebel_result settle(nb_draft *draft, int is_step)
+static nebel_result settle(nb_document *draft, int is_step)
 {
-    nb_edition fresh;
+    nb_document_state fresh;
     nebel_result result = apply(draft);
     if (result == NEBEL_OK && nb_edition_copy(&draft->now, &fresh) != 0) result = fail_memory(draft);
     if (result != NEBEL_OK) {
@@ -526,7 +526,7 @@ static nebel_result settle(nb_draft *draft, int is_step)
     return result;
 }
 
-nebel_result nb_draft_place_models(nb_draft *draft)
+nebel_result nb_draft_place_models(nb_document *draft)
 {
     const nebel_result result = nebel_reload_scene_models(draft->scene, draft->good.models, draft->good.model_count);
     const nebel_scene_data *const scene = nebel_get_scene_data(draft->scene);
@@ -538,14 +538,14 @@ nebel_result nb_draft_place_models(nb_draft *draft)
     return result;
 }
 
-nebel_result nb_draft_commit(nb_draft *draft)
+nebel_result nb_draft_commit(nb_document *draft)
 {
     if (nb_keys_store(&draft->now, &draft->good, draft->frame) != 0) return fail_memory(draft);
     nb_keys_place(&draft->now, draft->frame);
     return nb_edition_is_same(&draft->now, &draft->good) ? NEBEL_OK : settle(draft, 1);
 }
 
-nebel_result nb_draft_set_frame(nb_draft *draft, double frame)
+nebel_result nb_draft_set_frame(nb_document *draft, double frame)
 {
     draft->frame = frame;
     place_volumes(draft);
@@ -553,7 +553,7 @@ nebel_result nb_draft_set_frame(nb_draft *draft, double frame)
     return settle(draft, 0);
 }
 
-int nb_draft_undo(nb_draft *draft, nebel_result *result)
+int nb_draft_undo(nb_document *draft, nebel_result *result)
 {
     if (!nb_history_undo(&draft->history, &draft->now)) return 0;
     place_volumes(draft);
@@ -561,7 +561,7 @@ int nb_draft_undo(nb_draft *draft, nebel_result *result)
     return 1;
 }
 
-int nb_draft_redo(nb_draft *draft, nebel_result *result)
+int nb_draft_redo(nb_document *draft, nebel_result *result)
 {
     if (!nb_history_redo(&draft->history, &draft->now)) return 0;
     place_volumes(draft);
@@ -573,9 +573,9 @@ int nb_draft_redo(nb_draft *draft, nebel_result *result)
  * --------------------------------------------------------------------------------------------------------
  */
 
-int nb_draft_is_changed(const nb_draft *draft)
+int nb_draft_is_changed(const nb_document *draft)
 {
-    const nb_edition *const now = &draft->now, *const was = &draft->written;
+    const nb_document_state *const now = &draft->now, *const was = &draft->written;
     if (!nb_edition_has_same_sources(now, was) || !nb_edition_has_same_nebulae(now, was) ||
         !nb_edition_has_same_cells(now, was) || !nb_edition_has_same_models(now, was) ||
         !nb_edition_has_same_lamps(now, was) || !nb_edition_has_same_light(now, was) ||
@@ -590,22 +590,22 @@ int nb_draft_is_changed(const nb_draft *draft)
     return 0;
 }
 
-int nb_draft_must_be_read(const nb_draft *draft)
+int nb_draft_must_be_read(const nb_document *draft)
 {
     const nebel_scene_data *const scene = nebel_get_scene_data(draft->scene);
-    const nb_edition *const now = &draft->now;
+    const nb_document_state *const now = &draft->now;
     int brings_fog = 0;
     for (size_t i = 0; i < now->model_count; i++) brings_fog |= scene->models[now->models[i].model_index].has_fog;
     return now->model_count != scene->model_count || (brings_fog && !nb_edition_has_same_models(now, &draft->written));
 }
 
-int nb_draft_can_save_camera(const nb_draft *draft)
+int nb_draft_can_save_camera(const nb_document *draft)
 {
     return draft->now.camera_key_count == 0 && draft->data.turntable_frames == 0;
 }
 
 /* That of the scene that stays; by its name, which is what the file says of it. */
-static nebel_grid *find_grid(const nb_draft *draft, nebel_grid *grid)
+static nebel_grid *find_grid(const nb_document *draft, nebel_grid *grid)
 {
     const nebel_scene_data *const scene = nebel_get_scene_data(draft->scene);
     for (size_t i = 0; i < scene->volume_count && grid != NULL; i++) {
@@ -616,7 +616,7 @@ static nebel_grid *find_grid(const nb_draft *draft, nebel_grid *grid)
 }
 
 /* Its keys have the same one, without owning it. */
-static void adopt_grid(const nb_draft *draft, nb_edition *edition, size_t index)
+static void adopt_grid(const nb_document *draft, nb_document_state *edition, size_t index)
 {
     nebel_grid *const fresh = edition->volumes[index].density.grid, *const own = find_grid(draft, fresh);
     const nebel_volume_track *const entry = &edition->entries[index];
@@ -628,7 +628,7 @@ static void adopt_grid(const nb_draft *draft, nb_edition *edition, size_t index)
 }
 
 /* Points, portals and grids are those of the scene that stays. */
-static void adopt_arrays(const nb_draft *draft, nb_edition *edition)
+static void adopt_arrays(const nb_document *draft, nb_document_state *edition)
 {
     const nebel_nebula_desc *const own = nebel_get_scene_data(draft->scene)->nebulae;
     for (size_t i = 0; i < edition->nebula_count; i++) {
@@ -648,9 +648,9 @@ static void exchange(nebel_volume_desc *a, nebel_volume_desc *b)
 
 /* What the file holds is as it says now, to the last digit. Changes that it does not hold stay as long as the volumes
  * are the same ones; with others, what is known by their old places is forgotten. */
-static nebel_result use_written(nb_draft *draft, int has_moved)
+static nebel_result use_written(nb_document *draft, int has_moved)
 {
-    nb_edition now;
+    nb_document_state now;
     if (nb_edition_copy(&draft->written, &now) != 0) return fail_memory(draft);
     for (size_t i = 0; i < now.count && !has_moved; i++)
         if (!is_saved(draft, i)) exchange(&now.volumes[i], &draft->now.volumes[i]);
@@ -662,12 +662,12 @@ static nebel_result use_written(nb_draft *draft, int has_moved)
 }
 
 /* The file is read again, without its models, so that `written` is what it says. */
-static nebel_result read_back(nb_draft *draft, const char *path)
+static nebel_result read_back(nb_document *draft, const char *path)
 {
     const nebel_scene_desc desc = {.log = draft->log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
     const int has_moved = !nb_edition_has_same_sources(&draft->now, &draft->written);
     nebel_scene *fresh = NULL;
-    nb_edition written;
+    nb_document_state written;
     nebel_result result = load(path, &desc, &fresh);
     if (result == NEBEL_OK) result = nebel_load_scene_planets(fresh);
     if (result == NEBEL_OK && nb_edition_make(nebel_get_scene_data(fresh), &written) != 0) result = fail_memory(draft);
@@ -692,7 +692,7 @@ nebel_result nb_draft_try_file(const char *path, const nebel_log *log)
     return result;
 }
 
-nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera)
+nebel_result nb_draft_save(nb_document *draft, const char *path, int with_camera)
 {
     const nebel_scene_desc desc = {.log = draft->log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
     nebel_scene_data before = *nebel_get_scene_data(draft->file);

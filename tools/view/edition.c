@@ -32,7 +32,7 @@ static int grow(void **array, size_t count, size_t size)
     return larger != NULL ? 0 : -1;
 }
 
-static int make_room(nb_edition *edition)
+static int make_room(nb_document_state *edition)
 {
     const size_t wanted = edition->capacity > 0 ? 2 * edition->capacity : 8;
     if (edition->count < edition->capacity) return 0;
@@ -92,8 +92,8 @@ static int own_entry(nebel_volume_track *entry)
  * ---------------------------------------------------------------------------------------------------------
  */
 
-static int add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_track *entry, const char *name,
-               size_t source)
+static int add(nb_document_state *edition, const nebel_volume_desc *volume, const nebel_volume_track *entry,
+               const char *name, size_t source)
 {
     if (make_room(edition) != 0) return -1;
     nebel_volume_desc own = *volume;
@@ -114,13 +114,13 @@ static int add(nb_edition *edition, const nebel_volume_desc *volume, const nebel
     return 0;
 }
 
-int nb_edition_add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_track *entry,
+int nb_edition_add(nb_document_state *edition, const nebel_volume_desc *volume, const nebel_volume_track *entry,
                    const char *name)
 {
     return add(edition, volume, entry, name, NEBEL_NEW_VOLUME);
 }
 
-int nb_edition_rename(nb_edition *edition, size_t index, const char *name)
+int nb_edition_rename(nb_document_state *edition, size_t index, const char *name)
 {
     char *const own = copy_text(name);
     if (own == NULL) return -1;
@@ -129,7 +129,7 @@ int nb_edition_rename(nb_edition *edition, size_t index, const char *name)
     return 0;
 }
 
-void nb_edition_remove(nb_edition *edition, size_t index)
+void nb_edition_remove(nb_document_state *edition, size_t index)
 {
     const size_t behind = --edition->count - index;
     nb_shape_free(&edition->volumes[index].shape);
@@ -157,7 +157,7 @@ static int own_nebula(nebel_nebula_desc *nebula)
 }
 
 /* Those that are there are counted one by one, so that an edition that is not complete can be freed. */
-static int add_nebulae(nb_edition *edition, const nebel_nebula_desc *nebulae, const nebel_transform *places,
+static int add_nebulae(nb_document_state *edition, const nebel_nebula_desc *nebulae, const nebel_transform *places,
                        size_t count)
 {
     edition->nebulae = calloc(count + 1, sizeof *edition->nebulae);
@@ -185,14 +185,14 @@ int nb_edition_set_colors(nebel_nebula_desc *nebula, size_t count)
     return 0;
 }
 
-static int add_models(nb_edition *edition, const nebel_scene_model *models, size_t count)
+static int add_models(nb_document_state *edition, const nebel_scene_model *models, size_t count)
 {
     edition->models = copy_array(models, count, sizeof *models);
     edition->model_count = edition->models != NULL ? count : 0;
     return edition->models != NULL ? 0 : -1;
 }
 
-static int add_lamps(nb_edition *edition, const nebel_light *lamps, size_t count)
+static int add_lamps(nb_document_state *edition, const nebel_light *lamps, size_t count)
 {
     edition->lamps = copy_array(lamps, count, sizeof *lamps);
     edition->lamp_count = edition->lamps != NULL ? count : 0;
@@ -200,7 +200,7 @@ static int add_lamps(nb_edition *edition, const nebel_light *lamps, size_t count
 }
 
 /* What is made of them is made anew where they change. */
-static int add_planets(nb_edition *edition, const nebel_planet *planets, size_t count)
+static int add_planets(nb_document_state *edition, const nebel_planet *planets, size_t count)
 {
     edition->planets = copy_array(planets, count, sizeof *planets);
     edition->planet_count = edition->planets != NULL ? count : 0;
@@ -212,14 +212,14 @@ static int add_planets(nb_edition *edition, const nebel_planet *planets, size_t 
     return edition->planets != NULL ? 0 : -1;
 }
 
-static int add_camera_keys(nb_edition *edition, const nebel_camera_key *keys, size_t count)
+static int add_camera_keys(nb_document_state *edition, const nebel_camera_key *keys, size_t count)
 {
     edition->camera_keys = copy_array(keys, count, sizeof *keys);
     edition->camera_key_count = edition->camera_keys != NULL ? count : 0;
     return edition->camera_keys != NULL ? 0 : -1;
 }
 
-static int add_cells(nb_edition *edition, const nebel_cells_desc *desc)
+static int add_cells(nb_document_state *edition, const nebel_cells_desc *desc)
 {
     if (desc == NULL) return 0;
     edition->cells_desc = *desc;
@@ -236,12 +236,12 @@ static int add_cells(nb_edition *edition, const nebel_cells_desc *desc)
 /* What a section has that is added: fog that one sees. */
 static const nebel_factor_desc plain_classic = {.end = 100, .density = 0.03, .color = {0.5, 0.5, 0.5}};
 
-int nb_edition_make(const nebel_scene_data *scene, nb_edition *edition)
+int nb_edition_make(const nebel_scene_data *scene, nb_document_state *edition)
 {
-    nb_edition made = {.max_opacity = scene->max_opacity,
-                       .has_sun = scene->has_sun,
-                       .has_classic = scene->classic != NULL,
-                       .classic = scene->classic != NULL ? *scene->classic : plain_classic};
+    nb_document_state made = {.max_opacity = scene->max_opacity,
+                              .has_sun = scene->has_sun,
+                              .has_classic = scene->classic != NULL,
+                              .classic = scene->classic != NULL ? *scene->classic : plain_classic};
     memcpy(made.background, scene->background, sizeof made.background);
     memcpy(made.ambient, scene->ambient, sizeof made.ambient);
     made.environment = scene->environment;
@@ -262,9 +262,9 @@ int nb_edition_make(const nebel_scene_data *scene, nb_edition *edition)
     return result;
 }
 
-int nb_edition_copy(const nb_edition *from, nb_edition *to)
+int nb_edition_copy(const nb_document_state *from, nb_document_state *to)
 {
-    nb_edition made = *from;
+    nb_document_state made = *from;
     made.volumes = NULL;
     made.names = NULL;
     made.sources = NULL;
@@ -292,7 +292,7 @@ int nb_edition_copy(const nb_edition *from, nb_edition *to)
     return result;
 }
 
-void nb_edition_free(nb_edition *edition)
+void nb_edition_free(nb_document_state *edition)
 {
     for (size_t i = 0; i < edition->count; i++) {
         nb_shape_free(&edition->volumes[i].shape);
@@ -317,11 +317,11 @@ void nb_edition_free(nb_edition *edition)
     free(edition->camera_keys);
     free(edition->planets);
     free(edition->cells);
-    *edition = (nb_edition){.volumes = NULL};
+    *edition = (nb_document_state){.volumes = NULL};
 }
 
 /* What the file says of a volume without its keys has the parts and planes that the volume has now. */
-static void lend_pieces(nb_edition *edition)
+static void lend_pieces(nb_document_state *edition)
 {
     for (size_t i = 0; i < edition->count; i++) {
         const nebel_shape *const from = &edition->volumes[i].shape;
@@ -334,7 +334,7 @@ static void lend_pieces(nb_edition *edition)
     }
 }
 
-void nb_edition_show(nb_edition *edition, nebel_scene_data *scene)
+void nb_edition_show(nb_document_state *edition, nebel_scene_data *scene)
 {
     lend_pieces(edition);
     scene->volumes = edition->volumes;
@@ -363,7 +363,7 @@ void nb_edition_show(nb_edition *edition, nebel_scene_data *scene)
     memcpy(scene->sun_irradiance, edition->sun_irradiance, sizeof scene->sun_irradiance);
 }
 
-size_t nb_edition_size(const nb_edition *edition)
+size_t nb_edition_size(const nb_document_state *edition)
 {
     size_t size = sizeof *edition;
     for (size_t i = 0; i < edition->count; i++)
@@ -446,7 +446,7 @@ static int is_same_nebula(const nebel_nebula_desc *a, const nebel_nebula_desc *b
            a->turbulence == b->turbulence && a->turbulence_scale == b->turbulence_scale;
 }
 
-int nb_edition_has_same_nebulae(const nb_edition *a, const nb_edition *b)
+int nb_edition_has_same_nebulae(const nb_document_state *a, const nb_document_state *b)
 {
     if (a->nebula_count != b->nebula_count) return 0;
     for (size_t i = 0; i < a->nebula_count; i++)
@@ -462,7 +462,7 @@ static int is_same_cell(const nebel_cell *a, const nebel_cell *b)
            memcmp(a->color, b->color, sizeof a->color) == 0;
 }
 
-int nb_edition_has_same_cells(const nb_edition *a, const nb_edition *b)
+int nb_edition_has_same_cells(const nb_document_state *a, const nb_document_state *b)
 {
     const nebel_cells_desc *const from = &a->cells_desc, *const to = &b->cells_desc;
     if (from->cell_count != to->cell_count || from->model != to->model || from->span != to->span ||
@@ -479,7 +479,7 @@ static int is_same_model(const nebel_scene_model *a, const nebel_scene_model *b)
            HAS_SAME(a, b, nebel_scene_model, position, has_color) && memcmp(a->color, b->color, sizeof a->color) == 0;
 }
 
-int nb_edition_has_same_models(const nb_edition *a, const nb_edition *b)
+int nb_edition_has_same_models(const nb_document_state *a, const nb_document_state *b)
 {
     if (a->model_count != b->model_count) return 0;
     for (size_t i = 0; i < a->model_count; i++)
@@ -492,7 +492,7 @@ static int is_same_lamp(const nebel_light *a, const nebel_light *b)
     return a->type == b->type && HAS_SAME(a, b, nebel_light, position, outer_angle) && a->outer_angle == b->outer_angle;
 }
 
-int nb_edition_has_same_lamps(const nb_edition *a, const nb_edition *b)
+int nb_edition_has_same_lamps(const nb_document_state *a, const nb_document_state *b)
 {
     if (a->lamp_count != b->lamp_count) return 0;
     for (size_t i = 0; i < a->lamp_count; i++)
@@ -541,7 +541,7 @@ static int are_same_shells(const nebel_textured_planet_desc *a, const nebel_text
     return 1;
 }
 
-int nb_edition_has_same_planets(const nb_edition *a, const nb_edition *b)
+int nb_edition_has_same_planets(const nb_document_state *a, const nb_document_state *b)
 {
     if (a->planet_count != b->planet_count) return 0;
     for (size_t i = 0; i < a->planet_count; i++) {
@@ -554,7 +554,7 @@ int nb_edition_has_same_planets(const nb_edition *a, const nb_edition *b)
     return 1;
 }
 
-int nb_edition_has_same_camera_keys(const nb_edition *a, const nb_edition *b)
+int nb_edition_has_same_camera_keys(const nb_document_state *a, const nb_document_state *b)
 {
     if (a->camera_key_count != b->camera_key_count) return 0;
     for (size_t i = 0; i < a->camera_key_count; i++) {
@@ -566,7 +566,7 @@ int nb_edition_has_same_camera_keys(const nb_edition *a, const nb_edition *b)
     return 1;
 }
 
-static int has_same_classic(const nb_edition *a, const nb_edition *b)
+static int has_same_classic(const nb_document_state *a, const nb_document_state *b)
 {
     const nebel_factor_desc *const from = &a->classic, *const to = &b->classic;
     return a->has_classic == b->has_classic && from->coordinate == to->coordinate && from->stage == to->stage &&
@@ -574,7 +574,7 @@ static int has_same_classic(const nb_edition *a, const nb_edition *b)
            memcmp(from->color, to->color, sizeof from->color) == 0;
 }
 
-static int has_same_environment(const nb_edition *a, const nb_edition *b)
+static int has_same_environment(const nb_document_state *a, const nb_document_state *b)
 {
     const nebel_environment *const from = &a->environment, *const to = &b->environment;
     return a->shows_ambient == b->shows_ambient && from->type == to->type &&
@@ -584,7 +584,7 @@ static int has_same_environment(const nb_edition *a, const nb_edition *b)
            from->intensity == to->intensity;
 }
 
-nebel_environment nb_edition_environment(const nb_edition *edition, nebel_environment_map *map)
+nebel_environment nb_edition_environment(const nb_document_state *edition, nebel_environment_map *map)
 {
     nebel_environment environment = edition->environment;
     memcpy(environment.radiance, edition->ambient, sizeof environment.radiance);
@@ -593,19 +593,20 @@ nebel_environment nb_edition_environment(const nb_edition *edition, nebel_enviro
     return environment;
 }
 
-int nb_edition_has_same_light(const nb_edition *a, const nb_edition *b)
+int nb_edition_has_same_light(const nb_document_state *a, const nb_document_state *b)
 {
     return a->has_sun == b->has_sun && a->max_opacity == b->max_opacity &&
-           HAS_SAME(a, b, nb_edition, background, max_opacity) && has_same_environment(a, b) && has_same_classic(a, b);
+           HAS_SAME(a, b, nb_document_state, background, max_opacity) && has_same_environment(a, b) &&
+           has_same_classic(a, b);
 }
 
-int nb_edition_has_same_sources(const nb_edition *a, const nb_edition *b)
+int nb_edition_has_same_sources(const nb_document_state *a, const nb_document_state *b)
 {
     return a->count == b->count &&
            (a->count == 0 || memcmp(a->sources, b->sources, a->count * sizeof *a->sources) == 0);
 }
 
-int nb_edition_is_same(const nb_edition *a, const nb_edition *b)
+int nb_edition_is_same(const nb_document_state *a, const nb_document_state *b)
 {
     if (!nb_edition_has_same_sources(a, b) || !nb_edition_has_same_nebulae(a, b) || !nb_edition_has_same_cells(a, b) ||
         !nb_edition_has_same_models(a, b) || !nb_edition_has_same_lamps(a, b) || !nb_edition_has_same_light(a, b) ||

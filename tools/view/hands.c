@@ -21,10 +21,10 @@ static const double line_width = 0.01;
  * ------------------------------------------------------------------------------------------------------------
  */
 
-static void press(nb_hands *hands, nb_look *look, int key, int modifiers)
+static void press(nb_input *hands, nb_display *look, int key, int modifiers)
 {
     const int with_control = (modifiers & GLFW_MOD_CONTROL) != 0, with_shift = (modifiers & GLFW_MOD_SHIFT) != 0;
-    const nb_look before = *look;
+    const nb_display before = *look;
     if (with_control) {
         hands->wants_save |= key == GLFW_KEY_S;
         hands->wants_end |= key == GLFW_KEY_Q;
@@ -41,8 +41,8 @@ static void press(nb_hands *hands, nb_look *look, int key, int modifiers)
     hands->wants_reload |= key == GLFW_KEY_F5;
     hands->wants_picture |= key == GLFW_KEY_F12 && !with_shift;
     hands->wants_window_picture |= key == GLFW_KEY_F12 && with_shift;
-    if (key >= GLFW_KEY_1 && key < GLFW_KEY_1 + NB_LOOK_PLANES) look->plane = (nb_look_plane)(key - GLFW_KEY_1);
-    if (key == GLFW_KEY_C) look->compare = (nb_look_compare)((look->compare + 1) % NB_LOOK_COMPARES);
+    if (key >= GLFW_KEY_1 && key < GLFW_KEY_1 + NB_LOOK_PLANES) look->plane = (nb_display_plane)(key - GLFW_KEY_1);
+    if (key == GLFW_KEY_C) look->compare = (nb_display_compare)((look->compare + 1) % NB_LOOK_COMPARES);
     if (key == GLFW_KEY_LEFT_BRACKET) look->exposure = fmax(-20, look->exposure - 0.5);
     if (key == GLFW_KEY_RIGHT_BRACKET) look->exposure = fmin(20, look->exposure + 0.5);
     hands->changed_look |= look->plane != before.plane || look->compare != before.compare;
@@ -60,7 +60,7 @@ static unsigned find_fly_key(int key)
 }
 
 /* `keys` went down in this turn, and may have come up again. */
-static void fly(nb_hands *hands, unsigned keys, const nb_window *window, nebel_camera *camera)
+static void fly(nb_input *hands, unsigned keys, const nb_window *window, nebel_camera *camera)
 {
     const int in_a_hurry = glfwGetKey(window->handle, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS ||
                            glfwGetKey(window->handle, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
@@ -80,7 +80,8 @@ static void fly(nb_hands *hands, unsigned keys, const nb_window *window, nebel_c
  * -----------------------------------------------------------------------------------------------------------
  */
 
-static nb_hands_grip take_hold(const nb_hands *hands, const nb_window_event *event, const nb_look *look, double aspect)
+static nb_drag_mode take_hold(const nb_input *hands, const nb_window_event *event, const nb_display *look,
+                              double aspect)
 {
     if (nb_panel_has_place(event->x, event->y)) return NB_HANDS_ELSEWHERE;
     if (event->code == GLFW_MOUSE_BUTTON_MIDDLE) return NB_HANDS_PAN;
@@ -91,7 +92,7 @@ static nb_hands_grip take_hold(const nb_hands *hands, const nb_window_event *eve
     return at_line ? NB_HANDS_SPLIT : NB_HANDS_ORBIT;
 }
 
-static void drag(nb_hands *hands, double dx, double dy, nebel_camera *camera, nb_look *look, double aspect)
+static void drag(nb_input *hands, double dx, double dy, nebel_camera *camera, nb_display *look, double aspect)
 {
     switch (hands->grip) {
     case NB_HANDS_ORBIT:
@@ -112,8 +113,8 @@ static void drag(nb_hands *hands, double dx, double dy, nebel_camera *camera, nb
     hands->moved_camera = 1;
 }
 
-static void move_cursor(nb_hands *hands, const nb_window *window, const nb_window_event *event, nebel_camera *camera,
-                        nb_look *look)
+static void move_cursor(nb_input *hands, const nb_window *window, const nb_window_event *event, nebel_camera *camera,
+                        nb_display *look)
 {
     const double x = event->x / window->inner_height, y = event->y / window->inner_height;
     const double dx = x - hands->x, dy = y - hands->y;
@@ -122,7 +123,7 @@ static void move_cursor(nb_hands *hands, const nb_window *window, const nb_windo
     if (dx != 0 || dy != 0) drag(hands, dx, dy, camera, look, (double)window->inner_width / window->inner_height);
 }
 
-static void turn_wheel(nb_hands *hands, const nb_window *window, double notches, nebel_camera *camera)
+static void turn_wheel(nb_input *hands, const nb_window *window, double notches, nebel_camera *camera)
 {
     if (nb_panel_has_place(hands->x * window->inner_height, hands->y * window->inner_height)) return;
     nb_navigate_dolly(camera, pow(wheel_factor, notches));
@@ -133,15 +134,15 @@ static void turn_wheel(nb_hands *hands, const nb_window *window, double notches,
  * ----------------------------------------------------------------------------------------------------------
  */
 
-static void press_button(nb_hands *hands, const nb_window *window, const nb_window_event *event, const nb_look *look)
+static void press_button(nb_input *hands, const nb_window *window, const nb_window_event *event, const nb_display *look)
 {
     if (hands->grip != NB_HANDS_FREE) return;
     hands->grip = take_hold(hands, event, look, (double)window->inner_width / window->inner_height);
     hands->button = event->code;
 }
 
-static void take_event(nb_hands *hands, const nb_window *window, const nb_window_event *event, nebel_camera *camera,
-                       nb_look *look)
+static void take_event(nb_input *hands, const nb_window *window, const nb_window_event *event, nebel_camera *camera,
+                       nb_display *look)
 {
     switch (event->kind) {
     case NB_WINDOW_KEY_DOWN:
@@ -172,14 +173,14 @@ static void take_event(nb_hands *hands, const nb_window *window, const nb_window
 }
 
 /* What comes behind a command waits until it is obeyed, so that each counts, in its order. */
-static int has_command(const nb_hands *hands)
+static int has_command(const nb_input *hands)
 {
     return hands->wants_undo || hands->wants_redo || hands->wants_save || hands->wants_reload || hands->steps != 0;
 }
 
-void nb_hands_move(nb_hands *hands, nb_window *window, nebel_camera *camera, nb_look *look)
+void nb_hands_move(nb_input *hands, nb_window *window, nebel_camera *camera, nb_display *look)
 {
-    *hands = (nb_hands){
+    *hands = (nb_input){
         .x = hands->x, .y = hands->y, .grip = hands->grip, .button = hands->button, .keys_down = hands->keys_down};
     unsigned keys = 0;
     int taken = 0;
@@ -193,7 +194,7 @@ void nb_hands_move(nb_hands *hands, nb_window *window, nebel_camera *camera, nb_
     fly(hands, keys, window, camera);
 }
 
-int nb_hands_are_busy(const nb_hands *hands)
+int nb_hands_are_busy(const nb_input *hands)
 {
     return hands->keys_down != 0;
 }

@@ -7,18 +7,18 @@
 
 #include <nebel/scene.h>
 
-typedef enum nb_hands_grip {
+typedef enum nb_drag_mode {
     NB_HANDS_FREE = 0,
     NB_HANDS_ORBIT,
     NB_HANDS_PAN,
     NB_HANDS_LOOK,
     NB_HANDS_SPLIT,
     NB_HANDS_ELSEWHERE /* a button went down where it is not ours */
-} nb_hands_grip;
+} nb_drag_mode;
 
-typedef struct nb_hands {
+typedef struct nb_input {
     double x, y; /* of the cursor, in heights of the window from its upper left corner */
-    nb_hands_grip grip;
+    nb_drag_mode grip;
     int button;         /* that took hold */
     unsigned keys_down; /* of those that fly, a bit each */
 
@@ -27,12 +27,12 @@ typedef struct nb_hands {
     int wants_home, wants_help, wants_panel, wants_picture, wants_window_picture, wants_save, wants_reload, wants_undo,
         wants_redo, wants_end, wants_play;
     int steps; /* 1: to the next frame, -1: to the one before */
-} nb_hands;
+} nb_input;
 
 /* Takes what has happened since the last turn, and what is held down. */
-void nb_hands_move(nb_hands *hands, nb_window *window, nebel_camera *camera, nb_look *look);
+void nb_hands_move(nb_input *hands, nb_window *window, nebel_camera *camera, nb_display *look);
 
 /* Whether something moves as long as nothing happens. */
-int nb_hands_are_busy(const nb_hands *hands);
+int nb_hands_are_busy(const nb_input *hands);
 
 #endif

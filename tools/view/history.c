@@ -5,14 +5,14 @@
 /* Bytes that all steps may take. */
 static const size_t most = (size_t)64 << 20;
 
-static void forget_from(nb_history *history, size_t first)
+static void forget_from(nb_undo_stack *history, size_t first)
 {
     for (size_t i = first; i < history->count; i++) nb_edition_free(&history->steps[i]);
     history->count = first;
     if (history->at > first) history->at = first;
 }
 
-static void forget_oldest(nb_history *history)
+static void forget_oldest(nb_undo_stack *history)
 {
     nb_edition_free(&history->steps[0]);
     history->count--;
@@ -26,7 +26,7 @@ static size_t find_limit(size_t size)
     return steps < 2 ? 2 : steps > NB_HISTORY_STEPS ? NB_HISTORY_STEPS : steps;
 }
 
-void nb_history_note(nb_history *history, const nb_edition *before)
+void nb_history_note(nb_undo_stack *history, const nb_document_state *before)
 {
     if (history->is_open) return;
     history->is_open = 1;
@@ -36,19 +36,19 @@ void nb_history_note(nb_history *history, const nb_edition *before)
     history->at = ++history->count;
 }
 
-void nb_history_close(nb_history *history)
+void nb_history_close(nb_undo_stack *history)
 {
     history->is_open = 0;
 }
 
-static void exchange(nb_edition *a, nb_edition *b)
+static void exchange(nb_document_state *a, nb_document_state *b)
 {
-    const nb_edition kept = *a;
+    const nb_document_state kept = *a;
     *a = *b;
     *b = kept;
 }
 
-int nb_history_undo(nb_history *history, nb_edition *now)
+int nb_history_undo(nb_undo_stack *history, nb_document_state *now)
 {
     if (history->at == 0) return 0;
     history->is_open = 0;
@@ -56,7 +56,7 @@ int nb_history_undo(nb_history *history, nb_edition *now)
     return 1;
 }
 
-int nb_history_redo(nb_history *history, nb_edition *now)
+int nb_history_redo(nb_undo_stack *history, nb_document_state *now)
 {
     if (history->at == history->count) return 0;
     history->is_open = 0;
@@ -64,7 +64,7 @@ int nb_history_redo(nb_history *history, nb_edition *now)
     return 1;
 }
 
-void nb_history_forget(nb_history *history)
+void nb_history_forget(nb_undo_stack *history)
 {
     forget_from(history, 0);
     history->is_open = 0;

@@ -50,7 +50,7 @@ static int insert(nebel_volume_track *entry, size_t at, const nebel_volume_desc 
     return 0;
 }
 
-int nb_keys_set(nb_edition *edition, size_t volume, double frame)
+int nb_keys_set(nb_document_state *edition, size_t volume, double frame)
 {
     nebel_volume_track *const entry = &edition->entries[volume];
     const size_t at = find(entry, frame);
@@ -61,7 +61,7 @@ int nb_keys_set(nb_edition *edition, size_t volume, double frame)
 }
 
 /* A volume at a frame has its own parts and planes. */
-static void place(nb_edition *edition, size_t index, double frame)
+static void place(nb_document_state *edition, size_t index, double frame)
 {
     const nebel_volume_track *const entry = &edition->entries[index];
     const nebel_shape own = edition->volumes[index].shape;
@@ -74,12 +74,12 @@ static void place(nb_edition *edition, size_t index, double frame)
     shape->plane_count = own.plane_count;
 }
 
-void nb_keys_place(nb_edition *edition, double frame)
+void nb_keys_place(nb_document_state *edition, double frame)
 {
     for (size_t i = 0; i < edition->count; i++) place(edition, i, frame);
 }
 
-void nb_keys_remove(nb_edition *edition, size_t volume, size_t key)
+void nb_keys_remove(nb_document_state *edition, size_t volume, size_t key)
 {
     nebel_volume_track *const entry = &edition->entries[volume];
     nebel_volume_key *const keys = keys_of(entry);
@@ -95,7 +95,7 @@ void nb_keys_remove(nb_edition *edition, size_t volume, size_t key)
     entry->key_count--;
 }
 
-void nb_keys_move(nb_edition *edition, size_t volume, size_t key, double frame)
+void nb_keys_move(nb_document_state *edition, size_t volume, size_t key, double frame)
 {
     nebel_volume_track *const entry = &edition->entries[volume];
     const int has_room_before = key == 0 || frame > entry->keys[key - 1].frame;
@@ -117,7 +117,7 @@ static void store_kind(nebel_volume_desc *to, const nebel_volume_desc *from)
     to->density.grid = from->density.grid;
 }
 
-static int store(nb_edition *edition, const nb_edition *before, size_t index, double frame)
+static int store(nb_document_state *edition, const nb_document_state *before, size_t index, double frame)
 {
     nebel_volume_track *const entry = &edition->entries[index];
     const nebel_volume_desc now = bare(&edition->volumes[index]);
@@ -129,7 +129,7 @@ static int store(nb_edition *edition, const nb_edition *before, size_t index, do
     return nb_edition_is_same_volume(&was, &now) ? 0 : nb_keys_set(edition, index, frame);
 }
 
-int nb_keys_store(nb_edition *edition, const nb_edition *before, double frame)
+int nb_keys_store(nb_document_state *edition, const nb_document_state *before, double frame)
 {
     int result = 0;
     if (!nb_edition_has_same_sources(edition, before)) return 0;
@@ -141,7 +141,7 @@ int nb_keys_store(nb_edition *edition, const nb_edition *before, double frame)
  * ------------------------------------------------------------------------------------------------------
  */
 
-int nb_keys_set_camera(nb_edition *edition, const nebel_camera *camera, double frame)
+int nb_keys_set_camera(nb_document_state *edition, const nebel_camera *camera, double frame)
 {
     const size_t count = edition->camera_key_count;
     nebel_camera_key *const keys = realloc(edition->camera_keys, (count + 1) * sizeof *keys);
@@ -159,13 +159,13 @@ int nb_keys_set_camera(nb_edition *edition, const nebel_camera *camera, double f
     return 0;
 }
 
-void nb_keys_remove_camera(nb_edition *edition, size_t key)
+void nb_keys_remove_camera(nb_document_state *edition, size_t key)
 {
     nebel_camera_key *const gone = edition->camera_keys + key;
     memmove(gone, gone + 1, (--edition->camera_key_count - key) * sizeof *gone);
 }
 
-void nb_keys_move_camera(nb_edition *edition, size_t key, double frame)
+void nb_keys_move_camera(nb_document_state *edition, size_t key, double frame)
 {
     nebel_camera_key *const keys = edition->camera_keys;
     const int has_room_before = key == 0 || frame > keys[key - 1].frame;
@@ -177,7 +177,7 @@ void nb_keys_move_camera(nb_edition *edition, size_t key, double frame)
  * ------------------------------------------------------------------------------------------------------------
  */
 
-int nb_keys_find_range(const nb_edition *edition, double range[2])
+int nb_keys_find_range(const nb_document_state *edition, double range[2])
 {
     const size_t count = edition->camera_key_count;
     int has_keys = count > 0;

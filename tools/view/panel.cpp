@@ -60,13 +60,13 @@ void end_places()
 void draw_comparison(nb_panel *panel)
 {
     static const char *const compares[] = {"OpenGL", "CPU | OpenGL", "difference", "CPU"};
-    nb_look *const look = panel->look;
+    nb_display *const look = panel->look;
     int compare = look->compare;
     panel->look_changed |=
         choose("drawn by", &compare, compares, NB_LOOK_COMPARES,
                "The CPU's picture on the left of a line that can be dragged, the difference of both, or the CPU's "
                "alone.");
-    look->compare = nb_look_compare(compare);
+    look->compare = nb_display_compare(compare);
     if (compare == NB_LOOK_SPLIT) slide("split", &look->split, 0, 1, "%.2f", false, "Where the line is.");
     if (compare == NB_LOOK_DIFFERENCE)
         slide("times", &look->gain, 1, 255, "%.4g", true,
@@ -139,17 +139,17 @@ void draw_technique(nb_panel *panel)
                "Balls: each particle in closed form, from the farthest to the nearest. Five-tap: a disc that "
                "is drawn or not, by the classic comparison of depth at five places. Fog: among all "
                "other fog, as the CPU does; slow where there are many.");
-    panel->look->particles = nb_look_particles(particles);
+    panel->look->particles = nb_display_particles(particles);
 }
 
 void draw_look(nb_panel *panel)
 {
     static const char *const planes[] = {"colour", "transmittance", "in-scattering", "depth"};
-    nb_look *const look = panel->look;
+    nb_display *const look = panel->look;
     int plane = look->plane;
     panel->look_changed |= choose("picture", &plane, planes, NB_LOOK_PLANES,
                                   "What is shown: picture = transmittance x surface + in-scattering.");
-    look->plane = nb_look_plane(plane);
+    look->plane = nb_display_plane(plane);
     slide("exposure", &look->exposure, -10, 10, "%.2f stops", false,
           "One more doubles the light. Of the window alone.");
     panel->look_changed |=

@@ -12,24 +12,24 @@ extern "C" {
 #endif
 
 /* Noise that follows its control once that is let go: its voxels take time. */
-typedef struct nb_held_noise {
+typedef struct nb_deferred_noise {
     unsigned owner; /* whose it is, by Dear ImGui's numbers; 0: nobody's */
     nebel_scene_noise noise;
     double seconds; /* that the last one took to be made */
-} nb_held_noise;
+} nb_deferred_noise;
 
 /* What the panel shows, and what was done with it. */
 typedef struct nb_panel {
     const char *scene;                  /* the file's name */
     const char *driver;                 /* of OpenGL */
     nebel_scene_data *data;             /* the camera is changed in place */
-    nb_edition *now;                    /* fog and light, changed in place */
+    nb_document_state *now;             /* fog and light, changed in place */
     const nebel_volume_origin *origins; /* of the volumes */
     const char *const *cell_names;
     const nebel_scene_model *models; /* of the file: their names */
     const nebel_scene *loaded;       /* that makes noise */
-    nb_held_noise held_noise;
-    nb_look *look;
+    nb_deferred_noise held_noise;
+    nb_display *look;
     const char *note;    /* why the picture is not what was chosen; "": it is */
     const char *reason;  /* ... in the words of OpenGL; "": none */
     double *frame;       /* of what moves */

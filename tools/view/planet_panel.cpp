@@ -246,7 +246,7 @@ bool draw_layers(nebel_textured_planet_desc *layers, const nebel_textured_planet
 
 void draw_planets(nb_panel *panel)
 {
-    nb_edition *const now = panel->now;
+    nb_document_state *const now = panel->now;
     if (now->planet_count == 0 || !open_section(now->planet_count > 1 ? "Planets" : "Planet", false)) return;
     for (size_t i = 0; i < now->planet_count; i++) {
         const Owner owner("planet", i);

@@ -21,7 +21,7 @@ const double degree = 3.14159265358979323846 / 180;
  */
 
 // In the middle of the sky, so that one sees what it does.
-void add_sun(nb_edition *now)
+void add_sun(nb_document_state *now)
 {
     now->has_sun = 1;
     for (int i = 0; i < 3; i++) {
@@ -43,7 +43,7 @@ bool slide_direction(double d[3], const char *turn_name, const char *turn_help, 
     return true;
 }
 
-bool draw_sun(nb_edition *now, bool moves)
+bool draw_sun(nb_document_state *now, bool moves)
 {
     if (moves) {
         ImGui::TextDisabled("the sun moves by keys of the file");
@@ -58,7 +58,7 @@ bool draw_sun(nb_edition *now, bool moves)
     return true;
 }
 
-bool draw_missing_sun(nb_edition *now)
+bool draw_missing_sun(nb_document_state *now)
 {
     if (!press("Add a sun", "Lights surfaces, and fog with an albedo, through all fog on its way.")) return false;
     add_sun(now);
@@ -66,7 +66,7 @@ bool draw_missing_sun(nb_edition *now)
 }
 
 /* 0 and 1 are no limit. */
-bool draw_opacity(nb_edition *now)
+bool draw_opacity(nb_document_state *now)
 {
     double opacity = now->max_opacity > 0 ? now->max_opacity : 1;
     if (!slide("most opacity", &opacity, 0.01, 1, opacity < 1 ? "%.2f" : "no limit", false,
@@ -76,7 +76,7 @@ bool draw_opacity(nb_edition *now)
     return true;
 }
 
-bool draw_ambient(nb_edition *now)
+bool draw_ambient(nb_document_state *now)
 {
     nebel_environment *const sky = &now->environment;
     if (sky->type == NEBEL_ENVIRONMENT_GRADIENT) {
@@ -92,7 +92,7 @@ bool draw_ambient(nb_edition *now)
     return pick("ambient", now->ambient, false, "Radiance from everywhere. Lights surfaces, and fog with an albedo.");
 }
 
-bool draw_background(nb_edition *now)
+bool draw_background(nb_document_state *now)
 {
     const bool switched = tick("ambient as background", &now->shows_ambient,
                                "Where no surface is one sees what ambient light comes from there.");
@@ -294,7 +294,7 @@ void draw_time(nb_panel *panel)
 
 void draw_models(nb_panel *panel, double reach)
 {
-    nb_edition *const now = panel->now;
+    nb_document_state *const now = panel->now;
     size_t gone = now->model_count;
     if (now->model_count == 0) return;
     ImGui::Text("Models: %u", unsigned(now->model_count));
@@ -319,7 +319,7 @@ void draw_lamps(nb_panel *panel, double reach)
 
 void draw_lights(nb_panel *panel)
 {
-    nb_edition *const now = panel->now;
+    nb_document_state *const now = panel->now;
     if (!open_section("Light", false)) return;
     bool changed = draw_ambient(now);
     changed |= draw_background(now);
@@ -330,7 +330,7 @@ void draw_lights(nb_panel *panel)
 
 void draw_classic(nb_panel *panel, double reach)
 {
-    nb_edition *const now = panel->now;
+    nb_document_state *const now = panel->now;
     if (!open_section("Classic fog", false)) return;
     const Owner owner("classic", 0);
     if (!now->has_classic) {
@@ -368,7 +368,7 @@ static bool draw_camera_key(nb_panel *panel, size_t key)
 static void draw_camera_keys(nb_panel *panel)
 {
     const Owner owner("camera", 0);
-    nb_edition *const now = panel->now;
+    nb_document_state *const now = panel->now;
     size_t gone = now->camera_key_count;
     bool is_here = false;
     for (size_t i = 0; i < now->camera_key_count; i++) {

@@ -55,7 +55,7 @@ static const char show_text[] =
     "    color = vec4(floor(shown * 255.0 + threshold(ivec2(at.x, size.y - at.y))) / 255.0, 1.0);\n"
     "}\n";
 
-nebel_result nb_screen_open(const nebel_log *log, nb_screen *screen)
+nebel_result nb_screen_open(const nebel_log *log, nb_display_pass *screen)
 {
     const nebel_result result = nb_program_make(show_text, log, &screen->program);
     if (result != NEBEL_OK) return result;
@@ -65,16 +65,16 @@ nebel_result nb_screen_open(const nebel_log *log, nb_screen *screen)
     return NEBEL_OK;
 }
 
-void nb_screen_close(nb_screen *screen)
+void nb_screen_close(nb_display_pass *screen)
 {
     if (screen->program == 0) return;
     glDeleteProgram(screen->program);
     glDeleteVertexArrays(1, &screen->array);
     glDeleteTextures(1, &screen->cpu_texture);
-    *screen = (nb_screen){0};
+    *screen = (nb_display_pass){0};
 }
 
-void nb_screen_set_cpu(nb_screen *screen, uint32_t width, uint32_t height, const float *rgb)
+void nb_screen_set_cpu(nb_display_pass *screen, uint32_t width, uint32_t height, const float *rgb)
 {
     glActiveTexture(GL_TEXTURE0);
     glBindTexture(GL_TEXTURE_2D, screen->cpu_texture);
@@ -86,13 +86,13 @@ void nb_screen_set_cpu(nb_screen *screen, uint32_t width, uint32_t height, const
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
 }
 
-static void set(const nb_screen *screen, const char *name, double value)
+static void set(const nb_display_pass *screen, const char *name, double value)
 {
     glUniform1f(glGetUniformLocation(screen->program, name), (GLfloat)value);
 }
 
-void nb_screen_draw(const nb_screen *screen, unsigned gl_texture, int has_cpu, const nb_look *look, uint32_t width,
-                    uint32_t height)
+void nb_screen_draw(const nb_display_pass *screen, unsigned gl_texture, int has_cpu, const nb_display *look,
+                    uint32_t width, uint32_t height)
 {
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glViewport(0, 0, (GLsizei)width, (GLsizei)height);

@@ -6,23 +6,23 @@
 
 #include <nebel/nebel.h>
 
-typedef struct nb_screen {
+typedef struct nb_display_pass {
     unsigned program, array;
     unsigned cpu_texture;
-} nb_screen;
+} nb_display_pass;
 
-nebel_result nb_screen_open(const nebel_log *log, nb_screen *screen);
+nebel_result nb_screen_open(const nebel_log *log, nb_display_pass *screen);
 
 /* Fine with zeros. */
-void nb_screen_close(nb_screen *screen);
+void nb_screen_close(nb_display_pass *screen);
 
 /* The picture of the CPU: rgb, the top row first. */
-void nb_screen_set_cpu(nb_screen *screen, uint32_t width, uint32_t height, const float *rgb);
+void nb_screen_set_cpu(nb_display_pass *screen, uint32_t width, uint32_t height, const float *rgb);
 
 /* Fills the window's framebuffer. `gl_texture` has the plane of the look, lowest row first; without a picture of the
  * CPU
  * (`has_cpu` 0) that of OpenGL is everywhere. */
-void nb_screen_draw(const nb_screen *screen, unsigned gl_texture, int has_cpu, const nb_look *look, uint32_t width,
-                    uint32_t height);
+void nb_screen_draw(const nb_display_pass *screen, unsigned gl_texture, int has_cpu, const nb_display *look,
+                    uint32_t width, uint32_t height);
 
 #endif

@@ -324,7 +324,7 @@ double now()
 // The density owns its grid.
 bool replace_noise(nb_panel *panel, nebel_density *density)
 {
-    nb_held_noise *const held = &panel->held_noise;
+    nb_deferred_noise *const held = &panel->held_noise;
     nebel_grid *fresh = nullptr;
     const double start = now();
     const nebel_result result = nebel_update_scene_noise(panel->loaded, density->grid, &held->noise, &fresh);
@@ -342,7 +342,7 @@ const double quick_noise = 0.05;
 // Other grids are those of a file.
 bool draw_noise(nb_panel *panel, nebel_density *density, bool moves)
 {
-    nb_held_noise *const held = &panel->held_noise;
+    nb_deferred_noise *const held = &panel->held_noise;
     const unsigned here = ImGui::GetID("noise");
     nebel_scene_noise noise;
     if (!nebel_get_scene_noise(panel->loaded, density->grid, &noise)) return false;

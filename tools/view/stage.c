@@ -24,7 +24,7 @@ static const char copy_text[] = "uniform sampler2D plane_texture, color_texture;
                                 "    picture = vec4(is_depth ? vec3(depth) : plane.rgb, 1.0);\n"
                                 "}\n";
 
-nebel_result nb_stage_open(const nebel_scene_data *scene, const nebel_log *log, nb_stage *stage)
+nebel_result nb_stage_open(const nebel_scene_data *scene, const nebel_log *log, nb_gl_preview *stage)
 {
     const nebel_gl_renderer_desc desc = {.log = *log};
     nebel_result result = nebel_create_gl_renderer(scene, NULL, &desc, &stage->renderer);
@@ -39,7 +39,7 @@ nebel_result nb_stage_open(const nebel_scene_data *scene, const nebel_log *log, 
     return NEBEL_OK;
 }
 
-void nb_stage_close(nb_stage *stage)
+void nb_stage_close(nb_gl_preview *stage)
 {
     if (stage->renderer == NULL) return;
     nebel_destroy_gl_renderer(stage->renderer);
@@ -47,7 +47,7 @@ void nb_stage_close(nb_stage *stage)
     glDeleteFramebuffers(1, &stage->target);
     glDeleteVertexArrays(1, &stage->array);
     glDeleteProgram(stage->program);
-    *stage = (nb_stage){.renderer = NULL};
+    *stage = (nb_gl_preview){.renderer = NULL};
 }
 
 static double now(void)
@@ -61,7 +61,7 @@ static double now(void)
  * --------------------------------------------------------------------------------------------------------
  */
 
-static void fit_texture(nb_stage *stage, uint32_t width, uint32_t height)
+static void fit_texture(nb_gl_preview *stage, uint32_t width, uint32_t height)
 {
     glBindTexture(GL_TEXTURE_2D, stage->texture);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, stage->target);
@@ -76,7 +76,7 @@ static void fit_texture(nb_stage *stage, uint32_t width, uint32_t height)
     stage->height = height;
 }
 
-static nebel_result copy_plane(nb_stage *stage, nb_look_plane plane)
+static nebel_result copy_plane(nb_gl_preview *stage, nb_display_plane plane)
 {
     nebel_gl_textures from;
     const nebel_result result = nebel_gl_get_textures(stage->renderer, &from);
@@ -101,12 +101,12 @@ static nebel_result copy_plane(nb_stage *stage, nb_look_plane plane)
 
 static int stop(size_t done, size_t total, void *user)
 {
-    nb_stage *const stage = user;
+    nb_gl_preview *const stage = user;
     stage->was_stopped = done < total && stage->is_needed(stage->user);
     return stage->was_stopped;
 }
 
-static nebel_gl_method find_method(const nb_look *look)
+static nebel_gl_method find_method(const nb_display *look)
 {
     switch (look->method) {
     case NEBEL_METHOD_CELLS:
@@ -127,8 +127,8 @@ static nebel_gl_method find_method(const nb_look *look)
 }
 
 /* Many particles take long to dim the sun for an eye that moves. */
-static nebel_result draw(nb_stage *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
-                         const nb_look *look, uint32_t samples, int quick)
+static nebel_result draw(nb_gl_preview *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
+                         const nb_display *look, uint32_t samples, int quick)
 {
     nebel_gl_frame_desc desc = {.camera = *camera,
                                 .width = width,
@@ -157,7 +157,7 @@ static nebel_result draw(nb_stage *stage, const nebel_camera *camera, uint32_t w
 }
 
 /* One pixel stands for so many either way. */
-static uint32_t find_coarseness(const nb_stage *stage, uint32_t width, uint32_t height)
+static uint32_t find_coarseness(const nb_gl_preview *stage, uint32_t width, uint32_t height)
 {
     uint32_t by = 1;
     while (by < COARSEST && stage->pixel_seconds * width * height > frame_seconds * by * by) by++;
@@ -169,8 +169,8 @@ static uint32_t divide_up(uint32_t a, uint32_t b)
     return (a + b - 1) / b;
 }
 
-static nebel_result draw_moving(nb_stage *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
-                                const nb_look *look)
+static nebel_result draw_moving(nb_gl_preview *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
+                                const nb_display *look)
 {
     const uint32_t by = find_coarseness(stage, width, height);
     const nebel_result result = draw(stage, camera, divide_up(width, by), divide_up(height, by), look, 1, 1);
@@ -178,8 +178,8 @@ static nebel_result draw_moving(nb_stage *stage, const nebel_camera *camera, uin
     return result;
 }
 
-nebel_result nb_stage_draw(nb_stage *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
-                           const nb_look *look, int moving)
+nebel_result nb_stage_draw(nb_gl_preview *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
+                           const nb_display *look, int moving)
 {
     if (moving) return draw_moving(stage, camera, width, height, look);
     if (stage->state == NB_STAGE_FINE) return NEBEL_OK;

@@ -6,19 +6,19 @@
 
 #include <nebel/gl_render.h>
 
-typedef enum nb_stage_state {
+typedef enum nb_preview_quality {
     NB_STAGE_STALE = 0, /* nothing of what it should show */
     NB_STAGE_COARSE,    /* fewer pixels than the window */
     NB_STAGE_WHOLE,     /* one sample for each pixel */
     NB_STAGE_FINE       /* as many as wanted */
-} nb_stage_state;
+} nb_preview_quality;
 
-typedef struct nb_stage {
+typedef struct nb_gl_preview {
     nebel_gl_renderer *renderer;
-    nb_stage_state state;
+    nb_preview_quality state;
     unsigned texture, target, program, array; /* the plane to be shown, RGBA32F, and what draws it */
     uint32_t width, height;                   /* of the texture */
-    nb_look_plane plane;                      /* what is in it */
+    nb_display_plane plane;                   /* what is in it */
     double pixel_seconds;                     /* of the last coarse or whole frame */
     double seconds;                           /* of the last frame that was finished */
     uint32_t samples;                         /* of that frame */
@@ -29,17 +29,17 @@ typedef struct nb_stage {
     int was_stopped;                          /* the fine picture was given up */
     int (*is_needed)(void *user);             /* nonzero: something happens, give up the fine picture */
     void *user;
-} nb_stage;
+} nb_gl_preview;
 
 /* In a current context of OpenGL 3.3 core, without fog. `scene` must outlive the stage. */
-nebel_result nb_stage_open(const nebel_scene_data *scene, const nebel_log *log, nb_stage *stage);
+nebel_result nb_stage_open(const nebel_scene_data *scene, const nebel_log *log, nb_gl_preview *stage);
 
 /* Fine with zeros. */
-void nb_stage_close(nb_stage *stage);
+void nb_stage_close(nb_gl_preview *stage);
 
 /* Draws the next better picture. `moving`: another one will follow soon, so this one has to be quick. Where the fine
  * picture was given up the one before stays. */
-nebel_result nb_stage_draw(nb_stage *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
-                           const nb_look *look, int moving);
+nebel_result nb_stage_draw(nb_gl_preview *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
+                           const nb_display *look, int moving);
 
 #endif

@@ -11,28 +11,28 @@
 /* The first picture has one pixel of so many either way; each that follows has half. */
 enum { COARSEST = 8 };
 
-struct nb_twin {
+struct nb_cpu_preview {
     nebel_scene_data scene; /* of the thread, with the light of the wish */
     thrd_t thread;
     mtx_t lock; /* of all that follows */
     cnd_t news, rest;
-    nb_twin_wish wish;
+    nb_preview_request wish;
     int is_asked, is_ended, is_working, is_fresh, must_rest;
-    nb_twin_picture made, taken;
+    nb_preview_image made, taken;
 };
 
 /* ---- the thread
  * ------------------------------------------------------------------------------------------------------
  */
 
-typedef struct work {
-    nb_twin *twin;
+typedef struct nb_preview_work {
+    nb_cpu_preview *twin;
     nebel_renderer *renderer;
-    nb_twin_wish wish;
+    nb_preview_request wish;
     int may_stop;
-} work;
+} nb_preview_work;
 
-static int is_out_of_date(nb_twin *twin)
+static int is_out_of_date(nb_cpu_preview *twin)
 {
     mtx_lock(&twin->lock);
     const int is = twin->is_asked || twin->is_ended || twin->must_rest;
@@ -42,12 +42,12 @@ static int is_out_of_date(nb_twin *twin)
 
 static int stop(size_t done, size_t total, void *user)
 {
-    const work *const w = user;
+    const nb_preview_work *const w = user;
     (void)done, (void)total;
     return w->may_stop && is_out_of_date(w->twin);
 }
 
-static nebel_result render(work *w, const nb_twin_picture *picture)
+static nebel_result render(nb_preview_work *w, const nb_preview_image *picture)
 {
     const size_t pixels = (size_t)picture->width * picture->height;
     const nebel_frame_desc desc = {.camera = w->wish.camera,
@@ -76,7 +76,7 @@ static double now(void)
     return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
-static void publish(nb_twin *twin, nb_twin_picture picture)
+static void publish(nb_cpu_preview *twin, nb_preview_image picture)
 {
     mtx_lock(&twin->lock);
     free(twin->made.rgb);
@@ -86,9 +86,9 @@ static void publish(nb_twin *twin, nb_twin_picture picture)
 }
 
 /* Nonzero: go on with the next one. */
-static int make_picture(work *w, uint32_t by)
+static int make_picture(nb_preview_work *w, uint32_t by)
 {
-    nb_twin_picture picture = {(w->wish.width + by - 1) / by, (w->wish.height + by - 1) / by, NULL, 0};
+    nb_preview_image picture = {(w->wish.width + by - 1) / by, (w->wish.height + by - 1) / by, NULL, 0};
     const double start = now();
     picture.rgb = malloc(sizeof(float[3]) * picture.width * picture.height);
     if (picture.rgb == NULL) return 0;
@@ -103,7 +103,7 @@ static int make_picture(work *w, uint32_t by)
 }
 
 /* The light goes over here, where no frame is under way. */
-static void take_light(nebel_scene_data *scene, const nb_twin_wish *wish)
+static void take_light(nebel_scene_data *scene, const nb_preview_request *wish)
 {
     const nebel_scene_data *const light = &wish->light;
     scene->lights = wish->lamps;
@@ -117,18 +117,18 @@ static void take_light(nebel_scene_data *scene, const nb_twin_wish *wish)
     memcpy(scene->sun_irradiance, light->sun_irradiance, sizeof scene->sun_irradiance);
 }
 
-static nebel_result set_method(work *w)
+static nebel_result set_method(nb_preview_work *w)
 {
-    const nb_twin_wish *const wish = &w->wish;
+    const nb_preview_request *const wish = &w->wish;
     const nebel_cell_stage stage = wish->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL;
     const nebel_result result = nebel_set_renderer_cells(w->renderer, wish->cells, stage);
     if (result != NEBEL_OK || wish->cells != NULL) return result;
     return nebel_set_renderer_method(w->renderer, wish->method, &(nebel_method_desc){.factor = &wish->factor});
 }
 
-static nebel_result prepare(work *w)
+static nebel_result prepare(nb_preview_work *w)
 {
-    nb_twin *const twin = w->twin;
+    nb_cpu_preview *const twin = w->twin;
     const nebel_cpu_renderer_desc desc = {.thread_count = 0};
     take_light(&twin->scene, &w->wish);
     const nebel_result result = w->renderer != NULL
@@ -137,7 +137,7 @@ static nebel_result prepare(work *w)
     return result == NEBEL_OK ? set_method(w) : result;
 }
 
-static void forget(nb_twin_wish *wish)
+static void forget(nb_preview_request *wish)
 {
     nebel_release_snapshot(wish->fog);
     nebel_destroy_cells(wish->cells);
@@ -148,9 +148,9 @@ static void forget(nb_twin_wish *wish)
 }
 
 /* Waits for a wish; 0 at the end. */
-static int take_wish(work *w)
+static int take_wish(nb_preview_work *w)
 {
-    nb_twin *const twin = w->twin;
+    nb_cpu_preview *const twin = w->twin;
     mtx_lock(&twin->lock);
     twin->is_working = 0;
     cnd_signal(&twin->rest);
@@ -170,7 +170,7 @@ static int take_wish(work *w)
 
 static int run(void *user)
 {
-    work w = {.twin = user};
+    nb_preview_work w = {.twin = user};
     while (take_wish(&w)) {
         uint32_t by = COARSEST;
         if (prepare(&w) == NEBEL_OK) {
@@ -187,7 +187,7 @@ static int run(void *user)
  * ------------------------------------------------------------------------------------------------
  */
 
-static int start(nb_twin *twin)
+static int start(nb_cpu_preview *twin)
 {
     if (mtx_init(&twin->lock, mtx_plain) != thrd_success) return -1;
     if (cnd_init(&twin->news) == thrd_success) {
@@ -201,9 +201,9 @@ static int start(nb_twin *twin)
     return -1;
 }
 
-nb_twin *nb_twin_open(const nebel_scene_data *scene)
+nb_cpu_preview *nb_twin_open(const nebel_scene_data *scene)
 {
-    nb_twin *const twin = calloc(1, sizeof *twin);
+    nb_cpu_preview *const twin = calloc(1, sizeof *twin);
     if (twin == NULL) return NULL;
     twin->scene = *scene;
     if (start(twin) == 0) return twin;
@@ -211,7 +211,7 @@ nb_twin *nb_twin_open(const nebel_scene_data *scene)
     return NULL;
 }
 
-void nb_twin_close(nb_twin *twin)
+void nb_twin_close(nb_cpu_preview *twin)
 {
     if (twin == NULL) return;
     mtx_lock(&twin->lock);
@@ -228,7 +228,7 @@ void nb_twin_close(nb_twin *twin)
     free(twin);
 }
 
-void nb_twin_rest(nb_twin *twin)
+void nb_twin_rest(nb_cpu_preview *twin)
 {
     if (twin == NULL) return;
     mtx_lock(&twin->lock);
@@ -239,11 +239,11 @@ void nb_twin_rest(nb_twin *twin)
     mtx_unlock(&twin->lock);
 }
 
-void nb_twin_ask(nb_twin *twin, const nb_twin_wish *wish)
+void nb_twin_ask(nb_cpu_preview *twin, const nb_preview_request *wish)
 {
     nebel_snapshot *const fog = nebel_retain_snapshot(wish->fog);
     mtx_lock(&twin->lock);
-    nb_twin_wish before = twin->wish;
+    nb_preview_request before = twin->wish;
     twin->wish = *wish;
     twin->wish.fog = fog;
     twin->is_asked = 1;
@@ -252,7 +252,7 @@ void nb_twin_ask(nb_twin *twin, const nb_twin_wish *wish)
     forget(&before);
 }
 
-int nb_twin_take(nb_twin *twin, nb_twin_picture *picture)
+int nb_twin_take(nb_cpu_preview *twin, nb_preview_image *picture)
 {
     mtx_lock(&twin->lock);
     const int is_fresh = twin->is_fresh;
@@ -267,7 +267,7 @@ int nb_twin_take(nb_twin *twin, nb_twin_picture *picture)
     return is_fresh;
 }
 
-int nb_twin_is_done(nb_twin *twin)
+int nb_twin_is_done(nb_cpu_preview *twin)
 {
     mtx_lock(&twin->lock);
     const int is = !twin->is_asked && !twin->is_working && !twin->is_fresh;

@@ -32,17 +32,17 @@ static const double last_frame = 1000000;
 static const double message_seconds = 6;
 
 typedef struct viewer {
-    const nb_view_settings *settings;
+    const nb_viewer_options *settings;
     nb_window window;
-    nb_draft draft;
-    nb_stage stage;
-    nb_screen screen;
-    nb_twin *twin; /* NULL: nobody has asked for it yet */
+    nb_document draft;
+    nb_gl_preview stage;
+    nb_display_pass screen;
+    nb_cpu_preview *twin; /* NULL: nobody has asked for it yet */
     int twin_is_stale, has_cpu;
-    nb_watch watch;
-    nb_hands hands;
+    nb_file_watch watch;
+    nb_input hands;
     nb_panel panel;
-    nb_look look;
+    nb_display look;
     nebel_camera home;
     nebel_log log;
     char message[512]; /* the last one, for the window */
@@ -120,7 +120,7 @@ static void set_home(viewer *all)
 /* The draft's fog to the renderer, particles in the way that is wished for. */
 static nebel_result set_fog(viewer *all)
 {
-    nb_draft *const draft = &all->draft;
+    nb_document *const draft = &all->draft;
     nebel_snapshot *fog = draft->volumes;
     const int is_whole = all->look.particles == NB_LOOK_AS_FOG;
     nebel_result result = is_whole ? nb_draft_whole(draft, &fog) : NEBEL_OK;
@@ -131,7 +131,7 @@ static nebel_result set_fog(viewer *all)
 
 static nebel_result open_stage(viewer *all)
 {
-    all->stage = (nb_stage){.is_needed = is_needed, .user = all};
+    all->stage = (nb_gl_preview){.is_needed = is_needed, .user = all};
     const nebel_result result = nb_stage_open(&all->draft.data, &all->log, &all->stage);
     return result == NEBEL_OK ? set_fog(all) : result;
 }
@@ -144,7 +144,7 @@ static void watch_files(viewer *all)
 /* All that a context of OpenGL has. */
 static int open_window(viewer *all, uint32_t width, uint32_t height)
 {
-    const nb_view_settings *const settings = all->settings;
+    const nb_viewer_options *const settings = all->settings;
     nb_window *const window = &all->window;
     if (nb_window_open(window, settings->scene, width, height) != NB_DONE) return NB_FAILED;
     /* Who reads where the controls are waits for them. */
@@ -169,7 +169,7 @@ static void close_window(viewer *all)
 
 static int open_viewer(viewer *all)
 {
-    const nb_view_settings *const settings = all->settings;
+    const nb_viewer_options *const settings = all->settings;
     const nebel_result result = nb_draft_open(settings->scene, settings->frame, &all->log, &all->draft);
     if (result != NEBEL_OK) return fail(all, result);
     if (nb_target_check_window(settings->screenshot, settings->controls, settings->scene, &all->draft.data) != NB_DONE)
@@ -205,7 +205,7 @@ static int has_factor(nebel_method method)
 /* A method whose section has gone is none any longer. */
 static void check_method(viewer *all)
 {
-    const nb_edition *const good = &all->draft.good;
+    const nb_document_state *const good = &all->draft.good;
     const nebel_method method = all->look.method;
     if ((is_of_cells(method) && good->cells == NULL) || (has_factor(method) && !good->has_classic))
         all->look.method = NEBEL_METHOD_EXACT;
@@ -219,9 +219,9 @@ static const char *explain_method(const viewer *all)
 }
 
 /* What can be shown of what is wished for. */
-static nb_look shown_look(const viewer *all)
+static nb_display shown_look(const viewer *all)
 {
-    nb_look look = all->look;
+    nb_display look = all->look;
     if (explain_method(all)[0] == '\0') return look;
     look.method = NEBEL_METHOD_EXACT;
     look.compare = NB_LOOK_CPU_ALONE;
@@ -255,7 +255,7 @@ static nebel_result forgive(nebel_result result)
 /* A stage with the draft's scene in the place of ours, which stays where that fails. */
 static nebel_result renew_stage(viewer *all)
 {
-    nb_stage old = all->stage;
+    nb_gl_preview old = all->stage;
     const nebel_result result = open_stage(all);
     if (result != NEBEL_OK) {
         nb_stage_close(&all->stage);
@@ -271,7 +271,7 @@ static const double quick_placing = 0.1;
 
 static nebel_result renew_renderers(viewer *all)
 {
-    nb_draft *const draft = &all->draft;
+    nb_document *const draft = &all->draft;
     const int waits = all->panel.is_held && all->placing_seconds > quick_placing;
     if (!draft->planets_are_new && (!draft->models_are_stale || waits)) return NEBEL_OK;
     const double start = nb_window_now();
@@ -312,7 +312,7 @@ static nebel_result set_frame(viewer *all, double frame)
 /* Air is slow to be made: other planets come once the control is let go. */
 static int must_wait(const viewer *all)
 {
-    const nb_draft *const draft = &all->draft;
+    const nb_document *const draft = &all->draft;
     return all->panel.is_held && !nb_edition_has_same_planets(&draft->now, &draft->good);
 }
 
@@ -342,9 +342,9 @@ static int is_same_camera(const nebel_camera *a, const nebel_camera *b)
 }
 
 /* The fresh draft in the place of ours, unless it cannot be drawn. */
-static nebel_result replace_draft(viewer *all, const nb_draft *fresh)
+static nebel_result replace_draft(viewer *all, const nb_document *fresh)
 {
-    nb_draft old = all->draft;
+    nb_document old = all->draft;
     nb_twin_close(all->twin);
     all->twin = NULL;
     all->draft = *fresh;
@@ -365,7 +365,7 @@ static nebel_result replace_draft(viewer *all, const nb_draft *fresh)
  * now. */
 static nebel_result read_again(viewer *all)
 {
-    nb_draft fresh;
+    nb_document fresh;
     const nebel_camera view = all->draft.data.camera, before = nebel_get_scene_data(all->draft.file)->camera;
     say(all, "");
     nb_watch_take(&all->watch);
@@ -458,7 +458,7 @@ static int recover(viewer *all)
         return nb_report_failure("view: the graphics driver was reset, and no new window opens");
     all->lost = now;
     all->has_cpu = 0;
-    all->hands = (nb_hands){.x = 0};
+    all->hands = (nb_input){.x = 0};
     note_change(all);
     nb_report_message("view: %s", words);
     say(all, words);
@@ -471,7 +471,7 @@ static int recover(viewer *all)
 
 static void obey_keys(viewer *all)
 {
-    const nb_hands *const hands = &all->hands;
+    const nb_input *const hands = &all->hands;
     if (hands->moved_camera) note_change(all);
     if (hands->wants_help) all->panel.help_shown = !all->panel.help_shown;
     if (hands->wants_panel) all->panel.shown = !all->panel.shown;
@@ -542,7 +542,7 @@ static nebel_result step_frame(viewer *all, int by)
 static nebel_result obey_commands(viewer *all)
 {
     const nb_panel *const panel = &all->panel;
-    const nb_hands *const hands = &all->hands;
+    const nb_input *const hands = &all->hands;
     if (panel->wants_undo || hands->wants_undo) return step(all, 1);
     if (panel->wants_redo || hands->wants_redo) return step(all, 0);
     if (panel->wants_reload || hands->wants_reload) return read_again(all);
@@ -626,14 +626,14 @@ static nebel_light *copy_lamps(const nebel_scene_data *scene)
 
 static nebel_result ask_twin(viewer *all)
 {
-    nb_twin_wish wish = {.camera = all->draft.data.camera,
-                         .width = all->window.width,
-                         .height = all->window.height,
-                         .frame = all->draft.frame,
-                         .plane = all->look.plane,
-                         .method = all->look.method,
-                         .factor = all->draft.good.classic,
-                         .light = all->draft.data};
+    nb_preview_request wish = {.camera = all->draft.data.camera,
+                               .width = all->window.width,
+                               .height = all->window.height,
+                               .frame = all->draft.frame,
+                               .plane = all->look.plane,
+                               .method = all->look.method,
+                               .factor = all->draft.good.classic,
+                               .light = all->draft.data};
     nebel_result result = nb_draft_whole(&all->draft, &wish.fog);
     if (result == NEBEL_OK && all->twin == NULL) all->twin = nb_twin_open(&all->draft.data);
     if (result == NEBEL_OK && all->twin == NULL) {
@@ -654,7 +654,7 @@ static nebel_result ask_twin(viewer *all)
 
 static void compare(viewer *all)
 {
-    nb_twin_picture picture;
+    nb_preview_image picture;
     if (shown_look(all).compare == NB_LOOK_GL_ALONE) return;
     if (all->twin_is_stale) (void)ask_twin(all);
     if (all->twin == NULL || !nb_twin_take(all->twin, &picture)) return;
@@ -698,7 +698,7 @@ static int show(viewer *all)
 {
     const nb_window *const window = &all->window;
     compare(all);
-    const nb_look look = shown_look(all);
+    const nb_display look = shown_look(all);
     nb_screen_draw(&all->screen, all->stage.texture, all->has_cpu, &look, window->width, window->height);
     int status = take_pictures(all, 0);
     if (status == NB_DONE) status = fill_panel(all);
@@ -714,7 +714,7 @@ static nebel_result try_frame(viewer *all)
 {
     const nb_window *const window = &all->window;
     all->refusal[0] = '\0';
-    const nb_look look = shown_look(all);
+    const nb_display look = shown_look(all);
     all->is_asking = 1;
     const nebel_result result =
         nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &look, is_moving(all));
@@ -732,7 +732,7 @@ enum { BLANK_TURNS = 2 };
 static nebel_result try_first_frame(viewer *all)
 {
     if (all->settings->screenshot == NULL && all->blank_turns < BLANK_TURNS) return all->blank_turns++, NEBEL_OK;
-    nb_meter meter = nb_meter_start(0);
+    nb_progress_bar meter = nb_meter_start(0);
     nb_meter_say(&meter, "OpenGL: compiling shaders...");
     const nebel_result result = try_frame(all);
     (void)nb_meter_end(&meter);
@@ -782,7 +782,7 @@ static int is_ended(viewer *all)
     return 0;
 }
 
-int nb_view_run(const nb_view_settings *settings)
+int nb_view_run(const nb_viewer_options *settings)
 {
     viewer all = {
         .settings = settings,

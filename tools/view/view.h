@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-typedef struct nb_view_settings {
+typedef struct nb_viewer_options {
     const char *scene;
     uint32_t width, height;
     double exposure; /* stops */
@@ -12,9 +12,9 @@ typedef struct nb_view_settings {
     double scale;           /* of the controls; 0: what the screen says */
     const char *screenshot; /* NULL: none; else the finished picture goes there, and the window closes */
     const char *controls;   /* NULL: none; else a file that says where the controls are */
-} nb_view_settings;
+} nb_viewer_options;
 
 /* Opens the window and stays until it is closed. Returns an exit status; what went wrong was said. */
-int nb_view_run(const nb_view_settings *settings);
+int nb_view_run(const nb_viewer_options *settings);
 
 #endif

@@ -17,14 +17,14 @@ static void look(nb_watch_file *file)
                             (long long)status.st_ino};
 }
 
-static void add(nb_watch *watch, const char *path)
+static void add(nb_file_watch *watch, const char *path)
 {
     nb_watch_file *const file = &watch->files[watch->count];
     file->path = strdup(path);
     watch->count += file->path != NULL;
 }
 
-void nb_watch_open(nb_watch *watch, const char *scene, const char *const *files, size_t count)
+void nb_watch_open(nb_file_watch *watch, const char *scene, const char *const *files, size_t count)
 {
     nb_watch_close(watch);
     watch->files = calloc(count + 1, sizeof *watch->files);
@@ -34,19 +34,19 @@ void nb_watch_open(nb_watch *watch, const char *scene, const char *const *files,
     nb_watch_take(watch);
 }
 
-void nb_watch_close(nb_watch *watch)
+void nb_watch_close(nb_file_watch *watch)
 {
     for (size_t i = 0; i < watch->count; i++) free(watch->files[i].path);
     free(watch->files);
-    *watch = (nb_watch){.files = NULL};
+    *watch = (nb_file_watch){.files = NULL};
 }
 
-void nb_watch_take(nb_watch *watch)
+void nb_watch_take(nb_file_watch *watch)
 {
     for (size_t i = 0; i < watch->count; i++) look(&watch->files[i]);
 }
 
-const char *nb_watch_find_changed(const nb_watch *watch)
+const char *nb_watch_find_changed(const nb_file_watch *watch)
 {
     for (size_t i = 0; i < watch->count; i++) {
         const nb_watch_file *const was = &watch->files[i];
