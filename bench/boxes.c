@@ -6,7 +6,7 @@ const double nb_boxes_color[3] = {.7, .7, .5};
 void nb_boxes_set(nb_setting setting, nb_boxes *boxes)
 {
     const float y = setting == NB_FOG_OVER_ALL ? 13 : 3, size = setting == NB_FOG_OVER_ALL ? 51 : 45;
-    boxes->count = setting == NB_FOG_IN_PATCHES ? NB_BOXES_MOST : 1;
+    boxes->count = setting == NB_FOG_IN_PATCHES ? NB_MAX_BOXES : 1;
     boxes->list[0] = (nb_old_box){{-size, -3, -size}, {size, y, size}, .05f};
     for (size_t i = 0; i < boxes->count && setting == NB_FOG_IN_PATCHES; i++) {
         const float x = (float)(i % 4) * 24 - 46, z = (float)(i / 4) * 24 - 46;

@@ -6,7 +6,7 @@
 
 #include <nebel/nebel.h>
 
-enum { NB_BOXES_MOST = 16 };
+enum { NB_MAX_BOXES = 16 };
 
 typedef enum nb_setting {
     NB_FOG_BANK = 0,   /* the box of scene A: three quarters of the points are above it */
@@ -18,7 +18,7 @@ typedef enum nb_setting {
 extern const char *const nb_setting_names[NB_SETTINGS];
 
 typedef struct nb_boxes {
-    nb_old_box list[NB_BOXES_MOST];
+    nb_old_box list[NB_MAX_BOXES];
     size_t count;
 } nb_boxes;
 

@@ -38,8 +38,8 @@ static double median(double *seconds, int count)
 
 int nb_measure(nb_contest *contests, size_t count, int repetitions)
 {
-    double seconds[CONTESTS_MOST][NB_REPETITIONS_MOST];
-    if (count > CONTESTS_MOST || repetitions < 1 || repetitions > NB_REPETITIONS_MOST) return -1;
+    double seconds[CONTESTS_MOST][NB_MAX_REPETITIONS];
+    if (count > CONTESTS_MOST || repetitions < 1 || repetitions > NB_MAX_REPETITIONS) return -1;
     for (int r = -1; r < repetitions; r++) {
         for (size_t i = 0; i < count; i++) {
             const double taken = contests[i].run(contests[i].user);

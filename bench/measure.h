@@ -17,9 +17,9 @@ typedef struct nb_contest {
     double seconds; /* out: median */
 } nb_contest;
 
-enum { NB_REPETITIONS_MOST = 64 };
+enum { NB_MAX_REPETITIONS = 64 };
 
-/* Runs every contestant once to warm up, then all of them in turn `repetitions` times (1 to NB_REPETITIONS_MOST).
+/* Runs every contestant once to warm up, then all of them in turn `repetitions` times (1 to NB_MAX_REPETITIONS).
  * Returns 0, or -1 when a run failed. */
 int nb_measure(nb_contest *contests, size_t count, int repetitions);
 

@@ -18,9 +18,9 @@ enum { NB_FORMULA_INPUTS = 16, NB_FORMULA_OUTPUTS = 4 };
     X(around, of_interval(nb_interval_around(a0, a1, a2, a3)))                                                         \
     X(box, of_interval(nb_interval_box(v0, v3, v6, v9, a12)))                                                          \
     X(half_space, of_interval(nb_interval_half_space(v0, v3, v6, a9, a10, a11, a12, a13)))                             \
-    X(ball, of_interval(nb_interval_ball(v0, v3, a6, a12)))                                                            \
+    X(ball, of_interval(nb_interval_sphere(v0, v3, a6, a12)))                                                          \
     X(pipe, of_interval(nb_interval_pipe(v0, v3, a12)))                                                                \
-    X(tube, of_interval(nb_interval_tube(v0, v3, a12)))                                                                \
+    X(tube, of_interval(nb_interval_cylinder(v0, v3, a12)))                                                            \
     X(cone, of_interval(nb_interval_cone(v0, v3, a6, a7, a12)))                                                        \
     X(capsule, of_interval(nb_interval_capsule(v0, v3, a6, a12)))
 
@@ -54,8 +54,8 @@ enum { NB_FORMULA_INPUTS = 16, NB_FORMULA_OUTPUTS = 4 };
     X(phase_lobe, of_real(nb_phase_lobe(r0, r1, r2, r3, nb_turn_between(v6, v9))))                                     \
     X(turn_cosine, of_real(nb_turn_between(v6, v9).cosine))                                                            \
     X(turn_ahead, of_real(nb_turn_between(v6, v9).ahead))                                                              \
-    X(lamp_fluence, of_wide(nb_lamp_fluence(a0, a1)))                                                                  \
-    X(lamp_cone, of_real(nb_lamp_cone(r0, r1, r2)))                                                                    \
+    X(lamp_fluence, of_wide(nb_light_fluence(a0, a1)))                                                                 \
+    X(lamp_cone, of_real(nb_light_cone(r0, r1, r2)))                                                                   \
     X(swing_end, of_wide(nb_swing_between(a0, a1, a2, a3).end))                                                        \
     X(swing_place, of_wide(nb_swing_place(nb_swing_between(a0, a1, a2, a3), a4)))                                      \
     X(swing_rate, of_wide(nb_swing_rate(nb_swing_between(a0, a1, a2, a3), a4)))

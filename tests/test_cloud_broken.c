@@ -16,7 +16,7 @@ static void scatter(const double turns[SLAB_PARTS + 1], uint64_t *numbers, doubl
     const double turn = turns[low] + (place - low) * (turns[low + 1] - turns[low]),
                  sine = sqrt(fmax(0, 1 - turn * turn));
     double across[2][3];
-    nb_vector_find_aside(direction, across[0]);
+    nb_vector_perpendicular(direction, across[0]);
     nb_vector_cross(direction, across[0], across[1]);
     for (int c = 0; c < 3; c++)
         direction[c] = turn * direction[c] + sine * (cos(around) * across[0][c] + sin(around) * across[1][c]);

@@ -65,8 +65,8 @@ static void test_what_means_miss_is_told(void **state)
         nb_aerial_nodes haze;
         float over[NEBEL_MAX_CLOUD_NODES];
         sample(&media, &knots, &haze);
-        nb_cloud_haze_sum(&knots, 0, &haze, over);
-        const double told = (double)nb_cloud_haze_missed(&knots, &haze);
+        nb_cloud_compose_sum(&knots, 0, &haze, over);
+        const double told = (double)nb_cloud_compose_missed(&knots, &haze);
         const double sum = (double)over[KNOTS - 1] + media.left[0][STEPS] * media.light[1][STEPS];
         const double off = fabs(sum - light_of(&media));
         assert_true(off <= told + 1e-5);
@@ -88,8 +88,8 @@ static void test_the_bound_is_met(void **state)
             haze.left[c][k] = 1;
             haze.light[c][k] = .5f * (float)k;
         }
-    nb_cloud_haze_sum(&knots, 0, &haze, over);
-    const float sum = over[1] + .25f * .5f, told = nb_cloud_haze_missed(&knots, &haze);
+    nb_cloud_compose_sum(&knots, 0, &haze, over);
+    const float sum = over[1] + .25f * .5f, told = nb_cloud_compose_missed(&knots, &haze);
     assert_float_equal(sum + told, .5f, 1e-6);
     assert_float_equal(sum - told, .25f * .5f, 1e-6);
 }

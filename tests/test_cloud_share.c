@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-enum { COLUMNS = NB_CLOUD_SHARE_COLUMNS, ROWS = NB_CLOUD_SHARE_ROWS, ALL = NB_CLOUD_SHARE };
+enum { COLUMNS = NB_CLOUD_PIXELS_COLUMNS, ROWS = NB_CLOUD_PIXELS_ROWS, ALL = NB_CLOUD_SHARE };
 
 static int at(int x, int y)
 {
@@ -43,10 +43,10 @@ static void begin(picture *p)
 static int trace(picture *p)
 {
     int count = 0;
-    nb_cloud_block_begin(&p->block);
-    for (int level = 0; level < NB_CLOUD_SHARE_LEVELS; level++) {
+    nb_cloud_pixels_block_begin(&p->block);
+    for (int level = 0; level < NB_CLOUD_PIXELS_LEVELS; level++) {
         int is_asked[ALL];
-        nb_cloud_block_ask(&p->block, level, is_asked);
+        nb_cloud_pixels_block_ask(&p->block, level, is_asked);
         for (int i = 0; i < ALL; i++) {
             if (!is_asked[i]) continue;
             p->knots[i] = p->truth[i];
@@ -150,8 +150,8 @@ static void test_mean_is_between(void **state)
     (void)state;
     nebel_cloud_transfer a = wall(.2f, 1), b = wall(.22f, 1.02f);
     for (int k = 0; k < 3; k++) b.t[k] += 100;
-    const nebel_cloud_transfer mean = nb_cloud_mean(&a, &b), clear = {.density_queries = 3},
-                               half = nb_cloud_mean(&clear, &a);
+    const nebel_cloud_transfer mean = nb_cloud_pixels_mean(&a, &b), clear = {.density_queries = 3},
+                               half = nb_cloud_pixels_mean(&clear, &a);
     assert_int_equal(mean.count, 3);
     assert_true(mean.t[0] == 1000 && mean.t[2] == 1500);
     assert_true(mean.transmittance[0] == 1 && mean.in_scattering[0][0] == 0);
@@ -160,7 +160,7 @@ static void test_mean_is_between(void **state)
     assert_float_equal(mean.in_scattering[2][0], 1.01, 1e-6);
     assert_float_equal(half.transmittance[2], .6, 1e-6);
     assert_float_equal(half.in_scattering[2][0], .5, 1e-6);
-    assert_int_equal(nb_cloud_mean(&clear, &clear).count, 0);
+    assert_int_equal(nb_cloud_pixels_mean(&clear, &clear).count, 0);
 }
 
 /* Seen aslant from far above, the next row's sheet lies farther off than it is deep, as does the ground below it. Each pixel has its

@@ -21,7 +21,7 @@ static int is_cloud(const nebel_clouds *clouds, const nb_cloud_layer *layer, con
 {
     nb_cloud_density_query looks = {.count = 1};
     for (int c = 0; c < 3; c++) looks.place[c][0] = (layer->low + layer->high) / 2 * unit[c];
-    nb_cloud_look_alone(clouds->kernel, &clouds->noise, layer, &looks);
+    nb_cloud_density_alone(clouds->kernel, &clouds->noise, layer, &looks);
     return looks.whole[0] > 0;
 }
 

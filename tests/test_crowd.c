@@ -1,4 +1,4 @@
-/* Very many media over each other: those of constant density are summed in a tree from NB_LEAST_CROWD on. Their light
+/* Very many media over each other: those of constant density are summed in a tree from NB_MIN_OVERLAP_SET on. Their light
  * is that of the closed form between all ends, and neither company nor order changes a bit. */
 #include <math.h>
 #include <setjmp.h>
@@ -64,7 +64,8 @@ static void test_media_over_each_other_give_the_closed_form(void **unused)
     static shell shells[BALLS];
     static nebel_volume_desc volumes[BALLS];
     uint64_t state = 1;
-    const size_t counts[] = {NB_LEAST_CROWD - 1, NB_LEAST_CROWD, NB_LEAST_CROWD + 1, 2 * NB_LEAST_CROWD, BALLS};
+    const size_t counts[] = {NB_MIN_OVERLAP_SET - 1, NB_MIN_OVERLAP_SET, NB_MIN_OVERLAP_SET + 1, 2 * NB_MIN_OVERLAP_SET,
+                             BALLS};
     for (size_t k = 0; k < sizeof counts / sizeof counts[0]; k++) {
         for (size_t i = 0; i < counts[k]; i++) {
             shells[i] = (shell){dice(&state, 1, 10), dice(&state, 0, .4 / (double)counts[k]), dice(&state, 0, 3)};

@@ -264,7 +264,7 @@ static void lattices_say_how_far_they_are_off(void **state)
         const nebel_allocator heap = nb_resolve_allocator(&(nebel_allocator){0});
         double way[3];
         for (int a = 0; a < 3; a++) way[a] = c.sun[a] * c.rate[a];
-        nb_sun_lattice *l = nb_grid_lattice_make(c.grid, &heap, way, (nb_sun_lattice_limit){2, (size_t)1 << 25, 1});
+        nb_sun_lattice *l = nb_sun_lattice_make(c.grid, &heap, way, (nb_sun_lattice_limit){2, (size_t)1 << 25, 1});
         assert_non_null(l);
         for (int n = 0; n < PLACES; n++, places++) {
             double place[3], cell[3], leaves[3], length, deviation;
@@ -279,7 +279,7 @@ static void lattices_say_how_far_they_are_off(void **state)
             over += off > deviation;
             assert_true(off <= 3 * deviation);
         }
-        nb_grid_lattice_release(l);
+        nb_sun_lattice_release(l);
         nebel_release_grid(c.grid);
     }
     assert_true(over * 500 <= places);

@@ -137,18 +137,18 @@ static void take_stretch(const nb_solid *solid, stretch_ends *e)
     at[(*count)++] = solid->leave;
 }
 
-static void walk_lines(const nb_alpha_mask *mask, const nb_mask_lines *lines, stretch_ends *e)
+static void walk_lines(const nb_alpha_mask *mask, const nb_alpha_mask_lines *lines, stretch_ends *e)
 {
-    nb_mask_walk walk;
+    nb_alpha_mask_walk walk;
     memset(e->count, 0, sizeof e->count);
-    nb_mask_begin(&walk, mask, lines);
+    nb_alpha_mask_begin(&walk, mask, lines);
     do {
         for (uint32_t i = 0; i < walk.count; i++) take_stretch(&walk.found[i], e);
-    } while (nb_mask_next(&walk));
+    } while (nb_alpha_mask_next(&walk));
 }
 
-/* How many places of a line its stretches and nb_mask_is_hole disagree about, but for those near an end. */
-static size_t compare_line(const nb_alpha_mask *mask, const nb_mask_lines *lines, int line, const stretch_ends *e,
+/* How many places of a line its stretches and nb_alpha_mask_is_hole disagree about, but for those near an end. */
+static size_t compare_line(const nb_alpha_mask *mask, const nb_alpha_mask_lines *lines, int line, const stretch_ends *e,
                            uint64_t *numbers, size_t *places)
 {
     const double *from[2] = {&lines->from[0][line], &lines->from[1][line]};
@@ -165,7 +165,7 @@ static size_t compare_line(const nb_alpha_mask *mask, const nb_mask_lines *lines
         }
         if (near) continue;
         *places += 1;
-        wrong += nb_mask_is_hole(mask, (float)(x / mask->width), (float)(y / mask->height)) != (before % 2 == 0);
+        wrong += nb_alpha_mask_is_hole(mask, (float)(x / mask->width), (float)(y / mask->height)) != (before % 2 == 0);
     }
     return wrong;
 }
@@ -174,7 +174,7 @@ static size_t compare_line(const nb_alpha_mask *mask, const nb_mask_lines *lines
 static size_t compare_lines(const nb_alpha_mask *mask, uint64_t *numbers, size_t *places)
 {
     static stretch_ends e;
-    nb_mask_lines lines;
+    nb_alpha_mask_lines lines;
     size_t wrong = 0;
     for (int line = 0; line < NB_PACKET; line++) {
         lines.is_asked[line] = line != 1;
@@ -209,9 +209,9 @@ static void a_line_is_cut_where_alpha_passes_the_cutoff(void **state)
             const int x = i % WIDE, y = i / WIDE, inside = hypot(x - 20, y - 15) < 11 && hypot(x - 22, y - 17) > 4;
             texels[i][3] = kind == 0 ? (uint8_t)(inside ? 255 : 0) : (uint8_t)dice(&numbers, 0, 256);
         }
-        assert_int_equal(nb_mask_make(&mask, &allocator, &scene, 0, .5f), NEBEL_OK);
+        assert_int_equal(nb_alpha_mask_make(&mask, &allocator, &scene, 0, .5f), NEBEL_OK);
         for (int packet = 0; packet < 150; packet++) wrong += compare_lines(&mask, &numbers, &places);
-        nb_mask_free(&mask, &allocator);
+        nb_alpha_mask_free(&mask, &allocator);
     }
     print_message("%zu of %zu places wrong\n", wrong, places);
     assert_true(places > 300000 && wrong <= places / 20000);

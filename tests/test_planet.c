@@ -95,9 +95,9 @@ static void lengths_are_those_of_T13(void **state)
         const double *row = rows[i];
         const nb_air_components airs = make_airs(6360, 6460, row[0]);
         const nb_atmosphere_ray track = track_from(6360 + row[1], row[2]);
-        const double end = fmin(nb_track_enter(track, airs.radius), nb_track_leave(track, airs.top));
+        const double end = fmin(nb_atmosphere_ray_enter(track, airs.radius), nb_atmosphere_ray_leave(track, airs.top));
         double depth[3];
-        nb_track_depth(&airs, track, end, depth);
+        nb_atmosphere_ray_depth(&airs, track, end, depth);
         expect_near("way", end, row[3], 1e-10);
         expect_near("length", depth[0], row[4], 4e-9);
     }
@@ -112,12 +112,12 @@ static void pieces_add_up(void **state)
     airs.count = 2;
     for (int i = 0; i < 1000; i++) {
         const nb_atmosphere_ray track = track_from(6361 + 97.0 * (i % 17) / 17, 93.0 * (i % 31) / 31);
-        const double end = fmin(nb_track_enter(track, airs.radius), nb_track_leave(track, airs.top));
+        const double end = fmin(nb_atmosphere_ray_enter(track, airs.radius), nb_atmosphere_ray_leave(track, airs.top));
         const double cut = end * (i % 13) / 13;
         double whole[3], first[3], rest[3];
-        nb_track_depth(&airs, track, end, whole);
-        nb_track_depth(&airs, track, cut, first);
-        nb_track_depth(&airs, nb_track_ahead(track, cut), end - cut, rest);
+        nb_atmosphere_ray_depth(&airs, track, end, whole);
+        nb_atmosphere_ray_depth(&airs, track, cut, first);
+        nb_atmosphere_ray_depth(&airs, nb_atmosphere_ray_ahead(track, cut), end - cut, rest);
         for (int c = 0; c < 3; c++)
             if (whole[c] > 0) expect_near("sum", first[c] + rest[c], whole[c], c == 1 ? 4e-9 : 2e-5);
     }
@@ -184,8 +184,10 @@ static void gain_is_that_of_T31(void **state)
             const double weight = 0.5 / 16 * rule->weights[k % 8] * 3 * part * part * fabs(span);
             const nb_atmosphere_ray track = {radius, radius * (horizon + span * part * part * part)};
             nb_ray_nodes path;
-            nb_path_lay(airs, NULL, rule, track,
-                        fmin(nb_track_enter(track, airs->radius), nb_track_leave(track, airs->top)), 0, NULL, &path);
+            nb_ray_nodes_lay(
+                airs, NULL, rule, track,
+                fmin(nb_atmosphere_ray_enter(track, airs->radius), nb_atmosphere_ray_leave(track, airs->top)), 0, NULL,
+                &path);
             for (int n = 0; n < path.count; n++)
                 for (int c = 0; c < 3; c++) {
                     const double scattering = airs->airs[0].scattering[c] * path.density[0][n] +
@@ -204,8 +206,8 @@ static void gain_is_that_of_T31(void **state)
 static double gather(const nebel_atmosphere *atmosphere, double height, double zenith, double sun, int c)
 {
     const nb_atmosphere_ray track = track_from(atmosphere->airs.radius + height, zenith);
-    const double end =
-        fmin(nb_track_enter(track, atmosphere->airs.radius), nb_track_leave(track, atmosphere->airs.top));
+    const double end = fmin(nb_atmosphere_ray_enter(track, atmosphere->airs.radius),
+                            nb_atmosphere_ray_leave(track, atmosphere->airs.top));
     const nb_moment_basis aspect = {cos(zenith * DEGREES), cos((zenith - sun) * DEGREES), cos(sun * DEGREES)};
     nb_in_scattered gathered;
     double once[3];
@@ -227,9 +229,9 @@ static void light_is_that_of_T40(void **state)
     nebel_atmosphere *small = make(&desc);
     const nb_atmosphere_ray level = {1.4e6, 0}, up = {1.4e6, 1.4e6};
     double depth[3];
-    expect_near("up", nb_track_leave(up, small->airs.top), 1e5, 1e-12);
-    expect_near("level", nb_track_leave(level, small->airs.top), 538516.4807134504, 1e-12);
-    nb_track_depth(&small->airs, up, 1e5, depth);
+    expect_near("up", nb_atmosphere_ray_leave(up, small->airs.top), 1e5, 1e-12);
+    expect_near("level", nb_atmosphere_ray_leave(level, small->airs.top), 538516.4807134504, 1e-12);
+    nb_atmosphere_ray_depth(&small->airs, up, 1e5, depth);
     expect_near("length", depth[0] / 1e-6, 61.93585949521763, 1e-8);
     expect_near("both", 4 * PI * gather(small, 0, 0, 0, 1), 0.05320320237142445 + 0.039911993097991726, 1e-6);
     expect_near("Rayleigh", 4 * PI * gather(small, 0, 0, 0, 2), 0.05320320237142445, 1e-6);
@@ -239,9 +241,9 @@ static void light_is_that_of_T40(void **state)
         .absorption = {1.2e-6}, .profile = NEBEL_COMPONENT_TENT, .center_height = 2.5e5, .half_width = 2.5e5};
     desc.components[1] = (nebel_atmosphere_component){.scattering = {0, 1e-6, 0}, .scale_height = 1e15};
     nebel_atmosphere *odd = make(&desc);
-    nb_track_depth(&odd->airs, (nb_atmosphere_ray){1e6, 1e6}, 5e5, depth);
+    nb_atmosphere_ray_depth(&odd->airs, (nb_atmosphere_ray){1e6, 1e6}, 5e5, depth);
     expect_near("layer", exp(-depth[0]), 0.7408182206817179, 1e-9);
-    nb_track_depth(&odd->airs, level, 538516.4807134504, depth);
+    nb_atmosphere_ray_depth(&odd->airs, level, 538516.4807134504, depth);
     expect_near("even", exp(-depth[1]), 0.5836134122275815, 1e-8);
     nebel_destroy_atmosphere(odd);
 }
@@ -280,7 +282,7 @@ static void add_ground(const nebel_atmosphere *atmosphere, const nebel_sun *sun,
 {
     const double radius = atmosphere->airs.radius, height = ray->origin[1];
     const nb_atmosphere_ray track = {radius + height, (radius + height) * ray->direction[1]};
-    const double way = nb_track_enter(track, radius);
+    const double way = nb_atmosphere_ray_enter(track, radius);
     if (!(way < HUGE_VAL)) return;
     double place[3], up[3], cosine = 0;
     for (int c = 0; c < 3; c++) {
@@ -317,7 +319,8 @@ static void skies_are_those_of_T41(void **state)
                                              (earth->airs.radius + ray.origin[1]) * cos(zenith)};
             const double cosine = ray.direction[0] * sun.direction[0] + ray.direction[1] * sun.direction[1];
             nb_in_scattered gathered;
-            const double end = fmin(nb_track_enter(track, earth->airs.radius), nb_track_leave(track, earth->airs.top));
+            const double end = fmin(nb_atmosphere_ray_enter(track, earth->airs.radius),
+                                    nb_atmosphere_ray_leave(track, earth->airs.top));
             double once[3];
             nb_gather(earth, &earth->rule, track, (nb_moment_basis){cos(zenith), cosine, cos(low)}, 1, &end, &gathered);
             nb_gathered_once(earth, &gathered, cosine, once);
@@ -355,7 +358,7 @@ static void twilights_agree(void **state)
             const double zenith = views[i / 2][0] * DEGREES, turn = views[i / 2][1] * DEGREES,
                          low = (90 + depths[s]) * DEGREES;
             const nb_atmosphere_ray track = track_from(fast->airs.radius + (i % 2 ? 1e4 : 10), views[i / 2][0]);
-            const double end = nb_track_leave(track, fast->airs.top);
+            const double end = nb_atmosphere_ray_leave(track, fast->airs.top);
             const nb_moment_basis aspect = {cos(zenith), sin(zenith) * cos(turn) * sin(low) + cos(zenith) * cos(low),
                                             cos(low)};
             nb_in_scattered a, b;
@@ -428,7 +431,7 @@ static void check_furnace(nebel_atmosphere_quality quality)
         const double angle = views[i][1] * DEGREES, height = views[i][0];
         const nebel_ray ray = {{0, height, 0}, {sin(angle), cos(angle), 0}, (double)INFINITY};
         const nb_atmosphere_ray track = {6.36e6 + height, (6.36e6 + height) * cos(angle)};
-        const double way = nb_track_enter(track, 6.36e6);
+        const double way = nb_atmosphere_ray_enter(track, 6.36e6);
         double light[3] = {0, 0, 0}, ground[3] = {0, 0, 0};
         nebel_transfer clear = {.error = 0};
         for (int k = 0; k < RINGS * TURNS; k++) {
@@ -717,10 +720,11 @@ static void try_kernel(const nebel_atmosphere *atmosphere, nb_gather_fn *kernel)
     const nb_air_components *airs = &atmosphere->airs;
     for (int i = 0; i < 60; i++) {
         const nb_atmosphere_ray track = track_from(airs->radius + 1e4 * (i % 4), 80 + i % 5 * 4);
-        const double end = fmin(nb_track_enter(track, airs->radius), nb_track_leave(track, airs->top));
+        const double end =
+            fmin(nb_atmosphere_ray_enter(track, airs->radius), nb_atmosphere_ray_leave(track, airs->top));
         nb_ray_nodes path;
         nb_node_light light, same;
-        nb_path_lay(airs, NULL, &atmosphere->rule, track, end, 0, NULL, &path);
+        nb_ray_nodes_lay(airs, NULL, &atmosphere->rule, track, end, 0, NULL, &path);
         const nb_gather_job job = {
             .airs = airs,
             .scatter = &atmosphere->scatter,

@@ -517,7 +517,7 @@ static void ask(nebel_sky_view *view, nebel_isa isa, const bundle *rays, int end
         ground.sun[c] = a->sun[c];
         ground.sky[c] = a->sky[c];
     }
-    view->look = nb_look_choose(isa);
+    view->look = nb_sky_view_choose(isa);
     assert_int_equal(nebel_trace_sky_view(view, RAYS, direction, ends ? rays->t_max : NULL, &transfers), NEBEL_OK);
     assert_int_equal(nebel_trace_ground(view, RAYS, direction, &ground), NEBEL_OK);
 }
@@ -548,7 +548,7 @@ static void all_instruction_sets_agree(void **state)
         }
         ask(view, NEBEL_ISA_SCALAR, &rays, desc.has_ray_ends, &scalar);
         for (int isa = 0; isa < NEBEL_ISA_COUNT; isa++) {
-            if (nb_look_choose((nebel_isa)isa) == NULL) continue;
+            if (nb_sky_view_choose((nebel_isa)isa) == NULL) continue;
             ask(view, (nebel_isa)isa, &rays, desc.has_ray_ends, &other);
             assert_memory_equal(&scalar, &other, sizeof scalar);
         }

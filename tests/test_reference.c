@@ -438,12 +438,12 @@ static void variances_are_those_of_T38(void **state)
         const nb_tracker track = {.media = &media, .ray = {{0, 0, 0}, {0, 0, 1}, cases[i].depth / cases[i].part}};
         const double expected = exp(-cases[i].depth), variance[2] = {cases[i].delta, cases[i].ratio};
         double sum[2] = {0}, square[2] = {0};
-        nb_rng chance = nb_chance_of(1, 2, 3, (uint32_t)i);
+        nb_rng chance = nb_rng_of(1, 2, 3, (uint32_t)i);
         for (int n = 0; n < FLIGHTS; n++) {
             nb_free_flight flight;
             double weight[2];
-            assert_int_equal(nb_track_fly(&track, &chance, &flight), NEBEL_OK);
-            assert_int_equal(nb_track_transmittance(&track, &chance, &weight[1]), NEBEL_OK);
+            assert_int_equal(nb_tracking_fly(&track, &chance, &flight), NEBEL_OK);
+            assert_int_equal(nb_tracking_transmittance(&track, &chance, &weight[1]), NEBEL_OK);
             weight[0] = !flight.collided;
             for (int k = 0; k < 2; k++) {
                 sum[k] += weight[k] / FLIGHTS;

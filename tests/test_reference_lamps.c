@@ -124,7 +124,7 @@ static void places_are_those_of_T20(void **state)
     const nb_light_pass passing = nb_passing_of(&lamp, &ray);
     for (int i = 0; i < 3; i++) {
         const double t = nb_passing_draw(&passing, chances[i]);
-        const nb_sampled_light sight = nb_lamp_sight_from(&lamp, (const double[3]){t, 0, 0});
+        const nb_sampled_light sight = nb_light_sight_from(&lamp, (const double[3]){t, 0, 0});
         assert_true(fabs(t - places[i]) < 1e-12 * places[i]);
         assert_true(fabs(sight.beam / nb_passing_density(&passing, t) - .5318835164163347) < 1e-12);
     }

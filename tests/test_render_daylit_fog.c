@@ -278,7 +278,7 @@ static steps step_along(const world *w, const nb_irradiance_table *daylight, con
         ray.t_max = to - from;
         const nebel_irradiance there = light_at(w, middle);
         double sun_left[3], brighter[3];
-        nb_daylight_at(daylight, NB_DAYLIGHT_OF_FOG, middle, sun_left, brighter);
+        nb_irradiance_at(daylight, NB_IRRADIANCE_OF_FOG, middle, sun_left, brighter);
         assert_int_equal(nebel_trace_atmosphere(w->atmosphere, &w->sun, 1, &ray, 0, &air, 0), NEBEL_OK);
         assert_int_equal(nebel_trace(by_sun, NULL, 1, &ray, 0, &sun, 0), NEBEL_OK);
         assert_int_equal(nebel_trace(by_sky, NULL, 1, &ray, 0, &sky, 0), NEBEL_OK);
@@ -316,7 +316,7 @@ static void mist_is_lit_by_place(void **state)
     for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
         world w;
         make_world(views[v].sun, &w);
-        nb_daylight_set(&daylight, &w.planet, &w.planet, w.sun.direction);
+        nb_irradiance_set(&daylight, &w.planet, &w.planet, w.sun.direction);
         nebel_environment_map *map = planet_even_sky(&w.scene);
         const double none[3] = {0, 0, 0}, origin[3] = {0, 0, 0};
         const nebel_environment dark = {.type = NEBEL_ENVIRONMENT_CONSTANT};

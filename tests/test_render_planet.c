@@ -245,7 +245,7 @@ static void daylight_is_that_of_the_air(void **state)
         const nebel_sun white = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
         nebel_irradiance at_origin, there;
         double worst_sun = 0, worst_sky = 0;
-        nb_daylight_set(&daylight, &w.planet, &w.planet, to_sun);
+        nb_irradiance_set(&daylight, &w.planet, &w.planet, to_sun);
         assert_int_equal(nebel_compute_atmosphere_irradiance(w.atmosphere, &white, 1, origin, 0, &at_origin, 0),
                          NEBEL_OK);
         for (int i = 0; i < 2000; i++) {
@@ -256,7 +256,7 @@ static void daylight_is_that_of_the_air(void **state)
             double sun[3], sky[3];
             assert_int_equal(nebel_compute_atmosphere_irradiance(w.atmosphere, &white, 1, place, 0, &there, 0),
                              NEBEL_OK);
-            nb_daylight_at(&daylight, NB_DAYLIGHT_OF_SURFACES, place[0], sun, sky);
+            nb_irradiance_at(&daylight, NB_IRRADIANCE_OF_SURFACES, place[0], sun, sky);
             for (int c = 0; c < 3; c++) {
                 worst_sun = fmax(worst_sun, fabs(sun[c] - there.sun[c]));
                 worst_sky = fmax(worst_sky, fabs(sky[c] * at_origin.sky[c] - there.sky[c]) / at_origin.sky[c]);
@@ -320,7 +320,7 @@ static void fog_has_the_sky_from_all_sides(void **state)
         double place[3], there[3], at_origin[3], worst = 0, by_level = 0;
         const nebel_sun white = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
         nebel_irradiance level, level_at_origin;
-        nb_daylight_set(&daylight, &w.planet, &w.planet, to_sun);
+        nb_irradiance_set(&daylight, &w.planet, &w.planet, to_sun);
         look_around(&w, to_sun, to_sun[1], place, at_origin);
         assert_int_equal(nebel_compute_atmosphere_irradiance(w.atmosphere, &white, 1, (const double(*)[3])place, 0,
                                                              &level_at_origin, 0),
@@ -328,7 +328,7 @@ static void fog_has_the_sky_from_all_sides(void **state)
         for (size_t i = 0; i < sizeof heights / sizeof *heights; i++) {
             double sun[3], sky[3];
             look_around(&w, to_sun, heights[i], place, there);
-            nb_daylight_at(&daylight, NB_DAYLIGHT_OF_FOG, place, sun, sky);
+            nb_irradiance_at(&daylight, NB_IRRADIANCE_OF_FOG, place, sun, sky);
             assert_int_equal(
                 nebel_compute_atmosphere_irradiance(w.atmosphere, &white, 1, (const double(*)[3])place, 0, &level, 0),
                 NEBEL_OK);

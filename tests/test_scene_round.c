@@ -76,7 +76,7 @@ static void free_shape(const nebel_shape *shape)
 static void change_volume(nebel_volume_desc *volume)
 {
     volume->shape = copy_shape(&volume->shape);
-    nb_space_convert_volume(&half, volume);
+    nb_file_units_convert_volume(&half, volume);
     dim(volume->source);
     dim(volume->albedo);
     if (volume->density.type == NEBEL_DENSITY_RADIAL) volume->density.power = volume->density.power % 3 + 1;
@@ -96,7 +96,7 @@ static void change_entry(change *c, size_t i)
         *key = entry->keys[k];
         key->frame += 1;
         key->volume.shape.plane_count = key->volume.shape.part_count = 0;
-        nb_space_convert_volume(&half, &key->volume);
+        nb_file_units_convert_volume(&half, &key->volume);
         key->volume.shape.planes = own.planes, key->volume.shape.plane_count = own.plane_count;
         key->volume.shape.parts = own.parts, key->volume.shape.part_count = own.part_count;
         dim(key->volume.source);
@@ -138,7 +138,7 @@ static void change_nebulae(change *c)
         nebel_nebula_desc *nebula = &c->nebulae[i];
         *nebula = c->data.nebulae[i];
         nebula->shape = copy_shape(&nebula->shape);
-        nb_space_convert_nebula(&half, nebula);
+        nb_file_units_convert_nebula(&half, nebula);
         nebula->seed++;
         if (nebula->points == NULL) nebula->dimming = nebula->dimming > .5 ? .25 : .75;
         nebula->count++;
@@ -172,7 +172,7 @@ static void change_cells(change *c)
     for (size_t i = 0; i < c->cells.cell_count; i++) {
         c->cell[i] = c->cells.cells[i];
         c->cell[i].shape = copy_shape(&c->cell[i].shape);
-        nb_space_convert_cell(&half, &c->cell[i]);
+        nb_file_units_convert_cell(&half, &c->cell[i]);
         dim(c->cell[i].color);
         c->cell_names[i] = name_anew(c, "cell");
     }
@@ -224,13 +224,13 @@ static void change_classic(change *c)
 
 static void change_camera(change *c)
 {
-    nb_space_convert_camera(&half, &c->data.camera);
+    nb_file_units_convert_camera(&half, &c->data.camera);
     c->data.camera.vertical_fov /= 2;
     c->data.camera.projection = (nebel_projection)((c->data.camera.projection + 1) % 3);
     for (size_t i = 0; i < c->data.camera_key_count; i++) {
         c->camera_keys[i] = c->data.camera_keys[i];
         c->camera_keys[i].frame += 1;
-        nb_space_convert_camera(&half, &c->camera_keys[i].camera);
+        nb_file_units_convert_camera(&half, &c->camera_keys[i].camera);
         c->camera_keys[i].camera.vertical_fov /= 2;
         c->camera_keys[i].camera.projection = c->data.camera.projection;
     }
@@ -243,7 +243,7 @@ static void change_models(change *c)
     for (size_t i = 0; i < c->data.model_count; i++) {
         nebel_scene_model *model = &c->models[i];
         *model = c->data.models[i];
-        nb_space_convert_placement(&half, model->position, model->rotation, model->scale);
+        nb_file_units_convert_placement(&half, model->position, model->rotation, model->scale);
         model->size[0] /= 2;
         model->size[1] /= 2;
         model->height /= 2;
@@ -258,7 +258,7 @@ static void change_lamps(change *c)
     for (size_t i = 0; i < c->data.light_count; i++) {
         nebel_light *lamp = &c->lamps[i];
         *lamp = c->data.lights[i];
-        nb_space_convert_place(&half, lamp->position);
+        nb_file_units_convert_place(&half, lamp->position);
         dim(lamp->intensity);
         lamp->radius = lamp->radius > 0 ? 2 * lamp->radius : .25;
         if (lamp->type != NEBEL_LIGHT_SPOT) continue;

@@ -62,11 +62,11 @@ static void media_name_their_filters(void **state)
     size_t count, fog_count;
     nebel_snapshot *fog = commit(&dusk, 4, g, (nebel_log){0});
     nebel_texel_f32 *words = pack(fog, 0, &count), packed[64];
-    assert_int_equal(count, NB_ENVIRONMENT_WORDS + 2 * (1 + NB_FILTER_PIECES));
+    assert_int_equal(count, NB_ENVIRONMENT_TEXELS + 2 * (1 + NB_FILTER_PIECES));
     assert_int_equal(nebel_pack_fog(fog, (const double[3]){1, 2, 3}, packed, 64, &fog_count), NEBEL_OK);
     int used[2] = {0, 0}, none = 0;
     for (int i = 0; i < 4; i++) {
-        const nebel_texel_f32 *medium = &packed[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS];
+        const nebel_texel_f32 *medium = &packed[NB_HEADER_TEXELS + i * NB_MEDIUM_TEXELS];
         const int filter = (int)medium[NB_MEDIUM_FILTER].v[3];
         none += filter == 0;
         if (filter == 0) continue;
@@ -95,8 +95,8 @@ static void maps_bring_what_surfaces_want(void **state)
     nebel_snapshot *fog = commit(&sky, 2, g, (nebel_log){0});
     nebel_texel_f32 *filter = pack(fog, 0, &alone), *all = pack(fog, 1, &count);
     assert_true(count > alone + PIXELS);
-    assert_memory_equal(filter + NB_ENVIRONMENT_WORDS, all + NB_ENVIRONMENT_WORDS,
-                        (alone - NB_ENVIRONMENT_WORDS) * sizeof *all);
+    assert_memory_equal(filter + NB_ENVIRONMENT_TEXELS, all + NB_ENVIRONMENT_TEXELS,
+                        (alone - NB_ENVIRONMENT_TEXELS) * sizeof *all);
     assert_true(filter[1].v[0] == 0 && (size_t)all[1].v[0] == alone);
     assert_true(fabsf(all[0].v[1]) < 1e-6F && fabsf(all[0].v[2] - 1) < 1e-6F && all[0].v[3] == 3);
     const nebel_texel_f32 *picture = &all[(size_t)all[1].v[1]];
@@ -134,7 +134,7 @@ static void what_is_the_same(void **state)
     assert_int_equal(nebel_pack_environment(fogs[FOGS - 1], 0, NULL, 0, &count), NEBEL_OK);
     assert_int_equal(count, 0);
     nebel_texel_f32 *words = pack(fogs[FOGS - 1], 1, &count);
-    assert_int_equal(count, NB_ENVIRONMENT_WORDS);
+    assert_int_equal(count, NB_ENVIRONMENT_TEXELS);
     assert_true((int)words[0].v[0] == NB_ENVIRONMENT_CONSTANT && words[1].v[2] == 0.2F);
     assert_false(nebel_pack_features(fogs[FOGS - 1]) & NEBEL_FEATURE_ENVIRONMENT);
     free(words);

@@ -90,9 +90,9 @@ static void test_layout(void **state)
     const double eye[3] = {1e7, -1e7, 2};
     size_t count;
     nebel_texel_f32 *words = pack(snapshot, eye, &count);
-    assert_int_equal(count, NB_HEADER_WORDS + NB_MEDIUM_WORDS);
-    assert_true((NEBEL_BLOCK_TEXELS - NB_HEADER_WORDS) / NB_MEDIUM_WORDS >= 100);
-    const float *m = words[NB_HEADER_WORDS].v, *leaf = words[NB_HEADER_WORDS + NB_MEDIUM_LEAF].v;
+    assert_int_equal(count, NB_HEADER_TEXELS + NB_MEDIUM_TEXELS);
+    assert_true((NEBEL_BLOCK_TEXELS - NB_HEADER_TEXELS) / NB_MEDIUM_TEXELS >= 100);
+    const float *m = words[NB_HEADER_TEXELS].v, *leaf = words[NB_HEADER_TEXELS + NB_MEDIUM_LEAF].v;
     const float expected[] = {.1f, .2f, .3f, NB_KIND_CONSTANT, .05f, .1f, 1.15f, 1, .5f, .5f, .5f, 1};
     for (int i = 0; i < 12; i++) assert_float_equal(m[i], expected[i], 1e-6f);
     const float place[] = {NB_TYPE_BOX, 0, 0, 1, 1 - 1e7f, 2 + 1e7f, 1, 0, 4 - 1e7f, 5 + 1e7f, 4, 1e18f};
@@ -118,7 +118,7 @@ static void test_faces_of_a_turned_body(void **state)
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &body, 1);
     size_t count;
     nebel_texel_f32 *words = pack(snapshot, (const double[3]){0, 0, 0}, &count);
-    const float *leaf = words[NB_HEADER_WORDS + NB_MEDIUM_LEAF].v;
+    const float *leaf = words[NB_HEADER_TEXELS + NB_MEDIUM_LEAF].v;
     unsigned found = 0;
     assert_int_equal((int)leaf[1], 6);
     for (size_t i = 0; i < 6; i++) {

@@ -163,7 +163,7 @@ static void try_scene(const nebel_scene_data *scene, uint64_t seed, uint64_t num
     const nebel_camera camera = trial_camera(seed);
     nb_geometry geometry = place_triangles(scene, &camera, &run->view);
     assert_int_equal(nb_sun_cells_set(&run->cells, &geometry, sun), NEBEL_OK);
-    run->eye = is_seen ? nb_shafts_eye(&run->cells, &geometry, &run->view) : NB_EYE_UNKNOWN;
+    run->eye = is_seen ? nb_sun_shafts_eye(&run->cells, &geometry, &run->view) : NB_EYE_UNKNOWN;
     nb_region_points points;
     nb_sample_region(0, 1, &points);
     for (int first = 0; first < NB_PIXELS; first += 4 * NB_BATCH) {
@@ -172,8 +172,8 @@ static void try_scene(const nebel_scene_data *scene, uint64_t seed, uint64_t num
         for (int i = 0; i < NB_BATCH; i++) run->distance[i] = i % 5 == 0 ? 20 : INFINITY;
         if (is_seen) end_at_surfaces(&geometry, run);
         const nb_lit_box all = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
-        assert_int_equal(nb_shafts_find(&run->shafts, &geometry.allocator, &run->cells, seed == 2 ? &box : &all,
-                                        &run->rays, run->view.advance, run->distance, run->eye),
+        assert_int_equal(nb_sun_shafts_find(&run->shafts, &geometry.allocator, &run->cells, seed == 2 ? &box : &all,
+                                            &run->rays, run->view.advance, run->distance, run->eye),
                          NEBEL_OK);
         run->toggles += run->shafts.toggle_count;
         const nebel_ray_visibility lit = {run->shafts.first, run->shafts.toggles};
@@ -188,7 +188,7 @@ static void try_scene(const nebel_scene_data *scene, uint64_t seed, uint64_t num
 static void end_trial(trial *run)
 {
     const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
-    nb_shafts_free(&run->shafts, &allocator);
+    nb_sun_shafts_free(&run->shafts, &allocator);
     report_trial(run);
 }
 
@@ -392,15 +392,15 @@ static void ends_of_lamplight_are_those_of_visibility(void **state)
         nebel_camera camera = trial_camera(seed);
         if (seed == 4) memcpy(camera.look_at, lamps[1].position, sizeof camera.look_at);
         nb_geometry geometry = place_triangles(&h.scene, &camera, &run.view);
-        assert_int_equal(nb_shadow_tree_set_lamps(&run.tree, &geometry, 1), NEBEL_OK);
+        assert_int_equal(nb_shadow_tree_set_lights(&run.tree, &geometry, 1), NEBEL_OK);
         nb_region_points points;
         nb_sample_region(0, 1, &points);
         for (int first = 0; first < NB_PIXELS; first += 8 * NB_BATCH) {
             const nb_lit_box all = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
             nb_view_rays(&run.view, 0, 0, points.x + first, points.y + first, &run.rays);
             for (int i = 0; i < NB_BATCH; i++) run.distance[i] = i % 5 == 0 ? 20 : INFINITY;
-            assert_int_equal(nb_lamp_shafts_find(&shafts, &geometry.allocator, &run.tree, fog, &all, &run.rays,
-                                                 run.view.advance, run.distance),
+            assert_int_equal(nb_light_shafts_find(&shafts, &geometry.allocator, &run.tree, fog, &all, &run.rays,
+                                                  run.view.advance, run.distance),
                              NEBEL_OK);
             run.toggles += shafts.shafts.toggle_count;
             for (int l = 0; l < LAMPS; l++)
@@ -414,7 +414,7 @@ static void ends_of_lamplight_are_those_of_visibility(void **state)
         nebel_release_snapshot(fog);
     }
     const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
-    nb_lamp_shafts_free(&shafts, &allocator);
+    nb_light_shafts_free(&shafts, &allocator);
     report_trial(&run);
 }
 

@@ -5,7 +5,7 @@
 #include <nebel/scene.h>
 
 /* Of more than this no light is left that a picture shows. */
-#define NB_MOST_DEPTH 80.
+#define NB_MAX_DEPTH 80.
 
 /* Whether the planet has air that scatters or absorbs. */
 int nb_has_air(const nebel_planet *planet);

@@ -180,7 +180,7 @@ static void summarize(const crew *all, double seconds)
     const nb_fog_call *const wanted = all->shared.wanted;
     const uint64_t *const sums = all->jobs.sums;
     char span[32], fog[512], count[128], depth[128] = "";
-    nb_meter_write_span(seconds, span, sizeof span);
+    nb_progress_bar_write_span(seconds, span, sizeof span);
     describe_fog(all, fog, sizeof fog);
     nb_jobs_describe(&all->jobs, "picture", count, sizeof count);
     nb_report_message("%s: %s, %s", wanted->patterns.output, count, fog);
@@ -276,7 +276,7 @@ static int fog_list(crew *all)
 {
     if (!all->shared.wanted->quiet) nb_jobs_note_copies(&all->jobs);
     nb_interrupt_listen();
-    nb_meter_begin(&all->meter);
+    nb_progress_bar_begin(&all->meter);
     fog_all(all);
     return all->jobs.failed == 0 ? NB_DONE : NB_FAILED;
 }
@@ -285,7 +285,7 @@ static int fog_pictures(crew *all)
 {
     int status = prepare(all);
     if (status == NB_DONE) status = fog_list(all);
-    const double seconds = nb_meter_end(&all->meter);
+    const double seconds = nb_progress_bar_end(&all->meter);
     if (nb_interrupt_is_requested()) return nb_report_failure("fog: %s: stopped", all->shared.wanted->patterns.output);
     status = nb_jobs_end(&all->jobs, status);
     const int has_some = status == NB_DONE || all->jobs.all_made + all->jobs.all_kept > 0;
@@ -300,7 +300,7 @@ static int fog(const nb_fog_call *wanted)
     nb_fog_call own = *wanted;
     crew all = {.shared = {.wanted = &own, .row_threads = 1, .hold = hold, .answer = answer},
                 .jobs = nb_jobs_of(&(nb_shard){0, wanted->shard.count > 0}),
-                .meter = nb_meter_start(wanted->quiet)};
+                .meter = nb_progress_bar_start(wanted->quiet)};
     all.shared.user = &all;
     if (mtx_init(&all.lock, mtx_plain) != thrd_success || mtx_init(&holding, mtx_plain) != thrd_success)
         return nb_report_failure("fog: out of memory");
@@ -308,7 +308,7 @@ static int fog(const nb_fog_call *wanted)
     if (status != NB_DONE) return status;
     own.quiet |= !all.jobs.is_chief; /* what one has said need not be repeated */
     all.listener.quiet = own.quiet;
-    if (all.jobs.is_joined && !own.quiet) nb_meter_write_lines(&all.meter);
+    if (all.jobs.is_joined && !own.quiet) nb_progress_bar_write_lines(&all.meter);
     status = fog_pictures(&all);
     nb_fog_names_free(&all.list);
     nb_load_free(&all.loaded);

@@ -136,7 +136,7 @@ static void free_studio(nb_render_state *all)
 #if defined(NEBEL_HAVE_GL)
     nb_gl_painter_close(&all->painter);
 #endif
-    nb_finer_free(&all->finer);
+    nb_refine_free(&all->finer);
     nb_load_free(&all->loaded);
 }
 
@@ -150,7 +150,7 @@ static void show_light(const nb_render_arguments *wanted, size_t pixels, float *
 }
 
 /* The picture of all planes that are wanted. */
-static nebel_image join_planes(nb_render_state *all, const char *names[NB_LAYERS_MOST_CHANNELS])
+static nebel_image join_planes(nb_render_state *all, const char *names[NB_MAX_LAYER_CHANNELS])
 {
     const nb_render_arguments *const wanted = all->wanted;
     const nebel_window *const window = &all->item.window;
@@ -171,7 +171,7 @@ static nebel_image join_planes(nb_render_state *all, const char *names[NB_LAYERS
 
 static int write_item(nb_render_state *all)
 {
-    const char *names[NB_LAYERS_MOST_CHANNELS];
+    const char *names[NB_MAX_LAYER_CHANNELS];
     const nebel_image image = join_planes(all, names);
     return nb_render_out_write(&all->out, &all->item, &image);
 }
@@ -231,7 +231,7 @@ static nebel_result move_to(nb_render_state *all, double time)
     const nebel_result result = nb_load_move_fog(&all->loaded, time);
     all->has_moved = result == NEBEL_OK;
     all->moved_to = time;
-    nb_finer_light(&all->finer, nebel_get_scene_data(all->loaded.scene));
+    nb_refine_light(&all->finer, nebel_get_scene_data(all->loaded.scene));
     return result;
 }
 
@@ -315,7 +315,7 @@ static nebel_result draw_frame(nb_render_state *all)
         .depth = all->samples[NB_LAYER_DEPTH],
         .normal = all->samples[NB_LAYER_NORMAL],
     };
-    if (all->jobs.made == 0) nb_meter_say(&all->meter, "OpenGL: compiling shaders...");
+    if (all->jobs.made == 0) nb_progress_bar_say(&all->meter, "OpenGL: compiling shaders...");
     return nb_gl_painter_draw(&all->painter, all->item.frame, &desc, &wanted);
 }
 
@@ -465,7 +465,7 @@ static void note_coarseness(const nebel_scene_data *scene, const nb_render_argum
         scene->classic->coordinate == NEBEL_COORDINATE_USER ||
         nebel_resolve_factor(scene->classic, &factor) != NEBEL_OK)
         return;
-    const double longest = nb_finer_find_longest_edge(scene), reach = reach_of(wanted->method, &factor);
+    const double longest = nb_refine_find_longest_edge(scene), reach = reach_of(wanted->method, &factor);
     if (longest <= reach) return;
     nb_report_message("note: %s: the factor is computed at vertices, and edges are up to %.3g m long, where fog grows "
                       "within %.3g m; \"stage\": \"pixel\" in \"classic\" computes it everywhere",
@@ -529,7 +529,7 @@ static void note_tessellation(const nb_render_arguments *wanted, const nb_refine
 static int refuse_tessellation(const nb_render_state *all)
 {
     const nebel_scene *const scene = all->loaded.scene;
-    const size_t volume = nb_finer_find_unproven(scene, all->wanted->first_frame);
+    const size_t volume = nb_refine_find_unproven(scene, all->wanted->first_frame);
     char place[32] = "fog";
     if (volume < nebel_get_scene_data(scene)->volume_count) (void)snprintf(place, sizeof place, "fog[%zu]", volume);
     return nb_report_failure("render: %s: %s: %s, or leave out --tessellate", all->wanted->scene, place,
@@ -545,7 +545,7 @@ static int tessellate(nb_render_state *all)
     for (int i = 0; i < 3; i++) desc.eye[i] = camera.position[i];
     all->listener.mode = NB_REPORT_KEEP; /* which volume it is the library does not know */
     const nebel_result result =
-        nb_finer_make(nebel_get_scene_data(all->loaded.scene), all->loaded.fog, &desc, &all->finer);
+        nb_refine_make(nebel_get_scene_data(all->loaded.scene), all->loaded.fog, &desc, &all->finer);
     all->listener.mode = NB_REPORT_PRINT;
     if (result == NEBEL_ERROR_UNSUPPORTED) return refuse_tessellation(all);
     if (result != NEBEL_OK)
@@ -645,7 +645,7 @@ static void summarize(const nb_render_state *all, double seconds)
     const nb_render_arguments *const wanted = all->wanted;
     char span[32], count[128] = "";
     const int is_one = !wanted->many_frames && all->out.band_rows == 0 && all->jobs.all_kept == 0;
-    nb_meter_write_span(seconds, span, sizeof span);
+    nb_progress_bar_write_span(seconds, span, sizeof span);
     if (!is_one) nb_jobs_describe(&all->jobs, all->out.band_rows > 0 ? "band" : "picture", count, sizeof count);
     nb_report_message("%s: %s%s%u x %u, %u sample%s, %s", wanted->output, count, is_one ? "" : ", ",
                       (unsigned)wanted->width, (unsigned)wanted->height, (unsigned)wanted->samples,
@@ -678,7 +678,7 @@ static int prepare(nb_render_state *all)
 static int render(const nb_render_arguments *wanted)
 {
     nb_render_state all = {
-        .wanted = wanted, .meter = nb_meter_start(wanted->quiet), .listener = {.quiet = wanted->quiet}};
+        .wanted = wanted, .meter = nb_progress_bar_start(wanted->quiet), .listener = {.quiet = wanted->quiet}};
     all.jobs = nb_jobs_of(&wanted->shard);
     all.sub_frames = wanted->shutter > 0 ? wanted->samples : 1;
     int status = nb_jobs_join(&all.jobs);
@@ -687,16 +687,16 @@ static int render(const nb_render_arguments *wanted)
     own.quiet |= !all.jobs.is_chief; /* what one has said need not be repeated */
     all.wanted = &own;
     all.listener.quiet = own.quiet;
-    if (all.jobs.is_joined && !own.quiet) nb_meter_write_lines(&all.meter);
+    if (all.jobs.is_joined && !own.quiet) nb_progress_bar_write_lines(&all.meter);
     all.out = nb_render_out_of(all.wanted, &all.jobs, &all.listener);
     status = prepare(&all);
     uint64_t item;
     if (status == NB_DONE && !own.quiet) nb_jobs_note_copies(&all.jobs);
-    nb_meter_begin(&all.meter);
+    nb_progress_bar_begin(&all.meter);
     while (status == NB_DONE && !nb_interrupt_is_requested() && nb_jobs_take(&all.jobs, &item))
         status = do_item(&all, item);
     if (status == NB_DONE && !nb_interrupt_is_requested()) status = nb_render_out_finish(&all.out);
-    const double seconds = nb_meter_end(&all.meter);
+    const double seconds = nb_progress_bar_end(&all.meter);
     free_studio(&all);
     if (nb_interrupt_is_requested()) return nb_report_failure("render: %s: stopped", wanted->output);
     status = nb_jobs_end(&all.jobs, status);

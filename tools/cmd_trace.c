@@ -193,7 +193,7 @@ typedef struct nb_output_page {
     size_t count; /* results on this page */
     nebel_precision precision;
     char *text; /* workers * SHARE * LINE_SIZE */
-    size_t sizes[NB_WORKERS_MOST];
+    size_t sizes[NB_MAX_WORKERS];
 } nb_output_page;
 
 static size_t write_number(double number, nebel_precision precision, char *text)
@@ -272,7 +272,7 @@ static int write_lights(const nebel_transfer *transfers, size_t count, const nb_
 static int read_settings(nb_arguments *arguments, nb_trace_options *wanted)
 {
     static const char *const precisions[] = {"double", "float", NULL};
-    const uint32_t threads = nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
+    const uint32_t threads = nb_options_whole(arguments, THREADS, 0, NB_MAX_WORKERS, 0);
     wanted->threads = threads > 0 ? (int)threads : nb_workers_available();
     nb_reader_limit(nb_options_memory(arguments, MEMORY));
     wanted->frame = nb_options_whole(arguments, FRAME, 0, LAST_FRAME, 0);

@@ -53,8 +53,8 @@ static nebel_result add_mesh(const nebel_snapshot *fog, const nebel_tessellation
     return refine_mesh(mesh, made, &finer->meshes[i], &finer->attributes[i]);
 }
 
-nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *fog,
-                           const nebel_tessellation_desc *desc, nb_refined_scene *finer)
+nebel_result nb_refine_make(const nebel_scene_data *scene, const nebel_snapshot *fog,
+                            const nebel_tessellation_desc *desc, nb_refined_scene *finer)
 {
     const size_t count = scene->mesh_count;
     *finer = (nb_refined_scene){.data = *scene};
@@ -68,7 +68,7 @@ nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *
     return result;
 }
 
-void nb_finer_light(nb_refined_scene *finer, const nebel_scene_data *scene)
+void nb_refine_light(nb_refined_scene *finer, const nebel_scene_data *scene)
 {
     memcpy(finer->data.sun_direction, scene->sun_direction, sizeof scene->sun_direction);
     memcpy(finer->data.sun_irradiance, scene->sun_irradiance, sizeof scene->sun_irradiance);
@@ -95,7 +95,7 @@ static int is_unproven(const nebel_scene *scene, double frame, size_t count)
 }
 
 /* By halves, because no volume proves anything of those before it. */
-size_t nb_finer_find_unproven(const nebel_scene *scene, double frame)
+size_t nb_refine_find_unproven(const nebel_scene *scene, double frame)
 {
     size_t proven = 0, count = nebel_get_scene_data(scene)->volume_count + 1;
     while (count - proven > 1) {
@@ -105,7 +105,7 @@ size_t nb_finer_find_unproven(const nebel_scene *scene, double frame)
     return proven;
 }
 
-void nb_finer_free(nb_refined_scene *finer)
+void nb_refine_free(nb_refined_scene *finer)
 {
     for (size_t i = 0; i < finer->data.mesh_count; i++) {
         if (finer->made != NULL) nebel_destroy_tessellation(finer->made[i]);
@@ -127,7 +127,7 @@ static double edge_of(const nebel_mesh *mesh, uint32_t a, uint32_t b)
     return sqrt(square);
 }
 
-double nb_finer_find_longest_edge(const nebel_scene_data *scene)
+double nb_refine_find_longest_edge(const nebel_scene_data *scene)
 {
     double longest = 0;
     for (size_t i = 0; i < scene->mesh_count; i++) {

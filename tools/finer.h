@@ -16,17 +16,17 @@ typedef struct nb_refined_scene {
 } nb_refined_scene;
 
 /* Tessellates every mesh, each within the limits of `desc`. Errors: those of nebel_tessellate. */
-nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *fog,
-                           const nebel_tessellation_desc *desc, nb_refined_scene *finer);
+nebel_result nb_refine_make(const nebel_scene_data *scene, const nebel_snapshot *fog,
+                            const nebel_tessellation_desc *desc, nb_refined_scene *finer);
 
 /* Lights it as the scene is lit now. */
-void nb_finer_light(nb_refined_scene *finer, const nebel_scene_data *scene);
+void nb_refine_light(nb_refined_scene *finer, const nebel_scene_data *scene);
 
 /* The volume with which the fog of the scene up to there has no proof at a frame; their number where none is found. */
-size_t nb_finer_find_unproven(const nebel_scene *scene, double frame);
-void nb_finer_free(nb_refined_scene *finer);
+size_t nb_refine_find_unproven(const nebel_scene *scene, double frame);
+void nb_refine_free(nb_refined_scene *finer);
 
 /* m */
-double nb_finer_find_longest_edge(const nebel_scene_data *scene);
+double nb_refine_find_longest_edge(const nebel_scene_data *scene);
 
 #endif

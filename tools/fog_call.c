@@ -265,7 +265,7 @@ int nb_fog_call_read(nb_arguments *arguments, nb_fog_call *wanted)
     read_camera(arguments, wanted);
     read_fog(arguments, wanted);
     read_jobs(arguments, wanted);
-    wanted->threads = (int)nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
+    wanted->threads = (int)nb_options_whole(arguments, THREADS, 0, NB_MAX_WORKERS, 0);
     if (wanted->threads == 0) wanted->threads = nb_workers_available();
     wanted->quiet = arguments->values[QUIET] != NULL;
     return arguments->misused ? nb_report_misuse("fog", "fog: nothing was done") : -1;

@@ -237,7 +237,7 @@ static void fog_rows(int worker, int count, void *user)
 
 static int add_fog(work *w)
 {
-    nebel_result results[NB_WORKERS_MOST] = {NEBEL_OK};
+    nebel_result results[NB_MAX_WORKERS] = {NEBEL_OK};
     const nb_fog_shared *const shared = w->shared;
     const rows all = {w, w->own_fog != NULL ? w->own_fog : shared->scene_fog, results};
     nebel_pixels *const p = &w->pixels;

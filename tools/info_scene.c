@@ -92,7 +92,7 @@ static void print_depth(const nebel_planet *planet)
     nb_find_air_depth(planet, depth);
     (void)printf("air: optical depth straight up from the ground");
     for (int c = 0; c < 3; c++)
-        (void)printf(depth[c] <= NB_MOST_DEPTH ? " %.3g" : " more than %g", fmin(depth[c], NB_MOST_DEPTH));
+        (void)printf(depth[c] <= NB_MAX_DEPTH ? " %.3g" : " more than %g", fmin(depth[c], NB_MAX_DEPTH));
     (void)printf("\n");
     const char *const deep = nb_find_deep_air(depth);
     if (deep != NULL) (void)printf("warning: %s\n", deep);

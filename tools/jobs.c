@@ -189,7 +189,7 @@ void nb_jobs_show(nb_jobs *jobs, nb_progress_bar *meter, const char *what, doubl
     if (count > 1)
         (void)snprintf(label, sizeof label, "%s %llu of %llu", what,
                        (unsigned long long)(done < count ? done + 1 : count), (unsigned long long)count);
-    nb_meter_show(meter, share, label);
+    nb_progress_bar_show(meter, share, label);
 }
 
 int nb_jobs_end(nb_jobs *jobs, int status)

@@ -15,7 +15,7 @@ typedef enum nb_aov {
     NB_LAYER_COUNT
 } nb_aov;
 
-enum { NB_LAYERS_MOST_CHANNELS = 16 }; /* that one picture has */
+enum { NB_MAX_LAYER_CHANNELS = 16 }; /* that one picture has */
 
 typedef struct nb_layer_kind {
     const char *names[3]; /* of its channels */

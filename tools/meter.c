@@ -30,7 +30,7 @@ static double clock_seconds(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-nb_progress_bar nb_meter_start(int quiet)
+nb_progress_bar nb_progress_bar_start(int quiet)
 {
     const char *const terminal = getenv("TERM");
     const int able = terminal != NULL && terminal[0] != '\0' && strcmp(terminal, "dumb") != 0;
@@ -39,12 +39,12 @@ nb_progress_bar nb_meter_start(int quiet)
         .visible = !quiet && able && isatty(STDERR_FILENO), .started = now, .began = now, .drawn = -1};
 }
 
-void nb_meter_begin(nb_progress_bar *meter)
+void nb_progress_bar_begin(nb_progress_bar *meter)
 {
     meter->began = clock_seconds();
 }
 
-void nb_meter_write_span(double seconds, char *text, size_t size)
+void nb_progress_bar_write_span(double seconds, char *text, size_t size)
 {
     if (seconds < 9.95) {
         (void)snprintf(text, size, "%.2g s", seconds < 0.01 ? 0.01 : seconds);
@@ -88,7 +88,7 @@ static void draw(double done, const char *label, const char *left)
     nb_report_status(line);
 }
 
-void nb_meter_write_lines(nb_progress_bar *meter)
+void nb_progress_bar_write_lines(nb_progress_bar *meter)
 {
     if (meter->visible) return;
     meter->line_pause = first_line_pause;
@@ -109,7 +109,7 @@ static void write_line(nb_progress_bar *meter, double done, const char *label, c
     meter->line_pause = fmin(2 * meter->line_pause, longest_line_pause);
 }
 
-void nb_meter_show(nb_progress_bar *meter, double done, const char *label)
+void nb_progress_bar_show(nb_progress_bar *meter, double done, const char *label)
 {
     if (!meter->visible && meter->line_pause == 0) return;
     const double now = clock_seconds();
@@ -120,7 +120,7 @@ void nb_meter_show(nb_progress_bar *meter, double done, const char *label)
     const double spent = now - meter->began;
     if (spent > guessing_pause && share > 0) {
         const double remaining = spent * (1 - share) / share;
-        nb_meter_write_span(ceil(remaining), span, sizeof span);
+        nb_progress_bar_write_span(ceil(remaining), span, sizeof span);
         (void)snprintf(left, sizeof left, "%s left", span);
     }
     if (meter->visible)
@@ -129,12 +129,12 @@ void nb_meter_show(nb_progress_bar *meter, double done, const char *label)
         write_line(meter, share, label, left);
 }
 
-void nb_meter_say(const nb_progress_bar *meter, const char *words)
+void nb_progress_bar_say(const nb_progress_bar *meter, const char *words)
 {
     if (meter->visible) nb_report_status(words);
 }
 
-double nb_meter_end(nb_progress_bar *meter)
+double nb_progress_bar_end(nb_progress_bar *meter)
 {
     if (meter->visible) nb_report_status("");
     return clock_seconds() - meter->started;

@@ -85,7 +85,7 @@ static int reject_unknown(const nb_command *command, const char *word, size_t si
 {
     char name[LONGEST_NAME + 1] = "";
     if (size > 2 && size - 2 <= LONGEST_NAME) memcpy(name, word + 2, size - 2);
-    const char *names[NB_OPTIONS_MOST + 1] = {help_option.name};
+    const char *names[NB_MAX_OPTIONS + 1] = {help_option.name};
     for (size_t i = 0; i < command->option_count; i++) names[i + 1] = command->options[i].name;
     const char *const nearest = nb_options_nearest(name, names, command->option_count + 1);
     if (nearest == NULL) {

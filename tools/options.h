@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { NB_OPTIONS_MOST = 32 };
+enum { NB_MAX_OPTIONS = 32 };
 
 typedef struct nb_option {
     const char *name;  /* without the dashes */
@@ -30,8 +30,8 @@ typedef struct nb_command {
 /* What a command was called with. */
 typedef struct nb_arguments {
     const nb_command *command;
-    const char *values[NB_OPTIONS_MOST]; /* by position in the table; NULL: not given; "" for an option without value */
-    char **operands;                     /* at the beginning of the words */
+    const char *values[NB_MAX_OPTIONS]; /* by position in the table; NULL: not given; "" for an option without value */
+    char **operands;                    /* at the beginning of the words */
     int operand_count;
     int misused; /* a value asked for was not what the option takes, and was reported */
 } nb_arguments;

@@ -26,7 +26,7 @@ static char *name_in_folder(const nb_parts *parts, const char *text)
     return name;
 }
 
-char *nb_parts_name(const nb_parts *parts, uint32_t part)
+char *nb_parallel_name(const nb_parts *parts, uint32_t part)
 {
     char text[32];
     const char *const ending = nebel_get_image_format(parts->file) == NEBEL_IMAGE_EXR ? "exr" : "png";
@@ -34,7 +34,7 @@ char *nb_parts_name(const nb_parts *parts, uint32_t part)
     return name_in_folder(parts, text);
 }
 
-int nb_parts_make_folder(const nb_parts *parts)
+int nb_parallel_make_folder(const nb_parts *parts)
 {
     char *const folder = name_in_folder(parts, "");
     if (folder == NULL) return NB_FAILED;
@@ -44,10 +44,10 @@ int nb_parts_make_folder(const nb_parts *parts)
     return status;
 }
 
-int nb_parts_have(const nb_parts *parts, uint32_t part)
+int nb_parallel_have(const nb_parts *parts, uint32_t part)
 {
     char wanted[NEBEL_MAX_RECORD + 1];
-    char *const name = nb_parts_name(parts, part);
+    char *const name = nb_parallel_name(parts, part);
     if (name == NULL) return 0;
     parts->record(parts->user, part, wanted);
     const int has = nb_record_is_in(name, wanted);
@@ -55,10 +55,10 @@ int nb_parts_have(const nb_parts *parts, uint32_t part)
     return has;
 }
 
-int nb_parts_have_all(const nb_parts *parts)
+int nb_parallel_have_all(const nb_parts *parts)
 {
     for (uint32_t i = 0; i < parts->count; i++)
-        if (!nb_parts_have(parts, i)) return 0;
+        if (!nb_parallel_have(parts, i)) return 0;
     return 1;
 }
 
@@ -66,7 +66,7 @@ int nb_parts_have_all(const nb_parts *parts)
 
 static const char lock_name[] = "lock";
 
-int nb_parts_lock(const nb_parts *parts, int *lock)
+int nb_parallel_lock(const nb_parts *parts, int *lock)
 {
     struct flock whole = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
     char *const name = name_in_folder(parts, lock_name);
@@ -78,7 +78,7 @@ int nb_parts_lock(const nb_parts *parts, int *lock)
     return !is_taken;
 }
 
-void nb_parts_unlock(int lock)
+void nb_parallel_unlock(int lock)
 {
     if (lock >= 0) (void)close(lock);
 }
@@ -88,7 +88,7 @@ void nb_parts_unlock(int lock)
 static int read_part(const nb_parts *parts, uint32_t part, nebel_image *image)
 {
     const nebel_scene_desc desc = {.log = nb_report_log(parts->listener)};
-    char *const name = nb_parts_name(parts, part);
+    char *const name = nb_parallel_name(parts, part);
     if (name == NULL) return NB_FAILED;
     const nebel_result result = nebel_read_image(name, &desc, image);
     const int status = result == NEBEL_OK ? NB_DONE : nb_report_result(parts->listener, name, result);
@@ -140,7 +140,7 @@ static int add_part(const nb_parts *parts, uint32_t part, joining *joint)
     return status;
 }
 
-int nb_parts_join_picture(const nb_parts *parts, uint32_t width, uint32_t height, const char *record)
+int nb_parallel_join_picture(const nb_parts *parts, uint32_t width, uint32_t height, const char *record)
 {
     joining joint = {
         .desc = {.log = nb_report_log(parts->listener), .width = width, .height = height, .record = record}};
@@ -174,7 +174,7 @@ static int add_frames(const nb_parts *parts, nebel_movie *film)
     return NB_DONE;
 }
 
-int nb_parts_join_film(const nb_parts *parts, const nebel_movie_desc *desc, const char *record)
+int nb_parallel_join_film(const nb_parts *parts, const nebel_movie_desc *desc, const char *record)
 {
     nebel_movie *film = NULL;
     nb_interrupt_hold();
@@ -222,7 +222,7 @@ static void remove_files(const nb_parts *parts, const char *folder)
     (void)closedir(open);
 }
 
-void nb_parts_remove(const nb_parts *parts)
+void nb_parallel_remove(const nb_parts *parts)
 {
     char *const folder = name_in_folder(parts, "");
     if (folder == NULL) return;

@@ -43,7 +43,7 @@ enum {
 };
 
 _Static_assert((int)COUNT == (int)NB_RENDER_OPTIONS, "as many as the header says");
-_Static_assert((int)COUNT <= (int)NB_OPTIONS_MOST, "no more than arguments have room for");
+_Static_assert((int)COUNT <= (int)NB_MAX_OPTIONS, "no more than arguments have room for");
 
 const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
     [OUTPUT] = {"output", 'o', "FILE",
@@ -315,7 +315,7 @@ int nb_render_call_read(nb_arguments *arguments, nb_render_arguments *wanted)
     wanted->exposure = nb_options_number(arguments, EXPOSURE, -20, 20, 0);
     wanted->tolerance = nb_options_number(arguments, TOLERANCE, 0, 1, NEBEL_DEFAULT_TOLERANCE);
     if (wanted->tolerance == 0) nb_options_reject(arguments, TOLERANCE, "is not more than 0");
-    wanted->renderer.thread_count = (int)nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
+    wanted->renderer.thread_count = (int)nb_options_whole(arguments, THREADS, 0, NB_MAX_WORKERS, 0);
     nb_reader_limit(nb_options_memory(arguments, MEMORY));
     wanted->renderer.isa = nb_isa_choose(arguments, ISA);
     read_size(arguments, wanted);

@@ -277,7 +277,7 @@ int nb_render_out_has(nb_render_out *out, const nb_render_item *item)
     if (!has && out->part_count > 0) {
         group of = {out, first_of(out, item->number)};
         const nb_parts parts = parts_of(&of, name);
-        has = nb_parts_have(&parts, (uint32_t)(item->number - of.first));
+        has = nb_parallel_have(&parts, (uint32_t)(item->number - of.first));
     }
     free(name);
     return has;
@@ -291,7 +291,7 @@ int nb_render_out_is_made(const nb_render_out *out, uint64_t item)
     int is_made = name != NULL && access(name, F_OK) == 0;
     if (name != NULL && !is_made && out->part_count > 0) {
         const nb_parts parts = parts_of(&of, name);
-        char *const part = nb_parts_name(&parts, (uint32_t)(item - of.first));
+        char *const part = nb_parallel_name(&parts, (uint32_t)(item - of.first));
         is_made = part != NULL && access(part, F_OK) == 0;
         free(part);
     }
@@ -331,9 +331,9 @@ static int write_part(const nb_render_out *out, const nb_render_item *item, cons
 {
     group of = {out, first_of(out, item->number)};
     const nb_parts parts = parts_of(&of, file);
-    int status = nb_parts_make_folder(&parts);
+    int status = nb_parallel_make_folder(&parts);
     if (status != NB_DONE) return status;
-    char *const name = nb_parts_name(&parts, (uint32_t)(item->number - of.first));
+    char *const name = nb_parallel_name(&parts, (uint32_t)(item->number - of.first));
     if (name == NULL) return NB_FAILED;
     status = write_file(out, item, name, image);
     free(name);
@@ -360,8 +360,8 @@ static int join_parts(const nb_render_out *out, const nb_parts *parts, uint32_t 
     char record[NEBEL_MAX_RECORD + 1];
     const nebel_movie_desc desc = film_desc(out);
     record_file(out, frame, record);
-    return out->wanted->is_film ? nb_parts_join_film(parts, &desc, record)
-                                : nb_parts_join_picture(parts, out->wanted->width, out->wanted->height, record);
+    return out->wanted->is_film ? nb_parallel_join_film(parts, &desc, record)
+                                : nb_parallel_join_picture(parts, out->wanted->width, out->wanted->height, record);
 }
 
 /* With the lock: another process may have joined the parts meanwhile. If it was removing their folder when the lock was made there, it left
@@ -369,13 +369,13 @@ static int join_parts(const nb_render_out *out, const nb_parts *parts, uint32_t 
 static int join_and_remove(const nb_render_out *out, const nb_parts *parts, uint32_t frame)
 {
     int is_joined = 0, status = NB_DONE;
-    if (nb_parts_have_all(parts)) {
+    if (nb_parallel_have_all(parts)) {
         status = join_parts(out, parts, frame);
         is_joined = status == NB_DONE && !nb_interrupt_is_requested();
     } else {
         is_joined = has_file(out, parts->file, frame);
     }
-    if (is_joined) nb_parts_remove(parts);
+    if (is_joined) nb_parallel_remove(parts);
     return status;
 }
 
@@ -384,12 +384,12 @@ static int join(const nb_render_out *out, const nb_parts *parts, uint32_t frame)
 {
     int lock;
     if (out->wanted->resume && has_file(out, parts->file, frame)) {
-        nb_parts_remove(parts); /* what was left when the process that joined them was ended */
+        nb_parallel_remove(parts); /* what was left when the process that joined them was ended */
         return NB_DONE;
     }
-    if (!nb_parts_have_all(parts) || !nb_parts_lock(parts, &lock)) return NB_DONE;
+    if (!nb_parallel_have_all(parts) || !nb_parallel_lock(parts, &lock)) return NB_DONE;
     const int status = join_and_remove(out, parts, frame);
-    nb_parts_unlock(lock);
+    nb_parallel_unlock(lock);
     return status;
 }
 

@@ -27,12 +27,12 @@ int nb_workers_available(void)
     cpu_set_t ours; /* fewer where a launcher bound the process to some */
     if (sched_getaffinity(0, sizeof ours, &ours) == 0) processors = CPU_COUNT(&ours);
     if (processors < 1) return 1;
-    return processors > NB_WORKERS_MOST ? NB_WORKERS_MOST : (int)processors;
+    return processors > NB_MAX_WORKERS ? NB_MAX_WORKERS : (int)processors;
 }
 
 void nb_workers_run(int count, nb_workers_fn work, void *user)
 {
-    nb_thread_range shares[NB_WORKERS_MOST];
+    nb_thread_range shares[NB_MAX_WORKERS];
     for (int i = 1; i < count; i++) {
         shares[i] = (nb_thread_range){.worker = i, .count = count, .work = work, .user = user};
         shares[i].started = thrd_create(&shares[i].thread, run_share, &shares[i]) == thrd_success;

@@ -12,8 +12,8 @@ typedef struct nb_shadowed_segment {
 } nb_shadowed_segment;
 
 /* clear: light of clear air up to shade->t. Returns how many pieces there are; 0: no shade. */
-static inline uint32_t nb_shaded_set(const nebel_air_shadow *shade, float (*const clear)[NB_SHADED_PIECES],
-                                     nb_shadowed_segment pieces[NB_SHADED_PIECES])
+static inline uint32_t nb_shadowed_air_set(const nebel_air_shadow *shade, float (*const clear)[NB_SHADED_PIECES],
+                                           nb_shadowed_segment pieces[NB_SHADED_PIECES])
 {
     if (shade->count == 0) return 0;
     for (int c = 0; c < 3; c++) {
@@ -30,7 +30,8 @@ static inline uint32_t nb_shaded_set(const nebel_air_shadow *shade, float (*cons
 }
 
 /* Of one colour, up to t; clear: that of clear air. */
-static inline float nb_shaded_light(const nb_shadowed_segment *pieces, uint32_t count, int c, float t, float clear)
+static inline float nb_shadowed_air_light(const nb_shadowed_segment *pieces, uint32_t count, int c, float t,
+                                          float clear)
 {
     if (count == 0 || !(t > pieces[0].t)) return clear;
     uint32_t k = count - 1;

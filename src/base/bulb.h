@@ -2,14 +2,14 @@
 #ifndef NB_BULB_H
 #define NB_BULB_H
 
-#define NB_LEAST_BULB                                                                                                  \
+#define NB_MIN_LIGHT_RADIUS                                                                                            \
     1e-3 /* m, radius of lamps that are given none: what a ray through a lamp sees has no bound without one */
 
 /* What is nearer gets no more light than at this distance [m], and casts no shadow: a lamp may stand on a surface, or lie
  * in it, without rounding deciding what it lights. */
-static inline double nb_bulb(double radius)
+static inline double nb_light_radius(double radius)
 {
-    return radius > NB_LEAST_BULB ? radius : NB_LEAST_BULB;
+    return radius > NB_MIN_LIGHT_RADIUS ? radius : NB_MIN_LIGHT_RADIUS;
 }
 
 #endif

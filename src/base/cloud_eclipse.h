@@ -11,7 +11,7 @@
 static inline void nb_cloud_uneclipsed(const nb_planet *worlds, int count, int cloudy, const double place[3],
                                        const double to_sun[3], double disc, double part[3])
 {
-    const double left = nb_worlds_uneclipsed(worlds, count, cloudy, place, to_sun, disc);
+    const double left = nb_planets_uneclipsed(worlds, count, cloudy, place, to_sun, disc);
     const nebel_sun sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
     nebel_irradiance light;
     for (int c = 0; c < 3; c++) part[c] = 1;
@@ -26,11 +26,11 @@ static inline void nb_cloud_uneclipsed(const nb_planet *worlds, int count, int c
 }
 
 /* Dims what clouds send from between two places of a ray by what is left in the middle. `to_sun` and `disc` as of
- * nb_worlds_light. */
+ * nb_planets_light. */
 static inline void nb_cloud_eclipse(const nb_planet *worlds, int count, const nebel_ray *ray, const double to_sun[3],
                                     double disc, nebel_cloud_transfer *knots)
 {
-    const nb_planet *const cloudy = nb_worlds_cloudy(worlds, count);
+    const nb_planet *const cloudy = nb_planets_cloudy(worlds, count);
     const double length = nb_vector_length(ray->direction);
     float before[3] = {0, 0, 0}, light[3] = {0, 0, 0};
     if (cloudy == NULL || count < 2) return;

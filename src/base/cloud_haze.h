@@ -18,8 +18,8 @@ typedef struct nb_cloud_air_rays {
     nebel_transfer_planes transfers; /* of the haze */
 } nb_cloud_air_rays;
 
-static inline void nb_cloud_haze_ask(const nebel_cloud_transfer *knots, const double direction[3],
-                                     nb_aerial_nodes *haze, nb_cloud_air_rays *rays)
+static inline void nb_cloud_compose_ask(const nebel_cloud_transfer *knots, const double direction[3],
+                                        nb_aerial_nodes *haze, nb_cloud_air_rays *rays)
 {
     rays->transfers.error = NULL;
     for (int c = 0; c < 3; c++) {
@@ -54,8 +54,8 @@ static inline float nb_cloud_fog_light(const nb_cloud_fog_nodes *marks, const nb
  * evenly. Let T and S be transmittance and light of clouds (c), air (a) and fog (f). What fog adds is the integral of T_a dS_f, at
  * most what is found of it and what is found to be missing of the air's, (T_f(a) - T_f(b)) dS_a; all of either lies somewhere between
  * T_c(a) and T_c(b). What fog takes of clouds is within (T_f(a) - T_f(b)) T_a dS_c. */
-static inline float nb_cloud_haze_doubt(const nebel_cloud_transfer *knots, const nb_cloud_fog_nodes *marks,
-                                        const nb_aerial_nodes *air, uint32_t a, uint32_t b)
+static inline float nb_cloud_compose_doubt(const nebel_cloud_transfer *knots, const nb_cloud_fog_nodes *marks,
+                                           const nb_aerial_nodes *air, uint32_t a, uint32_t b)
 {
     const float fallen = knots->transmittance[a] - knots->transmittance[b];
     float most = 0;
@@ -70,15 +70,15 @@ static inline float nb_cloud_haze_doubt(const nebel_cloud_transfer *knots, const
 }
 
 /* The two neighbouring marks between which most is in doubt: *a and *b. Returns all doubts. */
-static inline float nb_cloud_haze_worst(const nebel_cloud_transfer *knots, const nb_cloud_fog_nodes *marks,
-                                        const nb_aerial_nodes *air, uint32_t *a, uint32_t *b)
+static inline float nb_cloud_compose_worst(const nebel_cloud_transfer *knots, const nb_cloud_fog_nodes *marks,
+                                           const nb_aerial_nodes *air, uint32_t *a, uint32_t *b)
 {
     float all = 0, most = -1;
     uint32_t before = 0;
     *a = *b = 0;
     for (uint32_t k = 1; k < knots->count; k++) {
         if (!marks->is_set[k]) continue;
-        const float is = nb_cloud_haze_doubt(knots, marks, air, before, k);
+        const float is = nb_cloud_compose_doubt(knots, marks, air, before, k);
         all += is;
         if (is > most) {
             most = is;
@@ -101,7 +101,8 @@ static inline void nb_cloud_mark(nb_cloud_fog_nodes *marks, uint32_t k, const fl
 
 /* The next knot to mark, between a and b: where no knot is, one is put in the middle, where clouds are as between both and air is not
  * yet known. 0: no more can be had. */
-static inline uint32_t nb_cloud_haze_cut(uint32_t a, uint32_t b, nebel_cloud_transfer *knots, nb_cloud_fog_nodes *marks)
+static inline uint32_t nb_cloud_compose_cut(uint32_t a, uint32_t b, nebel_cloud_transfer *knots,
+                                            nb_cloud_fog_nodes *marks)
 {
     const float middle = 0.5f * (knots->t[a] + knots->t[b]);
     if (b > a + 1) return (a + b) / 2;
@@ -126,8 +127,8 @@ static inline uint32_t nb_cloud_haze_cut(uint32_t a, uint32_t b, nebel_cloud_tra
 
 /* The knot to mark next: the first, the last, then others while light is in doubt by more than the tolerance, times light where that
  * is more than 1. -1: none. air need not be known up to a knot that is new, which makes knots one more. *doubt: what is left. */
-static inline int nb_cloud_haze_next(nebel_cloud_transfer *knots, nb_cloud_fog_nodes *marks, const nb_aerial_nodes *air,
-                                     float tolerance, float *doubt)
+static inline int nb_cloud_compose_next(nebel_cloud_transfer *knots, nb_cloud_fog_nodes *marks,
+                                        const nb_aerial_nodes *air, float tolerance, float *doubt)
 {
     const uint32_t last = knots->count - 1;
     float brightest = 1;
@@ -136,15 +137,15 @@ static inline int nb_cloud_haze_next(nebel_cloud_transfer *knots, nb_cloud_fog_n
     if (!marks->is_set[0]) return 0;
     if (!marks->is_set[last]) return (int)last;
     for (int c = 0; c < 3; c++) brightest = fmaxf(brightest, marks->haze.light[c][last]);
-    *doubt = nb_cloud_haze_worst(knots, marks, air, &a, &b);
+    *doubt = nb_cloud_compose_worst(knots, marks, air, &a, &b);
     if (!(*doubt > tolerance * brightest)) return -1;
-    const uint32_t next = nb_cloud_haze_cut(a, b, knots, marks);
+    const uint32_t next = nb_cloud_compose_cut(a, b, knots, marks);
     return next > 0 ? (int)next : -1;
 }
 
 /* Of one colour, what air and fog do up to each knot: between two marks fog counts as spread evenly over the way. */
-static inline void nb_cloud_haze_add_fog(const nebel_cloud_transfer *knots, const nb_cloud_fog_nodes *marks, int c,
-                                         const nb_aerial_nodes *air, nb_aerial_nodes *haze)
+static inline void nb_cloud_compose_add_fog(const nebel_cloud_transfer *knots, const nb_cloud_fog_nodes *marks, int c,
+                                            const nb_aerial_nodes *air, nb_aerial_nodes *haze)
 {
     haze->left[c][0] = marks->haze.left[c][0];
     haze->light[c][0] = marks->haze.light[c][0];
@@ -162,8 +163,8 @@ static inline void nb_cloud_haze_add_fog(const nebel_cloud_transfer *knots, cons
 }
 
 /* Of one colour, the light up to each knot, without what of the haze before it clouds leave. */
-static inline void nb_cloud_haze_sum(const nebel_cloud_transfer *knots, int c, const nb_aerial_nodes *haze,
-                                     float over[NEBEL_MAX_CLOUD_NODES])
+static inline void nb_cloud_compose_sum(const nebel_cloud_transfer *knots, int c, const nb_aerial_nodes *haze,
+                                        float over[NEBEL_MAX_CLOUD_NODES])
 {
     float sum = haze->light[c][0];
     over[0] = 0;
@@ -178,7 +179,7 @@ static inline void nb_cloud_haze_sum(const nebel_cloud_transfer *knots, int c, c
 
 /* By how much light up to the last knot may be off at most, of the colour that is worst, as transmittances between two knots count as
  * their mean: both fall all the way, and light may all come from where either begins. */
-static inline float nb_cloud_haze_missed(const nebel_cloud_transfer *knots, const nb_aerial_nodes *haze)
+static inline float nb_cloud_compose_missed(const nebel_cloud_transfer *knots, const nb_aerial_nodes *haze)
 {
     float most = 0;
     for (int c = 0; c < 3; c++) {
@@ -213,7 +214,7 @@ static inline int nb_cloud_is_found(uint32_t count, float first, float last, flo
 
 /* The knot before a surface, and the part of the way to the next one; behind the last one that. The surface is behind the
  * first. */
-static inline uint32_t nb_cloud_haze_find(uint32_t count, const float *t, float end, float *part)
+static inline uint32_t nb_cloud_compose_find(uint32_t count, const float *t, float end, float *part)
 {
     uint32_t k = count - 1;
     *part = 0;

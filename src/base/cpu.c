@@ -36,10 +36,10 @@ static int is_supported(nebel_isa isa)
 
 #endif
 
-nebel_isa nb_cpu_choose(nebel_isa isa)
+nebel_isa nb_isa_select(nebel_isa isa)
 {
 #define LEVEL(NAME, suffix) NEBEL_ISA_##NAME,
-    static const nebel_isa levels[] = {NB_LEVELS(LEVEL)};
+    static const nebel_isa levels[] = {NB_ISA_LIST(LEVEL)};
 #undef LEVEL
     nebel_isa chosen = NEBEL_ISA_COUNT;
     for (size_t i = 0; i < sizeof levels / sizeof *levels; i++)

@@ -6,6 +6,6 @@
 
 /* The instruction set to run: `isa`, or for DEFAULT the best one; NEBEL_ISA_COUNT where this build or this processor
  * has not got it. */
-nebel_isa nb_cpu_choose(nebel_isa isa);
+nebel_isa nb_isa_select(nebel_isa isa);
 
 #endif

@@ -3,31 +3,32 @@
 #define NB_BASE_LEVELS_H
 
 #if defined(NB_HAVE_NEON)
-#define NB_LEVEL_NEON(X) X(NEON, neon)
+#define NB_ISA_LIST_NEON(X) X(NEON, neon)
 #else
-#define NB_LEVEL_NEON(X)
+#define NB_ISA_LIST_NEON(X)
 #endif
 
 #if defined(NB_HAVE_SSE2)
-#define NB_LEVEL_SSE2(X) X(SSE2, sse2)
+#define NB_ISA_LIST_SSE2(X) X(SSE2, sse2)
 #else
-#define NB_LEVEL_SSE2(X)
+#define NB_ISA_LIST_SSE2(X)
 #endif
 
 #if defined(NB_HAVE_AVX2)
-#define NB_LEVEL_AVX2(X) X(AVX2, avx2)
+#define NB_ISA_LIST_AVX2(X) X(AVX2, avx2)
 #else
-#define NB_LEVEL_AVX2(X)
+#define NB_ISA_LIST_AVX2(X)
 #endif
 
 #if defined(NB_HAVE_AVX512)
-#define NB_LEVEL_AVX512(X) X(AVX512, avx512)
+#define NB_ISA_LIST_AVX512(X) X(AVX512, avx512)
 #else
-#define NB_LEVEL_AVX512(X)
+#define NB_ISA_LIST_AVX512(X)
 #endif
 
 /* X(NAME, suffix) for each: C first, then ascending. */
-#define NB_LEVELS(X) X(SCALAR, scalar) NB_LEVEL_NEON(X) NB_LEVEL_SSE2(X) NB_LEVEL_AVX2(X) NB_LEVEL_AVX512(X)
+#define NB_ISA_LIST(X)                                                                                                 \
+    X(SCALAR, scalar) NB_ISA_LIST_NEON(X) NB_ISA_LIST_SSE2(X) NB_ISA_LIST_AVX2(X) NB_ISA_LIST_AVX512(X)
 
 /* What a kernel calls its symbol in the level that it is compiled for: NB_SUFFIXED(nb_trace_) is nb_trace_avx2. The build defines
  * NB_SUFFIX. */

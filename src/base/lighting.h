@@ -18,7 +18,7 @@ typedef struct nb_surface_lighting {
 } nb_surface_lighting;
 
 /* All the ambient light of a scene, whatever its type. */
-static inline nebel_environment nb_scene_environment(const nebel_scene_data *scene)
+static inline nebel_environment nb_surface_lighting_environment(const nebel_scene_data *scene)
 {
     nebel_environment environment = scene->environment;
     for (int c = 0; c < 3 && environment.type == NEBEL_ENVIRONMENT_CONSTANT; c++)
@@ -27,13 +27,13 @@ static inline nebel_environment nb_scene_environment(const nebel_scene_data *sce
 }
 
 /* Whether ambient light is the planet's sky. */
-static inline int nb_scene_owns_ambient(const nebel_scene_data *scene)
+static inline int nb_surface_lighting_owns_ambient(const nebel_scene_data *scene)
 {
     return scene->environment.type == NEBEL_ENVIRONMENT_MAP && scene->environment_path == NULL;
 }
 
 /* Above all air; where there is none one of no light. */
-static inline nebel_sun nb_scene_sun(const nebel_scene_data *scene)
+static inline nebel_sun nb_surface_lighting_sun(const nebel_scene_data *scene)
 {
     nebel_sun sun = {.direction = {0, 1, 0}};
     for (int c = 0; c < 3 && scene->has_sun; c++) {
@@ -43,28 +43,28 @@ static inline nebel_sun nb_scene_sun(const nebel_scene_data *scene)
     return sun;
 }
 
-static inline int nb_lighting_is_light(const double rgb[3])
+static inline int nb_surface_lighting_is_light(const double rgb[3])
 {
     return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0 && isfinite(rgb[0] + rgb[1] + rgb[2]);
 }
 
 /* Errors: VALUE. */
-static inline nebel_result nb_lighting_set(nb_surface_lighting *lighting, const nebel_scene_data *scene,
-                                           const nebel_log *log)
+static inline nebel_result nb_surface_lighting_set(nb_surface_lighting *lighting, const nebel_scene_data *scene,
+                                                   const nebel_log *log)
 {
     double direction[3] = {scene->sun_direction[0], scene->sun_direction[1], scene->sun_direction[2]};
-    if (!nb_lighting_is_light(scene->background) || !nb_lighting_is_light(scene->ambient) ||
-        (scene->has_sun && !nb_lighting_is_light(scene->sun_irradiance))) {
+    if (!nb_surface_lighting_is_light(scene->background) || !nb_surface_lighting_is_light(scene->ambient) ||
+        (scene->has_sun && !nb_surface_lighting_is_light(scene->sun_irradiance))) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "scene: background, ambient and sun must be finite and not negative");
     }
     for (size_t i = 0; i < scene->light_count; i++) {
         const nebel_light *lamp = &scene->lights[i];
-        if (!nb_lighting_is_light(lamp->intensity) ||
+        if (!nb_surface_lighting_is_light(lamp->intensity) ||
             !isfinite(lamp->position[0] + lamp->position[1] + lamp->position[2]))
             return nb_fail(log, NEBEL_ERROR_VALUE,
                            "scene: lamp %zu: place and intensity must be finite, intensity not negative", i);
     }
-    lighting->environment = nb_scene_environment(scene);
+    lighting->environment = nb_surface_lighting_environment(scene);
     lighting->shows_ambient = scene->shows_ambient;
     lighting->has_sun = scene->has_sun != 0;
     if (lighting->has_sun && !nb_vector_make_unit(direction)) {

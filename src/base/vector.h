@@ -43,7 +43,7 @@ static inline void nb_vector_round(double v[3])
 }
 
 /* A direction of length 1 at right angles to another. */
-static inline void nb_vector_find_aside(const double v[3], double aside[3])
+static inline void nb_vector_perpendicular(const double v[3], double aside[3])
 {
     const int is_by_x = fabs(v[0]) < fabs(v[1]);
     const double axis[3] = {is_by_x, !is_by_x, 0};
@@ -52,21 +52,21 @@ static inline void nb_vector_find_aside(const double v[3], double aside[3])
 }
 
 /* The middle of a ball, of its highest place. */
-static inline void nb_vector_ball_middle(const double highest[3], double radius, double middle[3])
+static inline void nb_sphere_center_below(const double highest[3], double radius, double middle[3])
 {
     for (int c = 0; c < 3; c++) middle[c] = highest[c] - (c == 1 ? radius : 0);
 }
 
 /* How far a place is above a ball, of which it is so far from the middle. Within 1e-12 of the radius, where rounding does not say on
  * which side of it, it is just above. */
-static inline double nb_vector_above_ball(double far, double radius)
+static inline double nb_height_above_sphere(double far, double radius)
 {
     const double on = 1e-12 * radius;
     return fabs(far - radius) <= on ? on : far - radius;
 }
 
 /* What a quaternion x y z w of any length, 0: none, makes of the axes x, y and z. */
-static inline void nb_vector_axes(const double q[4], double axes[3][3])
+static inline void nb_quaternion_axes(const double q[4], double axes[3][3])
 {
     const double x = q[0], y = q[1], z = q[2], w = q[3], n = x * x + y * y + z * z + w * w, s = n > 0 ? 2 / n : 0;
     const double turned[3][3] = {{1 - s * (y * y + z * z), s * (x * y + z * w), s * (x * z - y * w)},

@@ -366,7 +366,7 @@ static jet integrate_own_edge(const nb_error_part *p, const nb_body_interval *in
     const nb_leaf *const leaf = p->leaves[0].leaf;
     const nb_jet_ray s = in_leaf(leaf, v->world);
     line lines[MOST_FACTORS];
-    if (leaf->type == NB_LEAF_BALL) return integrate_ball(p, inside, v, &s);
+    if (leaf->type == NB_LEAF_SPHERE) return integrate_ball(p, inside, v, &s);
     const jet shares = leaf->type == NB_LEAF_BOX ? integrate_soft_box(p, inside, &s, 0, lines, 0)
                                                  : integrate_soft_planes(p, inside, &s);
     return product(v->length, shares);
@@ -438,10 +438,10 @@ static void cut_leaf(nb_body_interval *inside, const known_leaf *known, size_t p
     case NB_LEAF_PLANES:
         cut_faces(inside, &s, known->body->faces + leaf->first_face, leaf->face_count, known->eye);
         break;
-    case NB_LEAF_BALL:
+    case NB_LEAF_SPHERE:
         cut_round(inside, &s, 3, leaf->radius, known->eye);
         break;
-    case NB_LEAF_TUBE:
+    case NB_LEAF_CYLINDER:
         cut_axis(inside, &s, 2, 0, 1, known->eye[2]);
         cut_round(inside, &s, 2, 1, known->eye);
         break;
@@ -544,13 +544,13 @@ static int is_inside(const nb_volume *body, size_t leaves)
     unsigned stack[NB_STEP_STACK];
     size_t top = 0;
     for (size_t i = 0; i < body->step_count; i++) {
-        if (body->steps[i] == NB_STEP_LEAF) {
+        if (body->steps[i] == NB_OP_LEAF) {
             stack[top++] = leaves & 1;
             leaves >>= 1;
             continue;
         }
         top--;
-        stack[top - 1] = body->steps[i] == NB_STEP_ANY ? stack[top - 1] | stack[top] : stack[top - 1] & stack[top];
+        stack[top - 1] = body->steps[i] == NB_OP_UNION ? stack[top - 1] | stack[top] : stack[top - 1] & stack[top];
     }
     return stack[0] != 0;
 }
@@ -626,7 +626,7 @@ static int is_known_density(const nb_volume *body)
     const nb_leaf *const leaf = &body->leaves[0];
     if (body->density.type == NEBEL_DENSITY_GRID || body->density.type == NEBEL_DENSITY_ALTITUDE) return 0;
     if (body->density.type != NEBEL_DENSITY_SOFT_EDGE) return 1;
-    return leaf->type == NB_LEAF_BALL || leaf->type == NB_LEAF_BOX ||
+    return leaf->type == NB_LEAF_SPHERE || leaf->type == NB_LEAF_BOX ||
            (leaf->type == NB_LEAF_PLANES && leaf->face_count <= MOST_SOFT_PLANES);
 }
 
@@ -639,7 +639,7 @@ static nebel_result refuse_density(const nebel_log *log, const nb_volume *body)
         return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
                        "tessellation: nothing is proven of fog above a ball; give the volume another density");
     const nb_leaf_type type = body->leaves[0].type;
-    const char *const name = type == NB_LEAF_TUBE      ? "cylinder"
+    const char *const name = type == NB_LEAF_CYLINDER  ? "cylinder"
                              : type == NB_LEAF_CONE    ? "cone"
                              : type == NB_LEAF_CAPSULE ? "capsule"
                                                        : "body of more than 32 planes";

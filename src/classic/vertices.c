@@ -20,8 +20,8 @@ _Static_assert((int)NEBEL_CURVE_TABLE == (int)NB_CURVE_TABLE && (int)NEBEL_VERTE
 
 #define TRANSMIT(NAME, suffix) [NEBEL_ISA_##NAME] = nb_transmit_##suffix,
 #define WRITE(NAME, suffix) [NEBEL_ISA_##NAME] = nb_vertices_##suffix,
-static nb_transmit_fn *const transmit_kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(TRANSMIT)};
-static nb_vertices_fn *const write_kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(WRITE)};
+static nb_transmit_fn *const transmit_kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(TRANSMIT)};
+static nb_vertices_fn *const write_kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(WRITE)};
 
 /* ---- descriptions ---------------------------------------------------------------------------- */
 
@@ -253,7 +253,7 @@ nebel_result nebel_compute_vertex_fog(const nebel_snapshot *snapshot, const nebe
     if (result != NEBEL_OK) return nb_fail(&snapshot->log, result, "vertices: the description is not valid");
     const char *fault = fault_of(&c, n, outputs, output_count);
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "vertices: %s", fault);
-    c.level = nb_cpu_choose(c.desc.isa);
+    c.level = nb_isa_select(c.desc.isa);
     if (c.level == NEBEL_ISA_COUNT)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
                        nebel_isa_name(c.desc.isa));

@@ -9,11 +9,11 @@
 
 #define PI 3.14159265358979323846
 
-_Static_assert((int)NB_BATCH <= (int)NB_WORLDS_RAYS, "a batch is traced at once");
+_Static_assert((int)NB_BATCH <= (int)NB_PLANETS_RAYS, "a batch is traced at once");
 
 /* ---- the frame ------------------------------------------------------------------------------- */
 
-nebel_result nb_air_set_daylights(nb_air_frame *air, const nebel_planet *home, const nebel_log *log)
+nebel_result nb_cpu_planets_set_irradiances(nb_air_frame *air, const nebel_planet *home, const nebel_log *log)
 {
     for (int i = 0; i < air->count; i++) {
         nb_planet *world = &air->worlds[i];
@@ -21,41 +21,42 @@ nebel_result nb_air_set_daylights(nb_air_frame *air, const nebel_planet *home, c
         world->daylight = nb_allocate(air->allocator, 1, sizeof *world->daylight);
         if (world->daylight == NULL)
             return nb_fail(log, NEBEL_ERROR_MEMORY, "frame: out of memory for daylight on planets");
-        nb_daylight_set(world->daylight, world->planet, home, air->to_sun);
+        nb_irradiance_set(world->daylight, world->planet, home, air->to_sun);
     }
     return NEBEL_OK;
 }
 
-nebel_result nb_air_set(nb_air_frame *air, const nebel_scene_data *scene, const nebel_allocator *allocator,
-                        const nebel_log *log, const double position[3], const double to_sun[3], int ends, int threads)
+nebel_result nb_cpu_planets_set(nb_air_frame *air, const nebel_scene_data *scene, const nebel_allocator *allocator,
+                                const nebel_log *log, const double position[3], const double to_sun[3], int ends,
+                                int threads)
 {
-    nebel_sky_view_desc desc = {.sun = nb_scene_sun(scene),
+    nebel_sky_view_desc desc = {.sun = nb_surface_lighting_sun(scene),
                                 .run = nebel_parallel_for_openmp,
                                 .run_user = &threads,
                                 .allocator = *allocator,
                                 .log = *log};
     nebel_result result = NEBEL_OK;
     air->allocator = allocator;
-    air->count = nb_worlds_set(air->worlds, scene, position);
-    air->sun_radius = nb_worlds_disc(scene);
-    nb_worlds_disc_light(scene, air->sun_radius, air->sun_light);
+    air->count = nb_planets_set(air->worlds, scene, position);
+    air->sun_radius = nb_planets_disc(scene);
+    nb_planets_disc_light(scene, air->sun_radius, air->sun_light);
     memcpy(air->to_sun, to_sun, sizeof air->to_sun);
     memcpy(air->position, position, sizeof air->position);
     memcpy(desc.position, position, sizeof desc.position);
     air->ends = desc.has_ray_ends = ends || air->count > 1; /* the ground of one planet ends the air of others */
-    air->owns_ambient = nb_scene_owns_ambient(scene);
-    air->reach = nb_worlds_reach(air->worlds, air->count, position);
+    air->owns_ambient = nb_surface_lighting_owns_ambient(scene);
+    air->reach = nb_planets_reach(air->worlds, air->count, position);
     for (int i = 0; i < air->count && result == NEBEL_OK; i++) {
         nb_planet *world = &air->worlds[i];
         desc.atmosphere = world->planet->atmosphere;
         result = nebel_create_sky_view(&desc, &world->view);
     }
     if (result == NEBEL_OK && scene->has_sun && scene->mesh_count > 0)
-        result = nb_air_set_daylights(air, &scene->planets[0], log);
+        result = nb_cpu_planets_set_irradiances(air, &scene->planets[0], log);
     return result;
 }
 
-void nb_air_free(nb_air_frame *air)
+void nb_cpu_planets_free(nb_air_frame *air)
 {
     for (int i = 0; i < air->count; i++) {
         nebel_destroy_sky_view(air->worlds[i].view);
@@ -66,15 +67,15 @@ void nb_air_free(nb_air_frame *air)
 
 /* ---- along rays ------------------------------------------------------------------------------ */
 
-nebel_result nb_air_trace(const nb_air_frame *air, size_t n, const double *const direction[3], const float *t_max,
-                          const nebel_transfer_planes *transfers)
+nebel_result nb_cpu_planets_trace(const nb_air_frame *air, size_t n, const double *const direction[3],
+                                  const float *t_max, const nebel_transfer_planes *transfers)
 {
-    return nb_worlds_trace(air->worlds, air->count, n, direction, t_max, transfers);
+    return nb_planets_trace(air->worlds, air->count, n, direction, t_max, transfers);
 }
 
 static double uneclipsed(const nb_air_frame *air, int world, const double place[3])
 {
-    return nb_worlds_uneclipsed(air->worlds, air->count, world, place, air->to_sun, air->sun_radius);
+    return nb_planets_uneclipsed(air->worlds, air->count, world, place, air->to_sun, air->sun_radius);
 }
 
 /* ---- the ground ------------------------------------------------------------------------------ */
@@ -95,7 +96,7 @@ static void find_ground_of(const nb_planet *world, const nb_ray_batch *rays, nb_
     nebel_trace_ground(world->view, NB_BATCH, direction, &planes);
 }
 
-static void keep_nearer(int world, const nb_ground_batch *next, nb_air_scratch *scratch)
+static void keep_nearer(int world, const nb_ground_batch *next, nb_cpu_planets_scratch *scratch)
 {
     nb_ground_batch *ground = &scratch->ground;
     for (int i = 0; i < NB_BATCH; i++) {
@@ -110,8 +111,8 @@ static void keep_nearer(int world, const nb_ground_batch *next, nb_air_scratch *
     }
 }
 
-void nb_air_find_ground(const nb_air_frame *air, double advance, const nb_ray_batch *rays, const int *inside,
-                        nb_hits *hits, nb_air_scratch *scratch)
+void nb_cpu_planets_find_ground(const nb_air_frame *air, double advance, const nb_ray_batch *rays, const int *inside,
+                                nb_hits *hits, nb_cpu_planets_scratch *scratch)
 {
     float *distance = scratch->ground.distance;
     find_ground_of(&air->worlds[0], rays, &scratch->ground);
@@ -131,7 +132,7 @@ void nb_air_find_ground(const nb_air_frame *air, double advance, const nb_ray_ba
     }
 }
 
-int nb_air_sees_ground(const nb_air_scratch *scratch)
+int nb_cpu_planets_sees_ground(const nb_cpu_planets_scratch *scratch)
 {
     int any = 0;
     for (int i = 0; i < NB_BATCH; i++) any |= scratch->ground.distance[i] < HUGE_VALF;
@@ -140,7 +141,7 @@ int nb_air_sees_ground(const nb_air_scratch *scratch)
 
 /* The ground is not lifted: no surface hides fog and lamps from it there. */
 static void set_starts(const double position[3], const nb_ray_batch *rays, const nb_surface_batch *points,
-                       nb_air_scratch *scratch)
+                       nb_cpu_planets_scratch *scratch)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         const float distance = scratch->ground.distance[i];
@@ -152,9 +153,9 @@ static void set_starts(const double position[3], const nb_ray_batch *rays, const
     }
 }
 
-void nb_air_set_points(const nb_air_frame *air, double advance, const double position[3], const double origin[3],
-                       const float sun[3], const nb_ray_batch *rays, nb_air_scratch *scratch, nb_hits *hits,
-                       nb_surface_batch *points)
+void nb_cpu_planets_set_points(const nb_air_frame *air, double advance, const double position[3],
+                               const double origin[3], const float sun[3], const nb_ray_batch *rays,
+                               nb_cpu_planets_scratch *scratch, nb_hits *hits, nb_surface_batch *points)
 {
     nb_ground_batch *ground = &scratch->ground;
     for (int i = 0; i < NB_BATCH; i++) {
@@ -186,28 +187,29 @@ void nb_air_set_points(const nb_air_frame *air, double advance, const double pos
     set_starts(position, rays, points, scratch);
 }
 
-void nb_air_light_at(const nb_air_frame *air, nb_irradiance_receiver of, const double place[3], double sun[3],
-                     double sky[3])
+void nb_cpu_planets_light_at(const nb_air_frame *air, nb_irradiance_receiver of, const double place[3], double sun[3],
+                             double sky[3])
 {
-    const int nearest = nb_worlds_nearest(air->worlds, air->count, place);
-    nb_daylight_at(air->worlds[nearest].daylight, of, place, sun, sky);
+    const int nearest = nb_planets_nearest(air->worlds, air->count, place);
+    nb_irradiance_at(air->worlds[nearest].daylight, of, place, sun, sky);
     const double left = uneclipsed(air, nearest, place);
     for (int c = 0; c < 3; c++) sun[c] *= left;
 }
 
-nebel_irradiance nb_air_ask(const nb_air_frame *air, const double place[3])
+nebel_irradiance nb_cpu_planets_ask(const nb_air_frame *air, const double place[3])
 {
-    return nb_worlds_light(air->worlds, air->count, place, air->to_sun, air->sun_radius);
+    return nb_planets_light(air->worlds, air->count, place, air->to_sun, air->sun_radius);
 }
 
-void nb_air_set_daylight(const nb_air_frame *air, const double origin[3], const nb_hits *hits,
-                         const nb_surface_batch *points, nb_air_scratch *scratch)
+void nb_cpu_planets_set_irradiance(const nb_air_frame *air, const double origin[3], const nb_hits *hits,
+                                   const nb_surface_batch *points, nb_cpu_planets_scratch *scratch)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         double place[3], sun[3] = {0, 0, 0}, sky[3] = {1, 1, 1};
         const int is_model = hits->surface[i] != NB_NONE && hits->surface[i] != NB_GROUND;
         for (int c = 0; c < 3; c++) place[c] = origin[c] + (double)points->start[c][i];
-        if (is_model && air->worlds[0].daylight != NULL) nb_air_light_at(air, NB_DAYLIGHT_OF_SURFACES, place, sun, sky);
+        if (is_model && air->worlds[0].daylight != NULL)
+            nb_cpu_planets_light_at(air, NB_IRRADIANCE_OF_SURFACES, place, sun, sky);
         for (int c = 0; c < 3; c++) {
             scratch->sun_left[c][i] = (float)sun[c];
             scratch->sky_there[c][i] = air->owns_ambient ? (float)sky[c] : 1;
@@ -215,7 +217,8 @@ void nb_air_set_daylight(const nb_air_frame *air, const double origin[3], const 
     }
 }
 
-void nb_air_dim_sun(const float *sunlight, const nb_hits *hits, const nb_air_scratch *scratch, float (*color)[NB_BATCH])
+void nb_cpu_planets_dim_sun(const float *sunlight, const nb_hits *hits, const nb_cpu_planets_scratch *scratch,
+                            float (*color)[NB_BATCH])
 {
     for (int c = 0; c < 3; c++) {
         /* The ground's is irradiance already; color holds irradiance over pi. */
@@ -263,7 +266,7 @@ static void add_sun(const nb_air_frame *air, double cosine, double width, double
         light[c] += air->sun_light[c] * disc_scale(sun, radius, width, c) * disc(radius, width, angle, c);
 }
 
-int nb_air_sees_sun(const nb_air_frame *air, const nb_surface_lighting *lighting, const nb_ray_batch *rays)
+int nb_cpu_planets_sees_sun(const nb_air_frame *air, const nb_surface_lighting *lighting, const nb_ray_batch *rays)
 {
     if (!(air->sun_radius > 0 && lighting->has_sun)) return 0;
     const double near = cos(fmin(PI, air->sun_radius + 2 * air->pixel));
@@ -291,15 +294,15 @@ static int passes_rim(const nb_planet *world, const double position[3], double p
     return 0;
 }
 
-int nb_air_sees_rim(const nb_air_frame *air, const nb_ray_batch *rays)
+int nb_cpu_planets_sees_rim(const nb_air_frame *air, const nb_ray_batch *rays)
 {
     for (int k = 0; k < air->count; k++)
         if (passes_rim(&air->worlds[k], air->position, air->pixel, rays)) return 1;
     return 0;
 }
 
-void nb_air_background(const nb_air_frame *air, const nb_surface_lighting *lighting, const nb_ray_batch *rays, int lane,
-                       double light[3])
+void nb_cpu_planets_background(const nb_air_frame *air, const nb_surface_lighting *lighting, const nb_ray_batch *rays,
+                               int lane, double light[3])
 {
     double unit[3], cosine = 0;
     for (int c = 0; c < 3; c++) {

@@ -41,7 +41,7 @@ typedef struct nb_segment_shadow {
     float sun, sky, sun_doubt, sky_doubt, sun_within, sky_within;
 } nb_segment_shadow;
 
-enum { NB_AIR_KNOTS = 34 };
+enum { NB_AIR_NODES = 34 };
 
 /* A place on each ray of a batch, with what lies before it. */
 typedef struct nb_aerial_batch_nodes {
@@ -61,68 +61,69 @@ typedef struct nb_ground_batch {
 } nb_ground_batch;
 
 /* What a thread works in. */
-typedef struct nb_air_scratch {
+typedef struct nb_cpu_planets_scratch {
     nb_ground_batch ground, next;                        /* the nearest one; that of one planet */
     int world[NB_BATCH];                                 /* whose ground it is */
     float start[3][NB_BATCH];                            /* of rays to lights, relative to the camera */
-    float sun_left[3][NB_BATCH], sky_there[3][NB_BATCH]; /* of models: see nb_daylight_at */
-    nb_aerial_batch_nodes knots[NB_AIR_KNOTS], fresh;    /* the first where rays end; one that is being found */
+    float sun_left[3][NB_BATCH], sky_there[3][NB_BATCH]; /* of models: see nb_irradiance_at */
+    nb_aerial_batch_nodes knots[NB_AIR_NODES], fresh;    /* the first where rays end; one that is being found */
     int known[NB_BATCH];                                 /* a ray's knots */
-    uint8_t order[NB_BATCH][NB_AIR_KNOTS];               /* of those along it up to its end */
+    uint8_t order[NB_BATCH][NB_AIR_NODES];               /* of those along it up to its end */
     int count[NB_BATCH];
     int is_kept;                       /* knots but the first are of the rays that are followed next, too */
     nb_fog_shadow fog_shade[NB_BATCH]; /* through the middles of pixels, of fog that is shaded by its place */
-} nb_air_scratch;
+} nb_cpu_planets_scratch;
 
 /* Makes the tables for a place to look from, and those of the light on models. `to_sun`: of length 1. `ends`: whether rays
  * may end before the ground. Errors: MEMORY. */
-nebel_result nb_air_set(nb_air_frame *air, const nebel_scene_data *scene, const nebel_allocator *allocator,
-                        const nebel_log *log, const double position[3], const double to_sun[3], int ends, int threads);
-void nb_air_free(nb_air_frame *air);
+nebel_result nb_cpu_planets_set(nb_air_frame *air, const nebel_scene_data *scene, const nebel_allocator *allocator,
+                                const nebel_log *log, const double position[3], const double to_sun[3], int ends,
+                                int threads);
+void nb_cpu_planets_free(nb_air_frame *air);
 
 /* Makes tables of daylight where there are none. Errors: MEMORY. */
-nebel_result nb_air_set_daylights(nb_air_frame *air, const nebel_planet *home, const nebel_log *log);
+nebel_result nb_cpu_planets_set_irradiances(nb_air_frame *air, const nebel_planet *home, const nebel_log *log);
 
 /* By these: what is left of the sun at a place, and how much brighter the sky is than at the origin, for whom. */
-void nb_air_light_at(const nb_air_frame *air, nb_irradiance_receiver of, const double place[3], double sun[3],
-                     double sky[3]);
+void nb_cpu_planets_light_at(const nb_air_frame *air, nb_irradiance_receiver of, const double place[3], double sun[3],
+                             double sky[3]);
 
 /* Without tables: for a sun of irradiance 1. */
-nebel_irradiance nb_air_ask(const nb_air_frame *air, const double place[3]);
+nebel_irradiance nb_cpu_planets_ask(const nb_air_frame *air, const double place[3]);
 
 /* nebel_trace_sky_view, through the air of all planets; at most NB_BATCH rays. */
-nebel_result nb_air_trace(const nb_air_frame *air, size_t n, const double *const direction[3], const float *t_max,
-                          const nebel_transfer_planes *transfers);
+nebel_result nb_cpu_planets_trace(const nb_air_frame *air, size_t n, const double *const direction[3],
+                                  const float *t_max, const nebel_transfer_planes *transfers);
 
 /* Where the nearest ground is seen, to scratch->ground; what lies behind it is no hit any more. `advance` as of nb_view. */
-void nb_air_find_ground(const nb_air_frame *air, double advance, const nb_ray_batch *rays, const int *inside,
-                        nb_hits *hits, nb_air_scratch *scratch);
+void nb_cpu_planets_find_ground(const nb_air_frame *air, double advance, const nb_ray_batch *rays, const int *inside,
+                                nb_hits *hits, nb_cpu_planets_scratch *scratch);
 
-int nb_air_sees_ground(const nb_air_scratch *scratch);
+int nb_cpu_planets_sees_ground(const nb_cpu_planets_scratch *scratch);
 
 /* Makes hits and points of where the ground is seen, which other planets may hide from the sun. `position` is the camera's,
  * relative to `origin`, that of the geometry. scratch->start has all points relative to the camera: floats that count from
  * a geometry far away, or from the scene's origin where there is none, put the ground metres off. */
-void nb_air_set_points(const nb_air_frame *air, double advance, const double position[3], const double origin[3],
-                       const float sun[3], const nb_ray_batch *rays, nb_air_scratch *scratch, nb_hits *hits,
-                       nb_surface_batch *points);
+void nb_cpu_planets_set_points(const nb_air_frame *air, double advance, const double position[3],
+                               const double origin[3], const float sun[3], const nb_ray_batch *rays,
+                               nb_cpu_planets_scratch *scratch, nb_hits *hits, nb_surface_batch *points);
 
 /* The light at the places of models. `origin`: of the geometry. */
-void nb_air_set_daylight(const nb_air_frame *air, const double origin[3], const nb_hits *hits,
-                         const nb_surface_batch *points, nb_air_scratch *scratch);
+void nb_cpu_planets_set_irradiance(const nb_air_frame *air, const double origin[3], const nb_hits *hits,
+                                   const nb_surface_batch *points, nb_cpu_planets_scratch *scratch);
 
 /* What air leaves of the sun where it is met, times `color`. */
-void nb_air_dim_sun(const float *sunlight, const nb_hits *hits, const nb_air_scratch *scratch,
-                    float (*color)[NB_BATCH]);
+void nb_cpu_planets_dim_sun(const float *sunlight, const nb_hits *hits, const nb_cpu_planets_scratch *scratch,
+                            float (*color)[NB_BATCH]);
 
 /* Whether any of the rays sees the disc of the sun, or is within two pixels of it. The middle's pixels are the widest. */
-int nb_air_sees_sun(const nb_air_frame *air, const nb_surface_lighting *lighting, const nb_ray_batch *rays);
+int nb_cpu_planets_sees_sun(const nb_air_frame *air, const nb_surface_lighting *lighting, const nb_ray_batch *rays);
 
 /* Whether any of the rays passes within two pixels of the edge of a planet. */
-int nb_air_sees_rim(const nb_air_frame *air, const nb_ray_batch *rays);
+int nb_cpu_planets_sees_rim(const nb_air_frame *air, const nb_ray_batch *rays);
 
 /* Radiance behind all air and fog in one direction: the scene's background, and the sun. */
-void nb_air_background(const nb_air_frame *air, const nb_surface_lighting *lighting, const nb_ray_batch *rays, int lane,
-                       double light[3]);
+void nb_cpu_planets_background(const nb_air_frame *air, const nb_surface_lighting *lighting, const nb_ray_batch *rays,
+                               int lane, double light[3]);
 
 #endif

@@ -80,14 +80,14 @@ static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebe
     const nebel_renderer *renderer = frame->renderer;
     nebel_result result = NEBEL_OK;
     if (frame->has_shafts) {
-        result = nb_shafts_find(&scratch->shafts, &renderer->allocator, &renderer->sun_cells, &frame->sunlit_box,
-                                &scratch->rays, frame->view.advance, scratch->distance, frame->eye);
+        result = nb_sun_shafts_find(&scratch->shafts, &renderer->allocator, &renderer->sun_cells, &frame->sunlit_box,
+                                    &scratch->rays, frame->view.advance, scratch->distance, frame->eye);
         *sunlit = (nebel_ray_visibility){scratch->shafts.first, scratch->shafts.toggles};
         trace->sun_visibility = sunlit;
     }
     if (frame->has_lamp_shafts && result == NEBEL_OK) {
-        result = nb_lamp_shafts_find(&scratch->lamp_shafts, &renderer->allocator, &renderer->lamp_tree, renderer->fog,
-                                     &frame->lamplit_box, &scratch->rays, frame->view.advance, scratch->distance);
+        result = nb_light_shafts_find(&scratch->lamp_shafts, &renderer->allocator, &renderer->lamp_tree, renderer->fog,
+                                      &frame->lamplit_box, &scratch->rays, frame->view.advance, scratch->distance);
         trace->light_visibility = scratch->lamp_shafts.pieces;
     }
     return result;
@@ -104,14 +104,14 @@ static nebel_result trace_haze(const nb_frame *frame, nb_scratch *scratch)
 {
     nb_light_samples *samples = &scratch->samples;
     set_clear(samples);
-    if (!frame->air.has_fog) return nb_haze_add(frame, NULL, NULL, scratch);
+    if (!frame->air.has_fog) return nb_aerial_add(frame, NULL, NULL, scratch);
     const nebel_ray_planes rays = camera_rays(frame, scratch);
     const nebel_transfer_planes transfers = light_samples(frame, samples);
     nebel_trace_desc trace = frame->trace;
     nebel_ray_visibility pieces;
     nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
-    if (result == NEBEL_OK) result = nb_daylit_fog_trace(frame, &rays, &trace, &transfers, &scratch->air.knots[0]);
-    return result == NEBEL_OK ? nb_haze_add(frame, &rays, &trace, scratch) : result;
+    if (result == NEBEL_OK) result = nb_fog_irradiance_trace(frame, &rays, &trace, &transfers, &scratch->air.knots[0]);
+    return result == NEBEL_OK ? nb_aerial_add(frame, &rays, &trace, scratch) : result;
 }
 
 static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
@@ -125,21 +125,21 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
     const int has_fog = frame->renderer->fog != NULL && !(has_air && !frame->air.has_fog);
     const int has_shells = frame->layers != NULL;
     if (!has_fog || has_air) set_clear(samples);
-    if (!has_fog && has_shells) return nb_shells_trace(frame, NULL, NULL, scratch);
+    if (!has_fog && has_shells) return nb_cpu_textured_trace(frame, NULL, NULL, scratch);
     if (!has_fog && !has_air) return NEBEL_OK;
     set_distances(frame->view.advance, &scratch->rays, &scratch->hits, scratch->inside, scratch->distance);
     if (has_air) end_at_ground(scratch->air.ground.distance, scratch->distance);
     if (has_shells) end_at_ground(scratch->shells.ground, scratch->distance);
-    if (!has_fog) return nb_haze_add(frame, NULL, NULL, scratch);
+    if (!has_fog) return nb_aerial_add(frame, NULL, NULL, scratch);
     const nebel_ray_planes rays = camera_rays(frame, scratch);
     const nebel_transfer_planes transfers = light_samples(frame, samples);
     nebel_trace_desc trace = frame->trace;
     nebel_ray_visibility pieces;
     const nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
     if (result != NEBEL_OK) return result;
-    const nebel_result traced = nb_daylit_fog_trace(frame, &rays, &trace, &transfers, &scratch->air.knots[0]);
-    if (traced == NEBEL_OK && has_air) return nb_haze_add(frame, &rays, &trace, scratch);
-    return traced == NEBEL_OK && has_shells ? nb_shells_trace(frame, &rays, &trace, scratch) : traced;
+    const nebel_result traced = nb_fog_irradiance_trace(frame, &rays, &trace, &transfers, &scratch->air.knots[0]);
+    if (traced == NEBEL_OK && has_air) return nb_aerial_add(frame, &rays, &trace, scratch);
+    return traced == NEBEL_OK && has_shells ? nb_cpu_textured_trace(frame, &rays, &trace, scratch) : traced;
 }
 
 /* ---- surfaces -------------------------------------------------------------------------------- */
@@ -225,9 +225,9 @@ static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
 {
     set_clear_sunlight(frame->lighting.sunlight, scratch);
     if (frame->air.count > 0)
-        nb_air_dim_sun(frame->lighting.sunlight, &scratch->hits, &scratch->air, scratch->samples.color);
+        nb_cpu_planets_dim_sun(frame->lighting.sunlight, &scratch->hits, &scratch->air, scratch->samples.color);
     nebel_result result = NEBEL_OK;
-    if (frame->cloud_view != NULL) result = nb_cloudscape_shade(frame, scratch, scratch->samples.color);
+    if (frame->cloud_view != NULL) result = nb_cpu_clouds_shade(frame, scratch, scratch->samples.color);
     if (result != NEBEL_OK || !dims_sun(frame->renderer) || !frame->lighting.has_sun) return result;
     result = trace_sun_fog(frame, scratch, scratch->light_transmittance);
     if (result == NEBEL_OK) dim((const float(*)[NB_BATCH])scratch->light_transmittance, scratch->samples.color);
@@ -282,8 +282,8 @@ static nebel_result add_lamplight(const nb_frame *frame, nb_scratch *scratch)
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < renderer->scene->light_count && result == NEBEL_OK; i++) {
         const nebel_light *lamp = &renderer->scene->lights[i];
-        nb_lamp_ways_set(lamp, &starts, &scratch->hits, &scratch->points, &scratch->lamp);
-        nb_lamp_ways_shadow(geometry->scene, &scratch->points, &scratch->lamp, &scratch->packets);
+        nb_shadow_rays_set(lamp, &starts, &scratch->hits, &scratch->points, &scratch->lamp);
+        nb_shadow_rays_shadow(geometry->scene, &scratch->points, &scratch->lamp, &scratch->packets);
         if (!is_lit_anywhere(&scratch->lamp)) continue;
         if (is_dimmed) result = trace_lamp_fog(frame, &starts, scratch);
         add_lamp(lamp, is_dimmed, scratch);
@@ -340,7 +340,7 @@ static void set_colors_in_air(const nb_frame *frame, nb_scratch *scratch)
         const uint32_t surface = scratch->hits.surface[i];
         double behind[3] = {0, 0, 0};
         if (surface == NB_NONE) {
-            nb_air_background(&frame->air, &frame->lighting, &scratch->rays, i, behind);
+            nb_cpu_planets_background(&frame->air, &frame->lighting, &scratch->rays, i, behind);
         } else {
             double normal[3], ambient[3];
             for (int c = 0; c < 3; c++) {
@@ -413,14 +413,14 @@ static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
     nb_surface_points(geometry, renderer->scene, &renderer->table, &scratch->rays, &scratch->hits, lighting->sun,
                       &scratch->points);
     if (frame->air.count > 0)
-        nb_air_set_points(&frame->air, frame->view.advance, frame->view.start, geometry->origin, lighting->sun,
-                          &scratch->rays, &scratch->air, &scratch->hits, &scratch->points);
+        nb_cpu_planets_set_points(&frame->air, frame->view.advance, frame->view.start, geometry->origin, lighting->sun,
+                                  &scratch->rays, &scratch->air, &scratch->hits, &scratch->points);
     if (frame->air.count > 0)
-        nb_air_set_daylight(&frame->air, geometry->origin, &scratch->hits, &scratch->points, &scratch->air);
+        nb_cpu_planets_set_irradiance(&frame->air, geometry->origin, &scratch->hits, &scratch->points, &scratch->air);
     if (lighting->has_sun) {
         nb_hits_shadow(geometry->scene, scratch->points.start, lighting->sun, scratch->points.lit, &scratch->packets);
     }
-    nebel_result result = frame->cloud_view != NULL ? nb_cloudscape_shade_sky(frame, scratch) : NEBEL_OK;
+    nebel_result result = frame->cloud_view != NULL ? nb_cpu_clouds_shade_sky(frame, scratch) : NEBEL_OK;
     if (result == NEBEL_OK) result = set_sunlight(frame, scratch);
     return result == NEBEL_OK ? add_lamplight(frame, scratch) : result;
 }
@@ -428,8 +428,8 @@ static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
 static void find_ground(const nb_frame *frame, nb_scratch *scratch)
 {
     if (frame->air.count > 0)
-        nb_air_find_ground(&frame->air, frame->view.advance, &scratch->rays, scratch->inside, &scratch->hits,
-                           &scratch->air);
+        nb_cpu_planets_find_ground(&frame->air, frame->view.advance, &scratch->rays, scratch->inside, &scratch->hits,
+                                   &scratch->air);
 }
 
 void nb_batch_find(const nb_frame *frame, const nb_batch_place *place, uint32_t sample, nb_scratch *scratch)
@@ -450,24 +450,24 @@ void nb_batch_find_centers(const nb_frame *frame, const nb_batch_place *place, n
 nebel_result nb_batch_light(const nb_frame *frame, nb_scratch *scratch)
 {
     const int has_air = frame->air.count > 0;
-    nebel_result result = frame->layers != NULL ? nb_shells_find(frame, scratch) : NEBEL_OK;
+    nebel_result result = frame->layers != NULL ? nb_cpu_textured_find(frame, scratch) : NEBEL_OK;
     if (result == NEBEL_OK) result = trace_camera_fog(frame, scratch);
-    if (result == NEBEL_OK && frame->cloud_view != NULL) result = nb_cloudscape_add(frame, trace_haze, scratch);
-    const int has_surface = nb_hits_any(&scratch->hits) || (has_air && nb_air_sees_ground(&scratch->air));
+    if (result == NEBEL_OK && frame->cloud_view != NULL) result = nb_cpu_clouds_add(frame, trace_haze, scratch);
+    const int has_surface = nb_hits_any(&scratch->hits) || (has_air && nb_cpu_planets_sees_ground(&scratch->air));
     if (result == NEBEL_OK && has_surface) result = light_surfaces(frame, scratch);
     if (result != NEBEL_OK) return result;
     if (nebel_method_blends_stored(frame->renderer->method))
         set_stored_colors(frame, scratch);
     else
         choose_colors(frame, scratch);
-    if (frame->layers != NULL) nb_shells_blend(frame, scratch);
+    if (frame->layers != NULL) nb_cpu_textured_blend(frame, scratch);
     return result;
 }
 
 nebel_result nb_batch_render(const nb_frame *frame, const nb_batch_place *place, uint32_t sample, nb_scratch *scratch)
 {
     nb_batch_find(frame, place, sample, scratch);
-    if (frame->renderer->method == NEBEL_METHOD_PATH) return nb_reference_trace(frame, place, scratch);
+    if (frame->renderer->method == NEBEL_METHOD_PATH) return nb_path_batch_trace(frame, place, scratch);
     find_ground(frame, scratch);
     return nb_batch_light(frame, scratch);
 }

@@ -69,8 +69,8 @@ static void fill(const nb_geometry *geometry, const double axes[3][3], int is_fo
     }
 }
 
-nebel_result nb_casters_list(const nb_geometry *geometry, const double axes[3][3], int is_for_sun,
-                             nb_occluders *casters)
+nebel_result nb_occluders_list(const nb_geometry *geometry, const double axes[3][3], int is_for_sun,
+                               nb_occluders *casters)
 {
     const nebel_allocator *allocator = &geometry->allocator;
     size_t count = 0, holed = 0;
@@ -90,7 +90,7 @@ nebel_result nb_casters_list(const nb_geometry *geometry, const double axes[3][3
     return NEBEL_OK;
 }
 
-void nb_casters_free(nb_occluders *casters, const nebel_allocator *allocator)
+void nb_occluders_free(nb_occluders *casters, const nebel_allocator *allocator)
 {
     nb_release(allocator, casters->triangles);
     nb_release(allocator, casters->numbers);

@@ -43,10 +43,10 @@ double nb_caster_area(const nb_occluder *triangle);
 
 /* Lists those that have a place, in the frame of these axes. Those that are level with the third axis are left out where
  * `is_for_sun`. To be freed whatever comes. Errors: MEMORY. */
-nebel_result nb_casters_list(const nb_geometry *geometry, const double axes[3][3], int is_for_sun,
-                             nb_occluders *casters);
+nebel_result nb_occluders_list(const nb_geometry *geometry, const double axes[3][3], int is_for_sun,
+                               nb_occluders *casters);
 
-void nb_casters_free(nb_occluders *casters, const nebel_allocator *allocator);
+void nb_occluders_free(nb_occluders *casters, const nebel_allocator *allocator);
 
 /* A plane of this normal through the point; scaled so that products with coordinates stay numbers. */
 void nb_shadow_plane(const double normal[3], const double point[3], float plane[4]);

@@ -16,19 +16,20 @@ nebel_ray nb_cloud_air_ray(const nb_frame *frame, const nb_cloud_scratch *clouds
 /* ---- asking ---------------------------------------------------------------------------------- */
 
 /* What is asked of the air at once: ends along the rays of some lanes. */
-typedef struct nb_air_asked {
+typedef struct nb_cpu_planets_asked {
     uint32_t lane_count, lanes[NB_BATCH], first[NB_BATCH]; /* of a lane's ends */
     uint32_t count;
-    double direction[3][NB_WORLDS_RAYS];
-    float t[NB_WORLDS_RAYS], left[3][NB_WORLDS_RAYS], light[3][NB_WORLDS_RAYS];
-} nb_air_asked;
+    double direction[3][NB_PLANETS_RAYS];
+    float t[NB_PLANETS_RAYS], left[3][NB_PLANETS_RAYS], light[3][NB_PLANETS_RAYS];
+} nb_cpu_planets_asked;
 
-static int has_room(const nb_air_asked *asked, uint32_t count)
+static int has_room(const nb_cpu_planets_asked *asked, uint32_t count)
 {
-    return asked->count + count <= NB_WORLDS_RAYS;
+    return asked->count + count <= NB_PLANETS_RAYS;
 }
 
-static void ask(const nb_cloud_scratch *clouds, uint32_t lane, uint32_t count, const float *t, nb_air_asked *asked)
+static void ask(const nb_cloud_scratch *clouds, uint32_t lane, uint32_t count, const float *t,
+                nb_cpu_planets_asked *asked)
 {
     asked->lanes[asked->lane_count] = lane;
     asked->first[asked->lane_count++] = asked->count;
@@ -38,7 +39,7 @@ static void ask(const nb_cloud_scratch *clouds, uint32_t lane, uint32_t count, c
     }
 }
 
-static nebel_result trace(const nb_frame *frame, nb_air_asked *asked)
+static nebel_result trace(const nb_frame *frame, nb_cpu_planets_asked *asked)
 {
     const double *const direction[3] = {asked->direction[0], asked->direction[1], asked->direction[2]};
     nebel_transfer_planes transfers = {.error = NULL};
@@ -46,7 +47,7 @@ static nebel_result trace(const nb_frame *frame, nb_air_asked *asked)
         transfers.transmittance[c] = asked->left[c];
         transfers.in_scattering[c] = asked->light[c];
     }
-    return nb_air_trace(&frame->air, asked->count, direction, asked->t, &transfers);
+    return nb_cpu_planets_trace(&frame->air, asked->count, direction, asked->t, &transfers);
 }
 
 /* ---- shade ----------------------------------------------------------------------------------- */
@@ -58,7 +59,7 @@ static nebel_result trace(const nb_frame *frame, nb_air_asked *asked)
 
 /* The shade of those that were asked; begins anew. */
 static nebel_result set_shade(const nb_frame *frame, const nebel_air_shadow *shades, nb_cloud_scratch *clouds,
-                              nb_air_asked *asked)
+                              nb_cpu_planets_asked *asked)
 {
     if (asked->count == 0) return NEBEL_OK;
     const nebel_result result = trace(frame, asked);
@@ -67,7 +68,7 @@ static nebel_result set_shade(const nb_frame *frame, const nebel_air_shadow *sha
         float light[3][NB_SHADED_PIECES];
         for (int c = 0; c < 3; c++)
             memcpy(light[c], asked->light[c] + asked->first[i], (shades[lane].count + 1) * sizeof light[c][0]);
-        clouds->shaded_count[lane] = nb_shaded_set(&shades[lane], light, clouds->shaded[lane]);
+        clouds->shaded_count[lane] = nb_shadowed_air_set(&shades[lane], light, clouds->shaded[lane]);
     }
     asked->lane_count = asked->count = 0;
     return result;
@@ -78,7 +79,7 @@ static nebel_result find_shade(const nb_frame *frame, const int is_own[NB_BATCH]
 {
     nebel_result result = NEBEL_OK;
     nebel_air_shadow shades[NB_BATCH];
-    nb_air_asked asked;
+    nb_cpu_planets_asked asked;
     asked.lane_count = asked.count = 0;
     for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
         if (!is_own[i]) continue;
@@ -188,7 +189,7 @@ nebel_result nb_cloud_air_shade(const nb_frame *frame, const nb_batch_place *pla
 /* ---- up to knots ----------------------------------------------------------------------------- */
 
 /* What the air does up to the knots of those that were asked; begins anew. */
-static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_air_asked *asked)
+static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_cpu_planets_asked *asked)
 {
     if (asked->count == 0) return NEBEL_OK;
     const nebel_result result = trace(frame, asked);
@@ -199,8 +200,8 @@ static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_
         for (int c = 0; c < 3; c++)
             for (uint32_t k = 0; k < knots->count; k++) {
                 air->left[c][k] = asked->left[c][first + k];
-                air->light[c][k] = nb_shaded_light(clouds->shaded[lane], clouds->shaded_count[lane], c, knots->t[k],
-                                                   asked->light[c][first + k]);
+                air->light[c][k] = nb_shadowed_air_light(clouds->shaded[lane], clouds->shaded_count[lane], c,
+                                                         knots->t[k], asked->light[c][first + k]);
             }
     }
     asked->lane_count = asked->count = 0;
@@ -210,7 +211,7 @@ static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_
 nebel_result nb_cloud_air_find(const nb_frame *frame, const int is_asked[NB_BATCH], nb_cloud_scratch *clouds)
 {
     nebel_result result = NEBEL_OK;
-    nb_air_asked asked;
+    nb_cpu_planets_asked asked;
     asked.lane_count = asked.count = 0;
     for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
         const nebel_cloud_transfer *knots = &clouds->knots[i];

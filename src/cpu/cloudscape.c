@@ -10,18 +10,18 @@
 #include <math.h>
 #include <string.h>
 
-_Static_assert((int)NB_CLOUD_SHARE_COLUMNS == (int)NB_REGION && (int)NB_CLOUD_SHARE == (int)NB_BATCH,
+_Static_assert((int)NB_CLOUD_PIXELS_COLUMNS == (int)NB_REGION && (int)NB_CLOUD_SHARE == (int)NB_BATCH,
                "a batch is a block");
 
 /* ---- the frame ------------------------------------------------------------------------------- */
 
-nebel_result nb_cloudscape_set(nb_frame *frame, const nebel_frame_desc *desc)
+nebel_result nb_cpu_clouds_set(nb_frame *frame, const nebel_frame_desc *desc)
 {
     nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
     if (frame->air.count == 0 || scene->planets[0].clouds == NULL) return NEBEL_OK;
     const nebel_cloud_lighting_desc view = {.clouds = scene->planets[0].clouds,
-                                            .sun = nb_scene_sun(scene),
+                                            .sun = nb_surface_lighting_sun(scene),
                                             .time = desc->time,
                                             .tolerance = fmin(1, desc->tolerance),
                                             .isa = renderer->fog_isa,
@@ -33,7 +33,7 @@ nebel_result nb_cloudscape_set(nb_frame *frame, const nebel_frame_desc *desc)
     return result;
 }
 
-void nb_cloudscape_free(nb_frame *frame)
+void nb_cpu_clouds_free(nb_frame *frame)
 {
     if (frame->cloud_view == NULL) return;
     for (int i = 0; i < frame->renderer->threads; i++) {
@@ -56,7 +56,7 @@ static void lift_rays(const nb_frame *frame, nb_cloud_scratch *clouds)
         double direction[3];
         for (int c = 0; c < 3; c++) direction[c] = clouds->rays.direction[c][i];
         clouds->is_lifted[i] = clouds->has_lifted[i] =
-            frame->samples > 1 && nb_worlds_lift(air->worlds, air->count, air->position, pixel, direction);
+            frame->samples > 1 && nb_planets_lift(air->worlds, air->count, air->position, pixel, direction);
         for (int c = 0; c < 3; c++) clouds->rays.direction[c][i] = direction[c];
         any |= clouds->has_lifted[i];
     }
@@ -64,14 +64,14 @@ static void lift_rays(const nb_frame *frame, nb_cloud_scratch *clouds)
     clouds->lifted = clouds->rays;
 }
 
-nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_batch_place *place, nb_scratch *scratch)
+nebel_result nb_cpu_clouds_start(const nb_frame *frame, const nb_batch_place *place, nb_scratch *scratch)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
     nb_view_rays(&frame->view, place->left, place->top, scratch->centers.x + place->first,
                  scratch->centers.y + place->first, &clouds->rays);
     memset(clouds->reach, 0, sizeof clouds->reach);
     lift_rays(frame, clouds);
-    nb_fog_shade_start(scratch);
+    nb_fog_shadow_start(scratch);
     for (uint32_t i = 0; i < NB_BATCH; i++) clouds->knots[i].count = clouds->shaded_count[i] = 0;
     return nb_cloud_air_shade(frame, place, clouds);
 }
@@ -87,7 +87,7 @@ static float ground_of(const nb_frame *frame, const nb_cloud_scratch *clouds, ui
     const nebel_ray ray = nb_cloud_air_ray(frame, clouds, lane);
     double unit[3];
     unit_of(clouds, &ray, lane, unit);
-    return (float)nb_worlds_cloudy_ground(frame->air.worlds, frame->air.count, ray.origin, unit);
+    return (float)nb_planets_cloudy_ground(frame->air.worlds, frame->air.count, ray.origin, unit);
 }
 
 /* How far clouds matter to a sample. A ray that goes on from there to the ground is not followed beyond it. */
@@ -162,10 +162,10 @@ static nebel_result trace_pixels(const nb_frame *frame, const int is_asked[NB_CL
 static nebel_result trace_block(const nb_frame *frame, nb_cloud_pixel_block *block, nb_cloud_scratch *clouds)
 {
     nebel_result result = NEBEL_OK;
-    nb_cloud_block_begin(block);
-    for (int level = 0; level < NB_CLOUD_SHARE_LEVELS && result == NEBEL_OK; level++) {
+    nb_cloud_pixels_block_begin(block);
+    for (int level = 0; level < NB_CLOUD_PIXELS_LEVELS && result == NEBEL_OK; level++) {
         int is_asked[NB_CLOUD_SHARE];
-        nb_cloud_block_ask(block, level, is_asked);
+        nb_cloud_pixels_block_ask(block, level, is_asked);
         result = trace_pixels(frame, is_asked, clouds);
     }
     return result;
@@ -202,7 +202,7 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
 /* ---- among air and fog ----------------------------------------------------------------------- */
 
 /* Marks the knots that are next. */
-static nebel_result mark(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
+static nebel_result mark(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *scratch)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
     for (int i = 0; i < NB_BATCH; i++)
@@ -231,7 +231,7 @@ static nebel_result choose(const nb_frame *frame, nb_cloud_scratch *clouds, int 
         clouds->next[i] = -1;
         if (!clouds->is_new[i]) continue;
         clouds->next[i] =
-            nb_cloud_haze_next(knots, &clouds->marks[i], &clouds->air[i], frame->air.tolerance, &clouds->doubt[i]);
+            nb_cloud_compose_next(knots, &clouds->marks[i], &clouds->air[i], frame->air.tolerance, &clouds->doubt[i]);
         *any |= clouds->next[i] >= 0;
         is_longer[i] = knots->count > count;
     }
@@ -239,7 +239,7 @@ static nebel_result choose(const nb_frame *frame, nb_cloud_scratch *clouds, int 
 }
 
 /* Along the middles of pixels, as air and clouds are: what is found of a ray up to one of its marks is known up to the others. */
-static nebel_result find_fog(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
+static nebel_result find_fog(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *scratch)
 {
     nebel_result result = NEBEL_OK;
     int any = 1;
@@ -249,9 +249,9 @@ static nebel_result find_fog(const nb_frame *frame, nb_haze_fn haze, nb_scratch 
     while (result == NEBEL_OK && any) {
         result = choose(frame, &scratch->clouds, &any);
         if (result == NEBEL_OK && any) result = mark(frame, haze, scratch);
-        if (result == NEBEL_OK && any) nb_haze_keep(scratch);
+        if (result == NEBEL_OK && any) nb_aerial_keep(scratch);
     }
-    nb_haze_forget(scratch);
+    nb_aerial_forget(scratch);
     scratch->rays = scratch->clouds.rays_of_samples;
     return result;
 }
@@ -264,14 +264,14 @@ static void mix_lane(int has_fog, nb_cloud_scratch *clouds, int lane)
     nb_aerial_nodes haze = *air;
     for (int c = 0; c < 3; c++) {
         float over[NEBEL_MAX_CLOUD_NODES];
-        if (has_fog) nb_cloud_haze_add_fog(knots, &clouds->marks[lane], c, air, &haze);
-        nb_cloud_haze_sum(knots, c, &haze, over);
+        if (has_fog) nb_cloud_compose_add_fog(knots, &clouds->marks[lane], c, air, &haze);
+        nb_cloud_compose_sum(knots, c, &haze, over);
         for (uint32_t k = 0; k < knots->count; k++) clouds->over[k][c][lane] = over[k];
     }
-    clouds->doubt[lane] += nb_cloud_haze_missed(knots, &haze);
+    clouds->doubt[lane] += nb_cloud_compose_missed(knots, &haze);
 }
 
-static nebel_result mix(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
+static nebel_result mix(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *scratch)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
     for (int i = 0; i < NB_BATCH; i++)
@@ -298,7 +298,7 @@ static void lay_over(nb_scratch *scratch, int lane)
     const float end = clouds->end[lane];
     float part;
     if (!(end > knots->t[0])) return;
-    const uint32_t k = nb_cloud_haze_find(knots->count, knots->t, end, &part);
+    const uint32_t k = nb_cloud_compose_find(knots->count, knots->t, end, &part);
     const uint32_t next = part > 0 ? k + 1 : k;
     const float left = (1 - part) * knots->transmittance[k] + part * knots->transmittance[next];
     for (int c = 0; c < 3; c++) {
@@ -309,7 +309,7 @@ static void lay_over(nb_scratch *scratch, int lane)
     samples->error[lane] += knots->error + clouds->doubt[lane];
 }
 
-nebel_result nb_cloudscape_add(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
+nebel_result nb_cpu_clouds_add(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *scratch)
 {
     int any;
     nebel_result result = trace(frame, scratch, &any);
@@ -333,7 +333,7 @@ static double find_place(const nb_frame *frame, const nb_scratch *scratch, int l
     return 4 * frame->air.pixel * sqrt(square);
 }
 
-nebel_result nb_cloudscape_shade(const nb_frame *frame, nb_scratch *scratch, float (*color)[NB_BATCH])
+nebel_result nb_cpu_clouds_shade(const nb_frame *frame, nb_scratch *scratch, float (*color)[NB_BATCH])
 {
     for (int i = 0; i < NB_BATCH; i++) {
         double place[1][3];
@@ -348,7 +348,7 @@ nebel_result nb_cloudscape_shade(const nb_frame *frame, nb_scratch *scratch, flo
     return NEBEL_OK;
 }
 
-nebel_result nb_cloudscape_shade_sky(const nb_frame *frame, nb_scratch *scratch)
+nebel_result nb_cpu_clouds_shade_sky(const nb_frame *frame, nb_scratch *scratch)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         const uint32_t surface = scratch->hits.surface[i];

@@ -117,9 +117,9 @@ static void sort_by_depth(const nb_depths *depths, size_t count, uint8_t *order)
 float nb_covered_from(const nb_occluders *casters, const uint32_t *list, const nb_depths *depths, size_t count,
                       const nb_sun_cell *cell)
 {
-    uint8_t order[NB_COVER_MOST];
+    uint8_t order[NB_MAX_COVER];
     double place[2], reach[2];
-    if (count > NB_COVER_MOST) return INFINITY;
+    if (count > NB_MAX_COVER) return INFINITY;
     sort_by_depth(depths, count, order);
     for (int i = 0; i < 2; i++) {
         place[i] = 0.5 * ((double)cell->low[i] + (double)cell->high[i]);

@@ -4,7 +4,7 @@
 
 #include "casters.h"
 
-enum { NB_COVER_MOST = 200 }; /* triangles; of more nothing is known */
+enum { NB_MAX_COVER = 200 }; /* triangles; of more nothing is known */
 
 /* A part of the plane that the sun looks at. */
 typedef struct nb_sun_cell {

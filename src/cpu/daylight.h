@@ -5,7 +5,7 @@
 #include "base/daylight.h"
 
 /* What is left of the sun, 0 in the planet's shadow, and how much brighter the sky is than at the scene's origin. */
-void nb_daylight_at(const nb_irradiance_table *daylight, nb_irradiance_receiver of, const double place[3],
-                    double sun[3], double sky[3]);
+void nb_irradiance_at(const nb_irradiance_table *daylight, nb_irradiance_receiver of, const double place[3],
+                      double sun[3], double sky[3]);
 
 #endif

@@ -35,11 +35,11 @@ static int is_even(const nb_air_frame *air, const double min[3], const double ma
     for (int c = 0; c < 3; c++)
         if (!(max[c] - min[c] < air->worlds[0].top - air->worlds[0].radius)) return 0;
     find_middle(min, max, middle);
-    const nebel_irradiance light = nb_air_ask(air, middle);
+    const nebel_irradiance light = nb_cpu_planets_ask(air, middle);
     for (int corner = 0; corner < 8; corner++) {
         double place[3];
         for (int c = 0; c < 3; c++) place[c] = (corner >> c & 1) != 0 ? max[c] : min[c];
-        const nebel_irradiance there = nb_air_ask(air, place);
+        const nebel_irradiance there = nb_cpu_planets_ask(air, place);
         if (differ(air, &light, &there)) return 0;
     }
     return 1;
@@ -57,7 +57,7 @@ static nebel_result find_cloud_shade(const nb_frame *frame, float *part)
 
 static void light_at(const nb_air_frame *air, const double place[3], double sun[3], double sky[3])
 {
-    nb_air_light_at(air, NB_DAYLIGHT_OF_FOG, place, sun, sky);
+    nb_cpu_planets_light_at(air, NB_IRRADIANCE_OF_FOG, place, sun, sky);
     for (int c = 0; c < 3; c++) {
         sun[c] *= (double)air->cloud_shade;
         if (!air->owns_ambient) sky[c] = 1;
@@ -68,20 +68,20 @@ static void light_at(const nb_air_frame *air, const double place[3], double sun[
 static void set_even_light(nb_air_frame *air, const nebel_planet *home, const double place[3], nebel_sun *sun)
 {
     static const double origin[3] = {0, 0, 0};
-    const nebel_irradiance there = nb_air_ask(air, place);
+    const nebel_irradiance there = nb_cpu_planets_ask(air, place);
     const nebel_sun bright = {.direction = {air->to_sun[0], air->to_sun[1], air->to_sun[2]}, .irradiance = {1, 1, 1}};
     double around_there[3], around_here[3];
-    nb_daylight_around(air->worlds[nb_worlds_nearest(air->worlds, air->count, place)].planet, &bright, place,
-                       around_there);
-    nb_daylight_around(home, &bright, origin, around_here);
+    nb_irradiance_around(air->worlds[nb_planets_nearest(air->worlds, air->count, place)].planet, &bright, place,
+                         around_there);
+    nb_irradiance_around(home, &bright, origin, around_here);
     for (int c = 0; c < 3; c++) {
         sun->irradiance[c] *= there.sun[c] * (double)air->cloud_shade;
         air->sun_at_eye[c] = 1;
-        air->sky_at_eye[c] = air->owns_ambient ? exp((double)nb_daylight_part(around_there[c], around_here[c])) : 1;
+        air->sky_at_eye[c] = air->owns_ambient ? exp((double)nb_irradiance_part(around_there[c], around_here[c])) : 1;
     }
 }
 
-nebel_result nb_daylit_fog_set(nb_frame *frame)
+nebel_result nb_fog_irradiance_set(nb_frame *frame)
 {
     nb_air_frame *air = &frame->air;
     const nebel_renderer *renderer = frame->renderer;
@@ -89,17 +89,17 @@ nebel_result nb_daylit_fog_set(nb_frame *frame)
     double min[3], max[3], middle[3] = {0, 0, 0};
     if (!air->has_fog || !scene->has_sun) return NEBEL_OK;
     const int is_far = nebel_snapshot_scattering_fog(renderer->fog, min, max) &&
-                       !nb_daylight_is_near(&scene->planets[0], scene->sun_direction, min, max);
-    nebel_result result = nb_fog_shade_set(frame);
+                       !nb_irradiance_is_near(&scene->planets[0], scene->sun_direction, min, max);
+    nebel_result result = nb_fog_shadow_set(frame);
     if (result != NEBEL_OK || !(is_far || air->roof.is_shaded)) return result;
-    nebel_sun sun = nb_scene_sun(scene);
+    nebel_sun sun = nb_surface_lighting_sun(scene);
     if (is_far) find_middle(min, max, middle);
     air->is_fog_even = !is_far || is_even(air, min, max);
     result = find_cloud_shade(frame, &air->cloud_shade);
     if (air->is_fog_even)
         set_even_light(air, &scene->planets[0], middle, &sun);
     else if (result == NEBEL_OK)
-        result = nb_air_set_daylights(air, &scene->planets[0], &renderer->log);
+        result = nb_cpu_planets_set_irradiances(air, &scene->planets[0], &renderer->log);
     if (result == NEBEL_OK && !air->is_fog_even) light_at(air, air->position, air->sun_at_eye, air->sky_at_eye);
     return result == NEBEL_OK ? nebel_split_light(renderer->fog, &sun, &air->fog) : result;
 }
@@ -118,11 +118,11 @@ static nebel_result trace_part(const nebel_snapshot *fog, const nebel_ray_planes
     return result;
 }
 
-nebel_result nb_daylit_fog_trace(const nb_frame *frame, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
-                                 const nebel_transfer_planes *transfers, nb_aerial_batch_nodes *knot)
+nebel_result nb_fog_irradiance_trace(const nb_frame *frame, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
+                                     const nebel_transfer_planes *transfers, nb_aerial_batch_nodes *knot)
 {
     const nebel_split_fog *fog = &frame->air.fog;
-    if (!nb_daylit_fog_is(&frame->air))
+    if (!nb_fog_irradiance_is(&frame->air))
         return nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, rays, transfers);
     nebel_trace_desc by_sky = *trace, by_sun = *trace;
     nebel_transfer_planes with_sky = *transfers;
@@ -138,7 +138,7 @@ nebel_result nb_daylit_fog_trace(const nb_frame *frame, const nebel_ray_planes *
     return result;
 }
 
-void nb_daylit_fog_light(const nb_frame *frame, const nb_ray_batch *rays, nb_aerial_batch_nodes *knot)
+void nb_fog_irradiance_light(const nb_frame *frame, const nb_ray_batch *rays, nb_aerial_batch_nodes *knot)
 {
     const nb_air_frame *air = &frame->air;
     for (int i = 0; i < NB_BATCH; i++) {
@@ -173,13 +173,13 @@ static double pass_first(const nb_air_frame *air, const nb_ray_batch *rays, int 
     return nearest;
 }
 
-float nb_daylit_fog_lowest(const nb_air_frame *air, const nb_ray_batch *rays, int lane)
+float nb_fog_irradiance_lowest(const nb_air_frame *air, const nb_ray_batch *rays, int lane)
 {
     double half = 0;
     return (float)fmax(0, pass_first(air, rays, lane, &half));
 }
 
-float nb_daylit_fog_enters(const nb_air_frame *air, const nb_ray_batch *rays, int lane)
+float nb_fog_irradiance_enters(const nb_air_frame *air, const nb_ray_batch *rays, int lane)
 {
     double half = 0;
     const double nearest = pass_first(air, rays, lane, &half);

@@ -6,7 +6,7 @@
 /* What the centre of a pixel may be off the mean over it: a part of its light, and of 1 of transmittance. */
 #define MOST_OFF 1e-3f
 
-int nb_even_may_be(const nb_frame *frame)
+int nb_uniform_batch_may_be(const nb_frame *frame)
 {
     return frame->air.count > 0 && !frame->air.has_fog && frame->samples > 1 && !frame->lighting.shows_ambient &&
            frame->renderer->method == NEBEL_METHOD_EXACT;
@@ -123,16 +123,16 @@ static int sees_clouds_alone(const nb_frame *frame, const nb_scratch *scratch)
     return any;
 }
 
-nebel_result nb_even_render(const nb_frame *frame, const nb_batch_place *place, uint32_t count, nb_scratch *scratch,
-                            int *is_even)
+nebel_result nb_uniform_batch_render(const nb_frame *frame, const nb_batch_place *place, uint32_t count,
+                                     nb_scratch *scratch, int *is_even)
 {
     const uint32_t right = frame->width - place->left, below = frame->height - place->top - nb_lane_y(place->first);
     const uint32_t columns = right < NB_REGION ? right : NB_REGION, rows = below < NB_BLOCK ? below : NB_BLOCK;
     *is_even = 0;
     if (columns < 3 || rows < 3 || sees_models(frame, place, count, scratch)) return NEBEL_OK;
     nb_batch_find_centers(frame, place, scratch);
-    if (sees_borders(frame, scratch) || nb_air_sees_sun(&frame->air, &frame->lighting, &scratch->rays) ||
-        nb_air_sees_rim(&frame->air, &scratch->rays))
+    if (sees_borders(frame, scratch) || nb_cpu_planets_sees_sun(&frame->air, &frame->lighting, &scratch->rays) ||
+        nb_cpu_planets_sees_rim(&frame->air, &scratch->rays))
         return NEBEL_OK;
     const nebel_result result = nb_batch_light(frame, scratch);
     *is_even = result == NEBEL_OK && (sees_clouds_alone(frame, scratch) || is_smooth(columns, rows, &scratch->samples));

@@ -2,12 +2,12 @@
 
 #include <math.h>
 
-nebel_result nb_fog_shade_set(nb_frame *frame)
+nebel_result nb_fog_shadow_set(nb_frame *frame)
 {
     nb_air_frame *const air = &frame->air;
     if (frame->cloud_view == NULL) return NEBEL_OK;
-    return nb_fog_roof_set(frame->renderer->scratch[0].clouds.workspace, frame->renderer->fog, air->owns_ambient,
-                           &air->roof);
+    return nb_cloud_shadow_extent_set(frame->renderer->scratch[0].clouds.workspace, frame->renderer->fog,
+                                      air->owns_ambient, &air->roof);
 }
 
 /* ---- along rays ------------------------------------------------------------------------------ */
@@ -20,16 +20,16 @@ static nebel_result find(const nb_frame *frame, const nb_cloud_scratch *clouds, 
         ray.origin[c] = air->position[c];
         ray.direction[c] = clouds->lifted.direction[c][lane];
     }
-    return nb_fog_shade_along(clouds->workspace, &air->roof, ray, air->pixel / (double)clouds->lifted.length[lane],
-                              shade);
+    return nb_fog_shadow_along(clouds->workspace, &air->roof, ray, air->pixel / (double)clouds->lifted.length[lane],
+                               shade);
 }
 
-void nb_fog_shade_start(nb_scratch *scratch)
+void nb_fog_shadow_start(nb_scratch *scratch)
 {
     for (int i = 0; i < NB_BATCH; i++) scratch->air.fog_shade[i].is_found = 0;
 }
 
-nebel_result nb_fog_shade_find(const nb_frame *frame, nb_scratch *scratch)
+nebel_result nb_fog_shadow_find(const nb_frame *frame, nb_scratch *scratch)
 {
     const nb_aerial_batch_nodes *const end = &scratch->air.knots[0];
     nebel_result result = NEBEL_OK;
@@ -63,7 +63,7 @@ static float mean_of(const sum *s, float *doubt, float *within)
     return mean;
 }
 
-nb_segment_shadow nb_fog_shade_between(const nb_fog_shadow *shade, float a, float b)
+nb_segment_shadow nb_fog_shadow_between(const nb_fog_shadow *shade, float a, float b)
 {
     const nebel_fog_shadow *const p = &shade->pieces;
     nb_segment_shadow between;
@@ -85,7 +85,7 @@ nb_segment_shadow nb_fog_shade_between(const nb_fog_shadow *shade, float a, floa
     return between;
 }
 
-float nb_fog_shade_cut(const nb_fog_shadow *shade, float a, float b)
+float nb_fog_shadow_cut(const nb_fog_shadow *shade, float a, float b)
 {
     const nebel_fog_shadow *const p = &shade->pieces;
     uint32_t first = 0, end = 0;

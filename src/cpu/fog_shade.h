@@ -6,18 +6,18 @@
 
 /* Whether it is not the same all over the frame's fog, once clouds are set; all that is needed for rays is then in frame->air.
  * Errors: MEMORY. */
-nebel_result nb_fog_shade_set(nb_frame *frame);
+nebel_result nb_fog_shadow_set(nb_frame *frame);
 
 /* For a batch to come: no ray has any. */
-void nb_fog_shade_start(nb_scratch *scratch);
+void nb_fog_shadow_start(nb_scratch *scratch);
 
 /* Along the rays that see fog up to scratch->air.knots[0] and have none yet. */
-nebel_result nb_fog_shade_find(const nb_frame *frame, nb_scratch *scratch);
+nebel_result nb_fog_shadow_find(const nb_frame *frame, nb_scratch *scratch);
 
 /* Between two places of a ray. */
-nb_segment_shadow nb_fog_shade_between(const nb_fog_shadow *shade, float a, float b);
+nb_segment_shadow nb_fog_shadow_between(const nb_fog_shadow *shade, float a, float b);
 
 /* A place between two others at which pieces of shade meet, with as many on both sides; 0: they are in one. */
-float nb_fog_shade_cut(const nb_fog_shadow *shade, float a, float b);
+float nb_fog_shadow_cut(const nb_fog_shadow *shade, float a, float b);
 
 #endif

@@ -87,17 +87,17 @@ static nebel_result set_shafts(nb_frame *frame)
     nebel_sunlit_fog fog;
     double min[3], max[3];
     nebel_result result = NEBEL_OK;
-    const nebel_snapshot *sunlit = nb_daylit_fog_is(&frame->air) ? frame->air.fog.sun : renderer->fog;
+    const nebel_snapshot *sunlit = nb_fog_irradiance_is(&frame->air) ? frame->air.fog.sun : renderer->fog;
     frame->has_shafts = may && nebel_snapshot_sunlit_fog(sunlit, &fog);
     frame->has_lamp_shafts = may && nebel_snapshot_lamplit_fog(renderer->fog, min, max);
     if (frame->has_shafts) {
         frame->sunlit_box = box_of(geometry, fog.min, fog.max);
         result = nb_sun_cells_set(&renderer->sun_cells, geometry, fog.direction);
-        frame->eye = nb_shafts_eye(&renderer->sun_cells, geometry, &frame->view);
+        frame->eye = nb_sun_shafts_eye(&renderer->sun_cells, geometry, &frame->view);
     }
     if (frame->has_lamp_shafts && result == NEBEL_OK) {
         frame->lamplit_box = box_of(geometry, min, max);
-        result = nb_shadow_tree_set_lamps(&renderer->lamp_tree, geometry, renderer->threads);
+        result = nb_shadow_tree_set_lights(&renderer->lamp_tree, geometry, renderer->threads);
     }
     if (result == NEBEL_OK) return NEBEL_OK;
     return nb_fail(&renderer->log, result, "frame: out of memory for the shadows that surfaces cast into fog");
@@ -122,7 +122,7 @@ static nebel_result set_air(nb_frame *frame, const nebel_frame_desc *desc)
     frame->air.tolerance = (float)tolerance;
     frame->air.pixel = nb_view_pixel(&frame->view, frame->height);
     frame->air.has_fog = renderer->fog != NULL && nebel_get_volume_count(renderer->fog) > 0;
-    return nb_air_set(
+    return nb_cpu_planets_set(
         &frame->air, scene, &renderer->allocator, &renderer->log, frame->view.position, frame->lighting.sun_direction,
         frame->air.has_fog || scene->planets[0].clouds != NULL || renderer->geometry.scene != NULL, renderer->threads);
 }
@@ -133,7 +133,7 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     nb_geometry *geometry = &renderer->geometry;
     nebel_result result = check_desc(desc, &renderer->log);
     if (result == NEBEL_OK) result = set_window(frame, desc);
-    if (result == NEBEL_OK) result = nb_lighting_set(&frame->lighting, renderer->scene, &renderer->log);
+    if (result == NEBEL_OK) result = nb_surface_lighting_set(&frame->lighting, renderer->scene, &renderer->log);
     if (result == NEBEL_OK)
         result = nb_view_set(&frame->view, &desc->camera, desc->width, desc->height, &renderer->log);
     if (result != NEBEL_OK) return result;
@@ -155,12 +155,12 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     result = nb_classic_fog_set_vertices(frame);
     if (result != NEBEL_OK)
         return nb_fail(&renderer->log, result, "frame: fog at a vertex: %s", nebel_result_text(result));
-    result = nb_reference_set(frame, desc);
+    result = nb_path_batch_set(frame, desc);
     if (result == NEBEL_OK) result = set_air(frame, desc);
-    if (result == NEBEL_OK) result = nb_cloudscape_set(frame, desc);
-    if (result == NEBEL_OK) result = nb_daylit_fog_set(frame);
+    if (result == NEBEL_OK) result = nb_cpu_clouds_set(frame, desc);
+    if (result == NEBEL_OK) result = nb_fog_irradiance_set(frame);
     if (result == NEBEL_OK) result = set_shafts(frame);
-    return result == NEBEL_OK ? nb_shells_set(frame, desc) : result;
+    return result == NEBEL_OK ? nb_cpu_textured_set(frame, desc) : result;
 }
 
 /* ---- regions --------------------------------------------------------------------------------- */
@@ -170,8 +170,9 @@ static nebel_result render_batch(const nb_frame *frame, const nb_batch_place *pl
 {
     nb_batch_place now = *place;
     int is_even = 0;
-    nebel_result result = frame->cloud_view != NULL ? nb_cloudscape_start(frame, place, scratch) : NEBEL_OK;
-    if (result == NEBEL_OK && nb_even_may_be(frame)) result = nb_even_render(frame, place, count, scratch, &is_even);
+    nebel_result result = frame->cloud_view != NULL ? nb_cpu_clouds_start(frame, place, scratch) : NEBEL_OK;
+    if (result == NEBEL_OK && nb_uniform_batch_may_be(frame))
+        result = nb_uniform_batch_render(frame, place, count, scratch, &is_even);
     for (uint32_t s = 0; s < count && result == NEBEL_OK; s++) {
         now.sample = first + s;
         if (!is_even) result = nb_batch_render(frame, &now, s, scratch);
@@ -188,7 +189,7 @@ static nebel_result render_samples(const nb_frame *frame, uint32_t left, uint32_
     for (uint32_t s = 0; s < count; s++) {
         nb_sample_region(first + s, frame->samples, &scratch->points_of_region[s]);
     }
-    if (nb_even_may_be(frame) || frame->cloud_view != NULL) nb_sample_region(0, 1, &scratch->centers);
+    if (nb_uniform_batch_may_be(frame) || frame->cloud_view != NULL) nb_sample_region(0, 1, &scratch->centers);
     if (frame->rasters) {
         nb_raster_region(&frame->raster, left, top, count, scratch->points_of_region, scratch->seen);
     }
@@ -249,7 +250,7 @@ static void render_region(const nb_frame *frame, size_t number, nb_frame_progres
     nb_batch_place place = {left, top, 0, 0};
     for (; place.first < NB_PIXELS && top + nb_lane_y(place.first) < frame->height; place.first += NB_BATCH) {
         nb_planes_finish(frame, &place, scratch);
-        if (frame->renderer->method == NEBEL_METHOD_PATH) nb_reference_finish(frame, &place, scratch);
+        if (frame->renderer->method == NEBEL_METHOD_PATH) nb_path_batch_finish(frame, &place, scratch);
     }
 }
 
@@ -267,9 +268,9 @@ static void render_regions(const nb_frame *frame, size_t regions, nb_frame_progr
 
 static void free_frame(nb_frame *frame)
 {
-    nb_cloudscape_free(frame);
-    nb_reference_free(frame);
-    nb_air_free(&frame->air);
+    nb_cpu_clouds_free(frame);
+    nb_path_batch_free(frame);
+    nb_cpu_planets_free(&frame->air);
 }
 
 nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc *desc, const nebel_frame *frame)

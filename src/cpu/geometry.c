@@ -248,7 +248,7 @@ static nebel_result find_mask(nb_geometry *geometry, const nebel_scene_data *sce
     }
     if (*found != NULL) return NEBEL_OK;
     *found = &geometry->masks[geometry->mask_count++];
-    return nb_mask_make((nb_alpha_mask *)*found, &geometry->allocator, scene, mesh->mask, mesh->alpha_cutoff);
+    return nb_alpha_mask_make((nb_alpha_mask *)*found, &geometry->allocator, scene, mesh->mask, mesh->alpha_cutoff);
 }
 
 static nebel_result make_surface(nb_geometry *geometry, const nebel_scene_data *scene, const nebel_mesh *mesh)
@@ -326,7 +326,7 @@ static void drop_holes(const struct RTCFilterFunctionNArguments *met)
             const float *uv = surface->mesh->uvs + 2 * (size_t)index[k];
             for (int c = 0; c < 2; c++) place[c] += isfinite(uv[c]) ? weights[k] * uv[c] : 0;
         }
-        if (nb_mask_is_hole(surface->mask, place[0], place[1])) met->valid[i] = 0;
+        if (nb_alpha_mask_is_hole(surface->mask, place[0], place[1])) met->valid[i] = 0;
     }
 }
 
@@ -424,7 +424,7 @@ void nb_geometry_free(nb_geometry *geometry)
         nb_release(&geometry->allocator, geometry->surfaces[i].positions);
         nb_release(&geometry->allocator, geometry->surfaces[i].ends);
     }
-    for (size_t i = 0; i < geometry->mask_count; i++) nb_mask_free(&geometry->masks[i], &geometry->allocator);
+    for (size_t i = 0; i < geometry->mask_count; i++) nb_alpha_mask_free(&geometry->masks[i], &geometry->allocator);
     nb_release(&geometry->allocator, geometry->masks);
     nb_release(&geometry->allocator, geometry->nodes);
     nb_release(&geometry->allocator, geometry->owners);

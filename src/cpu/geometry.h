@@ -11,8 +11,8 @@
 #include <embree3/rtcore.h>
 
 enum {
-    NB_FAN = 16,  /* children of a node of the tree of rectangles */
-    NB_LEVELS = 8 /* of this tree at most: 16^8 triangles */
+    NB_FAN = 16,           /* children of a node of the tree of rectangles */
+    NB_MAX_TREE_LEVELS = 8 /* of this tree at most: 16^8 triangles */
 };
 
 /* Pixels around each of the NB_FAN triangles or nodes below a node as -x0, -y0, x1, y1, ends included: around two of
@@ -51,8 +51,9 @@ typedef struct nb_geometry {
     uint32_t *owners; /* the surface of NB_FAN triangles whose IDs follow each other */
     void *nodes;
     int level_count;
-    nb_node *levels[NB_LEVELS]; /* of the tree: parts of `nodes`, leaves first; a node is on two lines of the cache */
-    size_t node_counts[NB_LEVELS];
+    nb_node *levels
+        [NB_MAX_TREE_LEVELS]; /* of the tree: parts of `nodes`, leaves first; a node is on two lines of the cache */
+    size_t node_counts[NB_MAX_TREE_LEVELS];
 } nb_geometry;
 
 /* Of an edge, over the way to its triangle: from here on the rounding of corners may be some 1e-5 of that way. */

@@ -17,14 +17,14 @@ typedef struct nb_aerial_node {
 static nb_aerial_node start_of(const nb_air_frame *air)
 {
     nb_aerial_node knot = {.fog_left = {1, 1, 1}, .air_left = {1, 1, 1}, .limit = {1, 1, 1}};
-    for (int c = 0; c < 3 && nb_daylit_fog_is(air); c++) {
+    for (int c = 0; c < 3 && nb_fog_irradiance_is(air); c++) {
         knot.sun[c] = (float)air->sun_at_eye[c];
         knot.sky[c] = (float)air->sky_at_eye[c];
     }
     return knot;
 }
 
-static nb_aerial_node knot_of(const nb_air_frame *air, const nb_air_scratch *scratch, int lane, int place)
+static nb_aerial_node knot_of(const nb_air_frame *air, const nb_cpu_planets_scratch *scratch, int lane, int place)
 {
     const nb_aerial_batch_nodes *knots = &scratch->knots[scratch->order[lane][place]];
     nb_aerial_node knot = {.at = knots->at[lane], .shade = {.sun = 1, .sky = 1}, .limit = {1, 1, 1}};
@@ -35,7 +35,7 @@ static nb_aerial_node knot_of(const nb_air_frame *air, const nb_air_scratch *scr
         knot.air_left[c] = knots->air_left[c][lane];
         knot.air_light[c] = knots->air_light[c][lane];
     }
-    for (int c = 0; c < 3 && nb_daylit_fog_is(air); c++) {
+    for (int c = 0; c < 3 && nb_fog_irradiance_is(air); c++) {
         knot.fog_sun[c] = knots->fog_sun[c][lane];
         knot.fog_sky[c] = knots->fog_sky[c][lane];
         knot.sun[c] = knots->sun[c][lane];
@@ -75,11 +75,11 @@ static void limit_opacity(const nb_air_frame *air, const nb_aerial_node *before,
 
 static int is_limited(const nb_air_frame *air)
 {
-    return nb_daylit_fog_is(air) && air->fog.max_opacity < 1;
+    return nb_fog_irradiance_is(air) && air->fog.max_opacity < 1;
 }
 
 /* The knot of a place behind the one before. */
-static nb_aerial_node knot_after(const nb_air_frame *air, const nb_air_scratch *scratch, int lane, int place,
+static nb_aerial_node knot_after(const nb_air_frame *air, const nb_cpu_planets_scratch *scratch, int lane, int place,
                                  const nb_aerial_node *before)
 {
     nb_aerial_node knot = knot_of(air, scratch, lane, place);
@@ -126,7 +126,7 @@ static float fog_doubt(const nb_aerial_node *a, const nb_aerial_node *b, int c)
 #define LEAST_PART 0.03125f
 
 /* The light of a lane by what is known. */
-static void sum_light(const nb_air_frame *air, const nb_air_scratch *scratch, int lane, float light[3])
+static void sum_light(const nb_air_frame *air, const nb_cpu_planets_scratch *scratch, int lane, float light[3])
 {
     nb_aerial_node before = start_of(air);
     for (int c = 0; c < 3; c++) light[c] = 0;
@@ -140,7 +140,7 @@ static void sum_light(const nb_air_frame *air, const nb_air_scratch *scratch, in
 }
 
 /* What may be off of each colour of a lane, in tolerances. */
-static void find_scales(const nb_air_frame *air, const nb_air_scratch *scratch, int lane, float scales[3])
+static void find_scales(const nb_air_frame *air, const nb_cpu_planets_scratch *scratch, int lane, float scales[3])
 {
     float light[3];
     sum_light(air, scratch, lane, light);
@@ -163,7 +163,7 @@ static float doubt(const nb_aerial_node *a, const nb_aerial_node *b, const float
 }
 
 /* The piece of a lane that is in doubt most, with the knots at its ends, and all doubts, in those scales. */
-static int find_worst(const nb_air_frame *air, const nb_air_scratch *scratch, int lane, const float scales[3],
+static int find_worst(const nb_air_frame *air, const nb_cpu_planets_scratch *scratch, int lane, const float scales[3],
                       nb_aerial_node *a, nb_aerial_node *b, float *all)
 {
     int worst = 0;
@@ -200,9 +200,9 @@ static float cut(const nb_frame *frame, const nb_scratch *scratch, int lane, con
                  const nb_aerial_node *b, const float scales[3])
 {
     const nb_ray_batch *const rays = &scratch->rays;
-    if (is_by_shade(a, b, scales)) return nb_fog_shade_cut(&scratch->air.fog_shade[lane], a->at, b->at);
-    if (a->at == 0 && nb_daylit_fog_is(&frame->air) && !frame->air.is_fog_even) {
-        const float enters = nb_daylit_fog_enters(&frame->air, rays, lane);
+    if (is_by_shade(a, b, scales)) return nb_fog_shadow_cut(&scratch->air.fog_shade[lane], a->at, b->at);
+    if (a->at == 0 && nb_fog_irradiance_is(&frame->air) && !frame->air.is_fog_even) {
+        const float enters = nb_fog_irradiance_enters(&frame->air, rays, lane);
         if (enters > 0 && enters < b->at) return enters;
     }
     if (a->at > 0) return b->at > 8 * a->at ? 4 * a->at : 0.5f * (a->at + b->at);
@@ -212,17 +212,17 @@ static float cut(const nb_frame *frame, const nb_scratch *scratch, int lane, con
 }
 
 /* Of the piece up to a knot. */
-static void shade_piece(nb_air_scratch *scratch, int lane, int place)
+static void shade_piece(nb_cpu_planets_scratch *scratch, int lane, int place)
 {
     static const nb_segment_shadow none = {.sun = 1, .sky = 1};
     const uint8_t *const order = scratch->order[lane];
     const nb_fog_shadow *const shade = &scratch->fog_shade[lane];
     nb_aerial_batch_nodes *const knots = &scratch->knots[order[place]];
     const float before = place > 0 ? scratch->knots[order[place - 1]].at[lane] : 0;
-    knots->shade[lane] = shade->is_found ? nb_fog_shade_between(shade, before, knots->at[lane]) : none;
+    knots->shade[lane] = shade->is_found ? nb_fog_shadow_between(shade, before, knots->at[lane]) : none;
 }
 
-static void insert(nb_air_scratch *scratch, int lane, int place, int knot)
+static void insert(nb_cpu_planets_scratch *scratch, int lane, int place, int knot)
 {
     uint8_t *order = scratch->order[lane];
     memmove(order + place + 1, order + place, (size_t)(scratch->count[lane] - place));
@@ -231,7 +231,7 @@ static void insert(nb_air_scratch *scratch, int lane, int place, int knot)
 }
 
 /* A fresh one, before the one at a place. */
-static void cut_at(const nb_air_frame *air, nb_air_scratch *scratch, int lane, int place, float at)
+static void cut_at(const nb_air_frame *air, nb_cpu_planets_scratch *scratch, int lane, int place, float at)
 {
     scratch->fresh.at[lane] = scratch->knots[scratch->known[lane]].at[lane] = at;
     insert(scratch, lane, place, scratch->known[lane]++);
@@ -254,14 +254,14 @@ static void copy_lane(const nb_aerial_batch_nodes *from, int lane, nb_aerial_bat
 }
 
 /* Fresh knots have been found. */
-static void keep_fresh(nb_air_scratch *scratch)
+static void keep_fresh(nb_cpu_planets_scratch *scratch)
 {
     for (int i = 0; i < NB_BATCH; i++)
         if (scratch->fresh.at[i] > 0) copy_lane(&scratch->fresh, i, &scratch->knots[scratch->known[i] - 1]);
 }
 
 /* Before which knot a place is. */
-static int place_of(const nb_air_scratch *scratch, int lane, float at)
+static int place_of(const nb_cpu_planets_scratch *scratch, int lane, float at)
 {
     int place = 0;
     while (scratch->knots[scratch->order[lane][place]].at[lane] < at) place++;
@@ -269,7 +269,7 @@ static int place_of(const nb_air_scratch *scratch, int lane, float at)
 }
 
 /* All that is known of a ray before its end, which comes last. */
-static void put_in_order(const nb_air_frame *air, nb_air_scratch *scratch, int lane)
+static void put_in_order(const nb_air_frame *air, nb_cpu_planets_scratch *scratch, int lane)
 {
     const float end = scratch->knots[0].at[lane];
     scratch->order[lane][0] = 0;
@@ -286,8 +286,8 @@ static void shade(const nb_cloud_scratch *clouds, nb_aerial_batch_nodes *knot)
 {
     for (int c = 0; c < 3; c++)
         for (int i = 0; i < NB_BATCH; i++)
-            knot->air_light[c][i] =
-                nb_shaded_light(clouds->shaded[i], clouds->shaded_count[i], c, knot->at[i], knot->air_light[c][i]);
+            knot->air_light[c][i] = nb_shadowed_air_light(clouds->shaded[i], clouds->shaded_count[i], c, knot->at[i],
+                                                          knot->air_light[c][i]);
 }
 
 static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
@@ -304,9 +304,9 @@ static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fo
         air.transmittance[c] = knot->air_left[c];
         air.in_scattering[c] = knot->air_light[c];
     }
-    nebel_result result = nb_daylit_fog_trace(frame, &rays, trace, &transfers, knot);
-    if (nb_daylit_fog_is(&frame->air)) nb_daylit_fog_light(frame, &scratch->rays, knot);
-    if (result == NEBEL_OK) result = nb_air_trace(&frame->air, NB_BATCH, direction, knot->at, &air);
+    nebel_result result = nb_fog_irradiance_trace(frame, &rays, trace, &transfers, knot);
+    if (nb_fog_irradiance_is(&frame->air)) nb_fog_irradiance_light(frame, &scratch->rays, knot);
+    if (result == NEBEL_OK) result = nb_cpu_planets_trace(&frame->air, NB_BATCH, direction, knot->at, &air);
     if (result == NEBEL_OK && frame->cloud_view != NULL) shade(&scratch->clouds, knot);
     return result;
 }
@@ -315,7 +315,7 @@ static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fo
 static float first_cut(const nb_frame *frame, const nb_scratch *scratch, int lane)
 {
     const nb_aerial_batch_nodes *end = &scratch->air.knots[0];
-    const float place = nb_daylit_fog_lowest(&frame->air, &scratch->rays, lane);
+    const float place = nb_fog_irradiance_lowest(&frame->air, &scratch->rays, lane);
     float light = 0;
     for (int c = 0; c < 3; c++) light = fmaxf(light, end->fog_sun[c][lane] + end->fog_sky[c][lane]);
     for (int k = 1; k < scratch->air.known[lane]; k++)
@@ -326,13 +326,13 @@ static float first_cut(const nb_frame *frame, const nb_scratch *scratch, int lan
 /* One more knot for each lane that needs it; returns whether any did. */
 static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
 {
-    nb_air_scratch *air = &scratch->air;
+    nb_cpu_planets_scratch *air = &scratch->air;
     int any = 0;
-    is_first = is_first && nb_daylit_fog_is(&frame->air) && !frame->air.is_fog_even;
+    is_first = is_first && nb_fog_irradiance_is(&frame->air) && !frame->air.is_fog_even;
     for (int i = 0; i < NB_BATCH; i++) {
         float all, first, scales[3];
         air->fresh.at[i] = 0;
-        if (!scratch->inside[i] || air->known[i] == NB_AIR_KNOTS) continue;
+        if (!scratch->inside[i] || air->known[i] == NB_AIR_NODES) continue;
         if (is_first && (first = first_cut(frame, scratch, i)) > 0) {
             cut_at(&frame->air, air, i, place_of(air, i, first), first);
             any = 1;
@@ -374,7 +374,7 @@ static float limit_error(const nb_aerial_node *end, float most, float error)
 static void sum_up(const nb_air_frame *of, nb_scratch *scratch, int lane)
 {
     static const float plain[3] = {1, 1, 1};
-    const nb_air_scratch *air = &scratch->air;
+    const nb_cpu_planets_scratch *air = &scratch->air;
     nb_light_samples *samples = &scratch->samples;
     nb_aerial_node before = start_of(of), a, b;
     float light[3], all = 0;
@@ -397,7 +397,7 @@ static void sum_up(const nb_air_frame *of, nb_scratch *scratch, int lane)
 /* Air has an end, rays need not: beyond it neither adds anything to the other. */
 static void set_first(const nb_frame *frame, nb_scratch *scratch)
 {
-    nb_air_scratch *air = &scratch->air;
+    nb_cpu_planets_scratch *air = &scratch->air;
     for (int i = 0; i < NB_BATCH; i++) {
         if (!air->is_kept) air->known[i] = 1;
         air->knots[0].at[i] = scratch->inside[i] ? fminf(scratch->distance[i], (float)frame->air.reach) : 0;
@@ -408,22 +408,22 @@ static void set_first(const nb_frame *frame, nb_scratch *scratch)
     }
 }
 
-void nb_haze_keep(nb_scratch *scratch)
+void nb_aerial_keep(nb_scratch *scratch)
 {
-    nb_air_scratch *air = &scratch->air;
+    nb_cpu_planets_scratch *air = &scratch->air;
     air->is_kept = 1;
     for (int i = 0; i < NB_BATCH; i++)
-        if (air->knots[0].at[i] > 0 && air->known[i] < NB_AIR_KNOTS)
+        if (air->knots[0].at[i] > 0 && air->known[i] < NB_AIR_NODES)
             copy_lane(&air->knots[0], i, &air->knots[air->known[i]++]);
 }
 
-void nb_haze_forget(nb_scratch *scratch)
+void nb_aerial_forget(nb_scratch *scratch)
 {
     scratch->air.is_kept = 0;
 }
 
-nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
-                         nb_scratch *scratch)
+nebel_result nb_aerial_add(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
+                           nb_scratch *scratch)
 {
     nb_aerial_batch_nodes *first = &scratch->air.knots[0];
     const double *const direction[3] = {scratch->rays.direction[0], scratch->rays.direction[1],
@@ -435,14 +435,14 @@ nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, con
     }
     set_first(frame, scratch);
     nebel_result result =
-        nb_air_trace(&frame->air, NB_BATCH, direction, frame->air.ends ? first->at : NULL, &transfers);
+        nb_cpu_planets_trace(&frame->air, NB_BATCH, direction, frame->air.ends ? first->at : NULL, &transfers);
     if (result == NEBEL_OK && frame->cloud_view != NULL) shade(&scratch->clouds, first);
     if (fog == NULL) {
         take_air(scratch);
         return result;
     }
-    if (nb_daylit_fog_is(&frame->air)) nb_daylit_fog_light(frame, &scratch->rays, first);
-    if (result == NEBEL_OK && frame->air.roof.is_shaded) result = nb_fog_shade_find(frame, scratch);
+    if (nb_fog_irradiance_is(&frame->air)) nb_fog_irradiance_light(frame, &scratch->rays, first);
+    if (result == NEBEL_OK && frame->air.roof.is_shaded) result = nb_fog_shadow_find(frame, scratch);
     for (int i = 0; i < NB_BATCH; i++) put_in_order(&frame->air, &scratch->air, i);
     for (int k = 1; result == NEBEL_OK && choose(frame, scratch, k == 1); k++) {
         result = trace_knot(frame, fog, trace, scratch, &scratch->air.fresh);

@@ -11,11 +11,11 @@
  *     the integral of T_fog dS_air + T_air dS_fog
  * is within what it is with the transmittances of the one place and of the other. The mean of both is taken; what is left is
  * half of the products of their differences, and pieces are halved until all of them are within the tolerance. */
-nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
-                         nb_scratch *scratch);
+nebel_result nb_aerial_add(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
+                           nb_scratch *scratch);
 
 /* What has been found of rays counts when the same rays are followed to other ends, until it is forgotten. */
-void nb_haze_keep(nb_scratch *scratch);
-void nb_haze_forget(nb_scratch *scratch);
+void nb_aerial_keep(nb_scratch *scratch);
+void nb_aerial_forget(nb_scratch *scratch);
 
 #endif

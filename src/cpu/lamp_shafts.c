@@ -16,14 +16,14 @@ typedef struct nb_flats {
     float height[NB_PACKET]; /* m, of the ray from the lamp */
 } nb_flats;
 
-typedef struct nb_lamp_place {
+typedef struct nb_light_place {
     double place[3]; /* relative to the origin of the geometry */
     double radius;
-} nb_lamp_place;
+} nb_light_place;
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
-NB_CLONES static void move_rays(const nb_lamp_place *lamp, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
+NB_CLONES static void move_rays(const nb_light_place *lamp, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
 {
     for (int c = 0; c < 3; c++) {
         const double place = lamp->place[c];
@@ -97,14 +97,14 @@ NB_CLONES static void set_flats(const nb_shaft_rays *rays, nb_flats *flats)
 /* ---- boxes ----------------------------------------------------------------------------------- */
 
 /* A child's box relative to a lamp. */
-typedef struct nb_lamp_box {
+typedef struct nb_light_box {
     float low[3], high[3], middle[3], half[3];
     float slack; /* what rounding may do to its distance from a plane */
-} nb_lamp_box;
+} nb_light_box;
 
-NB_ALWAYS_INLINE nb_lamp_box box_of(const nb_shadow_node *node, int child, const nb_lamp_place *lamp)
+NB_ALWAYS_INLINE nb_light_box box_of(const nb_shadow_node *node, int child, const nb_light_place *lamp)
 {
-    nb_lamp_box box = {.slack = 0};
+    nb_light_box box = {.slack = 0};
     for (int c = 0; c < 3; c++) {
         const float low = node->low[c][child], high = node->high[c][child], place = (float)lamp->place[c];
         const float margin = 1e-6f * (fabsf(low) + fabsf(high) + fabsf(place));
@@ -129,14 +129,14 @@ NB_ALWAYS_INLINE float before_plane(const float place[3], const float (*normal)[
 }
 
 /* How far the box reaches to either side of such a plane through its middle. */
-NB_ALWAYS_INLINE float reach_along(const nb_lamp_box *box, const float (*normal)[NB_PACKET], int i)
+NB_ALWAYS_INLINE float reach_along(const nb_light_box *box, const float (*normal)[NB_PACKET], int i)
 {
     return box->half[0] * size_of(normal[0][i]) + box->half[1] * size_of(normal[1][i]) +
            box->half[2] * size_of(normal[2][i]) + box->slack;
 }
 
 /* Whether the box may meet any of the flat triangles: no plane of a few likely ones has them on different sides. */
-NB_ALWAYS_INLINE int meets(const nb_lamp_box *box, const nb_flats *flats)
+NB_ALWAYS_INLINE int meets(const nb_light_box *box, const nb_flats *flats)
 {
     const float(*across)[NB_PACKET] = flats->across, (*near)[NB_PACKET] = flats->near, (*far)[NB_PACKET] = flats->far,
           (*beyond)[NB_PACKET] = flats->beyond;
@@ -218,10 +218,10 @@ static void cut_hole(const nb_hole *hole, const nb_shaft_rays *rays, int i, nb_s
 }
 
 NB_ALWAYS_INLINE int add(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_masked_occluder *sheet,
-                         const nb_sheet_lamp *lamp, const nb_shaft_interval *found, nb_shaft_rays *rays)
+                         const nb_masked_triangle_light *lamp, const nb_shaft_interval *found, nb_shaft_rays *rays)
 {
     int fresh[NB_PACKET];
-    if (sheet != NULL) return nb_sheet_cast(sheet, lamp, shafts, allocator, found, rays);
+    if (sheet != NULL) return nb_masked_triangle_cast(sheet, lamp, shafts, allocator, found, rays);
     return !nb_extend(found, rays, fresh) || nb_replace(shafts, allocator, found, fresh, rays);
 }
 
@@ -233,7 +233,7 @@ typedef struct nb_seen_caster {
 
 /* Returns 0 where the lamp is in the triangle's plane. Triangles with a common edge get the same plane there, to the
  * bit. */
-NB_ALWAYS_INLINE int see(const nb_occluder *caster, const nb_lamp_place *lamp, nb_seen_caster *seen)
+NB_ALWAYS_INLINE int see(const nb_occluder *caster, const nb_light_place *lamp, nb_seen_caster *seen)
 {
     static const double here[3] = {0, 0, 0};
     double corner[3][3], way[2][3];
@@ -260,7 +260,7 @@ NB_ALWAYS_INLINE int see(const nb_occluder *caster, const nb_lamp_place *lamp, n
 }
 
 NB_ALWAYS_INLINE int cast(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                          size_t number, const nb_lamp_place *lamp, const nb_flats *flats, nb_shaft_rays *rays)
+                          size_t number, const nb_light_place *lamp, const nb_flats *flats, nb_shaft_rays *rays)
 {
     const nb_occluder *caster = &tree->casters[number];
     const nb_masked_occluder *sheet = nb_shadow_tree_sheet(tree, number);
@@ -274,33 +274,33 @@ NB_ALWAYS_INLINE int cast(nb_sun_shafts *shafts, const nebel_allocator *allocato
             slack += 1e-6f * (fabsf(at) + fabsf(place));
         }
     if (!may_meet((const float(*)[3])corner, slack, flats) || !see(caster, lamp, &seen)) return 1;
-    const nb_sheet_lamp view = {lamp->place, seen.hole.normal, sqrt(seen.hole.distance2)};
+    const nb_masked_triangle_light view = {lamp->place, seen.hole.normal, sqrt(seen.hole.distance2)};
     nb_cross_prism(&seen.pyramid, rays, &found);
     if (seen.hole.distance2 >= seen.hole.radius2) return add(shafts, allocator, sheet, &view, &found, rays);
     for (int i = 0; i < NB_PACKET; i++) cut_hole(&seen.hole, rays, i, &found, &rest);
     return add(shafts, allocator, sheet, &view, &found, rays) && add(shafts, allocator, sheet, &view, &rest, rays);
 }
 
-typedef struct nb_lamp_visit {
+typedef struct nb_light_visit {
     int level;
     size_t number; /* of the node; at level -1 of the leaf */
-} nb_lamp_visit;
+} nb_light_visit;
 
 enum { VISITS = NB_SHADOW_LEVELS * NB_SHADOW_FAN };
 
 /* Returns 0 when memory is out. */
 NB_CLONES static int walk_to_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                                  const nb_lamp_place *lamp, const nb_flats *flats, nb_shaft_rays *rays)
+                                  const nb_light_place *lamp, const nb_flats *flats, nb_shaft_rays *rays)
 {
-    nb_lamp_visit visits[VISITS];
+    nb_light_visit visits[VISITS];
     int count = 1;
-    visits[0] = (nb_lamp_visit){tree->level_count - 1, 0};
+    visits[0] = (nb_light_visit){tree->level_count - 1, 0};
     while (count > 0) {
-        const nb_lamp_visit visit = visits[--count];
+        const nb_light_visit visit = visits[--count];
         const size_t first = visit.number * NB_SHADOW_FAN;
         for (size_t k = 0; k < NB_SHADOW_FAN && visit.level >= 0; k++) {
-            const nb_lamp_box box = box_of(&tree->levels[visit.level][visit.number], (int)k, lamp);
-            if (meets(&box, flats)) visits[count++] = (nb_lamp_visit){visit.level - 1, first + k};
+            const nb_light_box box = box_of(&tree->levels[visit.level][visit.number], (int)k, lamp);
+            if (meets(&box, flats)) visits[count++] = (nb_light_visit){visit.level - 1, first + k};
         }
         for (size_t k = first; k < first + NB_SHADOW_FAN && k < tree->count && visit.level < 0; k++)
             if (!cast(shafts, allocator, tree, k, lamp, flats, rays)) return 0;
@@ -311,7 +311,7 @@ NB_CLONES static int walk_to_lamp(nb_sun_shafts *shafts, const nebel_allocator *
 /* ---- lamps ----------------------------------------------------------------------------------- */
 
 static int find_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                       const nb_lamp_place *lamp, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
+                       const nb_light_place *lamp, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
 {
     nb_flats flats;
     for (int i = 0; i < NB_PACKET; i++) {
@@ -326,7 +326,7 @@ static int find_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, 
 }
 
 static int find_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                     const nb_lamp_place *lamp, const float *from, const float *to, const nb_ray_batch *rays,
+                     const nb_light_place *lamp, const float *from, const float *to, const nb_ray_batch *rays,
                      double advance, uint32_t *numbers)
 {
     for (int p = 0; p < NB_BATCH; p += NB_PACKET) {
@@ -338,7 +338,7 @@ static int find_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, co
             packet.to[i] = to[p + i];
         }
         if (!find_packet(shafts, allocator, tree, lamp, rays, p, &packet) ||
-            !nb_shafts_finish(shafts, allocator, &packet, rays->length + p, advance, numbers + p))
+            !nb_sun_shafts_finish(shafts, allocator, &packet, rays->length + p, advance, numbers + p))
             return 0;
     }
     numbers[NB_BATCH] = (uint32_t)shafts->toggle_count;
@@ -356,26 +356,26 @@ static int make_room(nb_light_shafts *shafts, const nebel_allocator *allocator, 
     return grown;
 }
 
-static nb_lamp_place place_lamp(const nebel_snapshot *fog, size_t number, const double origin[3])
+static nb_light_place place_lamp(const nebel_snapshot *fog, size_t number, const double origin[3])
 {
-    nb_lamp_place lamp;
+    nb_light_place lamp;
     nebel_snapshot_lamp(fog, number, lamp.place, &lamp.radius);
     for (int c = 0; c < 3; c++) lamp.place[c] -= origin[c];
-    lamp.radius = nb_bulb(lamp.radius);
+    lamp.radius = nb_light_radius(lamp.radius);
     return lamp;
 }
 
-nebel_result nb_lamp_shafts_find(nb_light_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                                 const nebel_snapshot *fog, const nb_lit_box *box, const nb_ray_batch *rays,
-                                 double advance, const float *distance)
+nebel_result nb_light_shafts_find(nb_light_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                                  const nebel_snapshot *fog, const nb_lit_box *box, const nb_ray_batch *rays,
+                                  double advance, const float *distance)
 {
     const size_t count = nebel_snapshot_lamp_count(fog);
     float from[NB_BATCH], to[NB_BATCH];
     if (!make_room(shafts, allocator, count)) return NEBEL_ERROR_MEMORY;
-    nb_shafts_clip(box, rays, advance, distance, from, to);
+    nb_sun_shafts_clip(box, rays, advance, distance, from, to);
     shafts->shafts.toggle_count = 0;
     for (size_t i = 0; i < count; i++) {
-        const nb_lamp_place lamp = place_lamp(fog, i, tree->origin);
+        const nb_light_place lamp = place_lamp(fog, i, tree->origin);
         uint32_t *numbers = shafts->numbers + i * (NB_BATCH + 1);
         if (!find_lamp(&shafts->shafts, allocator, tree, &lamp, from, to, rays, advance, numbers))
             return NEBEL_ERROR_MEMORY;
@@ -385,9 +385,9 @@ nebel_result nb_lamp_shafts_find(nb_light_shafts *shafts, const nebel_allocator 
     return NEBEL_OK;
 }
 
-void nb_lamp_shafts_free(nb_light_shafts *shafts, const nebel_allocator *allocator)
+void nb_light_shafts_free(nb_light_shafts *shafts, const nebel_allocator *allocator)
 {
-    nb_shafts_free(&shafts->shafts, allocator);
+    nb_sun_shafts_free(&shafts->shafts, allocator);
     nb_release(allocator, shafts->numbers);
     nb_release(allocator, shafts->pieces);
 }

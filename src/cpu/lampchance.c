@@ -26,11 +26,11 @@ static double cone_of(const nebel_light *lamp, const double direction[3])
     return s * s * (3 - 2 * s);
 }
 
-nb_sampled_light nb_lamp_sight_from(const nebel_light *lamp, const double place[3])
+nb_sampled_light nb_light_sight_from(const nebel_light *lamp, const double place[3])
 {
     nb_sampled_light sight;
     for (int i = 0; i < 3; i++) sight.direction[i] = lamp->position[i] - place[i];
-    const double distance = nb_vector_length(sight.direction), radius = nb_bulb(lamp->radius);
+    const double distance = nb_vector_length(sight.direction), radius = nb_light_radius(lamp->radius);
     for (int i = 0; i < 3 && distance > 0; i++) sight.direction[i] /= distance;
     const double nearest = fmax(distance, radius), part = radius / nearest;
     sight.reach = fmax(distance - lamp->radius, 0);
@@ -48,7 +48,7 @@ nb_light_pass nb_passing_of(const nebel_light *lamp, const nebel_ray *ray)
     for (int i = 0; i < 3; i++) to_lamp[i] = lamp->position[i] - ray->origin[i];
     nb_light_pass p = {.start = -nb_vector_dot(to_lamp, ray->direction), .t_max = ray->t_max};
     for (int i = 0; i < 3; i++) aside[i] = to_lamp[i] + p.start * ray->direction[i];
-    p.aside = fmax(nb_vector_length(aside), nb_bulb(lamp->radius));
+    p.aside = fmax(nb_vector_length(aside), nb_light_radius(lamp->radius));
     /* One angle between two places; as the difference of two it would be lost to rounding far from the lamp. */
     p.angle = atan2(p.aside * p.t_max, p.aside * p.aside + p.start * (p.start + p.t_max));
     return p;
@@ -69,26 +69,26 @@ double nb_passing_density(const nb_light_pass *p, double t)
 
 /* ---- one of many ----------------------------------------------------------------------------- */
 
-double nb_lamp_weight_at(const nebel_light *lamp, const nebel_ray *ray)
+double nb_light_weight_at(const nebel_light *lamp, const nebel_ray *ray)
 {
-    return largest(lamp->intensity) * nb_lamp_sight_from(lamp, ray->origin).fluence;
+    return largest(lamp->intensity) * nb_light_sight_from(lamp, ray->origin).fluence;
 }
 
-double nb_lamp_weight_along(const nebel_light *lamp, const nebel_ray *ray)
+double nb_light_weight_along(const nebel_light *lamp, const nebel_ray *ray)
 {
     const nb_light_pass passing = nb_passing_of(lamp, ray);
     return largest(lamp->intensity) * passing.angle / passing.aside;
 }
 
-double nb_lamps_sum(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray)
+double nb_lights_sum(const nebel_scene_data *scene, nb_light_weigh *weigh, const nebel_ray *ray)
 {
     double sum = 0;
     for (size_t i = 0; i < scene->light_count; i++) sum += weigh(&scene->lights[i], ray);
     return sum;
 }
 
-const nebel_light *nb_lamps_choose(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray,
-                                   double sum, double chance)
+const nebel_light *nb_lights_choose(const nebel_scene_data *scene, nb_light_weigh *weigh, const nebel_ray *ray,
+                                    double sum, double chance)
 {
     const nebel_light *chosen = NULL;
     double left = chance * sum;
@@ -100,12 +100,12 @@ const nebel_light *nb_lamps_choose(const nebel_scene_data *scene, nb_lamp_weigh 
     return chosen;
 }
 
-double nb_lamps_density(const nebel_scene_data *scene, const nebel_ray *ray, double sum, double t)
+double nb_lights_density(const nebel_scene_data *scene, const nebel_ray *ray, double sum, double t)
 {
     double density = 0;
     for (size_t i = 0; i < scene->light_count; i++) {
         const nb_light_pass passing = nb_passing_of(&scene->lights[i], ray);
-        const double part = nb_lamp_weight_along(&scene->lights[i], ray) / sum;
+        const double part = nb_light_weight_along(&scene->lights[i], ray) / sum;
         if (part > 0) density += part * nb_passing_density(&passing, t);
     }
     return density;

@@ -14,20 +14,20 @@ typedef struct nb_sampled_light {
 } nb_sampled_light;
 
 /* Before anything that is in the way. Of a lamp without a radius, and nearer than 1 mm, as everywhere. */
-nb_sampled_light nb_lamp_sight_from(const nebel_light *lamp, const double place[3]);
+nb_sampled_light nb_light_sight_from(const nebel_light *lamp, const double place[3]);
 
 /* What a lamp weighs among others where one of them is chosen: at the ray's origin, by the light that it brings there;
  * along the ray up to t_max, by what its light would add up to, were there no cone and the fog thin and even. */
-typedef double nb_lamp_weigh(const nebel_light *lamp, const nebel_ray *ray);
-double nb_lamp_weight_at(const nebel_light *lamp, const nebel_ray *ray);
-double nb_lamp_weight_along(const nebel_light *lamp, const nebel_ray *ray);
+typedef double nb_light_weigh(const nebel_light *lamp, const nebel_ray *ray);
+double nb_light_weight_at(const nebel_light *lamp, const nebel_ray *ray);
+double nb_light_weight_along(const nebel_light *lamp, const nebel_ray *ray);
 
 /* Of all lamps together. */
-double nb_lamps_sum(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray);
+double nb_lights_sum(const nebel_scene_data *scene, nb_light_weigh *weigh, const nebel_ray *ray);
 
 /* The lamp that 0 <= chance < 1 falls to, each as often as its part of `sum`, which is more than 0. */
-const nebel_light *nb_lamps_choose(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray,
-                                   double sum, double chance);
+const nebel_light *nb_lights_choose(const nebel_scene_data *scene, nb_light_weigh *weigh, const nebel_ray *ray,
+                                    double sum, double chance);
 
 /* A ray from its origin to t_max, which is finite, as a lamp sees it pass. */
 typedef struct nb_light_pass {
@@ -45,6 +45,6 @@ double nb_passing_draw(const nb_light_pass *passing, double chance);
 double nb_passing_density(const nb_light_pass *passing, double t);
 
 /* Of places by such chances, for lamps that are chosen by what they weigh along the ray; `sum` is that of all. 1/m */
-double nb_lamps_density(const nebel_scene_data *scene, const nebel_ray *ray, double sum, double t);
+double nb_lights_density(const nebel_scene_data *scene, const nebel_ray *ray, double sum, double t);
 
 #endif

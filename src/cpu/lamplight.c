@@ -51,16 +51,16 @@ NB_CLONES static void set_ways(const nb_spot_cone *within, float radius, float c
     }
 }
 
-void nb_lamp_ways_set(const nebel_light *lamp, const nb_ray_starts *starts, const nb_hits *hits,
-                      const nb_surface_batch *points, nb_shadow_rays *ways)
+void nb_shadow_rays_set(const nebel_light *lamp, const nb_ray_starts *starts, const nb_hits *hits,
+                        const nb_surface_batch *points, nb_shadow_rays *ways)
 {
     const nb_spot_cone within = cone_of(lamp);
     float place[3];
     for (int c = 0; c < 3; c++) place[c] = (float)(lamp->position[c] - starts->origin[c]);
-    set_ways(&within, (float)nb_bulb(lamp->radius), (float)lamp->radius, place, starts, hits, points, ways);
+    set_ways(&within, (float)nb_light_radius(lamp->radius), (float)lamp->radius, place, starts, hits, points, ways);
 }
 
-void nb_lamp_ways_shadow(RTCScene scene, nb_surface_batch *points, nb_shadow_rays *ways, nb_packets *packets)
+void nb_shadow_rays_shadow(RTCScene scene, nb_surface_batch *points, nb_shadow_rays *ways, nb_packets *packets)
 {
     nb_hits_between(scene, points->start, ways->direction, ways->shadowed, ways->lit, packets);
 }

@@ -14,10 +14,10 @@ typedef struct nb_shadow_rays {
 } nb_shadow_rays;
 
 /* Lanes are lit where they are hits, the lamp is above shading normal and triangle, and within the lamp's cone. */
-void nb_lamp_ways_set(const nebel_light *lamp, const nb_ray_starts *starts, const nb_hits *hits,
-                      const nb_surface_batch *points, nb_shadow_rays *ways);
+void nb_shadow_rays_set(const nebel_light *lamp, const nb_ray_starts *starts, const nb_hits *hits,
+                        const nb_surface_batch *points, nb_shadow_rays *ways);
 
 /* Lanes behind a surface are no longer lit. */
-void nb_lamp_ways_shadow(RTCScene scene, nb_surface_batch *points, nb_shadow_rays *ways, nb_packets *packets);
+void nb_shadow_rays_shadow(RTCScene scene, nb_surface_batch *points, nb_shadow_rays *ways, nb_packets *packets);
 
 #endif

@@ -91,8 +91,8 @@ static void set_corners(const nb_alpha_mask *mask, const nebel_texture *texture)
         }
 }
 
-nebel_result nb_mask_make(nb_alpha_mask *mask, const nebel_allocator *allocator, const nebel_scene_data *scene,
-                          int32_t number, float cutoff)
+nebel_result nb_alpha_mask_make(nb_alpha_mask *mask, const nebel_allocator *allocator, const nebel_scene_data *scene,
+                                int32_t number, float cutoff)
 {
     const nebel_texture *texture = &scene->textures[number];
     const size_t count = (size_t)texture->width * texture->height;
@@ -106,7 +106,7 @@ nebel_result nb_mask_make(nb_alpha_mask *mask, const nebel_allocator *allocator,
     return NEBEL_OK;
 }
 
-void nb_mask_free(nb_alpha_mask *mask, const nebel_allocator *allocator)
+void nb_alpha_mask_free(nb_alpha_mask *mask, const nebel_allocator *allocator)
 {
     nb_release(allocator, mask->corners);
     nb_release(allocator, mask->clearances);
@@ -123,7 +123,7 @@ static uint32_t find_cell(double place, uint32_t size, double *within)
     return round >= 0 && round < size ? (uint32_t)round : 0;
 }
 
-int nb_mask_is_hole(const nb_alpha_mask *mask, float u, float v)
+int nb_alpha_mask_is_hole(const nb_alpha_mask *mask, float u, float v)
 {
     const double x = isfinite(u) ? (double)u * mask->width : 0, y = isfinite(v) ? (double)v * mask->height : 0;
     double f, g;
@@ -142,7 +142,8 @@ int nb_mask_is_hole(const nb_alpha_mask *mask, float u, float v)
 static const double margin = 1e-6;
 
 /* Of lines that are not walked the place is of no meaning, but within the mask. */
-NB_ALWAYS_INLINE void begin_axis(nb_mask_walk *walk, const nb_mask_lines *lines, int axis, double size, int *is_walked)
+NB_ALWAYS_INLINE void begin_axis(nb_alpha_mask_walk *walk, const nb_alpha_mask_lines *lines, int axis, double size,
+                                 int *is_walked)
 {
     const double reach = NB_MASK_REACH, cells = (double)walk->mask->width * walk->mask->height;
     const int is_small = cells <= NB_MASK_LARGEST;
@@ -159,7 +160,7 @@ NB_ALWAYS_INLINE void begin_axis(nb_mask_walk *walk, const nb_mask_lines *lines,
     }
 }
 
-NB_CLONES static void begin_lines(nb_mask_walk *walk, const nb_mask_lines *lines)
+NB_CLONES static void begin_lines(nb_alpha_mask_walk *walk, const nb_alpha_mask_lines *lines)
 {
     int is_walked[NB_PACKET];
     for (int i = 0; i < NB_PACKET; i++) is_walked[i] = lines->is_asked[i];
@@ -173,7 +174,7 @@ NB_CLONES static void begin_lines(nb_mask_walk *walk, const nb_mask_lines *lines
     }
 }
 
-void nb_mask_begin(nb_mask_walk *walk, const nb_alpha_mask *mask, const nb_mask_lines *lines)
+void nb_alpha_mask_begin(nb_alpha_mask_walk *walk, const nb_alpha_mask *mask, const nb_alpha_mask_lines *lines)
 {
     walk->mask = mask;
     walk->is_over = 0;
@@ -199,7 +200,7 @@ typedef struct nb_mask_step {
     const int32_t column = cell - (size) * (int32_t)((cell + 0.5) * (inverse))
 
 /* Returns whether any line may have changes on its way. */
-NB_ALWAYS_INLINE int enter_cells(const nb_mask_walk *walk, nb_mask_step *step)
+NB_ALWAYS_INLINE int enter_cells(const nb_alpha_mask_walk *walk, nb_mask_step *step)
 {
     const nb_alpha_mask *mask = walk->mask;
     const uint32_t *restrict corners = mask->corners, *restrict clearances = mask->clearances;
@@ -280,7 +281,7 @@ typedef struct nb_mask_ends {
     } while (0)
 
 /* Returns whether there is any end. */
-NB_ALWAYS_INLINE int take_step(nb_mask_walk *walk, const nb_mask_step *step, nb_mask_ends *ends)
+NB_ALWAYS_INLINE int take_step(nb_alpha_mask_walk *walk, const nb_mask_step *step, nb_mask_ends *ends)
 {
     int any = 0, goes_on = 0;
     NB_SIMD
@@ -310,7 +311,7 @@ NB_ALWAYS_INLINE int take_step(nb_mask_walk *walk, const nb_mask_step *step, nb_
 }
 
 /* Without a branch, as it would be guessed wrong every other time. */
-NB_ALWAYS_INLINE void list_stretches(nb_mask_walk *walk, const nb_mask_ends *ends)
+NB_ALWAYS_INLINE void list_stretches(nb_alpha_mask_walk *walk, const nb_mask_ends *ends)
 {
     for (uint32_t i = 0; i < NB_PACKET; i++)
         for (int k = 0; k < 4; k++) {
@@ -319,7 +320,7 @@ NB_ALWAYS_INLINE void list_stretches(nb_mask_walk *walk, const nb_mask_ends *end
         }
 }
 
-NB_CLONES static void walk_lines(nb_mask_walk *walk)
+NB_CLONES static void walk_lines(nb_alpha_mask_walk *walk)
 {
     nb_mask_step step;
     nb_mask_ends ends;
@@ -329,7 +330,7 @@ NB_CLONES static void walk_lines(nb_mask_walk *walk)
     }
 }
 
-int nb_mask_next(nb_mask_walk *walk)
+int nb_alpha_mask_next(nb_alpha_mask_walk *walk)
 {
     walk->count = 0;
     walk_lines(walk);

@@ -23,12 +23,12 @@ typedef struct nb_alpha_mask {
 } nb_alpha_mask;
 
 /* Errors: MEMORY. */
-nebel_result nb_mask_make(nb_alpha_mask *mask, const nebel_allocator *allocator, const nebel_scene_data *scene,
-                          int32_t number, float cutoff);
-void nb_mask_free(nb_alpha_mask *mask, const nebel_allocator *allocator);
+nebel_result nb_alpha_mask_make(nb_alpha_mask *mask, const nebel_allocator *allocator, const nebel_scene_data *scene,
+                                int32_t number, float cutoff);
+void nb_alpha_mask_free(nb_alpha_mask *mask, const nebel_allocator *allocator);
 
 /* Whether there is a hole at these texture coordinates. What is no number is 0. */
-int nb_mask_is_hole(const nb_alpha_mask *mask, float u, float v);
+int nb_alpha_mask_is_hole(const nb_alpha_mask *mask, float u, float v);
 
 /* A stretch of a line without holes. */
 typedef struct nb_solid {
@@ -37,7 +37,7 @@ typedef struct nb_solid {
 } nb_solid;
 
 /* The lines of a packet over a mask, each from s = 0 to 1. Its place at s is start + s way, in cells; never below 0. */
-typedef struct nb_mask_walk {
+typedef struct nb_alpha_mask_walk {
     const nb_alpha_mask *mask;
     double start[2][NB_PACKET], way[2][NB_PACKET], inverse[2][NB_PACKET]; /* of the way; never infinite */
     uint32_t shift[NB_PACKET];                                            /* of the clearance for its way */
@@ -46,21 +46,21 @@ typedef struct nb_mask_walk {
     int is_over;                       /* all lines have been walked */
     nb_solid found[2 * NB_PACKET + 1]; /* by the last call */
     uint32_t count;
-} nb_mask_walk;
+} nb_alpha_mask_walk;
 
 /* Lines with more than so many texels along either axis, and those over a mask of more, are taken for solid. */
 enum { NB_MASK_REACH = 1 << 20, NB_MASK_LARGEST = 1 << 30 };
 
 /* Places between which lines run, in texels; 0 is the border of the first. */
-typedef struct nb_mask_lines {
+typedef struct nb_alpha_mask_lines {
     double from[2][NB_PACKET], to[2][NB_PACKET];
     int is_asked[NB_PACKET];
-} nb_mask_lines;
+} nb_alpha_mask_lines;
 
 /* Lines that are not walked are found at once. */
-void nb_mask_begin(nb_mask_walk *walk, const nb_alpha_mask *mask, const nb_mask_lines *lines);
+void nb_alpha_mask_begin(nb_alpha_mask_walk *walk, const nb_alpha_mask *mask, const nb_alpha_mask_lines *lines);
 
 /* Finds more stretches, those of a line one after the other; 0 where there are none left. */
-int nb_mask_next(nb_mask_walk *walk);
+int nb_alpha_mask_next(nb_alpha_mask_walk *walk);
 
 #endif

@@ -200,7 +200,7 @@ static double ground_at(const nb_planet *world, const nebel_ray *ray)
     double up[3];
     const double far = up_at(world, ray->origin, up);
     if (!(far > world->radius)) return nb_vector_dot(up, ray->direction) < 0 ? 0 : HUGE_VAL;
-    const double t = nb_world_ground(world, ray->origin, ray->direction);
+    const double t = nb_planet_ground(world, ray->origin, ray->direction);
     return t > 0 ? t : HUGE_VAL;
 }
 
@@ -229,7 +229,7 @@ double nb_media_sun_left(const nb_media *media, const double place[3], const dou
     int nearest = 0;
     double left = 1;
     for (int i = 1; i < media->planet_count; i++)
-        if (nb_world_power(&media->planets[i].world, place) < nb_world_power(&media->planets[nearest].world, place))
+        if (nb_planet_power(&media->planets[i].world, place) < nb_planet_power(&media->planets[nearest].world, place))
             nearest = i;
     for (int i = 0; i < media->planet_count; i++) {
         const nb_planet *world = &media->planets[i].world;

@@ -45,7 +45,7 @@ NB_ALWAYS_INLINE int sort_in(float *restrict passage, nb_boundary_crossings *pas
     NB_SIMD
     for (int i = 0; i < NB_PACKET; i++) any |= passage[i] < INFINITY;
     if (!any) return 1;
-    if (passages->count == NB_MOST_PASSAGES) return 0;
+    if (passages->count == NB_MAX_PASSAGES) return 0;
     memcpy(passages->rows[passages->count++], passage, sizeof passages->rows[0]);
     return 1;
 }
@@ -125,8 +125,8 @@ NB_CLONES static int find_passages(const nb_shadow_boundaries *walls, const nb_b
     return alternate(passages, is_dark);
 }
 
-int nb_passages_find(const nb_shadow_boundaries *walls, const nb_beam *beam, const nb_shaft_rays *rays, int is_dark,
-                     nb_boundary_crossings *passages)
+int nb_boundary_crossings_find(const nb_shadow_boundaries *walls, const nb_beam *beam, const nb_shaft_rays *rays,
+                               int is_dark, nb_boundary_crossings *passages)
 {
     return find_passages(walls, beam, rays, is_dark, passages);
 }

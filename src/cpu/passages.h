@@ -6,12 +6,12 @@
 
 #include <string.h>
 
-enum { NB_MOST_PASSAGES = 48 };
+enum { NB_MAX_PASSAGES = 48 };
 
 /* The first of each ray, the second of each, and so on, in m from the start of the ray, INFINITY where there is none.
  * The last bit of the number is not a part of it: it is 1 where the ray enters a shadow. */
 typedef struct nb_boundary_crossings {
-    float rows[NB_MOST_PASSAGES][NB_PACKET];
+    float rows[NB_MAX_PASSAGES][NB_PACKET];
     int count; /* of rows */
 } nb_boundary_crossings;
 
@@ -24,7 +24,7 @@ static inline int nb_enters(float passage)
 
 /* Of rays that begin where a place is in shadow, or not, and end before they pass a surface. Returns 0 where light and
  * shadow do not alternate, or where there are too many passages: then rounding has hidden a wall, or it is not known. */
-int nb_passages_find(const nb_shadow_boundaries *walls, const nb_beam *beam, const nb_shaft_rays *rays, int is_dark,
-                     nb_boundary_crossings *passages);
+int nb_boundary_crossings_find(const nb_shadow_boundaries *walls, const nb_beam *beam, const nb_shaft_rays *rays,
+                               int is_dark, nb_boundary_crossings *passages);
 
 #endif

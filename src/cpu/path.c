@@ -52,7 +52,7 @@ typedef struct path {
 /* The direction at an angle to the axis, by chance around it. */
 static void turn_about(const double axis[3], double cosine, nb_rng *chance, double direction[3])
 {
-    const double angle = 2 * PI * nb_chance_next(chance), sine = sqrt(fmax(0, 1 - cosine * cosine));
+    const double angle = 2 * PI * nb_rng_next(chance), sine = sqrt(fmax(0, 1 - cosine * cosine));
     double across[3] = {0, 0, 0}, third[3];
     int least = 0;
     for (int i = 1; i < 3; i++)
@@ -73,7 +73,7 @@ static void reflect_diffusely(const nb_path_vertex *at, nb_rng *chance, double d
     double normal[3] = {(double)at->normal[0], (double)at->normal[1], (double)at->normal[2]};
     const double side[3] = {(double)at->side[0], (double)at->side[1], (double)at->side[2]};
     (void)nb_vector_make_unit(normal);
-    turn_about(normal, sqrt(1 - nb_chance_next(chance)), chance, direction);
+    turn_about(normal, sqrt(1 - nb_rng_next(chance)), chance, direction);
     const double below = nb_vector_dot(direction, side);
     for (int i = 0; i < 3 && below < 0; i++) direction[i] -= 2 * below * side[i];
 }
@@ -97,7 +97,7 @@ static nebel_result add_arriving(path *p, const double origin[3], const double d
     memcpy(way.ray.direction, direction, sizeof way.ray.direction);
     double transmittance = 1;
     nebel_result result = NEBEL_OK;
-    if (!nb_media_are_empty(&world->media)) result = nb_track_transmittance(&way, &p->chance, &transmittance);
+    if (!nb_media_are_empty(&world->media)) result = nb_tracking_transmittance(&way, &p->chance, &transmittance);
     if (result == NEBEL_OK) add(p, light, share * transmittance);
     return result;
 }
@@ -130,8 +130,8 @@ static lit_ray light_ray(const nb_path_scene *world, const nb_tracker *track)
 {
     lit_ray lit = {.track = *track, .sum = 0};
     if (nb_media_are_empty(&world->media) || world->scene->light_count == 0) return lit;
-    lit.track.ray.t_max = nb_track_reach(&track->ray);
-    lit.sum = nb_lamps_sum(world->scene, nb_lamp_weight_along, &lit.track.ray);
+    lit.track.ray.t_max = nb_tracking_reach(&track->ray);
+    lit.sum = nb_lights_sum(world->scene, nb_light_weight_along, &lit.track.ray);
     return lit;
 }
 
@@ -139,10 +139,10 @@ static chosen_lamp choose_lamp(path *p, const double place[3])
 {
     const nebel_scene_data *scene = p->world->scene;
     const nebel_ray here = {.origin = {place[0], place[1], place[2]}};
-    const double sum = nb_lamps_sum(scene, nb_lamp_weight_at, &here);
+    const double sum = nb_lights_sum(scene, nb_light_weight_at, &here);
     if (!(sum > 0)) return (chosen_lamp){.lamp = NULL};
-    const nebel_light *lamp = nb_lamps_choose(scene, nb_lamp_weight_at, &here, sum, nb_chance_next(&p->chance));
-    return (chosen_lamp){lamp, nb_lamp_sight_from(lamp, place), nb_lamp_weight_at(lamp, &here) / sum};
+    const nebel_light *lamp = nb_lights_choose(scene, nb_light_weight_at, &here, sum, nb_rng_next(&p->chance));
+    return (chosen_lamp){lamp, nb_light_sight_from(lamp, place), nb_light_weight_at(lamp, &here) / sum};
 }
 
 /* `share` of the light of lamps that comes to a place in fog, times what the phase function sends along the path. */
@@ -164,7 +164,7 @@ static nebel_result choose_scatterer(path *p, const nebel_sample_point *place, c
 {
     const nb_path_scene *world = p->world;
     const int channel = world->is_grey ? -1 : p->channel;
-    return nb_media_choose(&world->media, place, matter, channel, nb_chance_next(&p->chance), scatterer);
+    return nb_media_choose(&world->media, place, matter, channel, nb_rng_next(&p->chance), scatterer);
 }
 
 /* Places in light are found in two ways: where a flight collides, and as lamps see the ray pass. This is how many there
@@ -173,7 +173,7 @@ static nebel_result choose_scatterer(path *p, const nebel_sample_point *place, c
  * Any weights that add up to 1 are right in the mean. */
 static double density_of(const path *p, const lit_ray *lit, double extinction, double t)
 {
-    return extinction + nb_lamps_density(p->world->scene, &lit->track.ray, lit->sum, t);
+    return extinction + nb_lights_density(p->world->scene, &lit->track.ray, lit->sum, t);
 }
 
 /* Where a flight collides, once the throughput is that of what is scattered there. */
@@ -193,18 +193,18 @@ static nebel_result add_passing_light(path *p, const lit_ray *lit)
     if (!(lit->sum > 0)) return NEBEL_OK;
     const nebel_ray *ray = &lit->track.ray;
     const nebel_light *lamp =
-        nb_lamps_choose(world->scene, nb_lamp_weight_along, ray, lit->sum, nb_chance_next(&p->chance));
+        nb_lights_choose(world->scene, nb_light_weight_along, ray, lit->sum, nb_rng_next(&p->chance));
     const nb_light_pass passing = nb_passing_of(lamp, ray);
     nb_tracker way = lit->track;
-    way.ray.t_max = nb_passing_draw(&passing, nb_chance_next(&p->chance));
+    way.ray.t_max = nb_passing_draw(&passing, nb_rng_next(&p->chance));
     nebel_sample_point place;
     nb_matter matter;
     nb_scatterer scatterer;
     double transmittance, share[3];
-    nebel_result result = nb_track_look(&way, way.ray.t_max, NB_MEDIA_ALL, &place, &matter);
+    nebel_result result = nb_tracking_look(&way, way.ray.t_max, NB_MEDIA_ALL, &place, &matter);
     if (result == NEBEL_OK) result = choose_scatterer(p, &place, &matter, &scatterer);
     if (result != NEBEL_OK || scatterer.probability == 0) return result;
-    result = nb_track_transmittance(&way, &p->chance, &transmittance);
+    result = nb_tracking_transmittance(&way, &p->chance, &transmittance);
     if (result != NEBEL_OK || transmittance == 0) return result;
     const double density = density_of(p, lit, matter.all.extinction[p->channel], way.ray.t_max);
     for (int c = 0; c < 3; c++) share[c] = transmittance * scatterer.scattering[c] / scatterer.probability / density;
@@ -278,7 +278,7 @@ static void leave_sunward(path *p, const nb_turns *turns, const double place[3])
     path other;
     double direction[3];
     memcpy(&other, p, offsetof(path, waiting));
-    turn_about(p->world->to_sun, nb_turns_draw(turns, nb_chance_next(&p->chance)), &p->chance, direction);
+    turn_about(p->world->to_sun, nb_turns_draw(turns, nb_rng_next(&p->chance)), &p->chance, direction);
     head(&other, place, direction, weigh(&other, turns, SUNWARD, direction));
     waiting_path *next = &p->waiting[p->waiting_count++];
     *next = (waiting_path){.ray = other.ray, .promise = other.promise, .bounces = p->bounces};
@@ -289,7 +289,7 @@ static void leave_sunward(path *p, const nb_turns *turns, const double place[3])
 static void turn(path *p, const nb_scatterer *scatterer, const double place[3])
 {
     const nb_turns *turns = scatterer->turns;
-    const double chance = nb_chance_next(&p->chance);
+    const double chance = nb_rng_next(&p->chance);
     double direction[3];
     if (turns == NULL) {
         turn_about(p->ray.direction, nebel_sample_phase(&scatterer->phase, chance), &p->chance, direction);
@@ -298,7 +298,7 @@ static void turn(path *p, const nb_scatterer *scatterer, const double place[3])
         return;
     }
     const double part = turns->is_peaked && p->world->has_sun && p->waiting_count < MOST_WAITING ? SUNWARD : 0;
-    if (part > 0 && nb_chance_next(&p->chance) < part) leave_sunward(p, turns, place);
+    if (part > 0 && nb_rng_next(&p->chance) < part) leave_sunward(p, turns, place);
     turn_about(p->ray.direction, nb_turns_draw(turns, chance), &p->chance, direction);
     head(p, place, direction, weigh(p, turns, part, direction));
 }
@@ -343,7 +343,7 @@ static int survives(path *p)
 {
     const double most = p->promise * fmax(p->throughput[0], fmax(p->throughput[1], p->throughput[2]));
     if (most >= SMALL_THROUGHPUT) return 1;
-    if (nb_chance_next(&p->chance) * SMALL_THROUGHPUT >= most) return 0;
+    if (nb_rng_next(&p->chance) * SMALL_THROUGHPUT >= most) return 0;
     for (int c = 0; c < 3; c++) p->throughput[c] *= SMALL_THROUGHPUT / most;
     return 1;
 }
@@ -352,13 +352,13 @@ static int survives(path *p)
 static nebel_result pass(path *p, const nb_tracker *track, nb_free_flight *flight)
 {
     memset(flight, 0, sizeof *flight);
-    return nb_track_transmittance(track, &p->chance, &flight->weight);
+    return nb_tracking_transmittance(track, &p->chance, &flight->weight);
 }
 
 static nebel_result fly(path *p, const nb_tracker *track, const lit_ray *lit, nb_free_flight *flight)
 {
     nebel_result result = add_passing_light(p, lit);
-    if (result == NEBEL_OK) result = nb_track_fly(track, &p->chance, flight);
+    if (result == NEBEL_OK) result = nb_tracking_fly(track, &p->chance, flight);
     if (result == NEBEL_OK) add(p, flight->shone, 1);
     return result;
 }
@@ -441,7 +441,7 @@ nebel_result nb_path_trace(const nb_path_scene *world, const nb_path_eye *eye, c
     static const path_share whole[] = {ALL}, parts[] = {SCATTERED, PASSED};
     const int has_air = world->media.planet_count > 0;
     const path_share *shares = has_air ? parts : whole;
-    const nb_rng stream = nb_chance_of(number[0], number[1], number[2], number[3]);
+    const nb_rng stream = nb_rng_of(number[0], number[1], number[2], number[3]);
     memset(light, 0, sizeof *light);
     for (int c = 0; c < (world->is_grey ? 1 : 3); c++) {
         nb_rng chance = stream;

@@ -164,7 +164,7 @@ void nb_planet_medium_set(nb_planet_medium *medium, const nebel_planet *planet, 
     const nebel_atmosphere_desc *desc = &planet->atmosphere_desc;
     const double top = desc->radius + desc->thickness;
     memset(medium, 0, sizeof *medium);
-    medium->world = nb_world_of(planet);
+    medium->world = nb_planet_of(planet);
     medium->time = time;
     set_clouds(medium, planet);
     add_shell(&medium->shells, desc->radius, top);

@@ -20,7 +20,7 @@ static nebel_result set_planets(nb_frame *frame, double time)
     const nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
     nb_planet worlds[NEBEL_MAX_PLANETS];
-    const int count = nb_worlds_set(worlds, scene, frame->view.position);
+    const int count = nb_planets_set(worlds, scene, frame->view.position);
     if (count == 0) return NEBEL_OK;
     frame->planets = nb_allocate(&renderer->allocator, (size_t)count, sizeof *frame->planets);
     if (frame->planets == NULL)
@@ -28,15 +28,15 @@ static nebel_result set_planets(nb_frame *frame, double time)
     for (int i = 0; i < count; i++) nb_planet_medium_set(&frame->planets[i], worlds[i].planet, time);
     frame->world.media.planets = frame->planets;
     frame->world.media.planet_count = count;
-    frame->world.disc = frame->air.sun_radius = nb_worlds_disc(scene);
-    nb_worlds_disc_light(scene, frame->air.sun_radius, frame->air.sun_light);
+    frame->world.disc = frame->air.sun_radius = nb_planets_disc(scene);
+    nb_planets_disc_light(scene, frame->air.sun_radius, frame->air.sun_light);
     frame->air.pixel = nb_view_pixel(&frame->view, frame->height);
-    if (nb_scene_owns_ambient(scene))
+    if (nb_surface_lighting_owns_ambient(scene))
         frame->world.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_CONSTANT};
     return NEBEL_OK;
 }
 
-nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc)
+nebel_result nb_path_batch_set(nb_frame *frame, const nebel_frame_desc *desc)
 {
     const nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
@@ -61,7 +61,7 @@ nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc)
     return result;
 }
 
-void nb_reference_free(nb_frame *frame)
+void nb_path_batch_free(nb_frame *frame)
 {
     nb_release(&frame->renderer->allocator, frame->planets);
     frame->planets = NULL;
@@ -90,7 +90,7 @@ static void look(const nb_frame *frame, nb_scratch *scratch, int i, nb_path_eye 
     const double advance = frame->view.advance * (double)scratch->rays.length[i];
     eye->first.t = eye->ray.t_max = advance + eye->first.t;
     nb_meeting_end_at_ground(&frame->world, &eye->ray, &eye->first);
-    nb_air_background(&frame->air, &frame->lighting, &scratch->rays, i, eye->background);
+    nb_cpu_planets_background(&frame->air, &frame->lighting, &scratch->rays, i, eye->background);
     if (!eye->first.is_ground) return;
     scratch->hits.surface[i] = NB_GROUND;
     scratch->hits.t[i] = (float)(eye->first.t - advance);
@@ -118,7 +118,7 @@ static void clear_sums(uint32_t first, nb_sums *sums)
     }
 }
 
-nebel_result nb_reference_trace(const nb_frame *frame, const nb_batch_place *place, nb_scratch *scratch)
+nebel_result nb_path_batch_trace(const nb_frame *frame, const nb_batch_place *place, nb_scratch *scratch)
 {
     const nebel_renderer *renderer = frame->renderer;
     if (nb_hits_any(&scratch->hits))
@@ -148,7 +148,7 @@ static double standard_error(double sum, double square, uint32_t n)
     return n > 1 ? sqrt(fmax(square / n - mean * mean, 0) / (n - 1)) : 0;
 }
 
-void nb_reference_finish(const nb_frame *frame, const nb_batch_place *place, const nb_scratch *scratch)
+void nb_path_batch_finish(const nb_frame *frame, const nb_batch_place *place, const nb_scratch *scratch)
 {
     const nb_sums *sums = &scratch->sums;
     for (uint32_t i = 0; i < NB_BATCH; i++) {

@@ -265,8 +265,8 @@ void nebel_destroy_renderer(nebel_renderer *renderer)
     nb_sun_cells_free(&renderer->sun_cells, &allocator);
     nb_shadow_tree_free(&renderer->lamp_tree, &allocator);
     for (int i = 0; i < renderer->threads && renderer->scratch != NULL; i++) {
-        nb_shafts_free(&renderer->scratch[i].shafts, &allocator);
-        nb_lamp_shafts_free(&renderer->scratch[i].lamp_shafts, &allocator);
+        nb_sun_shafts_free(&renderer->scratch[i].shafts, &allocator);
+        nb_light_shafts_free(&renderer->scratch[i].lamp_shafts, &allocator);
     }
     if (renderer->fog != NULL) nebel_release_snapshot(renderer->fog);
     nb_release(&allocator, renderer->scratch_memory);

@@ -87,7 +87,7 @@ typedef struct nb_scratch {
     nb_sun_shafts shafts;
     nb_light_shafts lamp_shafts;
     nb_shadow_rays lamp;
-    nb_air_scratch air;
+    nb_cpu_planets_scratch air;
     nb_shell_scratch shells;
     nb_cloud_scratch clouds;
     nb_single_ray lone; /* of a path behind its first surface */
@@ -166,12 +166,12 @@ void nb_batch_find_centers(const nb_frame *frame, const nb_batch_place *place, n
 nebel_result nb_batch_light(const nb_frame *frame, nb_scratch *scratch);
 
 /* The reference in nb_batch_render's place: after first hits are found. Errors: VALUE, UNSUPPORTED, MEMORY; UNBOUNDED. */
-nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc);
-void nb_reference_free(nb_frame *frame);
-nebel_result nb_reference_trace(const nb_frame *frame, const nb_batch_place *place, nb_scratch *scratch);
+nebel_result nb_path_batch_set(nb_frame *frame, const nebel_frame_desc *desc);
+void nb_path_batch_free(nb_frame *frame);
+nebel_result nb_path_batch_trace(const nb_frame *frame, const nb_batch_place *place, nb_scratch *scratch);
 
 /* Colours in the precision that they were summed in, and the standard errors. */
-void nb_reference_finish(const nb_frame *frame, const nb_batch_place *place, const nb_scratch *scratch);
+void nb_path_batch_finish(const nb_frame *frame, const nb_batch_place *place, const nb_scratch *scratch);
 
 /* Adds the sample of a batch to the planes: the first sample replaces what is there. */
 void nb_planes_add(const nb_frame *frame, const nb_batch_place *place, int is_first, nb_scratch *scratch);

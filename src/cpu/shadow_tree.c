@@ -185,7 +185,7 @@ static nebel_result build(nb_shadow_tree *tree, const nb_geometry *geometry, nb_
 {
     static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     nb_occluders *casters = &making->casters;
-    if (nb_casters_list(geometry, axes, 0, casters) != NEBEL_OK) return NEBEL_ERROR_MEMORY;
+    if (nb_occluders_list(geometry, axes, 0, casters) != NEBEL_OK) return NEBEL_ERROR_MEMORY;
     making->keys = nb_allocate(&geometry->allocator, casters->count + 1, sizeof *making->keys);
     making->other_keys = nb_allocate(&geometry->allocator, casters->count + 1, sizeof *making->other_keys);
     if (making->keys == NULL || making->other_keys == NULL) return NEBEL_ERROR_MEMORY;
@@ -196,13 +196,13 @@ static nebel_result build(nb_shadow_tree *tree, const nb_geometry *geometry, nb_
     return NEBEL_OK;
 }
 
-nebel_result nb_shadow_tree_set_lamps(nb_shadow_tree *tree, const nb_geometry *geometry, int threads)
+nebel_result nb_shadow_tree_set_lights(nb_shadow_tree *tree, const nb_geometry *geometry, int threads)
 {
     nb_making making = {.keys = NULL};
     if (tree->is_built && memcmp(tree->origin, geometry->origin, sizeof tree->origin) == 0) return NEBEL_OK;
     nb_shadow_tree_free(tree, &geometry->allocator);
     const nebel_result result = build(tree, geometry, &making, threads);
-    nb_casters_free(&making.casters, &geometry->allocator);
+    nb_occluders_free(&making.casters, &geometry->allocator);
     nb_release(&geometry->allocator, making.keys);
     nb_release(&geometry->allocator, making.other_keys);
     if (result != NEBEL_OK) {

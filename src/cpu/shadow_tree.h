@@ -30,7 +30,7 @@ typedef struct nb_shadow_tree {
 } nb_shadow_tree;
 
 /* Builds, or keeps what is built where that is for the same place. Errors: MEMORY; there is no tree then. */
-nebel_result nb_shadow_tree_set_lamps(nb_shadow_tree *tree, const nb_geometry *geometry, int threads);
+nebel_result nb_shadow_tree_set_lights(nb_shadow_tree *tree, const nb_geometry *geometry, int threads);
 
 /* NULL: the triangle has no holes. */
 static inline const nb_masked_occluder *nb_shadow_tree_sheet(const nb_shadow_tree *tree, size_t triangle)

@@ -27,17 +27,17 @@ typedef struct nb_shaft_rays {
 } nb_shaft_rays;
 
 /* What of each ray is within the box and asked for, in m from its start. */
-void nb_shafts_clip(const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance, float *from,
-                    float *to);
+void nb_sun_shafts_clip(const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance,
+                        float *from, float *to);
 
 /* Keeps the last shadow of a lane, as a part of the one that was kept before where it touches that. Returns 0 when
  * memory is out. */
-int nb_shafts_keep(nb_sun_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_shaft_rays *rays);
+int nb_sun_shafts_keep(nb_sun_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_shaft_rays *rays);
 
 /* The boundaries of a packet, of the shadows that were kept and the last one of each ray; `first` is as `offsets` of nebel_ray_visibility.
  * Returns 0 when memory is out. */
-int nb_shafts_finish(nb_sun_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays, const float *length,
-                     double advance, uint32_t *first);
+int nb_sun_shafts_finish(nb_sun_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays,
+                         const float *length, double advance, uint32_t *first);
 
 /* Whether nothing is asked for of a packet. */
 static inline int nb_is_empty(const float *from, const float *to)
@@ -77,7 +77,7 @@ static inline int nb_replace(nb_sun_shafts *shafts, const nebel_allocator *alloc
 {
     for (uint32_t i = 0; i < NB_PACKET; i++) {
         if (!fresh[i]) continue;
-        if (!nb_shafts_keep(shafts, allocator, i, rays)) return 0;
+        if (!nb_sun_shafts_keep(shafts, allocator, i, rays)) return 0;
         rays->enter[i] = found->enter[i];
         rays->leave[i] = found->leave[i];
     }

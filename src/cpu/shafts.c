@@ -31,8 +31,8 @@ NB_CLONES static void clip(const nb_lit_box *box, const nb_ray_batch *rays, doub
     }
 }
 
-void nb_shafts_clip(const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance, float *from,
-                    float *to)
+void nb_sun_shafts_clip(const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance,
+                        float *from, float *to)
 {
     clip(box, rays, advance, distance, from, to);
 }
@@ -54,7 +54,7 @@ NB_CLONES static void turn(const nb_sun_cells *cells, const nb_ray_batch *rays, 
 
 /* ---- the eye --------------------------------------------------------------------------------- */
 
-nb_eye_visibility nb_shafts_eye(const nb_sun_cells *cells, const nb_geometry *geometry, const nb_view *view)
+nb_eye_visibility nb_sun_shafts_eye(const nb_sun_cells *cells, const nb_geometry *geometry, const nb_view *view)
 {
     struct RTCIntersectContext context;
     float eye[3], turned[3], margin = 0;
@@ -65,7 +65,7 @@ nb_eye_visibility nb_shafts_eye(const nb_sun_cells *cells, const nb_geometry *ge
         turned[a] = axis[0] * eye[0] + axis[1] * eye[1] + axis[2] * eye[2];
         margin = nb_most(margin, 4 * nb_closeness * fabsf(eye[a]));
     }
-    if (nb_walls_meet(&cells->walls, turned, margin)) return NB_EYE_UNKNOWN;
+    if (nb_shadow_boundaries_meet(&cells->walls, turned, margin)) return NB_EYE_UNKNOWN;
     struct RTCRay ray = {.org_x = eye[0],
                          .org_y = eye[1],
                          .org_z = eye[2],
@@ -87,7 +87,7 @@ static int touch(float enter, float leave, float other_enter, float other_leave)
     return (enter <= other_leave + gap) & (leave >= other_enter - gap);
 }
 
-int nb_shafts_keep(nb_sun_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_shaft_rays *rays)
+int nb_sun_shafts_keep(nb_sun_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_shaft_rays *rays)
 {
     const float enter = rays->enter[lane], leave = rays->leave[lane];
     if (!(enter <= leave)) return 1;
@@ -267,7 +267,7 @@ NB_CLONES static int walk(nb_sun_shafts *shafts, const nebel_allocator *allocato
             recent.children[child % RECENT] = child;
             const nb_masked_occluder *sheet = nb_sun_cells_sheet(cells, prism);
             cross_prism(&cells->prisms[prism], rays, &found);
-            if (sheet != NULL && !nb_sheet_cast(sheet, NULL, shafts, allocator, &found, rays)) return 0;
+            if (sheet != NULL && !nb_masked_triangle_cast(sheet, NULL, shafts, allocator, &found, rays)) return 0;
             if (sheet != NULL) continue;
         } else {
             count += list_children(cells->nodes, child, beam, visits + count);
@@ -355,11 +355,11 @@ static int make_room(nb_sun_shafts *shafts, const nebel_allocator *allocator)
     return grown && reserve_toggles(shafts, allocator, 2 * shafts->shadow_count);
 }
 
-int nb_shafts_finish(nb_sun_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays, const float *length,
-                     double advance, uint32_t *first)
+int nb_sun_shafts_finish(nb_sun_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays,
+                         const float *length, double advance, uint32_t *first)
 {
     for (uint32_t i = 0; i < NB_PACKET; i++)
-        if (!nb_shafts_keep(shafts, allocator, i, rays)) return 0;
+        if (!nb_sun_shafts_keep(shafts, allocator, i, rays)) return 0;
     size_t ends[NB_PACKET], begin = 0;
     if (shafts->shadow_count > 0 && !make_room(shafts, allocator)) return 0;
     if (shafts->shadow_count > 0) sort_by_lane(shafts, ends);
@@ -385,7 +385,7 @@ static int find_by_prisms(nb_sun_shafts *shafts, const nebel_allocator *allocato
     nb_beam_set(&beam, packet);
     shafts->shadow_count = 0;
     return walk(shafts, allocator, cells, &beam, packet) &&
-           nb_shafts_finish(shafts, allocator, packet, length, advance, first);
+           nb_sun_shafts_finish(shafts, allocator, packet, length, advance, first);
 }
 
 /* What of the passages of a ray is asked for, as toggles. There is room for them. */
@@ -410,7 +410,7 @@ static int find_passages_from_eye(const nb_shadow_boundaries *walls, const nb_sh
     nb_beam beam;
     for (int i = 0; i < NB_PACKET; i++) rays.from[i] = packet->from[i] < packet->to[i] ? -skipped[i] : INFINITY;
     nb_beam_set(&beam, &rays);
-    return nb_passages_find(walls, &beam, &rays, is_dark, passages);
+    return nb_boundary_crossings_find(walls, &beam, &rays, is_dark, passages);
 }
 
 static int find_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
@@ -436,9 +436,9 @@ static int find_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, 
     return 1;
 }
 
-nebel_result nb_shafts_find(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
-                            const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance,
-                            nb_eye_visibility eye)
+nebel_result nb_sun_shafts_find(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
+                                const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance,
+                                nb_eye_visibility eye)
 {
     float from[NB_BATCH], to[NB_BATCH];
     clip(box, rays, advance, distance, from, to);
@@ -457,7 +457,7 @@ nebel_result nb_shafts_find(nb_sun_shafts *shafts, const nebel_allocator *alloca
     return NEBEL_OK;
 }
 
-void nb_shafts_free(nb_sun_shafts *shafts, const nebel_allocator *allocator)
+void nb_sun_shafts_free(nb_sun_shafts *shafts, const nebel_allocator *allocator)
 {
     nb_release(allocator, shafts->shadows);
     nb_release(allocator, shafts->sorted);

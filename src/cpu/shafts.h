@@ -37,15 +37,15 @@ typedef struct nb_sun_shafts {
 
 /* Whether the eye of the view is in shadow, in the sun that cells are made for. UNKNOWN, too, where it is so near the
  * border of a shadow that rounding would say. */
-nb_eye_visibility nb_shafts_eye(const nb_sun_cells *cells, const nb_geometry *geometry, const nb_view *view);
+nb_eye_visibility nb_sun_shafts_eye(const nb_sun_cells *cells, const nb_geometry *geometry, const nb_view *view);
 
 /* `distance` is how far fog is asked for along each ray, 0 where it is not, and `advance` as in nb_view. Where the eye is
  * known rays must end before they pass a surface; the ends of shadows are found with far less work then. Errors:
  * MEMORY. */
-nebel_result nb_shafts_find(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
-                            const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance,
-                            nb_eye_visibility eye);
+nebel_result nb_sun_shafts_find(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
+                                const nb_lit_box *box, const nb_ray_batch *rays, double advance, const float *distance,
+                                nb_eye_visibility eye);
 
-void nb_shafts_free(nb_sun_shafts *shafts, const nebel_allocator *allocator);
+void nb_sun_shafts_free(nb_sun_shafts *shafts, const nebel_allocator *allocator);
 
 #endif

@@ -3,14 +3,14 @@
 #include <math.h>
 
 /* Where stretches of rays are on the sheet that keeps the light from them. */
-typedef struct nb_sheet_lines {
-    nb_mask_lines lines;
+typedef struct nb_masked_triangle_lines {
+    nb_alpha_mask_lines lines;
     double near[NB_PACKET], far[NB_PACKET]; /* their ends are so many times as far from the light as the sheet */
-} nb_sheet_lines;
+} nb_masked_triangle_lines;
 
 /* Of one end of the stretches, its places in texels. */
-NB_ALWAYS_INLINE void look_up(const nb_masked_occluder *sheet, const nb_sheet_lamp *lamp, const nb_shaft_rays *rays,
-                              const float *t, double (*texel)[NB_PACKET], double *farness)
+NB_ALWAYS_INLINE void look_up(const nb_masked_occluder *sheet, const nb_masked_triangle_light *lamp,
+                              const nb_shaft_rays *rays, const float *t, double (*texel)[NB_PACKET], double *farness)
 {
     const nb_masked_occluder s = *sheet;
     const double none[3] = {0, 0, 0}, distance = lamp != NULL ? lamp->distance : 1;
@@ -29,8 +29,9 @@ NB_ALWAYS_INLINE void look_up(const nb_masked_occluder *sheet, const nb_sheet_la
 }
 
 /* Stretches that are in a shadow that is known are not asked for. Returns whether any is. */
-NB_CLONES static int look_up_ends(const nb_masked_occluder *sheet, const nb_sheet_lamp *lamp,
-                                  const nb_shaft_interval *found, const nb_shaft_rays *rays, nb_sheet_lines *lines)
+NB_CLONES static int look_up_ends(const nb_masked_occluder *sheet, const nb_masked_triangle_light *lamp,
+                                  const nb_shaft_interval *found, const nb_shaft_rays *rays,
+                                  nb_masked_triangle_lines *lines)
 {
     int any = 0;
     for (int i = 0; i < NB_PACKET; i++) {
@@ -56,7 +57,7 @@ static int add(nb_sun_shafts *shafts, const nebel_allocator *allocator, uint32_t
         rays->leave[lane] = fmaxf(leave, rays->leave[lane]);
         return 1;
     }
-    if (!nb_shafts_keep(shafts, allocator, lane, rays)) return 0;
+    if (!nb_sun_shafts_keep(shafts, allocator, lane, rays)) return 0;
     rays->enter[lane] = enter;
     rays->leave[lane] = leave;
     return 1;
@@ -70,13 +71,14 @@ static float place_at(double s, float enter, float leave, double near, double fa
     return s >= 1 ? leave : (float)((double)enter + part * ((double)leave - (double)enter));
 }
 
-int nb_sheet_cast(const nb_masked_occluder *sheet, const nb_sheet_lamp *lamp, nb_sun_shafts *shafts,
-                  const nebel_allocator *allocator, const nb_shaft_interval *found, nb_shaft_rays *rays)
+int nb_masked_triangle_cast(const nb_masked_occluder *sheet, const nb_masked_triangle_light *lamp,
+                            nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shaft_interval *found,
+                            nb_shaft_rays *rays)
 {
-    nb_sheet_lines lines;
-    nb_mask_walk walk;
+    nb_masked_triangle_lines lines;
+    nb_alpha_mask_walk walk;
     if (!look_up_ends(sheet, lamp, found, rays, &lines)) return 1;
-    nb_mask_begin(&walk, sheet->mask, &lines.lines);
+    nb_alpha_mask_begin(&walk, sheet->mask, &lines.lines);
     do {
         for (uint32_t i = 0; i < walk.count; i++) {
             const nb_solid *solid = &walk.found[i];
@@ -86,6 +88,6 @@ int nb_sheet_cast(const nb_masked_occluder *sheet, const nb_sheet_lamp *lamp, nb
             const float end = place_at(solid->leave, enter, leave, lines.near[k], lines.far[k]);
             if (!add(shafts, allocator, k, begin, end, rays)) return 0;
         }
-    } while (nb_mask_next(&walk));
+    } while (nb_alpha_mask_next(&walk));
     return 1;
 }

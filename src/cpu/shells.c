@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-nebel_result nb_shells_set(nb_frame *frame, const nebel_frame_desc *desc)
+nebel_result nb_cpu_textured_set(nb_frame *frame, const nebel_frame_desc *desc)
 {
     static const double up[3] = {0, 1, 0};
     nebel_renderer *renderer = frame->renderer;
@@ -36,7 +36,7 @@ static nebel_ray ray_of(const nb_frame *frame, const nb_ray_batch *rays, int lan
     return ray;
 }
 
-nebel_result nb_shells_find(const nb_frame *frame, nb_scratch *scratch)
+nebel_result nb_cpu_textured_find(const nb_frame *frame, nb_scratch *scratch)
 {
     nb_shell_scratch *shells = &scratch->shells;
     shells->most = 0;
@@ -121,8 +121,8 @@ static void start(nb_shell_scratch *shells)
     }
 }
 
-nebel_result nb_shells_trace(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
-                             nb_scratch *scratch)
+nebel_result nb_cpu_textured_trace(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
+                                   nb_scratch *scratch)
 {
     nb_shell_scratch *shells = &scratch->shells;
     start(shells);
@@ -135,7 +135,7 @@ nebel_result nb_shells_trace(const nb_frame *frame, const nebel_ray_planes *fog,
     return NEBEL_OK;
 }
 
-void nb_shells_blend(const nb_frame *frame, nb_scratch *scratch)
+void nb_cpu_textured_blend(const nb_frame *frame, nb_scratch *scratch)
 {
     const nb_shell_scratch *shells = &scratch->shells;
     for (int i = 0; i < NB_BATCH; i++)

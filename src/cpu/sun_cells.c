@@ -154,8 +154,9 @@ static int finish_cell(nb_division *d, const nb_sun_cell_part *part, nb_depths *
         depths[kept] = depths[i];
         list[kept++] = list[i];
     }
-    const int added = add_leaf(d, &part->cell, list, depths, kept, number) &&
-                      nb_walls_add(&d->cells->walls, d->allocator, &d->casters, list, kept, &part->cell, &d->all);
+    const int added =
+        add_leaf(d, &part->cell, list, depths, kept, number) &&
+        nb_shadow_boundaries_add(&d->cells->walls, d->allocator, &d->casters, list, kept, &part->cell, &d->all);
     nb_release(d->allocator, depths);
     return added;
 }
@@ -281,7 +282,7 @@ static nb_sun_cell_part list_all(nb_division *d, size_t count)
 
 static nebel_result build(nb_division *d, const nb_geometry *geometry, const double axes[3][3])
 {
-    if (nb_casters_list(geometry, axes, 1, &d->casters) != NEBEL_OK) return NEBEL_ERROR_MEMORY;
+    if (nb_occluders_list(geometry, axes, 1, &d->casters) != NEBEL_OK) return NEBEL_ERROR_MEMORY;
     const size_t count = d->casters.count;
     if (count == 0) return NEBEL_OK;
     d->prism_of = nb_allocate(d->allocator, count, sizeof *d->prism_of);
@@ -295,7 +296,7 @@ static nebel_result build(nb_division *d, const nb_geometry *geometry, const dou
     nb_depths depths;
     uint32_t number;
     d->all = all.cell;
-    return divide(d, &all, 0, &depths, &number) && nb_walls_finish(&d->cells->walls, d->allocator, &d->all)
+    return divide(d, &all, 0, &depths, &number) && nb_shadow_boundaries_finish(&d->cells->walls, d->allocator, &d->all)
                ? NEBEL_OK
                : NEBEL_ERROR_MEMORY;
 }
@@ -310,7 +311,7 @@ nebel_result nb_sun_cells_set(nb_sun_cells *cells, const nb_geometry *geometry, 
     nb_sun_cells_free(cells, &geometry->allocator);
     set_axes(sun, axes);
     const nebel_result result = build(&division, geometry, (const double(*)[3])axes);
-    nb_casters_free(&division.casters, &geometry->allocator);
+    nb_occluders_free(&division.casters, &geometry->allocator);
     nb_release(&geometry->allocator, division.prism_of);
     nb_release(&geometry->allocator, division.bounds);
     nb_release(&geometry->allocator, division.list);
@@ -332,6 +333,6 @@ void nb_sun_cells_free(nb_sun_cells *cells, const nebel_allocator *allocator)
     nb_release(allocator, cells->numbers);
     nb_release(allocator, cells->sheets);
     nb_release(allocator, cells->nodes);
-    nb_walls_free(&cells->walls, allocator);
+    nb_shadow_boundaries_free(&cells->walls, allocator);
     *cells = (nb_sun_cells){.is_built = 0};
 }

@@ -33,7 +33,7 @@ typedef struct boosts {
     double more; /* depth to add */
 } boosts;
 
-double nb_track_reach(const nebel_ray *ray)
+double nb_tracking_reach(const nebel_ray *ray)
 {
     double reach = ray->t_max;
     for (int i = 0; i < 3; i++) {
@@ -100,8 +100,8 @@ static nebel_result next_piece(const nb_tracker *track, nb_media_walk *walk, dou
     return NEBEL_OK;
 }
 
-nebel_result nb_track_look(const nb_tracker *track, double t, nb_media_part part, nebel_sample_point *place,
-                           nb_matter *matter)
+nebel_result nb_tracking_look(const nb_tracker *track, double t, nb_media_part part, nebel_sample_point *place,
+                              nb_matter *matter)
 {
     const nebel_ray *ray = &track->ray;
     for (int i = 0; i < 3; i++) place->position[i] = ray->origin[i] + t * ray->direction[i];
@@ -112,14 +112,14 @@ nebel_result nb_track_look(const nb_tracker *track, double t, nb_media_part part
 /* The way to the next stop at this rate. */
 static double draw_way(double rate, nb_rng *chance)
 {
-    return rate > 0 ? -log1p(-nb_chance_next(chance)) / rate : HUGE_VAL;
+    return rate > 0 ? -log1p(-nb_rng_next(chance)) / rate : HUGE_VAL;
 }
 
 /* Whether the flight ends at its stop, by chance, with what it weighs from there on. */
 static int collides(const nb_majorant_piece *p, double extinction, nb_rng *chance, double *weight)
 {
     const double part = p->boost * extinction / p->rate;
-    if (nb_chance_next(chance) * p->rate < p->boost * extinction) {
+    if (nb_rng_next(chance) * p->rate < p->boost * extinction) {
         *weight /= p->boost;
         return 1;
     }
@@ -127,9 +127,9 @@ static int collides(const nb_majorant_piece *p, double extinction, nb_rng *chanc
     return 0;
 }
 
-nebel_result nb_track_fly(const nb_tracker *track, nb_rng *chance, nb_free_flight *flight)
+nebel_result nb_tracking_fly(const nb_tracker *track, nb_rng *chance, nb_free_flight *flight)
 {
-    const double reach = !nb_media_are_empty(track->media) ? nb_track_reach(&track->ray) : 0;
+    const double reach = !nb_media_are_empty(track->media) ? nb_tracking_reach(&track->ray) : 0;
     nb_media_walk walk;
     boosts air;
     memset(flight, 0, sizeof *flight);
@@ -140,7 +140,7 @@ nebel_result nb_track_fly(const nb_tracker *track, nb_rng *chance, nb_free_fligh
         nb_majorant_piece p;
         result = next_piece(track, &walk, t, reach, &air, &p);
         while (result == NEBEL_OK && (t += draw_way(p.rate, chance)) < p.end) {
-            result = nb_track_look(track, t, NB_MEDIA_ALL, &flight->place, &flight->matter);
+            result = nb_tracking_look(track, t, NB_MEDIA_ALL, &flight->place, &flight->matter);
             if (result != NEBEL_OK) return result;
             for (int c = 0; c < 3; c++) flight->shone[c] += flight->weight * flight->matter.all.emission[c] / p.rate;
             flight->t = t;
@@ -156,13 +156,13 @@ nebel_result nb_track_fly(const nb_tracker *track, nb_rng *chance, nb_free_fligh
 static int survives(double *weight, nb_rng *chance)
 {
     if (*weight >= SMALL_WEIGHT) return 1;
-    *weight = nb_chance_next(chance) * SMALL_WEIGHT < *weight ? SMALL_WEIGHT : 0;
+    *weight = nb_rng_next(chance) * SMALL_WEIGHT < *weight ? SMALL_WEIGHT : 0;
     return *weight > 0;
 }
 
-nebel_result nb_track_transmittance(const nb_tracker *track, nb_rng *chance, double *transmittance)
+nebel_result nb_tracking_transmittance(const nb_tracker *track, nb_rng *chance, double *transmittance)
 {
-    const double reach = !nb_media_are_empty(track->media) ? nb_track_reach(&track->ray) : 0;
+    const double reach = !nb_media_are_empty(track->media) ? nb_tracking_reach(&track->ray) : 0;
     const int channel = track->channel;
     const double air = nb_media_air_transmittance(track->media, &track->ray, channel);
     double weight = 1;
@@ -177,7 +177,7 @@ nebel_result nb_track_transmittance(const nb_tracker *track, nb_rng *chance, dou
         while ((t += draw_way(rate, chance)) < end) {
             nebel_sample_point place;
             nb_matter matter;
-            result = nb_track_look(track, t, NB_MEDIA_WITHOUT_AIR, &place, &matter);
+            result = nb_tracking_look(track, t, NB_MEDIA_WITHOUT_AIR, &place, &matter);
             if (result != NEBEL_OK) return result;
             weight *= fmax(1 - matter.all.extinction[channel] / rate, 0);
             if (!survives(&weight, chance)) return NEBEL_OK;

@@ -28,11 +28,11 @@ typedef struct nb_free_flight {
 } nb_free_flight;
 
 /* How far along the ray there may be media, m: what is farther than places may be counts as none. */
-double nb_track_reach(const nebel_ray *ray);
+double nb_tracking_reach(const nebel_ray *ray);
 
 /* The media at t. */
-nebel_result nb_track_look(const nb_tracker *track, double t, nb_media_part part, nebel_sample_point *place,
-                           nb_matter *matter);
+nebel_result nb_tracking_look(const nb_tracker *track, double t, nb_media_part part, nebel_sample_point *place,
+                              nb_matter *matter);
 
 /* Delta tracking: Woodcock et al., "Techniques used in the GEM code", 1965. The mean of `collided` times weight is the
  * opacity; that of `shone` the integral of emission times transmittance, which is gathered wherever the bound's rate stops
@@ -40,10 +40,10 @@ nebel_result nb_track_look(const nb_tracker *track, double t, nb_media_part part
  * tracking, Galtier et al., "Integral formulation of null-collision Monte Carlo algorithms", 2013): air is thin where it is
  * bright at dusk. Elsewhere the weight stays as it is.
  * Errors: UNBOUNDED (emission without end and without extinction). */
-nebel_result nb_track_fly(const nb_tracker *track, nb_rng *chance, nb_free_flight *flight);
+nebel_result nb_tracking_fly(const nb_tracker *track, nb_rng *chance, nb_free_flight *flight);
 
 /* Ratio tracking: Novak, Selle and Jarosz, "Residual Ratio Tracking", 2014, times what air leaves. The mean is the
  * transmittance. Below 1e-3 roulette decides, by which the variance grows by less than 1e-3 of the transmittance. */
-nebel_result nb_track_transmittance(const nb_tracker *track, nb_rng *chance, double *transmittance);
+nebel_result nb_tracking_transmittance(const nb_tracker *track, nb_rng *chance, double *transmittance);
 
 #endif

@@ -5,7 +5,7 @@
 #include <string.h>
 
 enum {
-    MOST = NB_COVER_MOST, /* triangles of a cell; over more of them walls are not looked for */
+    MOST = NB_MAX_COVER, /* triangles of a cell; over more of them walls are not looked for */
     MOST_SPLITS = 2 * MOST + 2,
     DEEPEST = 24, /* a part of an edge is divided so often, at most */
 };
@@ -276,8 +276,8 @@ static int is_enough(const nb_shadow_boundaries *walls, const nb_occluders *cast
     return casters->numbers != NULL || count > MOST || walls->looks > most;
 }
 
-int nb_walls_add(nb_shadow_boundaries *walls, const nebel_allocator *allocator, const nb_occluders *casters,
-                 const uint32_t *list, size_t count, const nb_sun_cell *cell, const nb_sun_cell *last)
+int nb_shadow_boundaries_add(nb_shadow_boundaries *walls, const nebel_allocator *allocator, const nb_occluders *casters,
+                             const uint32_t *list, size_t count, const nb_sun_cell *cell, const nb_sun_cell *last)
 {
     nb_outline outline = {.walls = walls, .allocator = allocator};
     uint32_t keys[3 * MOST];
@@ -384,10 +384,11 @@ static size_t parents_of(size_t count)
     return (count + NB_WALL_FAN - 1) / NB_WALL_FAN;
 }
 
-int nb_walls_finish(nb_shadow_boundaries *walls, const nebel_allocator *allocator, const nb_sun_cell *bounds)
+int nb_shadow_boundaries_finish(nb_shadow_boundaries *walls, const nebel_allocator *allocator,
+                                const nb_sun_cell *bounds)
 {
     size_t all = 0;
-    if (walls->is_unknown) nb_walls_free(walls, allocator);
+    if (walls->is_unknown) nb_shadow_boundaries_free(walls, allocator);
     if (walls->count == 0) return 1;
     if (!sort_walls(walls, allocator, bounds)) return 0;
     for (size_t count = walls->count; count > 1 || all == 0; all += count) count = parents_of(count);
@@ -413,7 +414,7 @@ int nb_walls_finish(nb_shadow_boundaries *walls, const nebel_allocator *allocato
     return 1;
 }
 
-void nb_walls_free(nb_shadow_boundaries *walls, const nebel_allocator *allocator)
+void nb_shadow_boundaries_free(nb_shadow_boundaries *walls, const nebel_allocator *allocator)
 {
     nb_release(allocator, walls->walls);
     nb_release(allocator, walls->nodes);
@@ -448,7 +449,7 @@ static int meets(const nb_shadow_boundaries *walls, int level, size_t number, co
     return 0;
 }
 
-int nb_walls_meet(const nb_shadow_boundaries *walls, const float place[3], float margin)
+int nb_shadow_boundaries_meet(const nb_shadow_boundaries *walls, const float place[3], float margin)
 {
     return walls->level_count > 0 && meets(walls, walls->level_count - 1, 0, place, margin);
 }

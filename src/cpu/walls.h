@@ -41,15 +41,16 @@ typedef struct nb_shadow_boundaries {
 
 /* Adds the walls in a cell. `list` has the triangles that the sun may see there; edges along the high sides of a cell are
  * those of the next one, if that is not `last` in this direction. Returns 0 when memory is out. */
-int nb_walls_add(nb_shadow_boundaries *walls, const nebel_allocator *allocator, const nb_occluders *casters,
-                 const uint32_t *list, size_t count, const nb_sun_cell *cell, const nb_sun_cell *last);
+int nb_shadow_boundaries_add(nb_shadow_boundaries *walls, const nebel_allocator *allocator, const nb_occluders *casters,
+                             const uint32_t *list, size_t count, const nb_sun_cell *cell, const nb_sun_cell *last);
 
 /* Makes the tree when all walls are there, which are within these bounds. Returns 0 when memory is out. */
-int nb_walls_finish(nb_shadow_boundaries *walls, const nebel_allocator *allocator, const nb_sun_cell *bounds);
+int nb_shadow_boundaries_finish(nb_shadow_boundaries *walls, const nebel_allocator *allocator,
+                                const nb_sun_cell *bounds);
 
 /* Whether a wall is so near that rounding may say on which side the place is. */
-int nb_walls_meet(const nb_shadow_boundaries *walls, const float place[3], float margin);
+int nb_shadow_boundaries_meet(const nb_shadow_boundaries *walls, const float place[3], float margin);
 
-void nb_walls_free(nb_shadow_boundaries *walls, const nebel_allocator *allocator);
+void nb_shadow_boundaries_free(nb_shadow_boundaries *walls, const nebel_allocator *allocator);
 
 #endif

@@ -9,7 +9,7 @@
 #include <nebel/shader.h>
 #include <string.h>
 
-const nebel_planet *nb_gl_air_planet(const nebel_scene_data *scene)
+const nebel_planet *nb_gl_planets_planet(const nebel_scene_data *scene)
 {
     return scene->planet_count > 0 && scene->planets[0].atmosphere != NULL ? &scene->planets[0] : NULL;
 }
@@ -18,8 +18,8 @@ const nebel_planet *nb_gl_air_planet(const nebel_scene_data *scene)
 
 /* Depths, and behind them skies, of nb_irradiance_table. */
 enum {
-    DEPTHS = NB_DAYLIGHT_HEIGHTS * NB_DAYLIGHT_SUNS,
-    SKIES = NB_DAYLIGHT_OF_COUNT * NB_DAYLIGHT_SKIES,
+    DEPTHS = NB_IRRADIANCE_HEIGHTS * NB_IRRADIANCE_SUNS,
+    SKIES = NB_IRRADIANCE_OF_COUNT * NB_IRRADIANCE_SKIES,
     DAYLIGHT_WORDS = DEPTHS + SKIES
 };
 
@@ -73,7 +73,7 @@ static nebel_result find_daylight(nb_gl_air *air, const nebel_allocator *allocat
     world->daylight = *kept;
     if (world->daylight->atmosphere != world->planet->atmosphere ||
         memcmp(world->daylight->sun.direction, to_sun, sizeof world->daylight->sun.direction) != 0)
-        nb_daylight_set(world->daylight, world->planet, &scene->planets[0], to_sun);
+        nb_irradiance_set(world->daylight, world->planet, &scene->planets[0], to_sun);
     return NEBEL_OK;
 }
 
@@ -137,19 +137,20 @@ static nebel_result fill(nb_gl_air *air, const nebel_allocator *allocator, const
     if (words == NULL) return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL: out of memory for the planet's air");
     result = pack(air, words, count);
     if (result == NEBEL_OK)
-        result = nb_words_upload(&air->texture, log, context, words, rows, "the texture of the planet's air", "");
+        result =
+            nb_texel_texture_upload(&air->texture, log, context, words, rows, "the texture of the planet's air", "");
     nb_release(allocator, words);
     return result;
 }
 
-nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
-                           const nb_context *context, const nebel_scene_data *scene, const double eye[3], int ends,
-                           int is_lit)
+nebel_result nb_gl_planets_set(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
+                               const nb_context *context, const nebel_scene_data *scene, const double eye[3], int ends,
+                               int is_lit)
 {
     nb_planet worlds[NEBEL_MAX_PLANETS];
-    const int count = nb_worlds_set(worlds, scene, eye);
+    const int count = nb_planets_set(worlds, scene, eye);
     /* The ground of one planet ends the air of others. */
-    const nebel_sky_view_desc desc = {.sun = nb_scene_sun(scene),
+    const nebel_sky_view_desc desc = {.sun = nb_surface_lighting_sun(scene),
                                       .position = {eye[0], eye[1], eye[2]},
                                       .has_ray_ends = ends || count > 1,
                                       .run = air->run,
@@ -168,12 +169,12 @@ nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, con
     return result;
 }
 
-void nb_gl_air_delete(const nb_gl_air *air)
+void nb_gl_planets_delete(const nb_gl_air *air)
 {
     glDeleteTextures(1, &air->texture);
 }
 
-void nb_gl_air_release(nb_gl_air *air, const nebel_allocator *allocator)
+void nb_gl_planets_release(nb_gl_air *air, const nebel_allocator *allocator)
 {
     forget_views(air);
     forget_daylight(air, allocator);
@@ -191,7 +192,7 @@ static void look_from(const nb_gl_air *air, const nb_planet *world, float eye[4]
     for (int c = 0; c < 3; c++) eye[c] = (float)from[c];
 }
 
-void nb_gl_air_set_worlds(const nb_gl_air *air, unsigned program)
+void nb_gl_planets_set_list(const nb_gl_air *air, unsigned program)
 {
     GLint words[NEBEL_MAX_PLANETS][3];
     GLfloat eyes[NEBEL_MAX_PLANETS][4], sizes[NEBEL_MAX_PLANETS][2], albedos[NEBEL_MAX_PLANETS][3];
@@ -211,31 +212,32 @@ void nb_gl_air_set_worlds(const nb_gl_air *air, unsigned program)
     glUniform3fv(glGetUniformLocation(program, "world_albedos"), air->count, albedos[0]);
 }
 
-void nb_gl_air_set_light(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene)
+void nb_gl_planets_set_light(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene)
 {
-    const double radius = nb_worlds_disc(scene);
+    const double radius = nb_planets_disc(scene);
     double bright[3];
     float light[3];
-    nb_worlds_disc_light(scene, radius, bright);
+    nb_planets_disc_light(scene, radius, bright);
     for (int c = 0; c < 3; c++) light[c] = (float)bright[c];
-    nb_gl_air_set_worlds(air, program);
+    nb_gl_planets_set_list(air, program);
     glUniform1f(glGetUniformLocation(program, "disc_radius"), (float)radius);
     glUniform3fv(glGetUniformLocation(program, "disc_light"), 1, light);
-    glUniform1i(glGetUniformLocation(program, "sky_is_ambient"), nb_scene_owns_ambient(scene));
+    glUniform1i(glGetUniformLocation(program, "sky_is_ambient"), nb_surface_lighting_owns_ambient(scene));
 }
 
-void nb_gl_air_set_reach(const nb_gl_air *air, unsigned program)
+void nb_gl_planets_set_reach(const nb_gl_air *air, unsigned program)
 {
     glUniform1f(glGetUniformLocation(program, "daylight_reach"),
-                (float)nb_worlds_reach(air->worlds, air->count, air->of.position));
+                (float)nb_planets_reach(air->worlds, air->count, air->of.position));
 }
 
-void nb_gl_air_set_daylight(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene, float even_shade)
+void nb_gl_planets_set_irradiance(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene,
+                                  float even_shade)
 {
     double to_sun[3] = {scene->sun_direction[0], scene->sun_direction[1], scene->sun_direction[2]};
     (void)nb_vector_make_unit(to_sun);
-    nb_gl_air_set_light(air, program, scene);
+    nb_gl_planets_set_light(air, program, scene);
     glUniform3f(glGetUniformLocation(program, "scene_sun"), (float)to_sun[0], (float)to_sun[1], (float)to_sun[2]);
-    nb_gl_air_set_reach(air, program);
+    nb_gl_planets_set_reach(air, program);
     glUniform1f(glGetUniformLocation(program, "even_shade"), even_shade);
 }

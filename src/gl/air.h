@@ -21,28 +21,29 @@ typedef struct nb_gl_air {
 } nb_gl_air;
 
 /* The first planet of a scene where it has air; NULL: there is none. */
-const nebel_planet *nb_gl_air_planet(const nebel_scene_data *scene);
+const nebel_planet *nb_gl_planets_planet(const nebel_scene_data *scene);
 
 /* Makes the texture where it is not there already, bound to the active unit; wants the usual unpacking. `ends`: rays may end
  * before the ground. `is_lit`: the light at places is asked for. VALUE (a place or a sun that is none), MEMORY, LIMIT. */
-nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
-                           const nb_context *context, const nebel_scene_data *scene, const double eye[3], int ends,
-                           int is_lit);
+nebel_result nb_gl_planets_set(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
+                               const nb_context *context, const nebel_scene_data *scene, const double eye[3], int ends,
+                               int is_lit);
 
-/* Uniforms of nb_air_worlds_text, and of nb_air_light_text, in the current program, which is `program`. */
-void nb_gl_air_set_worlds(const nb_gl_air *air, unsigned program);
-void nb_gl_air_set_light(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene);
+/* Uniforms of nb_air_planets_text, and of nb_air_light_text, in the current program, which is `program`. */
+void nb_gl_planets_set_list(const nb_gl_air *air, unsigned program);
+void nb_gl_planets_set_light(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene);
 
-/* Those of nb_air_places_text, and of nb_air_haze_text by daylight. */
-void nb_gl_air_set_daylight(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene, float even_shade);
+/* Those of nb_air_places_text, and of nb_air_aerial_text by daylight. */
+void nb_gl_planets_set_irradiance(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene,
+                                  float even_shade);
 
 /* Of fog that clouds shade by its place. */
-void nb_gl_air_set_reach(const nb_gl_air *air, unsigned program);
+void nb_gl_planets_set_reach(const nb_gl_air *air, unsigned program);
 
 /* In OpenGL. */
-void nb_gl_air_delete(const nb_gl_air *air);
+void nb_gl_planets_delete(const nb_gl_air *air);
 
 /* The rest. */
-void nb_gl_air_release(nb_gl_air *air, const nebel_allocator *allocator);
+void nb_gl_planets_release(nb_gl_air *air, const nebel_allocator *allocator);
 
 #endif

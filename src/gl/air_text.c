@@ -9,11 +9,11 @@ const char *nb_air_head(int worlds, char text[NB_AIR_HEAD])
     text[0] = '\0';
     if (worlds > 0)
         (void)snprintf(text, NB_AIR_HEAD,
-                       "#define NEBEL_SKY_VIEW\n#define SCENE_WORLDS %d\n#define NB_DAYLIGHT_HEIGHTS %d.0\n#define "
-                       "NB_DAYLIGHT_SUNS %d.0\n#define NB_DAYLIGHT_SKIES %d.0\n#define NB_DAYLIGHT_TWILIGHT %g\n"
-                       "#define NB_DAYLIGHT_OF_SURFACES %d\n#define NB_DAYLIGHT_OF_FOG %d\n",
-                       worlds, NB_DAYLIGHT_HEIGHTS, NB_DAYLIGHT_SUNS, NB_DAYLIGHT_SKIES, NB_DAYLIGHT_TWILIGHT,
-                       NB_DAYLIGHT_OF_SURFACES, NB_DAYLIGHT_OF_FOG);
+                       "#define NEBEL_SKY_VIEW\n#define SCENE_WORLDS %d\n#define NB_IRRADIANCE_HEIGHTS %d.0\n#define "
+                       "NB_IRRADIANCE_SUNS %d.0\n#define NB_IRRADIANCE_SKIES %d.0\n#define NB_IRRADIANCE_TWILIGHT %g\n"
+                       "#define NB_IRRADIANCE_OF_SURFACES %d\n#define NB_IRRADIANCE_OF_FOG %d\n",
+                       worlds, NB_IRRADIANCE_HEIGHTS, NB_IRRADIANCE_SUNS, NB_IRRADIANCE_SKIES, NB_IRRADIANCE_TWILIGHT,
+                       NB_IRRADIANCE_OF_SURFACES, NB_IRRADIANCE_OF_FOG);
     return text;
 }
 
@@ -34,7 +34,7 @@ const char nb_air_words_text[] =
     "uniform highp vec3 scene_sun;\n"
     "#endif\n";
 
-const char nb_air_worlds_text[] =
+const char nb_air_planets_text[] =
     "uniform ivec3 world_words[SCENE_WORLDS];\n" /* of its table; from there on of light at places, -1: none; has it air? */
     "uniform vec4 world_eyes[SCENE_WORLDS];\n"  /* up from its centre to the eye; how high that is above the ground */
     "uniform vec2 world_sizes[SCENE_WORLDS];\n" /* radius; how thick the air is */
@@ -129,9 +129,9 @@ const char nb_air_places_text[] =
     /* The table of base/daylight.h: of the way to a sun that is not below the level. */
     "vec3 daylight_depth(int first, float height, float cosine)\n"
     "{\n"
-    "    vec2 h = nb_air_place(sqrt(clamp(height, 0.0, 1.0)) * (NB_DAYLIGHT_HEIGHTS - 1.0), NB_DAYLIGHT_HEIGHTS);\n"
-    "    vec2 s = nb_air_place(sqrt(clamp(cosine, 0.0, 1.0)) * (NB_DAYLIGHT_SUNS - 1.0), NB_DAYLIGHT_SUNS);\n"
-    "    int at = first + int(h.x) * int(NB_DAYLIGHT_SUNS) + int(s.x), above = at + int(NB_DAYLIGHT_SUNS);\n"
+    "    vec2 h = nb_air_place(sqrt(clamp(height, 0.0, 1.0)) * (NB_IRRADIANCE_HEIGHTS - 1.0), NB_IRRADIANCE_HEIGHTS);\n"
+    "    vec2 s = nb_air_place(sqrt(clamp(cosine, 0.0, 1.0)) * (NB_IRRADIANCE_SUNS - 1.0), NB_IRRADIANCE_SUNS);\n"
+    "    int at = first + int(h.x) * int(NB_IRRADIANCE_SUNS) + int(s.x), above = at + int(NB_IRRADIANCE_SUNS);\n"
     "    vec3 low = nb_toward(NEBEL_SKY_VIEW_TEXEL(at).xyz, NEBEL_SKY_VIEW_TEXEL(at + 1).xyz, s.y);\n"
     "    vec3 high = nb_toward(NEBEL_SKY_VIEW_TEXEL(above).xyz, NEBEL_SKY_VIEW_TEXEL(above + 1).xyz, s.y);\n"
     "    return nb_toward(low, high, h.y);\n"
@@ -140,22 +140,22 @@ const char nb_air_places_text[] =
        behind the eye. */
     "vec3 daylight_sun(int world, int first, float power, float rise)\n"
     "{\n"
-    "    float radius = world_sizes[world].x, thickness = world_sizes[world].y;\n"
+    "    float radius = world_sizes[world].x, top = world_sizes[world].y;\n"
     "    float height = height_of(radius, power), cosine = rise / (radius + height);\n"
     "    vec3 own = vec3(0), low = vec3(0);\n"
-    "    if (height <= thickness) own = daylight_depth(first, height / thickness, abs(cosine));\n"
+    "    if (height <= top) own = daylight_depth(first, height / top, abs(cosine));\n"
     "    if (cosine >= 0.0) return exp(-own);\n"
     "    float lowest = height_of(radius, power - rise * rise);\n"
     "    if (!(lowest >= 0.0)) return vec3(0.0);\n"
-    "    if (lowest <= thickness) low = daylight_depth(first, lowest / thickness, 0.0);\n"
+    "    if (lowest <= top) low = daylight_depth(first, lowest / top, 0.0);\n"
     "    return exp(min(own - 2.0 * low, 0.0));\n"
     "}\n"
     "vec3 daylight_sky(int first, int of, float cosine)\n"
     "{\n"
-    "    float x = sign(cosine) * log(1.0 + abs(cosine) / NB_DAYLIGHT_TWILIGHT) / log(1.0 + 1.0 / "
-    "NB_DAYLIGHT_TWILIGHT);\n"
-    "    vec2 s = nb_air_place(0.5 * (x + 1.0) * (NB_DAYLIGHT_SKIES - 1.0), NB_DAYLIGHT_SKIES);\n"
-    "    int at = first + int(NB_DAYLIGHT_HEIGHTS * NB_DAYLIGHT_SUNS) + of * int(NB_DAYLIGHT_SKIES) + int(s.x);\n"
+    "    float x = sign(cosine) * log(1.0 + abs(cosine) / NB_IRRADIANCE_TWILIGHT) / log(1.0 + 1.0 / "
+    "NB_IRRADIANCE_TWILIGHT);\n"
+    "    vec2 s = nb_air_place(0.5 * (x + 1.0) * (NB_IRRADIANCE_SKIES - 1.0), NB_IRRADIANCE_SKIES);\n"
+    "    int at = first + int(NB_IRRADIANCE_HEIGHTS * NB_IRRADIANCE_SUNS) + of * int(NB_IRRADIANCE_SKIES) + int(s.x);\n"
     "    return exp(nb_toward(NEBEL_SKY_VIEW_TEXEL(at).xyz, NEBEL_SKY_VIEW_TEXEL(at + 1).xyz, s.y));\n"
     "}\n"
     /* What is left of the sun, and how much brighter the sky is than at the scene's origin, for whom: those of the planet that is
@@ -202,26 +202,26 @@ const char nb_air_pieces_text[] =
     "#endif\n"
     "struct pass_knot { float at; nebel_transfer fog; nebel_transfer air; vec3 sun; vec3 sky; };\n" /* the last two: of daylight */
     /* Goes on with the fog of a ray, up to t. */
-    "nebel_transfer pass_on(inout nb_progress progress, nebel_view_ray sight, int entry, float t)\n"
+    "nebel_transfer pass_on(inout nb_progress progress, nebel_view_ray view, int entry, float t)\n"
     "{\n"
-    "    if (!nb_is_ray(sight.origin, sight.direction, t)) return nb_clear();\n"
+    "    if (!nb_is_ray(view.origin, view.direction, t)) return nb_clear();\n"
     "#ifdef NEBEL_TILES\n"
     "    nb_media media = nb_media_of(NEBEL_TILE_ENTRY(entry), NEBEL_TILE_ENTRY(entry + 1), true);\n"
     "#else\n"
     "    nb_media media = nb_media_of(0, int(NEBEL_FOG_TEXEL(0).x), false);\n"
     "#endif\n"
     "    progress.stage = NB_STAGE_WALK;\n"
-    "    return nb_trace_further(progress, nb_ray_up_to(sight.origin, sight.direction, t, true), media, true, true);\n"
+    "    return nb_trace_further(progress, nb_ray_up_to(view.origin, view.direction, t, true), media, true, true);\n"
     "}\n"
     "float pass_largest(vec3 v) { return max(v.x, max(v.y, v.z)); }\n"
     "#ifdef PASS_RELIT\n"
     "uniform float daylight_reach;\n" /* no planet is farther off */
     /* Of light in the mean of what it is at both ends, and in the shade between. Of what the sky adds the fog's own light is not told
        apart. */
-    "vec3 pass_daylight_doubt(pass_knot a, pass_knot b, pass_shade shade, nb_gathered before, nb_gathered behind)\n"
+    "vec3 pass_daylight_doubt(pass_knot a, pass_knot b, pass_shade shade, nb_gathered near, nb_gathered far)\n"
     "{\n"
-    "    vec3 of_sun = max(behind.sunlight - before.sunlight, 0.0);\n"
-    "    vec3 of_sky = max(behind.radiance - before.radiance - of_sun, 0.0);\n"
+    "    vec3 of_sun = max(far.sunlight - near.sunlight, 0.0);\n"
+    "    vec3 of_sky = max(far.radiance - near.radiance - of_sun, 0.0);\n"
     "    vec2 by_shade = shade.doubt / max(shade.mean, vec2(1e-6));\n"
     "    return 0.5 * (a.air.transmittance + b.air.transmittance) *\n"
     "           ((by_shade.x + abs(b.sun - a.sun) / max(a.sun + b.sun, 1e-30)) * of_sun +\n"
@@ -232,7 +232,7 @@ const char nb_air_pieces_text[] =
     "uniform float even_shade;\n"
     "void pass_set_daylight(inout pass_knot knot, vec3 direction)\n"
     "{\n"
-    "    daylight_at(knot.at * direction, NB_DAYLIGHT_OF_FOG, knot.sun, knot.sky);\n"
+    "    daylight_at(knot.at * direction, NB_IRRADIANCE_OF_FOG, knot.sun, knot.sky);\n"
     "    knot.sun *= even_shade;\n"
     "}\n"
     "float pass_next_lowest(vec3 direction, float after)\n"
@@ -260,18 +260,18 @@ const char nb_air_pieces_text[] =
     "                  (a.air.transmittance + b.air.transmittance) * (b.fog.in_scattering - a.fog.in_scattering));\n"
     "}\n";
 
-const char nb_air_haze_text[] =
-    "nebel_transfer pass_haze(nebel_view_ray sight, int entry)\n"
+const char nb_air_aerial_text[] =
+    "nebel_transfer pass_haze(nebel_view_ray view, int entry)\n"
     "{\n"
     "    nb_progress progress = nb_open_progress();\n"
     "    pass_knot from, here;\n"
     "    float begin, end;\n"
-    "    find_airs(sight.direction, begin, end);\n"
+    "    find_airs(view.direction, begin, end);\n"
     "#ifdef PASS_CLOUDS\n"
     "    pass_open_shade();\n"
     "#endif\n"
-    "    begin = min(begin, sight.t_max);\n"
-    "    end = min(end, sight.t_max);\n"
+    "    begin = min(begin, view.t_max);\n"
+    "    end = min(end, view.t_max);\n"
     "    nebel_transfer air = airs_up_to(end);\n"
     "    float brightest = pass_largest(air.in_scattering);\n"
     "    float counts = max(brightest, pass_largest(1.0 - air.transmittance));\n"
@@ -280,8 +280,8 @@ const char nb_air_haze_text[] =
     "    from.at = 0.0;\n"
     "    from.fog = from.air = nb_clear();\n"
     "#ifdef PASS_RELIT\n"
-    "    float reach = min(daylight_reach, sight.t_max);\n"
-    "    pass_set_daylight(from, sight.direction);\n"
+    "    float reach = min(daylight_reach, view.t_max);\n"
+    "    pass_set_daylight(from, view.direction);\n"
     "#endif\n"
     "#ifdef PASS_SHADE\n"
     "    pass_open_fog_shade();\n"
@@ -289,21 +289,21 @@ const char nb_air_haze_text[] =
     "    vec3 light = vec3(0.0);\n"
     "    float far = 1e30;\n" /* the nearest end that was too far */
     "    bool is_last = false;\n"
-    "    for (int i = 0; i < PASS_KNOTS && from.at < sight.t_max && !is_last; i++) {\n"
+    "    for (int i = 0; i < PASS_KNOTS && from.at < view.t_max && !is_last; i++) {\n"
     "        nb_progress further = progress;\n"
     "        is_last = i + 1 == PASS_KNOTS || nb_is_tired(progress.turns);\n"
-    "        here.at = from.at < begin ? begin : from.at < end ? min(from.at + way, end) : sight.t_max;\n"
+    "        here.at = from.at < begin ? begin : from.at < end ? min(from.at + way, end) : view.t_max;\n"
     "#ifdef PASS_DAYLIGHT\n"
-    "        here.at = min(here.at, pass_next_lowest(sight.direction, from.at));\n"
+    "        here.at = min(here.at, pass_next_lowest(view.direction, from.at));\n"
     "#endif\n"
-    "        if (is_last || !(here.at > from.at)) here.at = sight.t_max;\n"
+    "        if (is_last || !(here.at > from.at)) here.at = view.t_max;\n"
     "#ifdef PASS_RELIT\n"
     "        pass_shade shade = pass_fog_shade_between(from.at, here.at);\n"
-    "        pass_set_daylight(here, sight.direction);\n"
+    "        pass_set_daylight(here, view.direction);\n"
     "        fog_sun = 0.5 * shade.mean.x * (from.sun + here.sun);\n"
     "        fog_sky = 0.5 * shade.mean.y * (from.sky + here.sky);\n"
     "#endif\n"
-    "        here.fog = pass_on(further, sight, entry, here.at);\n"
+    "        here.fog = pass_on(further, view, entry, here.at);\n"
     "        here.air = pass_air(here.at);\n"
     "        vec3 in_doubt = vec3(0.0);\n"
     "#ifdef PASS_RELIT\n"
@@ -406,7 +406,7 @@ const char nb_air_light_text[] = "float sky_left()\n"
                                  "void light_model(vec3 at, inout vec3 light, inout vec3 shining)\n"
                                  "{\n"
                                  "    vec3 sun, sky;\n"
-                                 "    daylight_at(at, NB_DAYLIGHT_OF_SURFACES, sun, sky);\n"
+                                 "    daylight_at(at, NB_IRRADIANCE_OF_SURFACES, sun, sky);\n"
                                  "    shining *= sun;\n"
                                  "    light *= sky;\n"
                                  "    if (sky_is_ambient) light *= sky_left();\n"

@@ -3,14 +3,14 @@
 #define NB_GL_AIR_TEXT_H
 
 /* In the head of a program; "" where there are no planets. Returns text. */
-enum { NB_AIR_HEAD = 256 };
+enum { NB_AIR_HEAD = 320 };
 const char *nb_air_head(int worlds, char text[NB_AIR_HEAD]);
 
 /* Before the fog's text: where it finds words. */
 extern const char nb_air_words_text[];
 
 /* Behind it and before the other ones: the air and the ground of all. */
-extern const char nb_air_worlds_text[];
+extern const char nb_air_planets_text[];
 
 /* Declares daylight_at, the light of the sun and of the sky at a place, as models and fog have it. Behind the way to the sun,
  * scene_sun. */
@@ -20,7 +20,7 @@ extern const char nb_air_places_text[];
 extern const char nb_air_pieces_text[];
 
 /* Declares pass_haze, what fog and air do along a ray. `entry`: of its tile's list, if there are tiles. */
-extern const char nb_air_haze_text[];
+extern const char nb_air_aerial_text[];
 
 /* The ground into the targets of surfaces. */
 extern const char nb_air_ground_text[];

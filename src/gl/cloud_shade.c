@@ -26,7 +26,7 @@ typedef struct texels {
 
 static uint32_t *texel_at(const texels *t, uint32_t i)
 {
-    return t->words + NB_CLOUD_SHADE_WORDS * t->stride * i;
+    return t->words + NB_CLOUD_SHADE_TEXELS * t->stride * i;
 }
 
 static void add(texels *t, float at, uint32_t light)
@@ -94,7 +94,7 @@ void nb_gl_cloud_shade_set(const nb_gl_cloud_shade *shade, unsigned program)
 
 _Static_assert((int)NB_SHADED_PIECES == 7, "nb_cloud_shade_text has room for so many");
 
-/* nb_shaded_light. */
+/* nb_shadowed_air_light. */
 const char nb_cloud_shade_text[] =
     "uniform highp usampler2DArray shade_texture;\n"
     "int shaded_count = 0;\n"
@@ -131,7 +131,7 @@ const char nb_cloud_shade_text[] =
 
 /* As src/cpu/fog_shade.c has it: fog between two places of a ray counts as spread evenly, and may all be where shade is off most.
  * Pieces that end before the place that the walk has come to are left behind. */
-const char nb_fog_shade_text[] =
+const char nb_fog_shadow_text[] =
     "uniform float shade_clear_sky;\n"
     "struct pass_shade { vec2 mean; vec2 doubt; float cut; };\n" /* of the sun and of the sky; where to cut */
     "int shade_first, shade_last;\n"

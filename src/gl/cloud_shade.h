@@ -11,7 +11,7 @@
 enum {
     NB_AIR_SHADE_LAYERS = 1 + NB_SHADED_PIECES,                                      /* the head, air */
     NB_CLOUD_SHADE_LAYERS = NB_AIR_SHADE_LAYERS + NEBEL_MAX_FOG_SHADOW_SEGMENTS + 1, /* fog, and that over clouds */
-    NB_CLOUD_SHADE_WORDS = 2                                                         /* of a texel */
+    NB_CLOUD_SHADE_TEXELS = 2                                                        /* of a texel */
 };
 
 typedef struct nb_gl_cloud_shade {
@@ -33,7 +33,7 @@ nebel_result nb_gl_cloud_shade_upload(nb_gl_cloud_shade *shade, const nebel_log 
 /* Binds it for the current program, and sets the uniforms of the texts. Changes the active unit. */
 void nb_gl_cloud_shade_set(const nb_gl_cloud_shade *shade, unsigned program);
 
-/* For nb_air_haze_text: pass_air; and pass_shade, of fog by its place. */
-extern const char nb_cloud_shade_text[], nb_fog_shade_text[];
+/* For nb_air_aerial_text: pass_air; and pass_shade, of fog by its place. */
+extern const char nb_cloud_shade_text[], nb_fog_shadow_text[];
 
 #endif

@@ -27,7 +27,7 @@ typedef struct job {
 
 /* Rows of each part between two times of asking whether to go on: of a picture of 1280x720 some tenths of a second. Parts and rounds
  * begin where blocks do. */
-enum { ROUND = NB_CLOUD_SHARE_ROWS };
+enum { ROUND = NB_CLOUD_PIXELS_ROWS };
 
 /* Counted from the picture's first row. */
 static uint32_t first_row(const job *j, size_t part)
@@ -107,7 +107,8 @@ static double ray_at(const nb_cloud_picture *picture, uint32_t x, uint32_t y, ne
 /* To above the horizon, where samples may see the sky though the middle of their pixel meets the ground. Returns whether it was. */
 static int lift(const nb_cloud_picture *picture, double spread, nebel_ray *ray)
 {
-    return picture->lifts && nb_worlds_lift(picture->worlds, picture->world_count, ray->origin, spread, ray->direction);
+    return picture->lifts &&
+           nb_planets_lift(picture->worlds, picture->world_count, ray->origin, spread, ray->direction);
 }
 
 /* Along which knots are found for all samples at once: among fog, which is not asked again, it is lifted. */
@@ -136,8 +137,8 @@ static void forget(nb_gl_clouds *clouds)
     clouds->of.clouds = NULL;
 }
 
-nebel_result nb_gl_clouds_set(nb_gl_clouds *clouds, const nebel_clouds *of, const nebel_sun *sun, double time,
-                              const nebel_log *log)
+nebel_result nb_cloud_picture_set(nb_gl_clouds *clouds, const nebel_clouds *of, const nebel_sun *sun, double time,
+                                  const nebel_log *log)
 {
     const nebel_cloud_lighting_desc desc = {
         .clouds = of, .sun = *sun, .time = time, .allocator = clouds->allocator, .log = *log};
@@ -148,14 +149,14 @@ nebel_result nb_gl_clouds_set(nb_gl_clouds *clouds, const nebel_clouds *of, cons
     return result;
 }
 
-nebel_result nb_gl_clouds_workspace(nb_gl_clouds *clouds, nebel_cloud_workspace **workspace)
+nebel_result nb_cloud_picture_workspace(nb_gl_clouds *clouds, nebel_cloud_workspace **workspace)
 {
     const nebel_result result = open_workspace(clouds, &clouds->parts[0]);
     *workspace = clouds->parts[0].workspace;
     return result;
 }
 
-void nb_gl_clouds_release(nb_gl_clouds *clouds)
+void nb_cloud_picture_release(nb_gl_clouds *clouds)
 {
     forget(clouds);
     for (int i = 0; i < NB_CLOUD_PARTS; i++) {
@@ -220,9 +221,9 @@ static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray
         transfers.in_scattering[c] = light[c];
     }
     result =
-        nb_worlds_trace(j->picture->worlds, j->picture->world_count, shade.count + 1, direction, shade.t, &transfers);
+        nb_planets_trace(j->picture->worlds, j->picture->world_count, shade.count + 1, direction, shade.t, &transfers);
     if (result != NEBEL_OK) return result;
-    pixel->piece_count = nb_shaded_set(&shade, light, part->pieces + part->piece_count);
+    pixel->piece_count = nb_shadowed_air_set(&shade, light, part->pieces + part->piece_count);
     part->piece_count += pixel->piece_count;
     return NEBEL_OK;
 }
@@ -261,7 +262,7 @@ static float ground_of(const job *j, const nebel_ray *ray)
     const double length = nb_vector_length(ray->direction);
     double unit[3];
     for (int c = 0; c < 3; c++) unit[c] = ray->direction[c] / length;
-    return (float)nb_worlds_cloudy_ground(j->picture->worlds, j->picture->world_count, ray->origin, unit);
+    return (float)nb_planets_cloudy_ground(j->picture->worlds, j->picture->world_count, ray->origin, unit);
 }
 
 /* The pixels of a block in some rows; end: its last row's next. */
@@ -272,7 +273,7 @@ static nebel_result trace_block(const job *j, nb_cloud_part *part, uint32_t left
     nb_cloud_pixel_block block;
     nebel_result result = NEBEL_OK;
     for (uint32_t i = 0; i < NB_CLOUD_SHARE; i++) {
-        const uint32_t x = left + i % NB_CLOUD_SHARE_COLUMNS, y = top + i / NB_CLOUD_SHARE_COLUMNS;
+        const uint32_t x = left + i % NB_CLOUD_PIXELS_COLUMNS, y = top + i / NB_CLOUD_PIXELS_COLUMNS;
         block.is_wanted[i] = x < view->width && y < end;
         block.is_open[i] = 1;
         block.knots[i] = &bundle->knots[i];
@@ -280,10 +281,10 @@ static nebel_result trace_block(const job *j, nb_cloud_part *part, uint32_t left
         bundle->spreads[i] = first_ray_at(j->picture, x, view->height - 1 - y, &bundle->rays[i]);
         block.ground[i] = ground_of(j, &bundle->rays[i]);
     }
-    nb_cloud_block_begin(&block);
-    for (int level = 0; level < NB_CLOUD_SHARE_LEVELS && result == NEBEL_OK; level++) {
+    nb_cloud_pixels_block_begin(&block);
+    for (int level = 0; level < NB_CLOUD_PIXELS_LEVELS && result == NEBEL_OK; level++) {
         int is_asked[NB_CLOUD_SHARE];
-        nb_cloud_block_ask(&block, level, is_asked);
+        nb_cloud_pixels_block_ask(&block, level, is_asked);
         result = trace_pixels(j, part, is_asked);
     }
     return result;
@@ -294,7 +295,7 @@ static nebel_result keep_block(const job *j, nb_cloud_part *part, uint32_t left,
     const nebel_view *const view = j->picture->view;
     nebel_result result = NEBEL_OK;
     for (uint32_t i = 0; i < NB_CLOUD_SHARE && result == NEBEL_OK; i++) {
-        const uint32_t x = left + i % NB_CLOUD_SHARE_COLUMNS, y = top + i / NB_CLOUD_SHARE_COLUMNS;
+        const uint32_t x = left + i % NB_CLOUD_PIXELS_COLUMNS, y = top + i / NB_CLOUD_PIXELS_COLUMNS;
         if (x >= view->width || y >= end) continue;
         nb_cloud_pixel *const pixel = &j->clouds->pixels[(size_t)(view->height - 1 - y) * view->width + x];
         nebel_ray ray = part->bundle->rays[i];
@@ -307,14 +308,14 @@ static nebel_result keep_block(const job *j, nb_cloud_part *part, uint32_t left,
 
 static void trace_rows(const job *j, nb_cloud_part *part, uint32_t top, uint32_t end)
 {
-    for (uint32_t left = 0; left < j->picture->view->width; left += NB_CLOUD_SHARE_COLUMNS) {
+    for (uint32_t left = 0; left < j->picture->view->width; left += NB_CLOUD_PIXELS_COLUMNS) {
         part->result = trace_block(j, part, left, top, end);
         if (part->result == NEBEL_OK) part->result = keep_block(j, part, left, top, end);
         if (part->result != NEBEL_OK) return;
     }
 }
 
-nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture)
+nebel_result nb_cloud_picture_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture)
 {
     void *list = clouds->pixels;
     const size_t pixels = (size_t)picture->view->width * picture->view->height;
@@ -339,17 +340,17 @@ static void write_shade_row(const job *j, nb_cloud_part *part, uint32_t y)
         nb_fog_shadow fog;
         const double spread = ray_at(picture, x, y, &ray);
         (void)lift(picture, spread, &ray);
-        if (j->roof != NULL) part->result = nb_fog_shade_along(part->workspace, j->roof, ray, spread, &fog);
+        if (j->roof != NULL) part->result = nb_fog_shadow_along(part->workspace, j->roof, ray, spread, &fog);
         if (part->result != NEBEL_OK) return;
         const uint32_t layers = nb_gl_cloud_shade_write(
             part->pieces + pixel->first_piece, pixel->piece_count, j->roof != NULL ? &fog : NULL,
-            j->words + NB_CLOUD_SHADE_WORDS * i, width * picture->view->height);
+            j->words + NB_CLOUD_SHADE_TEXELS * i, width * picture->view->height);
         if (layers > part->layers) part->layers = layers;
     }
 }
 
-nebel_result nb_gl_clouds_write_shade(nb_gl_clouds *clouds, const nb_cloud_picture *picture,
-                                      const nb_cloud_shadow_extent *roof, uint32_t *words, uint32_t *layers)
+nebel_result nb_cloud_picture_write_shade(nb_gl_clouds *clouds, const nb_cloud_picture *picture,
+                                          const nb_cloud_shadow_extent *roof, uint32_t *words, uint32_t *layers)
 {
     job j = {.clouds = clouds, .picture = picture, .row = write_shade_row, .roof = roof, .words = words};
     for (int i = 0; i < NB_CLOUD_PARTS; i++) clouds->parts[i].layers = 0;
@@ -365,7 +366,7 @@ nebel_result nb_gl_clouds_write_shade(nb_gl_clouds *clouds, const nb_cloud_pictu
 /* Of one colour: light of air up to a place, which loses some in the shade of clouds. */
 static float shaded_at(const nb_cloud_part *part, const nb_cloud_pixel *pixel, int c, float t, float clear)
 {
-    return nb_shaded_light(part->pieces + pixel->first_piece, pixel->piece_count, c, t, clear);
+    return nb_shadowed_air_light(part->pieces + pixel->first_piece, pixel->piece_count, c, t, clear);
 }
 
 /* All that is known of a ray. */
@@ -386,9 +387,9 @@ static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_c
         mix->knots.transmittance[k] = list[k].left;
         memcpy(mix->knots.in_scattering[k], list[k].light, sizeof list[k].light);
     }
-    nb_cloud_haze_ask(&mix->knots, direction, &mix->air, &rays);
-    const nebel_result result = nb_worlds_trace(j->picture->worlds, j->picture->world_count, pixel->count,
-                                                rays.direction, mix->knots.t, &rays.transfers);
+    nb_cloud_compose_ask(&mix->knots, direction, &mix->air, &rays);
+    const nebel_result result = nb_planets_trace(j->picture->worlds, j->picture->world_count, pixel->count,
+                                                 rays.direction, mix->knots.t, &rays.transfers);
     for (uint32_t k = 0; k < pixel->count && result == NEBEL_OK; k++) {
         if (list[k].is_marked) nb_cloud_mark(&mix->marks, k, list[k].haze_left, list[k].haze_light);
         for (int c = 0; c < 3; c++) mix->air.light[c][k] = shaded_at(part, pixel, c, list[k].t, mix->air.light[c][k]);
@@ -405,7 +406,7 @@ static nebel_result choose_pixel(const job *j, nb_cloud_part *part, nb_cloud_pix
     nebel_result result = find_mix(j, part, before, pixel, direction, &mix);
     if (result != NEBEL_OK) return result;
     const uint32_t count = pixel->count;
-    pixel->next = nb_cloud_haze_next(&mix.knots, &mix.marks, &mix.air, (float)NEBEL_DEFAULT_TOLERANCE, &doubt);
+    pixel->next = nb_cloud_compose_next(&mix.knots, &mix.marks, &mix.air, (float)NEBEL_DEFAULT_TOLERANCE, &doubt);
     result = keep_knots(j, part, &mix.knots, pixel);
     for (uint32_t k = 0; k < count && result == NEBEL_OK; k++) {
         const uint32_t at = pixel->count > count && (int)k >= pixel->next ? k + 1 : k;
@@ -433,7 +434,7 @@ static void choose_row(const job *j, nb_cloud_part *part, uint32_t y)
     }
 }
 
-nebel_result nb_gl_clouds_choose(nb_gl_clouds *clouds, const nb_cloud_picture *picture, float *places, int *any)
+nebel_result nb_cloud_picture_choose(nb_gl_clouds *clouds, const nb_cloud_picture *picture, float *places, int *any)
 {
     const size_t pixels = (size_t)picture->view->width * picture->view->height;
     for (int i = 0; i < NB_CLOUD_PARTS; i++) {
@@ -461,7 +462,7 @@ static nb_cloud_part *part_of(nb_gl_clouds *clouds, const nb_cloud_picture *pict
     return &clouds->parts[i];
 }
 
-void nb_gl_clouds_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const float *left, const float *light)
+void nb_cloud_picture_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const float *left, const float *light)
 {
     for (uint32_t y = 0; y < picture->view->height; y++) {
         nb_cloud_part *const part = part_of(clouds, picture, y);
@@ -487,8 +488,8 @@ static nebel_result mix_pixel(const job *j, const nb_cloud_part *part, const nb_
     nb_aerial_nodes haze = mix.air;
     for (int c = 0; c < 3; c++) {
         float over[NEBEL_MAX_CLOUD_NODES];
-        if (mix.marks.is_set[0]) nb_cloud_haze_add_fog(&mix.knots, &mix.marks, c, &mix.air, &haze);
-        nb_cloud_haze_sum(&mix.knots, c, &haze, over);
+        if (mix.marks.is_set[0]) nb_cloud_compose_add_fog(&mix.knots, &mix.marks, c, &mix.air, &haze);
+        nb_cloud_compose_sum(&mix.knots, c, &haze, over);
         for (uint32_t k = 0; k < pixel->count; k++) list[k].light[c] = over[k];
     }
     return NEBEL_OK;
@@ -504,7 +505,7 @@ static void mix_row(const job *j, nb_cloud_part *part, uint32_t y)
     }
 }
 
-nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture)
+nebel_result nb_cloud_picture_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture)
 {
     job j = {.clouds = clouds, .picture = picture, .row = mix_row};
     return do_parts(&j);
@@ -523,7 +524,7 @@ static void lay_over(const nb_cloud_pixel_node *knots, uint32_t count, float end
     memcpy(over, clear, sizeof clear);
     if (count == 0 || !(end > knots[0].t)) return;
     for (uint32_t i = 0; i < count; i++) t[i] = knots[i].t;
-    const uint32_t k = nb_cloud_haze_find(count, t, end, &part);
+    const uint32_t k = nb_cloud_compose_find(count, t, end, &part);
     const nb_cloud_pixel_node *const a = &knots[k], *const b = &knots[part > 0 ? k + 1 : k];
     for (int c = 0; c < 3; c++) over[c] = (1 - part) * a->light[c] + part * b->light[c];
     over[3] = (1 - part) * a->left + part * b->left;
@@ -627,8 +628,8 @@ static void end_row(const job *j, nb_cloud_part *part, uint32_t y)
     }
 }
 
-nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_cloud_picture *middle,
-                              const float *places, float *over, float *shade_plane)
+nebel_result nb_cloud_picture_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_cloud_picture *middle,
+                                  const float *places, float *over, float *shade_plane)
 {
     job j = {.clouds = clouds,
              .picture = picture,

@@ -67,7 +67,7 @@ typedef struct nb_cloud_picture {
     double pixel; /* width of a pixel per metre of the camera's axis, or of the way in a panorama */
     const nb_planet *worlds;
     int world_count;
-    double to_sun[3], disc; /* as of nb_worlds_light */
+    double to_sun[3], disc; /* as of nb_planets_light */
     int has_fog;
     int lifts; /* whether samples of a pixel may see the sky though its middle meets the ground */
     /* Asked after some rows, in the caller's thread, for walks take seconds: what is not OK ends them. */
@@ -76,36 +76,37 @@ typedef struct nb_cloud_picture {
 } nb_cloud_picture;
 
 /* Clouds at a moment under a sun. VALUE, MEMORY. */
-nebel_result nb_gl_clouds_set(nb_gl_clouds *clouds, const nebel_clouds *of, const nebel_sun *sun, double time,
-                              const nebel_log *log);
+nebel_result nb_cloud_picture_set(nb_gl_clouds *clouds, const nebel_clouds *of, const nebel_sun *sun, double time,
+                                  const nebel_log *log);
 
 /* A workspace of theirs, for the caller's thread. MEMORY. */
-nebel_result nb_gl_clouds_workspace(nb_gl_clouds *clouds, nebel_cloud_workspace **workspace);
+nebel_result nb_cloud_picture_workspace(nb_gl_clouds *clouds, nebel_cloud_workspace **workspace);
 
 /* Finds all pixels' knots, in clear space, and their shade on the air, which is that of the eye. MEMORY. */
-nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture);
+nebel_result nb_cloud_picture_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture);
 
 /* Their shade on the air, and on fog, NULL: which is the same everywhere: texels as nb_gl_cloud_shade_write has them, of
  * NB_CLOUD_SHADE_LAYERS layers of the picture, without fog NB_AIR_SHADE_LAYERS; *layers: how many of these are used. */
-nebel_result nb_gl_clouds_write_shade(nb_gl_clouds *clouds, const nb_cloud_picture *picture,
-                                      const nb_cloud_shadow_extent *roof, uint32_t *words, uint32_t *layers);
+nebel_result nb_cloud_picture_write_shade(nb_gl_clouds *clouds, const nb_cloud_picture *picture,
+                                          const nb_cloud_shadow_extent *roof, uint32_t *words, uint32_t *layers);
 
 /* Where fog is to be known next among the clouds of each pixel, 0: nowhere, and the unit direction of the ray: 4 numbers for each.
  * *any: whether it is anywhere. MEMORY. */
-nebel_result nb_gl_clouds_choose(nb_gl_clouds *clouds, const nb_cloud_picture *picture, float *places, int *any);
+nebel_result nb_cloud_picture_choose(nb_gl_clouds *clouds, const nb_cloud_picture *picture, float *places, int *any);
 /* What air and fog do up to there: 4 numbers for each pixel. */
-void nb_gl_clouds_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const float *left, const float *light);
+void nb_cloud_picture_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const float *left,
+                           const float *light);
 
 /* Mixes them with the air, which is that of the eye, and with fog, if there is any, as far as it was chosen. MEMORY. */
-nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture);
+nebel_result nb_cloud_picture_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture);
 
 /* For rays that end at places[4 i], 0: nowhere, what is left of haze, and added to it, 4 numbers for each; and what clouds leave of
  * the sunlight there, three times, and of the sky's light: 4 numbers, where rays end. Where a ray ends amid clouds these are found
  * anew up to there, through the middle of the pixel, and where that just meets the ground but the ray does not above the horizon; but
  * among fog. MEMORY. */
-nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_cloud_picture *middle,
-                              const float *places, float *over, float *shade);
+nebel_result nb_cloud_picture_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_cloud_picture *middle,
+                                  const float *places, float *over, float *shade);
 
-void nb_gl_clouds_release(nb_gl_clouds *clouds);
+void nb_cloud_picture_release(nb_gl_clouds *clouds);
 
 #endif

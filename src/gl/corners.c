@@ -89,7 +89,7 @@ static void drop_triangles(nb_mesh *mesh)
     mesh->corner_array = mesh->corners = 0;
 }
 
-nebel_result nb_corners_make(nb_meshes *meshes)
+nebel_result nb_triangle_instances_make(nb_meshes *meshes)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < meshes->count && result == NEBEL_OK; i++) {
@@ -123,7 +123,7 @@ static nebel_result make_fog(const nb_meshes *meshes, nb_mesh *mesh)
     return result;
 }
 
-nebel_result nb_corners_set_fog(nb_meshes *meshes)
+nebel_result nb_triangle_instances_set_fog(nb_meshes *meshes)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < meshes->count && result == NEBEL_OK; i++) {
@@ -136,7 +136,7 @@ nebel_result nb_corners_set_fog(nb_meshes *meshes)
     return result;
 }
 
-void nb_corners_draw(const nb_mesh *mesh, int vertices)
+void nb_triangle_instances_draw(const nb_mesh *mesh, int vertices)
 {
     glBindVertexArray(mesh->corner_array);
     glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, vertices, mesh->index_count / 3);

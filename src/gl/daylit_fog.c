@@ -18,11 +18,11 @@ static nebel_result find_changes(const nebel_scene_data *scene, nebel_cloud_work
 {
     double min[3], max[3];
     *found = (changes){.by_air = 0};
-    if (fog == NULL || nb_gl_air_planet(scene) == NULL || !scene->has_sun) return NEBEL_OK;
+    if (fog == NULL || nb_gl_planets_planet(scene) == NULL || !scene->has_sun) return NEBEL_OK;
     found->by_air = nebel_snapshot_scattering_fog(fog, min, max) &&
-                    !nb_daylight_is_near(&scene->planets[0], scene->sun_direction, min, max);
+                    !nb_irradiance_is_near(&scene->planets[0], scene->sun_direction, min, max);
     if (clouds == NULL || nebel_get_volume_count(fog) == 0) return NEBEL_OK;
-    return nb_fog_roof_set(clouds, fog, nb_scene_owns_ambient(scene), &found->roof);
+    return nb_cloud_shadow_extent_set(clouds, fog, nb_surface_lighting_owns_ambient(scene), &found->roof);
 }
 
 /* Light that was scattered often comes from more places than one. */
@@ -44,8 +44,8 @@ static nebel_sun dim(const nebel_scene_data *scene, nebel_sun sun)
     nb_planet worlds[NEBEL_MAX_PLANETS] = {{.planet = &scene->planets[0]}};
     double to_sun[3] = {sun.direction[0], sun.direction[1], sun.direction[2]};
     (void)nb_vector_make_unit(to_sun);
-    const int count = nb_worlds_set(worlds, scene, origin);
-    const nebel_irradiance light = nb_worlds_light(worlds, count, origin, to_sun, nb_worlds_disc(scene));
+    const int count = nb_planets_set(worlds, scene, origin);
+    const nebel_irradiance light = nb_planets_light(worlds, count, origin, to_sun, nb_planets_disc(scene));
     for (int c = 0; c < 3; c++) sun.irradiance[c] *= light.sun[c];
     return sun;
 }
@@ -65,7 +65,7 @@ static nebel_result relight(nb_gl_daylit_fog *daylit, const nebel_log *log, cons
     nebel_result result = NEBEL_OK;
     nb_gl_daylit_fog_release(daylit);
     if (fog == NULL) return NEBEL_OK;
-    const nebel_sun above = nb_scene_sun(scene);
+    const nebel_sun above = nb_surface_lighting_sun(scene);
     if ((found->by_air || found->roof.is_shaded) && !is_diffuse(log, fog)) {
         const nebel_sun sun = found->by_air ? above : dim(scene, above);
         result = nebel_relight(fog, &sun, &daylit->lit);
@@ -80,7 +80,7 @@ static nebel_result relight(nb_gl_daylit_fog *daylit, const nebel_log *log, cons
 nebel_result nb_gl_daylit_fog_set(nb_gl_daylit_fog *daylit, const nebel_log *log, const nebel_scene_data *scene,
                                   nebel_cloud_workspace *clouds, nebel_snapshot *fog)
 {
-    const nebel_sun sun = nb_scene_sun(scene);
+    const nebel_sun sun = nb_surface_lighting_sun(scene);
     changes found;
     nebel_result result = find_changes(scene, clouds, fog, &found);
     if (result == NEBEL_OK && !is_same(daylit, fog, &sun, &found)) result = relight(daylit, log, scene, &found, fog);

@@ -16,8 +16,8 @@ static nebel_result fill(nb_environment *e, const nebel_allocator *allocator, co
     if (words == NULL) return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL: out of memory for the environment");
     result = nebel_pack_environment(snapshot, surfaces, words, count, &count);
     if (result == NEBEL_OK)
-        result = nb_words_upload(&e->name, log, context, words, rows, "the texture of the environment",
-                                 "; use a smaller picture, or fewer phase functions");
+        result = nb_texel_texture_upload(&e->name, log, context, words, rows, "the texture of the environment",
+                                         "; use a smaller picture, or fewer phase functions");
     nb_release(allocator, words);
     return result;
 }

@@ -37,7 +37,7 @@ static nebel_result set_fog(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     nebel_cloud_workspace *clouds = NULL;
-    nebel_result result = f->clouds != NULL ? nb_frame_set_clouds(f, &clouds) : NEBEL_OK;
+    nebel_result result = f->clouds != NULL ? nb_gl_frame_set_clouds(f, &clouds) : NEBEL_OK;
     if (result == NEBEL_OK) result = nb_gl_daylit_fog_set(&r->daylit, &r->log, r->scene, clouds, r->fog);
     f->fog = r->daylit.lit != NULL ? r->daylit.lit : r->fog;
     f->even_shade = 1;
@@ -73,16 +73,16 @@ static nebel_result set_frame(frame *f)
     const nebel_gl_renderer *const r = f->renderer;
     const nebel_gl_frame_desc *const desc = f->desc;
     f->samples = desc->samples != 0 ? desc->samples : 4;
-    nebel_result result = nb_frame_check(r, desc, f->samples);
+    nebel_result result = nb_gl_frame_check(r, desc, f->samples);
     if (result == NEBEL_OK) result = set_method(f);
-    if (result == NEBEL_OK) result = nb_lighting_set(&f->light, r->scene, &r->log);
+    if (result == NEBEL_OK) result = nb_surface_lighting_set(&f->light, r->scene, &r->log);
     if (result == NEBEL_OK) result = nb_camera_look(&desc->camera, desc->width, desc->height, &r->log, &f->view);
     if (result != NEBEL_OK) return result;
     f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];
     f->casts = f->light.has_sun && r->meshes.count > 0 && r->meshes.low[0] <= r->meshes.high[0];
-    f->planet = nb_gl_air_planet(r->scene);
-    f->layers = nb_gl_shells_planet(r->scene);
+    f->planet = nb_gl_planets_planet(r->scene);
+    f->layers = nb_gl_textured_planet(r->scene);
     f->clouds = f->planet != NULL ? f->planet->clouds : NULL;
     f->reach = reach_of(f);
     if (f->desc->camera.projection == NEBEL_PROJECTION_PERSPECTIVE) set_near_plane(f);
@@ -93,12 +93,12 @@ static nebel_result set_frame(frame *f)
 
 /* ---- surfaces -------------------------------------------------------------------------------- */
 
-void nb_frame_set_vector(unsigned program, const char *name, const float v[3])
+void nb_gl_frame_set_vector(unsigned program, const char *name, const float v[3])
 {
     glUniform3fv(glGetUniformLocation(program, name), 1, v);
 }
 
-void nb_frame_set_rays(const frame *f, unsigned program)
+void nb_gl_frame_set_rays(const frame *f, unsigned program)
 {
     float rays[6][3];
     for (int i = 0; i < 6; i++) {
@@ -125,7 +125,7 @@ static void set_clip(const frame *f, unsigned program)
     glUniform1f(glGetUniformLocation(program, "scene_reach"), (float)f->reach);
 }
 
-void nb_frame_bind_texture(GLuint unit, GLenum target, unsigned texture)
+void nb_gl_frame_bind_texture(GLuint unit, GLenum target, unsigned texture)
 {
     glActiveTexture(GL_TEXTURE0 + unit);
     glBindTexture(target, texture);
@@ -146,10 +146,10 @@ static void draw_meshes(const frame *f, unsigned program)
         glUniform3fv(offset, 1, from_eye);
         glUniform3fv(color, 1, mesh->base_color);
         glUniform1i(has_texture, mesh->texture != 0);
-        nb_frame_bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, mesh->texture);
+        nb_gl_frame_bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, mesh->texture);
         nb_meshes_bind_mask(mesh, cutoff);
         if (f->panorama) {
-            nb_corners_draw(mesh, NB_PANORAMA_STRIP);
+            nb_triangle_instances_draw(mesh, NB_PANORAMA_STRIP);
         } else {
             glBindVertexArray(mesh->vertex_array);
             glDrawElements(GL_TRIANGLES, mesh->index_count, GL_UNSIGNED_INT, NULL);
@@ -163,8 +163,8 @@ static void draw_ground(const frame *f)
     const nb_scene_programs *const shading = &f->renderer->shading;
     const unsigned program = f->panorama ? shading->round_ground : shading->ground;
     glUseProgram(program);
-    nb_frame_set_rays(f, program);
-    nb_gl_air_set_worlds(&f->renderer->air, program);
+    nb_gl_frame_set_rays(f, program);
+    nb_gl_planets_set_list(&f->renderer->air, program);
     glBindVertexArray(f->renderer->vertex_array);
     glDrawArrays(GL_TRIANGLES, 0, 3);
 }
@@ -181,12 +181,12 @@ static void draw_surfaces(const frame *f)
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER);
     glUseProgram(program);
-    nb_frame_set_rays(f, program);
+    nb_gl_frame_set_rays(f, program);
     set_clip(f, program);
-    nb_frame_set_vector(program, "scene_sun", f->light.sun);
+    nb_gl_frame_set_vector(program, "scene_sun", f->light.sun);
     draw_meshes(f, program);
     if (f->planet != NULL) draw_ground(f);
-    if (f->layers != NULL) nb_frame_draw_shell_ground(f);
+    if (f->layers != NULL) nb_gl_frame_draw_shell_ground(f);
 }
 
 static int has_lamps(const frame *f)
@@ -218,7 +218,7 @@ static void set_factor_numbers(const frame *f, unsigned program)
     glUniform1i(glGetUniformLocation(program, "factor_mode"), (GLint)f->method.factor.mode);
     glUniform3f(glGetUniformLocation(program, "factor_range"), (float)f->method.factor.start,
                 (float)f->method.factor.end, (float)f->method.factor.density);
-    nb_frame_set_vector(program, "factor_color", color);
+    nb_gl_frame_set_vector(program, "factor_color", color);
 }
 
 /* Table fog of an orthographic camera goes by device depth. */
@@ -237,12 +237,12 @@ static void draw_vertex_fog(const frame *f)
     const unsigned program = f->panorama ? r->shading.round_vertex_fog : r->shading.vertex_fog;
     clear_fog();
     glUseProgram(program);
-    nb_frame_set_rays(f, program);
+    nb_gl_frame_set_rays(f, program);
     set_clip(f, program);
     glUniform1f(glGetUniformLocation(program, "scene_weakening"), f->desc->method != NEBEL_GL_METHOD_ADDITIVE);
     glUniform1i(glGetUniformLocation(program, "factor_mode"), -1);
     if (nb_method_is_by_user(&f->method) && f->method.factor.stage == NEBEL_STAGE_PIXEL) set_factor_numbers(f, program);
-    nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
+    nb_gl_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     draw_meshes(f, program);
 }
 
@@ -254,22 +254,22 @@ static void set_axis(const frame *f, unsigned program)
     const int has_axis = !f->panorama && (parallel || f->method.factor.coordinate == NEBEL_COORDINATE_PLANE);
     float axis[3];
     for (int i = 0; i < 3; i++) axis[i] = has_axis ? (float)-eye[4 * i + 2] : 0;
-    nb_frame_set_vector(program, "scene_axis", axis);
+    nb_gl_frame_set_vector(program, "scene_axis", axis);
 }
 
 static nebel_result draw_factor(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    const nebel_result result = nb_shading_make_factor(&r->shading, &r->context, &r->log, f->panorama);
+    const nebel_result result = nb_scene_programs_make_factor(&r->shading, &r->context, &r->log, f->panorama);
     if (result != NEBEL_OK) return result;
     const unsigned program = f->panorama ? r->shading.round_factor : r->shading.factor;
     clear_fog();
     glUseProgram(program);
-    nb_frame_set_rays(f, program);
+    nb_gl_frame_set_rays(f, program);
     set_axis(f, program);
     set_factor_numbers(f, program);
     set_device_depth(f, program);
-    nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
+    nb_gl_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     glBindVertexArray(r->vertex_array);
     glDrawArrays(GL_TRIANGLES, 0, 3);
     return NEBEL_OK;
@@ -278,18 +278,18 @@ static nebel_result draw_factor(const frame *f)
 static void set_lamps(const frame *f, unsigned program)
 {
     const nb_light_maps *const lamps = &f->renderer->lamps;
-    nb_frame_bind_texture(NB_UNIT_LAMPS, GL_TEXTURE_2D, lamps->words);
-    nb_frame_bind_texture(NB_UNIT_LAMP_MAPS, GL_TEXTURE_2D_ARRAY, lamps->maps);
+    nb_gl_frame_bind_texture(NB_UNIT_LIGHTS, GL_TEXTURE_2D, lamps->words);
+    nb_gl_frame_bind_texture(NB_UNIT_LIGHT_MAPS, GL_TEXTURE_2D_ARRAY, lamps->maps);
     glUniform1i(glGetUniformLocation(program, "lamp_count"), (GLint)f->renderer->scene->light_count);
     glUniform1f(glGetUniformLocation(program, "map_face"), (float)lamps->face);
-    glUniform1f(glGetUniformLocation(program, "map_share"), 1 - 2.f * NB_LAMP_BORDER / (float)lamps->face);
+    glUniform1f(glGetUniformLocation(program, "map_share"), 1 - 2.f * NB_LIGHT_BORDER / (float)lamps->face);
 }
 
 /* In the programs of passes, too. */
 static void set_lamp_shade(const void *of, unsigned program)
 {
-    glUniform1i(glGetUniformLocation(program, "scene_lamps"), NB_UNIT_LAMPS);
-    glUniform1i(glGetUniformLocation(program, "lamp_maps"), NB_UNIT_LAMP_MAPS);
+    glUniform1i(glGetUniformLocation(program, "scene_lamps"), NB_UNIT_LIGHTS);
+    glUniform1i(glGetUniformLocation(program, "lamp_maps"), NB_UNIT_LIGHT_MAPS);
     set_lamps(of, program);
 }
 
@@ -311,14 +311,14 @@ static nebel_result draw_exact_fog(const frame *f)
                                  .shafts = f->shafts ? &r->shafts : NULL};
     double low[3], high[3];
     if (has_lamps(f) && r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, low, high))
-        picture.shade = (nb_gl_visibility){{nb_lamp_map_text, nb_lamp_shade_text}, set_lamp_shade, f};
+        picture.shade = (nb_gl_visibility){{nb_light_map_text, nb_light_shade_text}, set_lamp_shade, f};
     if (!f->panorama && nebel_compute_view_rays(&f->sample_view, &pass.depth, &picture.rays) != NEBEL_OK)
         return NEBEL_ERROR_ARGUMENT;
     return nb_gl_draw_fog(r->eye_fog, &pass, &picture);
 }
 
 /* Or air. Cells and factors have no need of the renderer's fog. */
-int nb_frame_has_fog(const frame *f)
+int nb_gl_frame_has_fog(const frame *f)
 {
     return f->renderer->fog != NULL || f->planet != NULL || nb_method_takes_cells(f->desc->method) ||
            f->method.replaces_fog;
@@ -351,16 +351,16 @@ static nebel_result draw_pixel_fog(const frame *f)
     return nb_pixel_fog_set(&r->targets, &r->allocator, &r->log, &f->rays, &source);
 }
 
-int nb_frame_has_particles(const frame *f)
+int nb_gl_frame_has_particles(const frame *f)
 {
     return f->renderer->particles.count > 0 && !f->method.replaces_fog;
 }
 
 /* Particles ask for the renderer's fog before them whatever is on surfaces, and lamps for that before surfaces. */
-nebel_result nb_frame_draw_fog(const frame *f)
+nebel_result nb_gl_frame_draw_fog(const frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
-    if (!nb_frame_has_fog(f)) return NEBEL_OK;
+    if (!nb_gl_frame_has_fog(f)) return NEBEL_OK;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.fog_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
     nebel_result result = NEBEL_OK;
@@ -372,9 +372,9 @@ nebel_result nb_frame_draw_fog(const frame *f)
         result = draw_pixel_fog(f);
     const int is_exact =
         !nb_method_is_by_vertex(&f->method) && !f->method.replaces_fog && !nb_method_takes_cells(f->desc->method);
-    const int is_asked = is_exact || nb_frame_has_particles(f) || (has_lamps(f) && !f->method.replaces_fog);
+    const int is_asked = is_exact || nb_gl_frame_has_particles(f) || (has_lamps(f) && !f->method.replaces_fog);
     if (result == NEBEL_OK && (r->fog != NULL || f->planet != NULL) && is_asked) result = set_eye_fog(f);
-    if (result == NEBEL_OK && nb_frame_has_particles(f) && r->eye_fog->is_crowded)
+    if (result == NEBEL_OK && nb_gl_frame_has_particles(f) && r->eye_fog->is_crowded)
         nb_gl_warn_of_turns(r->eye_fog, "particles ask in one pass for what is before them");
     return result == NEBEL_OK && is_exact ? draw_exact_fog(f) : result;
 }
@@ -407,11 +407,11 @@ static void set_face_tiles(const frame *f, const nebel_gl_fog_resources *fog, un
 
 static void bind_media(const nebel_gl_fog_resources *fog)
 {
-    if (fog->texture != 0) nb_frame_bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
+    if (fog->texture != 0) nb_gl_frame_bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
     if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
-    if (fog->environment != 0) nb_frame_bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, fog->environment);
-    if (fog->voxels != 0) nb_frame_bind_texture(NB_UNIT_VOXELS, GL_TEXTURE_2D, fog->voxels);
-    if (fog->diffusion != 0) nb_frame_bind_texture(NB_UNIT_NODES, GL_TEXTURE_2D, fog->diffusion);
+    if (fog->environment != 0) nb_gl_frame_bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, fog->environment);
+    if (fog->voxels != 0) nb_gl_frame_bind_texture(NB_UNIT_VOXELS, GL_TEXTURE_2D, fog->voxels);
+    if (fog->diffusion != 0) nb_gl_frame_bind_texture(NB_UNIT_NODES, GL_TEXTURE_2D, fog->diffusion);
 }
 
 static void set_particles(const frame *f, const nebel_gl_fog_resources *fog, unsigned program)
@@ -419,17 +419,17 @@ static void set_particles(const frame *f, const nebel_gl_fog_resources *fog, uns
     const int parallel = f->view.clip_from_eye[15] != 0;
     const double *const eye = f->view.eye_from_world;
     glUseProgram(program);
-    nb_frame_set_rays(f, program);
+    nb_gl_frame_set_rays(f, program);
     set_clip(f, program);
     glUniform3f(glGetUniformLocation(program, "scene_forward"), parallel ? (float)-eye[2] : 0,
                 parallel ? (float)-eye[6] : 0, parallel ? (float)-eye[10] : 0);
     glUniform2f(glGetUniformLocation(program, "scene_size"), (float)f->desc->width, (float)f->desc->height);
     const int five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP;
     if (five_taps) set_taps(f, program);
-    nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, five_taps ? f->place : f->depth);
+    nb_gl_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, five_taps ? f->place : f->depth);
     bind_media(fog);
     if (fog->tiles == 0) return;
-    nb_frame_bind_texture(NB_UNIT_TILES, GL_TEXTURE_2D, fog->tiles);
+    nb_gl_frame_bind_texture(NB_UNIT_TILES, GL_TEXTURE_2D, fog->tiles);
     if (f->panorama) {
         set_face_tiles(f, fog, program);
     } else {
@@ -437,8 +437,8 @@ static void set_particles(const frame *f, const nebel_gl_fog_resources *fog, uns
     }
 }
 
-nebel_result nb_frame_find_light(const frame *f, const nebel_gl *passes, nb_composite_key kind,
-                                 nebel_gl_fog_resources *fog, unsigned *program)
+nebel_result nb_gl_frame_find_light(const frame *f, const nebel_gl *passes, nb_composite_key kind,
+                                    nebel_gl_fog_resources *fog, unsigned *program)
 {
     nebel_gl_renderer *const r = f->renderer;
     *fog = (nebel_gl_fog_resources){0};
@@ -451,22 +451,22 @@ nebel_result nb_frame_find_light(const frame *f, const nebel_gl *passes, nb_comp
     kind.tiled = fog->tiles != 0 && !kind.air; /* ground reaches beyond all lists along the sun's light */
     const uint32_t lights = NEBEL_FEATURE_LIGHTS | NEBEL_FEATURE_DIFFUSION | NEBEL_FEATURE_ENVIRONMENT;
     kind.features = kind.of_particles ? fog->features : fog->features & ~lights;
-    return nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, program);
+    return nb_scene_programs_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, program);
 }
 
-int nb_frame_count_veil_layers(const frame *f)
+int nb_gl_frame_count_veil_layers(const frame *f)
 {
-    return !nb_frame_has_particles(f) ? 0 : f->renderer->particles.is_grey ? 1 : 3;
+    return !nb_gl_frame_has_particles(f) ? 0 : f->renderer->particles.is_grey ? 1 : 3;
 }
 
 /* Whatever comes to the farthest particle, and what it adds, passes through each. */
-nebel_result nb_frame_draw_particles(const frame *f)
+nebel_result nb_gl_frame_draw_particles(const frame *f)
 {
     static const GLfloat clear[2][4] = {{0, 0, 0, 1}, {0, 1, 0, 0}};
     nebel_gl_renderer *const r = f->renderer;
     nebel_gl_fog_resources fog;
     unsigned program = 0;
-    const int layers = nb_frame_count_veil_layers(f);
+    const int layers = nb_gl_frame_count_veil_layers(f);
     if (layers == 0) return NEBEL_OK;
     nb_renderer_judge_particles(r);
     const int has_fog = r->fog != NULL && nebel_get_volume_count(r->fog) > 0;
@@ -474,14 +474,14 @@ nebel_result nb_frame_draw_particles(const frame *f)
                                    .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
                                    .veil_layers = layers,
                                    .shafts = has_fog && f->shafts};
-    const nebel_result result = nb_frame_find_light(f, has_fog ? r->eye_fog : NULL, kind, &fog, &program);
+    const nebel_result result = nb_gl_frame_find_light(f, has_fog ? r->eye_fog : NULL, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.veil_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
     for (int i = 0; i < layers; i++) glClearBufferfv(GL_COLOR, i, clear[layers == 3]);
     nb_state_layer(&r->context, layers);
     set_particles(f, &fog, program);
-    if (kind.shafts) nb_shafts_set(&r->shafts, program);
+    if (kind.shafts) nb_shaft_maps_set(&r->shafts, program);
     nb_particles_draw(&r->particles, f->panorama ? NB_PANORAMA_STRIP : 4);
     return NEBEL_OK;
 }
@@ -493,10 +493,11 @@ static nebel_result prepare_lamps(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     if (!has_lamps(f)) return NEBEL_OK;
-    glActiveTexture(GL_TEXTURE0 + NB_UNIT_LAMPS);
-    nebel_result result = nb_lamps_set(&r->lamps, &r->allocator, &r->log, r->scene, r->fog, f->eye);
-    if (result == NEBEL_OK) result = nb_shading_make_lamp_map(&r->shading, &r->context, &r->log);
-    if (result == NEBEL_OK) result = nb_lamps_draw(&r->lamps, &r->context, &r->log, r->shading.lamp_map, &r->meshes);
+    glActiveTexture(GL_TEXTURE0 + NB_UNIT_LIGHTS);
+    nebel_result result = nb_light_maps_set(&r->lamps, &r->allocator, &r->log, r->scene, r->fog, f->eye);
+    if (result == NEBEL_OK) result = nb_scene_programs_make_light_map(&r->shading, &r->context, &r->log);
+    if (result == NEBEL_OK)
+        result = nb_light_maps_draw(&r->lamps, &r->context, &r->log, r->shading.lamp_map, &r->meshes);
     glActiveTexture(GL_TEXTURE0);
     return result;
 }
@@ -506,7 +507,7 @@ static nebel_result prepare_lamps(const frame *f)
 static void bind_fog(const frame *f, const nebel_gl_fog_resources *fog, unsigned program)
 {
     bind_media(fog);
-    if (fog->tiles != 0 && f->casts && f->planet == NULL) nb_frame_set_tiles(f, fog, program);
+    if (fog->tiles != 0 && f->casts && f->planet == NULL) nb_gl_frame_set_tiles(f, fog, program);
 }
 
 /* What comes through the particles of the sun's light to each surface. */
@@ -517,15 +518,15 @@ static nebel_result draw_dimming(const frame *f)
     unsigned program = 0;
     if (!f->dims) return NEBEL_OK;
     const nebel_result result =
-        nb_frame_find_light(f, r->sun_cloud, (nb_composite_key){.of_dimming = 1}, &fog, &program);
+        nb_gl_frame_find_light(f, r->sun_cloud, (nb_composite_key){.of_dimming = 1}, &fog, &program);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.dimming_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
     glUseProgram(program);
-    nb_frame_set_rays(f, program);
-    nb_frame_set_vector(program, "scene_sun", f->light.sun);
+    nb_gl_frame_set_rays(f, program);
+    nb_gl_frame_set_vector(program, "scene_sun", f->light.sun);
     glUniformMatrix3fv(glGetUniformLocation(program, "scene_light"), 1, GL_FALSE, r->shadows.light);
-    nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
+    nb_gl_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     bind_fog(f, &fog, program);
     glBindVertexArray(r->vertex_array);
     glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -540,10 +541,12 @@ static nebel_result prepare_air(const frame *f)
     const int ends = r->meshes.count > 0 || f->clouds != NULL || (r->fog != NULL && nebel_get_volume_count(r->fog) > 0);
     if (f->planet == NULL) return NEBEL_OK;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_AIR);
-    nebel_result result = nb_gl_air_set(&r->air, &r->allocator, &r->log, &r->context, r->scene, f->eye, ends, is_lit);
+    nebel_result result =
+        nb_gl_planets_set(&r->air, &r->allocator, &r->log, &r->context, r->scene, f->eye, ends, is_lit);
     glActiveTexture(GL_TEXTURE0);
-    return result == NEBEL_OK ? nb_shading_make_ground(&r->shading, &r->context, &r->log, f->panorama, r->air.count)
-                              : result;
+    return result == NEBEL_OK
+               ? nb_scene_programs_make_ground(&r->shading, &r->context, &r->log, f->panorama, r->air.count)
+               : result;
 }
 
 static int has_environment(const frame *f)
@@ -568,29 +571,29 @@ static void set_light(const frame *f, const nebel_gl_fog_resources *fog, unsigne
     const nebel_gl_renderer *const r = f->renderer;
     const nb_targets *const t = &r->targets;
     glUseProgram(program);
-    nb_frame_set_rays(f, program);
-    nb_frame_set_vector(program, "scene_background", f->light.background);
-    nb_frame_set_vector(program, "scene_ambient", f->light.ambient);
-    nb_frame_set_vector(program, "scene_sun", f->light.sun);
-    nb_frame_set_vector(program, "scene_sunlight", f->light.sunlight);
-    if (f->planet != NULL) nb_gl_air_set_light(&r->air, program, r->scene);
+    nb_gl_frame_set_rays(f, program);
+    nb_gl_frame_set_vector(program, "scene_background", f->light.background);
+    nb_gl_frame_set_vector(program, "scene_ambient", f->light.ambient);
+    nb_gl_frame_set_vector(program, "scene_sun", f->light.sun);
+    nb_gl_frame_set_vector(program, "scene_sunlight", f->light.sunlight);
+    if (f->planet != NULL) nb_gl_planets_set_light(&r->air, program, r->scene);
     glUniform1f(glGetUniformLocation(program, "scene_share"), 1 / (float)f->samples);
     glUniform1f(glGetUniformLocation(program, "scene_ahead"), (float)f->ahead);
     glUniform1i(glGetUniformLocation(program, "scene_is_stored"), f->method.blends_stored);
-    if (f->casts) nb_frame_set_shadows(f, program);
+    if (f->casts) nb_gl_frame_set_shadows(f, program);
     if (has_lamps(f)) set_lamps(f, program);
-    nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, t->place);
-    nb_frame_bind_texture(NB_UNIT_NORMAL, GL_TEXTURE_2D, t->normal);
-    nb_frame_bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, t->reflectance);
-    nb_frame_bind_texture(NB_UNIT_IN_SCATTERING, GL_TEXTURE_2D, t->in_scattering);
-    nb_frame_bind_texture(NB_UNIT_TRANSMITTANCE, GL_TEXTURE_2D, t->transmittance);
-    if (f->dims) nb_frame_bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, t->dimming);
-    if (nb_frame_has_particles(f)) nb_frame_bind_texture(NB_UNIT_VEIL, GL_TEXTURE_2D_ARRAY, t->veil);
+    nb_gl_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, t->place);
+    nb_gl_frame_bind_texture(NB_UNIT_NORMAL, GL_TEXTURE_2D, t->normal);
+    nb_gl_frame_bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, t->reflectance);
+    nb_gl_frame_bind_texture(NB_UNIT_IN_SCATTERING, GL_TEXTURE_2D, t->in_scattering);
+    nb_gl_frame_bind_texture(NB_UNIT_TRANSMITTANCE, GL_TEXTURE_2D, t->transmittance);
+    if (f->dims) nb_gl_frame_bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, t->dimming);
+    if (nb_gl_frame_has_particles(f)) nb_gl_frame_bind_texture(NB_UNIT_VEIL, GL_TEXTURE_2D_ARRAY, t->veil);
     bind_fog(f, fog, program);
-    if (f->layers != NULL) nb_frame_set_shells(f, program);
-    if (f->clouds != NULL) nb_frame_bind_clouds(f);
+    if (f->layers != NULL) nb_gl_frame_set_shells(f, program);
+    if (f->clouds != NULL) nb_gl_frame_bind_clouds(f);
     glUniform1i(glGetUniformLocation(program, "scene_shows_ambient"), f->light.shows_ambient);
-    if (has_environment(f)) nb_frame_bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, r->environment.name);
+    if (has_environment(f)) nb_gl_frame_bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, r->environment.name);
 }
 
 /* The first sample replaces what was there. */
@@ -616,10 +619,10 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
                                    .lamplit = has_lamps(f),
                                    .dimmed = f->dims || f->clouds != NULL,
                                    .clouds = f->clouds != NULL,
-                                   .in_fog = nb_frame_has_fog(f),
+                                   .in_fog = nb_gl_frame_has_fog(f),
                                    .environment = has_environment(f),
-                                   .veil_layers = nb_frame_count_veil_layers(f)};
-    const nebel_result result = nb_frame_find_light(f, passes, kind, &fog, &program);
+                                   .veil_layers = nb_gl_frame_count_veil_layers(f)};
+    const nebel_result result = nb_gl_frame_find_light(f, passes, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     start_picture(f, sample);
     set_light(f, &fog, program);
@@ -648,7 +651,7 @@ static nebel_result trace_clouds(frame *f)
 {
     const nb_pixel_position point = f->point;
     nebel_result result = set_sample(f, nb_pixel_sample(0, 1));
-    if (result == NEBEL_OK) result = nb_frame_trace_clouds(f);
+    if (result == NEBEL_OK) result = nb_gl_frame_trace_clouds(f);
     return result == NEBEL_OK ? set_sample(f, point) : result;
 }
 
@@ -657,19 +660,19 @@ static nebel_result draw_sample(frame *f, uint32_t sample)
     nebel_result result = set_sample(f, nb_pixel_sample(sample, f->samples));
     if (result != NEBEL_OK) return result;
     draw_surfaces(f);
-    if (sample == 0 && f->casts) result = nb_frame_prepare_sun(f);
-    if (result == NEBEL_OK && f->layers != NULL) result = nb_frame_draw_shells(f);
+    if (sample == 0 && f->casts) result = nb_gl_frame_prepare_sun(f);
+    if (result == NEBEL_OK && f->layers != NULL) result = nb_gl_frame_draw_shells(f);
     if (result == NEBEL_OK && sample == 0 && f->clouds != NULL) result = trace_clouds(f);
     f->place = f->renderer->targets.place;
     f->depth = f->renderer->targets.depth;
-    if (result == NEBEL_OK) result = nb_frame_draw_fog(f);
-    if (result == NEBEL_OK && f->clouds != NULL) result = nb_frame_end_clouds(f);
-    if (result == NEBEL_OK) result = nb_frame_draw_particles(f);
+    if (result == NEBEL_OK) result = nb_gl_frame_draw_fog(f);
+    if (result == NEBEL_OK && f->clouds != NULL) result = nb_gl_frame_end_clouds(f);
+    if (result == NEBEL_OK) result = nb_gl_frame_draw_particles(f);
     if (result == NEBEL_OK) result = draw_dimming(f);
     return result == NEBEL_OK ? draw_light(f, sample) : result;
 }
 
-nebel_result nb_frame_ask(const frame *f)
+nebel_result nb_gl_frame_ask(const frame *f)
 {
     const nebel_gl_frame_desc *const desc = f->desc;
     if (desc->progress == NULL || desc->progress(f->done, f->samples, desc->progress_user) == 0) return NEBEL_OK;
@@ -681,7 +684,7 @@ static nebel_result report(frame *f)
 {
     if (f->desc->progress != NULL) glFinish();
     f->done++;
-    return nb_frame_ask(f);
+    return nb_gl_frame_ask(f);
 }
 
 static nebel_result prepare_particles(const frame *f)
@@ -690,14 +693,14 @@ static nebel_result prepare_particles(const frame *f)
     const double *const eye = f->view.eye_from_world, forward[3] = {-eye[2], -eye[6], -eye[10]};
     const int parallel = f->view.clip_from_eye[15] != 0;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_VEIL);
-    const nebel_result result = nb_targets_fit_veil(&r->targets, &r->log, nb_frame_count_veil_layers(f));
+    const nebel_result result = nb_targets_fit_veil(&r->targets, &r->log, nb_gl_frame_count_veil_layers(f));
     glActiveTexture(GL_TEXTURE0);
     return result == NEBEL_OK ? nb_particles_sort(&r->particles, &r->log, f->eye, parallel ? forward : NULL) : result;
 }
 
 static int has_vertex_fog(const frame *f)
 {
-    return nb_method_is_by_vertex(&f->method) && nb_frame_has_fog(f);
+    return nb_method_is_by_vertex(&f->method) && nb_gl_frame_has_fog(f);
 }
 
 static nebel_result prepare_vertices(const frame *f)
@@ -705,7 +708,7 @@ static nebel_result prepare_vertices(const frame *f)
     nebel_gl_renderer *const r = f->renderer;
     if (!has_vertex_fog(f)) return NEBEL_OK;
     const nb_vertex_source source = find_source(f);
-    const nebel_result result = nb_shading_make_vertex_fog(&r->shading, &r->context, &r->log);
+    const nebel_result result = nb_scene_programs_make_vertex_fog(&r->shading, &r->context, &r->log);
     return result == NEBEL_OK ? nb_vertex_fog_set(&r->meshes, &source) : result;
 }
 
@@ -713,9 +716,10 @@ static nebel_result prepare_vertices(const frame *f)
 static nebel_result prepare_panorama(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    nebel_result result = nb_shading_make_round(&r->shading, &r->context, &r->log, nb_method_is_by_vertex(&f->method));
-    if (result == NEBEL_OK) result = nb_corners_make(&r->meshes);
-    return result == NEBEL_OK && has_vertex_fog(f) ? nb_corners_set_fog(&r->meshes) : result;
+    nebel_result result =
+        nb_scene_programs_make_round(&r->shading, &r->context, &r->log, nb_method_is_by_vertex(&f->method));
+    if (result == NEBEL_OK) result = nb_triangle_instances_make(&r->meshes);
+    return result == NEBEL_OK && has_vertex_fog(f) ? nb_triangle_instances_set_fog(&r->meshes) : result;
 }
 
 static nebel_result draw_samples(frame *f)
@@ -723,11 +727,11 @@ static nebel_result draw_samples(frame *f)
     nebel_gl_renderer *const r = f->renderer;
     glActiveTexture(GL_TEXTURE0);
     nebel_result result = nb_targets_fit(&r->targets, &r->log, f->desc->width, f->desc->height);
-    if (result == NEBEL_OK && nb_frame_has_particles(f)) result = prepare_particles(f);
+    if (result == NEBEL_OK && nb_gl_frame_has_particles(f)) result = prepare_particles(f);
     if (result == NEBEL_OK) result = prepare_lamps(f);
     if (result == NEBEL_OK) result = prepare_environment(f);
     if (result == NEBEL_OK) result = prepare_air(f);
-    if (result == NEBEL_OK && f->layers != NULL) result = nb_frame_prepare_shells(f);
+    if (result == NEBEL_OK && f->layers != NULL) result = nb_gl_frame_prepare_shells(f);
     if (result == NEBEL_OK) result = prepare_vertices(f);
     if (result == NEBEL_OK && f->panorama) result = prepare_panorama(f);
     for (uint32_t i = 0; i < f->samples && result == NEBEL_OK; i++) {
@@ -741,7 +745,7 @@ nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_f
 {
     if (renderer == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_gl_frame_desc near = *desc;
-    frame f = {.renderer = renderer, .desc = &near, .ahead = nb_frame_go_near(renderer, &near.camera, desc)};
+    frame f = {.renderer = renderer, .desc = &near, .ahead = nb_gl_frame_go_near(renderer, &near.camera, desc)};
     renderer->has_frame = 0;
     nebel_result result = nb_context_check(&renderer->log, renderer->vertex_array);
     if (result == NEBEL_OK) result = set_frame(&f);

@@ -80,7 +80,7 @@ static nebel_result check_air(const nebel_gl_renderer *r, const nebel_gl_frame_d
 /* What cannot be drawn with a planet is refused, not left out. */
 static nebel_result check_planet(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
-    const int has_air = nb_gl_air_planet(r->scene) != NULL, has_layers = nb_gl_shells_planet(r->scene) != NULL;
+    const int has_air = nb_gl_planets_planet(r->scene) != NULL, has_layers = nb_gl_textured_planet(r->scene) != NULL;
     if (has_air && r->scene->planets[0].cloud_layer_count > 0 && !desc->clouds_by_processor)
         return refuse(&r->log, "clouds with volume by itself");
     if ((has_air || has_layers) && desc->method != NEBEL_GL_METHOD_EXACT)
@@ -220,7 +220,7 @@ static nebel_result check_fog(const nebel_gl_renderer *r, const nebel_gl_frame_d
                    error.width, error.distance, error.error, error.distance * MOST_FOG_ERROR / error.error);
 }
 
-nebel_result nb_frame_check(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, uint32_t samples)
+nebel_result nb_gl_frame_check(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, uint32_t samples)
 {
     if (!(fabs(desc->time) <= 1e12))
         return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: time is %g; must be within -1e12 and 1e12", desc->time);

@@ -5,6 +5,6 @@
 #include "renderer.h"
 
 /* Size, samples, method, taps, and whether floats hold the meshes. VALUE, LIMIT, ARGUMENT, UNSUPPORTED, with a message. */
-nebel_result nb_frame_check(const nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc, uint32_t samples);
+nebel_result nb_gl_frame_check(const nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc, uint32_t samples);
 
 #endif

@@ -35,13 +35,13 @@ static int has_fog(const nb_gl_frame *f)
 
 static nebel_result ask(void *user)
 {
-    return nb_frame_ask(user);
+    return nb_gl_frame_ask(user);
 }
 
 static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, nb_pixel_position point)
 {
     const nebel_scene_data *const scene = f->renderer->scene;
-    nebel_sun sun = nb_scene_sun(scene);
+    nebel_sun sun = nb_surface_lighting_sun(scene);
     (void)nb_vector_make_unit(sun.direction);
     return (nb_cloud_picture){.view = view,
                               .panorama = f->panorama,
@@ -51,7 +51,7 @@ static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, nb_pi
                               .worlds = f->renderer->air.worlds,
                               .world_count = f->renderer->air.count,
                               .to_sun = {sun.direction[0], sun.direction[1], sun.direction[2]},
-                              .disc = nb_worlds_disc(scene),
+                              .disc = nb_planets_disc(scene),
                               .has_fog = has_fog(f),
                               .ask = ask,
                               .ask_user = f};
@@ -68,7 +68,7 @@ static nb_cloud_picture picture_of_middles(nb_gl_frame *f)
 static nebel_result upload(const nb_gl_frame *f, unsigned *texture, const float *texels)
 {
     glActiveTexture(GL_TEXTURE0);
-    nb_words_bind(texture);
+    nb_texel_texture_bind(texture);
     glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, (GLsizei)f->view.width, (GLsizei)f->view.height, 0, GL_RGBA, GL_FLOAT,
                  texels);
     return nb_context_check_memory(log_of(f), "clouds; ask for fewer pixels");
@@ -90,7 +90,7 @@ static nebel_result find_fog(nb_gl_frame *f, float *ends, float *left, float *li
     for (size_t i = 0; i < count_pixels(f); i++) ends[4 * i] = fmaxf(ends[4 * i], 1e-30f);
     nebel_result result = upload(f, &r->cloud_ends, ends);
     f->place = r->cloud_ends;
-    if (result == NEBEL_OK) result = nb_frame_draw_fog(f);
+    if (result == NEBEL_OK) result = nb_gl_frame_draw_fog(f);
     if (result != NEBEL_OK) return result;
     read_back(f, r->targets.fog_buffer, 0, light);
     read_back(f, r->targets.fog_buffer, 1, left);
@@ -108,11 +108,11 @@ static nebel_result find_marks(nb_gl_frame *f, const nb_cloud_picture *picture, 
     nebel_gl_renderer *const r = f->renderer;
     for (;;) {
         int any;
-        nebel_result result = nb_gl_clouds_choose(&r->clouds, picture, fog->places, &any);
+        nebel_result result = nb_cloud_picture_choose(&r->clouds, picture, fog->places, &any);
         if (result != NEBEL_OK || !any) return result;
         result = find_fog(f, fog->places, fog->left, fog->light);
         if (result != NEBEL_OK) return result;
-        nb_gl_clouds_mark(&r->clouds, picture, fog->left, fog->light);
+        nb_cloud_picture_mark(&r->clouds, picture, fog->left, fog->light);
     }
 }
 
@@ -145,9 +145,9 @@ static nebel_result draw_shade(nb_gl_frame *f, const nb_cloud_picture *picture)
     nebel_gl_renderer *const r = f->renderer;
     const nb_cloud_shadow_extent *const roof = r->cloud_shade.clear_sky > 0 ? &r->daylit.roof : NULL;
     const size_t texels = count_pixels(f) * (roof != NULL ? NB_CLOUD_SHADE_LAYERS : NB_AIR_SHADE_LAYERS);
-    uint32_t layers, *const words = nb_allocate(&r->allocator, texels, NB_CLOUD_SHADE_WORDS * sizeof *words);
+    uint32_t layers, *const words = nb_allocate(&r->allocator, texels, NB_CLOUD_SHADE_TEXELS * sizeof *words);
     if (words == NULL) return NEBEL_ERROR_MEMORY;
-    nebel_result result = nb_gl_clouds_write_shade(&r->clouds, picture, roof, words, &layers);
+    nebel_result result = nb_cloud_picture_write_shade(&r->clouds, picture, roof, words, &layers);
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_SHADE);
     if (result == NEBEL_OK)
         result = nb_gl_cloud_shade_upload(&r->cloud_shade, log_of(f), f->view.width, f->view.height, layers, words);
@@ -156,30 +156,30 @@ static nebel_result draw_shade(nb_gl_frame *f, const nb_cloud_picture *picture)
     return result;
 }
 
-nebel_result nb_frame_set_clouds(nb_gl_frame *f, nebel_cloud_workspace **workspace)
+nebel_result nb_gl_frame_set_clouds(nb_gl_frame *f, nebel_cloud_workspace **workspace)
 {
     nb_gl_clouds *const clouds = &f->renderer->clouds;
-    const nebel_sun sun = nb_scene_sun(f->renderer->scene);
-    nebel_result result = nb_gl_clouds_set(clouds, f->clouds, &sun, f->desc->time, log_of(f));
-    if (result == NEBEL_OK) result = nb_gl_clouds_workspace(clouds, workspace);
+    const nebel_sun sun = nb_surface_lighting_sun(f->renderer->scene);
+    nebel_result result = nb_cloud_picture_set(clouds, f->clouds, &sun, f->desc->time, log_of(f));
+    if (result == NEBEL_OK) result = nb_cloud_picture_workspace(clouds, workspace);
     return fail_memory(f, result);
 }
 
-nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
+nebel_result nb_gl_frame_trace_clouds(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     const nb_cloud_picture picture = picture_of_middles(f);
-    nebel_result result = nb_gl_clouds_trace(&r->clouds, &picture);
+    nebel_result result = nb_cloud_picture_trace(&r->clouds, &picture);
     if (result == NEBEL_OK) result = find_shade(f);
     if (result == NEBEL_OK) result = draw_shade(f, &picture);
     if (result == NEBEL_OK && has_fog(f)) result = find_all_fog(f, &picture);
-    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, &picture);
+    if (result == NEBEL_OK) result = nb_cloud_picture_mix(&r->clouds, &picture);
     return fail_memory(f, result);
 }
 
 /* ---- samples --------------------------------------------------------------------------------- */
 
-nebel_result nb_frame_end_clouds(nb_gl_frame *f)
+nebel_result nb_gl_frame_end_clouds(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     const nb_cloud_picture picture = picture_of(f, f->panorama ? &f->view : &f->sample_view, f->point);
@@ -188,7 +188,7 @@ nebel_result nb_frame_end_clouds(nb_gl_frame *f)
     nebel_result result = places != NULL && over != NULL && shade != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
     if (result == NEBEL_OK) {
         read_back(f, r->targets.surface_buffer, 0, places);
-        result = nb_gl_clouds_end(&r->clouds, &picture, &middle, places, over, shade);
+        result = nb_cloud_picture_end(&r->clouds, &picture, &middle, places, over, shade);
     }
     result = fail_memory(f, result);
     if (result == NEBEL_OK) result = upload(f, &r->cloud_over, over);
@@ -199,8 +199,8 @@ nebel_result nb_frame_end_clouds(nb_gl_frame *f)
     return result;
 }
 
-void nb_frame_bind_clouds(const nb_gl_frame *f)
+void nb_gl_frame_bind_clouds(const nb_gl_frame *f)
 {
-    nb_frame_bind_texture(NB_UNIT_CLOUDS, GL_TEXTURE_2D, f->renderer->cloud_over);
-    nb_frame_bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, f->renderer->cloud_dimming);
+    nb_gl_frame_bind_texture(NB_UNIT_CLOUDS, GL_TEXTURE_2D, f->renderer->cloud_over);
+    nb_gl_frame_bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, f->renderer->cloud_dimming);
 }

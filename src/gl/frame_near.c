@@ -48,7 +48,7 @@ static int may_go(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
            r->scene->planet_count == 0;
 }
 
-double nb_frame_go_near(const nebel_gl_renderer *r, nebel_camera *camera, const nebel_gl_frame_desc *desc)
+double nb_gl_frame_go_near(const nebel_gl_renderer *r, nebel_camera *camera, const nebel_gl_frame_desc *desc)
 {
     const nebel_log silent = {0};
     nb_camera_axes axes;

@@ -43,7 +43,7 @@ static void set_ambient(const nb_gl_frame *f, unsigned program, const char *name
     double ambient[3];
     nebel_evaluate_environment_diffuse(&f->light.environment, up, ambient);
     const float as_float[3] = {(float)ambient[0], (float)ambient[1], (float)ambient[2]};
-    nb_frame_set_vector(program, name, as_float);
+    nb_gl_frame_set_vector(program, name, as_float);
 }
 
 static void set_ball(const nb_gl_frame *f, unsigned program, double radius, double turned)
@@ -51,15 +51,15 @@ static void set_ball(const nb_gl_frame *f, unsigned program, double radius, doub
     const nebel_textured_planet_desc *const desc = nebel_get_textured_planet_desc(f->layers);
     double from[3], axes[3][3];
     float frame[9];
-    const double away = eye_from_middle(f, from), above = nb_vector_above_ball(away, radius);
+    const double away = eye_from_middle(f, from), above = nb_height_above_sphere(away, radius);
     const float middle[3] = {(float)from[0], (float)from[1], (float)from[2]};
-    nb_vector_axes(desc->rotation, axes);
+    nb_quaternion_axes(desc->rotation, axes);
     for (int i = 0; i < 9; i++) frame[i] = (float)axes[i / 3][i % 3];
     glUseProgram(program);
-    nb_frame_set_rays(f, program);
-    nb_frame_set_vector(program, "ball_from", middle);
-    nb_frame_set_vector(program, "ball_sun", f->light.sun);
-    nb_frame_set_vector(program, "ball_sunlight", f->light.sunlight);
+    nb_gl_frame_set_rays(f, program);
+    nb_gl_frame_set_vector(program, "ball_from", middle);
+    nb_gl_frame_set_vector(program, "ball_sun", f->light.sun);
+    nb_gl_frame_set_vector(program, "ball_sunlight", f->light.sunlight);
     set_ambient(f, program, "ball_ambient");
     glUniformMatrix3fv(glGetUniformLocation(program, "ball_frame"), 1, GL_FALSE, frame);
     glUniform1f(glGetUniformLocation(program, "ball_radius"), (float)radius);
@@ -70,7 +70,7 @@ static void set_ball(const nb_gl_frame *f, unsigned program, double radius, doub
 
 static void set_map(unsigned program, const nb_gl_map *map, GLuint unit, const char *sizes)
 {
-    nb_frame_bind_texture(unit, GL_TEXTURE_2D, map->name);
+    nb_gl_frame_bind_texture(unit, GL_TEXTURE_2D, map->name);
     glUniform3i(glGetUniformLocation(program, sizes), map->width, map->height, map->levels);
 }
 
@@ -80,7 +80,7 @@ static void draw_whole(const nb_gl_frame *f)
     glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
-void nb_frame_draw_shell_ground(const nb_gl_frame *f)
+void nb_gl_frame_draw_shell_ground(const nb_gl_frame *f)
 {
     const nb_gl_shells *const shells = &f->renderer->shells;
     const nebel_textured_planet_desc *const desc = nebel_get_textured_planet_desc(f->layers);
@@ -135,7 +135,7 @@ static void draw_side(const nb_gl_frame *f, uint32_t number, int is_far)
     else
         set_clouds(f, number, program);
     glUniform1i(glGetUniformLocation(program, "shell_is_far"), is_far);
-    nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
+    nb_gl_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     draw_whole(f);
 }
 
@@ -144,19 +144,19 @@ static nebel_result lay_over(const nb_gl_frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
     const nb_composite_key kind = {
-        .of_shells = 1, .in_fog = nb_frame_has_fog(f), .veil_layers = nb_frame_count_veil_layers(f)};
+        .of_shells = 1, .in_fog = nb_gl_frame_has_fog(f), .veil_layers = nb_gl_frame_count_veil_layers(f)};
     nebel_gl_fog_resources fog;
     unsigned program = 0;
-    const nebel_result result = nb_frame_find_light(f, NULL, kind, &fog, &program);
+    const nebel_result result = nb_gl_frame_find_light(f, NULL, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->shells.over_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
     nb_state_lay_under(&r->context);
     glUseProgram(program);
-    nb_frame_bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, r->shells.seen);
-    nb_frame_bind_texture(NB_UNIT_IN_SCATTERING, GL_TEXTURE_2D, r->targets.in_scattering);
-    nb_frame_bind_texture(NB_UNIT_TRANSMITTANCE, GL_TEXTURE_2D, r->targets.transmittance);
-    if (kind.veil_layers > 0) nb_frame_bind_texture(NB_UNIT_VEIL, GL_TEXTURE_2D_ARRAY, r->targets.veil);
+    nb_gl_frame_bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, r->shells.seen);
+    nb_gl_frame_bind_texture(NB_UNIT_IN_SCATTERING, GL_TEXTURE_2D, r->targets.in_scattering);
+    nb_gl_frame_bind_texture(NB_UNIT_TRANSMITTANCE, GL_TEXTURE_2D, r->targets.transmittance);
+    if (kind.veil_layers > 0) nb_gl_frame_bind_texture(NB_UNIT_VEIL, GL_TEXTURE_2D_ARRAY, r->targets.veil);
     draw_whole(f);
     return NEBEL_OK;
 }
@@ -166,8 +166,8 @@ static nebel_result add_side(nb_gl_frame *f, uint32_t number, int is_far)
     f->place = f->renderer->shells.place;
     f->depth = f->renderer->shells.depth;
     draw_side(f, number, is_far);
-    nebel_result result = nb_frame_draw_fog(f);
-    if (result == NEBEL_OK) result = nb_frame_draw_particles(f);
+    nebel_result result = nb_gl_frame_draw_fog(f);
+    if (result == NEBEL_OK) result = nb_gl_frame_draw_particles(f);
     return result == NEBEL_OK ? lay_over(f) : result;
 }
 
@@ -188,7 +188,7 @@ static uint32_t sort_shells(const nebel_textured_planet_desc *desc, int first_is
     return count;
 }
 
-nebel_result nb_frame_draw_shells(nb_gl_frame *f)
+nebel_result nb_gl_frame_draw_shells(nb_gl_frame *f)
 {
     static const GLfloat nothing[4] = {0, 0, 0, 1};
     const nebel_gl_renderer *const r = f->renderer;
@@ -212,15 +212,16 @@ nebel_result nb_frame_draw_shells(nb_gl_frame *f)
 
 /* ---- the frame ------------------------------------------------------------------------------- */
 
-nebel_result nb_frame_prepare_shells(const nb_gl_frame *f)
+nebel_result nb_gl_frame_prepare_shells(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     glActiveTexture(GL_TEXTURE0);
-    return nb_gl_shells_set(&r->shells, &r->context, &r->log, f->layers, f->desc->width, f->desc->height, f->panorama);
+    return nb_gl_textured_set(&r->shells, &r->context, &r->log, f->layers, f->desc->width, f->desc->height,
+                              f->panorama);
 }
 
-void nb_frame_set_shells(const nb_gl_frame *f, unsigned program)
+void nb_gl_frame_set_shells(const nb_gl_frame *f, unsigned program)
 {
-    nb_frame_bind_texture(NB_UNIT_SHELLS, GL_TEXTURE_2D, f->renderer->shells.over);
+    nb_gl_frame_bind_texture(NB_UNIT_SHELLS, GL_TEXTURE_2D, f->renderer->shells.over);
     set_ambient(f, program, "shell_ambient");
 }

@@ -44,7 +44,7 @@ static nebel_result set_sun_cloud(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     nebel_result result = NEBEL_OK;
-    f->dims = !f->desc->particles_leave_sun && nb_frame_has_particles(f);
+    f->dims = !f->desc->particles_leave_sun && nb_gl_frame_has_particles(f);
     if (!f->dims) return NEBEL_OK;
     if (r->cloud == NULL) result = nb_particles_commit(&r->particles, &r->allocator, &r->log, &r->cloud);
     if (result != NEBEL_OK) return result;
@@ -56,11 +56,11 @@ static nebel_result prepare_shafts(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     nb_shadows_turn_fog(&r->shafts.maps, f->light.sun_direction);
-    return nb_shafts_draw(&r->shafts, &r->context, &r->log, r->shading.shadow, r->vertex_array, &r->shadows,
-                          &r->targets, &f->rays, f->panorama, &r->meshes, &f->sunlit);
+    return nb_shaft_maps_draw(&r->shafts, &r->context, &r->log, r->shading.shadow, r->vertex_array, &r->shadows,
+                              &r->targets, &f->rays, f->panorama, &r->meshes, &f->sunlit);
 }
 
-nebel_result nb_frame_prepare_sun(nb_gl_frame *f)
+nebel_result nb_gl_frame_prepare_sun(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     nb_shadows_turn(&r->shadows, f->light.sun_direction);
@@ -77,10 +77,10 @@ nebel_result nb_frame_prepare_sun(nb_gl_frame *f)
     return result == NEBEL_OK ? set_sun_cloud(f) : result;
 }
 
-void nb_frame_set_shadows(const nb_gl_frame *f, unsigned program)
+void nb_gl_frame_set_shadows(const nb_gl_frame *f, unsigned program)
 {
     const nb_shadows *const s = &f->renderer->shadows;
-    nb_frame_bind_texture(NB_UNIT_SHADOWS, GL_TEXTURE_2D_ARRAY, s->texture);
+    nb_gl_frame_bind_texture(NB_UNIT_SHADOWS, GL_TEXTURE_2D_ARRAY, s->texture);
     glUniformMatrix3fv(glGetUniformLocation(program, "scene_light"), 1, GL_FALSE, s->light);
     glUniform1f(glGetUniformLocation(program, "map_size"), (float)s->size);
     glUniform4fv(glGetUniformLocation(program, "map_places"), NB_CASCADES, s->places[0]);
@@ -88,7 +88,7 @@ void nb_frame_set_shadows(const nb_gl_frame *f, unsigned program)
     glUniform3f(glGetUniformLocation(program, "map_heights"), s->low, s->high, s->rounding);
 }
 
-void nb_frame_set_tiles(const nb_gl_frame *f, const nebel_gl_fog_resources *fog, unsigned program)
+void nb_gl_frame_set_tiles(const nb_gl_frame *f, const nebel_gl_fog_resources *fog, unsigned program)
 {
     const nb_shadows *const s = &f->renderer->shadows;
     float place[4];
@@ -96,7 +96,7 @@ void nb_frame_set_tiles(const nb_gl_frame *f, const nebel_gl_fog_resources *fog,
         place[i] = (float)s->seen_low[i];
         place[2 + i] = (float)(f->sun_view.width / (s->seen_high[i] - s->seen_low[i]));
     }
-    nb_frame_bind_texture(NB_UNIT_TILES, GL_TEXTURE_2D, fog->tiles);
+    nb_gl_frame_bind_texture(NB_UNIT_TILES, GL_TEXTURE_2D, fog->tiles);
     glUniform4fv(glGetUniformLocation(program, "tile_place"), 1, place);
     glUniform4i(glGetUniformLocation(program, "tile_grid"), (GLint)f->sun_view.width, (GLint)f->sun_view.height,
                 (GLint)fog->tile_size, (GLint)fog->tile_columns);

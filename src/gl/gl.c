@@ -62,7 +62,7 @@ static void delete_objects(nebel_gl *gl)
 {
     const GLuint textures[] = {gl->texture, gl->voxels, gl->nodes, gl->tiles};
     nb_programs_delete(&gl->programs);
-    nb_steps_delete(&gl->steps);
+    nb_fog_passes_delete(&gl->steps);
     glDeleteTextures(4, textures);
     glDeleteBuffers(1, &gl->block);
     nb_environment_delete(&gl->environment);

@@ -42,7 +42,7 @@ static void set_cone(const nebel_light *lamp, float *axis, float *rise)
 
 static void set_words(const nebel_light *lamp, const double eye[3], int layer, int fog_layer, float *words)
 {
-    const double radius = nb_bulb(lamp->radius);
+    const double radius = nb_light_radius(lamp->radius);
     nb_camera_subtract(lamp->position, eye, words);
     words[3] = (float)layer;
     for (int i = 0; i < 3; i++) words[4 + i] = (float)lamp->intensity[i];
@@ -82,7 +82,7 @@ static void fill_words(nb_light_maps *lamps, uint32_t rows)
 
 static int make_room(nb_light_maps *lamps, const nebel_allocator *allocator, uint32_t rows)
 {
-    const size_t wanted = (size_t)rows * (NEBEL_TEXTURE_WIDTH / NB_LAMP_TEXELS);
+    const size_t wanted = (size_t)rows * (NEBEL_TEXTURE_WIDTH / NB_LIGHT_MAP_TEXELS);
     if (wanted <= lamps->capacity) return 1;
     nb_release(allocator, lamps->texels);
     nb_release(allocator, lamps->layers);
@@ -197,21 +197,21 @@ static int choose_layers(nb_light_maps *lamps, const nebel_allocator *allocator,
     return good;
 }
 
-nebel_result nb_lamps_set(nb_light_maps *lamps, const nebel_allocator *allocator, const nebel_log *log,
-                          const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3])
+nebel_result nb_light_maps_set(nb_light_maps *lamps, const nebel_allocator *allocator, const nebel_log *log,
+                               const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3])
 {
-    const uint32_t rows = (uint32_t)(scene->light_count * NB_LAMP_TEXELS / NEBEL_TEXTURE_WIDTH + 1);
+    const uint32_t rows = (uint32_t)(scene->light_count * NB_LIGHT_MAP_TEXELS / NEBEL_TEXTURE_WIDTH + 1);
     if (scene->light_count == 0) return NEBEL_OK;
-    if (scene->light_count > NB_LAMPS_MOST) {
+    if (scene->light_count > NB_MAX_SHADED_LIGHTS) {
         return nb_fail(log, NEBEL_ERROR_LIMIT,
                        "frame: %zu lamps; OpenGL lights with at most %d. The CPU renderer has no such bound",
-                       scene->light_count, (int)NB_LAMPS_MOST);
+                       scene->light_count, (int)NB_MAX_SHADED_LIGHTS);
     }
     if (!make_room(lamps, allocator, rows) || !choose_layers(lamps, allocator, scene, eye)) return out_of_memory(log);
     for (size_t i = 0; i < scene->light_count; i++) {
         const nebel_light *const lamp = &scene->lights[i];
         const int layer = lamps->layers[i];
-        set_words(lamp, eye, layer, is_in_fog(lamp, fog, i) ? layer : -1, lamps->texels + 4 * NB_LAMP_TEXELS * i);
+        set_words(lamp, eye, layer, is_in_fog(lamp, fog, i) ? layer : -1, lamps->texels + 4 * NB_LIGHT_MAP_TEXELS * i);
     }
     fill_words(lamps, rows);
     return nb_context_check_memory(log, "the lamps");
@@ -222,7 +222,7 @@ nebel_result nb_lamps_set(nb_light_maps *lamps, const nebel_allocator *allocator
 static nebel_result make_maps(nb_light_maps *lamps, const nebel_log *log)
 {
     const GLenum none = GL_NONE;
-    glActiveTexture(GL_TEXTURE0 + NB_UNIT_LAMP_MAPS);
+    glActiveTexture(GL_TEXTURE0 + NB_UNIT_LIGHT_MAPS);
     lamps->maps = nb_targets_make_array();
     glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_DEPTH_COMPONENT32F, (GLsizei)(3 * lamps->face), (GLsizei)(2 * lamps->face),
                  (GLsizei)lamps->layer_count, 0, GL_DEPTH_COMPONENT, GL_FLOAT, NULL);
@@ -258,15 +258,15 @@ static int is_in_face(const float low[3], const float high[3], int face, float w
 static void draw_face(const nb_light_maps *lamps, const nb_light_map_source *source, int face, unsigned program,
                       const nb_meshes *meshes)
 {
-    const float share = 1 - 2.f * NB_LAMP_BORDER / (float)lamps->face;
+    const float share = 1 - 2.f * NB_LIGHT_BORDER / (float)lamps->face;
     const GLint offset = glGetUniformLocation(program, "scene_offset"),
                 cutoff = glGetUniformLocation(program, "scene_cutoff");
     float turn[9];
     set_turn(face, turn);
     glUniformMatrix3fv(glGetUniformLocation(program, "map_turn"), 1, GL_FALSE, turn);
     glUniform1f(glGetUniformLocation(program, "map_share"), share);
-    glUniform1f(glGetUniformLocation(program, "map_radius"), (float)nb_bulb(source->radius));
-    glUniform1f(glGetUniformLocation(program, "map_near"), .5f * (float)nb_bulb(source->radius));
+    glUniform1f(glGetUniformLocation(program, "map_radius"), (float)nb_light_radius(source->radius));
+    glUniform1f(glGetUniformLocation(program, "map_near"), .5f * (float)nb_light_radius(source->radius));
     for (size_t i = 0; i < meshes->count; i++) {
         const nb_mesh *const mesh = &meshes->list[i];
         float from_lamp[3], low[3], high[3];
@@ -297,8 +297,8 @@ static void draw_layer(const nb_light_maps *lamps, const nb_context *context, si
     }
 }
 
-nebel_result nb_lamps_draw(nb_light_maps *lamps, const nb_context *context, const nebel_log *log, unsigned program,
-                           const nb_meshes *meshes)
+nebel_result nb_light_maps_draw(nb_light_maps *lamps, const nb_context *context, const nebel_log *log, unsigned program,
+                                const nb_meshes *meshes)
 {
     if (lamps->layer_count == 0) return NEBEL_OK;
     if (lamps->maps == 0) {
@@ -320,14 +320,14 @@ nebel_result nb_lamps_draw(nb_light_maps *lamps, const nb_context *context, cons
     return NEBEL_OK;
 }
 
-void nb_lamps_delete(const nb_light_maps *lamps)
+void nb_light_maps_delete(const nb_light_maps *lamps)
 {
     glDeleteFramebuffers(1, &lamps->buffer);
     glDeleteTextures(1, &lamps->maps);
     glDeleteTextures(1, &lamps->words);
 }
 
-void nb_lamps_release(const nebel_allocator *allocator, const nb_light_maps *lamps)
+void nb_light_maps_release(const nebel_allocator *allocator, const nb_light_maps *lamps)
 {
     nb_release(allocator, lamps->sources);
     nb_release(allocator, lamps->texels);

@@ -173,13 +173,13 @@ const char nb_particle_text[] =
     "float particle_length(nb_approach approach)\n"
     "{\n"
     "#if SCENE_PARTICLES == 1\n" /* branches are no jumps in software: one profile alone has none */
-    "    return nb_ball_piece(approach, place.w, 2);\n"
+    "    return nb_sphere_piece(approach, place.w, 2);\n"
     "#elif SCENE_PARTICLES == 2\n"
     "    return nb_gaussian_piece(approach, place.w / 3.0);\n"
     "#else\n"
     "    int profile = int(extinction.w);\n"
     "    return profile == 1 ? nb_gaussian_piece(approach, place.w / 3.0)\n"
-    "                        : nb_ball_piece(approach, place.w, profile == 0 ? 2 : 0);\n"
+    "                        : nb_sphere_piece(approach, place.w, profile == 0 ? 2 : 0);\n"
     "#endif\n"
     "}\n"
     /* nebel_medium_transfer with the light at infinite depth, emission / extinction, which needs no mean. */

@@ -37,7 +37,7 @@ static nebel_result check_samples(const nebel_gl *gl, const nebel_gl_pass *pass)
                     "OpenGL ES 3.0 has no multisampled textures; resolve color and depth first (glBlitFramebuffer), "
                     "and set samples to 0");
     }
-    if (pass->samples > NB_SAMPLES_MOST) return fail(gl, NEBEL_ERROR_LIMIT, "more than 32 samples");
+    if (pass->samples > NB_MAX_PASS_SAMPLES) return fail(gl, NEBEL_ERROR_LIMIT, "more than 32 samples");
     return NEBEL_OK;
 }
 
@@ -213,7 +213,7 @@ static void make_framebuffer(nebel_gl *gl)
 }
 
 /* Where in a pixel the samples of the depth texture are. Only the draw framebuffer can be asked. */
-static void read_places(nebel_gl *gl, const nebel_gl_pass *pass, GLfloat places[NB_SAMPLES_MOST][2])
+static void read_places(nebel_gl *gl, const nebel_gl_pass *pass, GLfloat places[NB_MAX_PASS_SAMPLES][2])
 {
     const GLenum attachments[] = {GL_DEPTH_ATTACHMENT, GL_COLOR_ATTACHMENT0};
     int known = 0;
@@ -230,7 +230,7 @@ static void read_places(nebel_gl *gl, const nebel_gl_pass *pass, GLfloat places[
 
 static void set_samples(const nb_pass_task *t, GLuint target_framebuffer)
 {
-    GLfloat places[NB_SAMPLES_MOST][2] = {{0}};
+    GLfloat places[NB_MAX_PASS_SAMPLES][2] = {{0}};
     read_places(t->gl, t->pass, places);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target_framebuffer);
     glUniform2i(t->program->sample_range, 0, (GLint)t->pass->samples);
@@ -263,15 +263,15 @@ static void set_uniforms(const nb_pass_task *t, GLuint target_framebuffer)
     if (t->gl->fog.tiles != 0) set_tiling(t);
     if (t->pass->samples > 1) set_samples(t, target_framebuffer);
     if (t->picture->shade.set != NULL) t->picture->shade.set(t->picture->shade.of, p->name);
-    if (t->picture->air != NULL) nb_gl_air_set_worlds(t->picture->air, p->name);
+    if (t->picture->air != NULL) nb_gl_planets_set_list(t->picture->air, p->name);
     if (t->picture->daylight != NULL)
-        nb_gl_air_set_daylight(t->picture->air, p->name, t->picture->daylight, t->picture->even_shade);
-    if (is_shaded(t->picture)) nb_gl_air_set_reach(t->picture->air, p->name);
+        nb_gl_planets_set_irradiance(t->picture->air, p->name, t->picture->daylight, t->picture->even_shade);
+    if (is_shaded(t->picture)) nb_gl_planets_set_reach(t->picture->air, p->name);
     if (t->picture->cloud_shade != NULL) {
         nb_gl_cloud_shade_set(t->picture->cloud_shade, p->name);
         glUniform1i(glGetUniformLocation(p->name, "pass_is_turned"), t->picture->is_turned);
     }
-    if (t->picture->shafts != NULL) nb_shafts_set(t->picture->shafts, p->name);
+    if (t->picture->shafts != NULL) nb_shaft_maps_set(t->picture->shafts, p->name);
 }
 
 static void draw_triangles(const nb_pass_task *t)
@@ -338,7 +338,7 @@ static nebel_result fit_steps(const nb_pass_task *t, uint32_t rows)
     nb_state_save_unpacking(&gl->context, &unpacking);
     glActiveTexture(layered[0]);
     const nebel_result result =
-        nb_steps_fit(&gl->steps, &gl->context, &gl->log, t->pass->output, t->picture->width, rows);
+        nb_fog_passes_fit(&gl->steps, &gl->context, &gl->log, t->pass->output, t->picture->width, rows);
     nb_state_restore_unpacking(&gl->context, &unpacking);
     return result;
 }
@@ -346,7 +346,7 @@ static nebel_result fit_steps(const nb_pass_task *t, uint32_t rows)
 static nebel_result draw_bands(const nb_pass_task *t, GLuint target_framebuffer)
 {
     nebel_gl *const gl = t->gl;
-    const uint32_t height = t->picture->height, rows = nb_steps_rows(t->picture->width, height);
+    const uint32_t height = t->picture->height, rows = nb_fog_passes_rows(t->picture->width, height);
     int is_cut = 0;
     nebel_result result = fit_steps(t, rows);
     if (result == NEBEL_OK) result = bind_textures(t);
@@ -356,10 +356,10 @@ static nebel_result draw_bands(const nb_pass_task *t, GLuint target_framebuffer)
                                    height - y < rows ? height - y : rows};
         glUseProgram(t->program->name);
         set_uniforms(t, target_framebuffer);
-        if (nb_steps_trace(&gl->steps, &gl->context, t->program->name, &band)) is_cut = 1;
+        if (nb_fog_passes_trace(&gl->steps, &gl->context, t->program->name, &band)) is_cut = 1;
         glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target_framebuffer);
         set_target(t, &band);
-        nb_steps_compose(&gl->steps, t->pass->output, &band);
+        nb_fog_passes_compose(&gl->steps, t->pass->output, &band);
     }
     if (is_cut) nb_gl_warn_of_turns(gl, "all passes together did not suffice");
     return result;

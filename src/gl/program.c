@@ -299,9 +299,9 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
     const nb_shader_parts fragment = {{head, is_shaded ? precision_text : "", is_shaded ? kind->shade[0] : "",
                                        is_shaded ? kind->shade[1] : "", kind->shafts ? nb_shaft_text : "",
                                        kind->air ? nb_air_words_text : "", fog, ray, tile,
-                                       kind->air ? nb_air_worlds_text : "", kind->daylit ? nb_air_places_text : "",
-                                       kind->clouds ? nb_cloud_shade_text : "", kind->shaded ? nb_fog_shade_text : "",
-                                       kind->air ? nb_air_pieces_text : "", kind->air ? nb_air_haze_text : "",
+                                       kind->air ? nb_air_planets_text : "", kind->daylit ? nb_air_places_text : "",
+                                       kind->clouds ? nb_cloud_shade_text : "", kind->shaded ? nb_fog_shadow_text : "",
+                                       kind->air ? nb_air_pieces_text : "", kind->air ? nb_air_aerial_text : "",
                                        fragment_text, kind->step ? nb_step_text : whole_text},
                                       17};
     *program = (nb_program){.kind = *kind};

@@ -10,7 +10,7 @@
 enum { NB_UNIT_FOG, NB_UNIT_TILES, NB_UNIT_VOXELS, NB_UNIT_NODES, NB_UNIT_ENVIRONMENT, NB_UNIT_DEPTH, NB_UNIT_COLOR };
 enum { NB_UNIT_AIR = 15 }; /* behind those of scenes; OpenGL ES has no more */
 
-enum { NB_SAMPLES_MOST = 32 };
+enum { NB_MAX_PASS_SAMPLES = 32 };
 
 /* The texts of a shader, one after the other. */
 typedef struct nb_shader_parts {

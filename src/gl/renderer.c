@@ -37,7 +37,7 @@ static nebel_result make_objects(nebel_gl_renderer *r)
 {
     glGenVertexArrays(1, &r->vertex_array);
     glBindVertexArray(r->vertex_array);
-    nebel_result result = nb_shading_make(&r->shading, &r->context, &r->log);
+    nebel_result result = nb_scene_programs_make(&r->shading, &r->context, &r->log);
     if (result == NEBEL_OK) result = nb_meshes_make(&r->meshes, &r->context, r->scene);
     return result;
 }
@@ -81,7 +81,7 @@ nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snaps
     const uint32_t size = desc->shadow_map_size != 0 ? desc->shadow_map_size : USUAL_SHADOW_SIZE;
     made->shadows.size = made->shafts.maps.size = size < context.widest ? size : context.widest;
     made->shadows.count = NB_CASCADES;
-    made->shafts.maps.count = NB_MOST_MAPS;
+    made->shafts.maps.count = NB_MAX_MAPS;
     made->shafts.maps.leaning = 1;
     made->lamps.most_face = size / 4;
     made->fog = fog != NULL ? nebel_retain_snapshot(fog) : NULL;
@@ -101,15 +101,15 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     const int in_context = r->vertex_array != 0 && nb_context_check(&silent, r->vertex_array) == NEBEL_OK;
     nb_meshes_delete(&r->meshes, in_context);
     if (in_context) {
-        nb_shading_delete(&r->shading);
+        nb_scene_programs_delete(&r->shading);
         nb_shadows_delete(&r->shadows);
-        nb_shafts_delete(&r->shafts);
-        nb_lamps_delete(&r->lamps);
+        nb_shaft_maps_delete(&r->shafts);
+        nb_light_maps_delete(&r->lamps);
         nb_targets_delete(&r->targets);
         nb_particles_delete(&r->particles);
         nb_environment_delete(&r->environment);
-        nb_gl_air_delete(&r->air);
-        nb_gl_shells_delete(&r->shells);
+        nb_gl_planets_delete(&r->air);
+        nb_gl_textured_delete(&r->shells);
         glDeleteTextures(1, &r->cloud_ends);
         glDeleteTextures(1, &r->cloud_over);
         glDeleteTextures(1, &r->cloud_dimming);
@@ -125,10 +125,10 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     nb_gl_daylit_fog_release(&r->daylit);
     nb_release(&r->allocator, r->shading.lights);
     nb_release(&r->allocator, r->shadows.blocks);
-    nb_lamps_release(&r->allocator, &r->lamps);
+    nb_light_maps_release(&r->allocator, &r->lamps);
     nb_particles_release(&r->allocator, &r->particles);
-    nb_gl_clouds_release(&r->clouds);
-    nb_gl_air_release(&r->air, &r->allocator);
+    nb_cloud_picture_release(&r->clouds);
+    nb_gl_planets_release(&r->air, &r->allocator);
     const nebel_allocator allocator = r->allocator;
     nb_release(&allocator, r);
 }

@@ -16,7 +16,7 @@ static const struct {
 enum { SWITCHES = sizeof switches / sizeof *switches, FIRST_UNIT = NB_STATE_UNITS };
 
 static const GLenum array_units[NB_SCENE_ARRAYS] = {GL_TEXTURE0 + NB_UNIT_SHADOWS, GL_TEXTURE0 + NB_UNIT_SHADE,
-                                                    GL_TEXTURE0 + NB_UNIT_VEIL, GL_TEXTURE0 + NB_UNIT_LAMP_MAPS};
+                                                    GL_TEXTURE0 + NB_UNIT_VEIL, GL_TEXTURE0 + NB_UNIT_LIGHT_MAPS};
 
 /* The last two are of OpenGL alone. */
 static const GLenum pack_names[NB_SCENE_PACK] = {GL_PACK_ALIGNMENT,   GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS,

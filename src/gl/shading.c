@@ -49,8 +49,8 @@ static const char surface_vertex_text[] = "layout(location = 0) in vec3 mesh_pos
                                           "}\n";
 
 /* The ray of a pixel: scene_rays are the words of nebel_compute_view_rays, or of a panorama. */
-const char nb_words_text[] = "uniform vec3 scene_rays[6];\n"
-                             "#define RAY_WORD(i) scene_rays[i]\n";
+const char nb_texel_texture_text[] = "uniform vec3 scene_rays[6];\n"
+                                     "#define RAY_WORD(i) scene_rays[i]\n";
 
 const char nb_ray_text[] = "vec3 ray_origin(vec2 pixel)\n"
                            "{\n"
@@ -529,14 +529,14 @@ static void set_unit(unsigned program, const char *sampler, int unit)
     glUniform1i(glGetUniformLocation(program, sampler), unit);
 }
 
-nebel_result nb_shading_make(nb_scene_programs *shading, const nb_context *context, const nebel_log *log)
+nebel_result nb_scene_programs_make(nb_scene_programs *shading, const nb_context *context, const nebel_log *log)
 {
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
     const nb_shader_parts surface_vertex = {{version, surface_vertex_text}, 2};
-    const nb_shader_parts surface_fragment = {{version, precision, nb_words_text, nb_ray_text, interpolated_text,
-                                               attributes_text, nb_surface_edge_text, nb_surface_distance_text,
-                                               nb_surface_inset_text, hole_text, surface_fragment_text},
-                                              11};
+    const nb_shader_parts surface_fragment = {
+        {version, precision, nb_texel_texture_text, nb_ray_text, interpolated_text, attributes_text,
+         nb_surface_edge_text, nb_surface_distance_text, nb_surface_inset_text, hole_text, surface_fragment_text},
+        11};
     char block[64];
     (void)snprintf(block, sizeof block, "#define NB_SURVEY_BLOCK %d\n", (int)NB_SURVEY_BLOCK);
     const nb_shader_parts survey_vertex = {{version, nb_whole_vertex_text}, 2};
@@ -557,13 +557,15 @@ nebel_result nb_shading_make(nb_scene_programs *shading, const nb_context *conte
     return NEBEL_OK;
 }
 
-nebel_result nb_shading_make_vertex_fog(nb_scene_programs *shading, const nb_context *context, const nebel_log *log)
+nebel_result nb_scene_programs_make_vertex_fog(nb_scene_programs *shading, const nb_context *context,
+                                               const nebel_log *log)
 {
     const char *const version = nb_program_version(context);
     const nb_shader_parts vertex = {{version, vertex_fog_vertex_text}, 2};
-    const nb_shader_parts fragment = {{version, precision_of(context), nb_words_text, nb_ray_text, interpolated_text,
-                                       fog_attribute_text, nb_surface_edge_text, nb_surface_distance_text,
-                                       nb_surface_inset_text, hole_text, nb_factor_text, vertex_fog_fragment_text},
+    const nb_shader_parts fragment = {{version, precision_of(context), nb_texel_texture_text, nb_ray_text,
+                                       interpolated_text, fog_attribute_text, nb_surface_edge_text,
+                                       nb_surface_distance_text, nb_surface_inset_text, hole_text, nb_factor_text,
+                                       vertex_fog_fragment_text},
                                       12};
     if (shading->vertex_fog != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->vertex_fog);
@@ -573,11 +575,12 @@ nebel_result nb_shading_make_vertex_fog(nb_scene_programs *shading, const nb_con
     return NEBEL_OK;
 }
 
-nebel_result nb_shading_make_lamp_map(nb_scene_programs *shading, const nb_context *context, const nebel_log *log)
+nebel_result nb_scene_programs_make_light_map(nb_scene_programs *shading, const nb_context *context,
+                                              const nebel_log *log)
 {
     const char *const version = nb_program_version(context);
-    const nb_shader_parts vertex = {{version, nb_lamp_map_vertex_text}, 2};
-    const nb_shader_parts fragment = {{version, precision_of(context), hole_text, nb_lamp_map_fragment_text}, 4};
+    const nb_shader_parts vertex = {{version, nb_light_map_vertex_text}, 2};
+    const nb_shader_parts fragment = {{version, precision_of(context), hole_text, nb_light_map_fragment_text}, 4};
     if (shading->lamp_map != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->lamp_map);
     if (result != NEBEL_OK) return result;
@@ -586,13 +589,13 @@ nebel_result nb_shading_make_lamp_map(nb_scene_programs *shading, const nb_conte
     return NEBEL_OK;
 }
 
-nebel_result nb_shading_make_factor(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
-                                    int panorama)
+nebel_result nb_scene_programs_make_factor(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                           int panorama)
 {
     const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : nb_ray_text;
     const nb_shader_parts vertex = {{version, nb_whole_vertex_text}, 2};
     const nb_shader_parts fragment = {
-        {version, precision_of(context), nb_words_text, ray, nb_factor_text, nb_pixel_factor_text}, 6};
+        {version, precision_of(context), nb_texel_texture_text, ray, nb_factor_text, nb_pixel_factor_text}, 6};
     unsigned *const name = panorama ? &shading->round_factor : &shading->factor;
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
@@ -602,15 +605,15 @@ nebel_result nb_shading_make_factor(nb_scene_programs *shading, const nb_context
     return NEBEL_OK;
 }
 
-nebel_result nb_shading_make_ground(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
-                                    int panorama, int worlds)
+nebel_result nb_scene_programs_make_ground(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                           int panorama, int worlds)
 {
     const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     char head[NB_AIR_HEAD];
     const nb_shader_parts vertex = {{nb_program_version(context), nb_whole_vertex_text}, 2};
     const nb_shader_parts fragment = {
         {nb_program_version(context), nb_air_head(worlds, head), precision_of(context), nb_air_words_text, fog,
-         nb_words_text, panorama ? nb_panorama_ray_text : nb_ray_text, nb_air_worlds_text, nb_air_ground_text},
+         nb_texel_texture_text, panorama ? nb_panorama_ray_text : nb_ray_text, nb_air_planets_text, nb_air_ground_text},
         9};
     unsigned *const name = panorama ? &shading->round_ground : &shading->ground;
     if (shading->ground_worlds != worlds) {
@@ -632,9 +635,9 @@ static nebel_result make_round(const nb_context *context, const nebel_log *log, 
                                const char *fragment_text, const char *sampler, int unit, unsigned *name)
 {
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
-    const nb_shader_parts vertex = {{version, option, nb_words_text, nb_panorama_box_text, round_surface_vertex_text},
-                                    5};
-    const nb_shader_parts fragment = {{version, option, precision, nb_words_text, nb_panorama_ray_text,
+    const nb_shader_parts vertex = {
+        {version, option, nb_texel_texture_text, nb_panorama_box_text, round_surface_vertex_text}, 5};
+    const nb_shader_parts fragment = {{version, option, precision, nb_texel_texture_text, nb_panorama_ray_text,
                                        nb_surface_edge_text, round_surface_text, nb_surface_distance_text, hole_text,
                                        nb_factor_text, fragment_text},
                                       11};
@@ -647,8 +650,8 @@ static nebel_result make_round(const nb_context *context, const nebel_log *log, 
     return NEBEL_OK;
 }
 
-nebel_result nb_shading_make_round(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
-                                   int with_fog)
+nebel_result nb_scene_programs_make_round(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                          int with_fog)
 {
     const nebel_result result = make_round(context, log, "", surface_fragment_text, "scene_texture",
                                            NB_UNIT_REFLECTANCE, &shading->round_surface);
@@ -698,8 +701,8 @@ static void set_units(unsigned program)
     set_unit(program, "scene_shadows", NB_UNIT_SHADOWS);
     set_unit(program, "scene_dimming", NB_UNIT_DIMMING);
     set_unit(program, "scene_veil", NB_UNIT_VEIL);
-    set_unit(program, "scene_lamps", NB_UNIT_LAMPS);
-    set_unit(program, "lamp_maps", NB_UNIT_LAMP_MAPS);
+    set_unit(program, "scene_lamps", NB_UNIT_LIGHTS);
+    set_unit(program, "lamp_maps", NB_UNIT_LIGHT_MAPS);
     set_unit(program, "nebel_sky_view_texture", NB_UNIT_AIR);
     set_unit(program, "scene_shells", NB_UNIT_SHELLS);
     set_unit(program, "scene_clouds", NB_UNIT_CLOUDS);
@@ -711,7 +714,7 @@ static nb_shader_parts light_vertex(const nb_context *context, const nb_composit
     const char *const version = nb_program_version(context);
     if (!kind->of_particles) return (nb_shader_parts){{version, nb_whole_vertex_text}, 2};
     if (!kind->panorama) return (nb_shader_parts){{version, nb_particle_vertex_text}, 2};
-    return (nb_shader_parts){{version, nb_words_text, nb_panorama_box_text, nb_round_particle_vertex_text}, 4};
+    return (nb_shader_parts){{version, nb_texel_texture_text, nb_panorama_box_text, nb_round_particle_vertex_text}, 4};
 }
 
 static nebel_result make_light(const nb_context *context, const nebel_log *log, const nb_composite_key *kind,
@@ -723,16 +726,16 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const char *const ray = kind->panorama ? nb_panorama_ray_text : nb_ray_text;
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
     const nb_shader_parts light = {{head, kind->air ? nb_air_words_text : "",
-                                    kind->has_fog || kind->environment || kind->air ? fog : "", nb_words_text, ray,
-                                    shadow_text, sun_text, kind->lamplit ? nb_lamp_map_text : "",
-                                    kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_worlds_text : "",
+                                    kind->has_fog || kind->environment || kind->air ? fog : "", nb_texel_texture_text,
+                                    ray, shadow_text, sun_text, kind->lamplit ? nb_light_map_text : "",
+                                    kind->lamplit ? nb_light_text : "", kind->air ? nb_air_planets_text : "",
                                     kind->air ? nb_air_places_text : "", kind->air ? nb_air_sun_text : "",
                                     kind->air ? nb_air_light_text : "", nb_veil_text, nb_device_text, light_text},
                                    16};
     const nb_shader_parts shell = {{head, nb_veil_text, nb_shell_over_text}, 3};
-    const nb_shader_parts dimming = {{head, fog, nb_words_text, ray, sun_text, dimming_text}, 6};
+    const nb_shader_parts dimming = {{head, fog, nb_texel_texture_text, ray, sun_text, dimming_text}, 6};
     const nb_shader_parts particle = {{head, kind->five_taps ? nb_five_tap_text : "", kind->shafts ? nb_shaft_text : "",
-                                       fog, nb_words_text, ray, tile, nb_particle_start_text, nb_particle_text},
+                                       fog, nb_texel_texture_text, ray, tile, nb_particle_start_text, nb_particle_text},
                                       9};
     const nb_shader_parts vertex = light_vertex(context, kind);
     const nebel_result result = nb_program_build(log, &vertex,
@@ -756,9 +759,9 @@ static int is_same(const nb_composite_key *a, const nb_composite_key *b)
            a->features == b->features;
 }
 
-nebel_result nb_shading_find_light(nb_scene_programs *shading, const nb_context *context,
-                                   const nebel_allocator *allocator, const nebel_log *log, const nb_composite_key *kind,
-                                   unsigned *program)
+nebel_result nb_scene_programs_find_light(nb_scene_programs *shading, const nb_context *context,
+                                          const nebel_allocator *allocator, const nebel_log *log,
+                                          const nb_composite_key *kind, unsigned *program)
 {
     for (size_t i = 0; i < shading->light_count; i++) {
         *program = shading->lights[i].name;
@@ -775,7 +778,7 @@ nebel_result nb_shading_find_light(nb_scene_programs *shading, const nb_context 
     return result;
 }
 
-void nb_shading_delete(const nb_scene_programs *shading)
+void nb_scene_programs_delete(const nb_scene_programs *shading)
 {
     glDeleteProgram(shading->surface);
     glDeleteProgram(shading->survey);

@@ -15,8 +15,8 @@ enum {
     NB_UNIT_SHADOWS,
     NB_UNIT_DIMMING,
     NB_UNIT_VEIL,
-    NB_UNIT_LAMPS,
-    NB_UNIT_LAMP_MAPS,
+    NB_UNIT_LIGHTS,
+    NB_UNIT_LIGHT_MAPS,
     NB_SCENE_UNIT_END,               /* at most NB_UNIT_AIR */
     NB_UNIT_SHELLS = NB_UNIT_AIR,    /* a planet has layers or air */
     NB_UNIT_SHADE = NB_UNIT_DIMMING, /* in passes, which are asked before what dims light is known */
@@ -24,7 +24,7 @@ enum {
     NB_UNIT_MASK = NB_UNIT_NORMAL    /* while surfaces are drawn nothing reads normals */
 };
 
-enum { NB_CASCADES = 4, NB_MOST_MAPS = 8 };
+enum { NB_CASCADES = 4, NB_MAX_MAPS = 8 };
 
 /* What a program that asks fog is made for. */
 typedef struct nb_composite_key {
@@ -66,36 +66,38 @@ typedef struct nb_scene_programs {
     size_t light_count, light_capacity;
 } nb_scene_programs;
 
-/* What is drawn over the whole picture: its vertices, and the ray of a pixel. nb_words_text: scene_rays are the words of
+/* What is drawn over the whole picture: its vertices, and the ray of a pixel. nb_texel_texture_text: scene_rays are the words of
  * nebel_compute_view_rays, or of a panorama, whose ray is another. */
-extern const char nb_whole_vertex_text[], nb_words_text[], nb_ray_text[];
+extern const char nb_whole_vertex_text[], nb_texel_texture_text[], nb_ray_text[];
 
 /* Compile and link what is not there yet, which changes the current program. UNSUPPORTED with the driver's words;
  * MEMORY. */
-nebel_result nb_shading_make(nb_scene_programs *shading, const nb_context *context, const nebel_log *log);
-nebel_result nb_shading_find_light(nb_scene_programs *shading, const nb_context *context,
-                                   const nebel_allocator *allocator, const nebel_log *log, const nb_composite_key *kind,
-                                   unsigned *program);
+nebel_result nb_scene_programs_make(nb_scene_programs *shading, const nb_context *context, const nebel_log *log);
+nebel_result nb_scene_programs_find_light(nb_scene_programs *shading, const nb_context *context,
+                                          const nebel_allocator *allocator, const nebel_log *log,
+                                          const nb_composite_key *kind, unsigned *program);
 
 /* Fog that vertices bring, over the surfaces that are seen. */
-nebel_result nb_shading_make_vertex_fog(nb_scene_programs *shading, const nb_context *context, const nebel_log *log);
+nebel_result nb_scene_programs_make_vertex_fog(nb_scene_programs *shading, const nb_context *context,
+                                               const nebel_log *log);
 
 /* Maps around lamps. */
-nebel_result nb_shading_make_lamp_map(nb_scene_programs *shading, const nb_context *context, const nebel_log *log);
+nebel_result nb_scene_programs_make_light_map(nb_scene_programs *shading, const nb_context *context,
+                                              const nebel_log *log);
 
 /* Fog factors of pixels. */
-nebel_result nb_shading_make_factor(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
-                                    int panorama);
+nebel_result nb_scene_programs_make_factor(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                           int panorama);
 
 /* Surfaces of panoramas, and the fog that vertices bring to them. */
-nebel_result nb_shading_make_round(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
-                                   int with_fog);
+nebel_result nb_scene_programs_make_round(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                          int with_fog);
 
 /* The ground of so many planets. */
-nebel_result nb_shading_make_ground(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
-                                    int panorama, int worlds);
+nebel_result nb_scene_programs_make_ground(nb_scene_programs *shading, const nb_context *context, const nebel_log *log,
+                                           int panorama, int worlds);
 
 /* In OpenGL. */
-void nb_shading_delete(const nb_scene_programs *shading);
+void nb_scene_programs_delete(const nb_scene_programs *shading);
 
 #endif

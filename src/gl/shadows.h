@@ -13,8 +13,8 @@ typedef struct nb_shadows {
     int count;                        /* of maps */
     float light[9];                   /* to light coordinates, by columns */
     double across[2][3];              /* the first two axes */
-    float places[NB_MOST_MAPS][4];    /* low corner, texels per metre */
-    float ends[NB_MOST_MAPS];         /* distance up to which a map is the finest; 0: the map is empty */
+    float places[NB_MAX_MAPS][4];     /* low corner, texels per metre */
+    float ends[NB_MAX_MAPS];          /* distance up to which a map is the finest; 0: the map is empty */
     float low, high;                  /* of everything that may cast shadows, against the light */
     float rounding;                   /* what heights may be off by [m] */
     double seen_low[2], seen_high[2]; /* of all surfaces that are seen; low above high: there are none */

@@ -160,7 +160,7 @@ static nebel_result make_ranges(nb_shaft_maps *shafts, const nebel_log *log)
     const GLsizei size = level_size(shafts, 1);
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_SHADOWS);
     shafts->ranges = nb_targets_make_array();
-    glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RG32F, size, size, LEVELS * NB_MOST_MAPS, 0, GL_RG, GL_FLOAT, NULL);
+    glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RG32F, size, size, LEVELS * NB_MAX_MAPS, 0, GL_RG, GL_FLOAT, NULL);
     glGenFramebuffers(1, &shafts->buffer);
     return nb_context_check_memory(log, "the shadows in fog; ask for smaller shadow maps");
 }
@@ -170,7 +170,7 @@ static void draw_level(const nb_shaft_maps *shafts, const nb_context *context, i
     const GLsizei size = level_size(shafts, level);
     const GLint place = glGetUniformLocation(shafts->program, "range_place");
     for (int map = 0; map < shafts->maps.count; map++) {
-        const GLint layer = (level - 1) * NB_MOST_MAPS + map;
+        const GLint layer = (level - 1) * NB_MAX_MAPS + map;
         if (!(shafts->maps.ends[map] > 0)) continue;
         glFramebufferTextureLayer(GL_DRAW_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, shafts->ranges, 0, layer);
         nb_state_clear(context, 0, 0, (uint32_t)size, (uint32_t)size);
@@ -189,9 +189,10 @@ static nebel_result make(nb_shaft_maps *shafts, const nb_context *context, const
     return result;
 }
 
-nebel_result nb_shafts_draw(nb_shaft_maps *shafts, const nb_context *context, const nebel_log *log, unsigned program,
-                            unsigned vertex_array, const nb_shadows *surfaces, const nb_targets *targets,
-                            const nebel_rays *rays, int panorama, const nb_meshes *meshes, const nebel_sunlit_fog *fog)
+nebel_result nb_shaft_maps_draw(nb_shaft_maps *shafts, const nb_context *context, const nebel_log *log,
+                                unsigned program, unsigned vertex_array, const nb_shadows *surfaces,
+                                const nb_targets *targets, const nebel_rays *rays, int panorama,
+                                const nb_meshes *meshes, const nebel_sunlit_fog *fog)
 {
     nebel_result result = make(shafts, context, log);
     if (result != NEBEL_OK) return result;
@@ -216,11 +217,11 @@ static void bind(unsigned program, const char *sampler, GLuint unit, unsigned te
     glBindSampler(unit, 0);
 }
 
-void nb_shafts_set(const nb_shaft_maps *shafts, unsigned program)
+void nb_shaft_maps_set(const nb_shaft_maps *shafts, unsigned program)
 {
     const nb_shadows *const s = &shafts->maps;
-    float places[NB_MOST_MAPS][4] = {{0}};
-    GLint layers[NB_MOST_MAPS] = {0}, count = 0;
+    float places[NB_MAX_MAPS][4] = {{0}};
+    GLint layers[NB_MAX_MAPS] = {0}, count = 0;
     bind(program, "shaft_maps", NB_UNIT_SHADOWS, s->texture);
     bind(program, "shaft_blocks", NB_UNIT_VEIL, shafts->ranges);
     glUniformMatrix3fv(glGetUniformLocation(program, "shaft_light"), 1, GL_FALSE, s->light);
@@ -233,12 +234,12 @@ void nb_shafts_set(const nb_shaft_maps *shafts, unsigned program)
     const float finest = count > 0 ? fmaxf(places[0][2], places[0][3]) : 1; /* texels per metre */
     glUniform1f(glGetUniformLocation(program, "shaft_fine"), fminf(1e-6f, 5e-5f / finest));
     glUniform1i(glGetUniformLocation(program, "shaft_count"), count);
-    glUniform1iv(glGetUniformLocation(program, "shaft_layers"), NB_MOST_MAPS, layers);
-    glUniform4fv(glGetUniformLocation(program, "shaft_places"), NB_MOST_MAPS, places[0]);
+    glUniform1iv(glGetUniformLocation(program, "shaft_layers"), NB_MAX_MAPS, layers);
+    glUniform4fv(glGetUniformLocation(program, "shaft_places"), NB_MAX_MAPS, places[0]);
     glUniform2f(glGetUniformLocation(program, "shaft_heights"), s->high, 1 / (s->high - s->low));
 }
 
-void nb_shafts_delete(const nb_shaft_maps *shafts)
+void nb_shaft_maps_delete(const nb_shaft_maps *shafts)
 {
     nb_shadows_delete(&shafts->maps);
     glDeleteTextures(1, &shafts->ranges);

@@ -8,14 +8,14 @@
 #include <epoxy/gl.h>
 #include <nebel/shader.h>
 
-const nebel_textured_planet *nb_gl_shells_planet(const nebel_scene_data *scene)
+const nebel_textured_planet *nb_gl_textured_planet(const nebel_scene_data *scene)
 {
     return scene->planet_count > 0 ? scene->planets[0].textured : NULL;
 }
 
 /* ---- maps ------------------------------------------------------------------------------------ */
 
-/* What nb_shell_ball_text reads. Columns of the levels behind the first are no more than those of the first, but of maps of
+/* What nb_shell_sphere_text reads. Columns of the levels behind the first are no more than those of the first, but of maps of
  * few columns. */
 static void upload_levels(const nebel_textured_planet *layers, const nebel_planet_map *map, GLenum format,
                           nb_gl_map *out)
@@ -145,15 +145,16 @@ static nebel_result fit_program(const nb_context *context, const nebel_log *log,
     const char *const precision = context->es ? "precision highp float;\nprecision highp int;\n" : "";
     const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const nb_shader_parts vertex = {{version, nb_whole_vertex_text}, 2};
-    const nb_shader_parts fragment = {{version, precision, fog, nb_words_text, ray, nb_shell_ball_text, text}, 7};
+    const nb_shader_parts fragment = {{version, precision, fog, nb_texel_texture_text, ray, nb_shell_sphere_text, text},
+                                      7};
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
     if (result == NEBEL_OK) set_units(*name);
     return result;
 }
 
-nebel_result nb_gl_shells_set(nb_gl_shells *shells, const nb_context *context, const nebel_log *log,
-                              const nebel_textured_planet *layers, uint32_t width, uint32_t height, int panorama)
+nebel_result nb_gl_textured_set(nb_gl_shells *shells, const nb_context *context, const nebel_log *log,
+                                const nebel_textured_planet *layers, uint32_t width, uint32_t height, int panorama)
 {
     static const char *const texts[NB_SHELL_PROGRAMS] = {[NB_SHELL_GROUND] = nb_shell_ground_text,
                                                          [NB_SHELL_CLOUDS] = nb_shell_clouds_text,
@@ -165,7 +166,7 @@ nebel_result nb_gl_shells_set(nb_gl_shells *shells, const nb_context *context, c
     return result;
 }
 
-void nb_gl_shells_delete(nb_gl_shells *shells)
+void nb_gl_textured_delete(nb_gl_shells *shells)
 {
     delete_maps(shells);
     delete_targets(shells);

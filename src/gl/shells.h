@@ -27,14 +27,14 @@ typedef struct nb_gl_shells {
 } nb_gl_shells;
 
 /* The planet of a scene that has layers; NULL: there is none. */
-const nebel_textured_planet *nb_gl_shells_planet(const nebel_scene_data *scene);
+const nebel_textured_planet *nb_gl_textured_planet(const nebel_scene_data *scene);
 
 /* Makes what is not there yet, or is of another planet or size. Changes the active unit's TEXTURE_2D, the draw framebuffer and
  * the program; wants the usual unpacking. MEMORY, LIMIT (a map larger than textures), UNSUPPORTED. */
-nebel_result nb_gl_shells_set(nb_gl_shells *shells, const nb_context *context, const nebel_log *log,
-                              const nebel_textured_planet *layers, uint32_t width, uint32_t height, int panorama);
+nebel_result nb_gl_textured_set(nb_gl_shells *shells, const nb_context *context, const nebel_log *log,
+                                const nebel_textured_planet *layers, uint32_t width, uint32_t height, int panorama);
 
 /* In OpenGL. */
-void nb_gl_shells_delete(nb_gl_shells *shells);
+void nb_gl_textured_delete(nb_gl_shells *shells);
 
 #endif

@@ -4,7 +4,7 @@
  * are small where they nearly cancel, near the ball the height above it, far from it how far the ray passes its middle.
  * Angles are halved until their series is short: s is the tangent of a quarter of one, at most that of 22.5 degrees, and
  * the first term that is left out 1e-8 of it. */
-const char nb_shell_ball_text[] =
+const char nb_shell_sphere_text[] =
     "uniform vec3 ball_from;\n"    /* the eye, from the planet's middle [m] */
     "uniform float ball_radius;\n" /* m */
     "uniform float ball_square;\n" /* of the eye's distance, less that of the radius */

@@ -82,7 +82,7 @@ static const char compose_text[] = "precision highp float;\n"
 
 /* ---- making ---------------------------------------------------------------------------------- */
 
-uint32_t nb_steps_rows(uint32_t width, uint32_t height)
+uint32_t nb_fog_passes_rows(uint32_t width, uint32_t height)
 {
     const uint32_t rows = width < BAND_PIXELS ? BAND_PIXELS / width : 1;
     return rows < height ? rows : height;
@@ -159,8 +159,8 @@ static nebel_result make_progress(nb_fog_passes *s, const nebel_log *log)
     return result;
 }
 
-nebel_result nb_steps_fit(nb_fog_passes *steps, const nb_context *context, const nebel_log *log, nebel_gl_output output,
-                          uint32_t width, uint32_t height)
+nebel_result nb_fog_passes_fit(nb_fog_passes *steps, const nb_context *context, const nebel_log *log,
+                               nebel_gl_output output, uint32_t width, uint32_t height)
 {
     if (steps->query == 0) glGenQueries(1, &steps->query);
     const nebel_result result = build_programs(steps, context, log, output);
@@ -172,7 +172,7 @@ nebel_result nb_steps_fit(nb_fog_passes *steps, const nb_context *context, const
     return make_progress(steps, log);
 }
 
-void nb_steps_delete(nb_fog_passes *steps)
+void nb_fog_passes_delete(nb_fog_passes *steps)
 {
     delete_progress(steps);
     glDeleteQueries(1, &steps->query);
@@ -221,7 +221,7 @@ static int is_any_left(const nb_fog_passes *s, int source)
     return left != 0;
 }
 
-int nb_steps_trace(const nb_fog_passes *s, const nb_context *context, unsigned program, const nb_pass_band *band)
+int nb_fog_passes_trace(const nb_fog_passes *s, const nb_context *context, unsigned program, const nb_pass_band *band)
 {
     static const GLfloat zeros[4] = {0, 0, 0, 0};
     const GLint is_last = glGetUniformLocation(program, "pass_is_last");
@@ -243,7 +243,7 @@ int nb_steps_trace(const nb_fog_passes *s, const nb_context *context, unsigned p
     return counts && left;
 }
 
-void nb_steps_compose(const nb_fog_passes *s, nebel_gl_output output, const nb_pass_band *band)
+void nb_fog_passes_compose(const nb_fog_passes *s, nebel_gl_output output, const nb_pass_band *band)
 {
     const unsigned program = s->compose_programs[output];
     glUseProgram(program);

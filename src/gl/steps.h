@@ -21,21 +21,22 @@ typedef struct nb_pass_band {
 } nb_pass_band;
 
 /* How many rows of such a picture a band has. */
-uint32_t nb_steps_rows(uint32_t width, uint32_t height);
+uint32_t nb_fog_passes_rows(uint32_t width, uint32_t height);
 
 /* Room for bands of this size, and the programs for one output. Changes the draw framebuffer, the current program and the
  * active unit's TEXTURE_2D_ARRAY; no buffer may be bound for unpacking. MEMORY; UNSUPPORTED, told, where the driver does
  * not draw into such textures. */
-nebel_result nb_steps_fit(nb_fog_passes *steps, const nb_context *context, const nebel_log *log, nebel_gl_output output,
-                          uint32_t width, uint32_t height);
+nebel_result nb_fog_passes_fit(nb_fog_passes *steps, const nb_context *context, const nebel_log *log,
+                               nebel_gl_output output, uint32_t width, uint32_t height);
 
 /* Draws a band of a program of kind `step` that is current, with its uniforms. Returns whether steps did not suffice for all
  * of it, as far as that can be asked; what was left then counts as even. Changes the draw framebuffer, the viewport, and NB_UNIT_COLOR. */
-int nb_steps_trace(const nb_fog_passes *steps, const nb_context *context, unsigned program, const nb_pass_band *band);
+int nb_fog_passes_trace(const nb_fog_passes *steps, const nb_context *context, unsigned program,
+                        const nb_pass_band *band);
 
 /* Writes what was found into the target, which is bound. Changes the program and NB_UNIT_DEPTH. */
-void nb_steps_compose(const nb_fog_passes *steps, nebel_gl_output output, const nb_pass_band *band);
+void nb_fog_passes_compose(const nb_fog_passes *steps, nebel_gl_output output, const nb_pass_band *band);
 
-void nb_steps_delete(nb_fog_passes *steps);
+void nb_fog_passes_delete(nb_fog_passes *steps);
 
 #endif

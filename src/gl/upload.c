@@ -184,7 +184,7 @@ static nebel_result fill_texture(const nebel_gl *gl, const texel_kind *kind, con
                        "nebel_gl_set_fog: %s needs %zu rows, this context has %u (GL_MAX_TEXTURE_SIZE); use fewer %s",
                        kind->what, needed, (unsigned)gl->context.widest, kind->fewer);
     }
-    nb_words_bind(name);
+    nb_texel_texture_bind(name);
     if (needed > *rows) {
         const nebel_result result = grow_texture(gl, kind, (uint32_t)needed, rows);
         if (result != NEBEL_OK) return result;

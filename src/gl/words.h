@@ -7,11 +7,11 @@
 #include <nebel/shader.h>
 
 /* Binds texture *name to the active unit, which is made where it is 0. */
-void nb_words_bind(unsigned *name);
+void nb_texel_texture_bind(unsigned *name);
 
 /* Makes *name a texture of whole rows of words of four floats, bound to the active unit; wants the usual unpacking. A
  * failure names `what`, and one of LIMIT ends with `remedy`. LIMIT, MEMORY. */
-nebel_result nb_words_upload(unsigned *name, const nebel_log *log, const nb_context *context,
-                             const nebel_texel_f32 *words, size_t rows, const char *what, const char *remedy);
+nebel_result nb_texel_texture_upload(unsigned *name, const nebel_log *log, const nb_context *context,
+                                     const nebel_texel_f32 *words, size_t rows, const char *what, const char *remedy);
 
 #endif

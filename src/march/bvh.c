@@ -244,7 +244,7 @@ nebel_result nb_bvh_build(const nebel_allocator *allocator, const nb_aabb *boxes
 {
     *out = (nb_bvh){{0}, 0, NULL, 0};
     if (n == 0) return NEBEL_OK;
-    if (n > NB_BVH_MOST_BOXES) return NEBEL_ERROR_LIMIT;
+    if (n > NB_MAX_BVH_BOXES) return NEBEL_ERROR_LIMIT;
     nb_bvh bvh = *out;
     if (!find_origin(boxes, n, &bvh)) return NEBEL_ERROR_VALUE;
     bvh.node_count = 2 * n - 1;

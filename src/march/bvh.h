@@ -22,7 +22,7 @@ typedef struct nb_bvh_node {
  * 26), all deeper ones in equal halves, and there are at most 2^30 boxes: no path is longer than NB_BVH_SPLIT_DEPTH +
  * ceil(log2 n) and thus NB_BVH_DEPTH - 2. A traversal, which holds at most one waiting sibling for each level and one
  * child more, fits a stack of NB_BVH_DEPTH. */
-#define NB_BVH_MOST_BOXES 0x40000000u
+#define NB_MAX_BVH_BOXES 0x40000000u
 #define NB_BVH_SPLIT_DEPTH 32
 #define NB_BVH_DEPTH (NB_BVH_SPLIT_DEPTH + 32)
 
@@ -35,7 +35,7 @@ typedef struct nb_bvh {
 
 /* Builds the tree over boxes[0..n-1]; the same boxes give the same tree. *out owns memory of `allocator` (resolved);
  * free it with nb_bvh_free. On an error *out is empty. Cost O(n log n). Errors: VALUE (a box that is not finite or
- * inside out), LIMIT (more than NB_BVH_MOST_BOXES), MEMORY. */
+ * inside out), LIMIT (more than NB_MAX_BVH_BOXES), MEMORY. */
 nebel_result nb_bvh_build(const nebel_allocator *allocator, const nb_aabb *boxes, size_t n, nb_bvh *out);
 
 void nb_bvh_free(const nebel_allocator *allocator, nb_bvh *bvh);

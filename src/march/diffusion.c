@@ -32,7 +32,7 @@ static nebel_result trace_sun(const nb_diffusion *d, const nebel_snapshot *fog, 
     }
     for (size_t i = 0; i < count; i++) {
         double place[3];
-        nb_lattice_node(l, first + i, place);
+        nb_diffusion_lattice_node(l, first + i, place);
         for (int a = 0; a < 3; a++) offset[a][i] = (float)(place[a] - rays.origin[a]);
     }
     return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, count, &rays, &transfers);
@@ -40,7 +40,7 @@ static nebel_result trace_sun(const nb_diffusion *d, const nebel_snapshot *fog, 
 
 static nebel_result light_nodes(const nb_diffusion *d, const nebel_snapshot *fog, nb_node_sun *sun)
 {
-    const size_t count = nb_lattice_nodes(&d->lattice);
+    const size_t count = nb_diffusion_lattice_nodes(&d->lattice);
     for (size_t first = 0; first < count; first += BATCH) {
         const size_t n = count - first < BATCH ? count - first : BATCH;
         float scaled[3][BATCH], whole[3][BATCH];
@@ -101,7 +101,7 @@ static void set_node(const nb_medium_transport *t, int c, const nb_node_sun *sun
 
 /* `light`: fluence and flux of what the sky lacks. What goes straight on dims no light: of that, the sky's own light is what
  * comes instead of what extinction as it is takes away. Nodes without fog say nothing of the sky. */
-static void set_sky_node(const nb_medium_transport *t, int c, const nb_sky_moments *sky, const double light[4],
+static void set_sky_node(const nb_medium_transport *t, int c, const nb_environment_moments *sky, const double light[4],
                          float *out)
 {
     const double scaled = t->extinction[c] - t->scattering[c] + t->turned[c];
@@ -153,7 +153,7 @@ static int has_colour(const nebel_snapshot *snapshot, const nebel_diffusion_desc
 
 static int find_has_colour(const nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot)
 {
-    if (has_colour(snapshot, &fog->diffusion) || (d->has_sky && nb_sky_has_colour(&fog->sky))) return 1;
+    if (has_colour(snapshot, &fog->diffusion) || (d->has_sky && nb_environment_has_colour(&fog->sky))) return 1;
     return d->is_own && nb_find_own_light(snapshot).has_colour;
 }
 
@@ -174,7 +174,7 @@ typedef struct nb_diffusion_builder {
 static nebel_result fill_sun(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot,
                              nb_diffusion_builder *made)
 {
-    const size_t nodes = nb_lattice_nodes(&d->lattice);
+    const size_t nodes = nb_diffusion_lattice_nodes(&d->lattice);
     const nb_diffuse_source source = {.sun = made->sun, .to_sun = d->to_sun};
     const nebel_result result = light_nodes(d, snapshot, made->sun);
     for (int c = 0; c < d->channel_count && result == NEBEL_OK; c++) {
@@ -182,7 +182,7 @@ static nebel_result fill_sun(nb_diffusion *d, const nebel_fog *fog, const nebel_
                                 &made->light[c]))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
-            const nb_medium_transport t = nb_lattice_around(&d->lattice, made->cells, i);
+            const nb_medium_transport t = nb_diffusion_lattice_around(&d->lattice, made->cells, i);
             float *node = &d->nodes[i * d->node_numbers];
             set_node(&t, c, &made->sun[i], &made->light[c].nodes[4 * i], node + c * NB_NODE_NUMBERS);
             node[NB_NODE_NUMBERS * d->channel_count] = (float)mean_cosine(&t);
@@ -193,16 +193,16 @@ static nebel_result fill_sun(nb_diffusion *d, const nebel_fog *fog, const nebel_
 
 static nebel_result fill_sky(nb_diffusion *d, const nebel_fog *fog, nb_diffusion_builder *made)
 {
-    const size_t nodes = nb_lattice_nodes(&d->lattice);
-    nb_sky_moments moments[3];
-    nb_sky_find_moments(&fog->sky, d->skylight, moments);
+    const size_t nodes = nb_diffusion_lattice_nodes(&d->lattice);
+    nb_environment_moments moments[3];
+    nb_environment_find_moments(&fog->sky, d->skylight, moments);
     for (int c = 0; c < d->channel_count; c++) {
         const nb_diffuse_source source = {.sky = moments[c]};
         if (!nb_diffusion_solve(&fog->allocator, &d->lattice, made->cells, &source, fog->diffusion.ground_albedo[c], c,
                                 &made->sky))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
-            const nb_medium_transport t = nb_lattice_around(&d->lattice, made->cells, i);
+            const nb_medium_transport t = nb_diffusion_lattice_around(&d->lattice, made->cells, i);
             float *node = &d->nodes[i * d->node_numbers + nb_diffusion_second_number(d, c)];
             set_sky_node(&t, c, &moments[c], &made->sky.nodes[4 * i], node);
         }
@@ -213,7 +213,7 @@ static nebel_result fill_sky(nb_diffusion *d, const nebel_fog *fog, nb_diffusion
 /* Where nothing goes straight on the exact light has all of lamps' that was scattered once. */
 static void forget_exact_light(const nb_diffusion *d)
 {
-    const size_t all = d->has_peaks ? 0 : nb_lattice_nodes(&d->lattice) * (size_t)d->channel_count;
+    const size_t all = d->has_peaks ? 0 : nb_diffusion_lattice_nodes(&d->lattice) * (size_t)d->channel_count;
     for (size_t i = 0; i < all; i++) {
         const size_t node = i / (size_t)d->channel_count, channel = i % (size_t)d->channel_count;
         float *straight = &d->nodes[node * d->node_numbers + nb_diffusion_second_number(d, (int)channel)];
@@ -228,7 +228,7 @@ static nebel_result solve_own(nb_diffusion *d, const nebel_fog *fog, const nebel
                               const nb_local_light *own, const nb_light_beams *beams, nb_local_node *straight,
                               nb_diffusion_builder *made)
 {
-    const size_t nodes = nb_lattice_nodes(&d->lattice);
+    const size_t nodes = nb_diffusion_lattice_nodes(&d->lattice);
     const nb_diffuse_source source = {.beams = beams};
     for (int c = 0; c < d->channel_count; c++) {
         nb_cast_beams(&d->lattice, snapshot, made->cells, c, own, beams);
@@ -237,7 +237,7 @@ static nebel_result solve_own(nb_diffusion *d, const nebel_fog *fog, const nebel
                                 &made->light[c]))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
-            const nb_medium_transport t = nb_lattice_around(&d->lattice, made->cells, i);
+            const nb_medium_transport t = nb_diffusion_lattice_around(&d->lattice, made->cells, i);
             float *node = &d->nodes[i * d->node_numbers];
             set_own_node(&t, c, &straight[i], &made->light[c].nodes[4 * i], node + c * NB_NODE_NUMBERS,
                          node + nb_diffusion_second_number(d, c));
@@ -252,12 +252,12 @@ static nebel_result fill_own(nb_diffusion *d, const nebel_fog *fog, const nebel_
 {
     const nebel_allocator *allocator = &fog->allocator;
     const nb_local_light own = nb_find_own_light(snapshot);
-    nb_local_node *straight = nb_allocate_zero(allocator, nb_lattice_nodes(&d->lattice), sizeof *straight);
+    nb_local_node *straight = nb_allocate_zero(allocator, nb_diffusion_lattice_nodes(&d->lattice), sizeof *straight);
     nb_light_beams beams;
     const int all = nb_beams_open(allocator, &d->lattice, &beams) && straight != NULL;
     nebel_result result = all ? NEBEL_OK : NEBEL_ERROR_MEMORY;
     memcpy(d->irradiance, own.unit, sizeof d->irradiance);
-    if (all) result = nb_light_nodes_by_lamps(d, snapshot, made->cells, &own, straight);
+    if (all) result = nb_light_nodes_by_point_lights(d, snapshot, made->cells, &own, straight);
     if (result == NEBEL_OK) result = solve_own(d, fog, snapshot, &own, &beams, straight, made);
     if (result == NEBEL_OK) result = nb_diffusion_balance(snapshot, d, made->light);
     if (result == NEBEL_OK) forget_exact_light(d);
@@ -270,7 +270,7 @@ static nebel_result fill(nb_diffusion *d, const nebel_fog *fog, const nebel_snap
                          nb_diffusion_builder *made)
 {
     nebel_result result = NEBEL_OK;
-    nb_lattice_mean(&d->lattice, snapshot, made->cells);
+    nb_diffusion_lattice_mean(&d->lattice, snapshot, made->cells);
     if (d->has_sun) result = fill_sun(d, fog, snapshot, made);
     if (result == NEBEL_OK && d->has_sky) result = fill_sky(d, fog, made);
     if (result == NEBEL_OK && d->is_own) result = fill_own(d, fog, snapshot, made);
@@ -281,9 +281,10 @@ static nebel_result fill(nb_diffusion *d, const nebel_fog *fog, const nebel_snap
 static nebel_result solve(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot)
 {
     const nebel_allocator *allocator = &fog->allocator;
-    const size_t nodes = nb_lattice_nodes(&d->lattice);
-    nb_diffusion_builder made = {.cells = nb_allocate(allocator, nb_lattice_cells(&d->lattice), sizeof *made.cells),
-                                 .sun = nb_allocate(allocator, nodes, sizeof *made.sun)};
+    const size_t nodes = nb_diffusion_lattice_nodes(&d->lattice);
+    nb_diffusion_builder made = {
+        .cells = nb_allocate(allocator, nb_diffusion_lattice_cells(&d->lattice), sizeof *made.cells),
+        .sun = nb_allocate(allocator, nodes, sizeof *made.sun)};
     double *light = nb_allocate(allocator, nodes, 4 * sizeof *light);
     nebel_result result = NEBEL_ERROR_MEMORY;
     for (int c = 0; c < 3; c++) made.light[c].nodes = light;
@@ -303,7 +304,7 @@ nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snaps
     nb_diffusion_lattice lattice;
     int lit;
     *made = NULL;
-    nebel_result result = nb_lattice_place(fog, snapshot, scaled, is_own, &lattice, &lit);
+    nebel_result result = nb_diffusion_lattice_place(fog, snapshot, scaled, is_own, &lattice, &lit);
     if (result != NEBEL_OK || !lit) return result;
     nb_diffusion *d = nb_allocate_zero(&fog->allocator, 1, sizeof *d);
     if (d == NULL) return NEBEL_ERROR_MEMORY;
@@ -311,7 +312,7 @@ nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snaps
     d->scaled = nebel_retain_snapshot(scaled);
     d->has_peaks = has_peaks(snapshot);
     d->has_sun = !is_own && snapshot->is_sunlit;
-    d->has_sky = !is_own && nb_sky_is_dimmed(fog, snapshot);
+    d->has_sky = !is_own && nb_environment_is_dimmed(fog, snapshot);
     d->is_own = is_own;
     d->channel_count = find_has_colour(d, fog, snapshot) ? 3 : 1;
     d->node_numbers = nb_diffusion_second_number(d, nb_diffusion_has_second(d) ? d->channel_count : 0);

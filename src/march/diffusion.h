@@ -13,16 +13,16 @@
 #include "trace_kernel.h"
 
 /* What is beyond the end of a lattice. */
-typedef enum nb_lattice_end {
+typedef enum nb_diffusion_lattice_end {
     NB_END_OPEN,  /* nothing: no diffuse light comes from there */
     NB_END_LEVEL, /* fog as it is at the end, for ever */
     NB_END_GROUND
-} nb_lattice_end;
+} nb_diffusion_lattice_end;
 
 typedef struct nb_diffusion_lattice {
     uint32_t size[3];                   /* cells, >= 1 */
     double low[3], high[3], spacing[3]; /* m */
-    nb_lattice_end ends[3][2];
+    nb_diffusion_lattice_end ends[3][2];
 } nb_diffusion_lattice;
 
 /* Of one channel at a node, per unit of the sun's irradiance. */
@@ -88,19 +88,19 @@ static inline int nb_diffusion_has_second(const nb_diffusion *diffusion)
 }
 
 /* How many faces lie across an axis, x fastest. */
-static inline size_t nb_lattice_faces(const nb_diffusion_lattice *lattice, int axis)
+static inline size_t nb_diffusion_lattice_faces(const nb_diffusion_lattice *lattice, int axis)
 {
     size_t count = 1;
     for (int a = 0; a < 3; a++) count *= lattice->size[a] + (a == axis ? 1u : 0u);
     return count;
 }
 
-static inline size_t nb_lattice_cells(const nb_diffusion_lattice *lattice)
+static inline size_t nb_diffusion_lattice_cells(const nb_diffusion_lattice *lattice)
 {
     return (size_t)lattice->size[0] * lattice->size[1] * lattice->size[2];
 }
 
-static inline size_t nb_lattice_nodes(const nb_diffusion_lattice *lattice)
+static inline size_t nb_diffusion_lattice_nodes(const nb_diffusion_lattice *lattice)
 {
     return ((size_t)lattice->size[0] + 1) * ((size_t)lattice->size[1] + 1) * ((size_t)lattice->size[2] + 1);
 }
@@ -111,10 +111,10 @@ typedef struct nb_node_sun {
 } nb_node_sun;
 
 /* Two moments of undimmed ambient light in one channel, per unit of its mean radiance. */
-typedef struct nb_sky_moments {
+typedef struct nb_environment_moments {
     double flux[3];      /* the way that light goes */
     double above, below; /* irradiance of a level plane from above, and from below */
-} nb_sky_moments;
+} nb_environment_moments;
 
 /* Own light in one channel on its straight way. */
 typedef struct nb_light_beams {
@@ -135,7 +135,7 @@ typedef struct nb_diffuse_source {
     const nb_node_sun *sun; /* of each node; NULL: not the sun */
     const double *to_sun;
     const nb_light_beams *beams; /* NULL: not own light */
-    nb_sky_moments sky;
+    nb_environment_moments sky;
 } nb_diffuse_source;
 
 static inline int nb_source_is_sky(const nb_diffuse_source *source)
@@ -153,7 +153,7 @@ typedef struct nb_local_light {
 nb_local_light nb_find_own_light(const nebel_snapshot *snapshot);
 
 /* Of a lamp's intensity or of what is emitted, per unit. */
-double nb_own_amount(const nb_local_light *own, const double color[3], int channel);
+double nb_local_amount(const nb_local_light *own, const double color[3], int channel);
 
 /* Follows own light on straight ways to the lattice's ends, in one channel. */
 void nb_cast_beams(const nb_diffusion_lattice *lattice, const nebel_snapshot *snapshot,
@@ -167,8 +167,9 @@ typedef struct nb_local_node {
 } nb_local_node;
 
 /* Fills the nodes, which are all 0, with lamps' light. */
-nebel_result nb_light_nodes_by_lamps(const nb_diffusion *diffusion, const nebel_snapshot *fog,
-                                     const nb_medium_transport *cells, const nb_local_light *own, nb_local_node *nodes);
+nebel_result nb_light_nodes_by_point_lights(const nb_diffusion *diffusion, const nebel_snapshot *fog,
+                                            const nb_medium_transport *cells, const nb_local_light *own,
+                                            nb_local_node *nodes);
 
 /* Adds what is emitted, as beams have it, in one channel. */
 void nb_light_nodes_by_cells(const nb_diffusion_lattice *lattice, const nb_medium_transport *cells,
@@ -183,31 +184,32 @@ int nb_medium_scatters(const nb_medium *medium);
 int nb_medium_is_lit(const nb_medium *medium);
 
 /* Whether any fog or the ground takes something from ambient light, so that it is darker than undimmed. */
-int nb_sky_is_dimmed(const nebel_fog *fog, const nebel_snapshot *snapshot);
+int nb_environment_is_dimmed(const nebel_fog *fog, const nebel_snapshot *snapshot);
 
 /* Of each channel; all 0 where it is dark. */
-void nb_sky_find_moments(const nebel_environment *sky, double mean[3], nb_sky_moments moments[3]);
+void nb_environment_find_moments(const nebel_environment *sky, double mean[3], nb_environment_moments moments[3]);
 
 /* Whether the moments are not the same in all channels. */
-int nb_sky_has_colour(const nebel_environment *sky);
+int nb_environment_has_colour(const nebel_environment *sky);
 
 /* Where the lattice is, and its cells: of own light, or of the sun and the sky. *lit: 0 where there is nothing to be solved.
  * Errors: UNSUPPORTED. */
-nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot, const nebel_snapshot *scaled,
-                              int is_own, nb_diffusion_lattice *lattice, int *lit);
+nebel_result nb_diffusion_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot,
+                                        const nebel_snapshot *scaled, int is_own, nb_diffusion_lattice *lattice,
+                                        int *lit);
 
 /* Whether it holds bodies in fog that goes on beside it. */
-int nb_lattice_has_bodies(const nb_diffusion_lattice *lattice);
+int nb_diffusion_lattice_has_bodies(const nb_diffusion_lattice *lattice);
 
 /* The place of a node. */
-void nb_lattice_node(const nb_diffusion_lattice *lattice, size_t node, double place[3]);
+void nb_diffusion_lattice_node(const nb_diffusion_lattice *lattice, size_t node, double place[3]);
 
 /* One of the eight cells around a node, or the nearest one where there is none. */
-size_t nb_lattice_cell_beside(const nb_diffusion_lattice *lattice, size_t node, int octant);
+size_t nb_diffusion_lattice_cell_beside(const nb_diffusion_lattice *lattice, size_t node, int octant);
 
 /* What the cells around a node hold together. */
-nb_medium_transport nb_lattice_around(const nb_diffusion_lattice *lattice, const nb_medium_transport *cells,
-                                      size_t node);
+nb_medium_transport nb_diffusion_lattice_around(const nb_diffusion_lattice *lattice, const nb_medium_transport *cells,
+                                                size_t node);
 
 /* g of what went almost straight on `n` times, where the rest has the mean cosine `turned`: the second moment of what is
  * taken to go straight on is that of this lobe for n = 1. */
@@ -218,7 +220,8 @@ double nb_lobe_width(double turned, double n);
 double nb_glow_width(double turned, double scaled, double whole);
 
 /* Means over the cells. */
-void nb_lattice_mean(const nb_diffusion_lattice *lattice, const nebel_snapshot *snapshot, nb_medium_transport *cells);
+void nb_diffusion_lattice_mean(const nb_diffusion_lattice *lattice, const nebel_snapshot *snapshot,
+                               nb_medium_transport *cells);
 
 /* One channel's diffuse light, per unit of irradiance; the sky's lack of light, per unit of its mean radiance. */
 typedef struct nb_diffuse_light {

@@ -30,17 +30,17 @@ enum {
     SHARES = 3
 };
 
-typedef struct nb_lattice_span {
+typedef struct nb_diffusion_span {
     double low, high;
     int is_endless[2];
-} nb_lattice_span;
+} nb_diffusion_span;
 
 /* ---- where lit fog is ------------------------------------------------------------------------ */
 
-static nb_lattice_span span_of(const nb_medium *medium, int axis)
+static nb_diffusion_span span_of(const nb_medium *medium, int axis)
 {
     const nebel_density *density = &medium->body.density;
-    nb_lattice_span s = {medium->body.low[axis], medium->body.high[axis], {0, 0}};
+    nb_diffusion_span s = {medium->body.low[axis], medium->body.high[axis], {0, 0}};
     if (density->type == NEBEL_DENSITY_GAUSSIAN) {
         s.low = fmax(s.low, density->center[axis] - GAUSSIAN_END * density->sigma);
         s.high = fmin(s.high, density->center[axis] + GAUSSIAN_END * density->sigma);
@@ -75,12 +75,12 @@ static int takes_part_in_own(const nb_medium *medium, int goes_on)
 }
 
 /* The span of all fog that ends and is lit, or scatters or gives own light, and whether there is any that does not. NULL, or what goes on and changes. */
-static const nb_medium *gather(const nebel_snapshot *snapshot, int is_own, int axis, nb_lattice_span *all)
+static const nb_medium *gather(const nebel_snapshot *snapshot, int is_own, int axis, nb_diffusion_span *all)
 {
-    *all = (nb_lattice_span){HUGE_VAL, -HUGE_VAL, {0, 0}};
+    *all = (nb_diffusion_span){HUGE_VAL, -HUGE_VAL, {0, 0}};
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_medium *medium = &snapshot->media[i];
-        const nb_lattice_span s = span_of(medium, axis);
+        const nb_diffusion_span s = span_of(medium, axis);
         const int goes_on = s.is_endless[0] || s.is_endless[1];
         if (!(is_own ? takes_part_in_own(medium, goes_on) : nb_medium_is_lit(medium))) continue;
         if (goes_on && axis != 1 && !is_level(medium, axis)) return medium;
@@ -116,7 +116,7 @@ static double find_height(const nebel_snapshot *scaled, double x, double z, doub
 }
 
 /* A part of the world's width for endless level fog; more than the fog that ends where there is both. */
-static void set_level_axis(nb_diffusion_lattice *l, int axis, const nb_lattice_span *s)
+static void set_level_axis(nb_diffusion_lattice *l, int axis, const nb_diffusion_span *s)
 {
     const int has_bodies = s->low < s->high;
     const double margin = has_bodies ? (s->high - s->low) / 2 : 0;
@@ -125,7 +125,7 @@ static void set_level_axis(nb_diffusion_lattice *l, int axis, const nb_lattice_s
     l->ends[axis][0] = l->ends[axis][1] = NB_END_LEVEL;
 }
 
-static void set_height(const nebel_snapshot *scaled, const nb_lattice_span *s, const nebel_diffusion_desc *desc,
+static void set_height(const nebel_snapshot *scaled, const nb_diffusion_span *s, const nebel_diffusion_desc *desc,
                        nb_diffusion_lattice *l)
 {
     const double x = (l->low[0] + l->high[0]) / 2, z = (l->low[2] + l->high[2]) / 2;
@@ -174,7 +174,7 @@ static double mean_extinction(const nb_diffusion_lattice *l, const nebel_snapsho
         const int at[3] = {k % PROBES, k / PROBES % PROBES, k / (PROBES * PROBES)};
         double place[3];
         for (int a = 0; a < 3; a++) place[a] = l->low[a] + (at[a] + .5) / PROBES * (l->high[a] - l->low[a]);
-        nb_sample_transport(snapshot, place, &sum);
+        nb_sample_medium_transport(snapshot, place, &sum);
     }
     for (int c = 0; c < 3; c++) most = fmax(most, sum.extinction[c] - sum.scattering[c] + sum.turned[c]);
     return most / (PROBES * PROBES * PROBES);
@@ -207,15 +207,16 @@ static void set_cells(const nebel_snapshot *snapshot, uint32_t limit, int is_own
     }
 }
 
-int nb_lattice_has_bodies(const nb_diffusion_lattice *l)
+int nb_diffusion_lattice_has_bodies(const nb_diffusion_lattice *l)
 {
     return (l->ends[0][0] == NB_END_LEVEL && l->size[0] > 1) || (l->ends[2][0] == NB_END_LEVEL && l->size[2] > 1);
 }
 
-nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot, const nebel_snapshot *scaled,
-                              int is_own, nb_diffusion_lattice *lattice, int *lit)
+nebel_result nb_diffusion_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot,
+                                        const nebel_snapshot *scaled, int is_own, nb_diffusion_lattice *lattice,
+                                        int *lit)
 {
-    nb_lattice_span spans[3];
+    nb_diffusion_span spans[3];
     memset(lattice, 0, sizeof *lattice);
     *lit = 0;
     for (int a = 0; a < 3; a++) {
@@ -253,7 +254,7 @@ static void mean_of_cell(const nb_diffusion_lattice *l, const nebel_snapshot *sn
         const int share[3] = {k % SHARES, k / SHARES % SHARES, k / (SHARES * SHARES)};
         double place[3];
         for (int a = 0; a < 3; a++) place[a] = l->low[a] + (at[a] + (share[a] + .5) / SHARES) * l->spacing[a];
-        nb_sample_transport(snapshot, place, &sum);
+        nb_sample_medium_transport(snapshot, place, &sum);
     }
     for (int c = 0; c < 3; c++) {
         mean->extinction[c] = sum.extinction[c] * part;
@@ -264,9 +265,10 @@ static void mean_of_cell(const nb_diffusion_lattice *l, const nebel_snapshot *sn
     }
 }
 
-void nb_lattice_mean(const nb_diffusion_lattice *lattice, const nebel_snapshot *snapshot, nb_medium_transport *cells)
+void nb_diffusion_lattice_mean(const nb_diffusion_lattice *lattice, const nebel_snapshot *snapshot,
+                               nb_medium_transport *cells)
 {
-    const size_t count = nb_lattice_cells(lattice), nx = lattice->size[0], ny = lattice->size[1];
+    const size_t count = nb_diffusion_lattice_cells(lattice), nx = lattice->size[0], ny = lattice->size[1];
     for (size_t i = 0; i < count; i++) {
         const uint32_t at[3] = {(uint32_t)(i % nx), (uint32_t)(i / nx % ny), (uint32_t)(i / (nx * ny))};
         mean_of_cell(lattice, snapshot, at, &cells[i]);
@@ -275,14 +277,14 @@ void nb_lattice_mean(const nb_diffusion_lattice *lattice, const nebel_snapshot *
 
 /* ---- its nodes ------------------------------------------------------------------------------- */
 
-void nb_lattice_node(const nb_diffusion_lattice *l, size_t node, double place[3])
+void nb_diffusion_lattice_node(const nb_diffusion_lattice *l, size_t node, double place[3])
 {
     const size_t nx = l->size[0] + 1u, ny = l->size[1] + 1u;
     const size_t at[3] = {node % nx, node / nx % ny, node / (nx * ny)};
     for (int a = 0; a < 3; a++) place[a] = at[a] == l->size[a] ? l->high[a] : l->low[a] + (double)at[a] * l->spacing[a];
 }
 
-size_t nb_lattice_cell_beside(const nb_diffusion_lattice *l, size_t node, int octant)
+size_t nb_diffusion_lattice_cell_beside(const nb_diffusion_lattice *l, size_t node, int octant)
 {
     const size_t nx = l->size[0] + 1u, ny = l->size[1] + 1u;
     const size_t at[3] = {node % nx, node / nx % ny, node / (nx * ny)};
@@ -294,11 +296,12 @@ size_t nb_lattice_cell_beside(const nb_diffusion_lattice *l, size_t node, int oc
     return cell[0] + l->size[0] * (cell[1] + l->size[1] * cell[2]);
 }
 
-nb_medium_transport nb_lattice_around(const nb_diffusion_lattice *l, const nb_medium_transport *cells, size_t node)
+nb_medium_transport nb_diffusion_lattice_around(const nb_diffusion_lattice *l, const nb_medium_transport *cells,
+                                                size_t node)
 {
     nb_medium_transport sum = {.extinction = {0}};
     for (int octant = 0; octant < 8; octant++) {
-        const nb_medium_transport *t = &cells[nb_lattice_cell_beside(l, node, octant)];
+        const nb_medium_transport *t = &cells[nb_diffusion_lattice_cell_beside(l, node, octant)];
         for (int c = 0; c < 3; c++) {
             sum.extinction[c] += t->extinction[c];
             sum.scattering[c] += t->scattering[c];

@@ -73,7 +73,7 @@ nb_local_light nb_find_own_light(const nebel_snapshot *snapshot)
     return own;
 }
 
-double nb_own_amount(const nb_local_light *own, const double color[3], int channel)
+double nb_local_amount(const nb_local_light *own, const double color[3], int channel)
 {
     return own->has_colour ? color[channel] : most_of(color);
 }
@@ -158,12 +158,12 @@ int nb_find_reach(const nebel_snapshot *snapshot, const nebel_snapshot *scaled, 
 
 int nb_beams_open(const nebel_allocator *allocator, const nb_diffusion_lattice *lattice, nb_light_beams *beams)
 {
-    beams->taken = nb_allocate(allocator, nb_lattice_cells(lattice), sizeof *beams->taken);
-    beams->scaled = nb_allocate(allocator, nb_lattice_cells(lattice), 4 * sizeof *beams->scaled);
-    beams->whole = nb_allocate(allocator, nb_lattice_cells(lattice), 4 * sizeof *beams->whole);
+    beams->taken = nb_allocate(allocator, nb_diffusion_lattice_cells(lattice), sizeof *beams->taken);
+    beams->scaled = nb_allocate(allocator, nb_diffusion_lattice_cells(lattice), 4 * sizeof *beams->scaled);
+    beams->whole = nb_allocate(allocator, nb_diffusion_lattice_cells(lattice), 4 * sizeof *beams->whole);
     int all = beams->taken != NULL && beams->scaled != NULL && beams->whole != NULL;
     for (int a = 0; a < 3; a++) {
-        beams->through[a] = nb_allocate(allocator, nb_lattice_faces(lattice, a), sizeof *beams->through[a]);
+        beams->through[a] = nb_allocate(allocator, nb_diffusion_lattice_faces(lattice, a), sizeof *beams->through[a]);
         all = all && beams->through[a] != NULL;
     }
     return all;
@@ -310,7 +310,7 @@ static double cone_of(const nb_light *lamp, const double direction[3])
 {
     double cosine = 0;
     for (int a = 0; a < 3; a++) cosine += direction[a] * lamp->axis[a];
-    return lamp->is_spot ? nb_lamp_cone(cosine, lamp->edge, lamp->rise) : 1;
+    return lamp->is_spot ? nb_light_cone(cosine, lamp->edge, lamp->rise) : 1;
 }
 
 /* Ways that are spread evenly, along a spiral of the golden angle. */
@@ -354,13 +354,13 @@ static void cast_from_cell(const caster *k, size_t cell, size_t i, double power)
 static void cast_emission(const caster *k, const nb_local_light *own)
 {
     const nb_diffusion_lattice *l = k->lattice;
-    const size_t cells = nb_lattice_cells(l);
+    const size_t cells = nb_diffusion_lattice_cells(l);
     const double volume = l->spacing[0] * l->spacing[1] * l->spacing[2];
     size_t glowing = 0, used = 0;
-    for (size_t i = 0; i < cells; i++) glowing += nb_own_amount(own, k->cells[i].emission, k->channel) > 0;
+    for (size_t i = 0; i < cells; i++) glowing += nb_local_amount(own, k->cells[i].emission, k->channel) > 0;
     const size_t count = glowing > 0 ? WAYS_OF_ALL / glowing + LEAST_WAYS_OF_CELL : 0;
     for (size_t i = 0; i < cells; i++) {
-        const double power = 4 * PI * volume * nb_own_amount(own, k->cells[i].emission, k->channel);
+        const double power = 4 * PI * volume * nb_local_amount(own, k->cells[i].emission, k->channel);
         for (size_t n = 0; n < count && power > 0; n++) cast_from_cell(k, i, used++, power / (double)count);
     }
 }
@@ -370,15 +370,16 @@ void nb_cast_beams(const nb_diffusion_lattice *lattice, const nebel_snapshot *sn
                    const nb_light_beams *beams)
 {
     caster k = {lattice, cells, channel, 0, beams};
-    const size_t count = nb_lattice_cells(lattice);
+    const size_t count = nb_diffusion_lattice_cells(lattice);
     memset(beams->taken, 0, count * sizeof *beams->taken);
     memset(beams->scaled, 0, 4 * count * sizeof *beams->scaled);
     memset(beams->whole, 0, 4 * count * sizeof *beams->whole);
-    for (int a = 0; a < 3; a++) memset(beams->through[a], 0, nb_lattice_faces(lattice, a) * sizeof *beams->through[a]);
+    for (int a = 0; a < 3; a++)
+        memset(beams->through[a], 0, nb_diffusion_lattice_faces(lattice, a) * sizeof *beams->through[a]);
     const double share = snapshot->lamp_count > 0 ? WAYS_OF_ALL / (double)snapshot->lamp_count : 0;
     const int ways = (int)fmin(fmax(share, LEAST_WAYS), MOST_WAYS);
     for (size_t i = 0; has_lamps(snapshot) && i < snapshot->lamp_count; i++)
-        cast_lamp(&k, &snapshot->lamps[i], nb_own_amount(own, snapshot->lamps[i].intensity, channel), ways);
+        cast_lamp(&k, &snapshot->lamps[i], nb_local_amount(own, snapshot->lamps[i].intensity, channel), ways);
     k.is_emitted = 1;
     cast_emission(&k, own);
 }
@@ -397,7 +398,7 @@ static void look(const nb_diffusion_lattice *l, const nb_light *lamp, size_t fir
 {
     for (size_t i = 0; i < v->count; i++) {
         double place[3], square = 0;
-        nb_lattice_node(l, first + i, place);
+        nb_diffusion_lattice_node(l, first + i, place);
         for (int a = 0; a < 3; a++) square += (lamp->place[a] - place[a]) * (lamp->place[a] - place[a]);
         v->distance[i] = sqrt(square);
         v->length[i] = (float)fmax(v->distance[i] - lamp->clear, 0);
@@ -439,9 +440,9 @@ static void add_lamp(const nb_light_view *v, size_t i, const nb_light *lamp, con
     const double away[3] = {-v->direction[0][i], -v->direction[1][i], -v->direction[2][i]};
     const double square = v->distance[i] * v->distance[i];
     const double part =
-        cone_of(lamp, away) * (double)nb_lamp_fluence((nb_wide)square, (nb_wide)fmax(lamp->radius2, soft2));
+        cone_of(lamp, away) * (double)nb_light_fluence((nb_wide)square, (nb_wide)fmax(lamp->radius2, soft2));
     for (int c = 0; c < 3; c++) {
-        const double full = part * nb_own_amount(own, lamp->intensity, c);
+        const double full = part * nb_local_amount(own, lamp->intensity, c);
         const double scaled = (double)v->scaled[c][i], whole = (double)v->whole[c][i];
         const double straight = full * fmax(scaled - whole, 0);
         const double width = nb_glow_width(turned_cosine(fog, c), scaled, whole);
@@ -451,11 +452,12 @@ static void add_lamp(const nb_light_view *v, size_t i, const nb_light *lamp, con
     }
 }
 
-nebel_result nb_light_nodes_by_lamps(const nb_diffusion *diffusion, const nebel_snapshot *fog,
-                                     const nb_medium_transport *cells, const nb_local_light *own, nb_local_node *nodes)
+nebel_result nb_light_nodes_by_point_lights(const nb_diffusion *diffusion, const nebel_snapshot *fog,
+                                            const nb_medium_transport *cells, const nb_local_light *own,
+                                            nb_local_node *nodes)
 {
     const nb_diffusion_lattice *l = &diffusion->lattice;
-    const size_t count = nb_lattice_nodes(l);
+    const size_t count = nb_diffusion_lattice_nodes(l);
     const double cell = nb_exp(nb_log(l->spacing[0] * l->spacing[1] * l->spacing[2]) / 3);
     for (size_t first = 0; first < count; first += BATCH) {
         nb_light_view v = {.count = count - first < BATCH ? count - first : BATCH};
@@ -466,7 +468,7 @@ nebel_result nb_light_nodes_by_lamps(const nb_diffusion *diffusion, const nebel_
             if (result == NEBEL_OK) result = ask(l, fog, &v, v.whole);
             if (result != NEBEL_OK) return result;
             for (size_t i = 0; i < v.count; i++) {
-                const nb_medium_transport around = nb_lattice_around(l, cells, first + i);
+                const nb_medium_transport around = nb_diffusion_lattice_around(l, cells, first + i);
                 add_lamp(&v, i, lamp, own, SOFT * SOFT * cell * cell, &around, &nodes[first + i]);
             }
         }
@@ -489,13 +491,13 @@ static void add_cells(const nb_diffusion_lattice *l, const nb_medium_transport *
     const double unit = 1 / (8 * l->spacing[0] * l->spacing[1] * l->spacing[2]);
     double scaled[4] = {0}, whole[4] = {0};
     for (int octant = 0; octant < 8; octant++) {
-        const size_t cell = nb_lattice_cell_beside(l, node, octant);
+        const size_t cell = nb_diffusion_lattice_cell_beside(l, node, octant);
         for (size_t k = 0; k < 4; k++) {
             scaled[k] += beams->scaled[4 * cell + k] * unit;
             whole[k] += beams->whole[4 * cell + k] * unit;
         }
     }
-    const nb_medium_transport fog = nb_lattice_around(l, cells, node);
+    const nb_medium_transport fog = nb_diffusion_lattice_around(l, cells, node);
     const double width = nb_lobe_width(turned_cosine(&fog, c), 1 + times_ahead(scaled[0], whole[0]));
     for (int k = 0; k < 4; k++) {
         out->scaled[c][k] += scaled[k];
@@ -506,6 +508,6 @@ static void add_cells(const nb_diffusion_lattice *l, const nb_medium_transport *
 void nb_light_nodes_by_cells(const nb_diffusion_lattice *lattice, const nb_medium_transport *cells,
                              const nb_light_beams *beams, int channel, nb_local_node *nodes)
 {
-    const size_t count = nb_lattice_nodes(lattice);
+    const size_t count = nb_diffusion_lattice_nodes(lattice);
     for (size_t i = 0; i < count; i++) add_cells(lattice, cells, beams, i, channel, &nodes[i]);
 }

@@ -20,11 +20,11 @@ int nb_medium_is_lit(const nb_medium *medium)
     return is_lit;
 }
 
-int nb_sky_is_dimmed(const nebel_fog *fog, const nebel_snapshot *snapshot)
+int nb_environment_is_dimmed(const nebel_fog *fog, const nebel_snapshot *snapshot)
 {
     double most[3];
     int is_dimmed = fog->sky.type != NEBEL_ENVIRONMENT_CONSTANT, is_lit = 0;
-    nb_sky_most(&fog->sky, most);
+    nb_environment_most(&fog->sky, most);
     for (int c = 0; c < 3; c++) is_dimmed |= fog->diffusion.has_ground && fog->diffusion.ground_albedo[c] < 1;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
@@ -59,7 +59,7 @@ static void find_mean(const nebel_environment *sky, double mean[3])
     }
 }
 
-void nb_sky_find_moments(const nebel_environment *sky, double mean[3], nb_sky_moments moments[3])
+void nb_environment_find_moments(const nebel_environment *sky, double mean[3], nb_environment_moments moments[3])
 {
     find_mean(sky, mean);
     for (int a = 0; a < 3; a++) {
@@ -80,17 +80,17 @@ void nb_sky_find_moments(const nebel_environment *sky, double mean[3], nb_sky_mo
 }
 
 /* But for rounding. */
-static int is_alike(const nb_sky_moments *a, const nb_sky_moments *b)
+static int is_alike(const nb_environment_moments *a, const nb_environment_moments *b)
 {
     double off = fmax(fabs(a->above - b->above), fabs(a->below - b->below));
     for (int i = 0; i < 3; i++) off = fmax(off, fabs(a->flux[i] - b->flux[i]));
     return off < 1e-9;
 }
 
-int nb_sky_has_colour(const nebel_environment *sky)
+int nb_environment_has_colour(const nebel_environment *sky)
 {
     double mean[3];
-    nb_sky_moments moments[3];
-    nb_sky_find_moments(sky, mean, moments);
+    nb_environment_moments moments[3];
+    nb_environment_find_moments(sky, mean, moments);
     return !is_alike(&moments[0], &moments[1]) || !is_alike(&moments[0], &moments[2]);
 }

@@ -142,7 +142,7 @@ static void join_cells(solver *s, int axis, const index3 *face)
  * that. */
 static double returned_by_ground(const solver *s, double beam)
 {
-    const nb_sky_moments *sky = &s->source->sky;
+    const nb_environment_moments *sky = &s->source->sky;
     return nb_source_is_sky(s->source) ? sky->below - s->ground_albedo * sky->above : s->ground_albedo * fmax(beam, 0);
 }
 
@@ -150,7 +150,7 @@ static double returned_by_ground(const solver *s, double beam)
 static void end_cells(solver *s, int axis, int side, const index3 *face)
 {
     const nb_diffusion_lattice *l = s->lattice;
-    const nb_lattice_end end = l->ends[axis][side];
+    const nb_diffusion_lattice_end end = l->ends[axis][side];
     const index3 within = shifted(face, axis, -side);
     const size_t f = face_index(l, axis, face), cell = cell_index(l, &within);
     const double beam = (side ? 1 : -1) * beam_through(s, axis, face), drive = s->ahead[cell] * beam;
@@ -459,7 +459,7 @@ static int allocate(const nebel_allocator *allocator, solver *s)
         all = all && *of_cells[i] != NULL;
     }
     for (int a = 0; a < 3; a++) {
-        const size_t n = nb_lattice_faces(s->lattice, a);
+        const size_t n = nb_diffusion_lattice_faces(s->lattice, a);
         s->faces[a] = (faces){nb_allocate(allocator, n, sizeof(double)), nb_allocate(allocator, n, sizeof(double))};
         all = all && s->faces[a].conductance != NULL && s->faces[a].drive != NULL;
     }
@@ -485,7 +485,7 @@ int nb_diffusion_solve(const nebel_allocator *allocator, const nb_diffusion_latt
                 .source = source,
                 .ground_albedo = ground_albedo,
                 .channel = channel,
-                .cell_count = nb_lattice_cells(lattice)};
+                .cell_count = nb_diffusion_lattice_cells(lattice)};
     for (int a = 0; a < 3; a++) s.area[a] = lattice->spacing[(a + 1) % 3] * lattice->spacing[(a + 2) % 3];
     const int all = allocate(allocator, &s);
     if (all) {

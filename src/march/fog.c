@@ -55,7 +55,7 @@ void nebel_destroy_fog(nebel_fog *fog)
     const nebel_allocator allocator = fog->allocator;
     for (size_t i = 0; i < fog->slot_count; i++) {
         if (fog->slots[i].used) nb_volume_free(&allocator, &fog->slots[i].volume);
-        nb_grid_lattice_release(fog->slots[i].lattice);
+        nb_sun_lattice_release(fog->slots[i].lattice);
     }
     nebel_release_environment_map(fog->sky.map);
     nb_release(&allocator, fog->lamps);
@@ -133,7 +133,7 @@ nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id)
     if (slot == NULL)
         return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "volume id %llu: no such volume", (unsigned long long)id);
     nb_volume_free(&fog->allocator, &slot->volume);
-    nb_grid_lattice_release(slot->lattice);
+    nb_sun_lattice_release(slot->lattice);
     slot->lattice = NULL;
     slot->used = 0;
     if (++slot->generation == 0) return NEBEL_OK; /* this slot's ids are used up: it is never taken again */
@@ -177,7 +177,7 @@ nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun)
 static nb_light *resolve_lamps(const nebel_allocator *allocator, size_t count, const nebel_light *lamps)
 {
     nb_light *made = nb_allocate(allocator, count, sizeof *made);
-    for (size_t i = 0; i < count && made != NULL; i++) made[i] = nb_lamp_resolve(&lamps[i]);
+    for (size_t i = 0; i < count && made != NULL; i++) made[i] = nb_light_resolve(&lamps[i]);
     return made;
 }
 
@@ -185,7 +185,7 @@ nebel_result nebel_set_lamps(nebel_fog *fog, size_t count, const nebel_light *la
 {
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
     if (count > 0 && lamps == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "lamps: must not be NULL");
-    const nebel_result result = nb_check_lamps(&fog->log, count, lamps);
+    const nebel_result result = nb_check_lights(&fog->log, count, lamps);
     if (result != NEBEL_OK) return result;
     nb_light *made = count > 0 ? resolve_lamps(&fog->allocator, count, lamps) : NULL;
     if (count > 0 && made == NULL)

@@ -11,10 +11,10 @@
 #include <string.h>
 
 #define BOXES(NAME, suffix) [NEBEL_ISA_##NAME] = nb_pixels_##suffix,
-static nb_pixels_fn *const box_kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(BOXES)};
+static nb_pixels_fn *const box_kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(BOXES)};
 
 #define PICTURE(NAME, suffix) [NEBEL_ISA_##NAME] = nb_picture_##suffix,
-static nb_picture_fn *const picture_kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(PICTURE)};
+static nb_picture_fn *const picture_kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(PICTURE)};
 
 /* ---- kinds of pixels ------------------------------------------------------------------------- */
 
@@ -259,7 +259,7 @@ nebel_result nebel_apply_fog_to_pixels(const nebel_snapshot *snapshot, nebel_isa
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     const char *fault = pixels != NULL ? fault_of(pixels) : "must not be NULL";
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "pixels: %s", fault);
-    const nebel_isa chosen = nb_cpu_choose(isa);
+    const nebel_isa chosen = nb_isa_select(isa);
     if (box_kernels[chosen] == NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
                        nebel_isa_name(isa));

@@ -92,7 +92,7 @@ static void sample(const nebel_snapshot *snapshot, const nebel_sample_point *pla
     }
 }
 
-void nb_sample_transport(const nebel_snapshot *snapshot, const double position[3], nb_medium_transport *sum)
+void nb_sample_medium_transport(const nebel_snapshot *snapshot, const double position[3], nb_medium_transport *sum)
 {
     const nebel_sample_point place = {{position[0], position[1], position[2]}, -1};
     const int64_t cover = find_cover(snapshot, &place);

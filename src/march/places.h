@@ -13,6 +13,6 @@ typedef struct nb_medium_transport {
 } nb_medium_transport;
 
 /* Adds what is at the place. `start` and `cutoff` do not count. */
-void nb_sample_transport(const nebel_snapshot *snapshot, const double position[3], nb_medium_transport *sum);
+void nb_sample_medium_transport(const nebel_snapshot *snapshot, const double position[3], nb_medium_transport *sum);
 
 #endif

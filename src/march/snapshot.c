@@ -38,7 +38,7 @@ static void light_medium(nb_medium *medium, const nebel_fog *fog)
 {
     const nb_volume *v = &medium->body;
     double ambient[3];
-    nb_sky_most(&fog->sky, ambient);
+    nb_environment_most(&fog->sky, ambient);
     for (int c = 0; c < 3; c++) {
         medium->radiance[c] = v->lit ? v->albedo[c] * ambient[c] : v->source[c];
         medium->light[c] = medium->radiance[c] * v->extinction[c] + v->emission[c];
@@ -59,11 +59,11 @@ static void free_snapshot(nebel_snapshot *s)
     const nebel_allocator allocator = s->allocator;
     for (size_t i = 0; i < s->medium_count; i++) {
         nb_volume_free(&allocator, &s->media[i].body);
-        nb_grid_lattice_release(s->media[i].lattice);
+        nb_sun_lattice_release(s->media[i].lattice);
     }
     nb_diffusion_free(&allocator, s->diffusion);
     nb_diffusion_free(&allocator, s->own_diffusion);
-    for (size_t i = 0; i < s->skylight_count; i++) nb_sky_filter_release(s->skylights[i].filter);
+    for (size_t i = 0; i < s->skylight_count; i++) nb_environment_filter_release(s->skylights[i].filter);
     nebel_release_environment_map(s->sky.map);
     nb_bvh_free(&allocator, &s->bvh);
     nb_release(&allocator, s->media);
@@ -162,7 +162,7 @@ static int copy_lamps(const nebel_fog *fog, nebel_snapshot *s)
 static const nb_environment_light *find_skylight(const nebel_snapshot *s, const nb_phase *phase)
 {
     for (size_t i = 0; i < s->skylight_count; i++)
-        if (nb_phase_compare(nb_sky_filter_phase(s->skylights[i].filter), phase) == 0) return &s->skylights[i];
+        if (nb_phase_compare(nb_environment_filter_phase(s->skylights[i].filter), phase) == 0) return &s->skylights[i];
     return NULL;
 }
 
@@ -171,7 +171,7 @@ static nebel_result add_skylight(nebel_snapshot *s, nb_medium *medium)
     if (s->skylight_count == NEBEL_MAX_ENVIRONMENT_PHASES)
         return nb_fail(&s->log, NEBEL_ERROR_LIMIT, "environment: more than %d phase functions scatter it",
                        NEBEL_MAX_ENVIRONMENT_PHASES);
-    nb_environment_filter *filter = nb_sky_filter_make(&s->allocator, &s->sky, &medium->body.phase);
+    nb_environment_filter *filter = nb_environment_filter_make(&s->allocator, &s->sky, &medium->body.phase);
     if (filter == NULL) return NEBEL_ERROR_MEMORY;
     s->skylights[s->skylight_count] = nb_skylight_of(&s->sky, filter);
     medium->sky = &s->skylights[s->skylight_count++];
@@ -255,7 +255,7 @@ static int is_flat(const nb_volume *body)
 {
     const nb_leaf *leaf = &body->leaves[0];
     return leaf->type == NB_LEAF_WORLD || leaf->type == NB_LEAF_BOX ||
-           (leaf->type == NB_LEAF_PLANES && leaf->face_count <= NB_MOST_EDGED_FACES);
+           (leaf->type == NB_LEAF_PLANES && leaf->face_count <= NB_MAX_EDGED_FACES);
 }
 
 /* Whether all media are convex bodies of constant density that add. */
@@ -305,15 +305,15 @@ static int are_flat(const nebel_snapshot *s)
 
 static nb_sun_depth_method find_way_to_sun(const nebel_snapshot *s)
 {
-    if (!s->is_sunlit) return NB_WAY_MARCHED;
-    if (s->is_added) return s->medium_count <= MOST_FLAT && are_flat(s) ? NB_WAY_FLAT : NB_WAY_ADDED;
+    if (!s->is_sunlit) return NB_SUN_DEPTH_MARCHED;
+    if (s->is_added) return s->medium_count <= MOST_FLAT && are_flat(s) ? NB_SUN_DEPTH_FLAT : NB_SUN_DEPTH_ADDED;
     const nb_volume *body = &s->media[0].body;
-    if (s->medium_count != 1 || nb_volume_covers(body) || body->leaf_count != 1) return NB_WAY_MARCHED;
-    if (body->density.type == NEBEL_DENSITY_GRID) return NB_WAY_GRID;
-    if (body->leaves[0].type != NB_LEAF_WORLD) return NB_WAY_MARCHED;
-    if (body->density.type == NEBEL_DENSITY_ALTITUDE) return NB_WAY_ALTITUDE;
+    if (s->medium_count != 1 || nb_volume_covers(body) || body->leaf_count != 1) return NB_SUN_DEPTH_MARCHED;
+    if (body->density.type == NEBEL_DENSITY_GRID) return NB_SUN_DEPTH_GRID;
+    if (body->leaves[0].type != NB_LEAF_WORLD) return NB_SUN_DEPTH_MARCHED;
+    if (body->density.type == NEBEL_DENSITY_ALTITUDE) return NB_SUN_DEPTH_ALTITUDE;
     const int is_height = body->density.type == NEBEL_DENSITY_HEIGHT && body->density.below == NEBEL_BELOW_GROW;
-    return is_height && s->to_sun[1] > 0 ? NB_WAY_HEIGHT : NB_WAY_MARCHED;
+    return is_height && s->to_sun[1] > 0 ? NB_SUN_DEPTH_HEIGHT : NB_SUN_DEPTH_MARCHED;
 }
 
 /* ---- lattices -------------------------------------------------------------------------------- */
@@ -332,7 +332,7 @@ void nb_way_in_cells(const nebel_snapshot *s, const nb_volume *body, double way[
 
 static int needs_lattice(const nebel_snapshot *s)
 {
-    return s->way_to_sun == NB_WAY_GRID && nb_grid_is_linear(s->media[0].body.density.grid);
+    return s->way_to_sun == NB_SUN_DEPTH_GRID && nb_grid_is_linear(s->media[0].body.density.grid);
 }
 
 /* Two columns per cell where they come to no more than 64 MiB. */
@@ -345,11 +345,11 @@ static int take_lattice(const nebel_fog *fog, const nebel_snapshot *s, nb_medium
     nebel_grid *grid = medium->body.density.grid;
     double way[3];
     nb_way_in_cells(s, &medium->body, way);
-    if (slot->lattice == NULL || !nb_grid_lattice_is_of(slot->lattice, grid, way)) {
-        nb_grid_lattice_release(slot->lattice);
-        slot->lattice = nb_grid_lattice_make(grid, &s->allocator, way, lattice_limit);
+    if (slot->lattice == NULL || !nb_sun_lattice_is_of(slot->lattice, grid, way)) {
+        nb_sun_lattice_release(slot->lattice);
+        slot->lattice = nb_sun_lattice_make(grid, &s->allocator, way, lattice_limit);
     }
-    medium->lattice = nb_grid_lattice_retain(slot->lattice);
+    medium->lattice = nb_sun_lattice_retain(slot->lattice);
     return medium->lattice != NULL;
 }
 
@@ -426,11 +426,12 @@ static nebel_result diffuse_level(const nebel_fog *fog, nb_diffusion **made)
 
 static nebel_result diffuse(const nebel_fog *fog, nebel_snapshot *s)
 {
-    const int has_sun = s->is_sunlit || nb_sky_is_dimmed(fog, s), has_own = nb_find_own_light(s).has;
+    const int has_sun = s->is_sunlit || nb_environment_is_dimmed(fog, s), has_own = nb_find_own_light(s).has;
     nebel_result result = has_sun || has_own ? refuse_looks(fog, s) : NEBEL_OK;
     if (result == NEBEL_OK && has_own) result = diffuse_selected(fog, s, 0, 1, &s->own_diffusion);
     if (result == NEBEL_OK && has_sun) result = diffuse_selected(fog, s, 0, 0, &s->diffusion);
-    if (result != NEBEL_OK || s->diffusion == NULL || !nb_lattice_has_bodies(&s->diffusion->lattice)) return result;
+    if (result != NEBEL_OK || s->diffusion == NULL || !nb_diffusion_lattice_has_bodies(&s->diffusion->lattice))
+        return result;
     return diffuse_level(fog, &s->diffusion->beside);
 }
 

@@ -37,19 +37,19 @@ typedef struct nb_medium {
 
 /* How the optical depth from a place to the sun is had. */
 typedef enum nb_sun_depth_method {
-    NB_WAY_MARCHED = 0, /* by a march of its own */
-    NB_WAY_ADDED,       /* convex bodies of constant density that add: what they cut out of the way, summed */
-    NB_WAY_FLAT,        /* few of them, where all faces are flat: along any ray it is linear between turns */
-    NB_WAY_HEIGHT,      /* one height fog without an end, and a sun above: a multiple of the density */
-    NB_WAY_ALTITUDE,    /* one fog of an altitude without an end: its integral from the place on */
-    NB_WAY_GRID         /* one box of voxels: they are walked through from the place on */
+    NB_SUN_DEPTH_MARCHED = 0, /* by a march of its own */
+    NB_SUN_DEPTH_ADDED,       /* convex bodies of constant density that add: what they cut out of the way, summed */
+    NB_SUN_DEPTH_FLAT,        /* few of them, where all faces are flat: along any ray it is linear between turns */
+    NB_SUN_DEPTH_HEIGHT,      /* one height fog without an end, and a sun above: a multiple of the density */
+    NB_SUN_DEPTH_ALTITUDE,    /* one fog of an altitude without an end: its integral from the place on */
+    NB_SUN_DEPTH_GRID         /* one box of voxels: they are walked through from the place on */
 } nb_sun_depth_method;
 
 /* Bodies of more faces have very many edges, and nearly smooth shadows: their turns are not looked for. */
-#define NB_MOST_EDGED_FACES 16
+#define NB_MAX_EDGED_FACES 16
 
 /* From so many such media on one ray on, they are summed in a tree. */
-#define NB_LEAST_CROWD 64
+#define NB_MIN_OVERLAP_SET 64
 
 struct nebel_snapshot {
     nebel_allocator allocator;

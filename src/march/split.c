@@ -17,9 +17,8 @@ typedef struct selection {
 static void keep(const nebel_snapshot *snapshot, selection kept, nb_fog_slot *slots)
 {
     for (size_t i = 0; i < snapshot->medium_count; i++) {
-        slots[i] = (nb_fog_slot){.volume = snapshot->media[i].body,
-                                 .used = 1,
-                                 .lattice = nb_grid_lattice_retain(snapshot->media[i].lattice)};
+        slots[i] = (nb_fog_slot){
+            .volume = snapshot->media[i].body, .used = 1, .lattice = nb_sun_lattice_retain(snapshot->media[i].lattice)};
         for (int c = 0; c < 3 && !kept.own; c++) slots[i].volume.source[c] = slots[i].volume.emission[c] = 0;
     }
 }
@@ -44,7 +43,7 @@ static nebel_result make_part(const nebel_snapshot *snapshot, selection kept, ne
     }
     keep(snapshot, kept, slots);
     const nebel_result result = nebel_commit_fog(&fog, part);
-    for (size_t i = 0; i < snapshot->medium_count; i++) nb_grid_lattice_release(slots[i].lattice);
+    for (size_t i = 0; i < snapshot->medium_count; i++) nb_sun_lattice_release(slots[i].lattice);
     nb_release(&snapshot->allocator, slots);
     return result;
 }

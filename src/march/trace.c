@@ -9,11 +9,11 @@
 #include <math.h>
 
 #define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_trace_##suffix,
-static nb_trace_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(KERNEL)};
+static nb_trace_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(KERNEL)};
 
 int nebel_isa_available(nebel_isa isa)
 {
-    return nb_cpu_choose(isa) != NEBEL_ISA_COUNT;
+    return nb_isa_select(isa) != NEBEL_ISA_COUNT;
 }
 
 const char *nebel_isa_name(nebel_isa isa)
@@ -222,7 +222,7 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
                         .ray_stride = ray_stride,
                         .transfers = transfers,
                         .transfer_stride = transfer_stride};
-    return run(snapshot, desc, n, is_float ? kernels[nb_cpu_choose(desc->isa)] : nb_trace_double, &job);
+    return run(snapshot, desc, n, is_float ? kernels[nb_isa_select(desc->isa)] : nb_trace_double, &job);
 }
 
 /* ---- planes ---------------------------------------------------------------------------------- */
@@ -288,7 +288,7 @@ nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trac
                         .wants_error = to.error != NULL,
                         .ray_planes = &from,
                         .light_planes = &to};
-    return run(snapshot, asked, n, kernels[nb_cpu_choose(asked->isa)], &job);
+    return run(snapshot, asked, n, kernels[nb_isa_select(asked->isa)], &job);
 }
 
 /* ---- visibility ------------------------------------------------------------------------------ */
@@ -307,9 +307,9 @@ nebel_result nebel_invert_transmittance(const nebel_snapshot *snapshot, double t
         for (size_t i = 0; i < n; i++) distances[i] = HUGE_VAL;
         return NEBEL_OK;
     }
-    nb_find_job job = {snapshot, -log(transmittance), channel, n, rays, ray_stride, distances};
+    nb_invert_job job = {snapshot, -log(transmittance), channel, n, rays, ray_stride, distances};
     const unsigned precision = nb_full_precision();
-    const nebel_result result = nb_find_double(&job);
+    const nebel_result result = nb_invert_double(&job);
     nb_restore_precision(precision);
     return result == NEBEL_OK ? result : nb_fail(&snapshot->log, result, "rays: out of memory for the fog they meet");
 }

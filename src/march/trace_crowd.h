@@ -147,12 +147,12 @@ static int open_crowd(packet_state *m, const nebel_allocator *allocator, const n
     overlap_set *c = &m->crowd;
     c->lanes = nb_mask_false;
     c->is_walking = 0;
-    if (snapshot->joining_count < NB_LEAST_CROWD || m->contact_count < NB_LEAST_CROWD) return 1;
+    if (snapshot->joining_count < NB_MIN_OVERLAP_SET || m->contact_count < NB_MIN_OVERLAP_SET) return 1;
     nb_scalar met[NB_WIDTH];
     const size_t most = count_crowd(m, met);
-    if (most < NB_LEAST_CROWD) return 1;
+    if (most < NB_MIN_OVERLAP_SET) return 1;
     if (!reserve_crowd(c, allocator, most)) return 0;
-    c->lanes = nb_load_lanes(met) >= nb_splat(NB_LEAST_CROWD);
+    c->lanes = nb_load_lanes(met) >= nb_splat(NB_MIN_OVERLAP_SET);
     c->rank = snapshot->joining->body.rank;
     for (int i = 0; i < NB_WIDTH; i++) {
         c->next[i] = c->present[i] = c->count[i] = 0;

@@ -68,7 +68,7 @@ static double find_depth(packet_state *m, int channel, nb_real wanted)
     return HUGE_VAL;
 }
 
-nebel_result NB_SUFFIXED(nb_find_)(nb_find_job *job)
+nebel_result NB_SUFFIXED(nb_invert_)(nb_invert_job *job)
 {
     workspace w;
     open_workspace(&w);
@@ -82,8 +82,8 @@ nebel_result NB_SUFFIXED(nb_find_)(nb_find_job *job)
             result = NEBEL_ERROR_MEMORY;
 #if defined(ASKS_QUAD)
         } else if (!is_clear(&w.m, NB_F(0.0))) {
-            nb_find_job one = {job->snapshot, job->depth, job->channel, 1, ray, job->ray_stride, &job->distances[i]};
-            result = nb_find_quad(&one);
+            nb_invert_job one = {job->snapshot, job->depth, job->channel, 1, ray, job->ray_stride, &job->distances[i]};
+            result = nb_invert_quad(&one);
 #endif
         } else {
             job->distances[i] = find_depth(&w.m, job->channel, job->depth);

@@ -38,7 +38,7 @@ nebel_ray nb_trace_ray_in_planes(const nebel_ray_planes *planes, size_t i);
 size_t nb_trace_first_fault(const nebel_ray_planes *rays, size_t first, size_t count);
 
 /* Distances to a transmittance; only the double kernels have it. */
-typedef struct nb_find_job {
+typedef struct nb_invert_job {
     const nebel_snapshot *snapshot;
     double depth; /* optical depth sought, > 0 */
     int channel;
@@ -46,9 +46,9 @@ typedef struct nb_find_job {
     const nebel_ray *rays;
     size_t ray_stride;
     double *distances;
-} nb_find_job;
+} nb_invert_job;
 
-nebel_result nb_find_double(nb_find_job *job);
-nebel_result nb_find_quad(nb_find_job *job);
+nebel_result nb_invert_double(nb_invert_job *job);
+nebel_result nb_invert_quad(nb_invert_job *job);
 
 #endif

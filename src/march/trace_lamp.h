@@ -58,7 +58,7 @@ static light_pass pass_lamp(const packet_state *m, const nb_light *lamp)
 static nb_real most_fluence(const light_pass *pass, nb_wide start, nb_wide end)
 {
     const nb_wide nearest = nb_wmax(nb_wmin(pass->closest, end), start) - pass->closest;
-    const nb_real fluence = nb_narrow(nb_lamp_fluence(pass->aside2 + nearest * nearest, WIDE(pass->lamp->radius2)));
+    const nb_real fluence = nb_narrow(nb_light_fluence(pass->aside2 + nearest * nearest, WIDE(pass->lamp->radius2)));
     const double *intensity = pass->lamp->intensity;
     return fluence * REAL(fmax(fmax(intensity[0], intensity[1]), intensity[2]));
 }
@@ -100,7 +100,7 @@ static light_depth way_to_lamp(sunlight *sun, const packet_state *m, const light
 static nb_real part_in_cone(const nb_light *lamp, nb_wvec3 towards)
 {
     const nb_wide within = -nb_wdot3(towards, wide_vector(lamp->axis)) - WIDE(lamp->edge);
-    return nb_lamp_cone(nb_narrow(within), NB_F(0.0), REAL(lamp->rise));
+    return nb_light_cone(nb_narrow(within), NB_F(0.0), REAL(lamp->rise));
 }
 
 /* What fog at t makes of the lamp's irradiance there. */
@@ -112,7 +112,7 @@ static lit_fog lamplit_fog(const packet_state *m, const light_pass *pass, nb_wid
     const nb_wide square = nb_wdot3(apart, apart);
     const nb_wvec3 towards = nb_wscale3(apart, -nb_wrcp_bounded(nb_wsqrt(square)));
     const nb_turn turn = nb_turn_between(m->rays.direction, towards);
-    nb_real fluence = nb_narrow(nb_lamp_fluence(square, WIDE(lamp->radius2)));
+    nb_real fluence = nb_narrow(nb_light_fluence(square, WIDE(lamp->radius2)));
     if (lamp->is_spot) fluence = fluence * part_in_cone(lamp, towards);
     lit_fog fog = {{zero, zero, zero}, {zero, zero, zero}, zero};
     for (size_t i = m->present_first; i < m->present_end; i++) {

@@ -106,9 +106,9 @@ static inline __attribute__((always_inline)) nb_real length_in_body(const packet
 {
     const nb_leaf *leaf = &body->leaves[0];
     nb_interval raw;
-    if (leaf->type == NB_LEAF_BALL) {
+    if (leaf->type == NB_LEAF_SPHERE) {
         const local_ray local = localize(way, leaf);
-        raw = nb_interval_ball(local.p, local.d, WIDE(FRAME(leaf, radius)), local.reach);
+        raw = nb_interval_sphere(local.p, local.d, WIDE(FRAME(leaf, radius)), local.reach);
     } else {
         raw = leaf_interval(way, body, leaf);
     }
@@ -182,14 +182,14 @@ static light_depth depth_to_sun(sunlight *sun, const packet_state *m, nb_wide t,
 {
     const nb_wide reach = nb_wselect(lanes, NB_WFAR, NB_W(0.0));
     switch (sun->snapshot->way_to_sun) {
-    case NB_WAY_HEIGHT:
+    case NB_SUN_DEPTH_HEIGHT:
         return depth_of_height(sun, m, t);
-    case NB_WAY_ALTITUDE:
+    case NB_SUN_DEPTH_ALTITUDE:
         return depth_of_altitude(sun, m, t);
-    case NB_WAY_ADDED:
-    case NB_WAY_FLAT:
+    case NB_SUN_DEPTH_ADDED:
+    case NB_SUN_DEPTH_FLAT:
         return depth_of_bodies(sun, m, t, sun->direction, reach);
-    case NB_WAY_GRID:
+    case NB_SUN_DEPTH_GRID:
         return depth_of_grid(sun, m, t, nb_narrow_mask(lanes), NB_HUGE);
     default:
         return depth_by_march(sun, m, t, sun->direction, reach);

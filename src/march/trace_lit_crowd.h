@@ -76,7 +76,7 @@ static nb_real lamp_arrives(const packet_state *m, const light_pass *pass, const
     const nb_wide square = nb_wdot3(apart, apart), distance = nb_wsqrt(square);
     *towards = nb_wscale3(apart, -nb_wrcp_bounded(distance));
     *reach = nb_wmax(distance - WIDE(lamp->clear), NB_W(0.0));
-    const nb_real fluence = nb_narrow(nb_lamp_fluence(square, WIDE(lamp->radius2)));
+    const nb_real fluence = nb_narrow(nb_light_fluence(square, WIDE(lamp->radius2)));
     const nb_real light = fluence * scattered(phase, nb_turn_between(m->rays.direction, *towards));
     if (!lamp->is_spot) return light;
     const nb_wvec3 from = apart_from_lamp(m, pass, beside);

@@ -24,7 +24,7 @@ static int is_endless(const nb_volume *body)
 static double radius_around(const nb_volume *body)
 {
     const double x = body->high[0] - body->low[0], y = body->high[1] - body->low[1], z = body->high[2] - body->low[2];
-    const int is_ball = body->leaves[0].type == NB_LEAF_BALL && body->leaves[0].aligned;
+    const int is_ball = body->leaves[0].type == NB_LEAF_SPHERE && body->leaves[0].aligned;
     return 0.5 * (is_ball ? fmax(fmax(x, y), z) : sqrt(x * x + y * y + z * z));
 }
 
@@ -106,7 +106,7 @@ typedef struct flat_bounds {
     nb_wide margin;
     int is_lamp;
     size_t count;
-    nb_wide a[NB_MOST_EDGED_FACES + 1], b[NB_MOST_EDGED_FACES + 1], c[NB_MOST_EDGED_FACES + 1];
+    nb_wide a[NB_MAX_EDGED_FACES + 1], b[NB_MAX_EDGED_FACES + 1], c[NB_MAX_EDGED_FACES + 1];
 } flat_bounds;
 
 static flat_bounds no_bounds(const packet *rays, nb_wvec3 light, int is_lamp, const nb_leaf *leaf)
@@ -136,8 +136,8 @@ static void add_bound(flat_bounds *f, nb_wvec3 normal, nb_wide level)
 static int box_around_leaf(const nb_leaf *leaf, double low[3], double high[3])
 {
     double side = 1, first = 0, last = 1;
-    if (leaf->type == NB_LEAF_WORLD || (leaf->type == NB_LEAF_BALL && leaf->aligned)) return 0;
-    if (leaf->type == NB_LEAF_BALL) side = last = leaf->radius, first = -leaf->radius;
+    if (leaf->type == NB_LEAF_WORLD || (leaf->type == NB_LEAF_SPHERE && leaf->aligned)) return 0;
+    if (leaf->type == NB_LEAF_SPHERE) side = last = leaf->radius, first = -leaf->radius;
     if (leaf->type == NB_LEAF_CONE) side = fmax(leaf->radius, leaf->radius + leaf->slope);
     if (leaf->type == NB_LEAF_CAPSULE) first = -1, last = leaf->length + 1;
     for (int i = 0; i < 3; i++) {
@@ -190,7 +190,7 @@ static void set_narrow_shadow(lit_shadow *s, const packet *rays, nb_wvec3 light,
 {
     const nb_volume *body = &s->medium->body;
     const nb_leaf *leaf = &body->leaves[0];
-    const int is_polytope = leaf->type == NB_LEAF_PLANES && leaf->face_count <= NB_MOST_EDGED_FACES;
+    const int is_polytope = leaf->type == NB_LEAF_PLANES && leaf->face_count <= NB_MAX_EDGED_FACES;
     double low[3], high[3];
     if (leaf->type == NB_LEAF_PLANES ? !is_polytope : !box_around_leaf(leaf, low, high)) return;
     flat_bounds f = no_bounds(rays, light, is_lamp, leaf);

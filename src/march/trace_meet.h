@@ -270,7 +270,7 @@ static void look_at_sky(packet_state *m, const nb_environment_light *sky)
     nb_wstore_lanes(direction[2], m->rays.direction.z);
     for (size_t i = 0; i < NB_WIDTH; i++) {
         double radiance[3];
-        nb_sky_scattered(sky, (const double[3]){direction[0][i], direction[1][i], direction[2][i]}, radiance);
+        nb_environment_scattered(sky, (const double[3]){direction[0][i], direction[1][i], direction[2][i]}, radiance);
         for (int c = 0; c < 3; c++) light[c][i] = (nb_scalar)radiance[c];
     }
     for (int c = 0; c < 3; c++) m->sky_light[c] = nb_load_lanes(light[c]);

@@ -233,10 +233,10 @@ static nb_interval leaf_interval(const packet *rays, const nb_volume *body, cons
         return planes_interval(body, leaf, &local);
     case NB_LEAF_BOX:
         return box_interval(leaf, &local);
-    case NB_LEAF_BALL:
-        return nb_interval_ball(local.p, local.d, WIDE(FRAME(leaf, radius)), local.reach);
-    case NB_LEAF_TUBE:
-        return nb_interval_tube(local.p, local.d, local.reach);
+    case NB_LEAF_SPHERE:
+        return nb_interval_sphere(local.p, local.d, WIDE(FRAME(leaf, radius)), local.reach);
+    case NB_LEAF_CYLINDER:
+        return nb_interval_cylinder(local.p, local.d, local.reach);
     case NB_LEAF_CONE:
         return nb_interval_cone(local.p, local.d, WIDE(FRAME(leaf, radius)), WIDE(FRAME(leaf, slope)), local.reach);
     default:

@@ -101,7 +101,7 @@ static void round_edge_contact(medium_hit *k, const packet *rays, const nb_leaf 
 {
     const local_ray local = localize(rays, leaf);
     const nb_soft_edge *made = &k->medium->body.edge;
-    const int ball = leaf->type == NB_LEAF_BALL, capsule = leaf->type == NB_LEAF_CAPSULE;
+    const int ball = leaf->type == NB_LEAF_SPHERE, capsule = leaf->type == NB_LEAF_CAPSULE;
     const nb_wide unit = ball ? NB_W(1.0) / WIDE(FRAME(leaf, radius)) : NB_W(1.0);
     const nb_wide one = NB_W(1.0);
     const nb_round_edge edge =

@@ -73,8 +73,8 @@ static void set_glow(medium_hit *k, const packet *rays, const sunlight *sun)
 static int is_ball_alone(const sunlight *sun)
 {
     const nb_medium *medium = &sun->snapshot->media[0];
-    return sun->snapshot->way_to_sun == NB_WAY_ADDED && sun->snapshot->medium_count == 1 &&
-           medium->body.leaves[0].type == NB_LEAF_BALL;
+    return sun->snapshot->way_to_sun == NB_SUN_DEPTH_ADDED && sun->snapshot->medium_count == 1 &&
+           medium->body.leaves[0].type == NB_LEAF_SPHERE;
 }
 
 /* Those of the lamp, or of the sun where it is NULL. Returns whether they were not there yet. */

@@ -111,8 +111,8 @@ static void note_box(sunlight *sun, const nb_leaf *leaf, const breakpoint_lines 
 
 static void note_planes(sunlight *sun, const nb_volume *body, const nb_leaf *leaf, const breakpoint_lines *s)
 {
-    breakpoint_faces faces[NB_MOST_EDGED_FACES];
-    if (leaf->face_count > NB_MOST_EDGED_FACES) return;
+    breakpoint_faces faces[NB_MAX_EDGED_FACES];
+    if (leaf->face_count > NB_MAX_EDGED_FACES) return;
     for (size_t i = 0; i < leaf->face_count; i++) {
         const nb_face *face = &body->faces[leaf->first_face + i];
         faces[i] = ways_to_face(s, wide_vector(face->normal), WIDE(face->distance));
@@ -124,7 +124,7 @@ static void note_round(sunlight *sun, const nb_leaf *leaf, const breakpoint_line
 {
     const nb_wvec3 zero = nb_wvec3(NB_W(0.0), NB_W(0.0), NB_W(0.0));
     const nb_wide one = NB_W(1.0);
-    if (leaf->type == NB_LEAF_BALL) {
+    if (leaf->type == NB_LEAF_SPHERE) {
         note_ball(sun, s, zero, WIDE(FRAME(leaf, radius)));
     } else if (leaf->type == NB_LEAF_CAPSULE) {
         const nb_wide length = WIDE(FRAME(leaf, length));

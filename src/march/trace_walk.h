@@ -49,7 +49,7 @@ static nb_wide next_event(const packet_state *m, nb_wide t)
 static int fold_step(nb_shape_op step, nb_mask *stack, int top)
 {
     const nb_mask a = stack[top - 2], b = stack[top - 1];
-    stack[top - 2] = step == NB_STEP_ANY ? nb_or(a, b) : nb_and(a, b);
+    stack[top - 2] = step == NB_OP_UNION ? nb_or(a, b) : nb_and(a, b);
     return top - 1;
 }
 
@@ -78,7 +78,7 @@ static nb_mask is_inside(const packet_state *m, const medium_hit *k, nb_wide sta
     int top = 0;
     size_t leaf = k->first_span;
     for (size_t i = 0; i < body->step_count; i++) {
-        if (body->steps[i] == NB_STEP_LEAF) {
+        if (body->steps[i] == NB_OP_LEAF) {
             const leaf_span *span = &m->spans[leaf++];
             stack[top++] = nb_narrow_mask(nb_wand(span->enter <= start, span->leave > start));
             continue;
@@ -293,7 +293,7 @@ static active_mask body_near(const packet_state *m, const medium_hit *k, size_t 
     int top = 0;
     size_t leaf = 0;
     for (size_t i = 0; i < body->step_count; i++) {
-        if (body->steps[i] != NB_STEP_LEAF) {
+        if (body->steps[i] != NB_OP_LEAF) {
             fold_step(body->steps[i], most, top);
             top = fold_step(body->steps[i], least, top);
             continue;

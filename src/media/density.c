@@ -49,9 +49,9 @@ static int is_in_leaf(const nb_volume *volume, const nb_leaf *leaf, const double
     case NB_LEAF_BOX:
         return is_within(p[0], leaf->low[0], leaf->high[0]) && is_within(p[1], leaf->low[1], leaf->high[1]) &&
                is_within(p[2], leaf->low[2], leaf->high[2]);
-    case NB_LEAF_BALL:
+    case NB_LEAF_SPHERE:
         return across + p[2] * p[2] <= leaf->radius * leaf->radius;
-    case NB_LEAF_TUBE:
+    case NB_LEAF_CYLINDER:
         return across <= 1 && is_within(p[2], 0, 1);
     case NB_LEAF_CONE: {
         const double radius = leaf->radius + leaf->slope * p[2];
@@ -69,12 +69,12 @@ int nb_volume_holds(const nb_volume *volume, const double place[3])
     int stack[NB_STEP_STACK], top = 0;
     size_t leaf = 0;
     for (size_t i = 0; i < volume->step_count; i++) {
-        if (volume->steps[i] == NB_STEP_LEAF) {
+        if (volume->steps[i] == NB_OP_LEAF) {
             stack[top++] = is_in_leaf(volume, &volume->leaves[leaf++], place);
             continue;
         }
         top--;
-        stack[top - 1] = volume->steps[i] == NB_STEP_ANY ? stack[top - 1] || stack[top] : stack[top - 1] && stack[top];
+        stack[top - 1] = volume->steps[i] == NB_OP_UNION ? stack[top - 1] || stack[top] : stack[top - 1] && stack[top];
     }
     return stack[0];
 }
@@ -120,7 +120,7 @@ static double round_edge_density(const nb_volume *volume, const double place[3])
 {
     const nb_leaf *leaf = &volume->leaves[0];
     const nb_soft_edge *edge = &volume->edge;
-    const int ball = leaf->type == NB_LEAF_BALL;
+    const int ball = leaf->type == NB_LEAF_SPHERE;
     const nb_wvec3 p = nb_wscale3(to_leaf(leaf, place), ball ? 1 / (nb_wide)leaf->radius : 1);
     const nb_round_edge at =
         nb_round_edge_of(p, nb_wvec3(0, 0, 0), ball ? 1 : (nb_wide)leaf->radius, (nb_wide)leaf->slope,

@@ -69,7 +69,7 @@ static void lay_along(nb_sun_lattice *l, const nebel_grid *grid, const double to
     set_counts(l, grid);
 }
 
-void nb_grid_lattice_lay(nb_sun_lattice *l, const nebel_grid *grid, const double to_sun[3], nb_sun_lattice_limit limit)
+void nb_sun_lattice_lay(nb_sun_lattice *l, const nebel_grid *grid, const double to_sun[3], nb_sun_lattice_limit limit)
 {
     const int steepest = steepest_axis(to_sun);
     lay_along(l, grid, to_sun, steepest, limit);
@@ -355,7 +355,7 @@ static int is_flawed(const nb_sun_lattice *l, const int cell[3], double true_mid
     return -expm1(-off * unit) * exp(-fmax(least - outside - off, 0) * unit) > demand->tolerance;
 }
 
-int nb_grid_lattice_find_flaws(const nb_sun_lattice *l, const nb_lattice_demand *demand, uint8_t *flawed)
+int nb_sun_lattice_find_flaws(const nb_sun_lattice *l, const nb_lattice_demand *demand, uint8_t *flawed)
 {
     const body *b = (const body *)(const void *)l;
     const size_t cells = (size_t)l->count[2] - 1;
@@ -400,8 +400,8 @@ static int fill_lattice(nb_sun_lattice *l, const nebel_grid *grid, const nebel_a
     return finish_layers(l, allocator);
 }
 
-nb_sun_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *allocator, const double to_sun[3],
-                                     nb_sun_lattice_limit limit)
+nb_sun_lattice *nb_sun_lattice_make(nebel_grid *grid, const nebel_allocator *allocator, const double to_sun[3],
+                                    nb_sun_lattice_limit limit)
 {
     body *b = nb_allocate_zero(allocator, 1, sizeof *b);
     if (b == NULL) return NULL;
@@ -409,25 +409,25 @@ nb_sun_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *al
     atomic_init(&b->owners, 1);
     b->grid = nebel_retain_grid(grid);
     memcpy(b->to_sun, to_sun, sizeof b->to_sun);
-    nb_grid_lattice_lay(&b->lattice, grid, to_sun, limit);
+    nb_sun_lattice_lay(&b->lattice, grid, to_sun, limit);
     if (fill_lattice(&b->lattice, grid, allocator, to_sun)) return &b->lattice;
     free_body(b);
     return NULL;
 }
 
-nb_sun_lattice *nb_grid_lattice_retain(nb_sun_lattice *lattice)
+nb_sun_lattice *nb_sun_lattice_retain(nb_sun_lattice *lattice)
 {
     if (lattice != NULL) atomic_fetch_add_explicit(&((body *)(void *)lattice)->owners, 1, memory_order_relaxed);
     return lattice;
 }
 
-void nb_grid_lattice_release(nb_sun_lattice *lattice)
+void nb_sun_lattice_release(nb_sun_lattice *lattice)
 {
     body *b = (body *)(void *)lattice;
     if (b != NULL && atomic_fetch_sub_explicit(&b->owners, 1, memory_order_acq_rel) == 1) free_body(b);
 }
 
-int nb_grid_lattice_is_of(const nb_sun_lattice *lattice, const nebel_grid *grid, const double to_sun[3])
+int nb_sun_lattice_is_of(const nb_sun_lattice *lattice, const nebel_grid *grid, const double to_sun[3])
 {
     const body *b = (const body *)(const void *)lattice;
     return b->grid == grid && memcmp(b->to_sun, to_sun, sizeof b->to_sun) == 0;

@@ -49,12 +49,12 @@ typedef struct nb_sun_lattice_limit {
 } nb_sun_lattice_limit;
 
 /* Lays a lattice out: axes and counts, without nodes. `to_sun`: cells per metre of the way to the sun, not all 0. */
-void nb_grid_lattice_lay(nb_sun_lattice *lattice, const nebel_grid *grid, const double to_sun[3],
-                         nb_sun_lattice_limit limit);
+void nb_sun_lattice_lay(nb_sun_lattice *lattice, const nebel_grid *grid, const double to_sun[3],
+                        nb_sun_lattice_limit limit);
 
 /* Lays it out and finds its nodes. The lattice keeps the grid. NULL where memory is out. */
-nb_sun_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *allocator, const double to_sun[3],
-                                     nb_sun_lattice_limit limit);
+nb_sun_lattice *nb_sun_lattice_make(nebel_grid *grid, const nebel_allocator *allocator, const double to_sun[3],
+                                    nb_sun_lattice_limit limit);
 
 /* What interpolation may be off by: so much of the light that comes through fog of this extinction [1/m]. */
 typedef struct nb_lattice_demand {
@@ -63,14 +63,14 @@ typedef struct nb_lattice_demand {
 
 /* Which cells between eight nodes are off by more, 1 or 0 for each, columns along side[0] in turn, then those along side[1].
  * Costs as much as making the lattice. Returns 0 where memory is out. */
-int nb_grid_lattice_find_flaws(const nb_sun_lattice *lattice, const nb_lattice_demand *demand, uint8_t *flawed);
+int nb_sun_lattice_find_flaws(const nb_sun_lattice *lattice, const nb_lattice_demand *demand, uint8_t *flawed);
 
-nb_sun_lattice *nb_grid_lattice_retain(nb_sun_lattice *lattice);
+nb_sun_lattice *nb_sun_lattice_retain(nb_sun_lattice *lattice);
 
 /* NULL: nothing happens. */
-void nb_grid_lattice_release(nb_sun_lattice *lattice);
+void nb_sun_lattice_release(nb_sun_lattice *lattice);
 
-/* Whether this is the lattice that nb_grid_lattice_make would make. */
-int nb_grid_lattice_is_of(const nb_sun_lattice *lattice, const nebel_grid *grid, const double to_sun[3]);
+/* Whether this is the lattice that nb_sun_lattice_make would make. */
+int nb_sun_lattice_is_of(const nb_sun_lattice *lattice, const nebel_grid *grid, const double to_sun[3]);
 
 #endif

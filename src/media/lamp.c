@@ -40,12 +40,12 @@ static const char *fault_of_lamp(const nebel_light *lamp)
         return "position: must be three finite numbers, at most " NB_TEXT(NEBEL_MAX_LENGTH) " m from the origin";
     if (!is_within(lamp->intensity, 0, NEBEL_MAX_AMOUNT))
         return "intensity: every channel must be within 0 and " NB_TEXT(NEBEL_MAX_AMOUNT);
-    if (lamp->radius != 0 && !(lamp->radius >= NB_LEAST_BULB && lamp->radius <= largest_radius))
+    if (lamp->radius != 0 && !(lamp->radius >= NB_MIN_LIGHT_RADIUS && lamp->radius <= largest_radius))
         return "radius: must be 0 or a length from 1e-3 to 1e6 m";
     return lamp->type == NEBEL_LIGHT_SPOT ? fault_of_cone(lamp) : NULL;
 }
 
-nebel_result nb_check_lamps(const nebel_log *log, size_t count, const nebel_light *lamps)
+nebel_result nb_check_lights(const nebel_log *log, size_t count, const nebel_light *lamps)
 {
     for (size_t i = 0; i < count; i++) {
         const char *fault = fault_of_lamp(&lamps[i]);
@@ -65,9 +65,9 @@ static void set_cone(const nebel_light *lamp, nb_light *made)
     made->rise = fmin(1 / (made->inner - made->edge), 1e30);
 }
 
-nb_light nb_lamp_resolve(const nebel_light *lamp)
+nb_light nb_light_resolve(const nebel_light *lamp)
 {
-    const double radius = nb_bulb(lamp->radius);
+    const double radius = nb_light_radius(lamp->radius);
     nb_light made = {.radius2 = radius * radius, .clear = lamp->radius};
     for (int i = 0; i < 3; i++) {
         made.place[i] = lamp->position[i] + 0;

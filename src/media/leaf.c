@@ -124,7 +124,7 @@ static int set_ball(nb_leaf *leaf, const nebel_shape *shape, const nb_affine_qua
         rough_center[i] = (long double)shape->center[i];
         axes[i][i] = (long double)radius;
     }
-    leaf->type = NB_LEAF_BALL;
+    leaf->type = NB_LEAF_SPHERE;
     leaf->radius = sphere ? shape->radius : 1;
     leaf->exact_radius = (long double)leaf->radius;
     leaf->quad_radius = (nb_quad)leaf->radius;
@@ -186,7 +186,7 @@ static void set_profile_of_axis(nb_leaf *leaf, const nebel_shape *shape, nb_quad
                                 nb_quad across_unit)
 {
     leaf->type = shape->type == NEBEL_SHAPE_CAPSULE ? NB_LEAF_CAPSULE
-                 : radii[0] == radii[1]             ? NB_LEAF_TUBE
+                 : radii[0] == radii[1]             ? NB_LEAF_CYLINDER
                                                     : NB_LEAF_CONE;
     leaf->quad_length = length / across_unit;
     leaf->quad_radius = radii[0] / across_unit;

@@ -11,10 +11,10 @@ typedef struct nb_lobe {
     double factor, peak, slope; /* what nb_phase_lobe takes; the factor holds the weight */
 } nb_lobe;
 
-enum { NB_MOST_LOBES = 2 };
+enum { NB_MAX_LOBES = 2 };
 
 typedef struct nb_phase {
-    nb_lobe lobes[NB_MOST_LOBES];
+    nb_lobe lobes[NB_MAX_LOBES];
     int lobe_count;
 } nb_phase;
 

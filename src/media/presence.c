@@ -49,11 +49,11 @@ static void clip_faces(reach *r, const nb_volume *volume, const nb_leaf *leaf, c
 /* The box around a leaf in its frame. */
 static void find_box(const nb_leaf *leaf, double low[3], double high[3])
 {
-    const double radius = leaf->type == NB_LEAF_BALL   ? leaf->radius
+    const double radius = leaf->type == NB_LEAF_SPHERE ? leaf->radius
                           : leaf->type == NB_LEAF_CONE ? fmax(leaf->radius, leaf->radius + leaf->slope)
                                                        : 1;
-    const double end = leaf->type == NB_LEAF_BALL ? radius : leaf->type == NB_LEAF_CAPSULE ? leaf->length + 1 : 1;
-    const double start = leaf->type == NB_LEAF_BALL ? -radius : leaf->type == NB_LEAF_CAPSULE ? -1 : 0;
+    const double end = leaf->type == NB_LEAF_SPHERE ? radius : leaf->type == NB_LEAF_CAPSULE ? leaf->length + 1 : 1;
+    const double start = leaf->type == NB_LEAF_SPHERE ? -radius : leaf->type == NB_LEAF_CAPSULE ? -1 : 0;
     for (int i = 0; i < 3; i++) {
         const int along = i == 2;
         low[i] = leaf->type == NB_LEAF_BOX ? leaf->low[i] : along ? start : -radius;
@@ -114,14 +114,14 @@ nb_overlap nb_volume_presence(const nb_volume *volume, const nb_line *line, doub
     int top = 0;
     size_t leaf = 0;
     for (size_t i = 0; i < volume->step_count; i++) {
-        if (volume->steps[i] == NB_STEP_LEAF) {
+        if (volume->steps[i] == NB_OP_LEAF) {
             const reach r = find_reach(volume, &volume->leaves[leaf++], line);
             stack[top++] = presence_in(&r, from, to);
             continue;
         }
         top--;
         const nb_overlap a = stack[top - 1], b = stack[top];
-        stack[top - 1] = volume->steps[i] == NB_STEP_ANY ? (a > b ? a : b) : (a < b ? a : b);
+        stack[top - 1] = volume->steps[i] == NB_OP_UNION ? (a > b ? a : b) : (a < b ? a : b);
     }
     return stack[0];
 }

@@ -32,7 +32,7 @@ static nebel_result check_map(const nebel_log *log, const nebel_environment *sky
         return nb_fail(log, NEBEL_ERROR_VALUE, "environment: intensity is %g; must be within 0 and %s", sky->intensity,
                        NB_TEXT(NEBEL_MAX_AMOUNT));
     double most[3];
-    nb_sky_most(sky, most);
+    nb_environment_most(sky, most);
     return nb_check_color(log, "environment: intensity times the brightest pixel", most, NEBEL_MAX_AMOUNT);
 }
 
@@ -58,9 +58,9 @@ static double intensity_of(const nebel_environment *sky)
     return sky->intensity > 0 ? sky->intensity : 1;
 }
 
-void nb_sky_most(const nebel_environment *sky, double most[3])
+void nb_environment_most(const nebel_environment *sky, double most[3])
 {
-    if (sky->type == NEBEL_ENVIRONMENT_MAP) nb_sky_map_most(sky->map, most);
+    if (sky->type == NEBEL_ENVIRONMENT_MAP) nb_environment_map_most(sky->map, most);
     for (int c = 0; c < 3; c++) {
         if (sky->type == NEBEL_ENVIRONMENT_MAP) most[c] *= intensity_of(sky);
         if (sky->type == NEBEL_ENVIRONMENT_GRADIENT)
@@ -156,8 +156,8 @@ static void fill_gradient(nb_environment_filter *filter)
     for (int i = 0; i < filter->phase.lobe_count; i++) sharpest = fmax(sharpest, fabs(filter->phase.lobes[i].g));
     filter->width = 0.5 * (1 - sharpest);
     filter->mean_cosine = nb_phase_mean_cosine(&filter->phase);
-    for (int k = 0; k < NB_SKY_KNOTS; k++) {
-        const double share = (double)k / (NB_SKY_KNOTS - 1);
+    for (int k = 0; k < NB_SKY_NODES; k++) {
+        const double share = (double)k / (NB_SKY_NODES - 1);
         const double u = fmin(filter->width * expm1(share * nb_log1p(1 / filter->width)), 1);
         filter->rectified[k] = 0;
         for (int i = 0; i < filter->phase.lobe_count; i++)
@@ -168,9 +168,9 @@ static void fill_gradient(nb_environment_filter *filter)
 /* The cubic through the four nearest knots. */
 static double rectified_at(const nb_environment_filter *filter, double u)
 {
-    const double place = (NB_SKY_KNOTS - 1) * (nb_log1p(u / filter->width) / nb_log1p(1 / filter->width));
+    const double place = (NB_SKY_NODES - 1) * (nb_log1p(u / filter->width) / nb_log1p(1 / filter->width));
     int first = (int)place - 1;
-    first = first < 0 ? 0 : first > NB_SKY_KNOTS - 4 ? NB_SKY_KNOTS - 4 : first;
+    first = first < 0 ? 0 : first > NB_SKY_NODES - 4 ? NB_SKY_NODES - 4 : first;
     const double x = place - first, *k = &filter->rectified[first];
     return k[0] * ((x - 1) * (x - 2) * (3 - x) / 6) + k[1] * (x * (x - 2) * (x - 3) / 2) +
            k[2] * (x * (x - 1) * (3 - x) / 2) + k[3] * (x * (x - 1) * (x - 2) / 6);
@@ -185,7 +185,7 @@ static double rectified_by_cosine(double u)
 
 /* ---- filters --------------------------------------------------------------------------------- */
 
-nb_environment_filter *nb_sky_filter_create(const nebel_allocator *allocator, const nb_phase *phase)
+nb_environment_filter *nb_environment_filter_create(const nebel_allocator *allocator, const nb_phase *phase)
 {
     nb_environment_filter *filter = nb_allocate_zero(allocator, 1, sizeof *filter);
     if (filter == NULL) return NULL;
@@ -195,7 +195,7 @@ nb_environment_filter *nb_sky_filter_create(const nebel_allocator *allocator, co
     return filter;
 }
 
-void nb_sky_filter_release(nb_environment_filter *filter)
+void nb_environment_filter_release(nb_environment_filter *filter)
 {
     if (filter == NULL || atomic_fetch_sub_explicit(&filter->owners, 1, memory_order_acq_rel) != 1) return;
     const nebel_allocator allocator = filter->allocator;
@@ -203,16 +203,16 @@ void nb_sky_filter_release(nb_environment_filter *filter)
     nb_release(&allocator, filter);
 }
 
-nb_environment_filter *nb_sky_filter_make(const nebel_allocator *allocator, const nebel_environment *sky,
-                                          const nb_phase *phase)
+nb_environment_filter *nb_environment_filter_make(const nebel_allocator *allocator, const nebel_environment *sky,
+                                                  const nb_phase *phase)
 {
-    if (sky->type == NEBEL_ENVIRONMENT_MAP) return nb_sky_map_filter(sky->map, phase);
-    nb_environment_filter *filter = nb_sky_filter_create(allocator, phase);
+    if (sky->type == NEBEL_ENVIRONMENT_MAP) return nb_environment_map_filter(sky->map, phase);
+    nb_environment_filter *filter = nb_environment_filter_create(allocator, phase);
     if (filter != NULL) fill_gradient(filter);
     return filter;
 }
 
-const nb_phase *nb_sky_filter_phase(const nb_environment_filter *filter)
+const nb_phase *nb_environment_filter_phase(const nb_environment_filter *filter)
 {
     return &filter->phase;
 }
@@ -222,13 +222,13 @@ nb_environment_light nb_skylight_of(const nebel_environment *sky, nb_environment
     return (nb_environment_light){sky, filter, turn_of(sky)};
 }
 
-void nb_sky_scattered(const nb_environment_light *light, const double direction[3], double radiance[3])
+void nb_environment_scattered(const nb_environment_light *light, const double direction[3], double radiance[3])
 {
     const nb_environment_filter *filter = light->filter;
     if (light->sky->type == NEBEL_ENVIRONMENT_MAP) {
         double turned[3];
         turn_to_map(light->turn, direction, turned);
-        nb_sky_map_scattered(&filter->table, turned, radiance);
+        nb_environment_map_scattered(&filter->table, turned, radiance);
         scale_map(light->sky, radiance);
     } else {
         const double y = fmin(fmax(direction[1], -1), 1);
@@ -259,7 +259,7 @@ void nebel_evaluate_environment(const nebel_environment *environment, const doub
         mix_gradient(environment, unit[1], fabs(unit[1]), radiance);
     } else {
         turn_to_map(turn_of(environment), unit, turned);
-        nb_sky_map_radiance(environment->map, turned, radiance);
+        nb_environment_map_radiance(environment->map, turned, radiance);
         scale_map(environment, radiance);
     }
 }
@@ -278,7 +278,7 @@ void nebel_evaluate_environment_diffuse(const nebel_environment *environment, co
         mix_gradient(environment, 2 * y / 3, rectified_by_cosine(fabs(y)), radiance);
     } else {
         turn_to_map(turn_of(environment), unit, turned);
-        nb_sky_map_reflected(environment->map, turned, radiance);
+        nb_environment_map_reflected(environment->map, turned, radiance);
         scale_map(environment, radiance);
     }
 }

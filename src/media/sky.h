@@ -27,20 +27,20 @@ typedef struct nb_environment_light {
 nebel_result nb_check_sky(const nebel_log *log, const nebel_environment *sky);
 
 /* The largest radiance of a sky that is in order, in each channel. */
-void nb_sky_most(const nebel_environment *sky, double most[3]);
+void nb_environment_most(const nebel_environment *sky, double most[3]);
 
 /* Of a gradient or a map that is in order, with one owner. Filters of maps are shared. NULL when memory is
  * out. */
-nb_environment_filter *nb_sky_filter_make(const nebel_allocator *allocator, const nebel_environment *sky,
-                                          const nb_phase *phase);
-void nb_sky_filter_release(nb_environment_filter *filter); /* NULL is fine */
+nb_environment_filter *nb_environment_filter_make(const nebel_allocator *allocator, const nebel_environment *sky,
+                                                  const nb_phase *phase);
+void nb_environment_filter_release(nb_environment_filter *filter); /* NULL is fine */
 
 nb_environment_light nb_skylight_of(const nebel_environment *sky, nb_environment_filter *filter);
 
 /* The phase function of a filter. */
-const nb_phase *nb_sky_filter_phase(const nb_environment_filter *filter);
+const nb_phase *nb_environment_filter_phase(const nb_environment_filter *filter);
 
 /* What fog scatters of the sky along a ray of a direction of unit length, at albedo 1, where it is opaque. */
-void nb_sky_scattered(const nb_environment_light *light, const double direction[3], double radiance[3]);
+void nb_environment_scattered(const nb_environment_light *light, const double direction[3], double radiance[3]);
 
 #endif

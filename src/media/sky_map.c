@@ -391,11 +391,11 @@ static nb_environment_filter *make_filter(const nebel_environment_map *map, cons
     double factors[ORDERS] = {0};
     for (int i = 0; i < phase->lobe_count; i++) add_lobe(&phase->lobes[i], factors);
     blur(factors);
-    nb_environment_filter *filter = nb_sky_filter_create(&map->allocator, phase);
+    nb_environment_filter *filter = nb_environment_filter_create(&map->allocator, phase);
     recurrence *r = nb_allocate(&map->allocator, 1, sizeof *r);
     if (r != NULL) fill_recurrence(r);
     if (filter != NULL && (r == NULL || !fill_table(map, factors, r, &filter->table))) {
-        nb_sky_filter_release(filter);
+        nb_environment_filter_release(filter);
         filter = NULL;
     }
     nb_release(&map->allocator, r);
@@ -433,10 +433,10 @@ static void keep_filter(nebel_environment_map *map, nb_environment_filter *filte
     map->filters[map->next_filter] = filter;
     map->next_filter = (map->next_filter + 1) % MOST_FILTERS;
     unlock(map);
-    nb_sky_filter_release(replaced);
+    nb_environment_filter_release(replaced);
 }
 
-nb_environment_filter *nb_sky_map_filter(nebel_environment_map *map, const nb_phase *phase)
+nb_environment_filter *nb_environment_map_filter(nebel_environment_map *map, const nb_phase *phase)
 {
     nb_environment_filter *filter = find_filter(map, phase);
     if (filter != NULL) return filter;
@@ -477,7 +477,7 @@ static const float *row_beyond(const nb_environment_table *table, ptrdiff_t row,
     return &table->coefficients[3 * (size_t)inside * table->columns];
 }
 
-void nb_sky_map_scattered(const nb_environment_table *table, const double direction[3], double radiance[3])
+void nb_environment_map_scattered(const nb_environment_table *table, const double direction[3], double radiance[3])
 {
     const sky_place place = place_of(direction);
     const double x = place.across * (double)table->columns - 0.5, y = place.down * (double)table->rows - 0.5;
@@ -497,12 +497,12 @@ void nb_sky_map_scattered(const nb_environment_table *table, const double direct
     for (int c = 0; c < 3; c++) radiance[c] = fmax(sum[c], 0);
 }
 
-void nb_sky_map_reflected(const nebel_environment_map *map, const double normal[3], double radiance[3])
+void nb_environment_map_reflected(const nebel_environment_map *map, const double normal[3], double radiance[3])
 {
-    nb_sky_map_scattered(&map->reflected, normal, radiance);
+    nb_environment_map_scattered(&map->reflected, normal, radiance);
 }
 
-void nb_sky_map_radiance(const nebel_environment_map *map, const double direction[3], double radiance[3])
+void nb_environment_map_radiance(const nebel_environment_map *map, const double direction[3], double radiance[3])
 {
     const sky_place place = place_of(direction);
     const double x = place.across * (double)map->width + (double)map->width - 0.5;
@@ -518,19 +518,19 @@ void nb_sky_map_radiance(const nebel_environment_map *map, const double directio
     }
 }
 
-const nb_environment_table *nb_sky_map_reflection(const nebel_environment_map *map)
+const nb_environment_table *nb_environment_map_reflection(const nebel_environment_map *map)
 {
     return &map->reflected;
 }
 
-const float *nb_sky_map_pixels(const nebel_environment_map *map, size_t *width, size_t *height)
+const float *nb_environment_map_pixels(const nebel_environment_map *map, size_t *width, size_t *height)
 {
     *width = map->width;
     *height = map->height;
     return map->pixels;
 }
 
-void nb_sky_map_most(const nebel_environment_map *map, double most[3])
+void nb_environment_map_most(const nebel_environment_map *map, double most[3])
 {
     memcpy(most, map->most, sizeof map->most);
 }
@@ -570,7 +570,7 @@ static nebel_result copy_pixels(const nebel_environment_map_desc *desc, nebel_en
 static void free_map(nebel_environment_map *map)
 {
     const nebel_allocator allocator = map->allocator;
-    for (int i = 0; i < MOST_FILTERS; i++) nb_sky_filter_release(map->filters[i]);
+    for (int i = 0; i < MOST_FILTERS; i++) nb_environment_filter_release(map->filters[i]);
     nb_release(&allocator, map->pixels);
     nb_release(&allocator, map->terms);
     nb_release(&allocator, map->reflected.coefficients);

@@ -14,7 +14,7 @@ typedef struct nb_environment_table {
 } nb_environment_table;
 
 /* Knots of a gradient's filter: see sky.c. */
-enum { NB_SKY_KNOTS = 129 };
+enum { NB_SKY_NODES = 129 };
 
 struct nb_environment_filter {
     nebel_allocator allocator;
@@ -22,25 +22,25 @@ struct nb_environment_filter {
     nb_phase phase;
     nb_environment_table table;     /* of a map */
     double mean_cosine, width;      /* of a gradient */
-    double rectified[NB_SKY_KNOTS]; /* the same */
+    double rectified[NB_SKY_NODES]; /* the same */
 };
 
 /* An empty one with one owner; NULL when memory is out. */
-nb_environment_filter *nb_sky_filter_create(const nebel_allocator *allocator, const nb_phase *phase);
+nb_environment_filter *nb_environment_filter_create(const nebel_allocator *allocator, const nb_phase *phase);
 
 /* The map's filter for a phase function, made where it has none. The caller becomes an owner. NULL when memory is out. */
-nb_environment_filter *nb_sky_map_filter(nebel_environment_map *map, const nb_phase *phase);
+nb_environment_filter *nb_environment_map_filter(nebel_environment_map *map, const nb_phase *phase);
 
 /* In the map's own frame and at intensity 1; direction of unit length. */
-void nb_sky_map_radiance(const nebel_environment_map *map, const double direction[3], double radiance[3]);
-void nb_sky_map_reflected(const nebel_environment_map *map, const double normal[3], double radiance[3]);
-void nb_sky_map_scattered(const nb_environment_table *table, const double direction[3], double radiance[3]);
+void nb_environment_map_radiance(const nebel_environment_map *map, const double direction[3], double radiance[3]);
+void nb_environment_map_reflected(const nebel_environment_map *map, const double normal[3], double radiance[3]);
+void nb_environment_map_scattered(const nb_environment_table *table, const double direction[3], double radiance[3]);
 
 /* What a white surface reflects, and the pixels: as above. */
-const nb_environment_table *nb_sky_map_reflection(const nebel_environment_map *map);
-const float *nb_sky_map_pixels(const nebel_environment_map *map, size_t *width, size_t *height);
+const nb_environment_table *nb_environment_map_reflection(const nebel_environment_map *map);
+const float *nb_environment_map_pixels(const nebel_environment_map *map, size_t *width, size_t *height);
 
 /* The largest of all pixels. */
-void nb_sky_map_most(const nebel_environment_map *map, double most[3]);
+void nb_environment_map_most(const nebel_environment_map *map, double most[3]);
 
 #endif

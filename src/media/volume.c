@@ -60,7 +60,7 @@ static nebel_result add_leaf(nb_volume_builder *b, const nebel_shape *shape, con
     const nebel_result result =
         nb_leaf_resolve(b->log, shape, world, &b->volume->faces[b->used.faces], b->used.faces, leaf, low, high);
     b->used.faces += leaf->face_count;
-    b->volume->steps[b->used.steps++] = NB_STEP_LEAF;
+    b->volume->steps[b->used.steps++] = NB_OP_LEAF;
     return result;
 }
 
@@ -72,7 +72,7 @@ static nebel_result add_group(nb_volume_builder *b, const nebel_shape *shape, co
         double l[3], h[3];
         const nebel_result result = add_shape(b, &shape->parts[i], world, l, h);
         if (result != NEBEL_OK) return result;
-        if (i > 0) b->volume->steps[b->used.steps++] = any ? NB_STEP_ANY : NB_STEP_ALL;
+        if (i > 0) b->volume->steps[b->used.steps++] = any ? NB_OP_UNION : NB_OP_INTERSECTION;
         for (int k = 0; k < 3; k++) {
             low[k] = i == 0 ? l[k] : any ? fmin(low[k], l[k]) : fmax(low[k], l[k]);
             high[k] = i == 0 ? h[k] : any ? fmax(high[k], h[k]) : fmin(high[k], h[k]);

@@ -16,12 +16,12 @@
 
 typedef enum nb_leaf_type {
     NB_LEAF_WORLD,
-    NB_LEAF_PLANES, /* n.x <= d for each plane */
-    NB_LEAF_BOX,    /* low <= x < high */
-    NB_LEAF_BALL,   /* |x| <= radius */
-    NB_LEAF_TUBE,   /* x^2 + y^2 <= 1, 0 <= z <= 1 */
-    NB_LEAF_CONE,   /* x^2 + y^2 <= (radius + slope z)^2, 0 <= z <= 1 */
-    NB_LEAF_CAPSULE /* within 1 of the z axis from 0 to length */
+    NB_LEAF_PLANES,   /* n.x <= d for each plane */
+    NB_LEAF_BOX,      /* low <= x < high */
+    NB_LEAF_SPHERE,   /* |x| <= radius */
+    NB_LEAF_CYLINDER, /* x^2 + y^2 <= 1, 0 <= z <= 1 */
+    NB_LEAF_CONE,     /* x^2 + y^2 <= (radius + slope z)^2, 0 <= z <= 1 */
+    NB_LEAF_CAPSULE   /* within 1 of the z axis from 0 to length */
 } nb_leaf_type;
 
 /* normal.x <= distance, the largest component of the normal within 0.5 and 1. `tie` decides for rays that lie in the
@@ -56,7 +56,7 @@ typedef struct nb_leaf {
 
 /* A postfix program over leaf membership: LEAF pushes the next leaf, the others fold the two topmost results into one.
  */
-typedef enum nb_shape_op { NB_STEP_LEAF, NB_STEP_ANY, NB_STEP_ALL } nb_shape_op;
+typedef enum nb_shape_op { NB_OP_LEAF, NB_OP_UNION, NB_OP_INTERSECTION } nb_shape_op;
 
 /* The deepest stack a program needs. */
 #define NB_STEP_STACK (NEBEL_MAX_SHAPE_NESTING + 2)
@@ -115,7 +115,7 @@ static inline int nb_volume_has_distances(const nb_volume *volume)
 /* How the soft edge of a round body is made: the forms of formulas/profiles.inc. */
 static inline int nb_leaf_edge_form(const nb_leaf *leaf)
 {
-    return leaf->type == NB_LEAF_BALL ? 0 : leaf->type == NB_LEAF_CAPSULE ? 2 : 1;
+    return leaf->type == NB_LEAF_SPHERE ? 0 : leaf->type == NB_LEAF_CAPSULE ? 2 : 1;
 }
 
 /* A copy with arrays of its own. 0 when memory is out. */

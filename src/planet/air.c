@@ -15,7 +15,7 @@ double nb_air_density(const nb_air_component *air, double height)
     return nb_density_of(air, height);
 }
 
-int nb_airs_are_empty(const nb_air_components *airs)
+int nb_air_components_are_empty(const nb_air_components *airs)
 {
     for (int k = 0; k < airs->count; k++)
         for (int c = 0; c < 3; c++)
@@ -45,7 +45,7 @@ static void set_peaks(nb_air_components *airs, int orders)
     }
 }
 
-void nb_airs_smooth(nb_air_components *airs, int orders, nb_air_components *smooth)
+void nb_air_components_smooth(nb_air_components *airs, int orders, nb_air_components *smooth)
 {
     set_peaks(airs, orders);
     *smooth = *airs;
@@ -88,7 +88,7 @@ static void cut_exponential(nb_air_components *airs, double scale)
 
 /* The edges of layers; else shells are thin near the ground, where the air changes most. Nodes between two of them see no layer that is
  * thin beside their distance. */
-void nb_airs_cut(nb_air_components *airs)
+void nb_air_components_cut(nb_air_components *airs)
 {
     airs->shell_count = 0;
     for (int i = 0; i < airs->count; i++) {
@@ -108,18 +108,18 @@ void nb_airs_cut(nb_air_components *airs)
 
 /* ---- where rays go --------------------------------------------------------------------------- */
 
-nb_atmosphere_ray nb_track_ahead(nb_atmosphere_ray track, double length)
+nb_atmosphere_ray nb_atmosphere_ray_ahead(nb_atmosphere_ray track, double length)
 {
     const nb_atmosphere_ray_lanes ahead = nb_tracks_ahead((nb_atmosphere_ray_lanes){track.radius, track.rise}, length);
     return (nb_atmosphere_ray){ahead.radius, ahead.rise};
 }
 
-double nb_track_leave(nb_atmosphere_ray track, double sphere)
+double nb_atmosphere_ray_leave(nb_atmosphere_ray track, double sphere)
 {
     return nb_tracks_leave((nb_atmosphere_ray_lanes){track.radius, track.rise}, sphere);
 }
 
-double nb_track_enter(nb_atmosphere_ray track, double sphere)
+double nb_atmosphere_ray_enter(nb_atmosphere_ray track, double sphere)
 {
     const double square = nb_half_chord_square((nb_atmosphere_ray_lanes){track.radius, track.rise}, sphere);
     if (!(track.rise < 0 && square > 0)) return HUGE_VAL;
@@ -136,22 +136,22 @@ static void add_rising(const nb_air_components *airs, nb_atmosphere_ray track, d
 }
 
 /* From the lowest place on, up on both sides. */
-void nb_track_depth(const nb_air_components *airs, nb_atmosphere_ray track, double length, double depth[3])
+void nb_atmosphere_ray_depth(const nb_air_components *airs, nb_atmosphere_ray track, double length, double depth[3])
 {
     for (int c = 0; c < 3; c++) depth[c] = 0;
     if (track.rise >= 0) {
         add_rising(airs, track, length, depth);
     } else if (length <= -track.rise) {
-        const nb_atmosphere_ray end = nb_track_ahead(track, length);
+        const nb_atmosphere_ray end = nb_atmosphere_ray_ahead(track, length);
         add_rising(airs, (nb_atmosphere_ray){end.radius, -end.rise}, length, depth);
     } else {
-        const nb_atmosphere_ray lowest = {nb_track_ahead(track, -track.rise).radius, 0};
+        const nb_atmosphere_ray lowest = {nb_atmosphere_ray_ahead(track, -track.rise).radius, 0};
         add_rising(airs, lowest, -track.rise, depth);
         add_rising(airs, lowest, length + track.rise, depth);
     }
 }
 
-void nb_track_sunlight(const nb_air_components *airs, nb_atmosphere_ray track, double light[3])
+void nb_atmosphere_ray_sunlight(const nb_air_components *airs, nb_atmosphere_ray track, double light[3])
 {
     nb_tracks_sunlight(airs, (nb_atmosphere_ray_lanes){track.radius, track.rise}, light);
 }

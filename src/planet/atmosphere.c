@@ -59,14 +59,15 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
     made->airs.count = (int)whole.component_count;
     for (int c = 0; c < 3; c++) made->ground_albedo[c] = whole.ground_albedo[c];
     for (int i = 0; i < made->airs.count; i++) resolve_air(&whole.components[i], &made->airs.airs[i]);
-    nb_airs_cut(&made->airs);
-    nb_vector_ball_middle(whole.ground_point, whole.radius, made->center);
-    made->rule = nb_rule_make(NB_RULE_MOST);
+    nb_air_components_cut(&made->airs);
+    nb_sphere_center_below(whole.ground_point, whole.radius, made->center);
+    made->rule = nb_gauss_rule_make(NB_MAX_RULE);
     made->gather = nb_gather_choose(NEBEL_ISA_DEFAULT);
     const nb_parallel parts = {whole.run, whole.run_user};
-    nb_airs_smooth(&made->airs, whole.quality == NEBEL_ATMOSPHERE_PRECISE ? NB_MOMENTS : NB_FEW_MOMENTS, &made->smooth);
-    result = nb_scatter_make(&allocator, &parts, &made->airs, &made->smooth, whole.quality, whole.ground_albedo,
-                             &made->scatter);
+    nb_air_components_smooth(&made->airs, whole.quality == NEBEL_ATMOSPHERE_PRECISE ? NB_MOMENTS : NB_FEW_MOMENTS,
+                             &made->smooth);
+    result = nb_scattering_table_make(&allocator, &parts, &made->airs, &made->smooth, whole.quality,
+                                      whole.ground_albedo, &made->scatter);
     made->share_off = (whole.quality == NEBEL_ATMOSPHERE_PRECISE ? 0.02 : 0.1) + made->scatter.missing;
     if (result == NEBEL_OK) {
         *atmosphere = made;
@@ -80,6 +81,6 @@ void nebel_destroy_atmosphere(nebel_atmosphere *atmosphere)
 {
     if (atmosphere == NULL) return;
     const nebel_allocator allocator = atmosphere->allocator;
-    nb_scatter_free(&allocator, &atmosphere->scatter);
+    nb_scattering_table_free(&allocator, &atmosphere->scatter);
     nb_release(&allocator, atmosphere);
 }

@@ -115,7 +115,7 @@ static void find_columns(nebel_cloud_workspace *workspace, int layer, nb_cloud_d
     }
 }
 
-void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_density_query *looks)
+void nb_cloud_density(nebel_cloud_workspace *workspace, int layer, nb_cloud_density_query *looks)
 {
     const nb_cloud_kernel *kernel = workspace->view->kernel;
     const nebel_clouds *clouds = workspace->view->clouds;
@@ -185,8 +185,8 @@ static int is_above(nebel_cloud_workspace *workspace, const nb_grid *grid, int s
 }
 
 /* Beyond a face's edge there are points, too: blocks that lie across need no more than others. */
-nb_cloud_column_cursor nb_cloud_look_out(const nebel_cloud_workspace *workspace, int layer, const double place[3],
-                                         const double direction[3], float width)
+nb_cloud_column_cursor nb_cloud_density_out(const nebel_cloud_workspace *workspace, int layer, const double place[3],
+                                            const double direction[3], float width)
 {
     const nb_cube_place at = cube_of(place);
     const int axis = at.face / 2, across[2] = {axis == 0, axis == 2 ? 1 : 2};

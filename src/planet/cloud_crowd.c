@@ -35,11 +35,12 @@
 enum { TRIES = 24576 };
 
 /* Rays' cosines to straight up. From above clouds show what the sun lights, from below what is in their shadow, however flat the
- * ray: between the two in the middle nothing is linear (nb_cloud_crowd_at). */
-static const float views[NB_CROWD_VIEWS] = {-1,       -.82f, -.66f, -.5f, -.28f, -.09f, -FLATTEST,
-                                            FLATTEST, .09f,  .28f,  .5f,  .66f,  .82f,  1};
-static const float suns[NB_CROWD_SUNS] = {-.15f, -.05f, 0, .05f, .1f, .2f, .3f, .43f, .55f, .68f, .84f, 1};
-static const float turns[NB_CROWD_TURNS] = {-1, 0, 1}; /* cosines between ray and sun, both seen from straight above */
+ * ray: between the two in the middle nothing is linear (nb_cloud_prefilter_at). */
+static const float views[NB_PREFILTER_VIEWS] = {-1,       -.82f, -.66f, -.5f, -.28f, -.09f, -FLATTEST,
+                                                FLATTEST, .09f,  .28f,  .5f,  .66f,  .82f,  1};
+static const float suns[NB_PREFILTER_SUNS] = {-.15f, -.05f, 0, .05f, .1f, .2f, .3f, .43f, .55f, .68f, .84f, 1};
+static const float turns[NB_PREFILTER_TURNS] = {-1, 0,
+                                                1}; /* cosines between ray and sun, both seen from straight above */
 
 /* ---- places ---------------------------------------------------------------------------------- */
 
@@ -63,7 +64,7 @@ static void find_places(const nebel_cloud_lighting *view, int k, nb_cloud_prefil
     const nb_cloud_layer *layer = &view->clouds->layers[k];
     const nb_cloud_rotation *pose = &view->poses[k];
     nb_cloud_density_query looks = {.count = 0, .are_of_rays = 0};
-    for (int first = 0; first < TRIES && crowd->count < NB_CROWD_PLACES; first += NB_CLOUD_LANES) {
+    for (int first = 0; first < TRIES && crowd->count < NB_PREFILTER_PLACES; first += NB_CLOUD_LANES) {
         nb_prefilter_point places[NB_CLOUD_LANES];
         float extinction[NB_CLOUD_LANES];
         for (int i = 0; i < NB_CLOUD_LANES; i++) {
@@ -75,7 +76,7 @@ static void find_places(const nebel_cloud_lighting *view, int k, nb_cloud_prefil
             nb_cloud_ask(&looks, pose, places[i].from, FINE_PART * layer->size);
         }
         nb_cloud_find_means(view->clouds, k, &looks, extinction);
-        for (int i = 0; i < NB_CLOUD_LANES && crowd->count < NB_CROWD_PLACES; i++) {
+        for (int i = 0; i < NB_CLOUD_LANES && crowd->count < NB_PREFILTER_PLACES; i++) {
             places[i].extinction = extinction[i];
             if (extinction[i] > 0) crowd->places[crowd->count++] = places[i];
         }
@@ -105,7 +106,7 @@ static void direct(const nb_prefilter_point *place, double cosine, double turn, 
     double up[3], east[3], north[3];
     const double radius = nb_vector_length(place->from), sine = sqrt(1 - cosine * cosine);
     for (int c = 0; c < 3; c++) up[c] = place->from[c] / radius;
-    nb_vector_find_aside(up, east);
+    nb_vector_perpendicular(up, east);
     nb_vector_cross(up, east, north);
     for (int c = 0; c < 3; c++) direction[c] = cosine * up[c] + sine * (cos(turn) * east[c] + sin(turn) * north[c]);
 }
@@ -219,7 +220,7 @@ static float place_among(const float *nodes, int count, float x, int *low)
     return nb_larger(0, nb_smaller(1, (x - nodes[i]) / (nodes[i + 1] - nodes[i])));
 }
 
-float nb_cloud_crowd_part(nebel_cloud_workspace *workspace, int k, float width)
+float nb_cloud_prefilter_part(nebel_cloud_workspace *workspace, int k, float width)
 {
     const float size = workspace->view->clouds->layers[k].size;
     const float part = nb_larger(0, nb_smaller(1, (width / size - NEAR_PART) / (FAR_PART - NEAR_PART)));
@@ -236,18 +237,18 @@ static float part_below(float view, float entered)
     return nb_larger(0, nb_smaller(1, 0.5f + 0.5f * steep + below * (1 - fabsf(steep))));
 }
 
-nb_cloud_irradiance nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int k, const double up[3], const double ray[3],
-                                      float entered)
+nb_cloud_irradiance nb_cloud_prefilter_at(nebel_cloud_workspace *workspace, int k, const double up[3],
+                                          const double ray[3], float entered)
 {
     const double *to_sun = workspace->view->sun.direction;
     const double sun = nb_vector_dot(up, to_sun), view = nb_vector_dot(up, ray);
     const double across = sqrt(fmax(0, (1 - sun * sun) * (1 - view * view)));
     const double turn = across > 1e-6 ? (nb_vector_dot(ray, to_sun) - sun * view) / across : 0;
     int low[3];
-    float part[3] = {place_among(views, NB_CROWD_VIEWS, (float)view, &low[0]),
-                     place_among(turns, NB_CROWD_TURNS, (float)turn, &low[1]),
-                     place_among(suns, NB_CROWD_SUNS, (float)sun, &low[2])};
-    if (low[0] == NB_CROWD_VIEWS / 2 - 1) part[0] = part_below((float)view, entered);
+    float part[3] = {place_among(views, NB_PREFILTER_VIEWS, (float)view, &low[0]),
+                     place_among(turns, NB_PREFILTER_TURNS, (float)turn, &low[1]),
+                     place_among(suns, NB_PREFILTER_SUNS, (float)sun, &low[2])};
+    if (low[0] == NB_PREFILTER_VIEWS / 2 - 1) part[0] = part_below((float)view, entered);
     nb_cloud_irradiance sum = {0, 0, 0, 0, 0};
     for (int corner = 0; corner < 8; corner++) {
         float weight = 1;

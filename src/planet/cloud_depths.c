@@ -111,9 +111,9 @@ static void stride(nb_depth_step *steps)
     nb_cloud_density_query *looks = &steps->looks;
     if (looks->count == 0) return;
     if (steps->is_alone)
-        nb_cloud_look_alone(view->kernel, &view->clouds->noise, &view->clouds->layers[steps->layer], looks);
+        nb_cloud_density_alone(view->kernel, &view->clouds->noise, &view->clouds->layers[steps->layer], looks);
     else
-        nb_cloud_look(steps->workspace, steps->layer, looks);
+        nb_cloud_density(steps->workspace, steps->layer, looks);
     for (int i = 0; i < looks->count; i++) *steps->depths[i] += steps->lengths[i] * (double)looks->whole[i];
     looks->count = 0;
 }
@@ -195,7 +195,7 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
                 first = nb_smaller(fine, 0.1f / layer->per_thickness);
     const int count = width > 2 * fine ? MOST_COLUMNS : width > fine ? 2 : 1;
     double across[2][3];
-    nb_vector_find_aside(place, across[0]);
+    nb_vector_perpendicular(place, across[0]);
     nb_vector_cross(place, across[0], across[1]);
     nb_vector_make_unit(across[1]);
     const int is_alone = width > MOST_COLUMNS * layer->size;

@@ -76,7 +76,7 @@ static inline nb_real read_billows(const nb_cloud_noise *noise, const nb_real pa
     nb_real billows = read_level(noise, parts, table->low);
     if (nb_any(table->next > NB_F(0.0)))
         billows = mix(billows, read_level(noise, parts, table->low + NB_F(1.0)), table->next);
-    return nb_select(is_mean, nb_splat(noise->billow_mean), billows * nb_splat(1.0f / NB_BILLOW_MOST));
+    return nb_select(is_mean, nb_splat(noise->billow_mean), billows * nb_splat(1.0f / NB_MAX_BILLOW));
 }
 
 /* Each scale's table for widths. Returns the variance that they lose by that. */

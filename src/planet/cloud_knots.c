@@ -57,7 +57,7 @@ static void add_knot(nb_cloud_node_builder *tally, double t)
 }
 
 /* A long gap is full of air, and clouds leave as much of its light at both ends: a knot between two clouds would have the mean of both. */
-void nb_cloud_tally_enter(nb_cloud_node_builder *tally, double t)
+void nb_cloud_nodes_enter(nb_cloud_node_builder *tally, double t)
 {
     if (tally->count == 0) {
         add_knot(tally, t);
@@ -68,7 +68,7 @@ void nb_cloud_tally_enter(nb_cloud_node_builder *tally, double t)
     tally->gap_end = knot_here(tally, t);
 }
 
-void nb_cloud_tally_pass(nb_cloud_node_builder *tally, double t, double depth, double apart)
+void nb_cloud_nodes_pass(nb_cloud_node_builder *tally, double t, double depth, double apart)
 {
     tally->end = t;
     tally->depth += depth;
@@ -78,7 +78,7 @@ void nb_cloud_tally_pass(nb_cloud_node_builder *tally, double t, double depth, d
 }
 
 /* Where the clouds' transmittance has fallen, or the ray is far from the last knot. */
-void nb_cloud_tally_leave(nb_cloud_node_builder *tally, double t)
+void nb_cloud_nodes_leave(nb_cloud_node_builder *tally, double t)
 {
     const double fallen = last_of(tally)->left - tally->left;
     if (fallen > MOST_FALL || (fallen > 0.02 && t > 1.5 * last_of(tally)->t)) add_knot(tally, t);
@@ -92,7 +92,7 @@ static void add_to_knot(nb_cloud_node *knot, const double light[3], const double
     }
 }
 
-void nb_cloud_tally_light(nb_cloud_node_builder *tally, const double light[3], const double ahead[3])
+void nb_cloud_nodes_light(nb_cloud_node_builder *tally, const double light[3], const double ahead[3])
 {
     const int number = ++tally->lit;
     for (int c = 0; c < 3; c++) {
@@ -115,7 +115,7 @@ static void add_end(nb_cloud_node_builder *tally)
     write_knot(tally, &end);
 }
 
-void nb_cloud_tally_end(nb_cloud_node_builder *tally, double through, nebel_cloud_transfer *knots)
+void nb_cloud_nodes_end(nb_cloud_node_builder *tally, double through, nebel_cloud_transfer *knots)
 {
     add_end(tally);
     knots->count = tally->count;

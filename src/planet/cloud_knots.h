@@ -23,14 +23,14 @@ typedef struct nb_cloud_node_builder {
 } nb_cloud_node_builder;
 
 /* Cloud begins at t, behind a gap or none. */
-void nb_cloud_tally_enter(nb_cloud_node_builder *tally, double t);
+void nb_cloud_nodes_enter(nb_cloud_node_builder *tally, double t);
 /* Cloud of such optical depths, up to t. */
-void nb_cloud_tally_pass(nb_cloud_node_builder *tally, double t, double depth, double apart);
+void nb_cloud_nodes_pass(nb_cloud_node_builder *tally, double t, double depth, double apart);
 /* A stretch ends at t. */
-void nb_cloud_tally_leave(nb_cloud_node_builder *tally, double t);
+void nb_cloud_nodes_leave(nb_cloud_node_builder *tally, double t);
 /* Light of the first stretch that has none yet, for all that lies behind it. */
-void nb_cloud_tally_light(nb_cloud_node_builder *tally, const double light[3], const double ahead[3]);
+void nb_cloud_nodes_light(nb_cloud_node_builder *tally, const double light[3], const double ahead[3]);
 /* Nothing follows, and all light has come; so much comes through all clouds. Sets all but the error. */
-void nb_cloud_tally_end(nb_cloud_node_builder *tally, double through, nebel_cloud_transfer *knots);
+void nb_cloud_nodes_end(nb_cloud_node_builder *tally, double through, nebel_cloud_transfer *knots);
 
 #endif

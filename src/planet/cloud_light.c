@@ -29,11 +29,11 @@ static float falling(float depth)
 static nb_cloud_light clear_light(const nebel_cloud_lighting *view, double radius, double sun)
 {
     const nebel_atmosphere *atmosphere = view->clouds->atmosphere;
-    const nb_radiance_moments field = nb_scatter_look_up(&atmosphere->scatter, &atmosphere->airs, radius, sun);
+    const nb_radiance_moments field = nb_scattering_table_look_up(&atmosphere->scatter, &atmosphere->airs, radius, sun);
     nb_cloud_light light = {.sun = {0}};
     double direct[3];
     const double aside = sqrt(fmax(0, 1 - sun * sun));
-    nb_track_sunlight(&atmosphere->smooth, (nb_atmosphere_ray){radius, radius * sun}, direct);
+    nb_atmosphere_ray_sunlight(&atmosphere->smooth, (nb_atmosphere_ray){radius, radius * sun}, direct);
     for (int c = 0; c < 3; c++) {
         const double mean = field.moments[0][c] / (4 * 3.14159265358979323846), e = view->sun.irradiance[c];
         const double down = sun * field.moments[1][c] + aside * field.moments[2][c];

@@ -170,7 +170,7 @@ static void surround(const float *table, int size, uint16_t *wider)
             for (int x = 0; x < row; x++) {
                 const int at[3] = {(x + size - 1) % size, (y + size - 1) % size, (z + size - 1) % size};
                 const float value = table[(at[2] * size + at[1]) * size + at[0]];
-                wider[(z * row + y) * row + x] = (uint16_t)(NB_BILLOW_MOST * value + 0.5f);
+                wider[(z * row + y) * row + x] = (uint16_t)(NB_MAX_BILLOW * value + 0.5f);
             }
 }
 

@@ -12,7 +12,7 @@ enum {
     NB_BILLOW_SIZE = 64,  /* numbers of billows before they repeat */
     NB_BILLOW_LEVELS = 6, /* each half the one before */
     NB_BILLOW_CELLS = 4,  /* the largest billows, before they repeat */
-    NB_BILLOW_MOST = 65535,
+    NB_MAX_BILLOW = 65535,
 };
 
 /* Of numbers; fminf and fmaxf are calls. */
@@ -38,7 +38,7 @@ typedef struct nb_cloud_noise {
     uint8_t *turns; /* [z][y][x]: which direction */
     float (*directions)[4];
     uint16_t
-        *billows; /* tables: NB_BILLOW_MOST in the middle of one; a number more on each side, as if it went on there */
+        *billows; /* tables: NB_MAX_BILLOW in the middle of one; a number more on each side, as if it went on there */
     float billow_starts[NB_BILLOW_LEVELS];   /* of each level, whole numbers */
     float billow_mean;                       /* where they are halved more often */
     float billow_variance[NB_BILLOW_LEVELS]; /* what a level has lost of the first one's */

@@ -232,7 +232,7 @@ static double depth_of(int i)
 
 static void set_solver(const nb_cloud_phase *phase, int orders, nb_slab_solver *solver)
 {
-    const nb_gauss_rule rule = nb_rule_make(STREAMS);
+    const nb_gauss_rule rule = nb_gauss_rule_make(STREAMS);
     const double straight = phase->moments[orders];
     solver->orders = orders;
     for (int l = 0; l < orders; l++) solver->moments[l] = (phase->moments[l] - straight) / (1 - straight);

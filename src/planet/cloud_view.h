@@ -114,21 +114,21 @@ typedef struct nb_prefilter_weight {
 } nb_prefilter_weight;
 
 enum {
-    NB_CROWD_VIEWS = 14,
-    NB_CROWD_TURNS = 3,
-    NB_CROWD_SUNS = 12,
-    NB_CROWD_PLACES = 768,
+    NB_PREFILTER_VIEWS = 14,
+    NB_PREFILTER_TURNS = 3,
+    NB_PREFILTER_SUNS = 12,
+    NB_PREFILTER_PLACES = 768,
 };
 
 /* Places in a layer, and what they are in the mean; what was not asked for is not there. */
 typedef struct nb_cloud_prefilter {
     int is_set, count;
-    nb_prefilter_point places[NB_CROWD_PLACES];
-    nb_cloud_depths depths[NB_CROWD_SUNS][NB_CROWD_PLACES];
-    nb_prefilter_weight seen[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_PLACES];
-    nb_cloud_irradiance means[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_SUNS];
-    uint8_t has_depths[NB_CROWD_SUNS], has_seen[NB_CROWD_VIEWS][NB_CROWD_TURNS],
-        has_mean[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_SUNS];
+    nb_prefilter_point places[NB_PREFILTER_PLACES];
+    nb_cloud_depths depths[NB_PREFILTER_SUNS][NB_PREFILTER_PLACES];
+    nb_prefilter_weight seen[NB_PREFILTER_VIEWS][NB_PREFILTER_TURNS][NB_PREFILTER_PLACES];
+    nb_cloud_irradiance means[NB_PREFILTER_VIEWS][NB_PREFILTER_TURNS][NB_PREFILTER_SUNS];
+    uint8_t has_depths[NB_PREFILTER_SUNS], has_seen[NB_PREFILTER_VIEWS][NB_PREFILTER_TURNS],
+        has_mean[NB_PREFILTER_VIEWS][NB_PREFILTER_TURNS][NB_PREFILTER_SUNS];
 } nb_cloud_prefilter;
 
 struct nebel_cloud_workspace {
@@ -145,7 +145,7 @@ int nb_cloud_pieces(double low, double high, const double from[3], const double 
                     double pieces[2][2]);
 
 /* Finds drops at places in a layer, from columns that are found once and linear between. */
-void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_density_query *looks);
+void nb_cloud_density(nebel_cloud_workspace *workspace, int layer, nb_cloud_density_query *looks);
 
 /* A place of a ray on a face of the cube, on which blocks of columns are. */
 typedef struct nb_cloud_column_cursor {
@@ -158,8 +158,8 @@ typedef struct nb_cloud_column_cursor {
 } nb_cloud_column_cursor;
 
 /* Place and direction in the layer's axes. */
-nb_cloud_column_cursor nb_cloud_look_out(const nebel_cloud_workspace *workspace, int layer, const double place[3],
-                                         const double direction[3], float width);
+nb_cloud_column_cursor nb_cloud_density_out(const nebel_cloud_workspace *workspace, int layer, const double place[3],
+                                            const double direction[3], float width);
 /* How far the ray stays within a block of size 0, 1 or 2, m. */
 double nb_cloud_way_in_block(const nebel_cloud_workspace *workspace, nb_cloud_column_cursor *out, int size);
 /* Whether the rank of any column there is above `least`, with all that a width hides. */
@@ -248,11 +248,11 @@ nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_
                                    const nb_cloud_light *light);
 
 /* How much of light is of clouds that a pixel so wide hides: 0 to 1. Always 0 where hardly any cloud is in the layer. */
-float nb_cloud_crowd_part(nebel_cloud_workspace *workspace, int layer, float width);
+float nb_cloud_prefilter_part(nebel_cloud_workspace *workspace, int layer, float width);
 
 /* Mean of places in a layer, by how much of each a ray sees that came into it, or began in it, at a part of its height. */
-nb_cloud_irradiance nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int layer, const double up[3],
-                                      const double ray[3], float entered);
+nb_cloud_irradiance nb_cloud_prefilter_at(nebel_cloud_workspace *workspace, int layer, const double up[3],
+                                          const double ray[3], float entered);
 nb_cloud_irradiance nb_cloud_mix_parts(const nb_cloud_irradiance *a, const nb_cloud_irradiance *b, float part);
 
 #endif

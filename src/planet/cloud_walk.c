@@ -242,7 +242,7 @@ static double clear_way(nb_cloud_walk *walk, int k)
 {
     const nb_cloud_sample *spot = &walk->spot;
     nb_cloud_column_cursor out =
-        nb_cloud_look_out(walk->workspace, k, spot->place, walk->turned[k].direction, spot->width);
+        nb_cloud_density_out(walk->workspace, k, spot->place, walk->turned[k].direction, spot->width);
     for (int size = 2; size >= 0; size--) {
         if (walk->t < walk->unknown[size]) continue;
         const double way = nb_cloud_way_in_block(walk->workspace, &out, size) + 1e-3 * walk->least;
@@ -346,7 +346,7 @@ static void light_stretch(nb_lights *lights, int i)
                                   (float)nb_vector_dot(up, walk->unit), (float)walk->ray.sun};
     nb_cloud_irradiance parts = nb_cloud_parts_of(layer, &depths, &sight);
     if (crowd > 0) {
-        const nb_cloud_irradiance mean = nb_cloud_crowd_at(walk->workspace, k, up, walk->unit, lights->entered[i]);
+        const nb_cloud_irradiance mean = nb_cloud_prefilter_at(walk->workspace, k, up, walk->unit, lights->entered[i]);
         const float left = parts.left + crowd * (1 - walk->ray.own) * (mean.left - parts.left);
         parts = nb_cloud_mix_parts(&parts, &mean, crowd);
         parts.left = left;
@@ -360,7 +360,7 @@ static void light_stretch(nb_lights *lights, int i)
                   stretch->seen_apart * (double)source.often[c];
         ahead[c] = stretch->passed * (double)source.ahead[c];
     }
-    nb_cloud_tally_light(&walk->tally, sent, ahead);
+    nb_cloud_nodes_light(&walk->tally, sent, ahead);
 }
 
 /* A walk that waited for its last light is ready. */
@@ -401,7 +401,7 @@ static void add_light(nb_cloud_walk *walk, int k)
     lights->stretches[i] = stretch;
     lights->radius[i] = radius_at(walk, t, lights->asked[i].place);
     lights->asked[i].grain = grain_of(walk, k, walk->spread * t);
-    lights->crowd[i] = nb_cloud_crowd_part(walk->workspace, k, lights->asked[i].grain.width);
+    lights->crowd[i] = nb_cloud_prefilter_part(walk->workspace, k, lights->asked[i].grain.width);
     lights->entered[i] = lights->crowd[i] > 0 ? height_entered(walk, k) : 0;
     lights->asked[i].is_alike = lights->crowd[i] >= 1 && !(walk->ray.own > 0);
     walk->tally.asked++;
@@ -439,7 +439,7 @@ static void take_part(nb_cloud_walk *walk, int k, double t, double length, nb_pi
     nb_cloud_segment *stretch = &walk->stretch;
     const double apart = (double)walk->ray.apart[k], left = walk->tally.left, visibly = visible(walk->tally.left_apart);
     stretch->end = t + length;
-    nb_cloud_tally_pass(&walk->tally, t + length, depth.whole, depth.apart);
+    nb_cloud_nodes_pass(&walk->tally, t + length, depth.whole, depth.apart);
     const double seen = left - walk->tally.left, seen_apart = (visibly - visible(walk->tally.left_apart)) / apart;
     stretch->seen += seen;
     stretch->seen_apart += seen_apart;
@@ -472,7 +472,7 @@ static void take_piece(nb_cloud_walk *walk, int k, double t, double length, nb_p
     nb_cloud_segment *stretch = &walk->stretch;
     if (!(depth.whole > 0)) return;
     take_gap(walk, k, t);
-    nb_cloud_tally_enter(&walk->tally, t);
+    nb_cloud_nodes_enter(&walk->tally, t);
     for (double begin = 0; begin < 1;) {
         if (!(stretch->weight > 0)) stretch->most = deepest_stretch(walk);
         const double rest = 1 - begin, whole = part_of_stretch(walk, k, rest * length, rest * depth.whole);
@@ -484,7 +484,7 @@ static void take_piece(nb_cloud_walk *walk, int k, double t, double length, nb_p
         }
         begin = nb_min(1, begin + part);
         add_light(walk, k);
-        nb_cloud_tally_leave(&walk->tally, t + begin * length);
+        nb_cloud_nodes_leave(&walk->tally, t + begin * length);
     }
 }
 
@@ -711,7 +711,7 @@ static void begin_next(nb_cloud_rays *rays, nb_cloud_walk *walk, nb_cloud_ray_gr
 static void look(const nb_cloud_rays *rays, int k, nb_cloud_ray_group *party)
 {
     nb_queue *queue = &party->queues[k];
-    nb_cloud_look(rays->workspace, k, &queue->looks);
+    nb_cloud_density(rays->workspace, k, &queue->looks);
     for (int i = 0; i < queue->looks.count; i++) see(queue, i);
     for (int i = 0; i < queue->looks.count; i++) {
         nb_cloud_walk *walk = queue->walks[i];
@@ -726,12 +726,9 @@ static void look(const nb_cloud_rays *rays, int k, nb_cloud_ray_group *party)
 /* The layer of which most is asked; -1: of none. */
 static int find_asked(const nb_cloud_rays *rays, const nb_cloud_ray_group *party)
 {
-    int most = -1, count = 0;
+    int most = -1;
     for (int k = 0; k < rays->workspace->view->clouds->layer_count; k++)
-        if (party->queues[k].looks.count > count) {
-            count = party->queues[k].looks.count;
-            most = k;
-        }
+        if (party->queues[k].looks.count > (most < 0 ? 0 : party->queues[most].looks.count)) most = k;
     return most;
 }
 
@@ -750,22 +747,10 @@ static void attend(nb_cloud_rays *rays, nb_cloud_walk *walk, nb_cloud_ray_group 
         walk->wait = NB_WAIT_LIGHT;
         return;
     }
-    nb_cloud_tally_end(&walk->tally, through_all(walk), walk->knots);
+    nb_cloud_nodes_end(&walk->tally, through_all(walk), walk->knots);
     walk->knots->error = (float)walk->missed;
     walk->knots->density_queries = walk->looks;
     if (rays->next < rays->n) begin_next(rays, walk, party);
-}
-
-/* When no walk is ready: questions about one layer, or, where nobody has any, of light. Returns 0 where there are none either. */
-static int answer(const nb_cloud_rays *rays, nb_cloud_ray_group *party)
-{
-    const int k = find_asked(rays, party);
-    if (k < 0 && party->lights.count == 0) return 0;
-    if (k >= 0)
-        look(rays, k, party);
-    else
-        find_lights(party);
-    return 1;
 }
 
 static void trace(nb_cloud_rays *rays)
@@ -777,9 +762,17 @@ static void trace(nb_cloud_rays *rays)
         party.queues[k].looks.are_of_rays = 1;
     }
     for (int i = 0; i < WALKS && rays->next < rays->n; i++) begin_next(rays, &party.walks[i], &party);
-    do {
+    for (;;) {
         while (party.ready_count > 0) attend(rays, party.ready[--party.ready_count], &party);
-    } while (answer(rays, &party));
+        /* No walk is ready: what one layer is asked is answered, or, if no layer is asked anything, what light is asked. */
+        const int k = find_asked(rays, &party);
+        if (k >= 0)
+            look(rays, k, &party);
+        else if (party.lights.count > 0)
+            find_lights(&party);
+        else
+            break;
+    }
 }
 
 /* ---- the face -------------------------------------------------------------------------------- */

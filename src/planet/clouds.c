@@ -111,7 +111,7 @@ static float weather_at(const nb_cloud_layer *layer, const double unit[3], float
     if (layer->weather.level_count == 0) return layer->coverage;
     const double u = atan2(unit[2], -unit[0]) / (2 * PI), v = acos(fmax(-1, fmin(1, unit[1]))) / PI;
     const double texel = PI * layer->low / (double)layer->weather.height[0];
-    nb_layer_map_read(&layer->weather, u, v, log2(fmax(1, (double)width / texel)), 0, &value);
+    nb_planet_map_read(&layer->weather, u, v, log2(fmax(1, (double)width / texel)), 0, &value);
     return layer->coverage * (float)value;
 }
 
@@ -152,11 +152,11 @@ nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_l
 /* ---- places that are asked at once ----------------------------------------------------------- */
 
 #define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = {nb_cloud_find_places_##suffix, nb_cloud_find_drops_##suffix},
-static const nb_cloud_kernel kernels[NEBEL_ISA_COUNT] = {NB_LEVELS(KERNEL)};
+static const nb_cloud_kernel kernels[NEBEL_ISA_COUNT] = {NB_ISA_LIST(KERNEL)};
 
 const nb_cloud_kernel *nb_cloud_kernel_choose(nebel_isa isa)
 {
-    const nebel_isa chosen = nb_cpu_choose(isa);
+    const nebel_isa chosen = nb_isa_select(isa);
     return chosen != NEBEL_ISA_COUNT ? &kernels[chosen] : NULL;
 }
 
@@ -168,8 +168,8 @@ void nb_cloud_ask(nb_cloud_density_query *looks, const nb_cloud_rotation *pose, 
     looks->hidden[i] = 0;
 }
 
-void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *noise, const nb_cloud_layer *layer,
-                         nb_cloud_density_query *looks)
+void nb_cloud_density_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *noise, const nb_cloud_layer *layer,
+                            nb_cloud_density_query *looks)
 {
     nb_cloud_fill_lanes(looks);
     kernel->find_places(layer, 0, looks);
@@ -188,7 +188,7 @@ void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *no
 
 void nb_cloud_find_means(const nebel_clouds *clouds, int layer, nb_cloud_density_query *looks, float extinction[])
 {
-    nb_cloud_look_alone(clouds->kernel, &clouds->noise, &clouds->layers[layer], looks);
+    nb_cloud_density_alone(clouds->kernel, &clouds->noise, &clouds->layers[layer], looks);
     memcpy(extinction, looks->whole, (size_t)looks->count * sizeof *extinction);
     looks->count = 0;
 }
@@ -440,8 +440,9 @@ static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *des
     layer->hidden_width = hidden_widths[desc->type != NEBEL_CLOUD_CUMULUS] * (float)desc->cell_size;
     set_octaves(desc, radius, layer);
     set_ranks(&clouds->noise, layer);
-    return desc->weather_map.texels != NULL ? nb_layer_map_make(&clouds->allocator, &desc->weather_map, &layer->weather)
-                                            : NEBEL_OK;
+    return desc->weather_map.texels != NULL
+               ? nb_planet_map_make(&clouds->allocator, &desc->weather_map, &layer->weather)
+               : NEBEL_OK;
 }
 
 static int overlap(const nebel_cloud_layer *a, const nebel_cloud_layer *b)
@@ -456,7 +457,7 @@ static nebel_result check(const nebel_clouds_desc *desc, nebel_cloud_layer *laye
     if (desc->layer_count > NEBEL_MAX_CLOUD_LAYERS)
         return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "clouds: %u layers; at most %d are possible",
                        (unsigned)desc->layer_count, NEBEL_MAX_CLOUD_LAYERS);
-    if (desc->layer_count > 0 && nb_airs_are_empty(airs))
+    if (desc->layer_count > 0 && nb_air_components_are_empty(airs))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "clouds: need air, and the planet has none");
     for (uint32_t i = 0; i < desc->layer_count; i++) {
         const nebel_result result =
@@ -511,7 +512,7 @@ void nebel_destroy_clouds(nebel_clouds *clouds)
     if (clouds == NULL) return;
     const nebel_allocator allocator = clouds->allocator;
     for (int i = 0; i < clouds->layer_count; i++) {
-        nb_layer_map_free(&allocator, &clouds->layers[i].weather);
+        nb_planet_map_free(&allocator, &clouds->layers[i].weather);
         nb_release(&allocator, clouds->layers[i].slab);
     }
     nb_cloud_noise_free(&allocator, &clouds->noise);

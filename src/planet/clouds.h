@@ -129,8 +129,8 @@ typedef struct nb_cloud_density_query nb_cloud_density_query;
 /* Puts a place from the planet's centre behind those whose mean is asked. */
 void nb_cloud_ask(nb_cloud_density_query *looks, const nb_cloud_rotation *pose, const double place[3], float width);
 /* Finds drops; no column next to the places is asked, so that none is kept. */
-void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *noise, const nb_cloud_layer *layer,
-                         nb_cloud_density_query *looks);
+void nb_cloud_density_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *noise, const nb_cloud_layer *layer,
+                            nb_cloud_density_query *looks);
 /* Mean extinction at all places that were asked; begins anew. */
 void nb_cloud_find_means(const nebel_clouds *clouds, int layer, nb_cloud_density_query *looks,
                          float extinction[/* NB_CLOUD_LANES */]);

@@ -7,7 +7,7 @@
 
 #include "moments.h"
 
-void nb_field_add(nb_radiance_moments *field, int orders, nb_moment_basis from, const double light[3])
+void nb_radiance_moments_add(nb_radiance_moments *field, int orders, nb_moment_basis from, const double light[3])
 {
     double values[NB_FIELD];
     nb_basis_of(orders, (nb_moment_basis_lanes){from.zenith, from.sun, from.height_of_sun}, values);

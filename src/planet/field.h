@@ -20,6 +20,6 @@ typedef struct nb_moment_basis {
 } nb_moment_basis;
 
 /* Adds light (radiance times solid angle) that comes from a direction. */
-void nb_field_add(nb_radiance_moments *field, int orders, nb_moment_basis from, const double light[3]);
+void nb_radiance_moments_add(nb_radiance_moments *field, int orders, nb_moment_basis from, const double light[3]);
 
 #endif

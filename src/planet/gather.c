@@ -26,9 +26,9 @@ void nb_gather_aim(nb_gather_job *job)
 }
 
 #define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_gather_##suffix,
-static nb_gather_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(KERNEL)};
+static nb_gather_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(KERNEL)};
 
 nb_gather_fn *nb_gather_choose(nebel_isa isa)
 {
-    return kernels[nb_cpu_choose(isa)];
+    return kernels[nb_isa_select(isa)];
 }

@@ -145,7 +145,7 @@ NB_MOMENTS_INLINE void add_often(const nb_gather_job *job, int orders, const nb_
     nb_real basis[NB_FIELD];
     nb_basis_of(orders, (nb_moment_basis_lanes){nodes->zenith, nb_splat(job->aspect.sun), nodes->sun}, basis);
     for (int c = 0; c < 3; c++) {
-        const double(*left)[NB_PATH_MOST] = job->smooth != NULL ? job->path->smooth : job->path->transmittance;
+        const double(*left)[NB_MAX_PATH] = job->smooth != NULL ? job->path->smooth : job->path->transmittance;
         const nb_real mean = nb_exp(nb_moment_at(&spots, 0, c)), all = left_of(nodes, left[c]) * mean;
         nb_real radiance;
         const nb_scattered scattered = scatter(job, orders, &spots, nodes->at, basis, c, &radiance);

@@ -88,7 +88,7 @@ static size_t set_sizes(const nebel_planet_map *desc, nb_planet_map *map)
     return all;
 }
 
-nebel_result nb_layer_map_make(const nebel_allocator *allocator, const nebel_planet_map *desc, nb_planet_map *map)
+nebel_result nb_planet_map_make(const nebel_allocator *allocator, const nebel_planet_map *desc, nb_planet_map *map)
 {
     const size_t all = set_sizes(desc, map);
     float *texels = nb_allocate(allocator, all, sizeof *texels);
@@ -104,13 +104,13 @@ nebel_result nb_layer_map_make(const nebel_allocator *allocator, const nebel_pla
     return NEBEL_OK;
 }
 
-void nb_layer_map_free(const nebel_allocator *allocator, nb_planet_map *map)
+void nb_planet_map_free(const nebel_allocator *allocator, nb_planet_map *map)
 {
     nb_release(allocator, map->levels[0]);
     *map = (nb_planet_map){.channels = 0};
 }
 
-nebel_planet_map nb_layer_map_level(const nb_planet_map *map, int level)
+nebel_planet_map nb_planet_map_level(const nb_planet_map *map, int level)
 {
     return (nebel_planet_map){map->width[level], map->height[level], map->channels, map->levels[level]};
 }
@@ -145,7 +145,7 @@ static void read_level(const nb_planet_map *map, int level, double u, double v, 
     }
 }
 
-void nb_layer_map_read(const nb_planet_map *map, double u, double v, double level, int repeats, double *values)
+void nb_planet_map_read(const nb_planet_map *map, double u, double v, double level, int repeats, double *values)
 {
     double coarse[3];
     const double most = (double)(map->level_count - 1), at = level > 0 ? fmin(level, most) : 0, low = floor(at);

@@ -16,18 +16,18 @@ typedef struct nb_planet_map {
 } nb_planet_map;
 
 /* Copies the map. Errors: MEMORY. */
-nebel_result nb_layer_map_make(const nebel_allocator *allocator, const nebel_planet_map *desc, nb_planet_map *map);
+nebel_result nb_planet_map_make(const nebel_allocator *allocator, const nebel_planet_map *desc, nb_planet_map *map);
 
-void nb_layer_map_free(const nebel_allocator *allocator, nb_planet_map *map);
+void nb_planet_map_free(const nebel_allocator *allocator, nb_planet_map *map);
 
 /* One of its levels; {0} of a map that was not made. */
-nebel_planet_map nb_layer_map_level(const nb_planet_map *map, int level);
+nebel_planet_map nb_planet_map_level(const nb_planet_map *map, int level);
 
 /* NULL, or what is wrong with one. */
 const char *nb_map_fault(const nebel_planet_map *map, int channels);
 
 /* Linear between texels, whose middles are half a texel from the edges, and between levels; `level` is how often the
  * map is halved, any number. Columns repeat; rows do where `repeats`, and end else. Writes map->channels numbers. */
-void nb_layer_map_read(const nb_planet_map *map, double u, double v, double level, int repeats, double *values);
+void nb_planet_map_read(const nb_planet_map *map, double u, double v, double level, int repeats, double *values);
 
 #endif

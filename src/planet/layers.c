@@ -167,7 +167,7 @@ static nebel_result paint_map(const nebel_allocator *allocator, const nebel_plan
     if (texels == NULL) return NEBEL_ERROR_MEMORY;
     result = nebel_generate_planet_map(desc, texels);
     painted.texels = texels;
-    if (result == NEBEL_OK) result = nb_layer_map_make(allocator, &painted, map);
+    if (result == NEBEL_OK) result = nb_planet_map_make(allocator, &painted, map);
     nb_release(allocator, texels);
     return result;
 }
@@ -175,7 +175,7 @@ static nebel_result paint_map(const nebel_allocator *allocator, const nebel_plan
 static nebel_result make_map(const nebel_allocator *allocator, const nebel_planet_map *given,
                              const nebel_planet_map_desc *desc, nb_planet_map *map)
 {
-    return given->texels != NULL ? nb_layer_map_make(allocator, given, map) : paint_map(allocator, desc, map);
+    return given->texels != NULL ? nb_planet_map_make(allocator, given, map) : paint_map(allocator, desc, map);
 }
 
 static nebel_result make_shell(const nebel_allocator *allocator, nebel_cloud_shell *desc, nb_shell *shell)
@@ -187,8 +187,8 @@ static nebel_result make_shell(const nebel_allocator *allocator, nebel_cloud_she
     const int is_one = desc->coverage_map.texels != NULL && desc->detail_map.texels == NULL;
     nebel_result result = make_map(allocator, &desc->coverage_map, &clouds, &shell->map);
     if (result == NEBEL_OK && !is_one) result = make_map(allocator, &desc->detail_map, &detail, &shell->detail);
-    desc->coverage_map = nb_layer_map_level(&shell->map, 0);
-    desc->detail_map = nb_layer_map_level(&shell->detail, 0);
+    desc->coverage_map = nb_planet_map_level(&shell->map, 0);
+    desc->detail_map = nb_planet_map_level(&shell->detail, 0);
     return result;
 }
 
@@ -198,7 +198,7 @@ static nebel_result make_maps(nebel_textured_planet *layers)
     const nebel_planet_map_desc ground = {
         .type = NEBEL_PLANET_MAP_GROUND, .seed = desc->seed, .coverage = desc->land_coverage};
     nebel_result result = make_map(&desc->allocator, &desc->color_map, &ground, &layers->ground);
-    desc->color_map = nb_layer_map_level(&layers->ground, 0);
+    desc->color_map = nb_planet_map_level(&layers->ground, 0);
     for (uint32_t i = 0; i < desc->cloud_shell_count && result == NEBEL_OK; i++)
         result = make_shell(&desc->allocator, &desc->cloud_shells[i], &layers->shells[i]);
     return result;
@@ -217,7 +217,7 @@ nebel_result nebel_create_textured_planet(const nebel_textured_planet_desc *desc
     made->desc = whole;
     made->desc.allocator = allocator;
     made->desc.log = (nebel_log){.write = NULL};
-    nb_vector_axes(whole.rotation, made->frame);
+    nb_quaternion_axes(whole.rotation, made->frame);
     result = make_maps(made);
     if (result == NEBEL_OK) {
         *layers = made;
@@ -231,10 +231,10 @@ void nebel_destroy_textured_planet(nebel_textured_planet *layers)
 {
     if (layers == NULL) return;
     const nebel_allocator allocator = layers->desc.allocator;
-    nb_layer_map_free(&allocator, &layers->ground);
+    nb_planet_map_free(&allocator, &layers->ground);
     for (uint32_t i = 0; i < NEBEL_MAX_CLOUD_SHELLS; i++) {
-        nb_layer_map_free(&allocator, &layers->shells[i].map);
-        nb_layer_map_free(&allocator, &layers->shells[i].detail);
+        nb_planet_map_free(&allocator, &layers->shells[i].map);
+        nb_planet_map_free(&allocator, &layers->shells[i].detail);
     }
     nb_release(&allocator, layers);
 }
@@ -264,7 +264,7 @@ nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *layers, const
     if (layers == NULL || map == NULL || map->texels == NULL || coarser == NULL) return NEBEL_ERROR_ARGUMENT;
     const nb_planet_map *const found = find_map(layers, map->texels);
     if (found == NULL || level >= (uint32_t)found->level_count) return NEBEL_ERROR_ARGUMENT;
-    *coarser = nb_layer_map_level(found, (int)level);
+    *coarser = nb_planet_map_level(found, (int)level);
     return NEBEL_OK;
 }
 
@@ -287,7 +287,7 @@ static double meet(const nb_shell_ray *s, double radius)
     const double square = radius * radius - s->aside;
     if (!(square >= 0)) return -1;
     const double half = sqrt(square), near = s->closest - half;
-    if (nb_vector_above_ball(s->far, radius) > 0) return s->closest > 0 ? fmax(0, near) : -1;
+    if (nb_height_above_sphere(s->far, radius) > 0) return s->closest > 0 ? fmax(0, near) : -1;
     return s->closest + half;
 }
 
@@ -326,7 +326,7 @@ static double read_map(const nb_planet_map *map, const nb_shell_sample *spot, do
 {
     double value = 0;
     const double texels = spot->level * fabs(wrap) * (double)map->width[0];
-    nb_layer_map_read(map, wrap * spot->u, wrap * spot->v, texels > 1 ? log2(texels) : 0, repeats, &value);
+    nb_planet_map_read(map, wrap * spot->u, wrap * spot->v, texels > 1 ? log2(texels) : 0, repeats, &value);
     return value;
 }
 
@@ -358,7 +358,7 @@ static void add_ground(const nb_shell_ray *s, double t, nebel_shell_hits *hits)
     const double texels = spot.level * (double)map->width[0];
     nebel_shell_hit hit = {.t = t, .opacity = 1, .is_ground = 1};
     double color[3];
-    nb_layer_map_read(map, spot.u, spot.v, texels > 1 ? log2(texels) : 0, 0, color);
+    nb_planet_map_read(map, spot.u, spot.v, texels > 1 ? log2(texels) : 0, 0, color);
     reflect(s, spot.sun, color, 1, hit.radiance);
     insert(hits, &hit);
 }

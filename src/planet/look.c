@@ -8,17 +8,17 @@
 /* What is told at least, as a part of the brightest light in the table: rays that are short and steep share few rows. */
 #define LEAST_OFF 2e-4
 
-#define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = &nb_look_kernel_##suffix,
-static const nb_sky_view_kernel *const kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(KERNEL)};
+#define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = &nb_sky_view_kernel_##suffix,
+static const nb_sky_view_kernel *const kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(KERNEL)};
 
-const nb_sky_view_kernel *nb_look_choose(nebel_isa isa)
+const nb_sky_view_kernel *nb_sky_view_choose(nebel_isa isa)
 {
-    return kernels[nb_cpu_choose(isa)];
+    return kernels[nb_isa_select(isa)];
 }
 
 static nb_sky_view_table table_of(const nebel_sky_view *view)
 {
-    const nb_outlook *outlook = &view->outlook;
+    const nb_elevation_map *outlook = &view->outlook;
     nb_sky_view_table table = {.radius = outlook->radius,
                                .ground = outlook->ground,
                                .thickness = outlook->thickness,

@@ -9,7 +9,7 @@ enum { NB_VIEW_SIZE = 3 * NEBEL_MAX_COMPONENTS + 8 };
 
 /* A view in plain numbers: kernels have the structures of formulas in lanes. */
 typedef struct nb_sky_view_table {
-    double radius, ground, thickness, height, dip, ratio, horizon, half_arc; /* an nb_outlook */
+    double radius, ground, thickness, height, dip, ratio, horizon, half_arc; /* an nb_elevation_map */
     double up[3], ahead[3], aside[3], sun_cosine, sun_sine;
     int falling, rising, columns, levels, size, suns;
     const float *entries;
@@ -35,10 +35,10 @@ typedef struct nb_sky_view_kernel {
     void (*down)(const nb_sky_view_job *job);
 } nb_sky_view_kernel;
 
-extern const nb_sky_view_kernel nb_look_kernel_scalar, nb_look_kernel_sse2, nb_look_kernel_avx2, nb_look_kernel_avx512,
-    nb_look_kernel_neon;
+extern const nb_sky_view_kernel nb_sky_view_kernel_scalar, nb_sky_view_kernel_sse2, nb_sky_view_kernel_avx2,
+    nb_sky_view_kernel_avx512, nb_sky_view_kernel_neon;
 
 /* For DEFAULT that of the best one; NULL where this build or processor has not got it. */
-const nb_sky_view_kernel *nb_look_choose(nebel_isa isa);
+const nb_sky_view_kernel *nb_sky_view_choose(nebel_isa isa);
 
 #endif

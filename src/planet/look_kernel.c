@@ -103,24 +103,24 @@ static inline nb_real sun_along(const nb_sky_view_table *table, const nb_bearing
     return bound_cosine(b->up * nb_splat(table->sun_cosine) + b->ahead * nb_splat(table->sun_sine));
 }
 
-static inline nb_outlook outlook_of(const nb_sky_view_table *table)
+static inline nb_elevation_map outlook_of(const nb_sky_view_table *table)
 {
-    return (nb_outlook){.radius = nb_splat(table->radius),
-                        .ground = nb_splat(table->ground),
-                        .thickness = nb_splat(table->thickness),
-                        .height = nb_splat(table->height),
-                        .dip = nb_splat(table->dip),
-                        .ratio = nb_splat(table->ratio),
-                        .horizon = nb_splat(table->horizon),
-                        .half_arc = nb_splat(table->half_arc)};
+    return (nb_elevation_map){.radius = nb_splat(table->radius),
+                              .ground = nb_splat(table->ground),
+                              .thickness = nb_splat(table->thickness),
+                              .height = nb_splat(table->height),
+                              .dip = nb_splat(table->dip),
+                              .ratio = nb_splat(table->ratio),
+                              .horizon = nb_splat(table->horizon),
+                              .half_arc = nb_splat(table->half_arc)};
 }
 
-static inline nb_mask falls(const nb_outlook *outlook, const nb_bearings *b)
+static inline nb_mask falls(const nb_elevation_map *outlook, const nb_bearings *b)
 {
     return nb_above_horizon(*outlook, b->up, b->level) < NB_F(0.0);
 }
 
-static inline nb_reach reach_of(const nb_outlook *outlook, const nb_bearings *b)
+static inline nb_reach reach_of(const nb_elevation_map *outlook, const nb_bearings *b)
 {
     const nb_mask down = falls(outlook, b);
     if (nb_all(down)) return nb_falling_reach(*outlook, b->up, b->level);
@@ -162,7 +162,7 @@ static inline nb_real length_in(const nb_sky_view_job *job, nb_sky_view_part par
 static inline nb_sky_view_lookups looks_along(const nb_sky_view_job *job, nb_sky_view_part part)
 {
     const nb_sky_view_table *table = job->table;
-    const nb_outlook outlook = outlook_of(table);
+    const nb_elevation_map outlook = outlook_of(table);
     const nb_bearings b = bearings_of(job, part);
     const nb_reach reach = reach_of(&outlook, &b);
     nb_sky_view_lookups l;
@@ -373,7 +373,7 @@ static inline void store_hits(nb_sky_view_part part, nb_mask hits, nb_real x, fl
 }
 
 /* The way to the ground, HUGE_VAL where a ray does not meet it. */
-static inline nb_real way_down(const nb_outlook *outlook, const nb_bearings *b, nb_mask down)
+static inline nb_real way_down(const nb_elevation_map *outlook, const nb_bearings *b, nb_mask down)
 {
     if (!nb_any(down)) return nb_splat(HUGE_VAL);
     const nb_reach reach = nb_falling_reach(*outlook, b->up, b->level);
@@ -404,7 +404,7 @@ static void store_ground(const nb_sky_view_job *job, nb_sky_view_part part, cons
 
 static void look_down(const nb_sky_view_job *job)
 {
-    const nb_outlook outlook = outlook_of(job->table);
+    const nb_elevation_map outlook = outlook_of(job->table);
     for (size_t first = 0; first < job->count; first += NB_WIDTH) {
         const nb_sky_view_part part = part_from(job, first);
         const nb_bearings b = bearings_of(job, part);
@@ -415,4 +415,4 @@ static void look_down(const nb_sky_view_job *job)
     }
 }
 
-const nb_sky_view_kernel NB_SUFFIXED(nb_look_kernel_) = {look_along, look_down};
+const nb_sky_view_kernel NB_SUFFIXED(nb_sky_view_kernel_) = {look_along, look_down};

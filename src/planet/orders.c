@@ -15,7 +15,7 @@
 #define MOST_PART 0.9999
 
 /* Of a colour, for two rounds' gains: the mean of their product over all entries, in parts of the light there. */
-typedef double nb_products[NB_MOST_ROUNDS][NB_MOST_ROUNDS];
+typedef double nb_products[NB_MAX_ROUNDS][NB_MAX_ROUNDS];
 
 static double gain(const nb_scattering_table tables[], int round, size_t entry, int c)
 {
@@ -26,13 +26,15 @@ static void multiply(int count, const nb_scattering_table tables[], int c, nb_pr
 {
     double most = DBL_MIN;
     memset(products, 0, sizeof(nb_products));
-    for (size_t e = 0; e < nb_scatter_entries(tables); e++) most = fmax(most, tables[count].fields[e].moments[0][c]);
-    for (size_t e = 0; e < nb_scatter_entries(tables); e++) {
+    for (size_t e = 0; e < nb_scattering_table_entries(tables); e++)
+        most = fmax(most, tables[count].fields[e].moments[0][c]);
+    for (size_t e = 0; e < nb_scattering_table_entries(tables); e++) {
         const double all = tables[count].fields[e].moments[0][c] + DARK * most;
-        double parts[NB_MOST_ROUNDS];
+        double parts[NB_MAX_ROUNDS];
         for (int i = 0; i < count; i++) parts[i] = gain(tables, i, e, c) / all;
         for (int i = 0; i < count; i++)
-            for (int j = 0; j <= i; j++) products[i][j] += parts[i] * parts[j] / (double)nb_scatter_entries(tables);
+            for (int j = 0; j <= i; j++)
+                products[i][j] += parts[i] * parts[j] / (double)nb_scattering_table_entries(tables);
     }
     for (int i = 0; i < count; i++)
         for (int j = i + 1; j < count; j++) products[i][j] = products[j][i];
@@ -84,7 +86,7 @@ static void mix_field(int count, const nb_scattering_table tables[], size_t entr
                       nb_radiance_moments *all)
 {
     const nb_radiance_moments *last = &tables[count].fields[entry];
-    double numbers[NB_MOST_ROUNDS];
+    double numbers[NB_MAX_ROUNDS];
     for (int m = 0; m < NB_FIELD; m++) {
         for (int i = 0; i < count; i++) numbers[i] = tables[i + 1].fields[entry].moments[m][c];
         mix(count, numbers, weights, &all->moments[m][c]);
@@ -96,7 +98,7 @@ static void mix_field(int count, const nb_scattering_table tables[], size_t entr
 static void mix_ground(int count, const nb_scattering_table tables[], int sun, int c, const double weights[],
                        double *ground)
 {
-    double numbers[NB_MOST_ROUNDS];
+    double numbers[NB_MAX_ROUNDS];
     for (int i = 0; i < count; i++) numbers[i] = tables[i + 1].ground[sun][c];
     mix(count, numbers, weights, ground);
     if (!(*ground > 0.5 * numbers[count - 1])) *ground = numbers[count - 1];
@@ -107,13 +109,14 @@ double nb_orders_extrapolate(int count, const nb_scattering_table tables[], doub
     double missing = 0;
     for (int c = 0; c < 3; c++) {
         nb_products products;
-        double weights[NB_MOST_ROUNDS];
+        double weights[NB_MAX_ROUNDS];
         multiply(count, tables, c, products);
         const double left = find_weights(count, products, weights);
         const double last = products[count - 1][count - 1], before = products[count - 2][count - 2];
         if (before > 0) slowest[c] = fmin(MOST_PART, fmax(slowest[c], sqrt(last / before)));
         missing = fmax(missing, left * slowest[c] / (1 - slowest[c]));
-        for (size_t e = 0; e < nb_scatter_entries(all); e++) mix_field(count, tables, e, c, weights, &all->fields[e]);
+        for (size_t e = 0; e < nb_scattering_table_entries(all); e++)
+            mix_field(count, tables, e, c, weights, &all->fields[e]);
         for (int s = 0; s < all->suns; s++) mix_ground(count, tables, s, c, weights, &all->ground[s][c]);
     }
     return missing;

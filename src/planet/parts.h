@@ -9,7 +9,8 @@ typedef struct nb_parallel {
     void *user;
 } nb_parallel;
 
-static inline void nb_parts_run(const nb_parallel *parts, size_t count, void (*part)(void *data, size_t i), void *data)
+static inline void nb_parallel_for(const nb_parallel *parts, size_t count, void (*part)(void *data, size_t i),
+                                   void *data)
 {
     if (parts->run != NULL) {
         parts->run(count, part, data, parts->user);

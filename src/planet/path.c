@@ -7,7 +7,7 @@
 
 #include "formulas/elementary.inc"
 
-enum { MOST_ENDS = 2 * NB_MOST_SHELLS + 3 + NB_PATH_CUTS };
+enum { MOST_ENDS = 2 * NB_MAX_SHELLS + 3 + NB_PATH_CUTS };
 
 typedef struct nb_quadrature_ends {
     int count;
@@ -30,8 +30,8 @@ static void find_ends(const nb_air_components *airs, nb_atmosphere_ray track, do
     ends->at[ends->count++] = 0;
     add_end(ends, length, -track.rise);
     for (int i = 0; i < airs->shell_count; i++) {
-        add_end(ends, length, nb_track_enter(track, airs->shells[i]));
-        add_end(ends, length, nb_track_leave(track, airs->shells[i]));
+        add_end(ends, length, nb_atmosphere_ray_enter(track, airs->shells[i]));
+        add_end(ends, length, nb_atmosphere_ray_leave(track, airs->shells[i]));
     }
     for (int i = 0; i < cut_count; i++) add_end(ends, length, cuts[i]);
     ends->at[ends->count++] = length;
@@ -41,7 +41,7 @@ static void set_node(const nb_air_components *airs, nb_atmosphere_ray track, dou
                      nb_ray_nodes *path, int i)
 {
     path->s[i] = s;
-    path->radius[i] = nb_track_ahead(track, s).radius;
+    path->radius[i] = nb_atmosphere_ray_ahead(track, s).radius;
     path->weight[i] = weight;
     for (int k = 0; k < airs->count; k++)
         path->density[k][i] = nb_air_density(&airs->airs[k], path->radius[i] - airs->radius);
@@ -69,7 +69,7 @@ static double extinction_at(const nb_air_components *airs, const nb_ray_nodes *p
 static void lose_light(const nb_air_components *airs, const nb_gauss_rule *rule, double half, const nb_ray_nodes *path,
                        int c, double *depth, double left[])
 {
-    double extinction[NB_RULE_MOST], whole = 0;
+    double extinction[NB_MAX_RULE], whole = 0;
     for (int i = 0; i < rule->count; i++) extinction[i] = extinction_at(airs, path, path->count + i, c);
     for (int i = 0; i < rule->count; i++) {
         double before = 0;
@@ -151,8 +151,8 @@ static void add_start(const nb_air_components *airs, nb_atmosphere_ray track, nb
     } while (++i % NB_PATH_LANES > 0);
 }
 
-void nb_path_lay(const nb_air_components *airs, const nb_air_components *smooth, const nb_gauss_rule *rule,
-                 nb_atmosphere_ray track, double length, int cut_count, const double cuts[], nb_ray_nodes *path)
+void nb_ray_nodes_lay(const nb_air_components *airs, const nb_air_components *smooth, const nb_gauss_rule *rule,
+                      nb_atmosphere_ray track, double length, int cut_count, const double cuts[], nb_ray_nodes *path)
 {
     const nb_medium medium = {airs, smooth, rule};
     nb_quadrature_ends ends;

@@ -1,4 +1,4 @@
-/* Light that forward peaks of phase functions turn: it goes nearly straight on, and smooth air (nb_airs_smooth) lets it pass. */
+/* Light that forward peaks of phase functions turn: it goes nearly straight on, and smooth air (nb_air_components_smooth) lets it pass. */
 #ifndef NB_PLANET_PEAKS_H
 #define NB_PLANET_PEAKS_H
 

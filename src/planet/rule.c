@@ -31,10 +31,10 @@ static double find_node(int count, int index, double values[])
 
 /* The integral up to a node: of the polynomial through the nodes, which is a sum of Legendre's, whose integrals are
  * (P_k+1 - P_k-1) / (2 k + 1). */
-nb_gauss_rule nb_rule_make(int count)
+nb_gauss_rule nb_gauss_rule_make(int count)
 {
     nb_gauss_rule rule = {.count = count};
-    double values[NB_RULE_MOST][NB_RULE_MOST + 1];
+    double values[NB_MAX_RULE][NB_MAX_RULE + 1];
     for (int i = 0; i < count; i++) {
         const double x = rule.nodes[i] = find_node(count, i, values[i]), s = slope(count, x, values[i]);
         rule.weights[i] = 2 / ((1 - x * x) * s * s);

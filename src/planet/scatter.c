@@ -45,8 +45,8 @@ static double sun_at(const nb_scattering_table *scatter, int i)
     return copysign(1 - left * left, place);
 }
 
-nb_radiance_moments nb_scatter_look_up(const nb_scattering_table *scatter, const nb_air_components *airs, double radius,
-                                       double sun)
+nb_radiance_moments nb_scattering_table_look_up(const nb_scattering_table *scatter, const nb_air_components *airs,
+                                                double radius, double sun)
 {
     const nb_moment_samples spots = nb_spots_of(scatter, airs, radius, sun);
     nb_radiance_moments field;
@@ -58,7 +58,7 @@ nb_radiance_moments nb_scatter_look_up(const nb_scattering_table *scatter, const
     return field;
 }
 
-void nb_scatter_look_up_ground(const nb_scattering_table *scatter, double sun, double irradiance[3])
+void nb_scattering_table_look_up_ground(const nb_scattering_table *scatter, double sun, double irradiance[3])
 {
     const nb_moment_interval s = nb_between_suns(scatter, sun);
     const double *a = scatter->ground[(int)s.first], *b = a + 3;
@@ -127,7 +127,7 @@ static void seal(const nb_scattering_table *table, nb_scattering_table *sealed)
 static void darken(nb_scattering_table *sealed)
 {
     for (int c = 0; c < 3; c++) {
-        for (size_t i = 0; i < nb_scatter_entries(sealed); i++) sealed->fields[i].moments[0][c] = to_power(0);
+        for (size_t i = 0; i < nb_scattering_table_entries(sealed); i++) sealed->fields[i].moments[0][c] = to_power(0);
         for (int i = 0; i < sealed->suns; i++) sealed->ground[i][c] = to_power(0);
     }
 }
@@ -240,10 +240,10 @@ static void gather_ground(const nb_direction_fan *fan, nb_moment_basis aspect, d
     const double sun = (fan->track.radius * aspect.height_of_sun + fan->end * aspect.sun) / airs->radius;
     double irradiance[3];
     if (maker->first) {
-        nb_track_sunlight(airs, (nb_atmosphere_ray){airs->radius, airs->radius * sun}, irradiance);
+        nb_atmosphere_ray_sunlight(airs, (nb_atmosphere_ray){airs->radius, airs->radius * sun}, irradiance);
         for (int c = 0; c < 3; c++) irradiance[c] *= fmax(0, sun);
     } else {
-        nb_scatter_look_up_ground(maker->sealed, sun, irradiance);
+        nb_scattering_table_look_up_ground(maker->sealed, sun, irradiance);
     }
     for (int c = 0; c < 3; c++) light[c] += fan->path.left[c] * maker->albedo[c] / PI * irradiance[c];
 }
@@ -265,10 +265,10 @@ static void add_slope(const nb_table_builder *maker, int height, double zenith, 
     nb_direction_fan fan;
     fan.maker = maker;
     fan.track = (nb_atmosphere_ray){radius, radius * zenith};
-    const double ground = nb_track_enter(fan.track, airs->radius), level = sqrt(fmax(0, 1 - zenith * zenith));
+    const double ground = nb_atmosphere_ray_enter(fan.track, airs->radius), level = sqrt(fmax(0, 1 - zenith * zenith));
     fan.hits_ground = ground < HUGE_VAL;
-    fan.end = fan.hits_ground ? ground : nb_track_leave(fan.track, airs->top);
-    nb_path_lay(airs, NULL, &maker->nodes, fan.track, fan.end, 0, NULL, &fan.path);
+    fan.end = fan.hits_ground ? ground : nb_atmosphere_ray_leave(fan.track, airs->top);
+    nb_ray_nodes_lay(airs, NULL, &maker->nodes, fan.track, fan.end, 0, NULL, &fan.path);
     for (int i = 0; i < effort->suns; i++) {
         const double sun = sun_at(maker->next, i), side = sqrt(fmax(0, 1 - sun * sun));
         for (int k = 0; k < effort->turns; k++) {
@@ -277,7 +277,7 @@ static void add_slope(const nb_table_builder *maker, int height, double zenith, 
             double light[3];
             gather(&fan, aspect, light);
             for (int c = 0; c < 3; c++) light[c] *= weight * 2 * PI / effort->turns;
-            nb_field_add(&maker->next->fields[height * effort->suns + i], effort->moments, aspect, light);
+            nb_radiance_moments_add(&maker->next->fields[height * effort->suns + i], effort->moments, aspect, light);
             if (height == 0 && zenith > 0)
                 for (int c = 0; c < 3; c++) maker->next->ground[i][c] += zenith * light[c];
         }
@@ -302,7 +302,7 @@ static void add_height(void *data, size_t height)
 static double deepest(const nb_air_components *airs)
 {
     double depth[3] = {0, 0, 0};
-    nb_track_depth(airs, (nb_atmosphere_ray){airs->radius, airs->radius}, airs->top - airs->radius, depth);
+    nb_atmosphere_ray_depth(airs, (nb_atmosphere_ray){airs->radius, airs->radius}, airs->top - airs->radius, depth);
     return fmax(depth[0], fmax(depth[1], depth[2]));
 }
 
@@ -331,7 +331,7 @@ static double find_unresolved(const nb_air_components *airs, const nb_scattering
     for (int i = 1; i < scatter->heights; i++) {
         const double low = height_at(scatter, airs, i - 1), high = height_at(scatter, airs, i);
         double depth[3], ends[2][3];
-        nb_track_depth(airs, (nb_atmosphere_ray){airs->radius + low, airs->radius + low}, high - low, depth);
+        nb_atmosphere_ray_depth(airs, (nb_atmosphere_ray){airs->radius + low, airs->radius + low}, high - low, depth);
         extinction_at(airs, low, ends[0]);
         extinction_at(airs, high, ends[1]);
         for (int c = 0; c < 3; c++) {
@@ -357,12 +357,12 @@ static nebel_result allocate(const nebel_allocator *allocator, const nb_scatteri
                              nb_scattering_table *scatter)
 {
     *scatter = *layout;
-    scatter->fields = nb_allocate_zero(allocator, nb_scatter_entries(scatter), sizeof *scatter->fields);
+    scatter->fields = nb_allocate_zero(allocator, nb_scattering_table_entries(scatter), sizeof *scatter->fields);
     scatter->ground = nb_allocate_zero(allocator, (size_t)scatter->suns, sizeof *scatter->ground);
     return scatter->fields != NULL && scatter->ground != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
 }
 
-void nb_scatter_free(const nebel_allocator *allocator, nb_scattering_table *scatter)
+void nb_scattering_table_free(const nebel_allocator *allocator, nb_scattering_table *scatter)
 {
     nb_release(allocator, scatter->fields);
     nb_release(allocator, scatter->ground);
@@ -370,13 +370,13 @@ void nb_scatter_free(const nebel_allocator *allocator, nb_scattering_table *scat
 
 static void copy(const nb_scattering_table *from, nb_scattering_table *to)
 {
-    memcpy(to->fields, from->fields, nb_scatter_entries(from) * sizeof *from->fields);
+    memcpy(to->fields, from->fields, nb_scattering_table_entries(from) * sizeof *from->fields);
     memcpy(to->ground, from->ground, (size_t)from->suns * sizeof *from->ground);
 }
 
 static void add(const nb_scattering_table *more, nb_scattering_table *sum)
 {
-    for (size_t i = 0; i < nb_scatter_entries(sum); i++)
+    for (size_t i = 0; i < nb_scattering_table_entries(sum); i++)
         for (int m = 0; m < NB_FIELD; m++)
             for (int c = 0; c < 3; c++) sum->fields[i].moments[m][c] += more->fields[i].moments[m][c];
     for (int i = 0; i < sum->suns; i++)
@@ -385,7 +385,7 @@ static void add(const nb_scattering_table *more, nb_scattering_table *sum)
 
 static void clear(nb_scattering_table *scatter)
 {
-    memset(scatter->fields, 0, nb_scatter_entries(scatter) * sizeof *scatter->fields);
+    memset(scatter->fields, 0, nb_scattering_table_entries(scatter) * sizeof *scatter->fields);
     memset(scatter->ground, 0, (size_t)scatter->suns * sizeof *scatter->ground);
 }
 
@@ -393,7 +393,7 @@ static void clear(nb_scattering_table *scatter)
 
 /* Tables of a cycle of rounds, one behind the other, the first of which is what it begins with. */
 typedef struct nb_scattering_rounds {
-    nb_scattering_table once, sum, tables[NB_MOST_ROUNDS + 1];
+    nb_scattering_table once, sum, tables[NB_MAX_ROUNDS + 1];
     double slowest[3]; /* by nb_orders_extrapolate */
 } nb_scattering_rounds;
 
@@ -403,7 +403,7 @@ static void scatter_again(nb_table_builder *maker, const nb_parallel *parts, int
     maker->first = first;
     maker->next = made;
     clear(made);
-    nb_parts_run(parts, (size_t)made->heights, add_height, maker);
+    nb_parallel_for(parts, (size_t)made->heights, add_height, maker);
 }
 
 /* Rounds from the first table on, until little may be missing or so many are done. Returns how many those are. */
@@ -412,7 +412,7 @@ static int run_cycle(nb_table_builder *maker, const nb_parallel *parts, nb_scatt
     const nb_table_resolution *effort = maker->effort;
     nb_scattering_table *sum = &rounds->sum;
     sum->missing = HUGE_VAL;
-    for (int i = 0; i < NB_MOST_ROUNDS && sum->missing > effort->most_missing; i++, done++) {
+    for (int i = 0; i < NB_MAX_ROUNDS && sum->missing > effort->most_missing; i++, done++) {
         nb_scattering_table *next = &rounds->tables[i + 1];
         if (done > 0) {
             seal(&rounds->tables[i], maker->sealed);
@@ -448,8 +448,8 @@ static void add_turned(const nb_air_components *airs, const nb_air_components *s
         const double sun = sun_at(scatter, i);
         const nb_atmosphere_ray track = {airs->radius, airs->radius * sun};
         double straight[3], ahead[3];
-        nb_track_sunlight(airs, track, straight);
-        nb_track_sunlight(smooth, track, ahead);
+        nb_atmosphere_ray_sunlight(airs, track, straight);
+        nb_atmosphere_ray_sunlight(smooth, track, ahead);
         for (int c = 0; c < 3; c++)
             scatter->ground[i][c] = to_power(exp(scatter->ground[i][c]) + fmax(0, sun) * (ahead[c] - straight[c]));
     }
@@ -460,29 +460,30 @@ static nebel_result allocate_rounds(const nebel_allocator *allocator, const nb_s
 {
     nebel_result result = allocate(allocator, like, &rounds->once);
     if (result == NEBEL_OK) result = allocate(allocator, like, &rounds->sum);
-    for (int i = 0; i <= NB_MOST_ROUNDS && result == NEBEL_OK; i++)
+    for (int i = 0; i <= NB_MAX_ROUNDS && result == NEBEL_OK; i++)
         result = allocate(allocator, like, &rounds->tables[i]);
     return result;
 }
 
 static void free_rounds(const nebel_allocator *allocator, nb_scattering_rounds *rounds)
 {
-    nb_scatter_free(allocator, &rounds->once);
-    nb_scatter_free(allocator, &rounds->sum);
-    for (int i = 0; i <= NB_MOST_ROUNDS; i++) nb_scatter_free(allocator, &rounds->tables[i]);
+    nb_scattering_table_free(allocator, &rounds->once);
+    nb_scattering_table_free(allocator, &rounds->sum);
+    for (int i = 0; i <= NB_MAX_ROUNDS; i++) nb_scattering_table_free(allocator, &rounds->tables[i]);
 }
 
-nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parallel *parts, const nb_air_components *airs,
-                             const nb_air_components *smooth, nebel_atmosphere_quality quality, const double albedo[3],
-                             nb_scattering_table *scatter)
+nebel_result nb_scattering_table_make(const nebel_allocator *allocator, const nb_parallel *parts,
+                                      const nb_air_components *airs, const nb_air_components *smooth,
+                                      nebel_atmosphere_quality quality, const double albedo[3],
+                                      nb_scattering_table *scatter)
 {
     const nb_table_resolution *effort = &efforts[quality];
     nb_table_builder maker = {.airs = smooth,
                               .albedo = albedo,
                               .effort = effort,
                               .sealed = scatter,
-                              .slopes = nb_rule_make(effort->slopes),
-                              .nodes = nb_rule_make(effort->nodes),
+                              .slopes = nb_gauss_rule_make(effort->slopes),
+                              .nodes = nb_gauss_rule_make(effort->nodes),
                               .gather = nb_gather_choose(NEBEL_ISA_DEFAULT)};
     for (int k = 0; k < effort->turns; k++) maker.turn_cosines[k] = cos(PI * (k + 0.5) / effort->turns);
     const nb_scattering_table layout = layout_of(smooth, effort);
@@ -491,7 +492,7 @@ nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parallel
     fine.suns = FINE * (layout.suns - 1) + 1;
     nebel_result result = allocate(allocator, &fine, scatter);
     if (result != NEBEL_OK) return result;
-    if (nb_airs_are_empty(smooth)) {
+    if (nb_air_components_are_empty(smooth)) {
         darken(scatter);
         return NEBEL_OK;
     }

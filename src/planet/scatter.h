@@ -17,19 +17,20 @@ typedef struct nb_scattering_table {
     double missing;      /* part of it that may not have been scattered often enough, or lie between entries */
 } nb_scattering_table;
 
-static inline size_t nb_scatter_entries(const nb_scattering_table *scatter)
+static inline size_t nb_scattering_table_entries(const nb_scattering_table *scatter)
 {
     return (size_t)scatter->heights * (size_t)scatter->suns;
 }
 
-nb_radiance_moments nb_scatter_look_up(const nb_scattering_table *scatter, const nb_air_components *airs, double radius,
-                                       double sun);
-void nb_scatter_look_up_ground(const nb_scattering_table *scatter, double sun, double irradiance[3]);
+nb_radiance_moments nb_scattering_table_look_up(const nb_scattering_table *scatter, const nb_air_components *airs,
+                                                double radius, double sun);
+void nb_scattering_table_look_up_ground(const nb_scattering_table *scatter, double sun, double irradiance[3]);
 
-/* Makes the table; `albedo` is the ground's; smooth: nb_airs_smooth of the airs. Errors: MEMORY. */
-nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parallel *parts, const nb_air_components *airs,
-                             const nb_air_components *smooth, nebel_atmosphere_quality quality, const double albedo[3],
-                             nb_scattering_table *scatter);
-void nb_scatter_free(const nebel_allocator *allocator, nb_scattering_table *scatter);
+/* Makes the table; `albedo` is the ground's; smooth: nb_air_components_smooth of the airs. Errors: MEMORY. */
+nebel_result nb_scattering_table_make(const nebel_allocator *allocator, const nb_parallel *parts,
+                                      const nb_air_components *airs, const nb_air_components *smooth,
+                                      nebel_atmosphere_quality quality, const double albedo[3],
+                                      nb_scattering_table *scatter);
+void nb_scattering_table_free(const nebel_allocator *allocator, nb_scattering_table *scatter);
 
 #endif

@@ -90,11 +90,11 @@ static void find_ground(const nebel_atmosphere *atmosphere, nb_atmosphere_ray tr
 {
     const nb_air_components *airs = &atmosphere->airs;
     for (int c = 0; c < 3; c++) light[c] = 0;
-    if (nb_track_ahead(track, way).radius > 0.5 * (airs->radius + airs->top)) return;
+    if (nb_atmosphere_ray_ahead(track, way).radius > 0.5 * (airs->radius + airs->top)) return;
     const double sun = fmax(-1, fmin(1, (track.radius * aspect.height_of_sun + way * aspect.sun) / airs->radius));
     double sky[3], straight[3];
-    nb_scatter_look_up_ground(&atmosphere->scatter, sun, sky);
-    nb_track_sunlight(airs, (nb_atmosphere_ray){airs->radius, airs->radius * sun}, straight);
+    nb_scattering_table_look_up_ground(&atmosphere->scatter, sun, sky);
+    nb_atmosphere_ray_sunlight(airs, (nb_atmosphere_ray){airs->radius, airs->radius * sun}, straight);
     for (int c = 0; c < 3; c++)
         light[c] = path->end_smooth[c][path->ends - 1] * atmosphere->ground_albedo[c] / PI *
                    (sky[c] + fmax(0, sun) * straight[c]);
@@ -232,8 +232,8 @@ nb_in_scattered nb_gather(const nebel_atmosphere *atmosphere, const nb_gauss_rul
     nb_ray_nodes path;
     nb_find_shadow(&atmosphere->airs, track, aspect, cuts);
     memcpy(cuts + 2, ends, (size_t)count * sizeof *ends);
-    nb_path_lay(&atmosphere->airs, nb_atmosphere_smooth(atmosphere), rule, track, ends[count - 1], 2 + count, cuts,
-                &path);
+    nb_ray_nodes_lay(&atmosphere->airs, nb_atmosphere_smooth(atmosphere), rule, track, ends[count - 1], 2 + count, cuts,
+                     &path);
     return nb_gather_path(atmosphere, track, aspect, &path, count, ends, gathered);
 }
 
@@ -317,7 +317,8 @@ static nb_inside find_inside(const nebel_atmosphere *atmosphere, const double st
         inside.track = (nb_atmosphere_ray){airs->top, -half};
     }
     inside.height_of_sun = bound_cosine(nb_vector_dot(from, sun) / inside.track.radius);
-    inside.end = fmin(nb_track_enter(inside.track, airs->radius), nb_track_leave(inside.track, airs->top));
+    inside.end =
+        fmin(nb_atmosphere_ray_enter(inside.track, airs->radius), nb_atmosphere_ray_leave(inside.track, airs->top));
     inside.length = fmax(0, fmin(left, inside.end));
     return inside;
 }
@@ -331,7 +332,7 @@ static void trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, cons
     const nb_inside inside = find_inside(atmosphere, ray->origin, unit, ray->t_max, sun->direction);
     if (!(inside.length > 0)) return;
     double depth[3];
-    nb_track_depth(&atmosphere->airs, inside.track, inside.length, depth);
+    nb_atmosphere_ray_depth(&atmosphere->airs, inside.track, inside.length, depth);
     for (int c = 0; c < 3; c++) transfer->transmittance[c] = nb_exp(-depth[c]);
     transfer->error = NB_LIGHT_ROUNDING;
     if (!(fmax(sun->irradiance[0], fmax(sun->irradiance[1], sun->irradiance[2])) > 0)) return;
@@ -390,9 +391,9 @@ static void light_place(const nebel_atmosphere *atmosphere, const nebel_sun *sun
     if (inside.track.radius > atmosphere->airs.top)
         light->sun[0] = light->sun[1] = light->sun[2] = 1;
     else
-        nb_track_sunlight(&atmosphere->airs, inside.track, light->sun);
-    nb_scatter_look_up_ground(&atmosphere->scatter, bound_cosine(nb_vector_dot(from, sun->direction) / radius),
-                              light->sky);
+        nb_atmosphere_ray_sunlight(&atmosphere->airs, inside.track, light->sun);
+    nb_scattering_table_look_up_ground(&atmosphere->scatter, bound_cosine(nb_vector_dot(from, sun->direction) / radius),
+                                       light->sky);
     for (int c = 0; c < 3; c++) {
         light->sun[c] *= sun->irradiance[c];
         light->sky[c] *= sun->irradiance[c];

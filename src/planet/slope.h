@@ -13,7 +13,7 @@
 #include "formulas/planet.inc"
 
 /* `radius` is at least the ground's. */
-nb_outlook nb_outlook_make(const nb_air_components *airs, double radius);
+nb_elevation_map nb_elevation_map_make(const nb_air_components *airs, double radius);
 
 /* Cosine and sine of the angle to the zenith. */
 typedef struct nb_view_elevation {
@@ -21,6 +21,6 @@ typedef struct nb_view_elevation {
 } nb_view_elevation;
 
 /* The slope of a row, with its reach. */
-nb_view_elevation nb_outlook_slope(const nb_outlook *outlook, int falls, double row, nb_reach *reach);
+nb_view_elevation nb_elevation_map_slope(const nb_elevation_map *outlook, int falls, double row, nb_reach *reach);
 
 #endif

@@ -20,8 +20,8 @@ enum { NODES = 4 }; /* of a piece of a ray: pieces are many */
 /* Rows may be asked for between those of the table. */
 static nb_view_elevation row_slope(const nebel_sky_view *view, double row, nb_reach *reach)
 {
-    if (row < NB_VIEW_FALLING) return nb_outlook_slope(&view->outlook, 1, row / (NB_VIEW_FALLING - 1.0), reach);
-    return nb_outlook_slope(&view->outlook, 0, (row - NB_VIEW_FALLING) / (NB_VIEW_RISING - 1.0), reach);
+    if (row < NB_VIEW_FALLING) return nb_elevation_map_slope(&view->outlook, 1, row / (NB_VIEW_FALLING - 1.0), reach);
+    return nb_elevation_map_slope(&view->outlook, 0, (row - NB_VIEW_FALLING) / (NB_VIEW_RISING - 1.0), reach);
 }
 
 /* ---- making ---------------------------------------------------------------------------------- */
@@ -102,7 +102,7 @@ static void fill_extinction(nebel_sky_view *view, int row, nb_atmosphere_ray tra
         double *extinction = nb_view_extinction(view, row, level);
         for (int c = 0; c < 3; c++) extinction[c] = nb_view_extinction(view, row, 0)[c];
         if (!(way > 0)) continue;
-        nb_track_depth(airs, track, way, extinction);
+        nb_atmosphere_ray_depth(airs, track, way, extinction);
         for (int c = 0; c < 3; c++) extinction[c] /= way;
     }
 }
@@ -120,8 +120,8 @@ static void set_row(const nebel_sky_view *view, double number, double before, nb
             row->reach.span * nb_level_end(row->reach.dense, row->reach.soft, (level + 1 - before) / view->levels);
     if (before > 0)
         row->ends[0] = 0.5 * row->reach.span * nb_level_end(row->reach.dense, row->reach.soft, 1.0 / view->levels);
-    nb_path_lay(airs, nb_atmosphere_smooth(view->atmosphere), &view->rule, row->track, row->reach.span, view->levels,
-                row->ends, &row->path);
+    nb_ray_nodes_lay(airs, nb_atmosphere_smooth(view->atmosphere), &view->rule, row->track, row->reach.span,
+                     view->levels, row->ends, &row->path);
 }
 
 static void fill_row(void *data, size_t number)
@@ -163,7 +163,7 @@ static int first_level(const nebel_sky_view *view, int cell)
 static double missed_extinction(nebel_sky_view *view, int number, const nb_row *row, int cell)
 {
     double depth[3] = {0, 0, 0}, most = 0;
-    nb_track_depth(&view->atmosphere->airs, row->track, row->ends[cell], depth);
+    nb_atmosphere_ray_depth(&view->atmosphere->airs, row->track, row->ends[cell], depth);
     for (int c = 0; c < 3; c++) {
         double sum = 0;
         for (int i = 0; i < 2; i++)
@@ -292,8 +292,8 @@ static void estimate_row(void *data, size_t number)
 static void estimate(nebel_sky_view *view, const nb_parallel *parts)
 {
     nb_estimates estimates = {.view = view};
-    nb_parts_run(parts, NB_VIEW_ROWS, measure_row, &estimates);
-    nb_parts_run(parts, NB_VIEW_ROWS, estimate_row, &estimates);
+    nb_parallel_for(parts, NB_VIEW_ROWS, measure_row, &estimates);
+    nb_parallel_for(parts, NB_VIEW_ROWS, estimate_row, &estimates);
 }
 
 static void set_sunlight(nebel_sky_view *view)
@@ -301,7 +301,8 @@ static void set_sunlight(nebel_sky_view *view)
     const nb_air_components *airs = &view->atmosphere->airs;
     for (int i = 0; i < NB_VIEW_SUNS; i++) {
         const double root = i / (NB_VIEW_SUNS - 1.0);
-        nb_track_sunlight(airs, (nb_atmosphere_ray){airs->radius, airs->radius * root * root}, view->sunlight[i]);
+        nb_atmosphere_ray_sunlight(airs, (nb_atmosphere_ray){airs->radius, airs->radius * root * root},
+                                   view->sunlight[i]);
     }
 }
 
@@ -349,7 +350,7 @@ static nebel_result allocate(nebel_sky_view *view)
 /* From space day and night are seen at once, and so they are in air that is deep for the planet. */
 static int sees_day_and_night(const nebel_sky_view *view)
 {
-    const nb_outlook *outlook = &view->outlook;
+    const nb_elevation_map *outlook = &view->outlook;
     return outlook->height > outlook->thickness || outlook->thickness > 0.1 * view->atmosphere->airs.radius;
 }
 
@@ -365,10 +366,10 @@ static void set_up(nebel_sky_view *view, const nebel_sky_view_desc *desc)
     double place[3];
     nb_air_from_center(atmosphere, desc->position, place);
     set_axes(view, place);
-    view->outlook = nb_outlook_make(&atmosphere->airs, fmax(atmosphere->airs.radius, nb_vector_length(place)));
+    view->outlook = nb_elevation_map_make(&atmosphere->airs, fmax(atmosphere->airs.radius, nb_vector_length(place)));
     view->columns = sees_day_and_night(view) ? NB_VIEW_MORE_COLUMNS : NB_VIEW_COLUMNS;
     view->levels = !desc->has_ray_ends ? 1 : is_high(view) ? NB_VIEW_MORE_LEVELS : NB_VIEW_LEVELS;
-    view->rule = nb_rule_make(desc->has_ray_ends ? NODES : NB_RULE_MOST);
+    view->rule = nb_gauss_rule_make(desc->has_ray_ends ? NODES : NB_MAX_RULE);
     for (int k = 0; k < atmosphere->airs.count; k++) {
         const double *scattering = atmosphere->airs.airs[k].scattering;
         if (scattering[0] + scattering[1] + scattering[2] > 0) view->scatterers[view->scatterer_count++] = k;
@@ -395,15 +396,15 @@ nebel_result nebel_create_sky_view(const nebel_sky_view_desc *desc, nebel_sky_vi
     made->allocator = allocator;
     made->atmosphere = desc->atmosphere;
     made->sun = sun;
-    made->look = nb_look_choose(NEBEL_ISA_DEFAULT);
+    made->look = nb_sky_view_choose(NEBEL_ISA_DEFAULT);
     set_up(made, desc);
     if (allocate(made) != NEBEL_OK) {
         nebel_destroy_sky_view(made);
         return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "air: out of memory");
     }
     const nb_parallel parts = {desc->run, desc->run_user};
-    if (!nb_airs_are_empty(&made->atmosphere->airs)) {
-        nb_parts_run(&parts, NB_VIEW_ROWS, fill_row, made);
+    if (!nb_air_components_are_empty(&made->atmosphere->airs)) {
+        nb_parallel_for(&parts, NB_VIEW_ROWS, fill_row, made);
         estimate(made, &parts);
         made->brightest = brightest_of(made);
     }

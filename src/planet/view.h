@@ -21,7 +21,7 @@ struct nebel_sky_view {
     nebel_allocator allocator;
     const nebel_atmosphere *atmosphere;
     nebel_sun sun;
-    nb_outlook outlook;
+    nb_elevation_map outlook;
     double up[3], ahead[3], aside[3]; /* ahead: level, towards the sun */
     nb_view_elevation sun_slope;
     int columns;

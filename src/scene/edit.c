@@ -9,7 +9,7 @@ enum { NB_EDIT_MEMBERS = 32 };
 
 /* ---- pieces ---------------------------------------------------------------------------------- */
 
-void nb_edit_put(nb_edit *edit, size_t offset, size_t size, const char *words)
+void nb_json_patch_put(nb_edit *edit, size_t offset, size_t size, const char *words)
 {
     void *pieces = edit->pieces;
     char *copy = nb_arena_copy_text(&edit->arena, words, strlen(words));
@@ -19,7 +19,7 @@ void nb_edit_put(nb_edit *edit, size_t offset, size_t size, const char *words)
         return;
     }
     edit->pieces = pieces;
-    edit->pieces[edit->count++] = (nb_edit_piece){offset, size, copy};
+    edit->pieces[edit->count++] = (nb_json_patch_piece){offset, size, copy};
 }
 
 /* By place, and by age where several are added at one place, which qsort would not keep. There are few pieces, and most
@@ -28,7 +28,7 @@ static void sort_pieces(nb_edit *edit)
 {
     for (size_t i = 1; i < edit->count; i++)
         for (size_t k = i; k > 0 && edit->pieces[k - 1].offset > edit->pieces[k].offset; k--) {
-            const nb_edit_piece later = edit->pieces[k - 1];
+            const nb_json_patch_piece later = edit->pieces[k - 1];
             edit->pieces[k - 1] = edit->pieces[k];
             edit->pieces[k] = later;
         }
@@ -39,14 +39,14 @@ static bool append(const nb_edit *edit, nb_bytes *bytes, const char *words, size
     return nb_bytes_write(&edit->arena.allocator, bytes, bytes->size, words, size);
 }
 
-bool nb_edit_apply(nb_edit *edit, nb_bytes *bytes)
+bool nb_json_patch_apply(nb_edit *edit, nb_bytes *bytes)
 {
     size_t at = 0;
     *bytes = (nb_bytes){0};
     sort_pieces(edit);
     bool good = !edit->out_of_memory;
     for (size_t i = 0; i < edit->count && good; i++) {
-        const nb_edit_piece *piece = &edit->pieces[i];
+        const nb_json_patch_piece *piece = &edit->pieces[i];
         good = append(edit, bytes, edit->text + at, piece->offset - at) &&
                append(edit, bytes, piece->words, strlen(piece->words));
         at = piece->offset + piece->size;
@@ -56,7 +56,7 @@ bool nb_edit_apply(nb_edit *edit, nb_bytes *bytes)
     return false;
 }
 
-void nb_edit_release(nb_edit *edit)
+void nb_json_patch_release(nb_edit *edit)
 {
     nb_release(&edit->arena.allocator, edit->pieces);
     nb_arena_release(&edit->arena);
@@ -74,7 +74,7 @@ static int write_number(double number, char *text, size_t size)
     return length;
 }
 
-void nb_edit_write_numbers(size_t count, const double *numbers, nb_edit_style style, char *text)
+void nb_json_patch_write_numbers(size_t count, const double *numbers, nb_json_patch_style style, char *text)
 {
     const size_t size = NB_EDIT_NUMBERS;
     bool is_one = count == 1;
@@ -91,12 +91,12 @@ void nb_edit_write_numbers(size_t count, const double *numbers, nb_edit_style st
     snprintf(text + used, size - used, "]");
 }
 
-void nb_edit_replace(nb_edit *edit, const nb_json_node *node, const char *value)
+void nb_json_patch_replace(nb_edit *edit, const nb_json_node *node, const char *value)
 {
-    nb_edit_put(edit, node->offset, node->end - node->offset, value);
+    nb_json_patch_put(edit, node->offset, node->end - node->offset, value);
 }
 
-const nb_json_node *nb_edit_member(const nb_json *json, const nb_json_node *object, const char *key)
+const nb_json_node *nb_json_patch_member(const nb_json *json, const nb_json_node *object, const char *key)
 {
     if (object == NULL || object->type != NB_JSON_OBJECT) return NULL;
     const nb_json_node *node = nb_json_first(json, object);
@@ -104,9 +104,9 @@ const nb_json_node *nb_edit_member(const nb_json *json, const nb_json_node *obje
     return node;
 }
 
-nb_edit_object nb_edit_find(const nb_json *json, const nb_json_node *object)
+nb_json_patch_object nb_json_patch_find(const nb_json *json, const nb_json_node *object)
 {
-    nb_edit_object found = {.node = object};
+    nb_json_patch_object found = {.node = object};
     if (object == NULL) return found;
     for (const nb_json_node *node = nb_json_first(json, object); node != NULL; node = nb_json_next(json, node)) {
         found.last_key = node->key_offset;
@@ -151,7 +151,7 @@ NB_PRINTF(4, 5) static void put_words(nb_edit *edit, size_t offset, size_t size,
     char *words = length < 0 ? NULL : nb_allocate(&edit->arena.allocator, (size_t)length + 1, 1);
     if (words != NULL) {
         vsnprintf(words, (size_t)length + 1, format, again);
-        nb_edit_put(edit, offset, size, words);
+        nb_json_patch_put(edit, offset, size, words);
     } else {
         edit->out_of_memory = true;
     }
@@ -161,7 +161,7 @@ NB_PRINTF(4, 5) static void put_words(nb_edit *edit, size_t offset, size_t size,
 
 /* A new member stands behind the last one as that one's key stands behind what is before it: on a line of its own or on
  * the same. A remark stays with the value that it follows. */
-void nb_edit_add(nb_edit *edit, const nb_edit_object *object, const char *key, const char *value)
+void nb_json_patch_add(nb_edit *edit, const nb_json_patch_object *object, const char *key, const char *value)
 {
     char gap[64] = " ";
     size_t start = object->last_key;
@@ -171,7 +171,7 @@ void nb_edit_add(nb_edit *edit, const nb_edit_object *object, const char *key, c
     const size_t behind = skip_remark(edit, object->last_end);
     if (behind > object->last_end && strchr(gap, '\n') == NULL) strcpy(gap, "\n");
     const bool is_second = has_comma(edit, object->last_end);
-    if (!is_second) nb_edit_put(edit, object->last_end, 0, ",");
+    if (!is_second) nb_json_patch_put(edit, object->last_end, 0, ",");
     put_words(edit, behind, 0, "%s%s\"%s\": %s", is_second ? "," : "", gap, key, value);
 }
 
@@ -207,19 +207,19 @@ static bool is_all_blank(const nb_edit *edit, size_t from, size_t to)
 static void cut(nb_edit *edit, size_t from, size_t gap, size_t gap_end, size_t to)
 {
     if (is_all_blank(edit, gap, gap_end)) {
-        nb_edit_put(edit, from, to - from, "");
+        nb_json_patch_put(edit, from, to - from, "");
         return;
     }
-    nb_edit_put(edit, from, gap - from, "");
-    nb_edit_put(edit, gap_end, to - gap_end, "");
+    nb_json_patch_put(edit, from, gap - from, "");
+    nb_json_patch_put(edit, gap_end, to - gap_end, "");
 }
 
 /* Behind one that stays, the comma before it goes as well; otherwise the one behind it. */
-void nb_edit_remove(nb_edit *edit, const nb_edit_span *spans, size_t count)
+void nb_json_patch_remove(nb_edit *edit, const nb_json_patch_span *spans, size_t count)
 {
     bool has_kept = false;
     for (size_t i = 0; i < count; i++) {
-        const nb_edit_span *span = &spans[i];
+        const nb_json_patch_span *span = &spans[i];
         if (!span->goes) {
             has_kept = true;
         } else if (has_kept) {
@@ -229,7 +229,7 @@ void nb_edit_remove(nb_edit *edit, const nb_edit_span *spans, size_t count)
             const size_t comma = find_comma(edit, span->end), next = spans[i + 1].offset;
             cut(edit, span->offset, span->end, comma, is_all_blank(edit, comma + 1, next) ? next : comma + 1);
         } else {
-            nb_edit_put(edit, span->offset, span->end - span->offset, "");
+            nb_json_patch_put(edit, span->offset, span->end - span->offset, "");
         }
     }
 }
@@ -240,48 +240,49 @@ static bool is_among(const nb_json_node *node, const char *const *keys)
     return *keys != NULL;
 }
 
-void nb_edit_remove_members(nb_edit *edit, const nb_json *json, const nb_json_node *object, const char *const *keys)
+void nb_json_patch_remove_members(nb_edit *edit, const nb_json *json, const nb_json_node *object,
+                                  const char *const *keys)
 {
-    nb_edit_span spans[NB_EDIT_MEMBERS];
+    nb_json_patch_span spans[NB_EDIT_MEMBERS];
     size_t count = 0;
     for (const nb_json_node *node = nb_json_first(json, object); node != NULL && count < NB_EDIT_MEMBERS;
          node = nb_json_next(json, node))
-        spans[count++] = (nb_edit_span){node->key_offset, node->end, is_among(node, keys)};
-    nb_edit_remove(edit, spans, count);
+        spans[count++] = (nb_json_patch_span){node->key_offset, node->end, is_among(node, keys)};
+    nb_json_patch_remove(edit, spans, count);
 }
 
 /* ---- numbers --------------------------------------------------------------------------------- */
 
-void nb_edit_elements(nb_edit *edit, const nb_json *json, const nb_json_node *array, const double *was,
-                      const double *now)
+void nb_json_patch_elements(nb_edit *edit, const nb_json *json, const nb_json_node *array, const double *was,
+                            const double *now)
 {
     char text[NB_EDIT_NUMBERS];
     size_t i = 0;
     for (const nb_json_node *node = nb_json_first(json, array); node != NULL; node = nb_json_next(json, node), i++) {
         if (was[i] == now[i]) continue;
-        nb_edit_write_numbers(1, &now[i], NB_EDIT_EACH, text);
-        nb_edit_replace(edit, node, text);
+        nb_json_patch_write_numbers(1, &now[i], NB_EDIT_EACH, text);
+        nb_json_patch_replace(edit, node, text);
     }
 }
 
-void nb_edit_numbers(nb_edit *edit, const nb_json *json, const nb_edit_object *object, const char *key, size_t count,
-                     const double *was, const double *now, nb_edit_style style)
+void nb_json_patch_numbers(nb_edit *edit, const nb_json *json, const nb_json_patch_object *object, const char *key,
+                           size_t count, const double *was, const double *now, nb_json_patch_style style)
 {
     char text[NB_EDIT_NUMBERS];
     if (memcmp(was, now, count * sizeof *was) == 0) return;
-    const nb_json_node *node = nb_edit_member(json, object->node, key);
+    const nb_json_node *node = nb_json_patch_member(json, object->node, key);
     if (node != NULL && node->type == NB_JSON_ARRAY && node->count == count && style != NB_EDIT_WHOLE) {
-        nb_edit_elements(edit, json, node, was, now);
+        nb_json_patch_elements(edit, json, node, was, now);
         return;
     }
-    nb_edit_write_numbers(count, now, style, text);
+    nb_json_patch_write_numbers(count, now, style, text);
     if (node != NULL)
-        nb_edit_replace(edit, node, text);
+        nb_json_patch_replace(edit, node, text);
     else
-        nb_edit_add(edit, object, key, text);
+        nb_json_patch_add(edit, object, key, text);
 }
 
-bool nb_edit_write_text(const nebel_allocator *allocator, nb_bytes *bytes, const char *text)
+bool nb_json_patch_write_text(const nebel_allocator *allocator, nb_bytes *bytes, const char *text)
 {
     bool good = nb_bytes_write(allocator, bytes, bytes->size, "\"", 1);
     for (; *text != '\0' && good; text++) {
@@ -293,16 +294,17 @@ bool nb_edit_write_text(const nebel_allocator *allocator, nb_bytes *bytes, const
     return good && nb_bytes_write(allocator, bytes, bytes->size, "\"", 1);
 }
 
-void nb_edit_word(nb_edit *edit, const nb_json *json, const nb_edit_object *object, const char *key, const char *word)
+void nb_json_patch_word(nb_edit *edit, const nb_json *json, const nb_json_patch_object *object, const char *key,
+                        const char *word)
 {
     const nebel_allocator *allocator = &edit->arena.allocator;
-    const nb_json_node *node = nb_edit_member(json, object->node, key);
+    const nb_json_node *node = nb_json_patch_member(json, object->node, key);
     nb_bytes text = {0};
-    if (!nb_edit_write_text(allocator, &text, word) || !nb_bytes_write(allocator, &text, text.size, "", 1))
+    if (!nb_json_patch_write_text(allocator, &text, word) || !nb_bytes_write(allocator, &text, text.size, "", 1))
         edit->out_of_memory = true;
     else if (node != NULL)
-        nb_edit_replace(edit, node, (const char *)text.data);
+        nb_json_patch_replace(edit, node, (const char *)text.data);
     else
-        nb_edit_add(edit, object, key, (const char *)text.data);
+        nb_json_patch_add(edit, object, key, (const char *)text.data);
     nb_release(allocator, text.data);
 }

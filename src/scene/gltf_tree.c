@@ -16,7 +16,7 @@ static bool add_link(nb_json *json, nb_gltf_links *links, const nb_json_node *no
     void *items = links->items;
     double child = 0;
     static const nb_range range = {.low = 0, .high = UINT32_MAX - 2, .text = "the number of a node"};
-    if (!nb_value_number(json, node, &range, &child)) return false;
+    if (!nb_key_value_number(json, node, &range, &child)) return false;
     if (!nb_grow(&json->desc.allocator, &items, sizeof *links->items, links->count, &links->capacity, links->count + 1))
         return fail_memory(json, node);
     links->items = items;
@@ -27,7 +27,7 @@ static bool add_link(nb_json *json, nb_gltf_links *links, const nb_json_node *no
 static bool add_links(nb_json *json, nb_gltf_links *links, const nb_json_node *list, size_t parent)
 {
     if (list == NULL) return true;
-    if (!nb_value_is(json, list, NB_JSON_ARRAY, "an array of nodes")) return false;
+    if (!nb_key_value_is(json, list, NB_JSON_ARRAY, "an array of nodes")) return false;
     for (const nb_json_node *node = nb_json_first(json, list); node != NULL; node = nb_json_next(json, node))
         if (!add_link(json, links, node, parent)) return false;
     return true;
@@ -46,7 +46,7 @@ static const nb_json_node *find_member(const nb_json *json, const nb_json_node *
 static bool read_matrix(nb_json *json, const nb_json_node *node, nb_affine *place)
 {
     double numbers[16];
-    if (!nb_value_numbers(json, node, &nb_range_any, 16, numbers)) return false;
+    if (!nb_key_value_numbers(json, node, &nb_range_any, 16, numbers)) return false;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++) place->m[i][j] = numbers[4 * j + i];
     return true;
@@ -57,11 +57,11 @@ static bool read_place(nb_json *json, const nb_json_node *node, nb_affine *place
     nebel_transform transform = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
     const nb_json_node *matrix = find_member(json, node, "matrix");
     if (matrix != NULL) return read_matrix(json, matrix, place);
-    if (!nb_value_numbers(json, find_member(json, node, "translation"), &nb_range_any, 3, transform.position) ||
-        !nb_value_rotation(json, find_member(json, node, "rotation"), transform.rotation))
+    if (!nb_key_value_numbers(json, find_member(json, node, "translation"), &nb_range_any, 3, transform.position) ||
+        !nb_key_value_rotation(json, find_member(json, node, "rotation"), transform.rotation))
         return false;
     const nb_json_node *scale = find_member(json, node, "scale");
-    if (scale != NULL && !nb_value_numbers(json, scale, &nb_range_any, 3, transform.scale)) return false;
+    if (scale != NULL && !nb_key_value_numbers(json, scale, &nb_range_any, 3, transform.scale)) return false;
     *place = nb_affine_from_transform(&transform);
     return true;
 }
@@ -79,7 +79,7 @@ static bool take_node(nb_json *json, const nb_json_node *node, nb_gltf_tree *tre
 
 static bool take_scenes(nb_json *json, const nb_json_node *scenes, nb_gltf_tree *tree)
 {
-    if (!nb_value_is(json, scenes, NB_JSON_ARRAY, "an array of scenes")) return false;
+    if (!nb_key_value_is(json, scenes, NB_JSON_ARRAY, "an array of scenes")) return false;
     for (const nb_json_node *node = nb_json_first(json, scenes); node != NULL; node = nb_json_next(json, node))
         if (!add_links(json, &tree->roots, find_member(json, node, "nodes"), node->index)) return false;
     return true;
@@ -92,7 +92,7 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
     const nb_json_node *parent = nb_json_parent(json, value);
     if (parent == NULL) return true;
     if (nb_json_parent(json, parent) != NULL) return take_node(json, value, tree);
-    if (nb_json_has_key(value, "scene")) return nb_value_number(json, value, &nb_range_any, &tree->scene);
+    if (nb_json_has_key(value, "scene")) return nb_key_value_number(json, value, &nb_range_any, &tree->scene);
     return !nb_json_has_key(value, "scenes") || take_scenes(json, value, tree);
 }
 

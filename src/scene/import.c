@@ -61,7 +61,7 @@ static bool check_shape(nb_json *json, const nb_json_node *node, const nb_import
     const double radius = shape->type == NEBEL_SHAPE_CONE ? shape->radius_from : shape->radius;
     if (has_radius && !check(json, cause, "the radius", &radius, 1, &nb_range_extent)) return false;
     if (shape->type == NEBEL_SHAPE_CYLINDER || shape->type == NEBEL_SHAPE_CONE)
-        return nb_read_check_apart(json, cause, "from", shape->from, shape->to);
+        return nb_keys_read_check_apart(json, cause, "from", shape->from, shape->to);
     if (shape->type == NEBEL_SHAPE_ELLIPSOID) return check(json, cause, "a radius", shape->radii, 3, &nb_range_extent);
     return true;
 }
@@ -79,13 +79,13 @@ static bool check_numbers(nb_json *json, const nb_json_node *node, const nb_impo
     return true;
 }
 
-bool nb_read_import(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
+bool nb_keys_read_import(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
 {
     static const char *const types[IMPORTER_COUNT] = {
         "unreal_height_fog",         "unreal_local_fog_volume", "godot_fog",
         "godot_volumetric_fog",      "godot_fog_volume",        "hdrp_fog",
         "hdrp_local_volumetric_fog", "bevy_distance_fog",       "bevy_fog_volume"};
-    const int type = nb_value_type(in->json, node, types, IMPORTER_COUNT);
+    const int type = nb_key_value_type(in->json, node, types, IMPORTER_COUNT);
     const double unit = in->json->unit;
     in->json->unit = 1;
     const bool good = type >= 0 && importers[type].read(in, node, fog) && check_numbers(in->json, node, fog);
@@ -114,7 +114,7 @@ void nb_import_set_height(nebel_volume_desc *volume, double base, double scale_h
 bool nb_import_phase(nb_json *json, const nb_json_node *node, double usual, nebel_phase *phase)
 {
     phase->g = usual;
-    if (!nb_value_number(json, node, &nb_range_asymmetry, &phase->g)) return false;
+    if (!nb_key_value_number(json, node, &nb_range_asymmetry, &phase->g)) return false;
     phase->type = phase->g != 0 ? NEBEL_PHASE_HENYEY_GREENSTEIN : NEBEL_PHASE_ISOTROPIC;
     return true;
 }
@@ -122,7 +122,7 @@ bool nb_import_phase(nb_json *json, const nb_json_node *node, double usual, nebe
 bool nb_import_refuse_other(nb_json *json, const nb_json_node *node, double neutral, const char *reason)
 {
     double value = neutral;
-    if (!nb_value_number(json, node, &nb_range_any, &value)) return false;
+    if (!nb_key_value_number(json, node, &nb_range_any, &value)) return false;
     return value == neutral || nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, node, "is %.15g; %s, so it must be %.15g",
                                             value, reason, neutral);
 }

@@ -29,7 +29,7 @@ bool nb_import_bevy_distance_fog(nb_scene_reader *in, const nb_json_node *node, 
 bool nb_import_bevy_fog_volume(nb_scene_reader *in, const nb_json_node *node, nb_import *fog);
 
 /* Reads an import of any type. What settings make together is within the limits of the core. */
-bool nb_read_import(nb_scene_reader *in, const nb_json_node *node, nb_import *fog);
+bool nb_keys_read_import(nb_scene_reader *in, const nb_json_node *node, nb_import *fog);
 
 /* ---- what importers share -------------------------------------------------------------------- */
 

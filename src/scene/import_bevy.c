@@ -5,7 +5,7 @@ static bool check_inscattering(nb_json *json, const nb_json_node *node, const do
 {
     double other[3];
     for (int c = 0; c < 3; c++) other[c] = extinction[c];
-    if (!nb_value_amount(json, node, &nb_range_amount, other)) return false;
+    if (!nb_key_value_amount(json, node, &nb_range_amount, other)) return false;
     for (int c = 0; c < 3; c++)
         if (other[c] != extinction[c])
             return nb_json_fail(
@@ -25,15 +25,15 @@ bool nb_import_bevy_distance_fog(nb_scene_reader *in, const nb_json_node *node, 
     nebel_volume_desc *volume = &fog->volumes[0];
     *volume = nb_import_world(0);
     for (int c = 0; c < 3; c++) volume->source[c] = 1;
-    if (!nb_value_members(json, node, &keys, found)) return false;
+    if (!nb_key_value_members(json, node, &keys, found)) return false;
     if ((found[DENSITY] != NULL) == (found[EXTINCTION] != NULL))
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
                             "has \"density\" (Exponential) or \"extinction\" (Atmospheric), one of them; the other "
                             "falloffs are not integrals of a density");
     const nb_json_node *amount = found[DENSITY] != NULL ? found[DENSITY] : found[EXTINCTION];
     fog->count = 1;
-    return nb_value_color(json, found[COLOR], &nb_range_light, volume->source) &&
-           nb_value_amount(json, amount, &nb_range_amount, volume->extinction) &&
+    return nb_key_value_color(json, found[COLOR], &nb_range_light, volume->source) &&
+           nb_key_value_amount(json, amount, &nb_range_amount, volume->extinction) &&
            check_inscattering(json, found[INSCATTERING], volume->extinction);
 }
 
@@ -51,15 +51,15 @@ bool nb_import_bevy_fog_volume(nb_scene_reader *in, const nb_json_node *node, nb
     nebel_volume_desc *volume = &fog->volumes[0];
     *volume = nb_import_world(0);
     nebel_transform *transform = &volume->shape.transform;
-    if (!nb_value_members(json, node, &keys, found) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_light, &density) ||
-        !nb_value_number(json, found[ABSORPTION], &nb_range_amount, &absorption) ||
-        !nb_value_number(json, found[SCATTERING], &nb_range_amount, &scattering) ||
+    if (!nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_number(json, found[DENSITY], &nb_range_light, &density) ||
+        !nb_key_value_number(json, found[ABSORPTION], &nb_range_amount, &absorption) ||
+        !nb_key_value_number(json, found[SCATTERING], &nb_range_amount, &scattering) ||
         !nb_import_phase(json, found[ASYMMETRY], 0.5, &volume->phase) ||
-        !nb_value_color(json, found[COLOR], &nb_range_fraction, color) ||
-        !nb_value_place(json, found[TRANSLATION], transform->position) ||
-        !nb_value_rotation(json, found[ROTATION], transform->rotation) ||
-        !nb_value_scale(json, found[SCALE], transform->scale))
+        !nb_key_value_color(json, found[COLOR], &nb_range_fraction, color) ||
+        !nb_key_value_place(json, found[TRANSLATION], transform->position) ||
+        !nb_key_value_rotation(json, found[ROTATION], transform->rotation) ||
+        !nb_key_value_scale(json, found[SCALE], transform->scale))
         return false;
     volume->shape.type = NEBEL_SHAPE_BOX;
     for (int i = 0; i < 3; i++) {

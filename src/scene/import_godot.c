@@ -9,9 +9,9 @@ static const double ln2 = 0.69314718055994530942;
 static bool read_color(nb_json *json, const nb_json_node *node, const nb_range *range, double color[3])
 {
     double rgba[4];
-    if (node == NULL || node->type != NB_JSON_ARRAY) return nb_value_color(json, node, range, color);
-    if (!nb_value_numbers(json, node, range, node->count == 4 ? 4 : 3, rgba)) return false;
-    for (int c = 0; c < 3; c++) color[c] = nb_value_linear_from_srgb(rgba[c]);
+    if (node == NULL || node->type != NB_JSON_ARRAY) return nb_key_value_color(json, node, range, color);
+    if (!nb_key_value_numbers(json, node, range, node->count == 4 ? 4 : 3, rgba)) return false;
+    for (int c = 0; c < 3; c++) color[c] = nb_key_value_linear_from_srgb(rgba[c]);
     return true;
 }
 
@@ -26,13 +26,13 @@ bool nb_import_godot_fog(nb_scene_reader *in, const nb_json_node *node, nb_impor
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     double density = 0.01, energy = 1;
-    double color[3] = {nb_value_linear_from_srgb(0.518), nb_value_linear_from_srgb(0.553),
-                       nb_value_linear_from_srgb(0.608)};
-    if (!nb_value_members(json, node, &keys, found) ||
+    double color[3] = {nb_key_value_linear_from_srgb(0.518), nb_key_value_linear_from_srgb(0.553),
+                       nb_key_value_linear_from_srgb(0.608)};
+    if (!nb_key_value_members(json, node, &keys, found) ||
         !nb_import_refuse_other(json, found[MODE], 0, "depth fog is not the integral of a density") ||
-        !nb_value_number(json, found[DENSITY], &nb_range_amount, &density) ||
+        !nb_key_value_number(json, found[DENSITY], &nb_range_amount, &density) ||
         !read_color(json, found[COLOR], &nb_range_light, color) ||
-        !nb_value_number(json, found[ENERGY], &nb_range_light, &energy) ||
+        !nb_key_value_number(json, found[ENERGY], &nb_range_light, &energy) ||
         !nb_import_refuse_other(json, found[HEIGHT_DENSITY], 0,
                                 "Godot's height fog depends on the height of the surface alone"))
         return false;
@@ -59,11 +59,11 @@ bool nb_import_godot_volumetric_fog(nb_scene_reader *in, const nb_json_node *nod
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     double density = 0.05, albedo[3] = {1, 1, 1}, emission[3] = {0}, energy = 1;
-    if (!nb_value_members(json, node, &keys, found) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_amount, &density) ||
+    if (!nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_number(json, found[DENSITY], &nb_range_amount, &density) ||
         !read_color(json, found[ALBEDO], &nb_range_fraction, albedo) ||
         !read_color(json, found[EMISSION], &nb_range_light, emission) ||
-        !nb_value_number(json, found[ENERGY], &nb_range_light, &energy))
+        !nb_key_value_number(json, found[ENERGY], &nb_range_light, &energy))
         return false;
     fog->volumes[0] = nb_import_world(density);
     if (!nb_import_phase(json, found[ANISOTROPY], usual_anisotropy, &fog->volumes[0].phase)) return false;
@@ -133,7 +133,7 @@ static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transf
     double numbers[12];
     nb_affine map;
     if (node == NULL) return true;
-    if (!nb_value_numbers(json, node, &nb_range_any, 12, numbers)) return false;
+    if (!nb_key_value_numbers(json, node, &nb_range_any, 12, numbers)) return false;
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) map.m[i][j] = numbers[3 * i + j];
         map.m[i][3] = numbers[9 + i];
@@ -156,14 +156,15 @@ bool nb_import_godot_fog_volume(nb_scene_reader *in, const nb_json_node *node, n
     nebel_volume_desc *volume = &fog->volumes[0];
     *volume = nb_import_world(0);
     for (int c = 0; c < 3; c++) volume->albedo[c] = 1;
-    if (!nb_value_members(json, node, &keys, found) || !nb_value_integer(json, found[SHAPE], 0, WORLD, &shape) ||
-        !nb_value_numbers(json, found[SIZE], &nb_range_extent, 3, size) ||
+    if (!nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_integer(json, found[SHAPE], 0, WORLD, &shape) ||
+        !nb_key_value_numbers(json, found[SIZE], &nb_range_extent, 3, size) ||
         !read_transform(json, found[TRANSFORM], &volume->shape.transform) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_amount, &density) ||
+        !nb_key_value_number(json, found[DENSITY], &nb_range_amount, &density) ||
         !read_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) ||
         !read_color(json, found[EMISSION], &nb_range_light, emission) ||
-        !nb_value_number(json, found[FALLOFF], &nb_range_light, &falloff) ||
-        !nb_value_number(json, found[FADE], &nb_range_light, &fade) ||
+        !nb_key_value_number(json, found[FALLOFF], &nb_range_light, &falloff) ||
+        !nb_key_value_number(json, found[FADE], &nb_range_light, &fade) ||
         !nb_import_phase(json, found[ANISOTROPY], usual_anisotropy, &volume->phase))
         return false;
     set_shape(&volume->shape, shape, size);

@@ -22,10 +22,11 @@ bool nb_import_hdrp_fog(nb_scene_reader *in, const nb_json_node *node, nb_import
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     double path = 400, base = 0, top = 50, albedo[3] = {1, 1, 1};
-    if (!nb_value_members(json, node, &keys, found) || !nb_value_number(json, found[PATH], &nb_range_positive, &path) ||
-        !nb_value_number(json, found[BASE], &nb_range_place, &base) ||
-        !nb_value_number(json, found[TOP], &nb_range_place, &top) ||
-        !nb_value_color(json, found[ALBEDO], &nb_range_fraction, albedo))
+    if (!nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_number(json, found[PATH], &nb_range_positive, &path) ||
+        !nb_key_value_number(json, found[BASE], &nb_range_place, &base) ||
+        !nb_key_value_number(json, found[TOP], &nb_range_place, &top) ||
+        !nb_key_value_color(json, found[ALBEDO], &nb_range_fraction, albedo))
         return false;
     nebel_volume_desc *volume = &fog->volumes[0];
     *volume = nb_import_world(1 / path);
@@ -47,7 +48,8 @@ static bool read_fades(nb_json *json, const nb_json_node *const fades[2], const 
 {
     static const nb_range half = {.low = 0, .high = .5, .text = "a fraction of the size, from 0 to 0.5"};
     double positive[3] = {0}, negative[3] = {0};
-    if (!nb_value_numbers(json, fades[0], &half, 3, positive) || !nb_value_numbers(json, fades[1], &half, 3, negative))
+    if (!nb_key_value_numbers(json, fades[0], &half, 3, positive) ||
+        !nb_key_value_numbers(json, fades[1], &half, 3, negative))
         return false;
     for (int i = 0; i < 3; i++) {
         edges[i] = positive[i] * size[i];
@@ -80,8 +82,8 @@ static bool read_distances(nb_json *json, const nb_json_node *const distances[2]
 {
     double start = 10000, end = 10000; /* the engine's */
     if (distances[0] == NULL && distances[1] == NULL) return true;
-    if (!nb_value_number(json, distances[0], &nb_range_extent, &start) ||
-        !nb_value_number(json, distances[1], &nb_range_extent, &end))
+    if (!nb_key_value_number(json, distances[0], &nb_range_extent, &start) ||
+        !nb_key_value_number(json, distances[1], &nb_range_extent, &end))
         return false;
     *cutoff = end;
     return start == end || nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, distances[distances[0] == NULL],
@@ -96,8 +98,8 @@ static bool read_blending(nb_json *json, const nb_json_node *mode, const nb_json
 {
     enum { OVERWRITE, ADDITIVE, MULTIPLY, MIN, MAX };
     int blending = ADDITIVE;
-    if (!nb_value_integer(json, mode, OVERWRITE, MAX, &blending) ||
-        !nb_value_integer(json, priority, INT_MIN + 1, INT_MAX, &volume->priority))
+    if (!nb_key_value_integer(json, mode, OVERWRITE, MAX, &blending) ||
+        !nb_key_value_integer(json, priority, INT_MIN + 1, INT_MAX, &volume->priority))
         return false;
     if (blending == OVERWRITE) volume->operation = NEBEL_OPERATION_REPLACE;
     return blending <= ADDITIVE ||
@@ -146,17 +148,18 @@ bool nb_import_hdrp_local_fog(nb_scene_reader *in, const nb_json_node *node, nb_
     double path = 10, size[3] = {10, 10, 10}, edges[3], *albedo = volume->albedo;
     nebel_transform *transform = &volume->shape.transform;
     for (int c = 0; c < 3; c++) albedo[c] = 1;
-    if (!nb_value_members(json, node, &keys, found) || !nb_value_number(json, found[PATH], &nb_range_positive, &path) ||
-        !nb_value_color(json, found[ALBEDO], &nb_range_fraction, albedo) ||
+    if (!nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_number(json, found[PATH], &nb_range_positive, &path) ||
+        !nb_key_value_color(json, found[ALBEDO], &nb_range_fraction, albedo) ||
         !read_phase(json, found[ANISOTROPY], &volume->phase) ||
-        !nb_value_numbers(json, found[SIZE], &nb_range_extent, 3, size) ||
+        !nb_key_value_numbers(json, found[SIZE], &nb_range_extent, 3, size) ||
         !read_fades(json, &found[POSITIVE_FADE], size, edges) ||
         !nb_import_refuse_other(json, found[INVERT], 0, "fog here is inside its shape") ||
         !nb_import_refuse_other(json, found[FALLOFF], 0, "only the linear falloff has a closed form") ||
         !read_distances(json, &found[FADE_START], &volume->cutoff) ||
         !read_blending(json, found[BLENDING], found[PRIORITY], volume) ||
-        !nb_value_place(json, found[POSITION], transform->position) ||
-        !nb_value_rotation(json, found[ROTATION], transform->rotation))
+        !nb_key_value_place(json, found[POSITION], transform->position) ||
+        !nb_key_value_rotation(json, found[ROTATION], transform->rotation))
         return false;
     mirror(transform->position, transform->rotation);
     set_faded_box(volume, size, edges);

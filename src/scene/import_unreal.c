@@ -43,10 +43,10 @@ static bool read_second(nb_json *json, const nb_json_node *node, layer *second)
     static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "SecondFogData"};
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
-    if (!nb_value_members(json, node, &keys, found) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_light, &second->density) ||
-        !nb_value_number(json, found[FALLOFF], &nb_range_light, &second->falloff) ||
-        !nb_value_number(json, found[OFFSET], &nb_range_place, &second->offset))
+    if (!nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_number(json, found[DENSITY], &nb_range_light, &second->density) ||
+        !nb_key_value_number(json, found[FALLOFF], &nb_range_light, &second->falloff) ||
+        !nb_key_value_number(json, found[OFFSET], &nb_range_place, &second->offset))
         return false;
     second->causes = (nb_import_causes){.scale_height = found[FALLOFF], .base = found[OFFSET]};
     return true;
@@ -64,16 +64,16 @@ bool nb_import_unreal_height_fog(nb_scene_reader *in, const nb_json_node *node, 
     json->unit = centimetre;
     layer first = {.density = 0.02, .falloff = 0.2}, second = {.falloff = 0.2};
     double color[3] = {0}, location[3] = {0}, start = 0, opacity = 1;
-    if (!nb_value_members(json, node, &keys, found) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_light, &first.density) ||
-        !nb_value_number(json, found[FALLOFF], &nb_range_light, &first.falloff) ||
-        !read_second(json, found[SECOND], &second) || !nb_value_color(json, found[COLOR], &nb_range_light, color) ||
-        !nb_value_number(json, found[START], &nb_range_distance, &start) ||
+    if (!nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_number(json, found[DENSITY], &nb_range_light, &first.density) ||
+        !nb_key_value_number(json, found[FALLOFF], &nb_range_light, &first.falloff) ||
+        !read_second(json, found[SECOND], &second) || !nb_key_value_color(json, found[COLOR], &nb_range_light, color) ||
+        !nb_key_value_number(json, found[START], &nb_range_distance, &start) ||
         !nb_import_refuse_other(json, found[END], 0, "the engine measures it along the ground") ||
         !nb_import_refuse_other(json, found[CUTOFF], 0,
                                 "behind it the engine draws no fog at all, also not what lies before") ||
-        !nb_value_number(json, found[OPACITY], &nb_range_fraction, &opacity) ||
-        !nb_value_place(json, found[LOCATION], location))
+        !nb_key_value_number(json, found[OPACITY], &nb_range_fraction, &opacity) ||
+        !nb_key_value_place(json, found[LOCATION], location))
         return false;
     convert_location(location);
     if (opacity == 0) return true;
@@ -103,11 +103,12 @@ bool nb_import_unreal_local_fog(nb_scene_reader *in, const nb_json_node *node, n
     volume.shape.type = NEBEL_SHAPE_SPHERE;
     volume.density = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = 1};
     for (int c = 0; c < 3; c++) volume.albedo[c] = 1;
-    if (!nb_value_members(json, node, &keys, found) ||
-        !nb_value_number(json, found[EXTINCTION], &nb_range_light, &extinction) ||
-        !nb_value_color(json, found[ALBEDO], &nb_range_fraction, volume.albedo) ||
+    if (!nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_number(json, found[EXTINCTION], &nb_range_light, &extinction) ||
+        !nb_key_value_color(json, found[ALBEDO], &nb_range_fraction, volume.albedo) ||
         !nb_import_phase(json, found[PHASE_G], 0.2, &volume.phase) ||
-        !nb_value_place(json, found[LOCATION], volume.shape.center) || !nb_value_scale(json, found[SCALE], scale))
+        !nb_key_value_place(json, found[LOCATION], volume.shape.center) ||
+        !nb_key_value_scale(json, found[SCALE], scale))
         return false;
     convert_location(volume.shape.center);
     volume.shape.radius = base_radius * fmax(fabs(scale[0]), fmax(fabs(scale[1]), fabs(scale[2])));

@@ -35,7 +35,7 @@ nb_affine nb_model_place(const nb_model_source *model)
     for (int j = 0; j < 3; j++) {
         double axis[3] = {0};
         axis[j] = 1;
-        nb_space_convert_place(&model->space, axis);
+        nb_file_units_convert_place(&model->space, axis);
         for (int i = 0; i < 3; i++) own.m[i][j] = axis[i];
     }
     memcpy(transform.position, model->position, sizeof transform.position);
@@ -201,7 +201,7 @@ void nb_scene_note_file(void *user, const char *path, const struct stat *status)
     for (size_t i = 0; i < scene->data.path_count; i++)
         if (strcmp(scene->files[i], path) == 0) return;
     const char *kept =
-        scene->data.path_count < NB_MOST_FILES ? nb_arena_copy_text(&scene->arena, path, strlen(path)) : NULL;
+        scene->data.path_count < NB_MAX_FILES ? nb_arena_copy_text(&scene->arena, path, strlen(path)) : NULL;
     if (kept != NULL) nb_scene_keep_file(scene, kept);
     scene->data.paths = scene->files;
 }

@@ -53,7 +53,7 @@ typedef struct nb_model_load {
 void nb_scene_note_file(void *user, const char *path, const struct stat *status);
 
 /* Files beyond are not noted. */
-#define NB_MOST_FILES ((size_t)1 << 16)
+#define NB_MAX_FILES ((size_t)1 << 16)
 
 nebel_result nb_heightfield_load(const nb_model_load *load);
 

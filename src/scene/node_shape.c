@@ -12,12 +12,12 @@ static const nebel_shape unit_shapes[] = {
     {.type = NEBEL_SHAPE_WORLD},
 };
 
-bool nb_read_node_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
+bool nb_keys_read_node_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
 {
     static const char *const names[] = {"box", "sphere", "cylinder", "cone", "world"};
     static const nebel_transform still = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
-    if (node != NULL && node->type != NB_JSON_STRING) return nb_read_shape(in, node, shape);
-    const int choice = node != NULL ? nb_value_choice(in->json, node, names, sizeof names / sizeof *names) : 0;
+    if (node != NULL && node->type != NB_JSON_STRING) return nb_keys_read_shape(in, node, shape);
+    const int choice = node != NULL ? nb_key_value_choice(in->json, node, names, sizeof names / sizeof *names) : 0;
     if (choice < 0) return false;
     *shape = unit_shapes[choice];
     shape->transform = still;
@@ -66,7 +66,7 @@ static bool place_density(nb_scene_reader *in, const nb_json_node *node, const n
     return density->type != NEBEL_DENSITY_GAUSSIAN || place_gaussian(in, node, map, transform, density);
 }
 
-bool nb_read_place_volume(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume)
+bool nb_keys_read_place_volume(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume)
 {
     const nb_affine own = nb_affine_from_transform(&volume->shape.transform);
     const nb_affine whole = nb_affine_compose(&in->node->place, &own);

@@ -17,7 +17,7 @@ typedef struct noise_task {
 static bool is_noise_type(const nb_json *json, const nb_json_node *density)
 {
     static const char name[] = "noise";
-    const nb_json_node *type = nb_edit_member(json, density, "type");
+    const nb_json_node *type = nb_json_patch_member(json, density, "type");
     return type != NULL && type->type == NB_JSON_STRING && type->string_size == sizeof name - 1 &&
            memcmp(type->string, name, sizeof name - 1) == 0;
 }
@@ -27,10 +27,10 @@ static bool take_density(nb_json *json, const nb_json_node *value, void *user)
     noise_task *task = user;
     if (nb_json_parent(json, value) == NULL || !is_noise_type(json, value)) return true;
     *task->noise = (nebel_scene_noise){.evolution = 0};
-    if (!nb_read_noise_numbers(json, value, task->noise)) return false;
+    if (!nb_keys_read_noise_numbers(json, value, task->noise)) return false;
     task->is_noise = true;
-    const nb_edit_object object = nb_edit_find(json, value);
-    if (task->wanted != NULL) nb_save_noise(task->edit, json, &object, task->noise, task->wanted);
+    const nb_json_patch_object object = nb_json_patch_find(json, value);
+    if (task->wanted != NULL) nb_key_patch_noise(task->edit, json, &object, task->noise, task->wanted);
     return true;
 }
 
@@ -84,7 +84,7 @@ int nebel_get_scene_noise(const nebel_scene *scene, const nebel_grid *grid, nebe
     bool is_noise;
     if (scene == NULL || noise == NULL) return 0;
     if (find_noise(&scene->allocator, grid, noise, &is_noise) != NEBEL_OK || !is_noise) return 0;
-    nb_space_convert_noise(&scene->space, noise);
+    nb_file_units_convert_noise(&scene->space, noise);
     return 1;
 }
 
@@ -104,7 +104,7 @@ nebel_result nebel_get_scene_grid(const nebel_scene *scene, nebel_grid *grid, do
         if (grid != NULL) *at = nebel_retain_grid(grid);
         return NEBEL_OK;
     }
-    nb_space_convert_noise(&scene->space, &noise);
+    nb_file_units_convert_noise(&scene->space, &noise);
     nebel_noise_desc desc = noise.desc;
     desc.allocator = scene->allocator;
     desc.log = scene->log;
@@ -127,22 +127,22 @@ static const nb_key_entry places[] = {
     NOISE_PLACE("drift", velocity, 3),         NOISE_PLACE("change", evolution, 1),
 };
 
-void nb_save_noise(nb_edit *edit, const nb_json *json, const nb_edit_object *object, const nebel_scene_noise *was,
-                   const nebel_scene_noise *now)
+void nb_key_patch_noise(nb_edit *edit, const nb_json *json, const nb_json_patch_object *object,
+                        const nebel_scene_noise *was, const nebel_scene_noise *now)
 {
     const nebel_noise_desc *a = &was->desc, *b = &now->desc;
     const double size_was[] = {(double)a->size[0], (double)a->size[1], (double)a->size[2]};
     const double size_now[] = {(double)b->size[0], (double)b->size[1], (double)b->size[2]};
-    nb_edit_numbers(edit, json, object, "size", 3, size_was, size_now, NB_EDIT_EACH);
+    nb_json_patch_numbers(edit, json, object, "size", 3, size_was, size_now, NB_EDIT_EACH);
     for (size_t i = 0; i < sizeof places / sizeof *places; i++)
-        nb_edit_numbers(edit, json, object, places[i].key, places[i].count, nb_place_numbers(was, &places[i]),
-                        nb_place_numbers(now, &places[i]), places[i].style);
-    nb_edit_numbers(edit, json, object, "octaves", 1, &(double){a->octaves}, &(double){b->octaves}, NB_EDIT_EACH);
-    nb_edit_numbers(edit, json, object, "seed", 1, &(double){a->seed}, &(double){b->seed}, NB_EDIT_EACH);
+        nb_json_patch_numbers(edit, json, object, places[i].key, places[i].count, nb_place_numbers(was, &places[i]),
+                              nb_place_numbers(now, &places[i]), places[i].style);
+    nb_json_patch_numbers(edit, json, object, "octaves", 1, &(double){a->octaves}, &(double){b->octaves}, NB_EDIT_EACH);
+    nb_json_patch_numbers(edit, json, object, "seed", 1, &(double){a->seed}, &(double){b->seed}, NB_EDIT_EACH);
 }
 
-void nb_save_noise_grid(nb_key_patch *save, const nb_json *json, const nb_edit_object *object, const nebel_grid *was,
-                        const nebel_grid *now)
+void nb_key_patch_noise_grid(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *object,
+                             const nebel_grid *was, const nebel_grid *now)
 {
     const nebel_allocator *allocator = &save->edit.arena.allocator;
     nebel_scene_noise a, b;
@@ -150,7 +150,7 @@ void nb_save_noise_grid(nb_key_patch *save, const nb_json *json, const nb_edit_o
     if (was == now) return;
     if (find_noise(allocator, was, &a, &was_noise) != NEBEL_OK || find_noise(allocator, now, &b, &is_noise) != NEBEL_OK)
         save->edit.out_of_memory = true;
-    if (was_noise && is_noise) nb_save_noise(&save->edit, json, object, &a, &b);
+    if (was_noise && is_noise) nb_key_patch_noise(&save->edit, json, object, &a, &b);
 }
 
 /* Without what wraps it. False when memory is out. */
@@ -174,9 +174,9 @@ nebel_result nb_noise_words(const nebel_scene *scene, const char *words, const n
     edit.text = whole;
     edit.size = strlen(whole);
     result = read_words(&scene->allocator, &scene->log, whole, &task);
-    if (result == NEBEL_OK && (!nb_edit_apply(&edit, changed) || !unwrap(&scene->allocator, changed)))
+    if (result == NEBEL_OK && (!nb_json_patch_apply(&edit, changed) || !unwrap(&scene->allocator, changed)))
         result = NEBEL_ERROR_MEMORY;
-    nb_edit_release(&edit);
+    nb_json_patch_release(&edit);
     nb_release(&scene->allocator, whole);
     return result;
 }
@@ -192,7 +192,7 @@ static nebel_result make_noise(const nebel_scene *scene, const char *words, nebe
     result = read_words(&scene->allocator, &scene->log, whole, &task);
     nb_release(&scene->allocator, whole);
     if (result != NEBEL_OK) return result;
-    nb_space_convert_noise(&scene->space, &noise);
+    nb_file_units_convert_noise(&scene->space, &noise);
     noise.desc.allocator = scene->allocator;
     noise.desc.log = scene->log;
     noise.desc.name = words;
@@ -211,7 +211,7 @@ nebel_result nebel_update_scene_noise(const nebel_scene *scene, const nebel_grid
     nebel_result result = find_noise(&scene->allocator, grid, &was, &is_noise);
     if (result == NEBEL_OK && !is_noise) return NEBEL_ERROR_ARGUMENT;
     wanted = *noise;
-    nb_space_restore_noise(&scene->space, &wanted);
+    nb_file_units_restore_noise(&scene->space, &wanted);
     if (result == NEBEL_OK) result = nb_noise_words(scene, nebel_get_grid_name(grid), &wanted, &words);
     if (result == NEBEL_OK) result = make_noise(scene, (const char *)words.data, changed);
     nb_release(&scene->allocator, words.data);

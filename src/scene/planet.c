@@ -109,7 +109,7 @@ static double uneclipsed(const nebel_scene_data *data, const double to_sun[3])
     for (size_t i = 1; i < data->planet_count; i++) {
         const nebel_atmosphere_desc *air = &data->planets[i].atmosphere_desc;
         double center[3];
-        nb_vector_ball_middle(air->ground_point, air->radius, center);
+        nb_sphere_center_below(air->ground_point, air->radius, center);
         left *= nb_eclipse_left(origin, center, air->radius, to_sun, sun);
     }
     return left;
@@ -120,7 +120,7 @@ nebel_result nb_planet_light(nebel_scene *scene)
     static const double origin[1][3] = {{0, 0, 0}};
     nebel_planet *planet = scene->planets;
     if (planet == NULL || planet->atmosphere == NULL) return NEBEL_OK;
-    const nebel_sun sun = nb_scene_sun(&scene->data),
+    const nebel_sun sun = nb_surface_lighting_sun(&scene->data),
                     white = {{sun.direction[0], sun.direction[1], sun.direction[2]}, {1, 1, 1}};
     nebel_irradiance light;
     nebel_result result = nebel_compute_atmosphere_irradiance(planet->atmosphere, &white, 1, origin, 0, &light, 0);
@@ -162,7 +162,7 @@ static nebel_result shade_origin(const nebel_scene *scene, double frame, float *
 {
     static const double origin[1][3] = {{0, 0, 0}};
     const nebel_cloud_lighting_desc desc = {.clouds = scene->clouds,
-                                            .sun = nb_scene_sun(&scene->data),
+                                            .sun = nb_surface_lighting_sun(&scene->data),
                                             .time = frame,
                                             .allocator = scene->allocator,
                                             .log = scene->log};
@@ -187,7 +187,7 @@ nebel_result nebel_find_scene_light(const nebel_scene *scene, double frame, nebe
     if (!nb_scene_is_frame(scene, frame)) return NEBEL_ERROR_VALUE;
     const nebel_result result = scene->clouds != NULL ? shade_origin(scene, frame, &sun, &sky) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
-    *sunlight = nb_scene_sun(&scene->data);
+    *sunlight = nb_surface_lighting_sun(&scene->data);
     *ambient = scene->data.environment;
     for (int c = 0; c < 3 && scene->atmospheres[0] != NULL; c++)
         sunlight->irradiance[c] *= (double)sun * scene->planets->sun_left[c];

@@ -12,11 +12,11 @@ static bool is_word(const nb_json_node *node, const char *word)
            memcmp(node->string, word, node->string_size) == 0;
 }
 
-bool nb_read_background(nb_scene_reader *in, const nb_json_node *node)
+bool nb_keys_read_background(nb_scene_reader *in, const nb_json_node *node)
 {
     nebel_scene_data *data = &in->scene->data;
     data->shows_ambient = is_word(node, "ambient");
-    return data->shows_ambient || nb_value_color(in->json, node, &nb_range_light, data->background);
+    return data->shows_ambient || nb_key_value_color(in->json, node, &nb_range_light, data->background);
 }
 
 /* ---- gradients ------------------------------------------------------------------------------- */
@@ -28,10 +28,10 @@ static bool read_gradient(nb_scene_reader *in, const nb_json_node *node, nebel_e
     static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a gradient"};
     const nb_json_node *found[COUNT];
     environment->type = NEBEL_ENVIRONMENT_GRADIENT;
-    return nb_value_members(in->json, node, &keys, found) &&
-           nb_value_color(in->json, found[ZENITH], &nb_range_light, environment->zenith) &&
-           nb_value_color(in->json, found[HORIZON], &nb_range_light, environment->horizon) &&
-           nb_value_color(in->json, found[GROUND], &nb_range_light, environment->ground);
+    return nb_key_value_members(in->json, node, &keys, found) &&
+           nb_key_value_color(in->json, found[ZENITH], &nb_range_light, environment->zenith) &&
+           nb_key_value_color(in->json, found[HORIZON], &nb_range_light, environment->horizon) &&
+           nb_key_value_color(in->json, found[GROUND], &nb_range_light, environment->ground);
 }
 
 /* ---- maps ------------------------------------------------------------------------------------ */
@@ -95,7 +95,7 @@ static bool read_file(nb_scene_reader *in, const nb_json_node *node, nebel_envir
     const char *path = "";
     nb_note note = {""};
     const nebel_log log = nb_note_log(&note);
-    if (!nb_value_text(in->json, node, &scene->arena, &path)) return false;
+    if (!nb_key_value_text(in->json, node, &scene->arena, &path)) return false;
     if (nebel_get_image_format(path) != NEBEL_IMAGE_EXR)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
                             "is \"%s\"; must be the path of an OpenEXR picture, .exr", path);
@@ -123,19 +123,19 @@ static bool read_map(nb_scene_reader *in, const nb_json_node *node, nebel_enviro
     const nb_json_node *found[COUNT];
     environment->type = NEBEL_ENVIRONMENT_MAP;
     environment->intensity = 1;
-    return nb_value_members(in->json, node, &keys, found) &&
-           nb_value_number(in->json, found[ROTATION], &rotation_range, &environment->rotation) &&
-           nb_value_number(in->json, found[INTENSITY], &intensity_range, &environment->intensity) &&
+    return nb_key_value_members(in->json, node, &keys, found) &&
+           nb_key_value_number(in->json, found[ROTATION], &rotation_range, &environment->rotation) &&
+           nb_key_value_number(in->json, found[INTENSITY], &intensity_range, &environment->intensity) &&
            read_file(in, found[FILE_KEY], environment) &&
            try_environment(in, found[INTENSITY] != NULL ? found[INTENSITY] : node, environment);
 }
 
-bool nb_read_ambient(nb_scene_reader *in, const nb_json_node *node)
+bool nb_keys_read_ambient(nb_scene_reader *in, const nb_json_node *node)
 {
     static const char *const types[] = {"gradient", "environment"};
     nebel_scene_data *data = &in->scene->data;
-    if (node->type != NB_JSON_OBJECT) return nb_value_color(in->json, node, &nb_range_light, data->ambient);
-    const int type = nb_value_type(in->json, node, types, 2);
+    if (node->type != NB_JSON_OBJECT) return nb_key_value_color(in->json, node, &nb_range_light, data->ambient);
+    const int type = nb_key_value_type(in->json, node, types, 2);
     if (type < 0) return false;
     return type == 0 ? read_gradient(in, node, &data->environment) : read_map(in, node, &data->environment);
 }

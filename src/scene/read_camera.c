@@ -26,7 +26,7 @@ static bool check_view(const nb_scene_reader *in, const nb_json_node *node, cons
 {
     nb_json *json = in->json;
     const nb_json_node *at = found[LOOK_AT] != NULL ? found[LOOK_AT] : node;
-    nb_space_convert_camera(&in->space, &camera);
+    nb_file_units_convert_camera(&in->space, &camera);
     if (!nb_camera_is_apart(&camera))
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, at, "the camera looks at its own position; move one of them");
     if (found[UP] != NULL) at = found[UP];
@@ -41,11 +41,12 @@ static bool read_view(const nb_scene_reader *in, const nb_json_node *node, const
                       const double *ahead, nebel_camera *camera)
 {
     nb_json *json = in->json;
-    if (!nb_value_place(json, found[POSITION], camera->position)) return false;
+    if (!nb_key_value_place(json, found[POSITION], camera->position)) return false;
     if (found[LOOK_AT] == NULL && ahead != NULL) look_ahead(camera, ahead);
-    return nb_value_place(json, found[LOOK_AT], camera->look_at) && nb_value_direction(json, found[UP], camera->up) &&
-           nb_value_number(json, found[VERTICAL_FOV], &fov_range, &camera->vertical_fov) &&
-           nb_value_number(json, found[VIEW_HEIGHT], &nb_range_extent, &camera->view_height) &&
+    return nb_key_value_place(json, found[LOOK_AT], camera->look_at) &&
+           nb_key_value_direction(json, found[UP], camera->up) &&
+           nb_key_value_number(json, found[VERTICAL_FOV], &fov_range, &camera->vertical_fov) &&
+           nb_key_value_number(json, found[VIEW_HEIGHT], &nb_range_extent, &camera->view_height) &&
            check_view(in, node, found, *camera);
 }
 
@@ -54,7 +55,7 @@ const char *const nb_projection_names[3] = {"perspective", "orthographic", "pano
 static bool read_projection(nb_json *json, const nb_json_node *node, nebel_projection *projection)
 {
     if (node == NULL) return true;
-    const int choice = nb_value_choice(json, node, nb_projection_names, 3);
+    const int choice = nb_key_value_choice(json, node, nb_projection_names, 3);
     if (choice >= 0) *projection = (nebel_projection)choice;
     return choice >= 0;
 }
@@ -66,7 +67,7 @@ static bool read_turntable(nb_json *json, const nb_json_node *node, uint32_t *fr
     const nb_json_node *found[1];
     int count = 0;
     if (node == NULL) return true;
-    if (!nb_value_members(json, node, &keys, found) || !nb_value_integer(json, found[0], 1, 1000000, &count))
+    if (!nb_key_value_members(json, node, &keys, found) || !nb_key_value_integer(json, found[0], 1, 1000000, &count))
         return false;
     *frames = (uint32_t)count;
     return true;
@@ -75,8 +76,8 @@ static bool read_turntable(nb_json *json, const nb_json_node *node, uint32_t *fr
 static bool read_key(const nb_scene_reader *in, const nb_json_node *node, const double *ahead, nebel_camera_key *key)
 {
     const nb_json_node *found[CAMERA_KEY_COUNT];
-    return nb_value_members(in->json, node, &key_keys, found) &&
-           nb_value_number(in->json, found[FRAME], &nb_range_frame, &key->frame) &&
+    return nb_key_value_members(in->json, node, &key_keys, found) &&
+           nb_key_value_number(in->json, found[FRAME], &nb_range_frame, &key->frame) &&
            read_view(in, node, found, ahead, &key->camera);
 }
 
@@ -84,7 +85,7 @@ static bool read_keys(nb_scene_reader *in, const nb_json_node *node, const doubl
 {
     nebel_scene_data *data = &in->scene->data;
     if (node == NULL) return true;
-    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of camera keys")) return false;
+    if (!nb_key_value_is(in->json, node, NB_JSON_ARRAY, "an array of camera keys")) return false;
     if (node->count == 0) return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "holds no key; give one or more");
     nebel_camera_key *keys = nb_arena_allocate(&in->scene->arena, node->count, sizeof *keys);
     if (keys == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
@@ -97,28 +98,28 @@ static bool read_keys(nb_scene_reader *in, const nb_json_node *node, const doubl
                                 "its frame %.15g is not after the key before it, %.15g; frames must ascend",
                                 keys[i].frame, keys[i - 1].frame);
     }
-    for (i = 0; i < node->count; i++) nb_space_convert_camera(&in->space, &keys[i].camera);
+    for (i = 0; i < node->count; i++) nb_file_units_convert_camera(&in->space, &keys[i].camera);
     data->camera_keys = keys;
     data->camera_key_count = node->count;
     return true;
 }
 
-bool nb_read_camera(nb_scene_reader *in, const nb_json_node *node)
+bool nb_keys_read_camera(nb_scene_reader *in, const nb_json_node *node)
 {
     const nb_json_node *found[CAMERA_KEY_COUNT];
     nebel_scene_data *data = &in->scene->data;
-    if (!nb_value_members(in->json, node, &camera_keys, found)) return false;
+    if (!nb_key_value_members(in->json, node, &camera_keys, found)) return false;
     if (found[TURNTABLE] != NULL && found[KEYS] != NULL)
         return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, found[KEYS],
                                 "a camera has \"turntable\" or \"keys\", not both; remove one");
     double ahead[3];
-    nb_space_restore_camera(&in->space, &data->camera);
+    nb_file_units_restore_camera(&in->space, &data->camera);
     for (int i = 0; i < 3; i++) ahead[i] = data->camera.look_at[i] - data->camera.position[i];
     if (!read_projection(in->json, found[PROJECTION], &data->camera.projection) ||
         !read_view(in, node, found, ahead, &data->camera) ||
         !read_turntable(in->json, found[TURNTABLE], &data->turntable_frames) ||
         !read_keys(in, found[KEYS], found[LOOK_AT] == NULL ? ahead : NULL))
         return false;
-    nb_space_convert_camera(&in->space, &data->camera);
+    nb_file_units_convert_camera(&in->space, &data->camera);
     return true;
 }

@@ -52,22 +52,22 @@ static bool read_cell(nb_scene_reader *in, const nb_json_node *node, const cells
     nebel_cell *cell = &draft->cells[index];
     *cell = (nebel_cell){.density = 0};
     draft->names[index] = "";
-    if (!nb_value_is(json, node, NB_JSON_OBJECT, "a cell {\"shape\": ...}") ||
-        !nb_value_members(json, node, &cell_keys, found) ||
-        !nb_value_text(json, found[NAME], &in->scene->arena, &draft->names[index]) ||
-        !check_name(json, found[NAME], draft, index) || !nb_read_shape(in, found[SHAPE], &cell->shape) ||
+    if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "a cell {\"shape\": ...}") ||
+        !nb_key_value_members(json, node, &cell_keys, found) ||
+        !nb_key_value_text(json, found[NAME], &in->scene->arena, &draft->names[index]) ||
+        !check_name(json, found[NAME], draft, index) || !nb_keys_read_shape(in, found[SHAPE], &cell->shape) ||
         !check_shape(json, found[SHAPE], cell->shape.type) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_amount, &cell->density) ||
-        !nb_value_color(json, found[COLOR], &nb_range_light, cell->color))
+        !nb_key_value_number(json, found[DENSITY], &nb_range_amount, &cell->density) ||
+        !nb_key_value_color(json, found[COLOR], &nb_range_light, cell->color))
         return false;
-    nb_space_convert_cell(&in->space, cell);
+    nb_file_units_convert_cell(&in->space, cell);
     return true;
 }
 
 static bool read_list(nb_scene_reader *in, const nb_json_node *node, cells_draft *draft)
 {
     nb_json *json = in->json;
-    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of cells")) return false;
+    if (!nb_key_value_is(json, node, NB_JSON_ARRAY, "an array of cells")) return false;
     if (node->count < 1 || node->count > NEBEL_MAX_CELLS)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "holds %lu cells; must hold 1 to %d",
                             (unsigned long)node->count, NEBEL_MAX_CELLS);
@@ -88,14 +88,14 @@ static bool read_list(nb_scene_reader *in, const nb_json_node *node, cells_draft
 static bool read_ends(nb_scene_reader *in, const nb_json_node *node, const cells_draft *draft, nebel_portal *portal)
 {
     nb_json *json = in->json;
-    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of the names of two cells")) return false;
+    if (!nb_key_value_is(json, node, NB_JSON_ARRAY, "an array of the names of two cells")) return false;
     if (node->count != 2)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "names %lu cells; a portal joins two",
                             (unsigned long)node->count);
     const nb_json_node *at = nb_json_first(json, node);
     for (int i = 0; i < 2; i++, at = nb_json_next(json, at)) {
         const char *name = "";
-        if (!nb_value_text(json, at, &in->scene->arena, &name)) return false;
+        if (!nb_key_value_text(json, at, &in->scene->arena, &name)) return false;
         portal->cells[i] = name[0] != '\0' ? find_name(draft, draft->desc->cell_count, name) : draft->desc->cell_count;
         if (portal->cells[i] == draft->desc->cell_count)
             return nb_json_fail(json, NEBEL_ERROR_FORMAT, at, "is the name of no cell");
@@ -106,7 +106,7 @@ static bool read_ends(nb_scene_reader *in, const nb_json_node *node, const cells
 static bool read_polygon(nb_scene_reader *in, const nb_json_node *node, nebel_portal *portal)
 {
     nb_json *json = in->json;
-    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of vertices [x, y, z]")) return false;
+    if (!nb_key_value_is(json, node, NB_JSON_ARRAY, "an array of vertices [x, y, z]")) return false;
     if (node->count < 3 || node->count > NEBEL_MAX_PORTAL_VERTICES)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "holds %lu vertices; must hold 3 to %d",
                             (unsigned long)node->count, NEBEL_MAX_PORTAL_VERTICES);
@@ -114,8 +114,8 @@ static bool read_polygon(nb_scene_reader *in, const nb_json_node *node, nebel_po
     if (vertices == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     size_t i = 0;
     for (const nb_json_node *at = nb_json_first(json, node); at != NULL; at = nb_json_next(json, at), i++) {
-        if (!nb_value_place(json, at, vertices[i])) return false;
-        nb_space_convert_place(&in->space, vertices[i]);
+        if (!nb_key_value_place(json, at, vertices[i])) return false;
+        nb_file_units_convert_place(&in->space, vertices[i]);
     }
     portal->vertices = (const double(*)[3])vertices;
     portal->vertex_count = node->count;
@@ -128,8 +128,8 @@ static bool read_portal(nb_scene_reader *in, const nb_json_node *node, const cel
     static const char *const portal_names[] = {"cells", "polygon"};
     static const nb_key_set keys = {portal_names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a portal"};
     const nb_json_node *found[COUNT];
-    return nb_value_is(in->json, node, NB_JSON_OBJECT, "a portal {\"cells\": ..., \"polygon\": ...}") &&
-           nb_value_members(in->json, node, &keys, found) && read_ends(in, found[CELLS], draft, portal) &&
+    return nb_key_value_is(in->json, node, NB_JSON_OBJECT, "a portal {\"cells\": ..., \"polygon\": ...}") &&
+           nb_key_value_members(in->json, node, &keys, found) && read_ends(in, found[CELLS], draft, portal) &&
            read_polygon(in, found[POLYGON], portal);
 }
 
@@ -139,8 +139,8 @@ static bool read_portals(nb_scene_reader *in, const nb_json_node *node, const ce
     static const char *const derived_names[] = {"derived"};
     nb_json *json = in->json;
     if (node == NULL) return true;
-    if (node->type == NB_JSON_STRING) return nb_value_choice(json, node, derived_names, 1) >= 0;
-    if (!nb_value_is(json, node, NB_JSON_ARRAY, "\"derived\" or an array of portals")) return false;
+    if (node->type == NB_JSON_STRING) return nb_key_value_choice(json, node, derived_names, 1) >= 0;
+    if (!nb_key_value_is(json, node, NB_JSON_ARRAY, "\"derived\" or an array of portals")) return false;
     nebel_portal *portals = nb_arena_allocate(&in->scene->arena, node->count, sizeof *portals);
     if (portals == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     size_t i = 0;
@@ -155,7 +155,7 @@ static bool read_portals(nb_scene_reader *in, const nb_json_node *node, const ce
 
 static bool read_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count, int *choice)
 {
-    if (node != NULL) *choice = nb_value_choice(json, node, names, count);
+    if (node != NULL) *choice = nb_key_value_choice(json, node, names, count);
     return *choice >= 0;
 }
 
@@ -165,7 +165,7 @@ static bool read_manner(nb_json *json, const nb_json_node *model, const nb_json_
     int chosen_model = 0, chosen_span = 0;
     if (!read_choice(json, model, model_names, NEBEL_CELL_MODEL_COUNT, &chosen_model) ||
         !read_choice(json, span, span_names, NEBEL_SPAN_COUNT, &chosen_span) ||
-        (grouping != NULL && !nb_value_is(json, grouping, NB_JSON_BOOLEAN, "true or false")))
+        (grouping != NULL && !nb_key_value_is(json, grouping, NB_JSON_BOOLEAN, "true or false")))
         return false;
     desc->model = (nebel_cell_model)chosen_model;
     desc->span = (nebel_cell_span)chosen_span;
@@ -196,7 +196,7 @@ static bool try_cells(nb_scene_reader *in, const nb_json_node *node, const nb_js
     nebel_cells *cells = NULL;
     nebel_cells_desc tried = *desc;
     tried.allocator = in->scene->allocator;
-    tried.log = (nebel_log){nb_read_keep_message, in};
+    tried.log = (nebel_log){nb_keys_read_keep_message, in};
     tried.failed_cell = &cell;
     tried.failed_portal = &portal;
     in->core_message[0] = '\0';
@@ -208,7 +208,7 @@ static bool try_cells(nb_scene_reader *in, const nb_json_node *node, const nb_js
     return fail_as_core(in, result, node, false);
 }
 
-bool nb_read_cells(nb_scene_reader *in, const nb_json_node *node)
+bool nb_keys_read_cells(nb_scene_reader *in, const nb_json_node *node)
 {
     enum { CELLS, PORTALS, MODEL, SPAN, GROUPING, COUNT };
     static const char *const section_names[] = {"cells", "portals", "model", "span", "grouping"};
@@ -217,8 +217,8 @@ bool nb_read_cells(nb_scene_reader *in, const nb_json_node *node)
     cells_draft draft = {.desc = nb_arena_allocate(&in->scene->arena, 1, sizeof *draft.desc)};
     if (draft.desc == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
     *draft.desc = (nebel_cells_desc){.cells = NULL};
-    if (!nb_value_is(in->json, node, NB_JSON_OBJECT, "an object {\"cells\": [...]}") ||
-        !nb_value_members(in->json, node, &keys, found) || !read_list(in, found[CELLS], &draft) ||
+    if (!nb_key_value_is(in->json, node, NB_JSON_OBJECT, "an object {\"cells\": [...]}") ||
+        !nb_key_value_members(in->json, node, &keys, found) || !read_list(in, found[CELLS], &draft) ||
         !read_portals(in, found[PORTALS], &draft) ||
         !read_manner(in->json, found[MODEL], found[SPAN], found[GROUPING], draft.desc) ||
         !try_cells(in, node, found[CELLS], found[PORTALS], draft.desc))

@@ -12,7 +12,7 @@ const char *const nb_d3d9_mode_names[4] = {"none", "exp", "exp2", "linear"};
 
 static bool read_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count, int *choice)
 {
-    if (node != NULL) *choice = nb_value_choice(json, node, names, count);
+    if (node != NULL) *choice = nb_key_value_choice(json, node, names, count);
     return *choice >= 0;
 }
 
@@ -32,11 +32,11 @@ static bool read_table(nb_scene_reader *in, const nb_json_node *node)
     nb_json *json = in->json;
     double weights[NEBEL_CURVE_ENTRIES];
     if (node == NULL) return true;
-    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of 2 to 256 numbers")) return false;
+    if (!nb_key_value_is(json, node, NB_JSON_ARRAY, "an array of 2 to 256 numbers")) return false;
     if (node->count < 2 || node->count > NEBEL_CURVE_ENTRIES)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has %u weights; 2 to %d are possible",
                             (unsigned)node->count, NEBEL_CURVE_ENTRIES);
-    if (!nb_value_numbers(json, node, &nb_range_fraction, node->count, weights)) return false;
+    if (!nb_key_value_numbers(json, node, &nb_range_fraction, node->count, weights)) return false;
     float *table = nb_arena_allocate(&in->scene->arena, NEBEL_CURVE_ENTRIES, sizeof *table);
     if (table == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     for (size_t i = 0; i < NEBEL_CURVE_ENTRIES; i++) table[i] = find_entry(weights, node->count, i);
@@ -60,7 +60,7 @@ static bool read_curve(nb_scene_reader *in, const nb_json_node *curve, const nb_
 /* Numbers are parts of a byte, as in D3DCOLOR_COLORVALUE, and "#rrggbb" is bytes: neither is light. */
 static bool read_stored_color(nb_json *json, const nb_json_node *node, double color[3])
 {
-    if (!nb_value_color(json, node, &nb_range_fraction, color)) return false;
+    if (!nb_key_value_color(json, node, &nb_range_fraction, color)) return false;
     for (int c = 0; c < 3 && node != NULL && node->type == NB_JSON_STRING; c++) color[c] = nb_device_store(color[c]);
     return true;
 }
@@ -78,8 +78,8 @@ static bool read_planes(nb_scene_reader *in, const nb_json_node *near_node, cons
     const double unit = in->space.unit;
     nebel_scene_data *const data = &in->scene->data;
     double near = 0, far = 1000 / unit;
-    if (!nb_value_number(in->json, near_node, &nb_range_place, &near) ||
-        !nb_value_number(in->json, far_node, &nb_range_place, &far))
+    if (!nb_key_value_number(in->json, near_node, &nb_range_place, &near) ||
+        !nb_key_value_number(in->json, far_node, &nb_range_place, &far))
         return false;
     data->classic_z_near = near * unit;
     data->classic_z_far = far * unit;
@@ -101,15 +101,15 @@ static bool read_d3d9(nb_scene_reader *in, const nb_json_node *node)
     int vertex_mode = NEBEL_D3DFOG_NONE, table_mode = NEBEL_D3DFOG_NONE;
     double start = 0, end = 1 / unit, density = unit, color[3] = {0, 0, 0};
     if (node == NULL) return true;
-    if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {\"fog_vertex_mode\": ...}") ||
-        !nb_value_members(json, node, &keys, found) ||
+    if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {\"fog_vertex_mode\": ...}") ||
+        !nb_key_value_members(json, node, &keys, found) ||
         !read_choice(json, found[VERTEX_MODE], nb_d3d9_mode_names, 4, &vertex_mode) ||
         !read_choice(json, found[TABLE_MODE], nb_d3d9_mode_names, 4, &table_mode) ||
-        !nb_value_number(json, found[START], &nb_range_place, &start) ||
-        !nb_value_number(json, found[END], &nb_range_place, &end) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_density, &density) ||
+        !nb_key_value_number(json, found[START], &nb_range_place, &start) ||
+        !nb_key_value_number(json, found[END], &nb_range_place, &end) ||
+        !nb_key_value_number(json, found[DENSITY], &nb_range_density, &density) ||
         !read_stored_color(json, found[COLOR], color) ||
-        (found[RANGE] != NULL && !nb_value_is(json, found[RANGE], NB_JSON_BOOLEAN, "true or false")) ||
+        (found[RANGE] != NULL && !nb_key_value_is(json, found[RANGE], NB_JSON_BOOLEAN, "true or false")) ||
         !read_planes(in, found[NEAR], found[FAR]))
         return false;
     nebel_d3d9_fog *d3d9 = nb_arena_allocate(&in->scene->arena, 1, sizeof *d3d9);
@@ -156,7 +156,7 @@ static void convert(const nb_file_units *space, const nb_json_node *end, const n
     if (density != NULL) factor->density /= space->unit;
 }
 
-bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node)
+bool nb_keys_read_classic(nb_scene_reader *in, const nb_json_node *node)
 {
     enum { START, END, DENSITY, COLOR, COORDINATE, STAGE, CURVE, TABLE, D3D9, COUNT };
     static const char *const section_names[] = {"start", "end",   "density", "color", "coordinate",
@@ -168,12 +168,12 @@ bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node)
     nebel_factor_desc *factor = nb_arena_allocate(&in->scene->arena, 1, sizeof *factor);
     if (factor == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     *factor = (nebel_factor_desc){.end = 1, .density = 1};
-    if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {\"density\": ...}") ||
-        !nb_value_members(json, node, &keys, found) ||
-        !nb_value_number(json, found[START], &nb_range_place, &factor->start) ||
-        !nb_value_number(json, found[END], &nb_range_place, &factor->end) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_density, &factor->density) ||
-        !nb_value_color(json, found[COLOR], &nb_range_light, factor->color) ||
+    if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {\"density\": ...}") ||
+        !nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_number(json, found[START], &nb_range_place, &factor->start) ||
+        !nb_key_value_number(json, found[END], &nb_range_place, &factor->end) ||
+        !nb_key_value_number(json, found[DENSITY], &nb_range_density, &factor->density) ||
+        !nb_key_value_color(json, found[COLOR], &nb_range_light, factor->color) ||
         !read_choice(json, found[COORDINATE], nb_coordinate_names, NEBEL_COORDINATE_COUNT, &coordinate) ||
         !read_choice(json, found[STAGE], nb_stage_names, NEBEL_STAGE_COUNT, &stage) ||
         !read_curve(in, found[CURVE], found[TABLE]) || !read_d3d9(in, found[D3D9]))

@@ -13,7 +13,7 @@ static const nb_key_set keys = {names, KEY_COUNT, NB_BIT(KEY_COUNT) - 1, 0, "a l
 /* A part that 0 leaves nothing of. */
 static bool read_part(nb_json *json, const nb_json_node *node, double *value)
 {
-    if (!nb_value_number(json, node, &nb_range_fraction, value)) return false;
+    if (!nb_key_value_number(json, node, &nb_range_fraction, value)) return false;
     if (node != NULL && *value == 0) *value = NEBEL_CLOUD_NONE;
     return true;
 }
@@ -29,14 +29,14 @@ static bool read_numbers(nb_scene_reader *in, const nb_json_node *const *found, 
         .low = 4, .high = NEBEL_MAX_DROPLET_DIAMETER, .text = "a number of micrometres from 4 to 50"};
     static const nb_range wind_range = {.low = -1e12, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
     nb_json *json = in->json;
-    if (!nb_value_number(json, found[BASE], &height_range, &layer->base) ||
-        !nb_value_number(json, found[TOP], &height_range, &layer->top) ||
-        !nb_value_number(json, found[COVERAGE], &nb_range_fraction, &layer->coverage) ||
-        !nb_value_number(json, found[EXTINCTION], &amount_range, &layer->extinction) ||
-        !nb_value_number(json, found[SIZE], &size_range, &layer->cell_size) ||
+    if (!nb_key_value_number(json, found[BASE], &height_range, &layer->base) ||
+        !nb_key_value_number(json, found[TOP], &height_range, &layer->top) ||
+        !nb_key_value_number(json, found[COVERAGE], &nb_range_fraction, &layer->coverage) ||
+        !nb_key_value_number(json, found[EXTINCTION], &amount_range, &layer->extinction) ||
+        !nb_key_value_number(json, found[SIZE], &size_range, &layer->cell_size) ||
         !read_part(json, found[DETAIL], &layer->erosion) || !read_part(json, found[VARIATION], &layer->patchiness) ||
-        !nb_value_number(json, found[DIAMETER], &diameter_range, &layer->droplet_diameter) ||
-        !nb_value_numbers(json, found[WIND], &wind_range, 2, layer->wind))
+        !nb_key_value_number(json, found[DIAMETER], &diameter_range, &layer->droplet_diameter) ||
+        !nb_key_value_numbers(json, found[WIND], &wind_range, 2, layer->wind))
         return false;
     const double unit = in->space.unit;
     layer->base *= unit;
@@ -53,12 +53,12 @@ static bool try_layer(nb_scene_reader *in, const nb_json_node *node, double thic
                       nebel_cloud_layer *resolved)
 {
     static const char subject[] = "cloud layer: ";
-    const nebel_log log = {nb_read_keep_message, in};
+    const nebel_log log = {nb_keys_read_keep_message, in};
     const nebel_result result = nebel_resolve_cloud_layer(thickness, layer, &log, resolved);
     if (result == NEBEL_OK) return true;
     const char *message = in->core_message;
     if (strncmp(message, subject, sizeof subject - 1) == 0) message += sizeof subject - 1;
-    return nb_value_fail_within(in->json, node, message, "");
+    return nb_key_value_fail_within(in->json, node, message, "");
 }
 
 static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const nebel_planet *planet,
@@ -72,7 +72,7 @@ static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const neb
         return nb_json_fail(
             in->json, NEBEL_ERROR_FORMAT, node,
             "lies from %g to %g m and overlaps another, from %g to %g m; give each heights of its own%s", layer->base,
-            layer->top, other.base, other.top, nb_value_note_unit(in->json, note));
+            layer->top, other.base, other.top, nb_key_value_note_unit(in->json, note));
     }
     return true;
 }
@@ -83,7 +83,7 @@ static bool check_size(nb_json *json, const nb_json_node *node, const nebel_plan
     char message[140];
     snprintf(message, sizeof message, "size: is %g m%s; must be at most %g m, which is %g times the radius", size,
              is_given ? "" : ", as none is given", most, NEBEL_MAX_CLOUD_CELL_RADII);
-    return size <= most || nb_value_fail_within(json, node, message, "");
+    return size <= most || nb_key_value_fail_within(json, node, message, "");
 }
 
 /* Of no coverage: no layer. */
@@ -94,11 +94,13 @@ static bool read_layer(nb_scene_reader *in, const nb_json_node *node, nebel_plan
     nb_json *json = in->json;
     nebel_cloud_layer *layer = &planet->cloud_layers[planet->cloud_layer_count];
     *layer = (nebel_cloud_layer){.seed = 1 + planet->cloud_layer_count};
-    if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {...}") || !nb_value_members(json, node, &keys, found))
+    if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {...}") ||
+        !nb_key_value_members(json, node, &keys, found))
         return false;
-    const int kind = found[KIND] != NULL ? nb_value_choice(json, found[KIND], kind_names, NEBEL_CLOUD_TYPE_COUNT) : 0;
-    if (kind < 0 || !read_numbers(in, found, layer) || !nb_read_seed(in, found[SEED], &layer->seed) ||
-        !nb_read_map(in, found[WEATHER], 1, &layer->weather_map))
+    const int kind =
+        found[KIND] != NULL ? nb_key_value_choice(json, found[KIND], kind_names, NEBEL_CLOUD_TYPE_COUNT) : 0;
+    if (kind < 0 || !read_numbers(in, found, layer) || !nb_keys_read_seed(in, found[SEED], &layer->seed) ||
+        !nb_keys_read_map(in, found[WEATHER], 1, &layer->weather_map))
         return false;
     layer->type = (nebel_cloud_type)kind;
     nebel_cloud_layer resolved;
@@ -120,11 +122,11 @@ static bool has_air(const nebel_atmosphere_desc *desc)
     return false;
 }
 
-bool nb_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
+bool nb_keys_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
 {
     if (node == NULL) return true;
-    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of layers of clouds") ||
-        !nb_value_at_most(in->json, node, NEBEL_MAX_CLOUD_LAYERS, "a planet", "layers of clouds"))
+    if (!nb_key_value_is(in->json, node, NB_JSON_ARRAY, "an array of layers of clouds") ||
+        !nb_key_value_at_most(in->json, node, NEBEL_MAX_CLOUD_LAYERS, "a planet", "layers of clouds"))
         return false;
     for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_layer(in, one, planet)) return false;

@@ -56,7 +56,7 @@ static bool read_below(nb_json *json, const nb_json_node *node, nebel_below *bel
 {
     static const char *const names[] = {"grow", "constant"};
     if (node == NULL) return true;
-    const int choice = nb_value_choice(json, node, names, 2);
+    const int choice = nb_key_value_choice(json, node, names, 2);
     if (choice >= 0) *below = (nebel_below)choice;
     return choice >= 0;
 }
@@ -64,7 +64,8 @@ static bool read_below(nb_json *json, const nb_json_node *node, nebel_below *bel
 static bool check_ends(nb_json *json, const nb_json_node *const *found, const nebel_density *density)
 {
     const nb_json_node *end = found[TO] != NULL ? found[TO] : found[FROM];
-    return end == NULL || nb_read_check_apart(json, end, found[TO] != NULL ? "from" : "to", density->from, density->to);
+    return end == NULL ||
+           nb_keys_read_check_apart(json, end, found[TO] != NULL ? "from" : "to", density->from, density->to);
 }
 
 static const nb_json_node *find_type(const nb_json *json, const nb_json_node *object)
@@ -76,15 +77,15 @@ static const nb_json_node *find_type(const nb_json *json, const nb_json_node *ob
 
 static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_density *density)
 {
-    return nb_value_number(json, found[BASE], &nb_range_place, &density->base) &&
-           nb_value_number(json, found[SCALE_HEIGHT], &nb_range_extent, &density->scale_height) &&
-           read_below(json, found[BELOW], &density->below) && nb_value_place(json, found[FROM], density->from) &&
-           nb_value_place(json, found[TO], density->to) && check_ends(json, found, density) &&
-           nb_value_integer(json, found[POWER], 1, 3, &density->power) &&
-           nb_value_place(json, found[CENTER], density->center) &&
-           nb_value_number(json, found[SIGMA], &nb_range_extent, &density->sigma) &&
-           nb_value_number(json, found[DISTANCE], &nb_range_extent, &density->edge_width) &&
-           nb_value_number(json, found[RADIUS], &nb_range_extent, &density->radius);
+    return nb_key_value_number(json, found[BASE], &nb_range_place, &density->base) &&
+           nb_key_value_number(json, found[SCALE_HEIGHT], &nb_range_extent, &density->scale_height) &&
+           read_below(json, found[BELOW], &density->below) && nb_key_value_place(json, found[FROM], density->from) &&
+           nb_key_value_place(json, found[TO], density->to) && check_ends(json, found, density) &&
+           nb_key_value_integer(json, found[POWER], 1, 3, &density->power) &&
+           nb_key_value_place(json, found[CENTER], density->center) &&
+           nb_key_value_number(json, found[SIGMA], &nb_range_extent, &density->sigma) &&
+           nb_key_value_number(json, found[DISTANCE], &nb_range_extent, &density->edge_width) &&
+           nb_key_value_number(json, found[RADIUS], &nb_range_extent, &density->radius);
 }
 
 /* The ball is that of the first planet, in terms of the file. Where that has no center the ground is at the origin. */
@@ -97,7 +98,7 @@ static bool read_altitude(nb_scene_reader *in, const nb_json_node *const *found,
         memcpy(density->center, ball->center, sizeof density->center);
     } else if (found[CENTER] == NULL) {
         density->center[1] = -density->radius * in->space.unit;
-        nb_space_restore_place(&in->space, density->center);
+        nb_file_units_restore_place(&in->space, density->center);
     }
     if (density->radius + density->base >= NEBEL_MIN_ALTITUDE_RATIO * density->scale_height) return true;
     return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, found[SCALE_HEIGHT],
@@ -105,7 +106,7 @@ static bool read_altitude(nb_scene_reader *in, const nb_json_node *const *found,
                         density->scale_height, NEBEL_MIN_ALTITUDE_RATIO, density->radius + density->base);
 }
 
-bool nb_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
+bool nb_keys_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
 {
     const nb_json_node *found[DENSITY_KEY_COUNT];
     nb_key_set keys = density_keys[density->type];
@@ -115,7 +116,7 @@ bool nb_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_de
     if (keys.allowed == 0)
         return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, node, "does not move; %s has no numbers for that",
                                 keys.owner);
-    return nb_value_members(in->json, node, &keys, found) && read_members(in->json, found, density);
+    return nb_key_value_members(in->json, node, &keys, found) && read_members(in->json, found, density);
 }
 
 /* In a node of a model a text may name a density that needs no numbers. */
@@ -123,30 +124,30 @@ static bool read_named(nb_json *json, const nb_json_node *node, nebel_shape_type
 {
     static const char *const names[] = {"constant", "radial"};
     static const nebel_density_type types[] = {NEBEL_DENSITY_CONSTANT, NEBEL_DENSITY_RADIAL};
-    const int choice = nb_value_choice(json, node, names, 2);
+    const int choice = nb_key_value_choice(json, node, names, 2);
     if (choice < 0 || !check_type(json, node, (int)types[choice], shape)) return false;
     *density = (nebel_density){.type = types[choice], .power = types[choice] == NEBEL_DENSITY_RADIAL ? 1 : 0};
     return true;
 }
 
-bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density)
+bool nb_keys_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density)
 {
     const nb_json_node *found[DENSITY_KEY_COUNT];
     nb_json *json = in->json;
     if (node == NULL) return true;
     if (in->node != NULL && node->type == NB_JSON_STRING) return read_named(json, node, shape, density);
-    const int type = nb_value_type(json, node, type_names, TYPE_COUNT);
+    const int type = nb_key_value_type(json, node, type_names, TYPE_COUNT);
     if (type < 0 || !check_type(json, find_type(json, node), type, shape)) return false;
-    if (type == NEBEL_DENSITY_GRID) return nb_read_grid(in, node, density);
-    if (type == NOISE) return nb_read_noise(in, node, density);
-    if (!nb_value_members(json, node, &density_keys[type], found)) return false;
+    if (type == NEBEL_DENSITY_GRID) return nb_keys_read_grid(in, node, density);
+    if (type == NOISE) return nb_keys_read_noise(in, node, density);
+    if (!nb_key_value_members(json, node, &density_keys[type], found)) return false;
     *density = (nebel_density){.type = (nebel_density_type)type, .power = type == NEBEL_DENSITY_RADIAL ? 1 : 0};
     return type == NEBEL_DENSITY_ALTITUDE ? read_altitude(in, found, density) : read_members(json, found, density);
 }
 
 /* ---- phase ----------------------------------------------------------------------------------- */
 
-bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *phase)
+bool nb_keys_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *phase)
 {
     enum { PHASE_TYPE, G, ALPHA, DIAMETER, COUNT };
     static const char *const names[] = {"type", "g", "alpha", "diameter"};
@@ -168,11 +169,11 @@ bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *p
         .low = 1e-6, .high = NEBEL_MAX_DROPLET_DIAMETER, .text = "a diameter within 1e-6 and 50 micrometres"};
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
-    const int type = nb_value_type(in->json, node, phase_names, (int)(sizeof types / sizeof *types));
+    const int type = nb_key_value_type(in->json, node, phase_names, (int)(sizeof types / sizeof *types));
     if (type < 0) return false;
     phase->type = types[type];
-    return nb_value_members(in->json, node, &keys[type], found) &&
-           nb_value_number(in->json, found[G], &nb_range_asymmetry, &phase->g) &&
-           nb_value_number(in->json, found[ALPHA], &alpha_range, &phase->alpha) &&
-           nb_value_number(in->json, found[DIAMETER], &diameter_range, &phase->diameter);
+    return nb_key_value_members(in->json, node, &keys[type], found) &&
+           nb_key_value_number(in->json, found[G], &nb_range_asymmetry, &phase->g) &&
+           nb_key_value_number(in->json, found[ALPHA], &alpha_range, &phase->alpha) &&
+           nb_key_value_number(in->json, found[DIAMETER], &diameter_range, &phase->diameter);
 }

@@ -33,7 +33,7 @@ static nb_voxel_file kind_of(const nb_json *json, const nb_json_node *object)
 static bool names_file(nb_json *json, const nb_json_node *object)
 {
     for (const nb_json_node *node = nb_json_first(json, object); node != NULL; node = nb_json_next(json, node))
-        if (nb_json_has_key(node, "file") && !nb_value_is(json, node, NB_JSON_STRING, "the path of a file"))
+        if (nb_json_has_key(node, "file") && !nb_key_value_is(json, node, NB_JSON_STRING, "the path of a file"))
             return false;
     return true;
 }
@@ -41,24 +41,24 @@ static bool names_file(nb_json *json, const nb_json_node *object)
 static bool read_choices(nb_json *json, const nb_json_node *const *found, nebel_grid_file *file)
 {
     int filter = 0, type = 0;
-    if (found[FILTER] != NULL) filter = nb_value_choice(json, found[FILTER], filter_names, 2);
-    if (found[VOXELS] != NULL) type = nb_value_choice(json, found[VOXELS], voxel_names, 3);
+    if (found[FILTER] != NULL) filter = nb_key_value_choice(json, found[FILTER], filter_names, 2);
+    if (found[VOXELS] != NULL) type = nb_key_value_choice(json, found[VOXELS], voxel_names, 3);
     file->filter = (nebel_grid_filter)filter;
     file->type = (nebel_voxel_type)type;
     return filter >= 0 && type >= 0;
 }
 
-bool nb_read_grid_size(nb_json *json, const nb_json_node *node, size_t size[3])
+bool nb_keys_read_grid_size(nb_json *json, const nb_json_node *node, size_t size[3])
 {
     if (node == NULL) return true;
-    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of three numbers of voxels")) return false;
+    if (!nb_key_value_is(json, node, NB_JSON_ARRAY, "an array of three numbers of voxels")) return false;
     if (node->count != 3)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "holds %u numbers; must be an array of three",
                             (unsigned)node->count);
     int i = 0;
     for (const nb_json_node *at = nb_json_first(json, node); at != NULL; at = nb_json_next(json, at), i++) {
         int count = 0;
-        if (!nb_value_integer(json, at, 1, NEBEL_MAX_GRID_SIZE, &count)) return false;
+        if (!nb_key_value_integer(json, at, 1, NEBEL_MAX_GRID_SIZE, &count)) return false;
         size[i] = (size_t)count;
     }
     return true;
@@ -69,10 +69,10 @@ static bool read_file(nb_scene_reader *in, const nb_json_node *const *found, neb
     nb_arena *arena = &in->scene->arena;
     const char *path = "";
     int slices = 0;
-    if (!nb_value_text(in->json, found[FILE_KEY], arena, &path) ||
-        (found[GRID] != NULL && !nb_value_text(in->json, found[GRID], arena, &file->grid_name)) ||
-        !nb_value_integer(in->json, found[SLICES], 1, NEBEL_MAX_GRID_SIZE, &slices) ||
-        !nb_read_grid_size(in->json, found[SIZE], file->size) || !read_choices(in->json, found, file))
+    if (!nb_key_value_text(in->json, found[FILE_KEY], arena, &path) ||
+        (found[GRID] != NULL && !nb_key_value_text(in->json, found[GRID], arena, &file->grid_name)) ||
+        !nb_key_value_integer(in->json, found[SLICES], 1, NEBEL_MAX_GRID_SIZE, &slices) ||
+        !nb_keys_read_grid_size(in->json, found[SIZE], file->size) || !read_choices(in->json, found, file))
         return false;
     if (path[0] == '\0')
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, found[FILE_KEY], "is empty; must be the path of a file");
@@ -93,7 +93,7 @@ bool nb_scene_keep_grid(nb_scene_reader *in, const nb_json_node *node, nebel_gri
     return room || nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
 }
 
-bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
+bool nb_keys_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
 {
     const nb_json_node *found[GRID_KEY_COUNT];
     nb_json *json = in->json;
@@ -101,7 +101,7 @@ bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *
     nb_note note = {""};
     const nebel_scene_desc desc = {
         .allocator = in->scene->allocator, .log = nb_note_log(&note), .memory = nb_scene_room(in->scene)};
-    if (!names_file(json, node) || !nb_value_members(json, node, &grid_keys[kind_of(json, node)], found) ||
+    if (!names_file(json, node) || !nb_key_value_members(json, node, &grid_keys[kind_of(json, node)], found) ||
         !read_file(in, found, &file))
         return false;
     file.name = nb_arena_copy_text(&in->scene->arena, json->desc.text + node->offset, node->end - node->offset);

@@ -23,7 +23,7 @@ static void keep_channels(const nebel_image *image, const int first[3], int chan
         float color[3];
         for (int c = 0; c < 3; c++) {
             const float value = image->samples[i * n + (size_t)first[c]];
-            color[c] = is_linear || channels == 1 ? value : (float)nb_value_linear_from_srgb((double)value);
+            color[c] = is_linear || channels == 1 ? value : (float)nb_key_value_linear_from_srgb((double)value);
         }
         if (channels == 1) color[0] = (color[0] + color[1] + color[2]) / 3;
         memcpy(&texels[(size_t)channels * i], color, (size_t)channels * sizeof *color);
@@ -66,13 +66,13 @@ static nebel_result set_map(const nb_codec *codec, nebel_image *image, int chann
     return NEBEL_OK;
 }
 
-bool nb_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, nebel_planet_map *map)
+bool nb_keys_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, nebel_planet_map *map)
 {
     nebel_scene *scene = in->scene;
     const char *path = "";
     nb_note note = {""};
     if (node == NULL) return true;
-    if (!nb_value_text(in->json, node, &scene->arena, &path)) return false;
+    if (!nb_key_value_text(in->json, node, &scene->arena, &path)) return false;
     if (nebel_get_image_format(path) == NEBEL_IMAGE_NONE)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
                             "is \"%s\"; must be the path of a picture, .png or .exr", path);
@@ -91,11 +91,11 @@ bool nb_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, ne
     return nb_scene_charge(in, node, (double)map->width * (double)map->height * channels * (double)sizeof(float), 0);
 }
 
-bool nb_read_seed(nb_scene_reader *in, const nb_json_node *node, uint32_t *seed)
+bool nb_keys_read_seed(nb_scene_reader *in, const nb_json_node *node, uint32_t *seed)
 {
     int number = (int)*seed;
     if (node == NULL) return true;
-    if (!nb_value_integer(in->json, node, 0, INT32_MAX, &number)) return false;
+    if (!nb_key_value_integer(in->json, node, 0, INT32_MAX, &number)) return false;
     *seed = (uint32_t)number;
     return true;
 }
@@ -112,16 +112,17 @@ static bool read_cloud(nb_scene_reader *in, const nb_json_node *node, nebel_clou
         .low = 0, .high = 1e3, .open = true, .text = "a number between 0 and 1000, without them"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
-    if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {...}") || !nb_value_members(json, node, &keys, found) ||
-        !nb_value_number(json, found[HEIGHT], &height_range, &shell->height) ||
-        !nb_value_number(json, found[DAY], &day_range, &shell->rotation_period) ||
-        !nb_value_color(json, found[COLOR], &nb_range_fraction, shell->color) ||
-        !nb_read_map(in, found[MAP], 1, &shell->coverage_map) ||
-        !nb_read_map(in, found[DETAIL], 1, &shell->detail_map) ||
-        !nb_value_numbers(json, found[WRAP], &wrap_range, 3, shell->uv_tiling) ||
-        !nb_value_number(json, found[GAIN], &gain_range, &shell->gain) ||
-        !nb_value_number(json, found[COVERAGE], &part_range, &shell->coverage) ||
-        !nb_read_seed(in, found[SEED], &shell->seed))
+    if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {...}") ||
+        !nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_number(json, found[HEIGHT], &height_range, &shell->height) ||
+        !nb_key_value_number(json, found[DAY], &day_range, &shell->rotation_period) ||
+        !nb_key_value_color(json, found[COLOR], &nb_range_fraction, shell->color) ||
+        !nb_keys_read_map(in, found[MAP], 1, &shell->coverage_map) ||
+        !nb_keys_read_map(in, found[DETAIL], 1, &shell->detail_map) ||
+        !nb_key_value_numbers(json, found[WRAP], &wrap_range, 3, shell->uv_tiling) ||
+        !nb_key_value_number(json, found[GAIN], &gain_range, &shell->gain) ||
+        !nb_key_value_number(json, found[COVERAGE], &part_range, &shell->coverage) ||
+        !nb_keys_read_seed(in, found[SEED], &shell->seed))
         return false;
     shell->height *= in->space.unit;
     return true;
@@ -130,8 +131,8 @@ static bool read_cloud(nb_scene_reader *in, const nb_json_node *node, nebel_clou
 static bool read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_textured_planet_desc *desc)
 {
     if (node == NULL) return true;
-    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of shells of clouds") ||
-        !nb_value_at_most(in->json, node, NEBEL_MAX_CLOUD_SHELLS, "a planet", "shells of clouds"))
+    if (!nb_key_value_is(in->json, node, NB_JSON_ARRAY, "an array of shells of clouds") ||
+        !nb_key_value_at_most(in->json, node, NEBEL_MAX_CLOUD_SHELLS, "a planet", "shells of clouds"))
         return false;
     for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_cloud(in, one, &desc->cloud_shells[desc->cloud_shell_count++])) return false;
@@ -141,11 +142,11 @@ static bool read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_tex
 static bool read_ramp(nb_json *json, const nb_json_node *node, nebel_atmosphere_shell *air)
 {
     if (node == NULL) return true;
-    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of colours") ||
-        !nb_value_at_most(json, node, NEBEL_MAX_RAMP_COLORS, "a ramp", "colours"))
+    if (!nb_key_value_is(json, node, NB_JSON_ARRAY, "an array of colours") ||
+        !nb_key_value_at_most(json, node, NEBEL_MAX_RAMP_COLORS, "a ramp", "colours"))
         return false;
     for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one))
-        if (!nb_value_color(json, one, &nb_range_fraction, air->ramp[air->ramp_count++])) return false;
+        if (!nb_key_value_color(json, one, &nb_range_fraction, air->ramp[air->ramp_count++])) return false;
     return air->ramp_count > 0 || nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is empty; leave it out for a blue one");
 }
 
@@ -158,9 +159,10 @@ static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_atmosp
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     if (node == NULL) return true;
-    if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {...}") || !nb_value_members(json, node, &keys, found) ||
-        !nb_value_number(json, found[HEIGHT], &height_range, &air->height) ||
-        !nb_value_number(json, found[BRIGHTNESS], &brightness_range, &air->brightness) ||
+    if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {...}") ||
+        !nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_number(json, found[HEIGHT], &height_range, &air->height) ||
+        !nb_key_value_number(json, found[BRIGHTNESS], &brightness_range, &air->brightness) ||
         !read_ramp(json, found[RAMP], air))
         return false;
     air->height *= in->space.unit;
@@ -178,7 +180,7 @@ static bool turns(const nebel_textured_planet_desc *planet)
     return does;
 }
 
-bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_textured_planet_desc *desc)
+bool nb_keys_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_textured_planet_desc *desc)
 {
     enum { MODEL, CENTER, RADIUS, ROTATION, DAY, MAP, COVERAGE, SEED, CLOUDS, AIR, COUNT };
     static const char *const names[] = {"model", "center",   "radius", "rotation", "day",
@@ -188,17 +190,18 @@ bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_texture
     nb_json *json = in->json;
     double radius = 6.36e6 / in->space.unit, scale[3] = {1, 1, 1};
     *desc = (nebel_textured_planet_desc){.rotation = {0, 0, 0, 1}};
-    if (!nb_value_members(json, node, &keys, found) || !nb_value_number(json, found[RADIUS], &radius_range, &radius) ||
-        !nb_value_place(json, found[CENTER], desc->center) ||
-        !nb_value_rotation(json, found[ROTATION], desc->rotation) ||
-        !nb_value_number(json, found[DAY], &day_range, &desc->rotation_period) ||
-        !nb_read_map(in, found[MAP], 3, &desc->color_map) ||
-        !nb_value_number(json, found[COVERAGE], &part_range, &desc->land_coverage) ||
-        !nb_read_seed(in, found[SEED], &desc->seed) || !read_clouds(in, found[CLOUDS], desc) ||
+    if (!nb_key_value_members(json, node, &keys, found) ||
+        !nb_key_value_number(json, found[RADIUS], &radius_range, &radius) ||
+        !nb_key_value_place(json, found[CENTER], desc->center) ||
+        !nb_key_value_rotation(json, found[ROTATION], desc->rotation) ||
+        !nb_key_value_number(json, found[DAY], &day_range, &desc->rotation_period) ||
+        !nb_keys_read_map(in, found[MAP], 3, &desc->color_map) ||
+        !nb_key_value_number(json, found[COVERAGE], &part_range, &desc->land_coverage) ||
+        !nb_keys_read_seed(in, found[SEED], &desc->seed) || !read_clouds(in, found[CLOUDS], desc) ||
         !read_air(in, found[AIR], &desc->atmosphere))
         return false;
     desc->radius = radius * in->space.unit;
-    nb_space_convert_placement(&in->space, desc->center, desc->rotation, scale);
+    nb_file_units_convert_placement(&in->space, desc->center, desc->rotation, scale);
     if (found[CENTER] == NULL) desc->center[1] = -desc->radius;
     in->scene->data.has_endless_motion |= turns(desc);
     return true;

@@ -13,10 +13,10 @@ static const char *const sun_names[] = {"frame", "direction", "irradiance", "key
 /* What is not there stays as it is. */
 static bool read_sunlight(const nb_scene_reader *in, const nb_json_node *const *found, nebel_sun *sun)
 {
-    if (!nb_value_color(in->json, found[SUN_IRRADIANCE], &nb_range_light, sun->irradiance)) return false;
+    if (!nb_key_value_color(in->json, found[SUN_IRRADIANCE], &nb_range_light, sun->irradiance)) return false;
     if (found[SUN_DIRECTION] == NULL) return true;
-    if (!nb_value_direction(in->json, found[SUN_DIRECTION], sun->direction)) return false;
-    nb_space_convert_direction(&in->space, sun->direction);
+    if (!nb_key_value_direction(in->json, found[SUN_DIRECTION], sun->direction)) return false;
+    nb_file_units_convert_direction(&in->space, sun->direction);
     nb_vector_normalize(sun->direction, 3);
     return true;
 }
@@ -26,8 +26,8 @@ static bool read_sun_key(const nb_scene_reader *in, const nb_json_node *node, ne
     static const nb_key_set keys = {sun_names, SUN_KEY_COUNT, NB_BIT(SUN_FRAME) | SUN_LIGHT, NB_BIT(SUN_FRAME),
                                     "a key of the sun"};
     const nb_json_node *found[SUN_KEY_COUNT];
-    return nb_value_members(in->json, node, &keys, found) &&
-           nb_value_number(in->json, found[SUN_FRAME], &nb_range_frame, &key->frame) &&
+    return nb_key_value_members(in->json, node, &keys, found) &&
+           nb_key_value_number(in->json, found[SUN_FRAME], &nb_range_frame, &key->frame) &&
            read_sunlight(in, found, &key->sun);
 }
 
@@ -35,7 +35,7 @@ static bool read_sun_keys(nb_scene_reader *in, const nb_json_node *node, const n
 {
     nebel_scene_data *data = &in->scene->data;
     if (node == NULL) return true;
-    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of keys of the sun")) return false;
+    if (!nb_key_value_is(in->json, node, NB_JSON_ARRAY, "an array of keys of the sun")) return false;
     if (node->count == 0) return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "holds no key; give one or more");
     nebel_sun_key *keys = nb_arena_allocate(&in->scene->arena, node->count, sizeof *keys);
     if (keys == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
@@ -53,13 +53,13 @@ static bool read_sun_keys(nb_scene_reader *in, const nb_json_node *node, const n
     return true;
 }
 
-bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node)
+bool nb_keys_read_sun(nb_scene_reader *in, const nb_json_node *node)
 {
     static const nb_key_set keys = {sun_names, SUN_KEY_COUNT, SUN_LIGHT | NB_BIT(SUN_KEYS), SUN_LIGHT, "a sun"};
     const nb_json_node *found[SUN_KEY_COUNT];
     nebel_scene_data *data = &in->scene->data;
     nebel_sun sun;
-    if (!nb_value_members(in->json, node, &keys, found) || !read_sunlight(in, found, &sun) ||
+    if (!nb_key_value_members(in->json, node, &keys, found) || !read_sunlight(in, found, &sun) ||
         !read_sun_keys(in, found[SUN_KEYS], &sun))
         return false;
     memcpy(data->sun_direction, sun.direction, sizeof sun.direction);
@@ -87,9 +87,9 @@ static bool read_cone(nb_json *json, const nb_json_node *const *found, nebel_lig
         .low = DBL_TRUE_MIN, .high = 180, .text = "a number of degrees from the axis, > 0 and <= 180"};
     static const nb_range inner_range = {
         .low = 0, .high = 180, .text = "a number of degrees from the axis, from 0 to outer_angle"};
-    if (!nb_value_direction(json, found[DIRECTION], lamp->direction) ||
-        !nb_value_number(json, found[OUTER_ANGLE], &outer_range, &lamp->outer_angle) ||
-        !nb_value_number(json, found[INNER_ANGLE], &inner_range, &lamp->inner_angle))
+    if (!nb_key_value_direction(json, found[DIRECTION], lamp->direction) ||
+        !nb_key_value_number(json, found[OUTER_ANGLE], &outer_range, &lamp->outer_angle) ||
+        !nb_key_value_number(json, found[INNER_ANGLE], &inner_range, &lamp->inner_angle))
         return false;
     if (lamp->inner_angle <= lamp->outer_angle) return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[INNER_ANGLE], "is %.15g; must be %s", lamp->inner_angle,
@@ -125,7 +125,7 @@ static const nb_json_node *find_sphere(const nb_json *json, const nb_json_node *
     return NULL;
 }
 
-bool nb_read_light(nb_scene_reader *in, const nb_json_node *node)
+bool nb_keys_read_light(nb_scene_reader *in, const nb_json_node *node)
 {
     static const char *const types[] = {"point", "spot"};
     static const nb_range radius_range = {.low = 1e-3, .high = 1e6, .dimension = NB_LENGTH, .text = "a length"};
@@ -136,17 +136,18 @@ bool nb_read_light(nb_scene_reader *in, const nb_json_node *node)
     if (sphere != NULL)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, sphere,
                             "unknown; must be one of: point, spot; a ball that shines is a point with a \"radius\"");
-    const int type = nb_value_type(in->json, node, types, 2);
-    if (type < 0 || !nb_value_members(in->json, node, &light_keys[type], found) ||
-        !nb_value_text(in->json, found[NAME], &in->scene->arena, &name) ||
-        !nb_value_place(in->json, found[POSITION], lamp.position) ||
-        !nb_value_color(in->json, found[INTENSITY], &nb_range_light, lamp.intensity) ||
-        !nb_value_number(in->json, found[RADIUS], &radius_range, &lamp.radius) || !read_cone(in->json, found, &lamp))
+    const int type = nb_key_value_type(in->json, node, types, 2);
+    if (type < 0 || !nb_key_value_members(in->json, node, &light_keys[type], found) ||
+        !nb_key_value_text(in->json, found[NAME], &in->scene->arena, &name) ||
+        !nb_key_value_place(in->json, found[POSITION], lamp.position) ||
+        !nb_key_value_color(in->json, found[INTENSITY], &nb_range_light, lamp.intensity) ||
+        !nb_key_value_number(in->json, found[RADIUS], &radius_range, &lamp.radius) ||
+        !read_cone(in->json, found, &lamp))
         return false;
     lamp.type = (nebel_light_type)type;
     lamp.radius *= in->space.unit;
-    nb_space_convert_place(&in->space, lamp.position);
-    nb_space_convert_direction(&in->space, lamp.direction);
+    nb_file_units_convert_place(&in->space, lamp.position);
+    nb_file_units_convert_direction(&in->space, lamp.direction);
     nb_vector_normalize(lamp.direction, 3);
     return keep_lamp(in, node, &lamp, name);
 }

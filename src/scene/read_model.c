@@ -29,7 +29,7 @@ static bool read_file(nb_scene_reader *in, const nb_json_node *node, nb_model_so
 {
     nb_arena *arena = &in->scene->arena;
     const char *file = "";
-    if (!nb_value_text(in->json, node, arena, &file)) return false;
+    if (!nb_key_value_text(in->json, node, arena, &file)) return false;
     if (file[0] == '\0')
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; must be the path of a file");
     model->file = nb_path_join(arena, in->scene->folder, file);
@@ -44,7 +44,7 @@ static bool read_folder(nb_scene_reader *in, const nb_json_node *node, nb_model_
     nb_arena *arena = &in->scene->arena;
     const char *folder = "";
     if (node == NULL) return true;
-    if (!nb_value_text(in->json, node, arena, &folder)) return false;
+    if (!nb_key_value_text(in->json, node, arena, &folder)) return false;
     if (folder[0] == '\0')
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; must be the path of a folder");
     const char *path = nb_path_join(arena, in->scene->folder, folder);
@@ -62,9 +62,9 @@ static bool read_heightfield(nb_scene_reader *in, const nb_json_node *node, nb_m
     static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a heightfield"};
     const nb_json_node *found[COUNT];
     model->is_heightfield = true;
-    return nb_value_members(in->json, node, &keys, found) && read_file(in, found[HEIGHTFIELD_FILE], model) &&
-           nb_value_numbers(in->json, found[SIZE], &nb_range_extent, 2, model->size) &&
-           nb_value_number(in->json, found[HEIGHT], &nb_range_extent, &model->height);
+    return nb_key_value_members(in->json, node, &keys, found) && read_file(in, found[HEIGHTFIELD_FILE], model) &&
+           nb_key_value_numbers(in->json, found[SIZE], &nb_range_extent, 2, model->size) &&
+           nb_key_value_number(in->json, found[HEIGHT], &nb_range_extent, &model->height);
 }
 
 static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_node *const *found)
@@ -80,34 +80,34 @@ static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_no
     return true;
 }
 
-bool nb_read_up(nb_json *json, const nb_json_node *node, nb_file_units *space)
+bool nb_keys_read_up(nb_json *json, const nb_json_node *node, nb_file_units *space)
 {
     static const char *const names[] = {"y", "z"};
     if (node == NULL) return true;
-    const int choice = nb_value_choice(json, node, names, 2);
+    const int choice = nb_key_value_choice(json, node, names, 2);
     space->z_up = choice == 1;
     return choice >= 0;
 }
 
-bool nb_read_unit(nb_json *json, const nb_json_node *node, nb_file_units *space)
+bool nb_keys_read_unit(nb_json *json, const nb_json_node *node, nb_file_units *space)
 {
     static const nb_range range = {.low = 1e-9, .high = 1e18, .text = "a number of metres from 1e-9 to 1e18"};
-    return nb_value_number(json, node, &range, &space->unit);
+    return nb_key_value_number(json, node, &range, &space->unit);
 }
 
 static void convert_model(const nb_file_units *space, nb_model_source *model)
 {
-    nb_space_convert_placement(space, model->position, model->rotation, model->scale);
+    nb_file_units_convert_placement(space, model->position, model->rotation, model->scale);
     for (int i = 0; i < 2; i++) model->size[i] *= space->unit;
     model->height *= space->unit;
 }
 
 static bool read_placement(nb_json *json, const nb_json_node *const *found, nb_model_source *model)
 {
-    return nb_read_up(json, found[UP], &model->space) && nb_read_unit(json, found[UNIT], &model->space) &&
-           nb_value_place(json, found[POSITION], model->position) &&
-           nb_value_rotation(json, found[ROTATION], model->rotation) &&
-           nb_value_scale(json, found[SCALE], model->scale);
+    return nb_keys_read_up(json, found[UP], &model->space) && nb_keys_read_unit(json, found[UNIT], &model->space) &&
+           nb_key_value_place(json, found[POSITION], model->position) &&
+           nb_key_value_rotation(json, found[ROTATION], model->rotation) &&
+           nb_key_value_scale(json, found[SCALE], model->scale);
 }
 
 /* What the public face says of a model. */
@@ -145,20 +145,20 @@ static bool keep_model(nb_scene_reader *in, const nb_json_node *node, const nb_m
     return true;
 }
 
-bool nb_read_model(nb_scene_reader *in, const nb_json_node *node)
+bool nb_keys_read_model(nb_scene_reader *in, const nb_json_node *node)
 {
     const nb_json_node *found[MODEL_KEY_COUNT];
     nb_json *json = in->json;
     nb_model_source model = unplaced;
-    if (!nb_value_members(json, node, &model_keys, found) || !check_kind(json, node, found)) return false;
+    if (!nb_key_value_members(json, node, &model_keys, found) || !check_kind(json, node, found)) return false;
     model.has_color = found[COLOR] != NULL;
     const bool is_file = found[FILE_KEY] != NULL;
     if (!(is_file ? read_file(in, found[FILE_KEY], &model) : read_heightfield(in, found[HEIGHTFIELD], &model)) ||
         !read_folder(in, found[FOLDER], &model) || !read_placement(json, found, &model) ||
-        !nb_value_color(json, found[COLOR], &nb_range_fraction, model.color))
+        !nb_key_value_color(json, found[COLOR], &nb_range_fraction, model.color))
         return false;
     convert_model(&in->space, &model);
-    return (!is_file || nb_read_nodes(in, found[FILE_KEY], &model)) && keep_model(in, node, &model);
+    return (!is_file || nb_keys_read_nodes(in, found[FILE_KEY], &model)) && keep_model(in, node, &model);
 }
 
 /* ---- points ---------------------------------------------------------------------------------- */
@@ -179,8 +179,8 @@ static bool keep_points(nb_scene_reader *in, const nb_json_node *node, const nb_
     return true;
 }
 
-bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula,
-                    nebel_transform *place)
+bool nb_keys_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula,
+                         nebel_transform *place)
 {
     const nb_json_node *found[MODEL_KEY_COUNT];
     nb_model_source model = unplaced;
@@ -196,7 +196,7 @@ bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit,
                                 .most_seconds = nb_scene_most_seconds(in->scene),
                                 .seconds = &in->scene->budget.seconds};
     if (node == NULL) return true;
-    if (!nb_value_members(in->json, node, &points_keys, found) || !read_file(in, found[FILE_KEY], &model) ||
+    if (!nb_key_value_members(in->json, node, &points_keys, found) || !read_file(in, found[FILE_KEY], &model) ||
         !read_folder(in, found[FOLDER], &model) || !read_placement(in->json, found, &model))
         return false;
     convert_model(&in->space, &model);

@@ -34,9 +34,9 @@ static const nb_key_set nebula_keys = {key_names, NEBULA_KEY_COUNT, NB_BIT(NEBUL
 static bool read_counts(nb_json *json, const nb_json_node *const *found, nebel_nebula_desc *nebula)
 {
     int count = 10000, seed = 0;
-    if (!nb_value_integer(json, found[COUNT], 1, MOST_PARTICLES, &count) ||
-        !nb_value_number(json, found[FADE], &nb_range_fraction, &nebula->dimming) ||
-        !nb_value_integer(json, found[SEED], 0, INT32_MAX, &seed))
+    if (!nb_key_value_integer(json, found[COUNT], 1, MOST_PARTICLES, &count) ||
+        !nb_key_value_number(json, found[FADE], &nb_range_fraction, &nebula->dimming) ||
+        !nb_key_value_integer(json, found[SEED], 0, INT32_MAX, &seed))
         return false;
     nebula->count = (size_t)count;
     nebula->seed = (uint64_t)seed;
@@ -48,7 +48,7 @@ static bool read_profile(nb_json *json, const nb_json_node *node, nebel_particle
 {
     static const char *const names[] = {"soft", "gaussian", "ball"};
     if (node == NULL) return true;
-    const int choice = nb_value_choice(json, node, names, NEBEL_PARTICLE_PROFILE_COUNT);
+    const int choice = nb_key_value_choice(json, node, names, NEBEL_PARTICLE_PROFILE_COUNT);
     if (choice >= 0) *profile = (nebel_particle_profile)choice;
     return choice >= 0;
 }
@@ -57,9 +57,9 @@ static bool read_sizes(nb_json *json, const nb_json_node *const *found, nebel_ne
 {
     nb_range radius = nb_range_extent;
     if (nebula->profile == NEBEL_PARTICLE_GAUSSIAN) radius.low *= 3; /* its sigma is a third of the radius */
-    if (!nb_value_numbers(json, found[SIZE], &radius, 2, nebula->radius_range) ||
-        !nb_value_number(json, found[TURBULENCE], &nb_range_distance, &nebula->turbulence) ||
-        !nb_value_number(json, found[TURBULENCE_SIZE], &nb_range_extent, &nebula->turbulence_scale))
+    if (!nb_key_value_numbers(json, found[SIZE], &radius, 2, nebula->radius_range) ||
+        !nb_key_value_number(json, found[TURBULENCE], &nb_range_distance, &nebula->turbulence) ||
+        !nb_key_value_number(json, found[TURBULENCE_SIZE], &nb_range_extent, &nebula->turbulence_scale))
         return false;
     if (nebula->radius_range[0] <= nebula->radius_range[1]) return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[SIZE], "is larger first; must be [smallest, largest] radius");
@@ -83,7 +83,7 @@ static bool read_colors(nb_scene_reader *in, const nb_json_node *node, nebel_neb
 {
     nb_json *json = in->json;
     if (node == NULL) return true;
-    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of colors")) return false;
+    if (!nb_key_value_is(json, node, NB_JSON_ARRAY, "an array of colors")) return false;
     if (node->count < 1 || node->count > MOST_COLORS)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has %u colors; 1 to %d are possible",
                             (unsigned)node->count, MOST_COLORS);
@@ -92,7 +92,7 @@ static bool read_colors(nb_scene_reader *in, const nb_json_node *node, nebel_neb
     nebula->colors = (const double(*)[3])colors;
     for (const nb_json_node *color = nb_json_first(json, node); color != NULL; color = nb_json_next(json, color)) {
         double *factors = colors[nebula->color_count++];
-        if (!nb_value_color(json, color, &nb_range_light, factors) || !check_emission(json, color, nebula, factors))
+        if (!nb_key_value_color(json, color, &nb_range_light, factors) || !check_emission(json, color, nebula, factors))
             return false;
     }
     return true;
@@ -150,7 +150,7 @@ static bool try_nebula(nb_scene_reader *in, const nb_json_node *node, const nebe
     nebel_nebula_desc empty = *nebula;
     empty.count = 0;
     empty.allocator = in->scene->allocator;
-    empty.log = (nebel_log){nb_read_keep_message, in};
+    empty.log = (nebel_log){nb_keys_read_keep_message, in};
     in->core_message[0] = '\0';
     const nebel_result result = nebel_generate_nebula(&empty, NULL);
     if (result == NEBEL_OK) return true;
@@ -171,14 +171,14 @@ static bool check_total(nb_scene_reader *in, const nb_json_node *node, const neb
 static bool finish_nebula(nb_scene_reader *in, const nb_json_node *node, const nb_json_node *shape,
                           nebel_nebula_desc *nebula, const nebel_transform *place, const char *name)
 {
-    nb_space_convert_nebula(&in->space, nebula);
+    nb_file_units_convert_nebula(&in->space, nebula);
     return try_nebula(in, shape != NULL ? shape : node, nebula) && check_total(in, node, nebula) &&
            nb_scene_charge(in, node, (double)nebula->count * NB_PARTICLE_BYTES,
                            (double)nebula->count * NB_PARTICLE_SECONDS) &&
            keep_nebula(in, node, nebula, place, name);
 }
 
-bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
+bool nb_keys_read_nebula(nb_scene_reader *in, const nb_json_node *node)
 {
     const nb_json_node *found[NEBULA_KEY_COUNT];
     nb_json *json = in->json;
@@ -186,17 +186,17 @@ bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
     nebel_nebula_desc nebula = {.radius_range = {0.05 / in->space.unit, 0.2 / in->space.unit}};
     nebel_transform place = nb_plain_transform;
     const char *name = "";
-    return nb_value_is(json, node, NB_JSON_OBJECT, "a nebula {\"shape\": ...}") &&
-           nb_value_members(json, node, &nebula_keys, found) &&
-           nb_value_text(json, found[NAME], &in->scene->arena, &name) && check_kind(json, node, found) &&
-           (found[SHAPE] == NULL || nb_read_shape(in, found[SHAPE], &nebula.shape)) &&
+    return nb_key_value_is(json, node, NB_JSON_OBJECT, "a nebula {\"shape\": ...}") &&
+           nb_key_value_members(json, node, &nebula_keys, found) &&
+           nb_key_value_text(json, found[NAME], &in->scene->arena, &name) && check_kind(json, node, found) &&
+           (found[SHAPE] == NULL || nb_keys_read_shape(in, found[SHAPE], &nebula.shape)) &&
            check_bounds(json, found[SHAPE], nebula.shape.type) &&
-           nb_read_density(in, found[DENSITY], nebula.shape.type, &nebula.density) &&
+           nb_keys_read_density(in, found[DENSITY], nebula.shape.type, &nebula.density) &&
            read_counts(json, found, &nebula) && read_profile(json, found[PROFILE], &nebula.profile) &&
            read_sizes(json, found, &nebula) &&
-           nb_value_amount(json, found[ABSORPTION], &nb_range_amount, nebula.absorption) &&
-           nb_value_color(json, found[EMISSION], &nb_range_amount, nebula.emission) &&
+           nb_key_value_amount(json, found[ABSORPTION], &nb_range_amount, nebula.absorption) &&
+           nb_key_value_color(json, found[EMISSION], &nb_range_amount, nebula.emission) &&
            read_colors(in, found[COLORS], &nebula) &&
-           nb_read_points(in, found[POINTS], MOST_PARTICLES, &nebula, &place) &&
+           nb_keys_read_points(in, found[POINTS], MOST_PARTICLES, &nebula, &place) &&
            finish_nebula(in, node, found[SHAPE], &nebula, &place, name);
 }

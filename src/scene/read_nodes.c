@@ -75,7 +75,7 @@ static bool take_text(nb_json *json, const nb_json_node *value, void *user)
     nb_json *outer = in->json;
     if (nb_json_parent(json, value) == NULL) return true;
     in->json = json;
-    const bool good = nb_read_volume(in, value);
+    const bool good = nb_keys_read_volume(in, value);
     in->json = outer;
     return good;
 }
@@ -117,7 +117,7 @@ static bool read_fog(nodes_reader *nodes, nb_json *json, const nb_json_node *ext
     nodes->in->json = json;
     const bool is_text = whole != NULL && whole->type == NB_JSON_STRING;
     const bool good =
-        is_text ? read_text(nodes, json, whole) : nb_read_volume(nodes->in, whole != NULL ? whole : extras);
+        is_text ? read_text(nodes, json, whole) : nb_keys_read_volume(nodes->in, whole != NULL ? whole : extras);
     nodes->in->node = NULL;
     return good;
 }
@@ -189,7 +189,7 @@ static nebel_result read_inside(nb_scene_reader *in, nb_model_source *model, con
     return result;
 }
 
-bool nb_read_nodes(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
+bool nb_keys_read_nodes(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
 {
     nb_bytes text;
     nebel_result result = nb_gltf_read_text(&in->scene->allocator, model->file, &text);

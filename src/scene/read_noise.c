@@ -23,27 +23,27 @@ static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_
     static const nb_range cells = {.low = 1e-6, .high = NEBEL_MAX_GRID_SIZE / 2, .text = "a number from 1e-6 to 2048"};
     nebel_noise_desc *desc = &noise->desc;
     int seed = 0;
-    if (!nb_read_grid_size(json, found[SIZE], desc->size) ||
-        !nb_value_numbers(json, found[CELLS], &cells, 3, desc->frequency) ||
-        !nb_value_integer(json, found[OCTAVES], 1, 16, &desc->octaves) ||
-        !nb_value_number(json, found[GAIN], &part, &desc->gain) ||
-        !nb_value_number(json, found[COVERAGE], &part, &desc->coverage) ||
-        !nb_value_numbers(json, found[EDGE], &half, 3, desc->falloff) ||
-        !nb_value_numbers(json, found[DRIFT], &motion, 3, noise->velocity) ||
-        !nb_value_number(json, found[CHANGE], &motion, &noise->evolution) ||
-        !nb_value_integer(json, found[SEED], 0, INT_MAX, &seed))
+    if (!nb_keys_read_grid_size(json, found[SIZE], desc->size) ||
+        !nb_key_value_numbers(json, found[CELLS], &cells, 3, desc->frequency) ||
+        !nb_key_value_integer(json, found[OCTAVES], 1, 16, &desc->octaves) ||
+        !nb_key_value_number(json, found[GAIN], &part, &desc->gain) ||
+        !nb_key_value_number(json, found[COVERAGE], &part, &desc->coverage) ||
+        !nb_key_value_numbers(json, found[EDGE], &half, 3, desc->falloff) ||
+        !nb_key_value_numbers(json, found[DRIFT], &motion, 3, noise->velocity) ||
+        !nb_key_value_number(json, found[CHANGE], &motion, &noise->evolution) ||
+        !nb_key_value_integer(json, found[SEED], 0, INT_MAX, &seed))
         return false;
     desc->seed = (uint32_t)seed;
     return true;
 }
 
-bool nb_read_noise_numbers(nb_json *json, const nb_json_node *node, nebel_scene_noise *noise)
+bool nb_keys_read_noise_numbers(nb_json *json, const nb_json_node *node, nebel_scene_noise *noise)
 {
     const nb_json_node *found[NOISE_KEY_COUNT];
     noise->desc.octaves = 1;
     noise->desc.gain = 0.5;
     noise->desc.coverage = 1;
-    return nb_value_members(json, node, &noise_keys, found) && read_members(json, found, noise);
+    return nb_key_value_members(json, node, &noise_keys, found) && read_members(json, found, noise);
 }
 
 bool nb_noise_moves(const nebel_scene_noise *noise)
@@ -59,24 +59,24 @@ static const char *name_noise(nb_scene_reader *in, const nb_json_node *node, con
     nebel_scene_noise own = *noise;
     nb_bytes changed = {0};
     if (words == NULL || in->space.z_up == scene->space.z_up) return words;
-    nb_space_restore_noise(&scene->space, &own);
+    nb_file_units_restore_noise(&scene->space, &own);
     const nebel_result result = nb_noise_words(scene, words, &own, &changed);
     words = result == NEBEL_OK ? nb_arena_copy_text(&scene->arena, (const char *)changed.data, changed.size) : NULL;
     nb_release(&scene->allocator, changed.data);
     return words;
 }
 
-bool nb_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
+bool nb_keys_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
 {
     nb_json *json = in->json;
     nb_note note = {""};
     nebel_scene_noise noise = {.desc = {.allocator = in->scene->allocator, .log = nb_note_log(&note)}};
-    if (!nb_read_noise_numbers(json, node, &noise)) return false;
+    if (!nb_keys_read_noise_numbers(json, node, &noise)) return false;
     /* That of the scene's own file has been counted. */
     if (in->node != NULL && !nb_scene_charge_noise(in, node)) return false;
     noise.desc.name = name_noise(in, node, &noise);
     if (noise.desc.name == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
-    nb_space_convert_noise(&in->space, &noise);
+    nb_file_units_convert_noise(&in->space, &noise);
     *density = (nebel_density){.type = NEBEL_DENSITY_GRID};
     const nebel_result result = nebel_create_noise_grid(&noise.desc, &density->grid);
     if (result != NEBEL_OK)

@@ -31,14 +31,14 @@ static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_atmosp
     const nb_json_node *found[AIR_KEY_COUNT];
     nb_json *json = in->json;
     *air = (nebel_atmosphere_component){.scale_height = 0};
-    const int type = nb_value_type(json, node, nb_air_profile_names, NEBEL_COMPONENT_PROFILE_COUNT);
-    if (type < 0 || !nb_value_members(json, node, &air_keys[type], found) ||
-        !nb_value_amount(json, found[SCATTERING], &amount_range, air->scattering) ||
-        !nb_value_amount(json, found[ABSORPTION], &amount_range, air->absorption) ||
-        !nb_read_phase(in, found[PHASE], &air->phase) ||
-        !nb_value_number(json, found[SCALE_HEIGHT], &length_range, &air->scale_height) ||
-        !nb_value_number(json, found[MIDDLE], &middle_range, &air->center_height) ||
-        !nb_value_number(json, found[WIDTH], &length_range, &air->half_width))
+    const int type = nb_key_value_type(json, node, nb_air_profile_names, NEBEL_COMPONENT_PROFILE_COUNT);
+    if (type < 0 || !nb_key_value_members(json, node, &air_keys[type], found) ||
+        !nb_key_value_amount(json, found[SCATTERING], &amount_range, air->scattering) ||
+        !nb_key_value_amount(json, found[ABSORPTION], &amount_range, air->absorption) ||
+        !nb_keys_read_phase(in, found[PHASE], &air->phase) ||
+        !nb_key_value_number(json, found[SCALE_HEIGHT], &length_range, &air->scale_height) ||
+        !nb_key_value_number(json, found[MIDDLE], &middle_range, &air->center_height) ||
+        !nb_key_value_number(json, found[WIDTH], &length_range, &air->half_width))
         return false;
     air->profile = (nebel_component_profile)type;
     for (int c = 0; c < 3; c++) {
@@ -55,8 +55,8 @@ static bool read_airs(nb_scene_reader *in, const nb_json_node *node, nebel_atmos
 {
     uint32_t count = 0;
     if (node == NULL) return true;
-    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of kinds of air") ||
-        !nb_value_at_most(in->json, node, NEBEL_MAX_COMPONENTS, "a planet", "kinds of air"))
+    if (!nb_key_value_is(in->json, node, NB_JSON_ARRAY, "an array of kinds of air") ||
+        !nb_key_value_at_most(in->json, node, NEBEL_MAX_COMPONENTS, "a planet", "kinds of air"))
         return false;
     for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_air(in, one, &desc->components[count++])) return false;
@@ -110,10 +110,10 @@ static bool read_preset(nb_json *json, const nb_json_node *const *found, nebel_p
 {
     static const char *const preset_names[] = {"earth", "mars", "toy", "moon"};
     static const nb_range gravity_range = {.low = 0.1, .high = 1000, .text = "a number from 0.1 to 1000, in m/s^2"};
-    const int preset = found[PRESET] != NULL ? nb_value_choice(json, found[PRESET], preset_names, 4) : 0;
+    const int preset = found[PRESET] != NULL ? nb_key_value_choice(json, found[PRESET], preset_names, 4) : 0;
     if (preset < 0) return false;
     double gravity = presets[preset].gravity;
-    if (!nb_value_number(json, found[GRAVITY], &gravity_range, &gravity)) return false;
+    if (!nb_key_value_number(json, found[GRAVITY], &gravity_range, &gravity)) return false;
     planet->atmosphere_desc = *nebel_lookup_atmosphere(presets[preset].name);
     planet->sun_angular_diameter = presets[preset].sun_diameter;
     if (found[GRAVITY] != NULL) stretch(&planet->atmosphere_desc, presets[preset].gravity / gravity);
@@ -126,17 +126,17 @@ static bool read_sizes(nb_scene_reader *in, const nb_json_node *const *found, ne
     static const nb_range diameter_range = {.low = 0, .high = 10, .text = "a number of degrees from 0 to 10"};
     nebel_atmosphere_desc *desc = &planet->atmosphere_desc;
     double radius = desc->radius / in->space.unit, thickness = desc->thickness / in->space.unit, center[3];
-    if (!nb_value_number(in->json, found[RADIUS], &radius_range, &radius) ||
-        !nb_value_place(in->json, found[CENTER], center) ||
-        !nb_value_number(in->json, found[SUN_DIAMETER], &diameter_range, &planet->sun_angular_diameter))
+    if (!nb_key_value_number(in->json, found[RADIUS], &radius_range, &radius) ||
+        !nb_key_value_place(in->json, found[CENTER], center) ||
+        !nb_key_value_number(in->json, found[SUN_DIAMETER], &diameter_range, &planet->sun_angular_diameter))
         return false;
     if (found[RADIUS] != NULL) desc->radius = radius * in->space.unit;
     const nb_range thickness_range = {
         .low = desc->radius / 1e6, .high = 1e12, .dimension = NB_LENGTH, .text = "a length (radius / 1e6 or more)"};
-    if (!nb_value_number(in->json, found[THICKNESS], &thickness_range, &thickness)) return false;
+    if (!nb_key_value_number(in->json, found[THICKNESS], &thickness_range, &thickness)) return false;
     if (found[THICKNESS] != NULL) desc->thickness = thickness * in->space.unit;
     if (found[CENTER] == NULL) return true;
-    nb_space_convert_place(&in->space, center);
+    nb_file_units_convert_place(&in->space, center);
     memcpy(desc->ground_point, center, sizeof center);
     desc->ground_point[1] += desc->radius;
     return desc->ground_point[1] <= NEBEL_MAX_LENGTH ||
@@ -158,17 +158,17 @@ static void find_center(const nb_json *json, const nb_json_node *node, nb_ground
     ball->has_center = i == 3;
 }
 
-nb_ground_sphere nb_find_ball(const nb_json *json, const nb_json_node *planet)
+nb_ground_sphere nb_find_sphere(const nb_json *json, const nb_json_node *planet)
 {
     nb_ground_sphere ball = {.preset_radius = nebel_lookup_atmosphere(presets[0].name)->radius};
     const nb_json_node *const first =
         planet != NULL && planet->type == NB_JSON_ARRAY ? nb_json_first(json, planet) : planet;
     if (first == NULL || first->type != NB_JSON_OBJECT) return ball;
     for (const nb_json_node *one = nb_json_first(json, first); one != NULL; one = nb_json_next(json, one)) {
-        for (size_t i = 0; i < sizeof presets / sizeof *presets && nb_value_is_key(one, "", "preset"); i++)
+        for (size_t i = 0; i < sizeof presets / sizeof *presets && nb_key_value_is_key(one, "", "preset"); i++)
             if (is_text(one, presets[i].name)) ball.preset_radius = nebel_lookup_atmosphere(presets[i].name)->radius;
-        if (nb_value_is_key(one, "", "radius") && one->type == NB_JSON_NUMBER) ball.radius = one->number;
-        if (nb_value_is_key(one, "", "center")) find_center(json, one, &ball);
+        if (nb_key_value_is_key(one, "", "radius") && one->type == NB_JSON_NUMBER) ball.radius = one->number;
+        if (nb_key_value_is_key(one, "", "center")) find_center(json, one, &ball);
     }
     return ball;
 }
@@ -178,14 +178,14 @@ static bool try_planet(nb_scene_reader *in, const nb_json_node *node, bool has_a
 {
     static const char subject[] = "atmosphere: ",
                       advice[] = "; these airs are the preset's: give \"airs\" that go with the other keys";
-    planet->atmosphere_desc.log = (nebel_log){nb_read_keep_message, in};
+    planet->atmosphere_desc.log = (nebel_log){nb_keys_read_keep_message, in};
     const nebel_result result = nebel_resolve_atmosphere(&planet->atmosphere_desc, &planet->atmosphere_desc);
     planet->atmosphere_desc.log = (nebel_log){NULL, NULL};
     if (result == NEBEL_OK) return true;
     const char *message = in->core_message;
     if (strncmp(message, subject, sizeof subject - 1) == 0) message += sizeof subject - 1;
     const bool is_of_preset = !has_airs && strncmp(message, "airs[", 5) == 0;
-    return nb_value_fail_within(in->json, node, message, is_of_preset ? advice : "");
+    return nb_key_value_fail_within(in->json, node, message, is_of_preset ? advice : "");
 }
 
 static bool charge(nb_scene_reader *in, const nb_json_node *node, const nebel_planet *planet)
@@ -202,14 +202,14 @@ static bool read_physical(nb_scene_reader *in, const nb_json_node *node, nebel_p
     static const char *const quality_names[] = {"fast", "precise"};
     const nb_json_node *found[PLANET_KEY_COUNT];
     nb_json *json = in->json;
-    if (!nb_value_members(json, node, &planet_keys, found) || !read_preset(json, found, planet) ||
+    if (!nb_key_value_members(json, node, &planet_keys, found) || !read_preset(json, found, planet) ||
         !read_sizes(in, found, planet) || !read_airs(in, found[AIRS], &planet->atmosphere_desc) ||
-        !nb_value_color(json, found[GROUND_ALBEDO], &nb_range_fraction, planet->atmosphere_desc.ground_albedo))
+        !nb_key_value_color(json, found[GROUND_ALBEDO], &nb_range_fraction, planet->atmosphere_desc.ground_albedo))
         return false;
-    const int quality = found[QUALITY] != NULL ? nb_value_choice(json, found[QUALITY], quality_names, 2) : 0;
+    const int quality = found[QUALITY] != NULL ? nb_key_value_choice(json, found[QUALITY], quality_names, 2) : 0;
     if (quality < 0) return false;
     planet->atmosphere_desc.quality = (nebel_atmosphere_quality)quality;
-    return try_planet(in, node, found[AIRS] != NULL, planet) && nb_read_clouds(in, found[CLOUDS], planet) &&
+    return try_planet(in, node, found[AIRS] != NULL, planet) && nb_keys_read_clouds(in, found[CLOUDS], planet) &&
            charge(in, node, planet);
 }
 
@@ -218,7 +218,8 @@ static int read_model(nb_json *json, const nb_json_node *node)
 {
     static const char *const model_names[] = {"physical", "layers"};
     for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one))
-        if (nb_value_is_key(one, "", "model")) return nb_value_choice(json, one, model_names, NEBEL_PLANET_MODEL_COUNT);
+        if (nb_key_value_is_key(one, "", "model"))
+            return nb_key_value_choice(json, one, model_names, NEBEL_PLANET_MODEL_COUNT);
     (void)nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
                        "the key \"model\" is missing; must be one of: physical, layers");
     return -1;
@@ -226,12 +227,13 @@ static int read_model(nb_json *json, const nb_json_node *node)
 
 static bool read_planet(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
 {
-    if (!nb_value_is(in->json, node, NB_JSON_OBJECT, "an object {\"model\": ...}, or an array of those")) return false;
+    if (!nb_key_value_is(in->json, node, NB_JSON_OBJECT, "an object {\"model\": ...}, or an array of those"))
+        return false;
     const int model = read_model(in->json, node);
     if (model < 0) return false;
     planet->model = (nebel_planet_model)model;
     for (int c = 0; c < 3; c++) planet->sun_left[c] = 1;
-    return model == NEBEL_PLANET_TEXTURED ? nb_read_layers(in, node, &planet->textured_desc)
+    return model == NEBEL_PLANET_TEXTURED ? nb_keys_read_layers(in, node, &planet->textured_desc)
                                           : read_physical(in, node, planet);
 }
 
@@ -240,11 +242,11 @@ static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const neb
 {
     const nebel_atmosphere_desc *air = &planets[number].atmosphere_desc;
     double middle[3];
-    nb_vector_ball_middle(air->ground_point, air->radius, middle);
+    nb_sphere_center_below(air->ground_point, air->radius, middle);
     for (size_t i = 0; i < number; i++) {
         const nebel_atmosphere_desc *other = &planets[i].atmosphere_desc;
         double between[3];
-        nb_vector_ball_middle(other->ground_point, other->radius, between);
+        nb_sphere_center_below(other->ground_point, other->radius, between);
         for (int c = 0; c < 3; c++) between[c] = middle[c] - between[c];
         if (nb_vector_length(between) > air->radius + air->thickness + other->radius + other->thickness) continue;
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
@@ -269,13 +271,13 @@ static bool read_planets(nb_scene_reader *in, const nb_json_node *node, nebel_pl
         *count = 1;
         return read_planet(in, node, planets);
     }
-    if (!nb_value_at_most(in->json, node, NEBEL_MAX_PLANETS, "a scene", "planets")) return false;
+    if (!nb_key_value_at_most(in->json, node, NEBEL_MAX_PLANETS, "a scene", "planets")) return false;
     for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_one_of_many(in, one, planets, (*count)++)) return false;
     return *count > 0 || nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; leave it out for no planet");
 }
 
-bool nb_read_planet(nb_scene_reader *in, const nb_json_node *node)
+bool nb_keys_read_planet(nb_scene_reader *in, const nb_json_node *node)
 {
     size_t count = 0;
     nebel_planet *planets = nb_arena_allocate(&in->scene->arena, NEBEL_MAX_PLANETS, sizeof *planets);

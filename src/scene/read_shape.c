@@ -59,14 +59,15 @@ static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transf
     static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a transform"};
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
-    return nb_value_members(json, node, &keys, found) && nb_value_place(json, found[POSITION], transform->position) &&
-           nb_value_quaternion(json, found[ROTATION], transform->rotation) &&
-           nb_value_scale(json, found[SCALE], transform->scale);
+    return nb_key_value_members(json, node, &keys, found) &&
+           nb_key_value_place(json, found[POSITION], transform->position) &&
+           nb_key_value_quaternion(json, found[ROTATION], transform->rotation) &&
+           nb_key_value_scale(json, found[SCALE], transform->scale);
 }
 
 /* The two ends of something, in the file's numbers, as far apart as the core wants them. `end` is one of them. */
-bool nb_read_check_apart(nb_json *json, const nb_json_node *end, const char *other, const double from[3],
-                         const double to[3])
+bool nb_keys_read_check_apart(nb_json *json, const nb_json_node *end, const char *other, const double from[3],
+                              const double to[3])
 {
     double away[3];
     char wanted[NB_RANGE_TEXT];
@@ -97,7 +98,7 @@ static bool check_axis(nb_json *json, const nb_json_node *end, const nebel_shape
 {
     const bool is_ball = memcmp(shape->from, shape->to, sizeof shape->to) == 0 && shape->type == NEBEL_SHAPE_CAPSULE;
     return is_ball ||
-           nb_read_check_apart(json, end, nb_json_has_key(end, "to") ? "from" : "to", shape->from, shape->to);
+           nb_keys_read_check_apart(json, end, nb_json_has_key(end, "to") ? "from" : "to", shape->from, shape->to);
 }
 
 static bool check_cone(nb_json *json, const nb_json_node *radius, const nebel_shape *shape)
@@ -109,10 +110,10 @@ static bool check_cone(nb_json *json, const nb_json_node *radius, const nebel_sh
 static bool read_plane(nb_json *json, const nb_json_node *node, nebel_plane *plane)
 {
     double n[4];
-    if (!nb_value_numbers(json, node, &nb_range_any, 4, n)) return false;
+    if (!nb_key_value_numbers(json, node, &nb_range_any, 4, n)) return false;
     if (n[0] == 0 && n[1] == 0 && n[2] == 0)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has the normal 0; one of nx, ny, nz must not be 0");
-    if (!nb_value_check_direction(json, node, n)) return false;
+    if (!nb_key_value_check_direction(json, node, n)) return false;
     *plane = (nebel_plane){{n[0], n[1], n[2]}, n[3]};
     const double away = fabs(n[3] * json->unit), length = hypot(hypot(n[0], n[1]), n[2]);
     if (away <= NEBEL_MAX_LENGTH * length) return true;
@@ -132,13 +133,13 @@ static bool try_planes(nb_scene_reader *in, const nb_json_node *node, const nebe
     }
     body.shape.planes = planes;
     body.shape.transform = no_transform;
-    return nb_read_try(in, node, "convex: ", &body);
+    return nb_keys_read_try(in, node, "convex: ", &body);
 }
 
 static bool read_planes(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
 {
     nb_json *json = in->json;
-    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of planes [nx, ny, nz, d]")) return false;
+    if (!nb_key_value_is(json, node, NB_JSON_ARRAY, "an array of planes [nx, ny, nz, d]")) return false;
     if (node->count < 1 || node->count > NEBEL_MAX_SHAPE_PLANES)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "holds %lu planes; must hold 1 to %d",
                             (unsigned long)node->count, NEBEL_MAX_SHAPE_PLANES);
@@ -164,7 +165,7 @@ static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shap
 static bool read_parts(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape, nesting *where)
 {
     nb_json *json = in->json;
-    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of shapes")) return false;
+    if (!nb_key_value_is(json, node, NB_JSON_ARRAY, "an array of shapes")) return false;
     if (node->count < 1 || node->count > NEBEL_MAX_SHAPE_LEAVES)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "holds %lu shapes; must hold 1 to %d",
                             (unsigned long)node->count, NEBEL_MAX_SHAPE_LEAVES);
@@ -192,14 +193,16 @@ static bool check_nesting(nb_json *json, const nb_json_node *node, const nesting
 
 static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_shape *shape)
 {
-    return read_transform(json, found[TRANSFORM], &shape->transform) && nb_value_place(json, found[MIN], shape->min) &&
-           nb_value_place(json, found[MAX], shape->max) && nb_value_place(json, found[CENTER], shape->center) &&
-           nb_value_number(json, found[RADIUS], &nb_range_extent, &shape->radius) &&
-           nb_value_numbers(json, found[RADII], &nb_range_extent, 3, shape->radii) &&
-           nb_value_place(json, found[FROM], shape->from) && nb_value_place(json, found[TO], shape->to) &&
-           nb_value_number(json, found[RADIUS_FROM], &nb_range_end, &shape->radius_from) &&
-           nb_value_number(json, found[RADIUS_TO], &nb_range_end, &shape->radius_to) &&
-           nb_value_place(json, found[POINT], shape->point) && nb_value_direction(json, found[NORMAL], shape->normal);
+    return read_transform(json, found[TRANSFORM], &shape->transform) &&
+           nb_key_value_place(json, found[MIN], shape->min) && nb_key_value_place(json, found[MAX], shape->max) &&
+           nb_key_value_place(json, found[CENTER], shape->center) &&
+           nb_key_value_number(json, found[RADIUS], &nb_range_extent, &shape->radius) &&
+           nb_key_value_numbers(json, found[RADII], &nb_range_extent, 3, shape->radii) &&
+           nb_key_value_place(json, found[FROM], shape->from) && nb_key_value_place(json, found[TO], shape->to) &&
+           nb_key_value_number(json, found[RADIUS_FROM], &nb_range_end, &shape->radius_from) &&
+           nb_key_value_number(json, found[RADIUS_TO], &nb_range_end, &shape->radius_to) &&
+           nb_key_value_place(json, found[POINT], shape->point) &&
+           nb_key_value_direction(json, found[NORMAL], shape->normal);
 }
 
 /* What one number has to do with another. */
@@ -216,8 +219,8 @@ static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shap
 {
     const nb_json_node *found[SHAPE_KEY_COUNT];
     nb_json *json = in->json;
-    const int type = nb_value_type(json, node, type_names, NEBEL_SHAPE_COUNT);
-    if (type < 0 || !nb_value_members(json, node, &shape_keys[type], found)) return false;
+    const int type = nb_key_value_type(json, node, type_names, NEBEL_SHAPE_COUNT);
+    if (type < 0 || !nb_key_value_members(json, node, &shape_keys[type], found)) return false;
     *shape = (nebel_shape){.type = (nebel_shape_type)type, .transform = no_transform};
     if (!read_members(json, found, shape)) return false;
     where->leaf_count += found[SHAPES] == NULL;
@@ -226,18 +229,18 @@ static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shap
     return check_members(json, found, shape) && (found[PLANES] == NULL || read_planes(in, found[PLANES], shape));
 }
 
-bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
+bool nb_keys_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
 {
     nesting where = {0, 0};
     return read_shape(in, node, shape, &where);
 }
 
-bool nb_read_shape_key(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
+bool nb_keys_read_shape_key(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
 {
     const nb_json_node *found[SHAPE_KEY_COUNT];
     nb_key_set keys = shape_keys[shape->type];
     keys.allowed &= ~(NB_BIT(TYPE) | NB_BIT(PLANES) | NB_BIT(SHAPES));
     keys.required = 0;
-    return node == NULL || (nb_value_members(in->json, node, &keys, found) && read_members(in->json, found, shape) &&
-                            check_members(in->json, found, shape));
+    return node == NULL || (nb_key_value_members(in->json, node, &keys, found) &&
+                            read_members(in->json, found, shape) && check_members(in->json, found, shape));
 }

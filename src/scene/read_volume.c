@@ -51,8 +51,8 @@ static bool read_operation(nb_json *json, const nb_json_node *volume, const char
 {
     static const char *const names[] = {"add", "exclude", "replace"};
     for (const nb_json_node *node = nb_json_first(json, volume); node != NULL; node = nb_json_next(json, node)) {
-        if (!nb_value_is_key(node, prefix, "operation")) continue;
-        const int choice = nb_value_choice(json, node, names, 3);
+        if (!nb_key_value_is_key(node, prefix, "operation")) continue;
+        const int choice = nb_key_value_choice(json, node, names, 3);
         if (choice < 0) return false;
         *operation = (nebel_operation)choice;
     }
@@ -67,7 +67,7 @@ static bool read_length(nb_json *json, const nb_json_node *node, double depth, d
     const nb_range range = {
         .low = depth / NEBEL_MAX_AMOUNT, .high = HUGE_VAL, .dimension = NB_LENGTH, .text = "a length"};
     double length[3];
-    if (!nb_value_amount(json, node, &range, length)) return false;
+    if (!nb_key_value_amount(json, node, &range, length)) return false;
     for (int i = 0; i < 3; i++) extinction[i] = fmin(depth / length[i], NEBEL_MAX_AMOUNT * json->unit);
     return true;
 }
@@ -102,8 +102,8 @@ static bool read_amount(nb_json *json, const nb_json_node *const *found, double 
     if (found[CONTRAST] != NULL && found[VISIBILITY] == NULL)
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[CONTRAST],
                                 "belongs to \"visibility\", which is absent");
-    if (!nb_value_number(json, found[CONTRAST], &contrast_range, contrast)) return false;
-    if (found[EXTINCTION] != NULL) return nb_value_amount(json, found[EXTINCTION], &nb_range_amount, extinction);
+    if (!nb_key_value_number(json, found[CONTRAST], &contrast_range, contrast)) return false;
+    if (found[EXTINCTION] != NULL) return nb_key_value_amount(json, found[EXTINCTION], &nb_range_amount, extinction);
     if (found[VISIBILITY] != NULL)
         return read_length(json, found[VISIBILITY], nebel_extinction_from_visibility(1, *contrast), extinction);
     return found[MEAN_FREE_PATH] == NULL || read_length(json, found[MEAN_FREE_PATH], 1, extinction);
@@ -121,7 +121,7 @@ static bool read_preset(nb_json *json, const nb_json_node *const *found, nebel_v
     if (found[PRESET] == NULL) return true;
     if (count > MOST_PRESETS) count = MOST_PRESETS;
     for (size_t i = 0; i < count; i++) names[i] = presets[i].name;
-    const int choice = nb_value_choice(json, found[PRESET], names, (int)count);
+    const int choice = nb_key_value_choice(json, found[PRESET], names, (int)count);
     if (choice < 0) return false;
     const nebel_fog_preset *const preset = &presets[choice];
     for (int i = 0; i < 3; i++) volume->extinction[i] = preset->extinction[i] * json->unit;
@@ -147,17 +147,18 @@ static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, ne
                                 "a volume has \"source\" or \"albedo\", not both; remove one");
     if (found[PHASE] != NULL && !is_lit(found))
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[PHASE], "belongs to \"albedo\", which is absent");
-    if (!nb_value_color(json, found[SOURCE], &nb_range_light, volume->source) ||
-        !nb_value_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) ||
-        !nb_read_phase(in, found[PHASE], &volume->phase) ||
-        !nb_value_color(json, found[EMISSION], &nb_range_amount, volume->emission))
+    if (!nb_key_value_color(json, found[SOURCE], &nb_range_light, volume->source) ||
+        !nb_key_value_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) ||
+        !nb_keys_read_phase(in, found[PHASE], &volume->phase) ||
+        !nb_key_value_color(json, found[EMISSION], &nb_range_amount, volume->emission))
         return false;
     return true;
 }
 
 /* ---- keeping --------------------------------------------------------------------------------- */
 
-bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subject, const nebel_volume_desc *volume)
+bool nb_keys_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subject,
+                      const nebel_volume_desc *volume)
 {
     nebel_volume_id id;
     in->core_message[0] = '\0';
@@ -238,10 +239,10 @@ static bool read_key(nb_scene_reader *in, const nb_json_node *node, const nb_jso
     nb_json *json = in->json;
     nebel_volume_desc *volume = &key->volume;
     double contrast = nb_volume_entry_default().contrast;
-    return nb_value_members(json, node, &moving_keys[volume->operation], found) &&
-           nb_value_number(json, found[FRAME], &nb_range_frame, &key->frame) &&
-           nb_read_shape_key(in, found[SHAPE], &volume->shape) &&
-           nb_read_density_key(in, found[DENSITY], &volume->density) &&
+    return nb_key_value_members(json, node, &moving_keys[volume->operation], found) &&
+           nb_key_value_number(json, found[FRAME], &nb_range_frame, &key->frame) &&
+           nb_keys_read_shape_key(in, found[SHAPE], &volume->shape) &&
+           nb_keys_read_density_key(in, found[DENSITY], &volume->density) &&
            read_amount(json, found, volume->extinction, &contrast) && check_light_key(json, entry, found) &&
            read_light(in, found, volume);
 }
@@ -251,7 +252,7 @@ static void convert_key(const nb_file_units *space, nebel_volume_desc *volume)
 {
     const size_t planes = volume->shape.plane_count, parts = volume->shape.part_count;
     volume->shape.plane_count = volume->shape.part_count = 0;
-    nb_space_convert_volume(space, volume);
+    nb_file_units_convert_volume(space, volume);
     volume->shape.plane_count = planes;
     volume->shape.part_count = parts;
 }
@@ -278,7 +279,7 @@ static bool read_keys(nb_scene_reader *in, const nb_json_node *list, const nb_js
                       const nebel_volume_desc *volume, nebel_volume_track *entry)
 {
     if (list == NULL) return true;
-    if (!nb_value_is(in->json, list, NB_JSON_ARRAY, "an array of keys {\"frame\": ...}")) return false;
+    if (!nb_key_value_is(in->json, list, NB_JSON_ARRAY, "an array of keys {\"frame\": ...}")) return false;
     if (list->count == 0) return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, list, "holds no key; give one or more");
     nebel_volume_key *keys = nb_arena_allocate(&in->scene->arena, list->count, sizeof *keys);
     if (keys == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, list, "out of memory");
@@ -293,7 +294,7 @@ static bool try_keys(nb_scene_reader *in, const nb_json_node *list, const nebel_
 {
     const nb_json_node *node = list != NULL ? nb_json_first(in->json, list) : NULL;
     for (size_t i = 0; i < entry->key_count; i++, node = nb_json_next(in->json, node))
-        if (!nb_read_try(in, node, "", &entry->keys[i].volume)) return false;
+        if (!nb_keys_read_try(in, node, "", &entry->keys[i].volume)) return false;
     return true;
 }
 
@@ -316,9 +317,9 @@ static bool finish_volume(nb_scene_reader *in, const nb_json_node *node, const n
                           nebel_volume_desc *volume, nebel_volume_track *entry, const char *name)
 {
     if (!read_keys(in, found[KEYS], found, volume, entry)) return false;
-    nb_space_convert_volume(&in->space, volume);
-    if (in->node != NULL && !nb_read_place_volume(in, node, volume)) return false;
-    if (!nb_read_try(in, node, "", volume) || !try_keys(in, found[KEYS], entry) ||
+    nb_file_units_convert_volume(&in->space, volume);
+    if (in->node != NULL && !nb_keys_read_place_volume(in, node, volume)) return false;
+    if (!nb_keys_read_try(in, node, "", volume) || !try_keys(in, found[KEYS], entry) ||
         !start_moving(in, node, volume, entry))
         return false;
     nebel_volume_origin origin = in->node != NULL ? NEBEL_VOLUME_FROM_NODE : NEBEL_VOLUME_STATIC;
@@ -331,22 +332,23 @@ static bool read_members(nb_scene_reader *in, const nb_json_node *node, nebel_vo
                          const nb_json_node **found)
 {
     const char *prefix = in->node != NULL ? in->node->prefix : "";
-    if (!nb_value_is(in->json, node, NB_JSON_OBJECT, "a volume {\"shape\": ...}") ||
+    if (!nb_key_value_is(in->json, node, NB_JSON_OBJECT, "a volume {\"shape\": ...}") ||
         !read_operation(in->json, node, prefix, &volume->operation))
         return false;
     nb_key_set keys = volume_keys[volume->operation];
     if (in->node == NULL)
-        return nb_value_members(in->json, node, &keys, found) && nb_read_shape(in, found[SHAPE], &volume->shape);
+        return nb_key_value_members(in->json, node, &keys, found) &&
+               nb_keys_read_shape(in, found[SHAPE], &volume->shape);
     keys.allowed &= ~NB_BIT(KEYS);
     keys.required = 0;
     keys.owner = "a fog node";
-    return nb_value_members_after(in->json, node, prefix, &keys, found) &&
-           nb_read_node_shape(in, found[SHAPE], &volume->shape);
+    return nb_key_value_members_after(in->json, node, prefix, &keys, found) &&
+           nb_keys_read_node_shape(in, found[SHAPE], &volume->shape);
 }
 
 static bool read_name(nb_scene_reader *in, const nb_json_node *node, const char **name)
 {
-    if (node != NULL || in->node == NULL) return nb_value_text(in->json, node, &in->scene->arena, name);
+    if (node != NULL || in->node == NULL) return nb_key_value_text(in->json, node, &in->scene->arena, name);
     *name = nb_arena_copy_text(&in->scene->arena, in->node->name, strlen(in->node->name));
     return *name != NULL;
 }
@@ -360,8 +362,8 @@ static bool keep_imported(nb_scene_reader *in, const nb_json_node *const found[3
     static const double black[3] = {0};
     const nebel_volume_track entry = nb_volume_entry_default();
     if (found[2] != NULL) memcpy(volume->albedo, black, sizeof black);
-    if (!nb_value_color(in->json, found[2], &nb_range_light, volume->source)) return false;
-    return nb_read_try(in, found[1], "", volume) &&
+    if (!nb_key_value_color(in->json, found[2], &nb_range_light, volume->source)) return false;
+    return nb_keys_read_try(in, found[1], "", volume) &&
            keep_volume(in, found[1], volume, &entry, name, NEBEL_VOLUME_IMPORTED);
 }
 
@@ -383,8 +385,8 @@ static bool read_imported(nb_scene_reader *in, const nb_json_node *node)
     const nb_json_node *found[3];
     const char *name = "";
     nb_import fog = {.count = 0};
-    if (!nb_value_members(in->json, node, &keys, found) ||
-        !nb_value_text(in->json, found[0], &in->scene->arena, &name) || !nb_read_import(in, found[1], &fog) ||
+    if (!nb_key_value_members(in->json, node, &keys, found) ||
+        !nb_key_value_text(in->json, found[0], &in->scene->arena, &name) || !nb_keys_read_import(in, found[1], &fog) ||
         !keep_opacity(in, found[1], fog.max_opacity))
         return false;
     for (size_t i = 0; i < fog.count; i++)
@@ -402,16 +404,16 @@ static bool is_imported(const nb_json *json, const nb_json_node *volume)
 /* What all volumes have, also those without fog. */
 static bool read_place(nb_json *json, const nb_json_node *const *found, nebel_volume_desc *volume)
 {
-    if (!nb_value_integer(json, found[PRIORITY], INT_MIN, INT_MAX, &volume->priority) ||
-        !nb_value_number(json, found[START], &nb_range_distance, &volume->start) ||
-        !nb_value_number(json, found[CUTOFF], &nb_range_distance, &volume->cutoff))
+    if (!nb_key_value_integer(json, found[PRIORITY], INT_MIN, INT_MAX, &volume->priority) ||
+        !nb_key_value_number(json, found[START], &nb_range_distance, &volume->start) ||
+        !nb_key_value_number(json, found[CUTOFF], &nb_range_distance, &volume->cutoff))
         return false;
     if (found[CUTOFF] == NULL || volume->cutoff > volume->start) return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[CUTOFF], "is %.15g; must be more than \"start\", %.15g",
                         volume->cutoff, volume->start);
 }
 
-bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
+bool nb_keys_read_volume(nb_scene_reader *in, const nb_json_node *node)
 {
     if (in->node == NULL && is_imported(in->json, node)) return read_imported(in, node);
     const nb_json_node *found[VOLUME_KEY_COUNT];
@@ -422,7 +424,7 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
     if (!read_members(in, node, &volume, found) || !read_place(json, found, &volume)) return false;
     if (!read_name(in, found[NAME], &name)) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     if (volume.operation != NEBEL_OPERATION_EXCLUDE &&
-        (!nb_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||
+        (!nb_keys_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||
          !check_amount_given(json, node, found) || !read_preset(json, found, &volume) ||
          !read_amount(json, found, volume.extinction, &entry.contrast) || !read_light(in, found, &volume)))
         return false;

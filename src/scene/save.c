@@ -20,7 +20,8 @@ static nebel_result save_text(const char *path, const nebel_scene_desc *desc, nb
     nebel_result result = nb_scene_parse(save->edit.text, save->edit.size, path, desc, save, &scene);
     nebel_destroy_scene(scene);
     if (result != NEBEL_OK || (save->edit.count == 0 && !save->edit.out_of_memory)) return result;
-    if (!nb_edit_apply(&save->edit, &bytes)) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
+    if (!nb_json_patch_apply(&save->edit, &bytes))
+        return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
     result = write_text(path, desc, &bytes);
     nb_release(&save->edit.arena.allocator, bytes.data);
     return result;
@@ -50,7 +51,7 @@ static nebel_result save_file(const char *path, const nebel_scene_desc *desc, nb
     save->edit.text = (const char *)bytes.data;
     save->edit.size = bytes.size;
     result = save_text(path, desc, save);
-    nb_edit_release(&save->edit);
+    nb_json_patch_release(&save->edit);
     nb_release(allocator, save->volumes.spans);
     nb_release(allocator, save->models.spans);
     nb_release(allocator, bytes.data);

@@ -8,24 +8,24 @@
 static void put(nb_key_patch *save, const nb_json_node *node, const char *key, const char *words)
 {
     if (node != NULL)
-        nb_edit_replace(&save->edit, node, words);
+        nb_json_patch_replace(&save->edit, node, words);
     else
-        nb_edit_add(&save->edit, &save->root, key, words);
+        nb_json_patch_add(&save->edit, &save->root, key, words);
 }
 
 static void put_color(nb_key_patch *save, const nb_json_node *node, const char *key, const double color[3])
 {
     char words[NB_EDIT_NUMBERS];
-    nb_edit_write_numbers(3, color, NB_EDIT_AMOUNT, words);
+    nb_json_patch_write_numbers(3, color, NB_EDIT_AMOUNT, words);
     put(save, node, key, words);
 }
 
 static void put_gradient(nb_key_patch *save, const nb_json_node *node, const nebel_environment *now)
 {
     char zenith[NB_EDIT_NUMBERS], horizon[NB_EDIT_NUMBERS], ground[NB_EDIT_NUMBERS], words[4 * NB_EDIT_NUMBERS];
-    nb_edit_write_numbers(3, now->zenith, NB_EDIT_AMOUNT, zenith);
-    nb_edit_write_numbers(3, now->horizon, NB_EDIT_AMOUNT, horizon);
-    nb_edit_write_numbers(3, now->ground, NB_EDIT_AMOUNT, ground);
+    nb_json_patch_write_numbers(3, now->zenith, NB_EDIT_AMOUNT, zenith);
+    nb_json_patch_write_numbers(3, now->horizon, NB_EDIT_AMOUNT, horizon);
+    nb_json_patch_write_numbers(3, now->ground, NB_EDIT_AMOUNT, ground);
     snprintf(words, sizeof words, "{ \"type\": \"gradient\", \"zenith\": %s, \"horizon\": %s, \"ground\": %s }", zenith,
              horizon, ground);
     put(save, node, "ambient", words);
@@ -34,26 +34,27 @@ static void put_gradient(nb_key_patch *save, const nb_json_node *node, const neb
 static void change_environment(nb_key_patch *save, const nb_json *json, const nb_json_node *node)
 {
     const nebel_environment *was = &save->before->environment, *now = &save->changed->environment;
-    const nb_edit_object object = nb_edit_find(json, node);
+    const nb_json_patch_object object = nb_json_patch_find(json, node);
     nb_edit *edit = &save->edit;
     if (now->type == NEBEL_ENVIRONMENT_GRADIENT) {
-        nb_edit_numbers(edit, json, &object, "zenith", 3, was->zenith, now->zenith, NB_EDIT_AMOUNT);
-        nb_edit_numbers(edit, json, &object, "horizon", 3, was->horizon, now->horizon, NB_EDIT_AMOUNT);
-        nb_edit_numbers(edit, json, &object, "ground", 3, was->ground, now->ground, NB_EDIT_AMOUNT);
+        nb_json_patch_numbers(edit, json, &object, "zenith", 3, was->zenith, now->zenith, NB_EDIT_AMOUNT);
+        nb_json_patch_numbers(edit, json, &object, "horizon", 3, was->horizon, now->horizon, NB_EDIT_AMOUNT);
+        nb_json_patch_numbers(edit, json, &object, "ground", 3, was->ground, now->ground, NB_EDIT_AMOUNT);
     } else {
-        nb_edit_numbers(edit, json, &object, "rotation", 1, &was->rotation, &now->rotation, NB_EDIT_EACH);
-        nb_edit_numbers(edit, json, &object, "intensity", 1, &was->intensity, &now->intensity, NB_EDIT_EACH);
+        nb_json_patch_numbers(edit, json, &object, "rotation", 1, &was->rotation, &now->rotation, NB_EDIT_EACH);
+        nb_json_patch_numbers(edit, json, &object, "intensity", 1, &was->intensity, &now->intensity, NB_EDIT_EACH);
     }
 }
 
 /* A file whose ambient light has become of another type is refused at its end, as is a map that is new. */
-void nb_save_ambient(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
+void nb_key_patch_ambient(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
 {
     const nebel_scene_data *was = save->before, *now = save->changed;
     const nebel_environment_type type = now->environment.type;
     if (in->scene->data.environment.type != was->environment.type) return;
     if (type == NEBEL_ENVIRONMENT_CONSTANT && was->environment.type == type)
-        nb_edit_numbers(&save->edit, in->json, &save->root, "ambient", 3, was->ambient, now->ambient, NB_EDIT_AMOUNT);
+        nb_json_patch_numbers(&save->edit, in->json, &save->root, "ambient", 3, was->ambient, now->ambient,
+                              NB_EDIT_AMOUNT);
     else if (was->environment.type == type)
         change_environment(save, in->json, node);
     else if (type == NEBEL_ENVIRONMENT_GRADIENT)
@@ -62,12 +63,12 @@ void nb_save_ambient(nb_key_patch *save, const nb_scene_reader *in, const nb_jso
         put_color(save, node, "ambient", now->ambient);
 }
 
-void nb_save_background(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
+void nb_key_patch_background(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
 {
     const nebel_scene_data *was = save->before, *now = save->changed;
     if (!was->shows_ambient && !now->shows_ambient)
-        nb_edit_numbers(&save->edit, in->json, &save->root, "background", 3, was->background, now->background,
-                        NB_EDIT_AMOUNT);
+        nb_json_patch_numbers(&save->edit, in->json, &save->root, "background", 3, was->background, now->background,
+                              NB_EDIT_AMOUNT);
     else if (now->shows_ambient && !was->shows_ambient)
         put(save, node, "background", "\"ambient\"");
     else if (!now->shows_ambient)

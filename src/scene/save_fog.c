@@ -19,8 +19,8 @@ static bool is_clear(const double extinction[3])
 static void replace_amount(nb_key_patch *save, const nb_json_node *was, const char *key, const double numbers[3])
 {
     char words[NB_EDIT_NUMBERS + 32], *const text = words + snprintf(words, 32, "\"%s\": ", key);
-    nb_edit_write_numbers(3, numbers, NB_EDIT_AMOUNT, text);
-    nb_edit_put(&save->edit, was->key_offset, was->end - was->key_offset, words);
+    nb_json_patch_write_numbers(3, numbers, NB_EDIT_AMOUNT, text);
+    nb_json_patch_put(&save->edit, was->key_offset, was->end - was->key_offset, words);
 }
 
 static void find_lengths(double scale, const double extinction[3], double lengths[3])
@@ -29,7 +29,7 @@ static void find_lengths(double scale, const double extinction[3], double length
 }
 
 /* Visibility, whose meaning its contrast is. */
-static void save_visibility(nb_key_patch *save, const nb_json *json, const nb_edit_object *volume,
+static void save_visibility(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *volume,
                             const nb_json_node *word, const nb_written_volume *was, const nb_written_volume *now)
 {
     double from[3], to[3];
@@ -38,34 +38,35 @@ static void save_visibility(nb_key_patch *save, const nb_json *json, const nb_ed
     for (int i = 0; i < 3; i++)
         if (fabs(to[i] - from[i]) <= 1e-14 * from[i]) to[i] = from[i];
     if (nb_json_has_key(word, "visibility"))
-        nb_edit_numbers(&save->edit, json, volume, "visibility", 3, from, to, NB_EDIT_AMOUNT);
+        nb_json_patch_numbers(&save->edit, json, volume, "visibility", 3, from, to, NB_EDIT_AMOUNT);
     else
         replace_amount(save, word, "visibility", to);
-    nb_edit_numbers(&save->edit, json, volume, "contrast", 1, &was->entry.contrast, &now->entry.contrast, NB_EDIT_EACH);
+    nb_json_patch_numbers(&save->edit, json, volume, "contrast", 1, &was->entry.contrast, &now->entry.contrast,
+                          NB_EDIT_EACH);
 }
 
 /* Where the file leaves the amount to a preset. */
-static void add_amount(nb_key_patch *save, const nb_edit_object *volume, const nb_written_volume *now)
+static void add_amount(nb_key_patch *save, const nb_json_patch_object *volume, const nb_written_volume *now)
 {
     const double *extinction = now->volume.extinction;
     const bool is_plain = now->entry.contrast == nb_volume_entry_default().contrast || is_clear(extinction);
     double visibility[3];
     char words[NB_EDIT_NUMBERS];
     find_lengths(-log(now->entry.contrast), extinction, visibility);
-    nb_edit_write_numbers(3, is_plain ? extinction : visibility, NB_EDIT_AMOUNT, words);
-    nb_edit_add(&save->edit, volume, is_plain ? "extinction" : "visibility", words);
+    nb_json_patch_write_numbers(3, is_plain ? extinction : visibility, NB_EDIT_AMOUNT, words);
+    nb_json_patch_add(&save->edit, volume, is_plain ? "extinction" : "visibility", words);
     if (is_plain) return;
-    nb_edit_write_numbers(1, &now->entry.contrast, NB_EDIT_EACH, words);
-    nb_edit_add(&save->edit, volume, "contrast", words);
+    nb_json_patch_write_numbers(1, &now->entry.contrast, NB_EDIT_EACH, words);
+    nb_json_patch_add(&save->edit, volume, "contrast", words);
 }
 
 /* The file's own word for the amount stays, unless it has none for an extinction of 0 or for a contrast. */
-static void save_amount(nb_key_patch *save, const nb_json *json, const nb_edit_object *volume,
+static void save_amount(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *volume,
                         const nb_written_volume *was, const nb_written_volume *now)
 {
-    const nb_json_node *visibility = nb_edit_member(json, volume->node, "visibility");
-    const nb_json_node *path = nb_edit_member(json, volume->node, "mean_free_path");
-    const nb_json_node *extinction = nb_edit_member(json, volume->node, "extinction");
+    const nb_json_node *visibility = nb_json_patch_member(json, volume->node, "visibility");
+    const nb_json_node *path = nb_json_patch_member(json, volume->node, "mean_free_path");
+    const nb_json_node *extinction = nb_json_patch_member(json, volume->node, "extinction");
     const nb_json_node *word = visibility != NULL ? visibility : path != NULL ? path : extinction;
     const double *from = was->volume.extinction, *to = now->volume.extinction;
     const bool has_other_contrast = was->entry.contrast != now->entry.contrast && !is_clear(to);
@@ -78,19 +79,19 @@ static void save_amount(nb_key_patch *save, const nb_json *json, const nb_edit_o
     if (!is_clear(to) && (visibility != NULL || has_other_contrast)) {
         save_visibility(save, json, volume, word, was, now);
     } else if (word == extinction) {
-        nb_edit_numbers(&save->edit, json, volume, "extinction", 3, from, to, NB_EDIT_AMOUNT);
+        nb_json_patch_numbers(&save->edit, json, volume, "extinction", 3, from, to, NB_EDIT_AMOUNT);
     } else if (is_clear(to)) {
         replace_amount(save, word, "extinction", to);
     } else {
         find_lengths(1, from, lengths_was);
         find_lengths(1, to, lengths_now);
-        nb_edit_numbers(&save->edit, json, volume, "mean_free_path", 3, lengths_was, lengths_now, NB_EDIT_AMOUNT);
+        nb_json_patch_numbers(&save->edit, json, volume, "mean_free_path", 3, lengths_was, lengths_now, NB_EDIT_AMOUNT);
     }
 }
 
 static bool is_same_kind(const nebel_volume_desc *a, const nebel_volume_desc *b)
 {
-    return a->operation == b->operation && nb_save_is_same_form(&a->shape, &b->shape) &&
+    return a->operation == b->operation && nb_key_patch_is_same_form(&a->shape, &b->shape) &&
            a->density.type == b->density.type;
 }
 
@@ -104,15 +105,15 @@ static nb_removed_keys find_lost_keys(const nb_written_volume *was, const nb_wri
 {
     const nebel_volume_desc *a = &was->volume, *b = &now->volume;
     nb_removed_keys lost = {{NULL}};
-    if (b->cutoff == 0 && a->cutoff != 0) nb_save_lose(&lost, "cutoff");
+    if (b->cutoff == 0 && a->cutoff != 0) nb_key_patch_lose(&lost, "cutoff");
     if (is_clear(b->extinction) && memcmp(a->extinction, b->extinction, sizeof a->extinction) != 0)
-        nb_save_lose(&lost, "contrast");
-    if (has_changed_to(a->albedo, b->albedo) && is_zero(b->source)) nb_save_lose(&lost, "source");
+        nb_key_patch_lose(&lost, "contrast");
+    if (has_changed_to(a->albedo, b->albedo) && is_zero(b->source)) nb_key_patch_lose(&lost, "source");
     if (has_changed_to(a->source, b->source) && is_zero(b->albedo)) {
-        nb_save_lose(&lost, "albedo");
-        nb_save_lose(&lost, "phase");
+        nb_key_patch_lose(&lost, "albedo");
+        nb_key_patch_lose(&lost, "phase");
     }
-    if (now->entry.key_count == 0 && was->entry.key_count > 0) nb_save_lose(&lost, "keys");
+    if (now->entry.key_count == 0 && was->entry.key_count > 0) nb_key_patch_lose(&lost, "keys");
     return lost;
 }
 
@@ -130,22 +131,22 @@ static bool is_same_phase(const nebel_phase *a, const nebel_phase *b)
     return a->type == b->type && a->g == b->g && a->alpha == b->alpha && a->diameter == b->diameter;
 }
 
-static void save_phase(nb_key_patch *save, const nb_json *json, const nb_edit_object *volume,
+static void save_phase(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *volume,
                        const nb_written_volume *was, const nb_written_volume *now)
 {
     const nebel_phase *to = &now->volume.phase;
-    const nb_json_node *node = nb_edit_member(json, volume->node, "phase");
+    const nb_json_node *node = nb_json_patch_member(json, volume->node, "phase");
     /* A preset's own comes to light when its source goes. */
-    const bool has_hidden =
-        nb_edit_member(json, volume->node, "preset") != NULL && nb_edit_member(json, volume->node, "source") != NULL;
+    const bool has_hidden = nb_json_patch_member(json, volume->node, "preset") != NULL &&
+                            nb_json_patch_member(json, volume->node, "source") != NULL;
     char words[NB_EDIT_NUMBERS];
     if (is_zero(now->volume.albedo)) return;
     if (!has_hidden && is_same_phase(&was->volume.phase, to)) return;
-    nb_save_write_phase(to, words);
+    nb_key_patch_write_phase(to, words);
     if (node != NULL)
-        nb_edit_replace(&save->edit, node, words);
+        nb_json_patch_replace(&save->edit, node, words);
     else
-        nb_edit_add(&save->edit, volume, "phase", words);
+        nb_json_patch_add(&save->edit, volume, "phase", words);
 }
 
 /* Numbers of the volume alone; false where any of them is another one. */
@@ -204,10 +205,10 @@ static bool has_same_keys(const nb_written_volume *was, const nb_written_volume 
 }
 
 /* `was` and `now` are in metres. */
-static void save_keys(nb_key_patch *save, const nb_scene_reader *in, const nb_edit_object *volume,
+static void save_keys(nb_key_patch *save, const nb_scene_reader *in, const nb_json_patch_object *volume,
                       const nb_written_volume *was, const nb_written_volume *now)
 {
-    const nb_json_node *node = nb_edit_member(in->json, volume->node, "keys");
+    const nb_json_node *node = nb_json_patch_member(in->json, volume->node, "keys");
     const nebel_allocator *allocator = &save->edit.arena.allocator;
     const size_t count = now->entry.key_count;
     char gap[64];
@@ -216,40 +217,40 @@ static void save_keys(nb_key_patch *save, const nb_scene_reader *in, const nb_ed
     nb_bytes *kept = nb_allocate_zero(allocator, count, sizeof *kept);
     if (kept != NULL) find_kept_keys(save, in->json, node, was, now, kept);
     find_gap(&save->edit, in->json, node, gap, sizeof gap);
-    if (kept == NULL || !nb_save_write_keys(allocator, &in->space, now, kept, gap, &text)) {
+    if (kept == NULL || !nb_key_patch_write_keys(allocator, &in->space, now, kept, gap, &text)) {
         save->edit.out_of_memory = true;
     } else {
         if (node != NULL)
-            nb_edit_replace(&save->edit, node, (const char *)text.data);
+            nb_json_patch_replace(&save->edit, node, (const char *)text.data);
         else
-            nb_edit_add(&save->edit, volume, "keys", (const char *)text.data);
+            nb_json_patch_add(&save->edit, volume, "keys", (const char *)text.data);
         nb_release(allocator, text.data);
     }
     nb_release(allocator, kept);
 }
 
 /* A key may have an albedo where the volume says that it has one, be it 0. */
-static void save_lit_keys(nb_key_patch *save, const nb_json *json, const nb_edit_object *volume,
+static void save_lit_keys(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *volume,
                           const nb_written_volume *now)
 {
-    if (is_zero(now->volume.albedo) && nb_save_has_lit_key(&now->entry) &&
-        nb_edit_member(json, volume->node, "albedo") == NULL)
-        nb_edit_add(&save->edit, volume, "albedo", "0");
+    if (is_zero(now->volume.albedo) && nb_key_patch_has_lit_key(&now->entry) &&
+        nb_json_patch_member(json, volume->node, "albedo") == NULL)
+        nb_json_patch_add(&save->edit, volume, "albedo", "0");
 }
 
 /* In the file's numbers. */
-static void save_fog(nb_key_patch *save, const nb_json *json, const nb_edit_object *volume,
+static void save_fog(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *volume,
                      const nb_written_volume *was, const nb_written_volume *now)
 {
     const nebel_volume_desc *a = &was->volume, *b = &now->volume;
     const nb_removed_keys lost = find_lost_keys(was, now);
-    nb_save_density(save, json, volume->node, &a->density, &b->density);
-    nb_save_integer(save, json, volume, "priority", a->priority, b->priority);
-    nb_save_places(save, json, volume, nb_volume_places, find_mask(&lost), a, b);
+    nb_key_patch_density(save, json, volume->node, &a->density, &b->density);
+    nb_key_patch_integer(save, json, volume, "priority", a->priority, b->priority);
+    nb_key_patch_places(save, json, volume, nb_volume_places, find_mask(&lost), a, b);
     save_lit_keys(save, json, volume, now);
     save_phase(save, json, volume, was, now);
     save_amount(save, json, volume, was, now);
-    nb_edit_remove_members(&save->edit, json, volume->node, lost.names);
+    nb_json_patch_remove_members(&save->edit, json, volume->node, lost.names);
 }
 
 /* A volume as it stands in the file, or is to stand there. */
@@ -279,20 +280,20 @@ static void change_volume(nb_key_patch *save, const nb_scene_reader *in, const n
 {
     const nb_json *json = in->json;
     nb_written_volume was = *from, now = *to;
-    const nb_edit_object volume = nb_edit_find(json, node);
-    nb_save_shape(save, in, nb_edit_member(json, node, "shape"), &was.volume.shape, &now.volume.shape);
+    const nb_json_patch_object volume = nb_json_patch_find(json, node);
+    nb_key_patch_shape(save, in, nb_json_patch_member(json, node, "shape"), &was.volume.shape, &now.volume.shape);
     save_keys(save, in, &volume, &was, &now);
-    nb_space_restore_volume(&in->space, &was.volume);
-    nb_space_restore_volume(&in->space, &now.volume);
+    nb_file_units_restore_volume(&in->space, &was.volume);
+    nb_file_units_restore_volume(&in->space, &now.volume);
     save_fog(save, json, &volume, &was, &now);
-    if (strcmp(was.name, now.name) != 0) nb_edit_word(&save->edit, json, &volume, "name", now.name);
+    if (strcmp(was.name, now.name) != 0) nb_json_patch_word(&save->edit, json, &volume, "name", now.name);
 }
 
 /* The words of a whole volume; NULL, with a note in the edit, when memory is out. */
 static char *write_volume(nb_key_patch *save, const nb_scene_reader *in, const nb_written_volume *volume)
 {
     nb_bytes text;
-    if (nb_save_write_volume(&save->edit.arena.allocator, &in->space, volume, &text)) return (char *)text.data;
+    if (nb_key_patch_write_volume(&save->edit.arena.allocator, &in->space, volume, &text)) return (char *)text.data;
     save->edit.out_of_memory = true;
     return NULL;
 }
@@ -301,7 +302,7 @@ static void replace_volume(nb_key_patch *save, const nb_scene_reader *in, const 
                            const nb_written_volume *volume)
 {
     char *words = write_volume(save, in, volume);
-    if (words != NULL) nb_edit_replace(&save->edit, node, words);
+    if (words != NULL) nb_json_patch_replace(&save->edit, node, words);
     nb_release(&save->edit.arena.allocator, words);
 }
 
@@ -318,20 +319,20 @@ static bool save_entry(nb_key_patch *save, nb_scene_reader *in, const nb_json_no
         else
             replace_volume(save, in, node, &now);
     }
-    return nb_save_keep_span(save, in, &save->volumes, node, goes && origin != NEBEL_VOLUME_IMPORTED);
+    return nb_key_patch_keep_span(save, in, &save->volumes, node, goes && origin != NEBEL_VOLUME_IMPORTED);
 }
 
-bool nb_save_volume(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t first)
+bool nb_key_patch_volume(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t first)
 {
     for (size_t i = first; i < in->scene->data.volume_count; i++)
         if (i >= save->before->volume_count || !is_same_kind(&in->scene->volumes[i], &save->before->volumes[i]))
             return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, node,
                                 "is another volume than the one to be written; the file has changed, load it again");
-    if (first == in->scene->data.volume_count) return nb_save_keep_span(save, in, &save->volumes, node, false);
+    if (first == in->scene->data.volume_count) return nb_key_patch_keep_span(save, in, &save->volumes, node, false);
     return save_entry(save, in, node, first);
 }
 
-bool nb_save_check_removed(const nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *root)
+bool nb_key_patch_check_removed(const nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *root)
 {
     for (size_t i = 0; i < in->scene->data.volume_count; i++) {
         const nebel_volume_origin origin = in->scene->volume_origins[i];
@@ -349,13 +350,13 @@ bool nb_save_check_removed(const nb_key_patch *save, const nb_scene_reader *in, 
 /* Behind the last entry that stays, on a line of its own where that one is; in an empty array behind its bracket. */
 static void add_entry(nb_key_patch *save, const nb_json_node *array, const char *words)
 {
-    const nb_edit_span *last = NULL;
+    const nb_json_patch_span *last = NULL;
     char gap[64] = " ";
     for (size_t i = 0; i < save->volumes.count; i++)
         if (!save->volumes.spans[i].goes) last = &save->volumes.spans[i];
     if (last == NULL) {
-        if (save->has_added) nb_edit_put(&save->edit, array->offset + 1, 0, ", ");
-        nb_edit_put(&save->edit, array->offset + 1, 0, words);
+        if (save->has_added) nb_json_patch_put(&save->edit, array->offset + 1, 0, ", ");
+        nb_json_patch_put(&save->edit, array->offset + 1, 0, words);
         save->has_added = true;
         return;
     }
@@ -363,12 +364,12 @@ static void add_entry(nb_key_patch *save, const nb_json_node *array, const char 
     while (start > 0 && strchr(" \t\r\n", save->edit.text[start - 1]) != NULL) start--;
     if (last->offset - start > 0 && last->offset - start < sizeof gap)
         snprintf(gap, sizeof gap, "%.*s", (int)(last->offset - start), save->edit.text + start);
-    nb_edit_put(&save->edit, last->end, 0, ",");
-    nb_edit_put(&save->edit, last->end, 0, gap);
-    nb_edit_put(&save->edit, last->end, 0, words);
+    nb_json_patch_put(&save->edit, last->end, 0, ",");
+    nb_json_patch_put(&save->edit, last->end, 0, gap);
+    nb_json_patch_put(&save->edit, last->end, 0, words);
 }
 
-void nb_save_entries(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *array)
+void nb_key_patch_entries(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *array)
 {
     const nebel_allocator *allocator = &save->edit.arena.allocator;
     for (size_t i = 0; i < save->changed->volume_count; i++) {
@@ -378,5 +379,5 @@ void nb_save_entries(nb_key_patch *save, const nb_scene_reader *in, const nb_jso
         if (words != NULL) add_entry(save, array, words);
         nb_release(allocator, words);
     }
-    nb_edit_remove(&save->edit, save->volumes.spans, save->volumes.count);
+    nb_json_patch_remove(&save->edit, save->volumes.spans, save->volumes.count);
 }

@@ -78,7 +78,7 @@ const nb_key_entry nb_nebula_places[] = {
     END,
 };
 
-const nb_key_entry nb_strewn_places[] = {
+const nb_key_entry nb_generated_places[] = {
     NAMED(nebel_nebula_desc, "fade", dimming, 1, NB_EDIT_EACH),
     END,
 };
@@ -97,7 +97,7 @@ const nb_key_entry nb_model_places[] = {
     END,
 };
 
-const nb_key_entry nb_lamp_places[] = {
+const nb_key_entry nb_light_places[] = {
     PLACE(nebel_light, position, 3, NB_EDIT_EACH),
     PLACE(nebel_light, intensity, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_light, radius, 1, NB_EDIT_EACH),

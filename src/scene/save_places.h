@@ -9,13 +9,13 @@
 typedef struct nb_key_entry {
     const char *key;
     size_t offset, count; /* in its structure; of doubles */
-    nb_edit_style style;
+    nb_json_patch_style style;
 } nb_key_entry;
 
 /* Tables of places, which end in one without a key; masks say which places a type has, bit i for places[i]. */
 extern const nb_key_entry nb_volume_places[], nb_shape_places[], nb_transform_places[], nb_density_places[],
-    nb_nebula_places[], nb_strewn_places[], nb_cell_places[], nb_model_places[], nb_height_field_places[],
-    nb_lamp_places[];
+    nb_nebula_places[], nb_generated_places[], nb_cell_places[], nb_model_places[], nb_height_field_places[],
+    nb_light_places[];
 extern const unsigned nb_shape_masks[NEBEL_SHAPE_COUNT], nb_density_masks[NEBEL_DENSITY_COUNT];
 extern const char *const nb_shape_names[NEBEL_SHAPE_COUNT],
     *const nb_density_names[NEBEL_DENSITY_COUNT],

@@ -139,59 +139,60 @@ static bool are_same_airs(const nebel_atmosphere_desc *a, const nebel_atmosphere
 static void change_air(nb_key_patch *save, const nb_json *json, const nb_json_node *node,
                        const nebel_atmosphere_component *was, const nebel_atmosphere_component *now)
 {
-    const nb_edit_object air = nb_edit_find(json, node);
-    const nb_json_node *phase = nb_edit_member(json, node, "phase");
+    const nb_json_patch_object air = nb_json_patch_find(json, node);
+    const nb_json_node *phase = nb_json_patch_member(json, node, "phase");
     char text[NB_EDIT_NUMBERS];
-    nb_save_places(save, json, &air, air_places, air_masks[now->profile], was, now);
+    nb_key_patch_places(save, json, &air, air_places, air_masks[now->profile], was, now);
     if (is_same_phase(&was->phase, &now->phase)) return;
-    nb_save_write_phase(&now->phase, text);
+    nb_key_patch_write_phase(&now->phase, text);
     if (phase != NULL)
-        nb_edit_replace(&save->edit, phase, text);
+        nb_json_patch_replace(&save->edit, phase, text);
     else
-        nb_edit_add(&save->edit, &air, "phase", text);
+        nb_json_patch_add(&save->edit, &air, "phase", text);
 }
 
 static void put_air(nb_json_writer *out, const nebel_atmosphere_component *air)
 {
     char phase[NB_EDIT_NUMBERS];
-    nb_save_write_phase(&air->phase, phase);
-    nb_words_put(out, "{ \"type\": ");
-    nb_words_put_text(out, nb_air_profile_names[air->profile]);
-    nb_words_put(out, ", \"phase\": ");
-    nb_words_put(out, phase);
+    nb_key_patch_write_phase(&air->phase, phase);
+    nb_json_writer_put(out, "{ \"type\": ");
+    nb_json_writer_put_text(out, nb_air_profile_names[air->profile]);
+    nb_json_writer_put(out, ", \"phase\": ");
+    nb_json_writer_put(out, phase);
     for (size_t k = 0; air_places[k].key != NULL; k++) {
         if ((air_masks[air->profile] >> k & 1) == 0) continue;
-        nb_words_put(out, ", ");
-        nb_words_put_text(out, air_places[k].key);
-        nb_words_put(out, ": ");
-        nb_words_put_numbers(out, air_places[k].count, nb_place_numbers(air, &air_places[k]), air_places[k].style);
+        nb_json_writer_put(out, ", ");
+        nb_json_writer_put_text(out, air_places[k].key);
+        nb_json_writer_put(out, ": ");
+        nb_json_writer_put_numbers(out, air_places[k].count, nb_place_numbers(air, &air_places[k]),
+                                   air_places[k].style);
     }
-    nb_words_put(out, " }");
+    nb_json_writer_put(out, " }");
 }
 
 /* All of a preset's. `array`: the place of an empty one; NULL: there is none. */
-static void write_airs(nb_key_patch *save, const nb_edit_object *planet, const nb_json_node *array,
+static void write_airs(nb_key_patch *save, const nb_json_patch_object *planet, const nb_json_node *array,
                        const nebel_atmosphere_desc *now)
 {
     nb_json_writer out = {.save = save};
-    nb_words_put(&out, "[");
+    nb_json_writer_put(&out, "[");
     for (uint32_t i = 0; i < now->component_count; i++) {
-        if (i > 0) nb_words_put(&out, ", ");
+        if (i > 0) nb_json_writer_put(&out, ", ");
         put_air(&out, &now->components[i]);
     }
-    nb_words_put(&out, "]");
-    const char *words = nb_words_end(&out);
+    nb_json_writer_put(&out, "]");
+    const char *words = nb_json_writer_end(&out);
     if (words != NULL && array != NULL)
-        nb_edit_replace(&save->edit, array, words);
+        nb_json_patch_replace(&save->edit, array, words);
     else if (words != NULL)
-        nb_edit_add(&save->edit, planet, "airs", words);
+        nb_json_patch_add(&save->edit, planet, "airs", words);
     nb_release(&save->edit.arena.allocator, out.bytes.data);
 }
 
-static void save_airs(nb_key_patch *save, const nb_json *json, const nb_edit_object *planet,
+static void save_airs(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *planet,
                       const nebel_atmosphere_desc *was, const nebel_atmosphere_desc *now)
 {
-    const nb_json_node *array = nb_edit_member(json, planet->node, "airs");
+    const nb_json_node *array = nb_json_patch_member(json, planet->node, "airs");
     if (are_same_airs(was, now)) return;
     if (array == NULL || array->count != now->component_count) {
         write_airs(save, planet, array, now);
@@ -208,7 +209,7 @@ static void save_airs(nb_key_patch *save, const nb_json *json, const nb_edit_obj
 static const nb_json_node *skip_layers(const nb_json *json, const nb_json_node *node)
 {
     for (; node != NULL; node = nb_json_next(json, node)) {
-        const nb_json_node *coverage = nb_edit_member(json, node, "coverage");
+        const nb_json_node *coverage = nb_json_patch_member(json, node, "coverage");
         if (coverage == NULL || coverage->number != 0) break;
     }
     return node;
@@ -218,22 +219,22 @@ static void save_clouds(nb_key_patch *save, const nb_json *json, const nb_json_n
                         const nebel_planet *now)
 {
     if (now->cloud_layer_count == 0) return;
-    const nb_json_node *node = nb_json_first(json, nb_edit_member(json, planet, "clouds"));
+    const nb_json_node *node = nb_json_first(json, nb_json_patch_member(json, planet, "clouds"));
     for (uint32_t i = 0; i < now->cloud_layer_count; i++, node = nb_json_next(json, node)) {
         node = skip_layers(json, node);
-        nb_save_entry(save, json, node, cloud_places, &was->cloud_layers[i], &now->cloud_layers[i]);
+        nb_key_patch_entry(save, json, node, cloud_places, &was->cloud_layers[i], &now->cloud_layers[i]);
     }
 }
 
-static void save_shells(nb_key_patch *save, const nb_json *json, const nb_edit_object *planet,
+static void save_shells(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *planet,
                         const nebel_textured_planet_desc *was, const nebel_textured_planet_desc *now)
 {
-    nb_save_places(save, json, planet, layers_places, NB_ALL_PLACES, was, now);
-    nb_save_object(save, json, planet, "air", air_shell_places, &was->atmosphere, &now->atmosphere);
+    nb_key_patch_places(save, json, planet, layers_places, NB_ALL_PLACES, was, now);
+    nb_key_patch_object(save, json, planet, "air", air_shell_places, &was->atmosphere, &now->atmosphere);
     if (now->cloud_shell_count == 0) return;
-    const nb_json_node *node = nb_json_first(json, nb_edit_member(json, planet->node, "clouds"));
+    const nb_json_node *node = nb_json_first(json, nb_json_patch_member(json, planet->node, "clouds"));
     for (uint32_t i = 0; i < now->cloud_shell_count; i++, node = nb_json_next(json, node))
-        nb_save_entry(save, json, node, shell_places, &was->cloud_shells[i], &now->cloud_shells[i]);
+        nb_key_patch_entry(save, json, node, shell_places, &was->cloud_shells[i], &now->cloud_shells[i]);
 }
 
 /* ---- planets --------------------------------------------------------------------------------- */
@@ -249,7 +250,7 @@ static bool is_same_form(const nebel_planet *a, const nebel_planet *b)
     return true;
 }
 
-bool nb_save_has_same_planets(const nebel_scene_data *a, const nebel_scene_data *b)
+bool nb_key_patch_has_same_planets(const nebel_scene_data *a, const nebel_scene_data *b)
 {
     if (a->planet_count != b->planet_count) return false;
     for (size_t i = 0; i < a->planet_count; i++)
@@ -259,22 +260,22 @@ bool nb_save_has_same_planets(const nebel_scene_data *a, const nebel_scene_data 
 
 static void save_planet(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
-    const nb_edit_object planet = nb_edit_find(in->json, node);
+    const nb_json_patch_object planet = nb_json_patch_find(in->json, node);
     const nebel_planet was = restore(&in->space, &save->before->planets[index]),
                        now = restore(&in->space, &save->changed->planets[index]);
     if (now.model == NEBEL_PLANET_TEXTURED) {
         save_shells(save, in->json, &planet, &was.textured_desc, &now.textured_desc);
         return;
     }
-    nb_save_places(save, in->json, &planet, physical_places, NB_ALL_PLACES, &was, &now);
+    nb_key_patch_places(save, in->json, &planet, physical_places, NB_ALL_PLACES, &was, &now);
     save_airs(save, in->json, &planet, &was.atmosphere_desc, &now.atmosphere_desc);
     save_clouds(save, in->json, node, &was, &now);
 }
 
-bool nb_save_planets(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node)
+bool nb_key_patch_planets(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node)
 {
-    if (!nb_save_has_same_planets(save->before, &in->scene->data) ||
-        !nb_save_has_same_planets(save->before, save->changed))
+    if (!nb_key_patch_has_same_planets(save->before, &in->scene->data) ||
+        !nb_key_patch_has_same_planets(save->before, save->changed))
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, node,
                             "has other planets than those to be written; the file has changed, load it again");
     const bool is_array = node->type == NB_JSON_ARRAY;

@@ -10,19 +10,19 @@
 static void restore_sun(const nb_file_units *space, const nebel_scene_data *scene, double direction[3])
 {
     memcpy(direction, scene->sun_direction, sizeof scene->sun_direction);
-    nb_space_restore_direction(space, direction);
+    nb_file_units_restore_direction(space, direction);
 }
 
 static void save_sun(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
 {
     const nebel_scene_data *before = save->before, *changed = save->changed;
-    const nb_edit_object sun = nb_edit_find(in->json, node);
+    const nb_json_patch_object sun = nb_json_patch_find(in->json, node);
     double was[3], now[3];
     restore_sun(&in->space, before, was);
     restore_sun(&in->space, changed, now);
-    nb_edit_numbers(&save->edit, in->json, &sun, "direction", 3, was, now, NB_EDIT_WHOLE);
-    nb_edit_numbers(&save->edit, in->json, &sun, "irradiance", 3, before->sun_irradiance, changed->sun_irradiance,
-                    NB_EDIT_AMOUNT);
+    nb_json_patch_numbers(&save->edit, in->json, &sun, "direction", 3, was, now, NB_EDIT_WHOLE);
+    nb_json_patch_numbers(&save->edit, in->json, &sun, "irradiance", 3, before->sun_irradiance, changed->sun_irradiance,
+                          NB_EDIT_AMOUNT);
 }
 
 static void add_sun(nb_key_patch *save, const nb_file_units *space)
@@ -30,31 +30,31 @@ static void add_sun(nb_key_patch *save, const nb_file_units *space)
     char direction[NB_EDIT_NUMBERS], irradiance[NB_EDIT_NUMBERS], words[3 * NB_EDIT_NUMBERS];
     double now[3];
     restore_sun(space, save->changed, now);
-    nb_edit_write_numbers(3, now, NB_EDIT_EACH, direction);
-    nb_edit_write_numbers(3, save->changed->sun_irradiance, NB_EDIT_AMOUNT, irradiance);
+    nb_json_patch_write_numbers(3, now, NB_EDIT_EACH, direction);
+    nb_json_patch_write_numbers(3, save->changed->sun_irradiance, NB_EDIT_AMOUNT, irradiance);
     snprintf(words, sizeof words, "{ \"direction\": %s, \"irradiance\": %s }", direction, irradiance);
-    nb_edit_add(&save->edit, &save->root, "sun", words);
+    nb_json_patch_add(&save->edit, &save->root, "sun", words);
 }
 
 /* ---- lamps ----------------------------------------------------------------------------------- */
 
 static void restore_lamp(const nb_file_units *space, nebel_light *lamp)
 {
-    nb_space_restore_place(space, lamp->position);
-    nb_space_restore_direction(space, lamp->direction);
+    nb_file_units_restore_place(space, lamp->position);
+    nb_file_units_restore_direction(space, lamp->direction);
     lamp->radius /= space->unit;
 }
 
 static void change_lamp(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, nebel_light was,
                         nebel_light now)
 {
-    const nb_edit_object object = nb_edit_find(in->json, node);
+    const nb_json_patch_object object = nb_json_patch_find(in->json, node);
     restore_lamp(&in->space, &was);
     restore_lamp(&in->space, &now);
-    nb_save_places(save, in->json, &object, nb_lamp_places, NB_ALL_PLACES, &was, &now);
+    nb_key_patch_places(save, in->json, &object, nb_light_places, NB_ALL_PLACES, &was, &now);
 }
 
-bool nb_save_lamp(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
+bool nb_key_patch_light(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
     const nebel_scene_data *before = save->before;
     if (index >= before->light_count || in->scene->lamps[index].type != before->lights[index].type)
@@ -75,35 +75,37 @@ static const nebel_scene_model *find_model(const nebel_scene_data *scene, size_t
 
 static void restore_model(const nb_file_units *space, nebel_scene_model *model)
 {
-    nb_space_restore_placement(space, model->position, model->rotation, model->scale);
+    nb_file_units_restore_placement(space, model->position, model->rotation, model->scale);
     for (int i = 0; i < 2; i++) model->size[i] /= space->unit;
     model->height /= space->unit;
 }
 
-static void save_model_color(nb_key_patch *save, const nb_json *json, const nb_edit_object *object,
+static void save_model_color(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *object,
                              const nebel_scene_model *was, const nebel_scene_model *now)
 {
     double from[3];
     memcpy(from, was->color, sizeof from);
     if (!was->has_color) from[0] = HUGE_VAL;
-    if (now->has_color) nb_edit_numbers(&save->edit, json, object, "color", 3, from, now->color, NB_EDIT_AMOUNT);
+    if (now->has_color) nb_json_patch_numbers(&save->edit, json, object, "color", 3, from, now->color, NB_EDIT_AMOUNT);
     if (was->has_color && !now->has_color)
-        nb_edit_remove_members(&save->edit, json, object->node, (const char *const[]){"color", NULL});
+        nb_json_patch_remove_members(&save->edit, json, object->node, (const char *const[]){"color", NULL});
 }
 
 static void change_model(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, nebel_scene_model was,
                          nebel_scene_model now)
 {
-    const nb_edit_object object = nb_edit_find(in->json, node);
-    const nb_edit_object field = nb_edit_find(in->json, nb_edit_member(in->json, node, "heightfield"));
+    const nb_json_patch_object object = nb_json_patch_find(in->json, node);
+    const nb_json_patch_object field =
+        nb_json_patch_find(in->json, nb_json_patch_member(in->json, node, "heightfield"));
     restore_model(&in->space, &was);
     restore_model(&in->space, &now);
-    nb_save_places(save, in->json, &object, nb_model_places, field.node != NULL ? 1 : NB_ALL_PLACES, &was, &now);
-    if (field.node != NULL) nb_save_places(save, in->json, &field, nb_height_field_places, NB_ALL_PLACES, &was, &now);
+    nb_key_patch_places(save, in->json, &object, nb_model_places, field.node != NULL ? 1 : NB_ALL_PLACES, &was, &now);
+    if (field.node != NULL)
+        nb_key_patch_places(save, in->json, &field, nb_height_field_places, NB_ALL_PLACES, &was, &now);
     save_model_color(save, in->json, &object, &was, &now);
 }
 
-bool nb_save_model(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
+bool nb_key_patch_model(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
     const nebel_scene_data *before = save->before;
     if (index >= before->model_count || strcmp(in->scene->models[index].file, before->models[index].path) != 0)
@@ -111,7 +113,7 @@ bool nb_save_model(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *
                             "is another model than the one to be written; the file has changed, load it again");
     const nebel_scene_model *now = find_model(save->changed, index);
     if (now != NULL) change_model(save, in, node, before->models[index], *now);
-    return nb_save_keep_span(save, in, &save->models, node, now == NULL);
+    return nb_key_patch_keep_span(save, in, &save->models, node, now == NULL);
 }
 
 /* ---- sections -------------------------------------------------------------------------------- */
@@ -132,12 +134,12 @@ static bool is_there(const nebel_scene_data *scene, int section)
 static void save_light(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, int section)
 {
     if (section == AMBIENT)
-        nb_save_ambient(save, in, node);
+        nb_key_patch_ambient(save, in, node);
     else if (section == BACKGROUND)
-        nb_save_background(save, in, node);
+        nb_key_patch_background(save, in, node);
     else
-        nb_edit_numbers(&save->edit, in->json, &save->root, section_names[section], 1, &save->before->max_opacity,
-                        &save->changed->max_opacity, NB_EDIT_AMOUNT);
+        nb_json_patch_numbers(&save->edit, in->json, &save->root, section_names[section], 1, &save->before->max_opacity,
+                              &save->changed->max_opacity, NB_EDIT_AMOUNT);
 }
 
 /* One that is in the file, and stays there. */
@@ -145,34 +147,34 @@ static void save_section(nb_key_patch *save, const nb_scene_reader *in, const nb
 {
     switch (section) {
     case CAMERA:
-        nb_save_camera(save, in);
+        nb_key_patch_camera(save, in);
         break;
     case SUN:
         save_sun(save, in, node);
         break;
     case CLASSIC:
-        nb_save_classic(save, in, node);
+        nb_key_patch_classic(save, in, node);
         break;
     case FOG:
-        nb_save_entries(save, in, node);
+        nb_key_patch_entries(save, in, node);
         break;
     case MODELS:
-        nb_edit_remove(&save->edit, save->models.spans, save->models.count);
+        nb_json_patch_remove(&save->edit, save->models.spans, save->models.count);
         break;
     default:
         save_light(save, in, node, section);
     }
 }
 
-void nb_save_section(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
+void nb_key_patch_section(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
 {
     int section = 0;
     while (section < SECTIONS && !nb_json_has_key(node, section_names[section])) section++;
     /* A file that has got such a section since is refused at its end. */
     const bool is_new = section < SECTIONS && !is_there(save->before, section);
     const bool goes = section < SECTIONS && !is_there(save->changed, section);
-    save->sections[save->section_count++] = (nb_edit_span){node->key_offset, node->end, goes};
-    if (!goes) save->root = (nb_edit_object){nb_json_parent(in->json, node), node->key_offset, node->end};
+    save->sections[save->section_count++] = (nb_json_patch_span){node->key_offset, node->end, goes};
+    if (!goes) save->root = (nb_json_patch_object){nb_json_parent(in->json, node), node->key_offset, node->end};
     if (section == SECTIONS) return;
     save->done |= 1u << section;
     if (!goes && !is_new) save_section(save, in, node, section);
@@ -182,13 +184,13 @@ void nb_save_section(nb_key_patch *save, const nb_scene_reader *in, const nb_jso
 static void add_section(nb_key_patch *save, const nb_scene_reader *in, int section)
 {
     if (section == CAMERA)
-        nb_save_camera(save, in);
+        nb_key_patch_camera(save, in);
     else if (section <= MAX_OPACITY)
         save_light(save, in, NULL, section);
     else if (section == SUN && save->changed->has_sun)
         add_sun(save, &in->space);
     else if (section == CLASSIC && save->changed->classic != NULL)
-        nb_save_add_classic(save, &in->space);
+        nb_key_patch_add_classic(save, &in->space);
 }
 
 static bool check_counts(const nb_scene_reader *in, const nb_key_patch *save, const nb_json_node *root)
@@ -217,18 +219,18 @@ static bool check_counts(const nb_scene_reader *in, const nb_key_patch *save, co
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                             "names no picture of its ambient light; write one into the file");
     if ((now->cells == NULL) == (before->cells == NULL) && (now->classic == NULL) == (before->classic == NULL) &&
-        now->has_sun == before->has_sun && nb_save_has_same_planets(now, before))
+        now->has_sun == before->has_sun && nb_key_patch_has_same_planets(now, before))
         return true;
     return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                         "has not the sections that it had; the file has changed, load it again");
 }
 
-bool nb_save_rest(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *root)
+bool nb_key_patch_rest(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *root)
 {
-    if (!check_counts(in, save, root) || !nb_save_check_removed(save, in, root)) return false;
+    if (!check_counts(in, save, root) || !nb_key_patch_check_removed(save, in, root)) return false;
     save->root.node = root;
     for (int i = 0; i < SECTIONS; i++)
         if ((save->done >> i & 1) == 0) add_section(save, in, i);
-    nb_edit_remove(&save->edit, save->sections, save->section_count);
+    nb_json_patch_remove(&save->edit, save->sections, save->section_count);
     return true;
 }

@@ -29,13 +29,13 @@ static void put_key(writer *out, const char *key)
 static void put_text(writer *out, const char *key, const char *text)
 {
     put_key(out, key);
-    out->good = out->good && nb_edit_write_text(out->allocator, &out->text, text);
+    out->good = out->good && nb_json_patch_write_text(out->allocator, &out->text, text);
 }
 
-static void put_numbers(writer *out, size_t count, const double *numbers, nb_edit_style style)
+static void put_numbers(writer *out, size_t count, const double *numbers, nb_json_patch_style style)
 {
     char text[NB_EDIT_NUMBERS];
-    nb_edit_write_numbers(count, numbers, style, text);
+    nb_json_patch_write_numbers(count, numbers, style, text);
     put(out, text);
 }
 
@@ -71,7 +71,7 @@ static void put_planes(writer *out, const nebel_shape *shape)
     put_key(out, "planes");
     for (size_t i = 0; i < shape->plane_count; i++) {
         nebel_plane plane = shape->planes[i];
-        nb_space_restore_plane(out->space, &plane);
+        nb_file_units_restore_plane(out->space, &plane);
         const double numbers[4] = {plane.normal[0], plane.normal[1], plane.normal[2], plane.distance};
         put(out, i == 0 ? "[" : ", ");
         put_numbers(out, 4, numbers, NB_EDIT_WHOLE);
@@ -110,7 +110,7 @@ static bool is_plain(const nebel_transform *transform)
 static void put_shape(writer *out, const nebel_shape *shape)
 {
     nebel_shape own = *shape;
-    nb_space_restore_shape(out->space, &own);
+    nb_file_units_restore_shape(out->space, &own);
     complete_transform(&own.transform);
     put(out, "{");
     out->is_first = true;
@@ -147,15 +147,15 @@ static void put_density(writer *out, const nebel_density *density)
     close_object(out);
 }
 
-void nb_save_write_phase(const nebel_phase *phase, char text[NB_EDIT_NUMBERS])
+void nb_key_patch_write_phase(const nebel_phase *phase, char text[NB_EDIT_NUMBERS])
 {
     const bool is_draine = phase->type == NEBEL_PHASE_DRAINE, is_droplets = phase->type == NEBEL_PHASE_DROPLETS;
     const bool has_g =
         is_draine || phase->type == NEBEL_PHASE_HENYEY_GREENSTEIN || phase->type == NEBEL_PHASE_CORNETTE_SHANKS;
     char number[NB_EDIT_NUMBERS], first[40] = "", second[40] = "";
-    nb_edit_write_numbers(1, has_g ? &phase->g : &phase->diameter, NB_EDIT_EACH, number);
+    nb_json_patch_write_numbers(1, has_g ? &phase->g : &phase->diameter, NB_EDIT_EACH, number);
     if (has_g || is_droplets) snprintf(first, sizeof first, ", \"%s\": %.24s", has_g ? "g" : "diameter", number);
-    nb_edit_write_numbers(1, &phase->alpha, NB_EDIT_EACH, number);
+    nb_json_patch_write_numbers(1, &phase->alpha, NB_EDIT_EACH, number);
     if (is_draine) snprintf(second, sizeof second, ", \"alpha\": %.24s", number);
     snprintf(text, NB_EDIT_NUMBERS, "{ \"type\": \"%.20s\"%s%s }", nb_phase_names[phase->type], first, second);
 }
@@ -165,7 +165,7 @@ static bool is_zero(const double rgb[3])
     return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
 }
 
-bool nb_save_has_lit_key(const nebel_volume_track *entry)
+bool nb_key_patch_has_lit_key(const nebel_volume_track *entry)
 {
     for (size_t i = 0; i < entry->key_count; i++)
         if (!is_zero(entry->keys[i].volume.albedo)) return true;
@@ -191,7 +191,7 @@ static void put_phase(writer *out, const nebel_phase *phase)
 {
     char text[NB_EDIT_NUMBERS];
     if (phase->type == NEBEL_PHASE_ISOTROPIC) return;
-    nb_save_write_phase(phase, text);
+    nb_key_patch_write_phase(phase, text);
     put_key(out, "phase");
     put(out, text);
 }
@@ -235,7 +235,7 @@ static void put_key_object(writer *out, const nebel_volume_desc *own, const nebe
 {
     const unsigned light = 1 | 2 | 4;
     nebel_volume_desc volume = key->volume;
-    nb_space_restore_volume(out->space, &volume);
+    nb_file_units_restore_volume(out->space, &volume);
     complete_transform(&volume.shape.transform);
     put(out, "{");
     out->is_first = true;
@@ -256,7 +256,7 @@ static void put_key_object(writer *out, const nebel_volume_desc *own, const nebe
 static void put_keys(writer *out, const nb_written_volume *volume, const nb_bytes *kept, const char *gap)
 {
     nebel_volume_desc own = volume->volume;
-    nb_space_restore_volume(out->space, &own);
+    nb_file_units_restore_volume(out->space, &own);
     complete_transform(&own.shape.transform);
     put(out, "[");
     for (size_t i = 0; i < volume->entry.key_count; i++) {
@@ -282,8 +282,8 @@ static bool finish(writer *out, nb_bytes *text)
     return out->good;
 }
 
-bool nb_save_write_keys(const nebel_allocator *allocator, const nb_file_units *space, const nb_written_volume *volume,
-                        const nb_bytes *kept, const char *gap, nb_bytes *text)
+bool nb_key_patch_write_keys(const nebel_allocator *allocator, const nb_file_units *space,
+                             const nb_written_volume *volume, const nb_bytes *kept, const char *gap, nb_bytes *text)
 {
     writer out = {.allocator = allocator, .space = space, .good = true};
     put_keys(&out, volume, kept, gap);
@@ -309,7 +309,7 @@ static void put_members(writer *out, const nebel_volume_desc *own, const nb_writ
     }
     put_places(out, nb_volume_places, has_fog ? NB_ALL_PLACES : distances, own, &nothing);
     if (has_fog && !is_zero(own->albedo)) put_phase(out, &own->phase);
-    if (has_fog && is_zero(own->albedo) && nb_save_has_lit_key(&written->entry)) {
+    if (has_fog && is_zero(own->albedo) && nb_key_patch_has_lit_key(&written->entry)) {
         put_key(out, "albedo");
         put(out, "0");
     }
@@ -318,12 +318,12 @@ static void put_members(writer *out, const nebel_volume_desc *own, const nb_writ
     put_keys(out, written, NULL, " ");
 }
 
-bool nb_save_write_volume(const nebel_allocator *allocator, const nb_file_units *space, const nb_written_volume *volume,
-                          nb_bytes *text)
+bool nb_key_patch_write_volume(const nebel_allocator *allocator, const nb_file_units *space,
+                               const nb_written_volume *volume, nb_bytes *text)
 {
     nebel_volume_desc own = volume->volume;
     writer out = {.allocator = allocator, .space = space, .good = true, .is_first = true};
-    nb_space_restore_volume(space, &own);
+    nb_file_units_restore_volume(space, &own);
     put(&out, "{");
     if (volume->name[0] != '\0') put_text(&out, "name", volume->name);
     put_members(&out, &own, volume);

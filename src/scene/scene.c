@@ -43,7 +43,7 @@ static const nb_key_set section_keys = {section_names, SECTION_COUNT, NB_BIT(SEC
 static bool read_version(nb_json *json, const nb_json_node *node)
 {
     double version = 0;
-    if (!nb_value_number(json, node, &nb_range_any, &version)) return false;
+    if (!nb_key_value_number(json, node, &nb_range_any, &version)) return false;
     if (version == 1) return true;
     return nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, node, "is %.15g; this program reads version 1", version);
 }
@@ -51,15 +51,16 @@ static bool read_version(nb_json *json, const nb_json_node *node)
 /* Known since find_space, unless it is wrong. */
 static bool read_space(nb_scene_reader *in, const nb_json_node *node, int section)
 {
-    return section == UP ? nb_read_up(in->json, node, &in->space) : nb_read_unit(in->json, node, &in->space);
+    return section == UP ? nb_keys_read_up(in->json, node, &in->space) : nb_keys_read_unit(in->json, node, &in->space);
 }
 
 static bool read_section(nb_scene_reader *in, const nb_json_node *node)
 {
     nebel_scene_data *data = &in->scene->data;
-    const int section = nb_value_find_key(in->json, node, &section_keys);
+    const int section = nb_key_value_find_key(in->json, node, &section_keys);
     if (section < 0) return false;
-    if ((in->seen & NB_BIT(section)) != 0) return nb_value_fail_repeated(in->json, node, in->section_offsets[section]);
+    if ((in->seen & NB_BIT(section)) != 0)
+        return nb_key_value_fail_repeated(in->json, node, in->section_offsets[section]);
     in->seen |= NB_BIT(section);
     in->section_offsets[section] = node->key_offset;
     switch (section) {
@@ -69,51 +70,51 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
     case UNIT:
         return read_space(in, node, section);
     case CAMERA:
-        return nb_read_camera(in, node);
+        return nb_keys_read_camera(in, node);
     case BACKGROUND:
-        return nb_read_background(in, node);
+        return nb_keys_read_background(in, node);
     case SUN:
-        return nb_read_sun(in, node);
+        return nb_keys_read_sun(in, node);
     case AMBIENT:
         in->scene->has_ambient = true;
-        return nb_read_ambient(in, node);
+        return nb_keys_read_ambient(in, node);
     case MAX_OPACITY:
-        return nb_value_number(in->json, node, &nb_range_fraction, &data->max_opacity);
+        return nb_key_value_number(in->json, node, &nb_range_fraction, &data->max_opacity);
     case CELLS:
-        return nb_read_cells(in, node) && (in->save == NULL || nb_save_cells(in->save, in, node));
+        return nb_keys_read_cells(in, node) && (in->save == NULL || nb_key_patch_cells(in->save, in, node));
     case CLASSIC:
-        return nb_read_classic(in, node);
+        return nb_keys_read_classic(in, node);
     case MULTIPLE_SCATTERING:
-        return nb_read_multiple_scattering(in, node);
+        return nb_keys_read_multiple_scattering(in, node);
     case PLANET:
-        return nb_read_planet(in, node) && (in->save == NULL || nb_save_planets(in->save, in, node));
+        return nb_keys_read_planet(in, node) && (in->save == NULL || nb_key_patch_planets(in->save, in, node));
     default:
-        return nb_value_is(in->json, node, NB_JSON_ARRAY, "an array [...]");
+        return nb_key_value_is(in->json, node, NB_JSON_ARRAY, "an array [...]");
     }
 }
 
 static bool read_fog(nb_scene_reader *in, const nb_json_node *node)
 {
     const size_t index = in->scene->data.volume_count;
-    return nb_read_volume(in, node) && (in->save == NULL || nb_save_volume(in->save, in, node, index));
+    return nb_keys_read_volume(in, node) && (in->save == NULL || nb_key_patch_volume(in->save, in, node, index));
 }
 
 static bool read_nebula(nb_scene_reader *in, const nb_json_node *node)
 {
     const size_t index = in->scene->data.nebula_count;
-    return nb_read_nebula(in, node) && (in->save == NULL || nb_save_nebula(in->save, in, node, index));
+    return nb_keys_read_nebula(in, node) && (in->save == NULL || nb_key_patch_nebula(in->save, in, node, index));
 }
 
 static bool read_model(nb_scene_reader *in, const nb_json_node *node)
 {
     const size_t index = in->scene->model_count;
-    return nb_read_model(in, node) && (in->save == NULL || nb_save_model(in->save, in, node, index));
+    return nb_keys_read_model(in, node) && (in->save == NULL || nb_key_patch_model(in->save, in, node, index));
 }
 
 static bool read_light(nb_scene_reader *in, const nb_json_node *node)
 {
     const size_t index = in->scene->data.light_count;
-    return nb_read_light(in, node) && (in->save == NULL || nb_save_lamp(in->save, in, node, index));
+    return nb_keys_read_light(in, node) && (in->save == NULL || nb_key_patch_light(in->save, in, node, index));
 }
 
 static bool read_element(nb_scene_reader *in, const nb_json_node *array, const nb_json_node *node)
@@ -140,14 +141,14 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
 {
     nb_scene_reader *in = user;
     const nb_json_node *parent = nb_json_parent(json, value);
-    if (parent == NULL) return check_whole(in, value) && (in->save == NULL || nb_save_rest(in->save, in, value));
+    if (parent == NULL) return check_whole(in, value) && (in->save == NULL || nb_key_patch_rest(in->save, in, value));
     if (nb_json_parent(json, parent) != NULL) return read_element(in, parent, value);
     if (!read_section(in, value)) return false;
-    if (in->save != NULL) nb_save_section(in->save, in, value);
+    if (in->save != NULL) nb_key_patch_section(in->save, in, value);
     return true;
 }
 
-void nb_read_keep_message(nebel_result result, const char *message, void *user)
+void nb_keys_read_keep_message(nebel_result result, const char *message, void *user)
 {
     nb_scene_reader *in = user;
     (void)result;
@@ -163,9 +164,9 @@ static bool take_space(nb_json *json, const nb_json_node *value, void *user)
     const nb_json_node *parent = nb_json_parent(json, value);
     if (parent == NULL) return true;
     if (nb_json_parent(json, parent) != NULL) return nb_scene_count_noise(in, value);
-    if (nb_json_has_key(value, "up") && nb_read_up(json, value, &wanted)) space->z_up = wanted.z_up;
-    if (nb_json_has_key(value, "unit") && nb_read_unit(json, value, &wanted)) space->unit = wanted.unit;
-    if (nb_json_has_key(value, "planet")) in->ball = nb_find_ball(json, value);
+    if (nb_json_has_key(value, "up") && nb_keys_read_up(json, value, &wanted)) space->z_up = wanted.z_up;
+    if (nb_json_has_key(value, "unit") && nb_keys_read_unit(json, value, &wanted)) space->unit = wanted.unit;
+    if (nb_json_has_key(value, "planet")) in->ball = nb_find_sphere(json, value);
     return json->result == NEBEL_OK;
 }
 
@@ -187,8 +188,8 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
 {
     nb_json json;
     nb_scene_reader in = {
-        .json = &json, .scene = scene, .save = save, .space = NB_SPACE_OURS, .ball = nb_find_ball(NULL, NULL)};
-    const nebel_fog_desc fog = {.allocator = scene->allocator, .log = {nb_read_keep_message, &in}};
+        .json = &json, .scene = scene, .save = save, .space = NB_SPACE_OURS, .ball = nb_find_sphere(NULL, NULL)};
+    const nebel_fog_desc fog = {.allocator = scene->allocator, .log = {nb_keys_read_keep_message, &in}};
     nb_json_desc desc = {.text = text,
                          .size = size,
                          .name = name,
@@ -392,7 +393,7 @@ static nebel_result add_cells(nebel_fog *fog, const nebel_cells_desc *cells)
 
 bool nb_scene_is_frame(const nebel_scene *scene, double frame)
 {
-    if (fabs(frame) <= NB_MOST_FRAME) return true;
+    if (fabs(frame) <= NB_MAX_FRAME) return true;
     nb_fail(&scene->log, NEBEL_ERROR_VALUE, "frame: is %g; must be within -1e12 and 1e12", frame);
     return false;
 }

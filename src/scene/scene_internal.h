@@ -34,7 +34,7 @@ typedef struct nb_model_set {
 } nb_model_set;
 
 /* Of a planet: its ground's, and two of each shell of clouds. */
-enum { NB_MOST_MAPS = 1 + 2 * NEBEL_MAX_CLOUD_SHELLS };
+enum { NB_MAX_MAPS = 1 + 2 * NEBEL_MAX_CLOUD_SHELLS };
 
 /* Where models are read. */
 typedef struct nb_model_reader {
@@ -87,7 +87,7 @@ struct nebel_scene {
     nebel_atmosphere *atmospheres[NEBEL_MAX_PLANETS];
     nebel_textured_planet *layers;
     nebel_clouds *clouds;
-    nebel_image maps[NB_MOST_MAPS]; /* that the planet's layers were read from */
+    nebel_image maps[NB_MAX_MAPS]; /* that the planet's layers were read from */
     size_t map_count;
 
     nebel_grid **grids;
@@ -118,7 +118,7 @@ enum { NB_SCENE_SECTIONS = 16 };
 typedef struct nb_key_patch nb_key_patch;
 
 /* Moments beyond leave no digits of motion. */
-#define NB_MOST_FRAME 1e12
+#define NB_MAX_FRAME 1e12
 
 /* Whether a frame is a number within that; says what is wrong where it is none. */
 bool nb_scene_is_frame(const nebel_scene *scene, double frame);
@@ -179,65 +179,65 @@ double nb_scene_most_seconds(const nebel_scene *scene);
 nebel_result nb_scene_parse(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
                             nb_key_patch *save, nebel_scene **scene);
 
-bool nb_read_camera(nb_scene_reader *in, const nb_json_node *node);
-bool nb_read_background(nb_scene_reader *in, const nb_json_node *node);
-bool nb_read_ambient(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_camera(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_background(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_ambient(nb_scene_reader *in, const nb_json_node *node);
 /* The light of the planet's air at the scene's origin, for the sun of the contents. Errors: MEMORY. */
 nebel_result nb_planet_light(nebel_scene *scene);
 
-/* Without a planet that of the preset `earth`. What is wrong is left for nb_read_planet to say. */
-nb_ground_sphere nb_find_ball(const nb_json *json, const nb_json_node *planet);
+/* Without a planet that of the preset `earth`. What is wrong is left for nb_keys_read_planet to say. */
+nb_ground_sphere nb_find_sphere(const nb_json *json, const nb_json_node *planet);
 
-bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node);
-bool nb_read_light(nb_scene_reader *in, const nb_json_node *node);
-bool nb_read_model(nb_scene_reader *in, const nb_json_node *node);
-bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node);
-bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node);
-bool nb_read_cells(nb_scene_reader *in, const nb_json_node *node);
-bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_sun(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_light(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_model(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_volume(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_nebula(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_cells(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_classic(nb_scene_reader *in, const nb_json_node *node);
 
 /* How long a unit of the numbers of a device's fog is: 1 where they count in device depth, which has none. */
 double nb_device_unit(const nebel_scene_data *scene, const nebel_d3d9_fog *fog, double unit);
 
 /* When camera and classic fog are read: numbers in device depth were taken for lengths. */
 void nb_finish_classic(nb_scene_reader *in);
-bool nb_read_planet(nb_scene_reader *in, const nb_json_node *node);
-bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_textured_planet_desc *desc);
-bool nb_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet);
+bool nb_keys_read_planet(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_textured_planet_desc *desc);
+bool nb_keys_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet);
 
 /* A picture as a map of 1 or 3 channels, which the scene owns; and the seed of noise. */
-bool nb_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, nebel_planet_map *map);
-bool nb_read_seed(nb_scene_reader *in, const nb_json_node *node, uint32_t *seed);
-bool nb_read_multiple_scattering(nb_scene_reader *in, const nb_json_node *node);
+bool nb_keys_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, nebel_planet_map *map);
+bool nb_keys_read_seed(nb_scene_reader *in, const nb_json_node *node, uint32_t *seed);
+bool nb_keys_read_multiple_scattering(nb_scene_reader *in, const nb_json_node *node);
 /* Points, their number and their place, from a model file. NULL: none. */
-bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula,
-                    nebel_transform *place);
+bool nb_keys_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula,
+                         nebel_transform *place);
 
 /* The fog in the nodes of a glTF model. Sets model->has_fog. */
-bool nb_read_nodes(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model);
-bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
+bool nb_keys_read_nodes(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model);
+bool nb_keys_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
 
 /* Whether two places, in the file's numbers, lie as far apart as the core wants. `end` is the node of one, `other` the
  * key of the other. */
-bool nb_read_check_apart(nb_json *json, const nb_json_node *end, const char *other, const double from[3],
-                         const double to[3]);
+bool nb_keys_read_check_apart(nb_json *json, const nb_json_node *end, const char *other, const double from[3],
+                              const double to[3]);
 
 /* The shape of a node: an object like any other, a name, or NULL, a box. 1 is the size of an empty. */
-bool nb_read_node_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
+bool nb_keys_read_node_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
 
 /* Takes a volume from its node's coordinates to the world's. */
-bool nb_read_place_volume(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume);
+bool nb_keys_read_place_volume(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume);
 /* Adds to the files that the scene names; false when memory is out. */
 bool nb_scene_keep_file(nebel_scene *scene, const char *file);
 
 /* Three numbers of voxels. */
-bool nb_read_grid_size(nb_json *json, const nb_json_node *node, size_t size[3]);
+bool nb_keys_read_grid_size(nb_json *json, const nb_json_node *node, size_t size[3]);
 
 /* The scene becomes the grid's owner, also where it fails. */
 bool nb_scene_keep_grid(nb_scene_reader *in, const nb_json_node *node, nebel_grid *grid);
 
 /* What a density of the type "noise" says, with its defaults; allocator, log and name are left alone. */
-bool nb_read_noise_numbers(nb_json *json, const nb_json_node *node, nebel_scene_noise *noise);
+bool nb_keys_read_noise_numbers(nb_json *json, const nb_json_node *node, nebel_scene_noise *noise);
 
 /* Whether it changes from frame to frame. */
 bool nb_noise_moves(const nebel_scene_noise *noise);
@@ -247,23 +247,25 @@ nebel_result nb_noise_words(const nebel_scene *scene, const char *words, const n
                             nb_bytes *changed);
 
 /* The voxels of a density of the type "noise". */
-bool nb_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
+bool nb_keys_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
 
 /* The voxels of a density of the type "grid". */
-bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
-bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density);
+bool nb_keys_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
+bool nb_keys_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape,
+                          nebel_density *density);
 
 /* The numbers that a key of fog gives anew. Numbers it leaves out stay, as do type, planes and parts. */
-bool nb_read_shape_key(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
-bool nb_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
-bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *phase);
+bool nb_keys_read_shape_key(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
+bool nb_keys_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
+bool nb_keys_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *phase);
 
 /* Shows a volume to the core, which knows more than the file's rules: whether a convex body is empty, for one. Where
  * its message begins with `subject`, which the node's path says already, that is left out. */
-bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subject, const nebel_volume_desc *volume);
+bool nb_keys_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subject,
+                      const nebel_volume_desc *volume);
 
 /* For logs of the core: keeps the message in the reader, which is `user`. */
-void nb_read_keep_message(nebel_result result, const char *message, void *user);
+void nb_keys_read_keep_message(nebel_result result, const char *message, void *user);
 
 /* Words of the file, in the order of their enumerations. */
 extern const char *const nb_projection_names[3], *const nb_coordinate_names[NEBEL_COORDINATE_COUNT],
@@ -281,8 +283,8 @@ bool nb_camera_is_apart(const nebel_camera *camera);
 bool nb_camera_is_upright(const nebel_camera *camera);
 
 /* The keys "up" and "unit" of a scene or a model. */
-bool nb_read_up(nb_json *json, const nb_json_node *node, nb_file_units *space);
-bool nb_read_unit(nb_json *json, const nb_json_node *node, nb_file_units *space);
+bool nb_keys_read_up(nb_json *json, const nb_json_node *node, nb_file_units *space);
+bool nb_keys_read_unit(nb_json *json, const nb_json_node *node, nb_file_units *space);
 
 /* Where a model's numbers are in the world. */
 nb_affine nb_model_place(const nb_model_source *model);

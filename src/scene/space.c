@@ -19,16 +19,16 @@ static void swap_y_and_z(double vector[3])
     vector[2] = y;
 }
 
-void nb_space_convert_direction(const nb_file_units *space, double direction[3])
+void nb_file_units_convert_direction(const nb_file_units *space, double direction[3])
 {
     if (!space->z_up) return;
     swap_y_and_z(direction);
     direction[2] = -direction[2];
 }
 
-void nb_space_convert_place(const nb_file_units *space, double place[3])
+void nb_file_units_convert_place(const nb_file_units *space, double place[3])
 {
-    nb_space_convert_direction(space, place);
+    nb_file_units_convert_direction(space, place);
     scale_all(space->unit, place, 3);
 }
 
@@ -40,10 +40,11 @@ static void convert_extents(const nb_file_units *space, double unit, double exte
 }
 
 /* A rotation turns about the same axis by the same angle in either convention. */
-void nb_space_convert_placement(const nb_file_units *space, double position[3], double rotation[4], double scale[3])
+void nb_file_units_convert_placement(const nb_file_units *space, double position[3], double rotation[4],
+                                     double scale[3])
 {
-    nb_space_convert_place(space, position);
-    nb_space_convert_direction(space, rotation);
+    nb_file_units_convert_place(space, position);
+    nb_file_units_convert_direction(space, rotation);
     convert_extents(space, 1, scale);
 }
 
@@ -52,8 +53,8 @@ void nb_space_convert_placement(const nb_file_units *space, double position[3], 
 /* What was the least y is the largest z. */
 static void convert_box(const nb_file_units *space, double min[3], double max[3])
 {
-    nb_space_convert_place(space, min);
-    nb_space_convert_place(space, max);
+    nb_file_units_convert_place(space, min);
+    nb_file_units_convert_place(space, max);
     if (!space->z_up) return;
     const double near = min[2];
     min[2] = max[2];
@@ -63,20 +64,20 @@ static void convert_box(const nb_file_units *space, double min[3], double max[3]
 static void convert_shape(const nb_file_units *space, nebel_shape *shape)
 {
     nebel_transform *transform = &shape->transform;
-    nb_space_convert_placement(space, transform->position, transform->rotation, transform->scale);
+    nb_file_units_convert_placement(space, transform->position, transform->rotation, transform->scale);
     convert_box(space, shape->min, shape->max);
-    nb_space_convert_place(space, shape->center);
-    nb_space_convert_place(space, shape->from);
-    nb_space_convert_place(space, shape->to);
-    nb_space_convert_place(space, shape->point);
-    nb_space_convert_direction(space, shape->normal);
+    nb_file_units_convert_place(space, shape->center);
+    nb_file_units_convert_place(space, shape->from);
+    nb_file_units_convert_place(space, shape->to);
+    nb_file_units_convert_place(space, shape->point);
+    nb_file_units_convert_direction(space, shape->normal);
     convert_extents(space, space->unit, shape->radii);
     shape->radius *= space->unit;
     shape->radius_from *= space->unit;
     shape->radius_to *= space->unit;
     for (size_t i = 0; i < shape->plane_count; i++) {
         nebel_plane *plane = (nebel_plane *)&shape->planes[i];
-        nb_space_convert_direction(space, plane->normal);
+        nb_file_units_convert_direction(space, plane->normal);
         plane->distance *= space->unit;
     }
     for (size_t i = 0; i < shape->part_count; i++) convert_shape(space, (nebel_shape *)&shape->parts[i]);
@@ -84,9 +85,9 @@ static void convert_shape(const nb_file_units *space, nebel_shape *shape)
 
 static void convert_density(const nb_file_units *space, nebel_density *density)
 {
-    nb_space_convert_place(space, density->from);
-    nb_space_convert_place(space, density->to);
-    nb_space_convert_place(space, density->center);
+    nb_file_units_convert_place(space, density->from);
+    nb_file_units_convert_place(space, density->to);
+    nb_file_units_convert_place(space, density->center);
     density->base *= space->unit;
     density->scale_height *= space->unit;
     density->sigma *= space->unit;
@@ -94,7 +95,7 @@ static void convert_density(const nb_file_units *space, nebel_density *density)
     density->radius *= space->unit;
 }
 
-void nb_space_convert_volume(const nb_file_units *space, nebel_volume_desc *volume)
+void nb_file_units_convert_volume(const nb_file_units *space, nebel_volume_desc *volume)
 {
     convert_shape(space, &volume->shape);
     convert_density(space, &volume->density);
@@ -104,7 +105,7 @@ void nb_space_convert_volume(const nb_file_units *space, nebel_volume_desc *volu
     volume->cutoff *= space->unit;
 }
 
-void nb_space_convert_nebula(const nb_file_units *space, nebel_nebula_desc *nebula)
+void nb_file_units_convert_nebula(const nb_file_units *space, nebel_nebula_desc *nebula)
 {
     convert_shape(space, &nebula->shape);
     convert_density(space, &nebula->density);
@@ -115,7 +116,7 @@ void nb_space_convert_nebula(const nb_file_units *space, nebel_nebula_desc *nebu
     nebula->turbulence_scale *= space->unit;
 }
 
-void nb_space_convert_cell(const nb_file_units *space, nebel_cell *cell)
+void nb_file_units_convert_cell(const nb_file_units *space, nebel_cell *cell)
 {
     convert_shape(space, &cell->shape);
     cell->density /= space->unit;
@@ -132,53 +133,54 @@ static void exchange_axes(const nb_file_units *space, nebel_noise_desc *noise)
     swap_y_and_z(noise->falloff);
 }
 
-void nb_space_convert_noise(const nb_file_units *space, nebel_scene_noise *noise)
+void nb_file_units_convert_noise(const nb_file_units *space, nebel_scene_noise *noise)
 {
     exchange_axes(space, &noise->desc);
-    nb_space_convert_direction(space, noise->velocity);
+    nb_file_units_convert_direction(space, noise->velocity);
 }
 
 /* ---- camera ---------------------------------------------------------------------------------- */
 
-void nb_space_convert_camera(const nb_file_units *space, nebel_camera *camera)
+void nb_file_units_convert_camera(const nb_file_units *space, nebel_camera *camera)
 {
-    nb_space_convert_place(space, camera->position);
-    nb_space_convert_place(space, camera->look_at);
-    nb_space_convert_direction(space, camera->up);
+    nb_file_units_convert_place(space, camera->position);
+    nb_file_units_convert_place(space, camera->look_at);
+    nb_file_units_convert_direction(space, camera->up);
     camera->view_height *= space->unit;
 }
 
 /* ---- the other way --------------------------------------------------------------------------- */
 
-void nb_space_restore_direction(const nb_file_units *space, double direction[3])
+void nb_file_units_restore_direction(const nb_file_units *space, double direction[3])
 {
     if (!space->z_up) return;
     direction[2] = -direction[2];
     swap_y_and_z(direction);
 }
 
-void nb_space_restore_place(const nb_file_units *space, double place[3])
+void nb_file_units_restore_place(const nb_file_units *space, double place[3])
 {
-    nb_space_restore_direction(space, place);
+    nb_file_units_restore_direction(space, place);
     for (int i = 0; i < 3; i++) place[i] /= space->unit;
 }
 
-void nb_space_restore_placement(const nb_file_units *space, double position[3], double rotation[4], double scale[3])
+void nb_file_units_restore_placement(const nb_file_units *space, double position[3], double rotation[4],
+                                     double scale[3])
 {
-    nb_space_restore_place(space, position);
-    nb_space_restore_direction(space, rotation);
+    nb_file_units_restore_place(space, position);
+    nb_file_units_restore_direction(space, rotation);
     convert_extents(space, 1, scale);
 }
 
-void nb_space_restore_camera(const nb_file_units *space, nebel_camera *camera)
+void nb_file_units_restore_camera(const nb_file_units *space, nebel_camera *camera)
 {
-    nb_space_restore_place(space, camera->position);
-    nb_space_restore_place(space, camera->look_at);
-    nb_space_restore_direction(space, camera->up);
+    nb_file_units_restore_place(space, camera->position);
+    nb_file_units_restore_place(space, camera->look_at);
+    nb_file_units_restore_direction(space, camera->up);
     camera->view_height /= space->unit;
 }
 
-void nb_space_restore_shape(const nb_file_units *space, nebel_shape *shape)
+void nb_file_units_restore_shape(const nb_file_units *space, nebel_shape *shape)
 {
     nebel_transform *transform = &shape->transform;
     const double back = 1 / space->unit, near = shape->min[2];
@@ -187,27 +189,27 @@ void nb_space_restore_shape(const nb_file_units *space, nebel_shape *shape)
         shape->max[2] = near;
     }
     double *const places[] = {shape->min, shape->max, shape->center, shape->from, shape->to, shape->point};
-    nb_space_restore_placement(space, transform->position, transform->rotation, transform->scale);
-    for (size_t i = 0; i < sizeof places / sizeof *places; i++) nb_space_restore_place(space, places[i]);
-    nb_space_restore_direction(space, shape->normal);
+    nb_file_units_restore_placement(space, transform->position, transform->rotation, transform->scale);
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++) nb_file_units_restore_place(space, places[i]);
+    nb_file_units_restore_direction(space, shape->normal);
     convert_extents(space, back, shape->radii);
     shape->radius *= back;
     shape->radius_from *= back;
     shape->radius_to *= back;
 }
 
-void nb_space_restore_plane(const nb_file_units *space, nebel_plane *plane)
+void nb_file_units_restore_plane(const nb_file_units *space, nebel_plane *plane)
 {
-    nb_space_restore_direction(space, plane->normal);
+    nb_file_units_restore_direction(space, plane->normal);
     plane->distance /= space->unit;
 }
 
 static void restore_density(const nb_file_units *space, nebel_density *density)
 {
     const double back = 1 / space->unit;
-    nb_space_restore_place(space, density->from);
-    nb_space_restore_place(space, density->to);
-    nb_space_restore_place(space, density->center);
+    nb_file_units_restore_place(space, density->from);
+    nb_file_units_restore_place(space, density->to);
+    nb_file_units_restore_place(space, density->center);
     density->base *= back;
     density->scale_height *= back;
     density->sigma *= back;
@@ -215,9 +217,9 @@ static void restore_density(const nb_file_units *space, nebel_density *density)
     density->radius *= back;
 }
 
-void nb_space_restore_volume(const nb_file_units *space, nebel_volume_desc *volume)
+void nb_file_units_restore_volume(const nb_file_units *space, nebel_volume_desc *volume)
 {
-    nb_space_restore_shape(space, &volume->shape);
+    nb_file_units_restore_shape(space, &volume->shape);
     restore_density(space, &volume->density);
     volume->start /= space->unit;
     volume->cutoff /= space->unit;
@@ -225,9 +227,9 @@ void nb_space_restore_volume(const nb_file_units *space, nebel_volume_desc *volu
     scale_all(space->unit, volume->emission, 3);
 }
 
-void nb_space_restore_nebula(const nb_file_units *space, nebel_nebula_desc *nebula)
+void nb_file_units_restore_nebula(const nb_file_units *space, nebel_nebula_desc *nebula)
 {
-    nb_space_restore_shape(space, &nebula->shape);
+    nb_file_units_restore_shape(space, &nebula->shape);
     restore_density(space, &nebula->density);
     scale_all(space->unit, nebula->absorption, 3);
     scale_all(space->unit, nebula->emission, 3);
@@ -236,14 +238,14 @@ void nb_space_restore_nebula(const nb_file_units *space, nebel_nebula_desc *nebu
     nebula->turbulence_scale /= space->unit;
 }
 
-void nb_space_restore_noise(const nb_file_units *space, nebel_scene_noise *noise)
+void nb_file_units_restore_noise(const nb_file_units *space, nebel_scene_noise *noise)
 {
     exchange_axes(space, &noise->desc);
-    nb_space_restore_direction(space, noise->velocity);
+    nb_file_units_restore_direction(space, noise->velocity);
 }
 
-void nb_space_restore_cell(const nb_file_units *space, nebel_cell *cell)
+void nb_file_units_restore_cell(const nb_file_units *space, nebel_cell *cell)
 {
-    nb_space_restore_shape(space, &cell->shape);
+    nb_file_units_restore_shape(space, &cell->shape);
     cell->density *= space->unit;
 }

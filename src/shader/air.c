@@ -10,7 +10,7 @@
 #define MOST_WORDS ((size_t)1 << 24) /* indices are exact floats */
 
 _Static_assert((int)NB_AIR_FALLING == NB_VIEW_FALLING && (int)NB_AIR_RISING == NB_VIEW_RISING &&
-                   (int)NB_AIR_SUNS == NB_VIEW_SUNS && NB_MOST_LOBES == 2 && NEBEL_MAX_COMPONENTS == 4,
+                   (int)NB_AIR_SUNS == NB_VIEW_SUNS && NB_MAX_LOBES == 2 && NEBEL_MAX_COMPONENTS == 4,
                "what layout.h says");
 
 /* Where the parts begin, and how many words there are. */
@@ -21,7 +21,7 @@ typedef struct nb_air_parts {
 static nb_air_parts find_parts(const nebel_sky_view *view)
 {
     const size_t levels = (size_t)NB_VIEW_ROWS * ((size_t)view->levels + 1);
-    nb_air_parts parts = {.entries = NB_AIR_WORDS};
+    nb_air_parts parts = {.entries = NB_AIR_TEXELS};
     parts.extinction = parts.entries + levels * (size_t)view->columns * ((size_t)view->scatterer_count + 1);
     parts.suns = parts.extinction + levels;
     parts.skies = parts.suns + NB_VIEW_SUNS;
@@ -52,12 +52,12 @@ static void pack_lobes(const nebel_sky_view *view, nebel_texel_f32 *words)
 
 static void pack_head(const nebel_sky_view *view, const nb_air_parts *parts, nebel_texel_f32 *words)
 {
-    const nb_outlook *o = &view->outlook;
+    const nb_elevation_map *o = &view->outlook;
     const nb_scattering_table *scatter = &view->atmosphere->scatter;
     const double steps = (scatter->suns - 1) / (scatter->last_sun - scatter->first_sun);
-    memset(words, 0, NB_AIR_WORDS * sizeof *words);
-    words[NB_AIR_OUTLOOK] = word_of_four(o->radius, o->ground, o->thickness, o->height);
-    words[NB_AIR_OUTLOOK + 1] = word_of_four(o->dip, o->ratio, o->horizon, o->half_arc);
+    memset(words, 0, NB_AIR_TEXELS * sizeof *words);
+    words[NB_AIR_ELEVATION_MAP] = word_of_four(o->radius, o->ground, o->thickness, o->height);
+    words[NB_AIR_ELEVATION_MAP + 1] = word_of_four(o->dip, o->ratio, o->horizon, o->half_arc);
     words[NB_AIR_AXES] = word_of(view->up);
     words[NB_AIR_AXES + 1] = word_of(view->ahead);
     words[NB_AIR_AXES + 2] = word_of(view->aside);
@@ -68,7 +68,7 @@ static void pack_head(const nebel_sky_view *view, const nb_air_parts *parts, neb
         word_of_four((double)parts->entries, (double)parts->extinction, (double)parts->suns, (double)parts->skies);
     words[NB_AIR_SKIES] = word_of_four(1 / scatter->sun_scale, scatter->first_sun, steps, scatter->suns);
     /* A phase function of no lobes is 0 where its peak is not. */
-    for (int i = NB_AIR_LOBES; i < NB_AIR_WORDS; i++) words[i].v[2] = 1;
+    for (int i = NB_AIR_LOBES; i < NB_AIR_TEXELS; i++) words[i].v[2] = 1;
     pack_lobes(view, words + NB_AIR_LOBES);
 }
 

@@ -4,11 +4,11 @@
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
-nb_outlook nb_air_outlook()
+nb_elevation_map nb_air_elevation_map()
 {
-    nb_vec4 a = NEBEL_SKY_VIEW_TEXEL(NB_AIR_OUTLOOK);
-    nb_vec4 b = NEBEL_SKY_VIEW_TEXEL(NB_AIR_OUTLOOK + 1);
-    nb_outlook outlook;
+    nb_vec4 a = NEBEL_SKY_VIEW_TEXEL(NB_AIR_ELEVATION_MAP);
+    nb_vec4 b = NEBEL_SKY_VIEW_TEXEL(NB_AIR_ELEVATION_MAP + 1);
+    nb_elevation_map outlook;
     outlook.radius = a.x;
     outlook.ground = a.y;
     outlook.thickness = a.z;
@@ -29,7 +29,7 @@ nb_vec3 nb_air_bearing(nb_vec3 direction)
 
 nb_reach nb_air_reach(nb_vec3 bearing)
 {
-    nb_outlook outlook = nb_air_outlook();
+    nb_elevation_map outlook = nb_air_elevation_map();
     float level = sqrt(bearing.y * bearing.y + bearing.z * bearing.z);
     nb_reach reach = nb_rising_reach(outlook, bearing.x, level);
     if (nb_above_horizon(outlook, bearing.x, level) < 0.0) reach = nb_falling_reach(outlook, bearing.x, level);
@@ -153,7 +153,7 @@ nebel_ground nebel_trace_ground(nb_vec3 direction)
 {
     nebel_ground ground;
     nb_reach reach = nb_air_reach(nb_air_bearing(direction));
-    nb_outlook outlook = nb_air_outlook();
+    nb_elevation_map outlook = nb_air_elevation_map();
     nb_vec4 parts = NEBEL_SKY_VIEW_TEXEL(NB_AIR_PARTS);
     nb_vec4 skies = NEBEL_SKY_VIEW_TEXEL(NB_AIR_SKIES);
     nb_vec3 irradiance = NEBEL_SKY_VIEW_TEXEL(NB_AIR_IRRADIANCE).xyz;

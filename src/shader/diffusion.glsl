@@ -10,10 +10,10 @@
  * grow again. */
 #define NB_THICK_PIECE 0.5
 #define NB_THIN_PIECE 0.8
-#define NB_MOST_HALVINGS 5
+#define NB_MAX_HALVINGS 5
 
 /* g of no lobe of own light that went almost straight on is more. */
-#define NB_MOST_GLOW 0.999
+#define NB_MAX_GLOW 0.999
 
 /* What fog leaves less of does not matter. */
 #define NB_DARK_DEPTH 9.2103
@@ -42,7 +42,7 @@ void nb_add_depths_between(inout nb_two_depths sum, nb_ray ray, nb_media media, 
         int at = nb_medium_at(media.first + i, media.listed);
         int leaves = int(NEBEL_FOG_TEXEL(at + 2).w);
         float t = from;
-        if (NB_HAS(NB_HAS_COVER) && (nb_is_covered(at, floor) || int(NEBEL_FOG_TEXEL(at).w) == NB_KIND_EXCLUDE)) {
+        if (NB_HAS(NB_HAS_OVERRIDE) && (nb_is_covered(at, floor) || int(NEBEL_FOG_TEXEL(at).w) == NB_KIND_EXCLUDE)) {
             turns++;
             continue;
         }
@@ -76,7 +76,7 @@ nb_two_depths nb_depths_between(nb_ray ray, nb_media media, float from, float to
     sum.scaled = nb_splat3(0.0);
     ray.t_max = to;
     if (!NB_HAS(NB_HAS_SEVERAL)) media.count = min(media.count, 1);
-    if (NB_HAS(NB_HAS_COVER))
+    if (NB_HAS(NB_HAS_OVERRIDE))
         nb_add_covered_between(sum, ray, media, from, turns);
     else
         nb_add_depths_between(sum, ray, media, from, 0, turns);
@@ -90,7 +90,7 @@ struct nb_diffusion_lattice {
     int word, texel, channels, flags;
 };
 
-nb_diffusion_lattice nb_lattice_of(int word)
+nb_diffusion_lattice nb_diffusion_lattice_of(int word)
 {
     nb_vec4 low = NEBEL_FOG_TEXEL(word);
     nb_vec4 spacing = NEBEL_FOG_TEXEL(word + 1);
@@ -116,12 +116,12 @@ bool nb_is_own(nb_diffusion_lattice l) { return (l.flags & NB_LATTICE_OWN) != 0;
 bool nb_is_beside(float place, float low, float extent) { return place < low || place > low + extent; }
 
 /* Where fog goes on beside a lattice, bodies in it are not seen any more. */
-nb_diffusion_lattice nb_lattice_at(nb_diffusion_lattice l, nb_vec3 place)
+nb_diffusion_lattice nb_diffusion_lattice_at(nb_diffusion_lattice l, nb_vec3 place)
 {
     nb_vec3 extent = l.spacing * l.cells;
     bool beside = (nb_goes_on(l, 0, 0) && nb_is_beside(place.x, l.low.x, extent.x)) ||
                   (nb_goes_on(l, 2, 0) && nb_is_beside(place.z, l.low.z, extent.z));
-    if ((l.flags & NB_LATTICE_BESIDE) != 0 && beside) return nb_lattice_of(l.word + NB_LATTICE_WORDS);
+    if ((l.flags & NB_LATTICE_BESIDE) != 0 && beside) return nb_diffusion_lattice_of(l.word + NB_LATTICE_TEXELS);
     return l;
 }
 
@@ -165,7 +165,7 @@ float nb_step_along(float at, float d, float spacing, float cells)
     return step;
 }
 
-float nb_lattice_step(nb_diffusion_lattice l, nb_ray ray, float t)
+float nb_diffusion_lattice_step(nb_diffusion_lattice l, nb_ray ray, float t)
 {
     nb_vec3 at = ray.origin + ray.direction * t - l.low;
     float step = nb_step_along(at.x, ray.direction.x, l.spacing.x, l.cells.x);
@@ -175,7 +175,7 @@ float nb_lattice_step(nb_diffusion_lattice l, nb_ray ray, float t)
 
 /* ---- source radiance ------------------------------------------------------------------------- */
 
-float nb_lattice_lobe(float g, nb_turn turn)
+float nb_diffusion_lattice_lobe(float g, nb_turn turn)
 {
     float rest = 1.0 - abs(g);
     return nb_phase_lobe(rest * (1.0 + abs(g)) * 0.079577471545947667884, 0.0, rest * rest, 2.0 * g, turn);
@@ -188,11 +188,11 @@ float nb_diffuse_source(nb_vec4 numbers, float most, nb_vec3 direction)
     float mean = max(numbers.x, 0.0);
     if (!(mean > 0.0) || !(size > 0.0)) return mean;
     nb_turn turn = nb_turn_between(numbers.yzw * (1.0 / size), -direction);
-    return 12.566370614359172954 * mean * nb_lattice_lobe(min(size / mean, most), turn);
+    return 12.566370614359172954 * mean * nb_diffusion_lattice_lobe(min(size / mean, most), turn);
 }
 
 /* How much more of what is diffuse there is than nodes say, in light of this direction. */
-nb_vec3 nb_lattice_gain(nb_diffusion_lattice l, nb_vec3 d)
+nb_vec3 nb_diffusion_lattice_gain(nb_diffusion_lattice l, nb_vec3 d)
 {
     int word = l.word + 3;
     return d.x * d.x * NEBEL_FOG_TEXEL(word + (d.x < 0.0 ? 1 : 0)).xyz + d.y * d.y * NEBEL_FOG_TEXEL(word + (d.y < 0.0 ? 3 : 2)).xyz +
@@ -249,12 +249,12 @@ nb_vec4 nb_mix_nodes(nb_nodes n, int number)
     return near * (1.0 - n.share.z) + far * n.share.z;
 }
 
-nb_node_light nb_look_at_nodes(nb_diffusion_lattice l, nb_ray ray, float t, nb_turn to_sun)
+nb_node_light nb_lookup_nodes(nb_diffusion_lattice l, nb_ray ray, float t, nb_turn to_sun)
 {
     nb_nodes n = nb_nodes_around(l, ray.origin + ray.direction * t);
     float g = nb_mix_nodes(n, 2 * l.channels).x;
-    float turned = nb_lattice_lobe(g, to_sun);
-    nb_vec3 gain = nb_lattice_gain(l, ray.direction);
+    float turned = nb_diffusion_lattice_lobe(g, to_sun);
+    nb_vec3 gain = nb_diffusion_lattice_gain(l, ray.direction);
     nb_node_light light = nb_no_node_light();
     for (int c = 0; c < l.channels; c++) {
         nb_vec3 own = nb_vec3(c == 0 ? 1.0 : 0.0, c == 1 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0);
@@ -263,13 +263,13 @@ nb_node_light nb_look_at_nodes(nb_diffusion_lattice l, nb_ray ray, float t, nb_t
         if (nb_is_own(l)) {
             int straight = 2 * l.channels + 1 + 3 * c;
             light.source += own * (gain * diffuse + nb_splat3(nb_diffuse_source(nb_mix_nodes(n, straight), max(g, 0.0), ray.direction)));
-            light.once += own * (nb_diffuse_source(nb_mix_nodes(n, straight + 2), NB_MOST_GLOW, ray.direction) -
+            light.once += own * (nb_diffuse_source(nb_mix_nodes(n, straight + 2), NB_MAX_GLOW, ray.direction) -
                                  nb_diffuse_source(nb_mix_nodes(n, straight + 1), max(g, 0.0), ray.direction));
             continue;
         }
         nb_vec4 sun = nb_mix_nodes(n, 2 * c + 1);
         light.source += own * (gain * diffuse + nb_splat3(turned * nb_exp(sun.x)));
-        light.once += own * (sun.z * nb_lattice_lobe(sun.w, to_sun) - turned * nb_exp(sun.y));
+        light.once += own * (sun.z * nb_diffusion_lattice_lobe(sun.w, to_sun) - turned * nb_exp(sun.y));
         if (!nb_dims_sky(l)) continue;
         nb_vec4 along = nb_vec4(1.0, -ray.direction.x, -ray.direction.y, -ray.direction.z); /* light comes along the ray */
         int sky = 2 * (l.channels + c) + 1;
@@ -309,19 +309,19 @@ nb_vec3 nb_gather_in_lattice(nb_diffusion_lattice l, nb_ray ray, nb_media media,
     int word = 0;
     nb_node_light here = nb_no_node_light();
     while (t < span.y && nb_smallest(before.scaled) < NB_DARK_DEPTH && !nb_is_tired(turns)) {
-        float step = max(smaller * min(nb_lattice_step(l, ray, t), span.y - t), t * (2.0 * NB_EPSILON));
-        nb_diffusion_lattice within = nb_lattice_at(l, ray.origin + ray.direction * (t + 0.5 * step));
+        float step = max(smaller * min(nb_diffusion_lattice_step(l, ray, t), span.y - t), t * (2.0 * NB_EPSILON));
+        nb_diffusion_lattice within = nb_diffusion_lattice_at(l, ray.origin + ray.direction * (t + 0.5 * step));
         float end = within.word == word ? min(t + step, span.y) : t;
         word = within.word;
         nb_two_depths depth = nb_depths_between(ray, media, t, end, turns);
         float left = nb_smallest(nb_exp3(-depth.scaled));
         turns += NB_TURNS_OF_PIECE;
-        if (left < NB_THICK_PIECE && halvings < NB_MOST_HALVINGS) {
+        if (left < NB_THICK_PIECE && halvings < NB_MAX_HALVINGS) {
             halvings++;
             smaller *= 0.5;
             continue;
         }
-        nb_node_light there = nb_look_at_nodes(within, ray, end, to_sun);
+        nb_node_light there = nb_lookup_nodes(within, ray, end, to_sun);
         light += nb_exp3(-before.scaled) * nb_light_between(here.source, there.source, depth.scaled) +
                  nb_exp3(-before.whole) * nb_light_between(here.once, there.once, depth.whole);
         dimmed += nb_exp3(-before.scaled) * nb_light_between(here.dimmed, there.dimmed, depth.scaled) -
@@ -347,7 +347,7 @@ nb_vec3 nb_gather_diffuse(nb_ray ray, nb_media media)
     int turns = 0;
     for (int i = 0; i < 2; i++) {
         float word = i == 0 ? NEBEL_FOG_TEXEL(NB_HEADER_LATTICE).x : NEBEL_FOG_TEXEL(NB_HEADER_LATTICE).y;
-        if (word > 0.0) light += nb_gather_in_lattice(nb_lattice_of(int(word)), ray, media, turns);
+        if (word > 0.0) light += nb_gather_in_lattice(nb_diffusion_lattice_of(int(word)), ray, media, turns);
     }
     return light;
 }

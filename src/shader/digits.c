@@ -192,7 +192,7 @@ static double distance_to(const sight *s, const double place[3])
 /* Of a unit radius and, but for balls, a unit length or more in its frame. */
 static void note_round(const sight *s, const nb_volume *body, const nb_leaf *leaf, narrowness *n)
 {
-    const int is_ball = leaf->type == NB_LEAF_BALL;
+    const int is_ball = leaf->type == NB_LEAF_SPHERE;
     double least = HUGE_VAL;
     for (int i = 0; i < 3; i++) least = fmin(least, nb_vector_length(&leaf->matrix[3 * i]));
     const double extent = (is_ball ? leaf->radius : 2 + leaf->length) / least;

@@ -12,7 +12,7 @@
 
 #define MOST_WORDS ((size_t)1 << 24) /* indices are exact floats */
 
-_Static_assert(NB_FILTER_PIECES == NB_SKY_KNOTS - 3, "a piece has four knots");
+_Static_assert(NB_FILTER_PIECES == NB_SKY_NODES - 3, "a piece has four knots");
 _Static_assert(NB_ENVIRONMENT_CONSTANT == (int)NEBEL_ENVIRONMENT_CONSTANT &&
                    NB_ENVIRONMENT_GRADIENT == (int)NEBEL_ENVIRONMENT_GRADIENT &&
                    NB_ENVIRONMENT_MAP == (int)NEBEL_ENVIRONMENT_MAP,
@@ -34,7 +34,7 @@ static size_t filter_words(const nebel_snapshot *snapshot, size_t number)
 /* The first word of a filter, or behind the last one. */
 static size_t filter_place(const nebel_snapshot *snapshot, size_t number)
 {
-    size_t place = NB_ENVIRONMENT_WORDS;
+    size_t place = NB_ENVIRONMENT_TEXELS;
     for (size_t i = 0; i < number; i++) place += filter_words(snapshot, i);
     return place;
 }
@@ -43,8 +43,8 @@ static size_t surface_words(const nebel_environment *sky)
 {
     size_t width, height;
     if (sky->type != NEBEL_ENVIRONMENT_MAP) return 0;
-    (void)nb_sky_map_pixels(sky->map, &width, &height);
-    return table_words(nb_sky_map_reflection(sky->map)) + 1 + width * height;
+    (void)nb_environment_map_pixels(sky->map, &width, &height);
+    return table_words(nb_environment_map_reflection(sky->map)) + 1 + width * height;
 }
 
 static size_t count_words(const nebel_snapshot *snapshot, int surfaces)
@@ -73,7 +73,7 @@ void nb_place_filters(const nebel_snapshot *snapshot, nebel_texel_f32 *words)
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_environment_light *sky = snapshot->media[i].sky;
         if (sky == NULL) continue;
-        words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS + NB_MEDIUM_FILTER].v[3] =
+        words[NB_HEADER_TEXELS + i * NB_MEDIUM_TEXELS + NB_MEDIUM_FILTER].v[3] =
             (float)filter_place(snapshot, (size_t)(sky - snapshot->skylights));
     }
 }
@@ -88,7 +88,7 @@ static nebel_texel_f32 color_word(const double color[3])
 static void pack_head(const nebel_environment *sky, size_t surfaces, nebel_texel_f32 *words)
 {
     const nb_environment_light light = nb_skylight_of(sky, NULL);
-    memset(words, 0, NB_ENVIRONMENT_WORDS * sizeof *words);
+    memset(words, 0, NB_ENVIRONMENT_TEXELS * sizeof *words);
     words[0].v[0] = (float)sky->type;
     switch (sky->type) {
     case NEBEL_ENVIRONMENT_GRADIENT:
@@ -102,7 +102,7 @@ static void pack_head(const nebel_environment *sky, size_t surfaces, nebel_texel
         words[0].v[3] = sky->intensity > 0 ? (float)sky->intensity : 1;
         if (surfaces == 0) break;
         words[1].v[0] = (float)surfaces;
-        words[1].v[1] = (float)(surfaces + table_words(nb_sky_map_reflection(sky->map)));
+        words[1].v[1] = (float)(surfaces + table_words(nb_environment_map_reflection(sky->map)));
         break;
     default:
         words[1] = color_word(sky->radiance);
@@ -119,7 +119,7 @@ static nebel_texel_f32 *pack_rgb(const float *rgb, size_t columns, size_t rows, 
 
 static void pack_gradient_filter(const nb_environment_filter *filter, nebel_texel_f32 *word)
 {
-    const double steps = (NB_SKY_KNOTS - 1) / log1p(1 / filter->width);
+    const double steps = (NB_SKY_NODES - 1) / log1p(1 / filter->width);
     *word++ = (nebel_texel_f32){{(float)filter->mean_cosine, (float)(1 / filter->width), (float)steps, 0}};
     for (int i = 0; i < NB_FILTER_PIECES; i++)
         for (int k = 0; k < 4; k++) word[i].v[k] = (float)filter->rectified[i + k];
@@ -138,8 +138,8 @@ static void pack_filter(const nebel_snapshot *snapshot, size_t number, nebel_tex
 static void pack_surfaces(const nebel_environment_map *map, nebel_texel_f32 *word)
 {
     size_t width, height;
-    const nb_environment_table *table = nb_sky_map_reflection(map);
-    const float *pixels = nb_sky_map_pixels(map, &width, &height);
+    const nb_environment_table *table = nb_environment_map_reflection(map);
+    const float *pixels = nb_environment_map_pixels(map, &width, &height);
     (void)pack_rgb(pixels, width, height, pack_rgb(table->coefficients, table->columns, table->rows, word));
 }
 
@@ -191,7 +191,7 @@ int nebel_is_same_environment(const nebel_snapshot *a, const nebel_snapshot *b)
     if (a == NULL || b == NULL) return a == b;
     int same = a->skylight_count == b->skylight_count && is_same_sky(&a->sky, &b->sky);
     for (size_t i = 0; i < a->skylight_count && same; i++)
-        same = nb_phase_compare(nb_sky_filter_phase(a->skylights[i].filter),
-                                nb_sky_filter_phase(b->skylights[i].filter)) == 0;
+        same = nb_phase_compare(nb_environment_filter_phase(a->skylights[i].filter),
+                                nb_environment_filter_phase(b->skylights[i].filter)) == 0;
     return same;
 }

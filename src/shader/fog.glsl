@@ -52,19 +52,19 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
         if (from < ray.t_max) sum.last = max(sum.last, from);
         if (!(from > 0.0)) continue;
         int flags = int(NEBEL_FOG_TEXEL(at + 1).w);
-        if (NB_HAS(NB_HAS_COVER)) { /* without density, too */
+        if (NB_HAS(NB_HAS_OVERRIDE)) { /* without density, too */
             sum.covers = sum.covers || (any && (covering || (flags & NB_LIGHT_COVERS) != 0));
             covering = covering || (flags & NB_LIGHT_COVERS) != 0;
             any = true;
         }
-        if (length > 0.0 && (!NB_HAS(NB_HAS_COVER) || kind != NB_KIND_EXCLUDE)) {
+        if (length > 0.0 && (!NB_HAS(NB_HAS_OVERRIDE) || kind != NB_KIND_EXCLUDE)) {
             nb_vec3 radiance = nb_opaque_radiance(at, ray.direction);
             bool emits = (flags & NB_LIGHT_EMITS) != 0;
             bool other = radiance.x != sum.radiance.x || radiance.y != sum.radiance.y || radiance.z != sum.radiance.z;
             sum.mixed = sum.mixed || (sum.met && (other || emits || sum.emits));
             sum.emits = sum.emits || emits;
             sum.met = true;
-            if (NB_HAS(NB_HAS_SUN | NB_HAS_LAMPS)) sum.scatters = sum.scatters || NEBEL_FOG_TEXEL(at + NB_MEDIUM_SCATTERING).w > 0.0;
+            if (NB_HAS(NB_HAS_SUN | NB_HAS_LIGHTS)) sum.scatters = sum.scatters || NEBEL_FOG_TEXEL(at + NB_MEDIUM_SCATTERING).w > 0.0;
             sum.radiance = radiance;
             sum.depth += extinction.xyz * length;
             sum.light += nb_light_per_metre(at, radiance) * length;
@@ -264,7 +264,7 @@ nb_piece nb_note_slot(nb_piece piece, int k, nb_ray ray, bool by_cells)
         nb_vec4 extinction = NEBEL_FOG_TEXEL(at);
         nb_vec3 radiance = nb_slot_radiance(k, at);
         int kind = int(extinction.w);
-        if (!NB_HAS(NB_HAS_COVER) || kind != NB_KIND_EXCLUDE) {
+        if (!NB_HAS(NB_HAS_OVERRIDE) || kind != NB_KIND_EXCLUDE) {
             piece.present++;
             piece.emits = piece.emits || (int(NEBEL_FOG_TEXEL(at + 1).w) & NB_LIGHT_EMITS) != 0;
             piece.least = min(piece.least, radiance);
@@ -624,6 +624,6 @@ int nb_turns_to_sun()
 {
     int media = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_FOG_TEXEL(0).x) : 1;
     int way = 2 + (NB_HAS(NB_HAS_GROUP) ? 16 : 0) + (NB_HAS(NB_HAS_PLANES) ? 12 : 0) + (NB_HAS(NB_HAS_SOFT) ? 8 : 0);
-    int search = NB_MOST_PASSED + (NB_HAS(NB_HAS_PLANES) ? 32 : 0);
+    int search = NB_MAX_PASSED + (NB_HAS(NB_HAS_PLANES) ? 32 : 0);
     return media * (search + (nb_sun_is_closed() ? 2 : NB_NODES - 1) * way);
 }

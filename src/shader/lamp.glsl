@@ -29,10 +29,10 @@ nb_lamplit nb_open_lamplit()
     return l;
 }
 
-#if NB_DECLARES(NB_HAS_LAMPS)
+#if NB_DECLARES(NB_HAS_LIGHTS)
 
 /* A lamp that is passed by a ray. */
-struct nb_lamp_pass {
+struct nb_light_pass {
     int number;
     nb_vec3 intensity, axis;
     float radius2, clear, edge, inner, rise;
@@ -42,15 +42,15 @@ struct nb_lamp_pass {
     float aside;    /* its distance, at least the lamp's radius */
 };
 
-nb_lamp_pass nb_pass_lamp(nb_ray ray, int number)
+nb_light_pass nb_pass_light(nb_ray ray, int number)
 {
-    int at = int(NEBEL_FOG_TEXEL(NB_HEADER_LAMPS).w) + NB_LAMP_WORDS * number;
+    int at = int(NEBEL_FOG_TEXEL(NB_HEADER_LIGHTS).w) + NB_LIGHT_TEXELS * number;
     nb_vec4 place = NEBEL_FOG_TEXEL(at);
     nb_vec4 intensity = NEBEL_FOG_TEXEL(at + 1);
     nb_vec4 axis = NEBEL_FOG_TEXEL(at + 2);
     nb_vec4 cone = NEBEL_FOG_TEXEL(at + 3);
     nb_vec3 apart = ray.origin - place.xyz;
-    nb_lamp_pass by;
+    nb_light_pass by;
     by.number = number;
     by.intensity = intensity.xyz;
     by.axis = axis.xyz;
@@ -67,10 +67,10 @@ nb_lamp_pass nb_pass_lamp(nb_ray ray, int number)
 }
 
 /* The most irradiance between two places, times the length over which it may last: an angle over a distance. */
-float nb_most_fluence(nb_lamp_pass by, float start, float end)
+float nb_most_fluence(nb_light_pass by, float start, float end)
 {
     float nearest = clamp(by.closest, start, end) - by.closest;
-    return nb_lamp_fluence(by.aside2 + nearest * nearest, by.radius2) * nb_largest(by.intensity);
+    return nb_light_fluence(by.aside2 + nearest * nearest, by.radius2) * nb_largest(by.intensity);
 }
 
 /* The first root of a u^2 + 2 b u + c behind t, u from the closest place on, or `end`. */
@@ -90,7 +90,7 @@ float nb_root_behind(float closest, float t, float end, float a, float b, float 
 }
 
 /* Where the ray next enters or leaves the lamp, or the light of its cone changes otherwise. */
-float nb_lamp_turn(nb_lamp_pass by, nb_ray ray, float t, float end)
+float nb_light_turn(nb_light_pass by, nb_ray ray, float t, float end)
 {
     float near = t + nb_nearest(t);
     float next = nb_root_behind(by.closest, near, end, 1.0, 0.0, by.aside2 - by.radius2);
@@ -108,7 +108,7 @@ float nb_lamp_turn(nb_lamp_pass by, nb_ray ray, float t, float end)
 /* ---- media ----------------------------------------------------------------------------------- */
 
 /* A piece of the ray on which the same media are there, at and behind `start`. */
-struct nb_lamp_piece {
+struct nb_light_segment {
     float start, end;
     int floor;        /* what ranks lower is covered */
     int media;        /* how many to ask: those in slots, or in a crowd all */
@@ -133,7 +133,7 @@ float nb_most_scattered(int scattering)
 
 /* A lobe is (peak + slope (1 - cosine))^-1.5, of which the cosine is (1 - u u) / (1 + u u), u the tangent of half the angle from its peak:
  * up to u = width it hardly falls. */
-void nb_narrow_peaks(int scattering, inout nb_lamp_piece piece)
+void nb_narrow_peaks(int scattering, inout nb_light_segment piece)
 {
     int lobes = int(NEBEL_FOG_TEXEL(scattering).w);
     for (int i = 1; i <= lobes; i++) {
@@ -145,7 +145,7 @@ void nb_narrow_peaks(int scattering, inout nb_lamp_piece piece)
 }
 
 /* Word of the medium number `i` of a piece; where they are more than there are slots each is asked whether it is there, 0: it is not. */
-int nb_lamp_medium(nb_ray ray, int first, bool listed, nb_lamp_piece piece, int i, inout int turns)
+int nb_light_medium(nb_ray ray, int first, bool listed, nb_light_segment piece, int i, inout int turns)
 {
     int at = 0;
     if (!piece.crowd) {
@@ -192,9 +192,9 @@ float nb_smooth_length(nb_ray ray, int medium, float t)
 }
 
 /* `end`: it goes no farther. */
-nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float t, float end, inout int turns)
+nb_light_segment nb_next_piece(nb_ray ray, int first, int count, bool listed, float t, float end, inout int turns)
 {
-    nb_lamp_piece piece;
+    nb_light_segment piece;
     piece.start = t;
     piece.end = end;
     piece.floor = 0;
@@ -215,15 +215,15 @@ nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float
         if (s.enter > t) continue;
         piece.end = min(piece.end, t + nb_smooth_length(ray, at, t));
         int flags = int(NEBEL_FOG_TEXEL(at + 1).w);
-        if (NB_HAS(NB_HAS_COVER) && (flags & NB_LIGHT_COVERS) != 0) piece.floor = max(piece.floor, flags / NB_LIGHT_RANK);
+        if (NB_HAS(NB_HAS_OVERRIDE) && (flags & NB_LIGHT_COVERS) != 0) piece.floor = max(piece.floor, flags / NB_LIGHT_RANK);
         if (piece.media < NEBEL_MEDIUM_SLOTS) nb_set_slot(piece.media, at, s);
         piece.media++;
     }
     piece.crowd = piece.media > NEBEL_MEDIUM_SLOTS;
-    if (NB_HAS(NB_HAS_COVER) && !piece.crowd) piece.media = nb_drop_covered(piece.media, piece.floor);
+    if (NB_HAS(NB_HAS_OVERRIDE) && !piece.crowd) piece.media = nb_drop_covered(piece.media, piece.floor);
     if (piece.crowd) piece.media = count;
     for (int i = 0; i < piece.media; i++) {
-        int at = nb_lamp_medium(ray, first, listed, piece, i, turns);
+        int at = nb_light_medium(ray, first, listed, piece, i, turns);
         turns += 1;
         if (at == 0) continue;
         nb_vec4 extinction = NEBEL_FOG_TEXEL(at);
@@ -240,20 +240,20 @@ nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float
 
 /* What media make of light at a place of the piece, `from` metres behind its start: a skin of dense fog may be thinner than what places on
  * the ray are told apart by. */
-struct nb_lamp_place {
+struct nb_light_place {
     nb_vec3 depth;      /* from the start of the piece */
     nb_vec3 extinction;
     nb_vec3 glow;       /* radiance per metre and irradiance that comes from `towards` */
 };
 
-nb_lamp_place nb_place_in_piece(nb_ray ray, int first, bool listed, nb_lamp_piece piece, float from, nb_vec3 towards, inout int turns)
+nb_light_place nb_place_in_piece(nb_ray ray, int first, bool listed, nb_light_segment piece, float from, nb_vec3 towards, inout int turns)
 {
-    nb_lamp_place place;
+    nb_light_place place;
     place.depth = nb_splat3(0.0);
     place.extinction = nb_splat3(0.0);
     place.glow = nb_splat3(0.0);
     for (int i = 0; i < piece.media; i++) {
-        int at = nb_lamp_medium(ray, first, listed, piece, i, turns);
+        int at = nb_light_medium(ray, first, listed, piece, i, turns);
         turns += 1;
         if (at == 0) continue;
         nb_vec4 extinction = NEBEL_FOG_TEXEL(at);
@@ -271,37 +271,37 @@ nb_lamp_place nb_place_in_piece(nb_ray ray, int first, bool listed, nb_lamp_piec
 
 /* Kronrod's extension of Gauss's rule of three nodes on [0, 1], whose nodes are the second, the middle and the last but one. Source:
  * Kronrod, Nodes and Weights of Quadrature Formulas, 1965. */
-#define NB_LAMP_NODES 7
+#define NB_LIGHT_NODES 7
 
-float nb_lamp_node(int j)
+float nb_light_node(int j)
 {
     int k = j < 3 ? 3 - j : j - 3;
     float off = k == 0 ? 0.0 : k == 1 ? 0.21712187467340129 : k == 2 ? 0.38729833462074169 : 0.48024563435401014;
     return j < 3 ? 0.5 - off : 0.5 + off;
 }
 
-float nb_lamp_weight(int j)
+float nb_light_weight(int j)
 {
     int k = j < 3 ? 3 - j : j - 3;
     return k == 0 ? 0.22545826932923707 : k == 1 ? 0.20069870738798111 : k == 2 ? 0.13424404493416672 : 0.052328113013233632;
 }
 
-float nb_lamp_weight_of_three(int j) { return j == 3 ? 8.0 / 18.0 : j == 1 || j == 5 ? 5.0 / 18.0 : 0.0; }
+float nb_light_weight_of_three(int j) { return j == 3 ? 8.0 / 18.0 : j == 1 || j == 5 ? 5.0 / 18.0 : 0.0; }
 
 /* What a step's error may be of the light that is found so far. */
-#define NB_LAMP_SHARE 0.01
+#define NB_LIGHT_SHARE 0.01
 
 /* What is known of the place where a step begins, or of the one just behind it. */
-struct nb_lamp_start {
+struct nb_light_start {
     float from;    /* metres behind the start of the piece */
     nb_vec3 depth; /* from the eye */
     nb_vec3 way;   /* depth from there to the lamp */
     bool is_known;
 };
 
-nb_lamp_start nb_open_start()
+nb_light_start nb_open_start()
 {
-    nb_lamp_start start;
+    nb_light_start start;
     start.from = 0.0;
     start.depth = nb_splat3(0.0);
     start.way = nb_splat3(0.0);
@@ -309,11 +309,11 @@ nb_lamp_start nb_open_start()
     return start;
 }
 
-struct nb_lamp_step {
+struct nb_light_step {
     nb_vec3 light;
     float error;
     float steepness; /* by how much the logarithm of the light changes from the start to the first node */
-    nb_lamp_start next; /* the end of the step */
+    nb_light_start next; /* the end of the step */
 };
 
 /* From the last two nodes on to the end of a step. */
@@ -330,8 +330,8 @@ float nb_unseen_share(float change)
  * transmittance is lost. `before` is the depth in front of the piece. Where nodes do not see that loss they have passed over what causes it, and light that changes by large factors from node to
  * node may be anywhere between them; what is between the start and the first node may be all the light there is. `start` is asked where
  * it is not known: a way to the lamp may pass many voxels. */
-nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, nb_swing swing, float length,
-                               float end, nb_vec3 before, nb_vec3 seen, nb_vec3 drop, inout nb_lamp_start start, inout int turns)
+nb_light_step nb_step_past_light(nb_ray ray, int first, bool listed, nb_light_segment piece, nb_light_pass by, nb_swing swing, float length,
+                               float end, nb_vec3 before, nb_vec3 seen, nb_vec3 drop, inout nb_light_start start, inout int turns)
 {
     nb_vec3 seven = nb_splat3(0.0);
     nb_vec3 three = nb_splat3(0.0);
@@ -340,11 +340,11 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
     nb_vec3 last_depth = start.depth;
     nb_vec3 last_way = start.way;
     float hidden = 0.0;
-    nb_lamp_step s;
+    nb_light_step s;
     s.steepness = 0.0;
     s.next = nb_open_start();
-    for (int j = start.is_known ? 0 : -1; j < NB_LAMP_NODES; j++) {
-        float w = length * (j < 0 ? 1e-5 : nb_lamp_node(j));
+    for (int j = start.is_known ? 0 : -1; j < NB_LIGHT_NODES; j++) {
+        float w = length * (j < 0 ? 1e-5 : nb_light_node(j));
         float way_along = min(nb_swing_way(swing, w), end - start.from);
         float from = start.from + way_along;
         float along = swing.along + way_along;
@@ -354,8 +354,8 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
         nb_vec3 towards = apart * -nb_rcp_bounded(distance);
         float speed = (by.aside * by.aside + along * along) * nb_swing_rate(swing, w) * length;
         float cosine = -dot(towards, by.axis);
-        float fluence = nb_lamp_fluence(square, by.radius2) * speed * nb_lamp_cone(cosine, by.edge, by.rise);
-        nb_lamp_place place = nb_place_in_piece(ray, first, listed, piece, from, towards, turns);
+        float fluence = nb_light_fluence(square, by.radius2) * speed * nb_light_cone(cosine, by.edge, by.rise);
+        nb_light_place place = nb_place_in_piece(ray, first, listed, piece, from, towards, turns);
         nb_vec3 depth = before + place.depth;
         nb_vec3 light = nb_splat3(0.0);
         nb_vec3 way = last_way;
@@ -370,9 +370,9 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
             if (j == 0) s.steepness = 2.0 * change; /* over a tenth of the step, as src/march/trace_sun.h has it */
             s.next.way = max(way + (way - last_way) * NB_BEHIND_NODES, nb_splat3(0.0));
             s.next.is_known = fluence > 0.0;
-            seven += nb_lamp_weight(j) * light;
-            three += nb_lamp_weight_of_three(j) * light;
-            taken += nb_lamp_weight(j) * speed * place.extinction * nb_exp3(-depth);
+            seven += nb_light_weight(j) * light;
+            three += nb_light_weight_of_three(j) * light;
+            taken += nb_light_weight(j) * speed * place.extinction * nb_exp3(-depth);
             steepest = max(steepest, from * place.extinction * nb_exp3(-depth));
         } else {
             start.depth = depth;
@@ -393,12 +393,12 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
 }
 
 /* Behind a lamp nothing of its light is left [m]; squares of squares of it are numbers. */
-#define NB_LAMP_REACH 1e8
+#define NB_LIGHT_REACH 1e8
 
 /* The length of a first step of a few optical depths: light in dense fog comes from there. Density may begin with nothing and grow. */
-float nb_first_swing(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, inout int turns)
+float nb_first_swing(nb_ray ray, int first, bool listed, nb_light_segment piece, nb_light_pass by, inout int turns)
 {
-    float length = min(piece.end - piece.start, NB_LAMP_REACH);
+    float length = min(piece.end - piece.start, NB_LIGHT_REACH);
     float deep = nb_largest(piece.depth);
     for (int i = 0; i < 24 && deep > 4.01; i++) {
         length *= max(4.0 / deep, 0.001);
@@ -411,7 +411,7 @@ float nb_first_swing(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb
 /* The end of a step on which phase functions change smoothly. `ahead` is the tangent of half the angle by which light is turned: a step
  * goes to 2.5 times as much, and by 1.5 widths where it is in a peak. Towards peaks of light that is turned back it ends at a quarter of
  * 1 / ahead. On a ray through the lamp itself what is shorter than a hundredth of its radius does not count. */
-float nb_smooth_end(nb_lamp_pass by, nb_lamp_piece piece, float t, float end)
+float nb_smooth_end(nb_light_pass by, nb_light_segment piece, float t, float end)
 {
     float from = t - by.closest;
     float side = max(sqrt(by.aside2), 1e-6 * NEBEL_FOG_TEXEL(NB_HEADER_LATTICE).z);
@@ -426,28 +426,28 @@ float nb_smooth_end(nb_lamp_pass by, nb_lamp_piece piece, float t, float end)
 }
 
 /* Steps that a lamp takes in a piece; the rest is one. */
-#define NB_MOST_LAMP_STEPS 96
+#define NB_MAX_LIGHT_STEPS 96
 
 /* The light of one lamp in a piece. */
-nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, nb_vec3 before,
+nb_vec3 nb_in_scatter_past_light(nb_ray ray, int first, bool listed, nb_light_segment piece, nb_light_pass by, nb_vec3 before,
                            float tolerance, inout int turns)
 {
     nb_vec3 sum = nb_splat3(0.0);
     nb_vec3 seen = nb_exp3(-before);
     nb_vec2 lit = nb_vec2(1.0, piece.start);
-    float far = min(piece.end, by.closest + NB_LAMP_REACH);
+    float far = min(piece.end, by.closest + NB_LIGHT_REACH);
     float guess = nb_first_swing(ray, first, listed, piece, by, turns);
     float least = 1e-7 * min(guess, 1.0); /* shorter steps are not tried */
-    nb_lamp_start start = nb_open_start();
-    for (int i = 0; i < NB_MOST_LAMP_STEPS; i++) {
+    nb_light_start start = nb_open_start();
+    for (int i = 0; i < NB_MAX_LIGHT_STEPS; i++) {
         float t = piece.start + start.from;
         if (!(start.from < far - piece.start) || nb_is_tired(turns + nb_grid_turns)) break;
         if (lit.y <= t) {
             lit = NEBEL_LIGHT_VISIBILITY(by.number, ray.origin, ray.direction, t, far);
             lit.y = min(max(lit.y, t + nb_nearest(t)), far);
         }
-        bool last = i + 1 == NB_MOST_LAMP_STEPS;
-        float stop = last ? far : nb_smooth_end(by, piece, t, nb_lamp_turn(by, ray, t, lit.y));
+        bool last = i + 1 == NB_MAX_LIGHT_STEPS;
+        float stop = last ? far : nb_smooth_end(by, piece, t, nb_light_turn(by, ray, t, lit.y));
         float along = (piece.start - by.closest) + start.from;
         float rest = (stop - piece.start) - start.from;
         nb_swing swing = nb_swing_over(by.aside, t, along, along + rest, rest);
@@ -455,13 +455,13 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
         float end = start.from + (length >= swing.end ? rest : min(nb_swing_way(swing, length), rest));
         nb_vec3 depth = before + nb_place_in_piece(ray, first, listed, piece, end, ray.direction, turns).depth;
         nb_vec3 behind = nb_exp3(-depth);
-        turns += NB_LAMP_NODES + 1;
+        turns += NB_LIGHT_NODES + 1;
         bool fits = true;
-        nb_lamp_start next = nb_open_start();
+        nb_light_start next = nb_open_start();
         if (lit.x > 0.0) {
-            nb_lamp_step taken = nb_step_past_lamp(ray, first, listed, piece, by, swing, length, end, before, seen, seen - behind, start, turns);
+            nb_light_step taken = nb_step_past_light(ray, first, listed, piece, by, swing, length, end, before, seen, seen - behind, start, turns);
             next = taken.next;
-            float allowed = tolerance + NB_LAMP_SHARE * nb_largest(max(sum, taken.light));
+            float allowed = tolerance + NB_LIGHT_SHARE * nb_largest(max(sum, taken.light));
             fits = last || taken.error <= allowed || length < least;
             if (fits) sum += lit.x * taken.light;
             guess = fits ? max(guess, 2.0 * length) : length * min(max(0.55 / max(taken.steepness, 0.55), 0.001), 0.5);
@@ -479,24 +479,24 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
 /* ---- all lamps ------------------------------------------------------------------------------- */
 
 /* Nodes of a step are far better than the three that its error is told by. */
-#define NB_LAMP_TOLERANCE 60.0
+#define NB_LIGHT_TOLERANCE 60.0
 /* What lamps that are left out may give, of that. */
 #define NB_FAINT_SHARE 0.05
 
 /* Adds a piece. */
-void nb_light_piece(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns)
+void nb_scatter_light_segment(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns)
 {
-    float tolerance = NEBEL_FOG_TEXEL(0).y * NB_LAMP_TOLERANCE;
+    float tolerance = NEBEL_FOG_TEXEL(0).y * NB_LIGHT_TOLERANCE;
     int lamps = int(NEBEL_FOG_TEXEL(0).w);
     float end = l.most > 0.0 ? min(ray.t_max, l.reached + l.most) : ray.t_max;
-    nb_lamp_piece piece = nb_next_piece(ray, first, count, listed, l.reached, end, turns);
+    nb_light_segment piece = nb_next_piece(ray, first, count, listed, l.reached, end, turns);
     nb_vec3 drop = nb_exp3(-l.before) - nb_exp3(-(l.before + piece.depth));
     for (int i = 0; i < (piece.scatters ? lamps : 0); i++) {
-        nb_lamp_pass by = nb_pass_lamp(ray, i);
+        nb_light_pass by = nb_pass_light(ray, i);
         float most = nb_most_fluence(by, piece.start, piece.end) * piece.scatter * nb_largest(drop);
         turns += 1;
         if (most * float(lamps) <= tolerance * NB_FAINT_SHARE) continue;
-        l.light += nb_light_past_lamp(ray, first, listed, piece, by, l.before, tolerance, turns);
+        l.light += nb_in_scatter_past_light(ray, first, listed, piece, by, l.before, tolerance, turns);
     }
     l.before += piece.depth;
     l.reached = piece.end;
@@ -521,14 +521,14 @@ nb_lamplit nb_kept_lamplit(int count)
 
 /* As far as turns suffice. In several passes a piece that they do not suffice for is begun again in the next one, shorter if it was the
  * first. */
-void nb_lamplight(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns)
+void nb_surface_lights(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns)
 {
     float from = l.reached;
     nb_grid_turns = 0;
     if (NB_RESUMES) nb_keep_lamplit(count, l);
     while (l.reached < ray.t_max && nb_smallest(l.before) < NB_OPAQUE && !nb_is_tired(turns + nb_grid_turns)) {
         nb_lamplit before = l;
-        nb_light_piece(l, ray, first, count, listed, turns);
+        nb_scatter_light_segment(l, ray, first, count, listed, turns);
         if (NB_RESUMES && (nb_is_tired(turns + nb_grid_turns) || !nb_has_loops(count))) {
             if (before.reached > from) break;
             float most = before.most > 0.0 ? before.most : l.reached - from;
@@ -545,6 +545,6 @@ void nb_lamplight(inout nb_lamplit l, nb_ray ray, int first, int count, bool lis
 
 #else
 
-void nb_lamplight(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns) {}
+void nb_surface_lights(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns) {}
 
 #endif

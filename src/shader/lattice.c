@@ -35,7 +35,8 @@ static size_t count_texels(const nebel_snapshot *snapshot)
     const nb_diffusion *all[MOST_LATTICES];
     const size_t lattices = list_lattices(snapshot, all);
     size_t count = 0;
-    for (size_t i = 0; i < lattices; i++) count += nb_lattice_nodes(&all[i]->lattice) * texels_of_node(all[i]);
+    for (size_t i = 0; i < lattices; i++)
+        count += nb_diffusion_lattice_nodes(&all[i]->lattice) * texels_of_node(all[i]);
     return count;
 }
 
@@ -54,7 +55,7 @@ nebel_result nb_check_lattices(const nebel_snapshot *snapshot)
 size_t nb_count_lattice_words(const nebel_snapshot *snapshot)
 {
     const nb_diffusion *all[MOST_LATTICES];
-    return NB_LATTICE_WORDS * list_lattices(snapshot, all);
+    return NB_LATTICE_TEXELS * list_lattices(snapshot, all);
 }
 
 static int flags_of(const nb_diffusion *d)
@@ -86,7 +87,7 @@ static void pack_lattice(const nb_diffusion *d, const long double eye[3], size_t
 
 size_t nb_own_lattice_word(const nebel_snapshot *snapshot)
 {
-    return snapshot->own_diffusion != NULL ? nb_count_lattice_words(snapshot) - NB_LATTICE_WORDS : 0;
+    return snapshot->own_diffusion != NULL ? nb_count_lattice_words(snapshot) - NB_LATTICE_TEXELS : 0;
 }
 
 void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye[3], nebel_texel_f32 *words)
@@ -95,8 +96,8 @@ void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye
     const size_t lattices = list_lattices(snapshot, all);
     size_t first = 0;
     for (size_t i = 0; i < lattices; i++) {
-        pack_lattice(all[i], eye, first, &words[i * NB_LATTICE_WORDS]);
-        first += nb_lattice_nodes(&all[i]->lattice) * texels_of_node(all[i]);
+        pack_lattice(all[i], eye, first, &words[i * NB_LATTICE_TEXELS]);
+        first += nb_diffusion_lattice_nodes(&all[i]->lattice) * texels_of_node(all[i]);
     }
 }
 
@@ -118,7 +119,7 @@ static nebel_texel_f32 *pack_numbers(const float *numbers, size_t texels, nebel_
 /* Numbers of the march lie as texels do, but for the one of all channels. Returns the word behind the last. */
 static nebel_texel_f32 *pack_nodes(const nb_diffusion *d, nebel_texel_f32 *word)
 {
-    const size_t nodes = nb_lattice_nodes(&d->lattice), texels = 2 * (size_t)d->channel_count;
+    const size_t nodes = nb_diffusion_lattice_nodes(&d->lattice), texels = 2 * (size_t)d->channel_count;
     for (size_t i = 0; i < nodes; i++) {
         const float *numbers = &d->nodes[i * d->node_numbers];
         word = pack_numbers(numbers, texels, word);

@@ -9,7 +9,7 @@
  * Word 3: the first word of the lattice of diffuse light, and of that of own light, 0 where there is none; what is shorter along a ray
  *         has no digits near the eye [m], a millionth of what the fog is wide, or of a metre; one unused.
  *
- * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
+ * A medium, NB_MEDIUM_TEXELS words in the snapshot's order:
  *     0  extinction, density kind
  *     1  light per metre at density 1 (radiance times extinction, plus emission), flags and rank: 1 where there is
  *        emission, plus 2 where it covers, plus 4 times its rank, counted from 0: what covers takes away the fog of
@@ -27,23 +27,23 @@
  *        its phase function's filter, 0 where no environment lights it.
  *
  *
- * A leaf, NB_LEAF_WORDS words:
+ * A leaf, NB_LEAF_TEXELS words:
  *     0  leaf type (plus NB_LEAF_TURNED), a, b, folds
  *     1  the eye in the leaf's frame; box: low
  *     2  box: high
  *     3  the matrix, row by row; where the type says that it is turned
- * Scattering, NB_SCATTERING_WORDS words. Ambient light is not here: it is in the light per metre and the radiance.
+ * Scattering, NB_SCATTERING_TEXELS words. Ambient light is not here: it is in the light per metre and the radiance.
  *     0  albedo, lobes of the phase function
  *     1  first lobe: factor, alpha, peak, slope of nb_phase_lobe
  *     2  second lobe; zeros where there is none
  *
- * A lamp, NB_LAMP_WORDS words; for formulas/lamp.inc:
+ * A lamp, NB_LIGHT_TEXELS words; for formulas/lamp.inc:
  *     0  place, square of the radius, which is not 0
  *     1  intensity, how near to its place light does not pass through fog [m]
  *     2  axis and cosine at the edge of its cone; 0, -1 where it has none
- *     3  what nb_lamp_cone calls rise, cosine of the inner angle, 0, 0
+ *     3  what nb_light_cone calls rise, cosine of the inner angle, 0, 0
  *
- * A lattice, NB_LATTICE_WORDS words; behind it another one for what is beside it where NB_LATTICE_BESIDE says so:
+ * A lattice, NB_LATTICE_TEXELS words; behind it another one for what is beside it where NB_LATTICE_BESIDE says so:
  *     0  its low end, the texel of its first node
  *     1  the size of a cell [m], channels: 1 or 3
  *     2  cells along each axis, flags: 1 << (2 axis) where fog goes on beyond the low end, twice that for the high one
@@ -95,7 +95,7 @@
  *     then the coefficients, the top row first.
  *
  * Air words are vectors of floats, of one place, see planet/view.h:
- *     0  nb_outlook: radius, ground, thickness, height
+ *     0  nb_elevation_map: radius, ground, thickness, height
  *     1  dip, ratio, horizon, half_arc
  *     2  up; 3 level towards the sun; 4 level aside, of length 1
  *     5  the direction towards the sun, of length 1
@@ -109,21 +109,21 @@
 #ifndef NB_SHADER_LAYOUT_H
 #define NB_SHADER_LAYOUT_H
 
-#define NB_HEADER_WORDS 4
+#define NB_HEADER_TEXELS 4
 #define NB_HEADER_SUN 1
-#define NB_HEADER_LAMPS 2 /* its last number */
+#define NB_HEADER_LIGHTS 2 /* its last number */
 #define NB_HEADER_LATTICE 3
-#define NB_MEDIUM_WORDS 10
+#define NB_MEDIUM_TEXELS 10
 #define NB_MEDIUM_LEAF 4
 #define NB_MEDIUM_START 5
 #define NB_MEDIUM_CUTOFF 6
 #define NB_MEDIUM_SCATTERING 7
 #define NB_MEDIUM_AHEAD 8
 #define NB_MEDIUM_FILTER 9
-#define NB_LEAF_WORDS 6
-#define NB_SCATTERING_WORDS 3
-#define NB_LAMP_WORDS 4
-#define NB_LATTICE_WORDS 10
+#define NB_LEAF_TEXELS 6
+#define NB_SCATTERING_TEXELS 3
+#define NB_LIGHT_TEXELS 4
+#define NB_LATTICE_TEXELS 10
 #define NB_SUN_LATTICE_TEXELS 4
 
 #define NB_LATTICE_BESIDE 64
@@ -147,13 +147,13 @@
 #define NB_SUN_FLAT 1   /* in closed form: flat faces, constant densities */
 #define NB_SUN_HEIGHT 2 /* the same: one endless height fog */
 
-#define NB_ENVIRONMENT_WORDS 4
+#define NB_ENVIRONMENT_TEXELS 4
 #define NB_ENVIRONMENT_CONSTANT 0
 #define NB_ENVIRONMENT_GRADIENT 1
 #define NB_ENVIRONMENT_MAP 2
 #define NB_FILTER_PIECES 126
 
-#define NB_AIR_OUTLOOK 0
+#define NB_AIR_ELEVATION_MAP 0
 #define NB_AIR_AXES 2
 #define NB_AIR_SUN 5
 #define NB_AIR_IRRADIANCE 6
@@ -161,7 +161,7 @@
 #define NB_AIR_PARTS 8
 #define NB_AIR_SKIES 9
 #define NB_AIR_LOBES 10
-#define NB_AIR_WORDS 18
+#define NB_AIR_TEXELS 18
 #define NB_AIR_FALLING 60.0
 #define NB_AIR_RISING 64.0
 #define NB_AIR_SUNS 257.0
@@ -173,24 +173,24 @@
 #define NB_TYPE_WORLD 0
 #define NB_TYPE_PLANES 1
 #define NB_TYPE_BOX 2
-#define NB_TYPE_BALL 3
-#define NB_TYPE_TUBE 4
+#define NB_TYPE_SPHERE 3
+#define NB_TYPE_CYLINDER 4
 #define NB_TYPE_CONE 5
 #define NB_TYPE_CAPSULE 6
-#define NB_TYPE_TURNED 8
+#define NB_TYPE_ROTATED 8
 
 /* What fog may have: the bits of NEBEL_FEATURES. */
 #define NB_HAS_PLANES 1
 #define NB_HAS_BOX 2
-#define NB_HAS_BALL 4
-#define NB_HAS_TUBE 8
+#define NB_HAS_SPHERE 4
+#define NB_HAS_CYLINDER 8
 #define NB_HAS_CONE 16
 #define NB_HAS_CAPSULE 32
-#define NB_HAS_TURNED 64
-#define NB_HAS_GROUP 128  /* a body of several leaves */
-#define NB_HAS_COVER 256  /* exclude or replace */
-#define NB_HAS_MIXED 512  /* two media of different light, or one of two that shines */
-#define NB_HAS_SLOPE 1024 /* height, linear */
+#define NB_HAS_ROTATED 64
+#define NB_HAS_GROUP 128    /* a body of several leaves */
+#define NB_HAS_OVERRIDE 256 /* exclude or replace */
+#define NB_HAS_MIXED 512    /* two media of different light, or one of two that shines */
+#define NB_HAS_SLOPE 1024   /* height, linear */
 #define NB_HAS_GAUSSIAN 2048
 #define NB_HAS_SOFT_EDGE 4096
 #define NB_HAS_RADIAL 8192
@@ -201,7 +201,7 @@
 #define NB_HAS_SOFT_PLANES 262144
 #define NB_HAS_SUN 524288 /* which lights fog */
 #define NB_HAS_GRID 1048576
-#define NB_HAS_LAMPS 2097152       /* as the sun does */
+#define NB_HAS_LIGHTS 2097152      /* as the sun does */
 #define NB_HAS_DIFFUSION 4194304   /* light scattered more than once */
 #define NB_HAS_ENVIRONMENT 8388608 /* which lights fog */
 #define NB_HAS_ALTITUDE 16777216

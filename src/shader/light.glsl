@@ -93,7 +93,7 @@ float nb_planes_way_out(int first, int count, nb_spot spot, nb_vec3 v, float nea
 }
 #endif
 
-#define NB_HAS_ROUND (NB_HAS_BALL | NB_HAS_TUBE | NB_HAS_CONE | NB_HAS_CAPSULE)
+#define NB_HAS_ROUND (NB_HAS_SPHERE | NB_HAS_CYLINDER | NB_HAS_CONE | NB_HAS_CAPSULE)
 #if NB_DECLARES(NB_HAS_ROUND)
 /* What is round is where x x + y y + ball z z - w w < 0, w its radius at z: of a place p at the spot's start, d along the ray and v along the
  * way, each with what it adds to w. The first number is that form at the spot. The other is where the way leaves: of both roots of
@@ -121,8 +121,8 @@ nb_vec2 nb_round_way(nb_spot spot, nb_vec4 p, nb_vec4 d, nb_vec4 v, float ball, 
 float nb_round_way_out(int leaf, int type, nb_spot spot, nb_ray local, nb_vec3 v, float near)
 {
     nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
-    float ball = type == NB_TYPE_BALL ? 1.0 : 0.0;
-    float radius = type == NB_TYPE_BALL || type == NB_TYPE_CONE ? head.y : 1.0;
+    float ball = type == NB_TYPE_SPHERE ? 1.0 : 0.0;
+    float radius = type == NB_TYPE_SPHERE || type == NB_TYPE_CONE ? head.y : 1.0;
     float slope = type == NB_TYPE_CONE ? head.z : 0.0;
     near += 8.0 * NB_EPSILON * radius;
     nb_vec3 d = local.direction;
@@ -133,8 +133,8 @@ float nb_round_way_out(int leaf, int type, nb_spot spot, nb_ray local, nb_vec3 v
     nb_vec4 to = nb_vec4(v, slope * v.z);
     nb_vec2 side = nb_round_way(spot, p, along, to, ball, near);
     float way = side.x > 0.0 ? -1.0 : side.y;
-#if NB_DECLARES(NB_HAS_TUBE | NB_HAS_CONE | NB_HAS_CAPSULE)
-    if (type != NB_TYPE_BALL) {
+#if NB_DECLARES(NB_HAS_CYLINDER | NB_HAS_CONE | NB_HAS_CAPSULE)
+    if (type != NB_TYPE_SPHERE) {
         float length = type == NB_TYPE_CAPSULE ? head.y : 1.0;
         nb_vec2 ends = nb_spot_heights(spot, nb_vec3(-origin.z, length - origin.z, 0.0), nb_splat3(-d.z), near).xy;
         bool between = ends.x <= 0.0 && ends.y >= 0.0;
@@ -161,8 +161,8 @@ float nb_round_way_out(int leaf, int type, nb_spot spot, nb_ray local, nb_vec3 v
 float nb_way_out(int leaf, nb_spot spot, nb_vec3 v)
 {
     int type = int(NEBEL_FOG_TEXEL(leaf).x);
-    bool turned = type >= NB_TYPE_TURNED;
-    if (turned) type -= NB_TYPE_TURNED;
+    bool turned = type >= NB_TYPE_ROTATED;
+    if (turned) type -= NB_TYPE_ROTATED;
     nb_ray to = spot.ray;
     to.direction = v;
     nb_ray local = nb_turned_ray(leaf, turned, spot.ray);
@@ -170,7 +170,7 @@ float nb_way_out(int leaf, nb_spot spot, nb_vec3 v)
     float near = 8.0 * NB_EPSILON * spot.start * sqrt(dot(local.direction, local.direction));
     float way = -1.0;
 #if NB_DECLARES(NB_HAS_ROUND)
-    if (NB_HAS(NB_HAS_ROUND) && type >= NB_TYPE_BALL) way = nb_round_way_out(leaf, type, spot, local, to.direction, near);
+    if (NB_HAS(NB_HAS_ROUND) && type >= NB_TYPE_SPHERE) way = nb_round_way_out(leaf, type, spot, local, to.direction, near);
 #endif
 #if NB_DECLARES(NB_HAS_BOX)
     if (NB_HAS(NB_HAS_BOX) && type == NB_TYPE_BOX) way = nb_box_way(leaf, spot, local, to.direction, near);
@@ -209,7 +209,7 @@ nb_vec3 nb_added_depth(nb_ray ray, nb_media media, float from, int floor, inout 
         int at = nb_medium_at(media.first + i, media.listed);
         int leaves = int(NEBEL_FOG_TEXEL(at + 2).w);
         float t = from;
-        if (NB_HAS(NB_HAS_COVER) && (nb_is_covered(at, floor) || int(NEBEL_FOG_TEXEL(at).w) == NB_KIND_EXCLUDE)) {
+        if (NB_HAS(NB_HAS_OVERRIDE) && (nb_is_covered(at, floor) || int(NEBEL_FOG_TEXEL(at).w) == NB_KIND_EXCLUDE)) {
             turns++;
             continue;
         }
@@ -254,11 +254,11 @@ nb_cover nb_cover_at(nb_ray ray, nb_media media, float t, inout int turns)
 nb_vec3 nb_depth_of(nb_ray ray, nb_media media, inout int turns)
 {
     nb_vec3 depth = nb_splat3(0.0);
-#if NB_DECLARES(NB_HAS_COVER)
+#if NB_DECLARES(NB_HAS_OVERRIDE)
     float t = 0.0;
     nb_ray part = ray;
 #ifndef NEBEL_FEATURES_LITERAL
-    if (!NB_HAS(NB_HAS_COVER)) return nb_added_depth(ray, media, 0.0, 0, turns);
+    if (!NB_HAS(NB_HAS_OVERRIDE)) return nb_added_depth(ray, media, 0.0, 0, turns);
 #endif
     while (t < ray.t_max) {
         nb_cover cover = nb_cover_at(ray, media, t, turns);
@@ -266,7 +266,7 @@ nb_vec3 nb_depth_of(nb_ray ray, nb_media media, inout int turns)
         depth += nb_added_depth(part, media, t, cover.floor, turns);
         t = cover.end;
     }
-#elif NB_DECLARES(NB_HAS_SUN | NB_HAS_LAMPS)
+#elif NB_DECLARES(NB_HAS_SUN | NB_HAS_LIGHTS)
     depth = nb_added_depth(ray, media, 0.0, 0, turns);
 #endif
     return depth;

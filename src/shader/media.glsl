@@ -79,7 +79,7 @@ float nb_nearest(float t) { return max(abs(t) * (8.0 * NB_EPSILON), NEBEL_FOG_TE
 nb_ray nb_turned_ray(int leaf, bool turned, nb_ray ray)
 {
     nb_ray local = ray;
-    if (NB_HAS(NB_HAS_TURNED) && turned) {
+    if (NB_HAS(NB_HAS_ROTATED) && turned) {
         nb_vec3 x = NEBEL_FOG_TEXEL(leaf + 3).xyz;
         nb_vec3 y = NEBEL_FOG_TEXEL(leaf + 4).xyz;
         nb_vec3 z = NEBEL_FOG_TEXEL(leaf + 5).xyz;
@@ -114,8 +114,8 @@ nb_interval nb_leaf_interval(int leaf, nb_ray ray)
 {
     nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     int type = int(head.x);
-    bool turned = type >= NB_TYPE_TURNED;
-    if (turned) type -= NB_TYPE_TURNED;
+    bool turned = type >= NB_TYPE_ROTATED;
+    if (turned) type -= NB_TYPE_ROTATED;
     nb_interval span = nb_interval_all();
     if (NB_HAS(NB_HAS_PLANES) && type == NB_TYPE_PLANES) {
         span = nb_planes_interval(int(head.z), int(head.y), ray);
@@ -126,13 +126,13 @@ nb_interval nb_leaf_interval(int leaf, nb_ray ray)
         nb_vec3 p = local.origin + place;
         if (NB_HAS(NB_HAS_BOX) && type == NB_TYPE_BOX)
             span = nb_interval_box(local.origin, d, place, NEBEL_FOG_TEXEL(leaf + 2).xyz, 0.0);
-#if NB_DECLARES(NB_HAS_BALL)
-        else if (NB_HAS(NB_HAS_BALL) && type == NB_TYPE_BALL)
-            span = nb_interval_ball(p, d, head.y, NB_NO_REACH * head.y);
+#if NB_DECLARES(NB_HAS_SPHERE)
+        else if (NB_HAS(NB_HAS_SPHERE) && type == NB_TYPE_SPHERE)
+            span = nb_interval_sphere(p, d, head.y, NB_NO_REACH * head.y);
 #endif
-#if NB_DECLARES(NB_HAS_TUBE)
-        else if (NB_HAS(NB_HAS_TUBE) && type == NB_TYPE_TUBE)
-            span = nb_interval_tube(p, d, NB_NO_REACH);
+#if NB_DECLARES(NB_HAS_CYLINDER)
+        else if (NB_HAS(NB_HAS_CYLINDER) && type == NB_TYPE_CYLINDER)
+            span = nb_interval_cylinder(p, d, NB_NO_REACH);
 #endif
 #if NB_DECLARES(NB_HAS_CONE)
         else if (NB_HAS(NB_HAS_CONE) && type == NB_TYPE_CONE)
@@ -170,7 +170,7 @@ nb_stretch nb_group_stretch(int leaf, int count, nb_ray ray, float from)
         float next = ray.t_max;
         int stack = 0;
         for (int i = 0; i < count; i++) {
-            int at = leaf + NB_LEAF_WORDS * i;
+            int at = leaf + NB_LEAF_TEXELS * i;
             nb_interval span = nb_leaf_interval(at, ray);
             bool some = span.enter < span.leave;
             if (some && span.enter > t) next = min(next, span.enter);
@@ -255,13 +255,13 @@ nb_profile nb_round_body_profile(nb_profile profile, int leaf, nb_vec4 word, nb_
 {
     nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     int type = int(head.x);
-    nb_ray local = nb_turned_ray(leaf, type >= NB_TYPE_TURNED, ray);
-    if (type >= NB_TYPE_TURNED) type -= NB_TYPE_TURNED;
-    float unit = type == NB_TYPE_BALL ? 1.0 / head.y : 1.0;
+    nb_ray local = nb_turned_ray(leaf, type >= NB_TYPE_ROTATED, ray);
+    if (type >= NB_TYPE_ROTATED) type -= NB_TYPE_ROTATED;
+    float unit = type == NB_TYPE_SPHERE ? 1.0 / head.y : 1.0;
     float radius = type == NB_TYPE_CONE ? head.y : 1.0;
     float slope = type == NB_TYPE_CONE ? head.z : 0.0;
     float extent = type == NB_TYPE_CAPSULE ? head.y : 1.0;
-    profile.form = type == NB_TYPE_BALL ? NB_EDGE_BALL : type == NB_TYPE_CAPSULE ? NB_EDGE_CAPSULE : NB_EDGE_CAPPED;
+    profile.form = type == NB_TYPE_SPHERE ? NB_EDGE_SPHERE : type == NB_TYPE_CAPSULE ? NB_EDGE_CAPSULE : NB_EDGE_CAPPED;
     nb_vec3 p = (local.origin + NEBEL_FOG_TEXEL(leaf + 1).xyz + local.direction * start) * unit;
     nb_round_edge edge = nb_round_edge_of(p, local.direction * unit, radius, slope, extent, word.x, word.y, word.z, profile.form);
     profile.side = edge.side;
@@ -275,7 +275,7 @@ nb_profile nb_round_body_profile(nb_profile profile, int leaf, nb_vec4 word, nb_
 nb_profile nb_grid_profile(nb_profile profile, int leaf, nb_vec4 word, nb_ray ray, float start)
 {
     nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
-    nb_ray local = nb_turned_ray(leaf, int(head.x) >= NB_TYPE_TURNED, ray);
+    nb_ray local = nb_turned_ray(leaf, int(head.x) >= NB_TYPE_ROTATED, ray);
     profile.first = int(word.w);
     profile.offset = (local.origin + local.direction * start - NEBEL_FOG_TEXEL(leaf + 1).xyz) * word.xyz +
                      nb_splat3(0.5 * float(NEBEL_VOXEL_TEXEL(profile.first).w));
@@ -286,7 +286,7 @@ nb_profile nb_grid_profile(nb_profile profile, int leaf, nb_vec4 word, nb_ray ra
 nb_profile nb_leaf_profile(nb_profile profile, int leaf, float width, nb_ray ray, float start)
 {
     nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
-    nb_ray local = nb_turned_ray(leaf, int(head.x) >= NB_TYPE_TURNED, ray);
+    nb_ray local = nb_turned_ray(leaf, int(head.x) >= NB_TYPE_ROTATED, ray);
     nb_vec3 place = NEBEL_FOG_TEXEL(leaf + 1).xyz;
     if (NB_HAS(NB_HAS_RADIAL) && profile.kind >= NB_KIND_RADIAL) {
         profile = nb_round_profile(profile, local.origin + place, local.direction, 1.0 / head.y, start);

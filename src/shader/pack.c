@@ -16,7 +16,7 @@
 
 #define MOST_WORDS ((size_t)1 << 24) /* indices are exact floats */
 
-_Static_assert(NEBEL_MAX_PACKED_VOLUMES == (MOST_WORDS - NB_HEADER_WORDS) / NB_MEDIUM_WORDS,
+_Static_assert(NEBEL_MAX_PACKED_VOLUMES == (MOST_WORDS - NB_HEADER_TEXELS) / NB_MEDIUM_TEXELS,
                "what the public header says");
 
 /* Beyond this a float's square is none. */
@@ -52,8 +52,8 @@ static void set_color(nebel_texel_f32 *word, const double v[3], double last)
 }
 
 _Static_assert(NEBEL_FEATURE_MIXED == NB_HAS_MIXED && NEBEL_FEATURE_GRID == NB_HAS_GRID &&
-                   NEBEL_FEATURE_LIGHTS == NB_HAS_LAMPS && NEBEL_FEATURE_DIFFUSION == NB_HAS_DIFFUSION &&
-                   NEBEL_FEATURE_ENVIRONMENT == NB_HAS_ENVIRONMENT && NEBEL_FEATURE_OVERRIDE == NB_HAS_COVER &&
+                   NEBEL_FEATURE_LIGHTS == NB_HAS_LIGHTS && NEBEL_FEATURE_DIFFUSION == NB_HAS_DIFFUSION &&
+                   NEBEL_FEATURE_ENVIRONMENT == NB_HAS_ENVIRONMENT && NEBEL_FEATURE_OVERRIDE == NB_HAS_OVERRIDE &&
                    NEBEL_FEATURE_GROUP == NB_HAS_GROUP && NEBEL_FEATURE_SUN == NB_HAS_SUN,
                "the public names of features");
 
@@ -66,10 +66,10 @@ static int type_of(const nb_leaf *leaf)
         return NB_TYPE_PLANES;
     case NB_LEAF_BOX:
         return NB_TYPE_BOX;
-    case NB_LEAF_BALL:
-        return NB_TYPE_BALL;
-    case NB_LEAF_TUBE:
-        return NB_TYPE_TUBE;
+    case NB_LEAF_SPHERE:
+        return NB_TYPE_SPHERE;
+    case NB_LEAF_CYLINDER:
+        return NB_TYPE_CYLINDER;
     case NB_LEAF_CONE:
         return NB_TYPE_CONE;
     case NB_LEAF_CAPSULE:
@@ -136,9 +136,9 @@ static void pack_frame(const packer *p, const nb_leaf *leaf, nebel_texel_f32 *wo
 
 static void pack_leaf(packer *p, const nb_volume *body, const nb_leaf *leaf, unsigned folds, nebel_texel_f32 *word)
 {
-    memset(word, 0, NB_LEAF_WORDS * sizeof *word);
+    memset(word, 0, NB_LEAF_TEXELS * sizeof *word);
     const int framed = leaf->type != NB_LEAF_WORLD && leaf->type != NB_LEAF_PLANES;
-    word->v[0] = (float)(type_of(leaf) + (framed && !leaf->aligned ? NB_TYPE_TURNED : 0));
+    word->v[0] = (float)(type_of(leaf) + (framed && !leaf->aligned ? NB_TYPE_ROTATED : 0));
     word->v[1] = (float)(leaf->type == NB_LEAF_CAPSULE ? leaf->length : leaf->radius);
     word->v[2] = (float)leaf->slope;
     word->v[3] = (float)folds;
@@ -150,8 +150,8 @@ static void pack_leaf(packer *p, const nb_volume *body, const nb_leaf *leaf, uns
 static unsigned folds_behind(const nb_volume *body, size_t *step)
 {
     unsigned folds = 0, above = 1;
-    for (; *step < body->step_count && body->steps[*step] != NB_STEP_LEAF; ++*step, above <<= 1)
-        if (body->steps[*step] == NB_STEP_ALL) folds |= above;
+    for (; *step < body->step_count && body->steps[*step] != NB_OP_LEAF; ++*step, above <<= 1)
+        if (body->steps[*step] == NB_OP_INTERSECTION) folds |= above;
     return folds | above;
 }
 
@@ -164,14 +164,14 @@ static void pack_group(packer *p, const nb_volume *body, nebel_texel_f32 *word)
         low[i] = (long double)body->low[i] - p->eye[i] - (isfinite(margin) ? margin : 0);
         high[i] = (long double)body->high[i] - p->eye[i] + (isfinite(margin) ? margin : 0);
     }
-    memset(word, 0, NB_LEAF_WORDS * sizeof *word);
+    memset(word, 0, NB_LEAF_TEXELS * sizeof *word);
     nebel_texel_f32 *leaves = &p->words[p->used];
     set_word(&word[0], low, (double)p->used);
     set_word(&word[1], high, 0);
-    p->used += body->leaf_count * NB_LEAF_WORDS;
+    p->used += body->leaf_count * NB_LEAF_TEXELS;
     size_t step = 1;
     for (size_t i = 0; i < body->leaf_count; i++, step++)
-        pack_leaf(p, body, &body->leaves[i], folds_behind(body, &step), &leaves[i * NB_LEAF_WORDS]);
+        pack_leaf(p, body, &body->leaves[i], folds_behind(body, &step), &leaves[i * NB_LEAF_TEXELS]);
 }
 
 /* ---- profiles -------------------------------------------------------------------------------- */
@@ -289,8 +289,8 @@ static void pack_scattering(packer *p, const nb_medium *medium, nebel_texel_f32 
     if (!scatters(p->snapshot, medium)) return;
     word[NB_MEDIUM_SCATTERING].v[3] = (float)p->used;
     word[NB_MEDIUM_AHEAD].v[3] = (float)medium->ahead;
-    p->used += NB_SCATTERING_WORDS;
-    memset(scattering, 0, NB_SCATTERING_WORDS * sizeof *scattering);
+    p->used += NB_SCATTERING_TEXELS;
+    memset(scattering, 0, NB_SCATTERING_TEXELS * sizeof *scattering);
     set_color(&scattering[0], medium->body.albedo, phase->lobe_count);
     for (int i = 0; i < phase->lobe_count; i++) {
         const nb_lobe *lobe = &phase->lobes[i];
@@ -304,16 +304,16 @@ static void pack_sun(const nebel_snapshot *snapshot, nebel_texel_f32 word[2])
     memset(word, 0, 2 * sizeof *word);
     if (!snapshot->is_sunlit) return;
     const nb_sun_depth_method way = snapshot->way_to_sun;
-    const int form = way == NB_WAY_FLAT ? NB_SUN_FLAT : way == NB_WAY_HEIGHT ? NB_SUN_HEIGHT : NB_SUN_STEPS;
+    const int form = way == NB_SUN_DEPTH_FLAT ? NB_SUN_FLAT : way == NB_SUN_DEPTH_HEIGHT ? NB_SUN_HEIGHT : NB_SUN_STEPS;
     set_color(&word[0], snapshot->to_sun, form);
     set_color(&word[1], snapshot->irradiance, 0);
 }
 
-static void pack_lamp(const packer *p, const nb_light *lamp, nebel_texel_f32 word[NB_LAMP_WORDS])
+static void pack_lamp(const packer *p, const nb_light *lamp, nebel_texel_f32 word[NB_LIGHT_TEXELS])
 {
     long double place[3];
     for (int i = 0; i < 3; i++) place[i] = (long double)lamp->place[i] - p->eye[i];
-    memset(word, 0, NB_LAMP_WORDS * sizeof *word);
+    memset(word, 0, NB_LIGHT_TEXELS * sizeof *word);
     set_word(&word[0], place, lamp->radius2);
     set_color(&word[1], lamp->intensity, lamp->clear);
     set_color(&word[2], lamp->axis, lamp->is_spot ? lamp->edge : -1);
@@ -325,8 +325,8 @@ static void pack_lamps(packer *p, const nebel_snapshot *snapshot)
 {
     if (!snapshot->is_lamplit) return;
     p->words[0].v[3] = (float)snapshot->lamp_count;
-    p->words[NB_HEADER_LAMPS].v[3] = (float)p->used;
-    for (size_t i = 0; i < snapshot->lamp_count; i++, p->used += NB_LAMP_WORDS)
+    p->words[NB_HEADER_LIGHTS].v[3] = (float)p->used;
+    for (size_t i = 0; i < snapshot->lamp_count; i++, p->used += NB_LIGHT_TEXELS)
         pack_lamp(p, &snapshot->lamps[i], &p->words[p->used]);
 }
 
@@ -394,14 +394,14 @@ static void pack_medium(packer *p, const nb_medium *medium, nebel_texel_f32 *wor
 
 static size_t count_words(const nebel_snapshot *snapshot)
 {
-    size_t count = NB_HEADER_WORDS + snapshot->medium_count * NB_MEDIUM_WORDS;
+    size_t count = NB_HEADER_TEXELS + snapshot->medium_count * NB_MEDIUM_TEXELS;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
-        count += body->face_count + (body->leaf_count > 1 ? body->leaf_count * NB_LEAF_WORDS : 0);
-        count += scatters(snapshot, &snapshot->media[i]) ? NB_SCATTERING_WORDS : 0;
+        count += body->face_count + (body->leaf_count > 1 ? body->leaf_count * NB_LEAF_TEXELS : 0);
+        count += scatters(snapshot, &snapshot->media[i]) ? NB_SCATTERING_TEXELS : 0;
         count += body->density.type == NEBEL_DENSITY_ALTITUDE;
     }
-    if (snapshot->is_lamplit) count += snapshot->lamp_count * NB_LAMP_WORDS;
+    if (snapshot->is_lamplit) count += snapshot->lamp_count * NB_LIGHT_TEXELS;
     return count + nb_count_lattice_words(snapshot);
 }
 
@@ -431,7 +431,7 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
                        capacity);
     packer p = {snapshot,
                 words,
-                NB_HEADER_WORDS + snapshot->medium_count * NB_MEDIUM_WORDS,
+                NB_HEADER_TEXELS + snapshot->medium_count * NB_MEDIUM_TEXELS,
                 0,
                 {(long double)eye[0], (long double)eye[1], (long double)eye[2]}};
     words[0] =
@@ -442,7 +442,7 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
     const unsigned precision = nb_full_precision();
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         if (i > 0 && snapshot->media[i].body.rank > snapshot->media[i - 1].body.rank) p.rank++;
-        pack_medium(&p, &snapshot->media[i], &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS]);
+        pack_medium(&p, &snapshot->media[i], &words[NB_HEADER_TEXELS + i * NB_MEDIUM_TEXELS]);
     }
     pack_lamps(&p, snapshot);
     if (snapshot->diffusion != NULL) words[NB_HEADER_LATTICE].v[0] = (float)p.used;
@@ -462,12 +462,12 @@ static uint32_t features_of_leaf(const nb_leaf *leaf)
     static const uint32_t bits[] = {[NB_TYPE_WORLD] = 0,
                                     [NB_TYPE_PLANES] = NB_HAS_PLANES,
                                     [NB_TYPE_BOX] = NB_HAS_BOX,
-                                    [NB_TYPE_BALL] = NB_HAS_BALL,
-                                    [NB_TYPE_TUBE] = NB_HAS_TUBE,
+                                    [NB_TYPE_SPHERE] = NB_HAS_SPHERE,
+                                    [NB_TYPE_CYLINDER] = NB_HAS_CYLINDER,
                                     [NB_TYPE_CONE] = NB_HAS_CONE,
                                     [NB_TYPE_CAPSULE] = NB_HAS_CAPSULE};
     const int framed = leaf->type != NB_LEAF_WORLD && leaf->type != NB_LEAF_PLANES;
-    return bits[type_of(leaf)] | (framed && !leaf->aligned ? NB_HAS_TURNED : 0);
+    return bits[type_of(leaf)] | (framed && !leaf->aligned ? NB_HAS_ROTATED : 0);
 }
 
 static uint32_t features_of_kind(int kind)
@@ -506,13 +506,13 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot)
     if (snapshot == NULL) return NB_HAS_ALL;
     uint32_t features = (snapshot->medium_count > 1 ? NB_HAS_SEVERAL : 0) | (is_mixed(snapshot) ? NB_HAS_MIXED : 0) |
                         (snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0) | (snapshot->is_sunlit ? NB_HAS_SUN : 0) |
-                        (snapshot->is_lamplit ? NB_HAS_LAMPS : 0) |
+                        (snapshot->is_lamplit ? NB_HAS_LIGHTS : 0) |
                         (snapshot->diffusion != NULL || snapshot->own_diffusion != NULL ? NB_HAS_DIFFUSION : 0) |
                         (snapshot->skylight_count > 0 ? NB_HAS_ENVIRONMENT : 0);
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         features |= features_of_kind(kind_of(body)) | (body->leaf_count > 1 ? NB_HAS_GROUP : 0) |
-                    (nb_volume_covers(body) ? NB_HAS_COVER : 0) |
+                    (nb_volume_covers(body) ? NB_HAS_OVERRIDE : 0) |
                     (nb_volume_has_distances(body) ? NB_HAS_DISTANCES : 0);
         for (size_t k = 0; k < body->leaf_count; k++) features |= features_of_leaf(&body->leaves[k]);
     }

@@ -6,15 +6,15 @@ int nb_medium_at(int i, bool listed)
 #ifdef NEBEL_TILE_ENTRY
     int index = i;
     if (listed) index = NEBEL_TILE_ENTRY(i);
-    return NB_HEADER_WORDS + NB_MEDIUM_WORDS * index;
+    return NB_HEADER_TEXELS + NB_MEDIUM_TEXELS * index;
 #else
-    return NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
+    return NB_HEADER_TEXELS + NB_MEDIUM_TEXELS * i;
 #endif
 }
 
 bool nb_is_covered(int medium, int floor)
 {
-    return NB_HAS(NB_HAS_COVER) && int(NEBEL_FOG_TEXEL(medium + 1).w) / NB_LIGHT_RANK < floor;
+    return NB_HAS(NB_HAS_OVERRIDE) && int(NEBEL_FOG_TEXEL(medium + 1).w) / NB_LIGHT_RANK < floor;
 }
 
 /* Stretches that the walk keeps at hand, the next ones of their media: enter, leave, the medium's word. The mask keeps drivers from

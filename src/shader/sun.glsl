@@ -80,7 +80,7 @@ void nb_note_roots(inout nb_turning turning, float a, float b, float c, bool cur
 }
 
 /* The places p + t d, from which ways go along v; `p` counts from the ball's centre. */
-void nb_note_ball(inout nb_turning turning, nb_vec3 p, nb_vec3 d, nb_vec3 v, float radius)
+void nb_note_sphere(inout nb_turning turning, nb_vec3 p, nb_vec3 d, nb_vec3 v, float radius)
 {
     nb_vec3 moment = cross(p, v);
     nb_vec3 rate = cross(d, v);
@@ -114,13 +114,13 @@ void nb_note_rim(inout nb_turning turning, nb_vec3 p, nb_vec3 d, nb_vec3 v, floa
 void nb_note_round(inout nb_turning turning, int leaf, int type, nb_vec3 p, nb_vec3 d, nb_vec3 v)
 {
     nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
-    if (NB_HAS(NB_HAS_BALL) && type == NB_TYPE_BALL) {
-        nb_note_ball(turning, p, d, v, head.y);
+    if (NB_HAS(NB_HAS_SPHERE) && type == NB_TYPE_SPHERE) {
+        nb_note_sphere(turning, p, d, v, head.y);
     } else if (NB_HAS(NB_HAS_CAPSULE) && type == NB_TYPE_CAPSULE) {
         nb_note_mantle(turning, p, d, v, 1.0, 0.0);
-        nb_note_ball(turning, p, d, v, 1.0);
-        nb_note_ball(turning, p - nb_vec3(0.0, 0.0, head.y), d, v, 1.0);
-    } else if (NB_HAS(NB_HAS_TUBE | NB_HAS_CONE)) {
+        nb_note_sphere(turning, p, d, v, 1.0);
+        nb_note_sphere(turning, p - nb_vec3(0.0, 0.0, head.y), d, v, 1.0);
+    } else if (NB_HAS(NB_HAS_CYLINDER | NB_HAS_CONE)) {
         float radius = type == NB_TYPE_CONE ? head.y : 1.0;
         float slope = type == NB_TYPE_CONE ? head.z : 0.0;
         nb_note_mantle(turning, p, d, v, radius, slope);
@@ -206,14 +206,14 @@ float nb_planes_takeover(nb_way_through way, int first, int count, nb_vec3 place
 }
 
 /* Of faces that the way does not pass between, those that take over are passed by. */
-#define NB_MOST_PASSED 6
+#define NB_MAX_PASSED 6
 
 void nb_note_faces(inout nb_turning turning, int leaf, bool box, nb_vec3 p, nb_vec3 d, nb_vec3 v)
 {
     nb_vec4 head = NEBEL_FOG_TEXEL(leaf);
     nb_vec3 inverse = nb_vec3(nb_rcp_bounded(v.x), nb_rcp_bounded(v.y), nb_rcp_bounded(v.z));
     float t = turning.t;
-    for (int i = 0; i < NB_MOST_PASSED; i++) {
+    for (int i = 0; i < NB_MAX_PASSED; i++) {
         nb_vec3 place = p + d * t;
         nb_way_through way;
         float next = NB_FAR;
@@ -231,7 +231,7 @@ void nb_note_faces(inout nb_turning turning, int leaf, bool box, nb_vec3 p, nb_v
         float zero = gap.y != 0.0 ? -gap.x / gap.y : NB_FAR;
         bool outside = gap.x <= 0.0 && next < zero;
         if (zero > 0.0) next = min(next, zero);
-        if (!outside || i + 1 == NB_MOST_PASSED) {
+        if (!outside || i + 1 == NB_MAX_PASSED) {
             nb_note_turn(turning, t + next, false);
             return;
         }
@@ -243,8 +243,8 @@ void nb_note_faces(inout nb_turning turning, int leaf, bool box, nb_vec3 p, nb_v
 void nb_note_leaf(inout nb_turning turning, int leaf, nb_ray ray, nb_vec3 sun)
 {
     int type = int(NEBEL_FOG_TEXEL(leaf).x);
-    bool turned = type >= NB_TYPE_TURNED;
-    if (turned) type -= NB_TYPE_TURNED;
+    bool turned = type >= NB_TYPE_ROTATED;
+    if (turned) type -= NB_TYPE_ROTATED;
     if (type == NB_TYPE_WORLD) return;
     bool flat_sided = NB_HAS(NB_HAS_PLANES | NB_HAS_BOX) && (type == NB_TYPE_PLANES || type == NB_TYPE_BOX);
     nb_ray way = ray;
@@ -267,17 +267,17 @@ nb_turning nb_find_turn(nb_ray ray, float t, float end)
     nb_vec3 sun = nb_to_sun();
     int count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_FOG_TEXEL(0).x) : 1;
     for (int i = 0; i < count; i++) {
-        int at = NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
+        int at = NB_HEADER_TEXELS + NB_MEDIUM_TEXELS * i;
         int leaves = int(NEBEL_FOG_TEXEL(at + 2).w);
         bool several = NB_HAS(NB_HAS_GROUP) && leaves > 1;
         int leaf = at + NB_MEDIUM_LEAF;
         if (several) leaf = int(NEBEL_FOG_TEXEL(leaf).w);
-        for (int k = 0; k < (several ? leaves : 1); k++) nb_note_leaf(turning, leaf + NB_LEAF_WORDS * k, ray, sun);
+        for (int k = 0; k < (several ? leaves : 1); k++) nb_note_leaf(turning, leaf + NB_LEAF_TEXELS * k, ray, sun);
         if (NB_HAS(NB_HAS_GAUSSIAN) && int(NEBEL_FOG_TEXEL(at).w) == NB_KIND_GAUSSIAN) {
             nb_vec4 word = NEBEL_FOG_TEXEL(at + 3);
             float sigma = 0.70710678118654752440 / word.w;
-            nb_note_ball(turning, ray.origin + word.xyz, ray.direction, sun, sigma);
-            nb_note_ball(turning, ray.origin + word.xyz, ray.direction, sun, 4.0 * sigma);
+            nb_note_sphere(turning, ray.origin + word.xyz, ray.direction, sun, sigma);
+            nb_note_sphere(turning, ray.origin + word.xyz, ray.direction, sun, 4.0 * sigma);
         }
     }
     return turning;
@@ -305,7 +305,7 @@ float nb_most_in_shadow(nb_ray ray, float t)
     way.from_eye = false;
     int count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_FOG_TEXEL(0).x) : 1;
     for (int i = 0; i < count; i++) {
-        int at = NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
+        int at = NB_HEADER_TEXELS + NB_MEDIUM_TEXELS * i;
         if (int(NEBEL_FOG_TEXEL(at).w) != NB_KIND_GRID) continue;
         nb_stretch s = nb_next_stretch(at, 1, way, 0.0);
         if (!(s.enter < s.leave)) continue;

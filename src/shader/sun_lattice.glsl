@@ -23,7 +23,7 @@ nb_vec3 nb_sun_lattice_axes(nb_vec3 v, int axis)
 float nb_float_of(uint bits) { return nb_from_bits(int(bits)); }
 
 /* Ways that lean less leave by no side. */
-#define NB_LEAST_LEAN 1e-6
+#define NB_MIN_LEAN 1e-6
 
 /* `from` and `slope` are in cells of the grid. */
 nb_sun_lattice_ray nb_sun_lattice_ray_of(int lattice, nb_vec3 from, nb_vec3 slope)
@@ -42,8 +42,8 @@ nb_sun_lattice_ray nb_sun_lattice_ray_of(int lattice, nb_vec3 from, nb_vec3 slop
     nb_vec2 sides = aside * per_cell - nb_vec2(nb_float_of(lean.z), nb_float_of(lean.w));
     nb_vec2 speed = drift * per_cell;
     float up = nb_float_of(end.w);
-    bool by_first = abs(leans.x) > NB_LEAST_LEAN;
-    bool by_second = abs(leans.y) > NB_LEAST_LEAN;
+    bool by_first = abs(leans.x) > NB_MIN_LEAN;
+    bool by_second = abs(leans.y) > NB_MIN_LEAN;
     nb_vec2 layers = nb_vec2(by_first ? per_layer * up / leans.x : 0.0, by_second ? per_layer * up / leans.y : 0.0);
     nb_sun_lattice_ray ray;
     ray.first = lattice + NB_SUN_LATTICE_TEXELS;
@@ -87,7 +87,7 @@ float nb_sun_lattice_amount(nb_sun_lattice_ray ray, float s)
 
 /* What a walk to the sun takes at first, in cells; then more and more. */
 #define NB_FIRST_CELLS 2.0
-#define NB_MOST_CELLS 16.0
+#define NB_MAX_CELLS 16.0
 
 /* Of the grid that a medium is, from where a ray to the sun enters its box to where it leaves, or something covers it: a walk to where
  * the lattice holds the rest, mostly none. */
@@ -98,7 +98,7 @@ float nb_amount_to_sun(int medium, nb_ray ray, nb_stretch s)
         nb_sun_lattice_ray_of(int(NEBEL_FOG_TEXEL(medium + NB_MEDIUM_LEAF).y), profile.offset, profile.slope);
     float length = s.leave - s.enter;
     float behind = 0.0;
-    if (NB_HAS(NB_HAS_COVER)) behind = nb_sun_lattice_amount(to_sun, length);
+    if (NB_HAS(NB_HAS_OVERRIDE)) behind = nb_sun_lattice_amount(to_sun, length);
     float rest = nb_sun_lattice_amount(to_sun, 0.0);
     float sum = 0.0;
     bool ends = false;
@@ -111,7 +111,7 @@ float nb_amount_to_sun(int medium, nb_ray ray, nb_stretch s)
             float h = min(step, length - t);
             sum += nb_grid_integral(profile.offset + profile.slope * t, profile.slope, profile.first, h, enough);
             t += max(h, length * NB_EPSILON);
-            step = min(2.0 * step, NB_MOST_CELLS * cell);
+            step = min(2.0 * step, NB_MAX_CELLS * cell);
             rest = nb_sun_lattice_amount(to_sun, t);
             ends = t >= length || sum >= enough;
         }

@@ -84,7 +84,7 @@ static double layers_wanted(const nebel_snapshot *snapshot, size_t medium, const
 static int is_within(const nebel_snapshot *snapshot, size_t medium, const double way[3], nb_sun_lattice_limit limit)
 {
     nb_sun_lattice lattice = {0};
-    nb_grid_lattice_lay(&lattice, grid_of(snapshot, medium), way, limit);
+    nb_sun_lattice_lay(&lattice, grid_of(snapshot, medium), way, limit);
     return lattice.per_cell >= limit.per_cell;
 }
 
@@ -114,7 +114,7 @@ static size_t texels_of(const nebel_snapshot *snapshot, size_t medium, size_t ro
     nb_sun_lattice lattice = {0};
     double way[3];
     nb_way_in_cells(snapshot, &snapshot->media[medium].body, way);
-    nb_grid_lattice_lay(&lattice, grid_of(snapshot, medium), way, limit_of(snapshot, medium, room));
+    nb_sun_lattice_lay(&lattice, grid_of(snapshot, medium), way, limit_of(snapshot, medium, room));
     return NB_SUN_LATTICE_TEXELS + cells_of(&lattice, 0) * cells_of(&lattice, 1) * cells_of(&lattice, 2);
 }
 
@@ -130,10 +130,10 @@ void nb_place_sun_lattices(const nebel_snapshot *snapshot, size_t room, size_t f
 {
     for (size_t i = 0; i < snapshot->medium_count && snapshot->is_sunlit; i++) {
         if (grid_of(snapshot, i) == NULL) continue;
-        nebel_texel_f32 *word = &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS + NB_MEDIUM_LEAF];
+        nebel_texel_f32 *word = &words[NB_HEADER_TEXELS + i * NB_MEDIUM_TEXELS + NB_MEDIUM_LEAF];
         const size_t before = first_of(snapshot, i);
         word->v[1] =
-            before < i ? words[NB_HEADER_WORDS + before * NB_MEDIUM_WORDS + NB_MEDIUM_LEAF].v[1] : (float)first;
+            before < i ? words[NB_HEADER_TEXELS + before * NB_MEDIUM_TEXELS + NB_MEDIUM_LEAF].v[1] : (float)first;
         if (before == i) first += texels_of(snapshot, i, room);
     }
 }
@@ -181,7 +181,7 @@ static nebel_result mark_flaws(const nebel_snapshot *snapshot, size_t medium, co
     const nb_lattice_demand demand = {extinction_of(snapshot, medium), PLACE_TOLERANCE};
     if (demand.extinction * l->step * UINT16_MAX < demand.tolerance) return NEBEL_OK; /* dims nothing */
     uint8_t *const flawed = nb_allocate(&snapshot->allocator, count, sizeof *flawed);
-    const int is_known = flawed != NULL && nb_grid_lattice_find_flaws(l, &demand, flawed);
+    const int is_known = flawed != NULL && nb_sun_lattice_find_flaws(l, &demand, flawed);
     for (size_t i = 0; is_known && i < count; i++)
         if (flawed[i]) texel[i] = flaw;
     nb_release(&snapshot->allocator, flawed);
@@ -210,14 +210,14 @@ nebel_result nb_pack_sun_lattices(const nebel_snapshot *snapshot, size_t room, n
         double way[3];
         nb_way_in_cells(snapshot, &snapshot->media[i].body, way);
         nb_sun_lattice *lattice =
-            nb_grid_lattice_make(grid_of(snapshot, i), &snapshot->allocator, way, limit_of(snapshot, i, room));
+            nb_sun_lattice_make(grid_of(snapshot, i), &snapshot->allocator, way, limit_of(snapshot, i, room));
         nebel_result result = lattice != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
         if (result == NEBEL_OK) {
             nebel_texel_u32 *const cells = texels + NB_SUN_LATTICE_TEXELS;
             texels = pack_lattice(lattice, texels);
             result = mark_flaws(snapshot, i, lattice, cells);
         }
-        nb_grid_lattice_release(lattice);
+        nb_sun_lattice_release(lattice);
         if (result != NEBEL_OK) return nb_fail(&snapshot->log, result, "pack: out of memory for light in voxels");
     }
     return NEBEL_OK;

@@ -99,7 +99,7 @@ nb_approach nb_approach_of(nb_vec3 p, nb_vec3 direction, float t_max, float radi
     return nb_approach_at(closest, dot(q, q), sqrt(square), t_max, radius);
 }
 
-float nb_ball_piece(nb_approach a, float radius, int power)
+float nb_sphere_piece(nb_approach a, float radius, int power)
 {
     float h = a.leave - a.enter;
     float k = a.speed / radius;
@@ -110,7 +110,7 @@ float nb_ball_piece(nb_approach a, float radius, int power)
 
 float nebel_sphere_path_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_vec3 center, float radius, int power)
 {
-    return nb_ball_piece(nb_approach_of(origin - center, direction, t_max, radius), radius, power);
+    return nb_sphere_piece(nb_approach_of(origin - center, direction, t_max, radius), radius, power);
 }
 
 float nb_gaussian_piece(nb_approach a, float sigma)

@@ -63,7 +63,7 @@ static size_t count_grids(const nebel_snapshot *snapshot)
 /* What grids leave for lattices. */
 static size_t room_beside(size_t grids)
 {
-    return grids < NB_MOST_TEXELS ? NB_MOST_TEXELS - grids : 0;
+    return grids < NB_MAX_TEXELS ? NB_MAX_TEXELS - grids : 0;
 }
 
 static size_t count_all(const nebel_snapshot *snapshot)
@@ -75,11 +75,11 @@ static size_t count_all(const nebel_snapshot *snapshot)
 nebel_result nb_check_voxels(const nebel_snapshot *snapshot)
 {
     const size_t count = count_all(snapshot);
-    if (count <= NB_MOST_TEXELS) return NEBEL_OK;
+    if (count <= NB_MAX_TEXELS) return NEBEL_OK;
     return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
                    "pack: the grids are too large for shaders: where they are not even they take %zu texels, of which "
                    "%zu can be addressed; use fewer voxels, or nebel_trace or the CPU's renderer (--device cpu)",
-                   count, NB_MOST_TEXELS);
+                   count, NB_MAX_TEXELS);
 }
 
 void nb_place_voxels(const nebel_snapshot *snapshot, nebel_texel_f32 *words)
@@ -88,9 +88,9 @@ void nb_place_voxels(const nebel_snapshot *snapshot, nebel_texel_f32 *words)
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nebel_grid *grid = grid_of(snapshot, i);
         if (grid == NULL) continue;
-        nebel_texel_f32 *word = &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS + 3];
+        nebel_texel_f32 *word = &words[NB_HEADER_TEXELS + i * NB_MEDIUM_TEXELS + 3];
         const size_t first = first_of(snapshot, i);
-        word->v[3] = first < i ? words[NB_HEADER_WORDS + first * NB_MEDIUM_WORDS + 3].v[3] : (float)next;
+        word->v[3] = first < i ? words[NB_HEADER_TEXELS + first * NB_MEDIUM_TEXELS + 3].v[3] : (float)next;
         if (first == i) next += count_texels(grid);
     }
     nb_place_sun_lattices(snapshot, room_beside(next), next, words);

@@ -5,7 +5,7 @@
 #include <nebel/shader.h>
 
 /* How many texels can be addressed: indices are exact floats. */
-#define NB_MOST_TEXELS ((size_t)1 << 24)
+#define NB_MAX_TEXELS ((size_t)1 << 24)
 
 /* LIMIT, with a message, where the texels are more than can be addressed. */
 nebel_result nb_check_voxels(const nebel_snapshot *snapshot);

@@ -118,7 +118,7 @@ void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed,
             if (over_full) continue;
             next = window.rest;
             piece.end = min(piece.end, window.end);
-            if (NB_HAS(NB_HAS_COVER) && !on_leg) piece = nb_cover_piece(piece, window.used);
+            if (NB_HAS(NB_HAS_OVERRIDE) && !on_leg) piece = nb_cover_piece(piece, window.used);
             for (int k = 0; k < window.used; k++) {
                 if (!on_leg)
                     piece = nb_note_slot(piece, k, ray, lit && !crowd && nb_is_day());
@@ -169,7 +169,7 @@ struct nb_progress {
 };
 
 #define NB_STAGE_WALK 0
-#define NB_STAGE_LAMPS 1
+#define NB_STAGE_LIGHTS 1
 #define NB_STAGE_DIFFUSION 2
 #define NB_STAGE_DONE 3
 
@@ -214,10 +214,10 @@ nebel_transfer nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media,
     nebel_transfer transfer;
     transfer.transmittance = attenuation.left;
     transfer.in_scattering = sum.light * attenuation.mean;
-    bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
+    bool covers = NB_HAS(NB_HAS_OVERRIDE) && sum.met && sum.covers;
     bool mixed = (NB_HAS(NB_HAS_MIXED) && sum.mixed) || (NB_HAS(NB_HAS_SUN) && sum.scatters);
     bool walks = lit && (covers || mixed);
-#if NB_DECLARES(NB_HAS_COVER)
+#if NB_DECLARES(NB_HAS_OVERRIDE)
     if (covers && (!lit || (NB_MAY_TIRE && last))) {
         nb_vec3 depth = nb_depth_of(ray, media, turns);
         sum.light *= depth / max(sum.depth, nb_splat3(NB_TINY)); /* what is not walked is as bright as all together */
@@ -225,7 +225,7 @@ nebel_transfer nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media,
         transfer.transmittance = nb_exp3(-depth);
     }
 #endif
-#if NB_DECLARES(NB_HAS_COVER | NB_HAS_MIXED | NB_HAS_SUN)
+#if NB_DECLARES(NB_HAS_OVERRIDE | NB_HAS_MIXED | NB_HAS_SUN)
     if (walks && p.stage == NB_STAGE_WALK && !(NB_RESUMES && last)) nb_walk(p.walked, ray, first, count, listed, lit, turns);
     if (walks && p.stage == NB_STAGE_WALK && NB_MAY_TIRE && last && (NB_RESUMES || p.walked.is_cut)) {
         /* WebGL 2 knows no conditional operator between structures */
@@ -238,15 +238,15 @@ nebel_transfer nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media,
 #endif
     if (walks) transfer.in_scattering = p.walked.radiance;
     if (walks && covers) transfer.transmittance = nb_exp3(-p.walked.depth);
-    if (p.stage == NB_STAGE_WALK && !(NB_MAY_TIRE && p.walked.is_cut)) p.stage = NB_STAGE_LAMPS;
-    if (NB_HAS(NB_HAS_LAMPS) && lit && sum.scatters) {
+    if (p.stage == NB_STAGE_WALK && !(NB_MAY_TIRE && p.walked.is_cut)) p.stage = NB_STAGE_LIGHTS;
+    if (NB_HAS(NB_HAS_LIGHTS) && lit && sum.scatters) {
         int lamp_turns = NB_RESUMES ? turns : before;
-        if (p.stage == NB_STAGE_LAMPS && nb_is_fresh(turns) && nb_has_loops(count)) nb_lamplight(p.lamps, ray, first, count, listed, lamp_turns);
+        if (p.stage == NB_STAGE_LIGHTS && nb_is_fresh(turns) && nb_has_loops(count)) nb_surface_lights(p.lamps, ray, first, count, listed, lamp_turns);
         turns = NB_RESUMES ? lamp_turns : turns + lamp_turns - before;
         transfer.in_scattering += p.lamps.light;
         bool is_lit = !(p.lamps.reached < ray.t_max && nb_smallest(p.lamps.before) < NB_OPAQUE);
-        if (p.stage == NB_STAGE_LAMPS && (last || is_lit)) p.stage = NB_STAGE_DIFFUSION;
-    } else if (p.stage == NB_STAGE_LAMPS) {
+        if (p.stage == NB_STAGE_LIGHTS && (last || is_lit)) p.stage = NB_STAGE_DIFFUSION;
+    } else if (p.stage == NB_STAGE_LIGHTS) {
         p.stage = NB_STAGE_DIFFUSION;
     }
     if (p.stage == NB_STAGE_DIFFUSION && (last || nb_is_fresh(turns))) {

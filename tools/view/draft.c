@@ -83,10 +83,10 @@ static int moves_on(const nb_document *draft)
     return result;
 }
 
-void nb_draft_show(nb_document *draft)
+void nb_document_show(nb_document *draft)
 {
     nebel_scene_data *const data = &draft->data;
-    nb_edition_show(&draft->now, data);
+    nb_document_state_show(&draft->now, data);
     data->planets = find_light(draft)->planets;
     data->has_endless_motion = moves_on(draft);
     if (!data->has_sun) return;
@@ -100,7 +100,7 @@ static nebel_result find_fog_light(const nb_document *draft, const nb_document_s
                                    nebel_environment *ambient)
 {
     nebel_environment sky;
-    *ambient = nb_edition_environment(edition, find_light(draft)->environment.map);
+    *ambient = nb_document_state_environment(edition, find_light(draft)->environment.map);
     const nebel_result result = nebel_find_scene_light(draft->scene, draft->frame, sun, &sky);
     if (result == NEBEL_OK && ambient->type == NEBEL_ENVIRONMENT_MAP && find_light(draft)->environment_path == NULL)
         ambient->intensity = sky.intensity;
@@ -212,7 +212,7 @@ static nebel_result fill_fog(nb_document *draft, const nb_document_state *editio
 static int has_changed(const nb_document *draft, const nebel_volume_desc *was, const nebel_volume_desc *now)
 {
     const int may_move = draft->data.has_endless_motion && now->density.type == NEBEL_DENSITY_GRID;
-    return !nb_edition_is_same_volume(now, was) || (may_move && draft->frame != draft->fog_frame);
+    return !nb_document_state_is_same_volume(now, was) || (may_move && draft->frame != draft->fog_frame);
 }
 
 /* Only numbers of the edition are not as they were. */
@@ -328,7 +328,7 @@ static nebel_result add_all(const nb_document *draft, nebel_fog *fog)
     return result;
 }
 
-nebel_result nb_draft_whole(nb_document *draft, nebel_snapshot **whole)
+nebel_result nb_document_whole(nb_document *draft, nebel_snapshot **whole)
 {
     nebel_fog *fog = NULL;
     nebel_result result = NEBEL_OK;
@@ -348,7 +348,7 @@ nebel_result nb_draft_whole(nb_document *draft, nebel_snapshot **whole)
  * ------------------------------------------------------------------------------------------------------
  */
 
-nebel_volume_origin nb_draft_origin(const nb_document *draft, size_t volume)
+nebel_volume_origin nb_document_origin(const nb_document *draft, size_t volume)
 {
     const size_t source = draft->now.sources[volume];
     if (draft->now.entries[volume].key_count > 0) return NEBEL_VOLUME_ANIMATED;
@@ -360,7 +360,7 @@ nebel_volume_origin nb_draft_origin(const nb_document *draft, size_t volume)
 /* Whether the file could hold its changes. */
 static int is_saved(const nb_document *draft, size_t volume)
 {
-    const nebel_volume_origin origin = nb_draft_origin(draft, volume);
+    const nebel_volume_origin origin = nb_document_origin(draft, volume);
     return origin == NEBEL_VOLUME_STATIC || origin == NEBEL_VOLUME_ANIMATED;
 }
 
@@ -375,7 +375,7 @@ static int widen(double range[2], int has_range, double first, double last)
     return 1;
 }
 
-int nb_draft_find_frames(const nb_document *draft, double range[2])
+int nb_document_find_frames(const nb_document *draft, double range[2])
 {
     const nebel_scene_data *const data = &draft->data;
     const size_t suns = data->sun_key_count;
@@ -408,11 +408,11 @@ static void place_camera(nb_document *draft)
 static nebel_result make_editions(nb_document *draft)
 {
     const nebel_scene_data *const scene = nebel_get_scene_data(draft->scene);
-    if (nb_edition_make(scene, &draft->written) != 0 || nb_edition_make(scene, &draft->now) != 0)
+    if (nb_document_state_make(scene, &draft->written) != 0 || nb_document_state_make(scene, &draft->now) != 0)
         return fail_memory(draft);
     place_volumes(draft);
     place_camera(draft);
-    return nb_edition_copy(&draft->now, &draft->good) == 0 ? NEBEL_OK : fail_memory(draft);
+    return nb_document_state_copy(&draft->now, &draft->good) == 0 ? NEBEL_OK : fail_memory(draft);
 }
 
 /* A window reads its scene again and saves it: what is no file would wait for a writer. */
@@ -427,7 +427,7 @@ static nebel_result load(const char *path, const nebel_scene_desc *desc, nebel_s
     return NEBEL_ERROR_FILE;
 }
 
-nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log, nb_document *draft)
+nebel_result nb_document_open(const char *path, double frame, const nebel_log *log, nb_document *draft)
 {
     const nebel_scene_desc desc = {
         .log = *log, .run = nebel_parallel_for_openmp, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
@@ -441,15 +441,15 @@ nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log,
         result = make_editions(draft);
     }
     if (result == NEBEL_OK) result = light_scene(draft, &draft->good);
-    if (result == NEBEL_OK) nb_draft_show(draft);
+    if (result == NEBEL_OK) nb_document_show(draft);
     if (result == NEBEL_OK) result = make_cells(draft, &draft->good);
     if (result == NEBEL_OK) result = fill_fog(draft, &draft->good);
     if (result == NEBEL_OK) result = strew(draft, &draft->good);
-    if (result != NEBEL_OK) nb_draft_close(draft);
+    if (result != NEBEL_OK) nb_document_close(draft);
     return result;
 }
 
-void nb_draft_close(nb_document *draft)
+void nb_document_close(nb_document *draft)
 {
     nebel_release_snapshot(draft->volumes);
     nebel_release_snapshot(draft->whole);
@@ -458,9 +458,9 @@ void nb_draft_close(nb_document *draft)
     free(draft->ids);
     free(draft->particles);
     nb_history_forget(&draft->history);
-    nb_edition_free(&draft->now);
-    nb_edition_free(&draft->good);
-    nb_edition_free(&draft->written);
+    nb_document_state_free(&draft->now);
+    nb_document_state_free(&draft->good);
+    nb_document_state_free(&draft->written);
     if (draft->file != draft->scene) nebel_destroy_scene(draft->file);
     nebel_destroy_scene(draft->scene);
     *draft = (nb_document){.scene = NULL};
@@ -484,25 +484,25 @@ static nebel_result apply(nb_document *draft)
 {
     const nb_document_state *const now = &draft->now, *const was = &draft->good;
     nebel_result result = light_scene(draft, now);
-    if (result == NEBEL_OK && !nb_edition_has_same_planets(now, was)) result = make_planets(draft, now);
-    if (result == NEBEL_OK && !nb_edition_has_same_nebulae(now, was)) result = strew(draft, now);
-    const int has_other_cells = !nb_edition_has_same_cells(now, was);
+    if (result == NEBEL_OK && !nb_document_state_has_same_planets(now, was)) result = make_planets(draft, now);
+    if (result == NEBEL_OK && !nb_document_state_has_same_nebulae(now, was)) result = strew(draft, now);
+    const int has_other_cells = !nb_document_state_has_same_cells(now, was);
     if (result == NEBEL_OK && has_other_cells) result = make_cells(draft, now);
     if (result != NEBEL_OK) return result;
-    return nb_edition_has_same_sources(now, was) && !has_other_cells ? change_fog(draft, was, now)
-                                                                     : fill_fog(draft, now);
+    return nb_document_state_has_same_sources(now, was) && !has_other_cells ? change_fog(draft, was, now)
+                                                                            : fill_fog(draft, now);
 }
 
 /* The same the other way, from whatever has been reached. */
 static void revert(nb_document *draft)
 {
     nb_document_state back;
-    if (nb_edition_copy(&draft->good, &back) != 0) return;
-    if (draft->planets_are_new && !nb_edition_has_same_planets(&draft->now, &draft->good))
+    if (nb_document_state_copy(&draft->good, &back) != 0) return;
+    if (draft->planets_are_new && !nb_document_state_has_same_planets(&draft->now, &draft->good))
         (void)make_planets(draft, &draft->good);
-    if (!nb_edition_has_same_cells(&draft->now, &draft->good)) (void)make_cells(draft, &draft->good);
-    if (!nb_edition_has_same_nebulae(&draft->now, &draft->good)) (void)strew(draft, &draft->good);
-    nb_edition_free(&draft->now);
+    if (!nb_document_state_has_same_cells(&draft->now, &draft->good)) (void)make_cells(draft, &draft->good);
+    if (!nb_document_state_has_same_nebulae(&draft->now, &draft->good)) (void)strew(draft, &draft->good);
+    nb_document_state_free(&draft->now);
     draft->now = back;
     (void)light_scene(draft, &draft->good);
     (void)fill_fog(draft, &draft->good);
@@ -513,20 +513,20 @@ static nebel_result settle(nb_document *draft, int is_step)
 {
     nb_document_state fresh;
     nebel_result result = apply(draft);
-    if (result == NEBEL_OK && nb_edition_copy(&draft->now, &fresh) != 0) result = fail_memory(draft);
+    if (result == NEBEL_OK && nb_document_state_copy(&draft->now, &fresh) != 0) result = fail_memory(draft);
     if (result != NEBEL_OK) {
         revert(draft);
     } else {
         if (is_step) nb_history_note(&draft->history, &draft->good);
-        if (!nb_edition_has_same_models(&draft->now, &draft->good)) draft->models_are_stale = 1;
-        nb_edition_free(&draft->good);
+        if (!nb_document_state_has_same_models(&draft->now, &draft->good)) draft->models_are_stale = 1;
+        nb_document_state_free(&draft->good);
         draft->good = fresh;
     }
-    nb_draft_show(draft);
+    nb_document_show(draft);
     return result;
 }
 
-nebel_result nb_draft_place_models(nb_document *draft)
+nebel_result nb_document_place_models(nb_document *draft)
 {
     const nebel_result result = nebel_reload_scene_models(draft->scene, draft->good.models, draft->good.model_count);
     const nebel_scene_data *const scene = nebel_get_scene_data(draft->scene);
@@ -538,14 +538,14 @@ nebel_result nb_draft_place_models(nb_document *draft)
     return result;
 }
 
-nebel_result nb_draft_commit(nb_document *draft)
+nebel_result nb_document_commit(nb_document *draft)
 {
     if (nb_keys_store(&draft->now, &draft->good, draft->frame) != 0) return fail_memory(draft);
     nb_keys_place(&draft->now, draft->frame);
-    return nb_edition_is_same(&draft->now, &draft->good) ? NEBEL_OK : settle(draft, 1);
+    return nb_document_state_is_same(&draft->now, &draft->good) ? NEBEL_OK : settle(draft, 1);
 }
 
-nebel_result nb_draft_set_frame(nb_document *draft, double frame)
+nebel_result nb_document_set_frame(nb_document *draft, double frame)
 {
     draft->frame = frame;
     place_volumes(draft);
@@ -553,7 +553,7 @@ nebel_result nb_draft_set_frame(nb_document *draft, double frame)
     return settle(draft, 0);
 }
 
-int nb_draft_undo(nb_document *draft, nebel_result *result)
+int nb_document_undo(nb_document *draft, nebel_result *result)
 {
     if (!nb_history_undo(&draft->history, &draft->now)) return 0;
     place_volumes(draft);
@@ -561,7 +561,7 @@ int nb_draft_undo(nb_document *draft, nebel_result *result)
     return 1;
 }
 
-int nb_draft_redo(nb_document *draft, nebel_result *result)
+int nb_document_redo(nb_document *draft, nebel_result *result)
 {
     if (!nb_history_redo(&draft->history, &draft->now)) return 0;
     place_volumes(draft);
@@ -573,33 +573,35 @@ int nb_draft_redo(nb_document *draft, nebel_result *result)
  * --------------------------------------------------------------------------------------------------------
  */
 
-int nb_draft_is_changed(const nb_document *draft)
+int nb_document_is_changed(const nb_document *draft)
 {
     const nb_document_state *const now = &draft->now, *const was = &draft->written;
-    if (!nb_edition_has_same_sources(now, was) || !nb_edition_has_same_nebulae(now, was) ||
-        !nb_edition_has_same_cells(now, was) || !nb_edition_has_same_models(now, was) ||
-        !nb_edition_has_same_lamps(now, was) || !nb_edition_has_same_light(now, was) ||
-        !nb_edition_has_same_planets(now, was) || !nb_edition_has_same_camera_keys(now, was))
+    if (!nb_document_state_has_same_sources(now, was) || !nb_document_state_has_same_nebulae(now, was) ||
+        !nb_document_state_has_same_cells(now, was) || !nb_document_state_has_same_models(now, was) ||
+        !nb_document_state_has_same_lights(now, was) || !nb_document_state_has_same_light(now, was) ||
+        !nb_document_state_has_same_planets(now, was) || !nb_document_state_has_same_camera_keys(now, was))
         return 1;
     for (size_t i = 0; i < now->count; i++) {
         if (!is_saved(draft, i)) continue;
-        if (!nb_edition_is_same_volume(&now->volumes[i], &was->volumes[i]) ||
-            !nb_edition_is_same_entry(&now->entries[i], &was->entries[i]) || strcmp(now->names[i], was->names[i]) != 0)
+        if (!nb_document_state_is_same_volume(&now->volumes[i], &was->volumes[i]) ||
+            !nb_document_state_is_same_entry(&now->entries[i], &was->entries[i]) ||
+            strcmp(now->names[i], was->names[i]) != 0)
             return 1;
     }
     return 0;
 }
 
-int nb_draft_must_be_read(const nb_document *draft)
+int nb_document_must_be_read(const nb_document *draft)
 {
     const nebel_scene_data *const scene = nebel_get_scene_data(draft->scene);
     const nb_document_state *const now = &draft->now;
     int brings_fog = 0;
     for (size_t i = 0; i < now->model_count; i++) brings_fog |= scene->models[now->models[i].model_index].has_fog;
-    return now->model_count != scene->model_count || (brings_fog && !nb_edition_has_same_models(now, &draft->written));
+    return now->model_count != scene->model_count ||
+           (brings_fog && !nb_document_state_has_same_models(now, &draft->written));
 }
 
-int nb_draft_can_save_camera(const nb_document *draft)
+int nb_document_can_save_camera(const nb_document *draft)
 {
     return draft->now.camera_key_count == 0 && draft->data.turntable_frames == 0;
 }
@@ -651,10 +653,10 @@ static void exchange(nebel_volume_desc *a, nebel_volume_desc *b)
 static nebel_result use_written(nb_document *draft, int has_moved)
 {
     nb_document_state now;
-    if (nb_edition_copy(&draft->written, &now) != 0) return fail_memory(draft);
+    if (nb_document_state_copy(&draft->written, &now) != 0) return fail_memory(draft);
     for (size_t i = 0; i < now.count && !has_moved; i++)
         if (!is_saved(draft, i)) exchange(&now.volumes[i], &draft->now.volumes[i]);
-    nb_edition_free(&draft->now);
+    nb_document_state_free(&draft->now);
     draft->now = now;
     if (has_moved) nb_history_forget(&draft->history);
     place_volumes(draft);
@@ -665,25 +667,26 @@ static nebel_result use_written(nb_document *draft, int has_moved)
 static nebel_result read_back(nb_document *draft, const char *path)
 {
     const nebel_scene_desc desc = {.log = draft->log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
-    const int has_moved = !nb_edition_has_same_sources(&draft->now, &draft->written);
+    const int has_moved = !nb_document_state_has_same_sources(&draft->now, &draft->written);
     nebel_scene *fresh = NULL;
     nb_document_state written;
     nebel_result result = load(path, &desc, &fresh);
     if (result == NEBEL_OK) result = nebel_load_scene_planets(fresh);
-    if (result == NEBEL_OK && nb_edition_make(nebel_get_scene_data(fresh), &written) != 0) result = fail_memory(draft);
+    if (result == NEBEL_OK && nb_document_state_make(nebel_get_scene_data(fresh), &written) != 0)
+        result = fail_memory(draft);
     if (result != NEBEL_OK) {
         nebel_destroy_scene(fresh);
         return result;
     }
     adopt_arrays(draft, &written);
     if (draft->file != draft->scene) nebel_destroy_scene(draft->file);
-    nb_edition_free(&draft->written);
+    nb_document_state_free(&draft->written);
     draft->file = fresh;
     draft->written = written;
     return use_written(draft, has_moved);
 }
 
-nebel_result nb_draft_try_file(const char *path, const nebel_log *log)
+nebel_result nb_document_try_file(const char *path, const nebel_log *log)
 {
     nebel_scene *scene = NULL;
     const nebel_scene_desc desc = {.log = *log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
@@ -692,7 +695,7 @@ nebel_result nb_draft_try_file(const char *path, const nebel_log *log)
     return result;
 }
 
-nebel_result nb_draft_save(nb_document *draft, const char *path, int with_camera)
+nebel_result nb_document_save(nb_document *draft, const char *path, int with_camera)
 {
     const nebel_scene_desc desc = {.log = draft->log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
     nebel_scene_data before = *nebel_get_scene_data(draft->file);
@@ -702,8 +705,8 @@ nebel_result nb_draft_save(nb_document *draft, const char *path, int with_camera
     memcpy(before.sun_direction, draft->written.sun_direction, sizeof before.sun_direction);
     memcpy(before.sun_irradiance, draft->written.sun_irradiance, sizeof before.sun_irradiance);
     nebel_scene_data changed = before;
-    nb_edition_show(&draft->now, &changed);
-    if (with_camera && nb_draft_can_save_camera(draft)) changed.camera = nb_navigate_round(draft->data.camera);
+    nb_document_state_show(&draft->now, &changed);
+    if (with_camera && nb_document_can_save_camera(draft)) changed.camera = nb_navigate_round(draft->data.camera);
     if (changed.camera_key_count > 0) changed.camera.projection = changed.camera_keys->camera.projection;
     nb_interrupt_hold();
     const nebel_result result = nebel_save_scene(path, &desc, &before, &changed, draft->now.sources);

@@ -29,53 +29,53 @@ typedef struct nb_document {
 
 /* Loads the scene with its models, in place of nothing. The log must outlive the draft. On an error nothing is to be
  * closed. */
-nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log, nb_document *draft);
+nebel_result nb_document_open(const char *path, double frame, const nebel_log *log, nb_document *draft);
 
 /* Fine with zeros. */
-void nb_draft_close(nb_document *draft);
+void nb_document_close(nb_document *draft);
 
 /* Points `data` to the draft, which has been copied, and has the sun there as it is at the frame. */
-void nb_draft_show(nb_document *draft);
+void nb_document_show(nb_document *draft);
 
 /* Puts `now` into new snapshots. If it is not valid, all of it is what it was before, and the log says why. Where there is a planet
  * nobody may render `data` meanwhile, here and in what follows: its sky is made anew, where the sun has changed, and its air,
  * where planets have. */
-nebel_result nb_draft_commit(nb_document *draft);
+nebel_result nb_document_commit(nb_document *draft);
 
 /* All fog with its particles, as volumes. The snapshot is the draft's, until the next change. */
-nebel_result nb_draft_whole(nb_document *draft, nebel_snapshot **whole);
+nebel_result nb_document_whole(nb_document *draft, nebel_snapshot **whole);
 
 /* Loads the models of `good` anew. Nobody may use the meshes of `data` meanwhile: they are others then, unless that
  * fails. */
-nebel_result nb_draft_place_models(nb_document *draft);
+nebel_result nb_document_place_models(nb_document *draft);
 
 /* Goes to another frame: everything that moves. Volumes that stand still keep their changes. */
-nebel_result nb_draft_set_frame(nb_document *draft, double frame);
+nebel_result nb_document_set_frame(nb_document *draft, double frame);
 
 /* A step back or forth; 0: there is none. */
-int nb_draft_undo(nb_document *draft, nebel_result *result);
-int nb_draft_redo(nb_document *draft, nebel_result *result);
+int nb_document_undo(nb_document *draft, nebel_result *result);
+int nb_document_redo(nb_document *draft, nebel_result *result);
 
 /* Whether anything that the file could hold is not as the file says; the camera does not count. */
-int nb_draft_is_changed(const nb_document *draft);
+int nb_document_is_changed(const nb_document *draft);
 
 /* What the volume of `now` comes from; those that are new will stand in the file. */
-nebel_volume_origin nb_draft_origin(const nb_document *draft, size_t volume);
+nebel_volume_origin nb_document_origin(const nb_document *draft, size_t volume);
 
 /* The first and the last frame at which anything moves; 0: nothing does. */
-int nb_draft_find_frames(const nb_document *draft, double range[2]);
+int nb_document_find_frames(const nb_document *draft, double range[2]);
 
 /* Whether what was saved cannot be shown without the scene being read anew: models that have gone, or have taken fog
  * with them. */
-int nb_draft_must_be_read(const nb_document *draft);
+int nb_document_must_be_read(const nb_document *draft);
 
 /* Whether the camera is one that the file could hold. */
-int nb_draft_can_save_camera(const nb_document *draft);
+int nb_document_can_save_camera(const nb_document *draft);
 
 /* Reads a scene file and drops it again: whether it is good. The log says why it is not. */
-nebel_result nb_draft_try_file(const char *path, const nebel_log *log);
+nebel_result nb_document_try_file(const char *path, const nebel_log *log);
 
 /* Writes what has changed into the file. On an error the file is as it was, and the log has said why. */
-nebel_result nb_draft_save(nb_document *draft, const char *path, int with_camera);
+nebel_result nb_document_save(nb_document *draft, const char *path, int with_camera);
 
 #endif

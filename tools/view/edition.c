@@ -49,7 +49,7 @@ static int make_room(nb_document_state *edition)
  * ---------------------------------------------------------------------------------------------------------
  */
 
-nebel_volume_track nb_edition_plain_entry(void)
+nebel_volume_track nb_document_state_plain_entry(void)
 {
     return (nebel_volume_track){.contrast = 0.05};
 }
@@ -66,7 +66,7 @@ static void free_entry(nebel_volume_track *entry)
 {
     free((void *)entry->keys);
     free((void *)entry->base);
-    *entry = nb_edition_plain_entry();
+    *entry = nb_document_state_plain_entry();
 }
 
 static int own_entry(nebel_volume_track *entry)
@@ -114,13 +114,13 @@ static int add(nb_document_state *edition, const nebel_volume_desc *volume, cons
     return 0;
 }
 
-int nb_edition_add(nb_document_state *edition, const nebel_volume_desc *volume, const nebel_volume_track *entry,
-                   const char *name)
+int nb_document_state_add(nb_document_state *edition, const nebel_volume_desc *volume, const nebel_volume_track *entry,
+                          const char *name)
 {
     return add(edition, volume, entry, name, NEBEL_NEW_VOLUME);
 }
 
-int nb_edition_rename(nb_document_state *edition, size_t index, const char *name)
+int nb_document_state_rename(nb_document_state *edition, size_t index, const char *name)
 {
     char *const own = copy_text(name);
     if (own == NULL) return -1;
@@ -129,7 +129,7 @@ int nb_edition_rename(nb_document_state *edition, size_t index, const char *name
     return 0;
 }
 
-void nb_edition_remove(nb_document_state *edition, size_t index)
+void nb_document_state_remove(nb_document_state *edition, size_t index)
 {
     const size_t behind = --edition->count - index;
     nb_shape_free(&edition->volumes[index].shape);
@@ -170,7 +170,7 @@ static int add_nebulae(nb_document_state *edition, const nebel_nebula_desc *nebu
     return edition->nebulae != NULL && edition->nebula_places != NULL ? 0 : -1;
 }
 
-int nb_edition_set_colors(nebel_nebula_desc *nebula, size_t count)
+int nb_document_state_set_colors(nebel_nebula_desc *nebula, size_t count)
 {
     double(*const colors)[3] = malloc((count + 1) * sizeof *colors);
     if (colors == NULL) return -1;
@@ -236,7 +236,7 @@ static int add_cells(nb_document_state *edition, const nebel_cells_desc *desc)
 /* What a section has that is added: fog that one sees. */
 static const nebel_factor_desc plain_classic = {.end = 100, .density = 0.03, .color = {0.5, 0.5, 0.5}};
 
-int nb_edition_make(const nebel_scene_data *scene, nb_document_state *edition)
+int nb_document_state_make(const nebel_scene_data *scene, nb_document_state *edition)
 {
     nb_document_state made = {.max_opacity = scene->max_opacity,
                               .has_sun = scene->has_sun,
@@ -257,12 +257,12 @@ int nb_edition_make(const nebel_scene_data *scene, nb_document_state *edition)
     if (result == 0) result = add_cells(&made, scene->cells);
     for (size_t i = 0; i < scene->volume_count && result == 0; i++)
         result = add(&made, &scene->volumes[i], &scene->volume_tracks[i], scene->volume_names[i], i);
-    if (result != 0) nb_edition_free(&made);
+    if (result != 0) nb_document_state_free(&made);
     *edition = made;
     return result;
 }
 
-int nb_edition_copy(const nb_document_state *from, nb_document_state *to)
+int nb_document_state_copy(const nb_document_state *from, nb_document_state *to)
 {
     nb_document_state made = *from;
     made.volumes = NULL;
@@ -287,12 +287,12 @@ int nb_edition_copy(const nb_document_state *from, nb_document_state *to)
     if (result == 0 && from->cells != NULL) result = add_cells(&made, &from->cells_desc);
     for (size_t i = 0; i < from->count && result == 0; i++)
         result = add(&made, &from->volumes[i], &from->entries[i], from->names[i], from->sources[i]);
-    if (result != 0) nb_edition_free(&made);
+    if (result != 0) nb_document_state_free(&made);
     *to = made;
     return result;
 }
 
-void nb_edition_free(nb_document_state *edition)
+void nb_document_state_free(nb_document_state *edition)
 {
     for (size_t i = 0; i < edition->count; i++) {
         nb_shape_free(&edition->volumes[i].shape);
@@ -334,7 +334,7 @@ static void lend_pieces(nb_document_state *edition)
     }
 }
 
-void nb_edition_show(nb_document_state *edition, nebel_scene_data *scene)
+void nb_document_state_show(nb_document_state *edition, nebel_scene_data *scene)
 {
     lend_pieces(edition);
     scene->volumes = edition->volumes;
@@ -357,13 +357,13 @@ void nb_edition_show(nb_document_state *edition, nebel_scene_data *scene)
     scene->max_opacity = edition->max_opacity;
     memcpy(scene->background, edition->background, sizeof scene->background);
     memcpy(scene->ambient, edition->ambient, sizeof scene->ambient);
-    scene->environment = nb_edition_environment(edition, scene->environment.map);
+    scene->environment = nb_document_state_environment(edition, scene->environment.map);
     scene->shows_ambient = edition->shows_ambient;
     memcpy(scene->sun_direction, edition->sun_direction, sizeof scene->sun_direction);
     memcpy(scene->sun_irradiance, edition->sun_irradiance, sizeof scene->sun_irradiance);
 }
 
-size_t nb_edition_size(const nb_document_state *edition)
+size_t nb_document_state_size(const nb_document_state *edition)
 {
     size_t size = sizeof *edition;
     for (size_t i = 0; i < edition->count; i++)
@@ -408,7 +408,7 @@ static int is_same_phase(const nebel_phase *a, const nebel_phase *b)
     return a->type == b->type && a->g == b->g && a->alpha == b->alpha && a->diameter == b->diameter;
 }
 
-int nb_edition_is_same_volume(const nebel_volume_desc *a, const nebel_volume_desc *b)
+int nb_document_state_is_same_volume(const nebel_volume_desc *a, const nebel_volume_desc *b)
 {
     return a->operation == b->operation && a->priority == b->priority && nb_shape_is_same(&a->shape, &b->shape) &&
            is_same_density(&a->density, &b->density) && HAS_SAME(a, b, nebel_volume_desc, extinction, phase) &&
@@ -421,10 +421,10 @@ static int is_same_still(const nebel_volume_desc *a, const nebel_volume_desc *b)
     nebel_volume_desc bare_a = *a, bare_b = *b;
     strip(&bare_a.shape);
     strip(&bare_b.shape);
-    return nb_edition_is_same_volume(&bare_a, &bare_b);
+    return nb_document_state_is_same_volume(&bare_a, &bare_b);
 }
 
-int nb_edition_is_same_entry(const nebel_volume_track *a, const nebel_volume_track *b)
+int nb_document_state_is_same_entry(const nebel_volume_track *a, const nebel_volume_track *b)
 {
     if (a->contrast != b->contrast || a->key_count != b->key_count) return 0;
     for (size_t i = 0; i < a->key_count; i++)
@@ -446,7 +446,7 @@ static int is_same_nebula(const nebel_nebula_desc *a, const nebel_nebula_desc *b
            a->turbulence == b->turbulence && a->turbulence_scale == b->turbulence_scale;
 }
 
-int nb_edition_has_same_nebulae(const nb_document_state *a, const nb_document_state *b)
+int nb_document_state_has_same_nebulae(const nb_document_state *a, const nb_document_state *b)
 {
     if (a->nebula_count != b->nebula_count) return 0;
     for (size_t i = 0; i < a->nebula_count; i++)
@@ -462,7 +462,7 @@ static int is_same_cell(const nebel_cell *a, const nebel_cell *b)
            memcmp(a->color, b->color, sizeof a->color) == 0;
 }
 
-int nb_edition_has_same_cells(const nb_document_state *a, const nb_document_state *b)
+int nb_document_state_has_same_cells(const nb_document_state *a, const nb_document_state *b)
 {
     const nebel_cells_desc *const from = &a->cells_desc, *const to = &b->cells_desc;
     if (from->cell_count != to->cell_count || from->model != to->model || from->span != to->span ||
@@ -479,7 +479,7 @@ static int is_same_model(const nebel_scene_model *a, const nebel_scene_model *b)
            HAS_SAME(a, b, nebel_scene_model, position, has_color) && memcmp(a->color, b->color, sizeof a->color) == 0;
 }
 
-int nb_edition_has_same_models(const nb_document_state *a, const nb_document_state *b)
+int nb_document_state_has_same_models(const nb_document_state *a, const nb_document_state *b)
 {
     if (a->model_count != b->model_count) return 0;
     for (size_t i = 0; i < a->model_count; i++)
@@ -492,7 +492,7 @@ static int is_same_lamp(const nebel_light *a, const nebel_light *b)
     return a->type == b->type && HAS_SAME(a, b, nebel_light, position, outer_angle) && a->outer_angle == b->outer_angle;
 }
 
-int nb_edition_has_same_lamps(const nb_document_state *a, const nb_document_state *b)
+int nb_document_state_has_same_lights(const nb_document_state *a, const nb_document_state *b)
 {
     if (a->lamp_count != b->lamp_count) return 0;
     for (size_t i = 0; i < a->lamp_count; i++)
@@ -541,7 +541,7 @@ static int are_same_shells(const nebel_textured_planet_desc *a, const nebel_text
     return 1;
 }
 
-int nb_edition_has_same_planets(const nb_document_state *a, const nb_document_state *b)
+int nb_document_state_has_same_planets(const nb_document_state *a, const nb_document_state *b)
 {
     if (a->planet_count != b->planet_count) return 0;
     for (size_t i = 0; i < a->planet_count; i++) {
@@ -554,7 +554,7 @@ int nb_edition_has_same_planets(const nb_document_state *a, const nb_document_st
     return 1;
 }
 
-int nb_edition_has_same_camera_keys(const nb_document_state *a, const nb_document_state *b)
+int nb_document_state_has_same_camera_keys(const nb_document_state *a, const nb_document_state *b)
 {
     if (a->camera_key_count != b->camera_key_count) return 0;
     for (size_t i = 0; i < a->camera_key_count; i++) {
@@ -584,7 +584,7 @@ static int has_same_environment(const nb_document_state *a, const nb_document_st
            from->intensity == to->intensity;
 }
 
-nebel_environment nb_edition_environment(const nb_document_state *edition, nebel_environment_map *map)
+nebel_environment nb_document_state_environment(const nb_document_state *edition, nebel_environment_map *map)
 {
     nebel_environment environment = edition->environment;
     memcpy(environment.radiance, edition->ambient, sizeof environment.radiance);
@@ -593,28 +593,29 @@ nebel_environment nb_edition_environment(const nb_document_state *edition, nebel
     return environment;
 }
 
-int nb_edition_has_same_light(const nb_document_state *a, const nb_document_state *b)
+int nb_document_state_has_same_light(const nb_document_state *a, const nb_document_state *b)
 {
     return a->has_sun == b->has_sun && a->max_opacity == b->max_opacity &&
            HAS_SAME(a, b, nb_document_state, background, max_opacity) && has_same_environment(a, b) &&
            has_same_classic(a, b);
 }
 
-int nb_edition_has_same_sources(const nb_document_state *a, const nb_document_state *b)
+int nb_document_state_has_same_sources(const nb_document_state *a, const nb_document_state *b)
 {
     return a->count == b->count &&
            (a->count == 0 || memcmp(a->sources, b->sources, a->count * sizeof *a->sources) == 0);
 }
 
-int nb_edition_is_same(const nb_document_state *a, const nb_document_state *b)
+int nb_document_state_is_same(const nb_document_state *a, const nb_document_state *b)
 {
-    if (!nb_edition_has_same_sources(a, b) || !nb_edition_has_same_nebulae(a, b) || !nb_edition_has_same_cells(a, b) ||
-        !nb_edition_has_same_models(a, b) || !nb_edition_has_same_lamps(a, b) || !nb_edition_has_same_light(a, b) ||
-        !nb_edition_has_same_planets(a, b) || !nb_edition_has_same_camera_keys(a, b))
+    if (!nb_document_state_has_same_sources(a, b) || !nb_document_state_has_same_nebulae(a, b) ||
+        !nb_document_state_has_same_cells(a, b) || !nb_document_state_has_same_models(a, b) ||
+        !nb_document_state_has_same_lights(a, b) || !nb_document_state_has_same_light(a, b) ||
+        !nb_document_state_has_same_planets(a, b) || !nb_document_state_has_same_camera_keys(a, b))
         return 0;
     for (size_t i = 0; i < a->count; i++)
-        if (!nb_edition_is_same_volume(&a->volumes[i], &b->volumes[i]) ||
-            !nb_edition_is_same_entry(&a->entries[i], &b->entries[i]) || strcmp(a->names[i], b->names[i]) != 0)
+        if (!nb_document_state_is_same_volume(&a->volumes[i], &b->volumes[i]) ||
+            !nb_document_state_is_same_entry(&a->entries[i], &b->entries[i]) || strcmp(a->names[i], b->names[i]) != 0)
             return 0;
     return 1;
 }

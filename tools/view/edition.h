@@ -37,44 +37,44 @@ typedef struct nb_document_state {
 } nb_document_state;
 
 /* All return 0, or -1 where memory is out and nothing has changed. */
-int nb_edition_make(const nebel_scene_data *scene, nb_document_state *edition);
-int nb_edition_copy(const nb_document_state *from, nb_document_state *to);
-int nb_edition_add(nb_document_state *edition, const nebel_volume_desc *volume, const nebel_volume_track *entry,
-                   const char *name);
+int nb_document_state_make(const nebel_scene_data *scene, nb_document_state *edition);
+int nb_document_state_copy(const nb_document_state *from, nb_document_state *to);
+int nb_document_state_add(nb_document_state *edition, const nebel_volume_desc *volume, const nebel_volume_track *entry,
+                          const char *name);
 /* All its ambient light, with the map of the file, NULL where that has none. */
-nebel_environment nb_edition_environment(const nb_document_state *edition, nebel_environment_map *map);
+nebel_environment nb_document_state_environment(const nb_document_state *edition, nebel_environment_map *map);
 /* An entry of a volume without keys, contrast or phase of its own. */
-nebel_volume_track nb_edition_plain_entry(void);
+nebel_volume_track nb_document_state_plain_entry(void);
 
 /* As many as wanted; those that come are copies of the last one, or 1. */
-int nb_edition_set_colors(nebel_nebula_desc *nebula, size_t count);
+int nb_document_state_set_colors(nebel_nebula_desc *nebula, size_t count);
 
-int nb_edition_rename(nb_document_state *edition, size_t index, const char *name);
+int nb_document_state_rename(nb_document_state *edition, size_t index, const char *name);
 
-void nb_edition_remove(nb_document_state *edition, size_t index);
+void nb_document_state_remove(nb_document_state *edition, size_t index);
 
 /* Fine with zeros. */
-void nb_edition_free(nb_document_state *edition);
+void nb_document_state_free(nb_document_state *edition);
 
-int nb_edition_is_same(const nb_document_state *a, const nb_document_state *b);
-int nb_edition_is_same_volume(const nebel_volume_desc *a, const nebel_volume_desc *b);
-int nb_edition_is_same_entry(const nebel_volume_track *a, const nebel_volume_track *b);
+int nb_document_state_is_same(const nb_document_state *a, const nb_document_state *b);
+int nb_document_state_is_same_volume(const nebel_volume_desc *a, const nebel_volume_desc *b);
+int nb_document_state_is_same_entry(const nebel_volume_track *a, const nebel_volume_track *b);
 
 /* Whether both have the same nebulae, cells, volumes of the same sources. */
-int nb_edition_has_same_nebulae(const nb_document_state *a, const nb_document_state *b);
-int nb_edition_has_same_cells(const nb_document_state *a, const nb_document_state *b);
-int nb_edition_has_same_models(const nb_document_state *a, const nb_document_state *b);
-int nb_edition_has_same_lamps(const nb_document_state *a, const nb_document_state *b);
-int nb_edition_has_same_planets(const nb_document_state *a, const nb_document_state *b);
-int nb_edition_has_same_camera_keys(const nb_document_state *a, const nb_document_state *b);
-int nb_edition_has_same_light(const nb_document_state *a, const nb_document_state *b);
-int nb_edition_has_same_sources(const nb_document_state *a, const nb_document_state *b);
+int nb_document_state_has_same_nebulae(const nb_document_state *a, const nb_document_state *b);
+int nb_document_state_has_same_cells(const nb_document_state *a, const nb_document_state *b);
+int nb_document_state_has_same_models(const nb_document_state *a, const nb_document_state *b);
+int nb_document_state_has_same_lights(const nb_document_state *a, const nb_document_state *b);
+int nb_document_state_has_same_planets(const nb_document_state *a, const nb_document_state *b);
+int nb_document_state_has_same_camera_keys(const nb_document_state *a, const nb_document_state *b);
+int nb_document_state_has_same_light(const nb_document_state *a, const nb_document_state *b);
+int nb_document_state_has_same_sources(const nb_document_state *a, const nb_document_state *b);
 
 /* Puts light, lamps, camera keys, volumes, nebulae, cells, models and planets in the place of the scene's, which points to the edition then. */
-void nb_edition_show(nb_document_state *edition, nebel_scene_data *scene);
+void nb_document_state_show(nb_document_state *edition, nebel_scene_data *scene);
 
 /* Bytes that it takes, more or less. */
-size_t nb_edition_size(const nb_document_state *edition);
+size_t nb_document_state_size(const nb_document_state *edition);
 
 #ifdef __cplusplus
 }

@@ -196,7 +196,7 @@ bool draw_name(nb_panel *panel, size_t index)
     const bool changed = ImGui::InputText("name", name, sizeof name);
     note_place("name");
     explain("For people: it means nothing else.");
-    if (changed) panel->is_out_of_memory |= nb_edition_rename(panel->now, index, name) != 0;
+    if (changed) panel->is_out_of_memory |= nb_document_state_rename(panel->now, index, name) != 0;
     return changed;
 }
 
@@ -208,13 +208,13 @@ bool draw_commands(nb_panel *panel, size_t index, nebel_volume_origin origin)
         const nebel_volume_desc copy = panel->now->volumes[index];
         const nebel_volume_track entry = panel->now->entries[index];
         snprintf(name, sizeof name, "%.120s copy", panel->now->names[index]);
-        panel->is_out_of_memory |= nb_edition_add(panel->now, &copy, &entry, name) != 0;
+        panel->is_out_of_memory |= nb_document_state_add(panel->now, &copy, &entry, name) != 0;
         panel->fog_changed = 1;
     }
     if (origin != NEBEL_VOLUME_STATIC && origin != NEBEL_VOLUME_ANIMATED) return false;
     ImGui::SameLine();
     if (!press("Remove", "Takes the volume away. Ctrl + Z brings it back.")) return false;
-    nb_edition_remove(panel->now, index);
+    nb_document_state_remove(panel->now, index);
     panel->fog_changed = 1;
     return true;
 }
@@ -319,8 +319,8 @@ void add_volume(nb_panel *panel, double reach)
         volume.source[i] = 0.5;
     }
     volume.shape.type = NEBEL_SHAPE_BOX;
-    const nebel_volume_track entry = nb_edition_plain_entry();
-    panel->is_out_of_memory |= nb_edition_add(panel->now, &volume, &entry, "new") != 0;
+    const nebel_volume_track entry = nb_document_state_plain_entry();
+    panel->is_out_of_memory |= nb_document_state_add(panel->now, &volume, &entry, "new") != 0;
     panel->fog_changed = 1;
 }
 
@@ -386,7 +386,7 @@ bool draw_colors(nb_panel *panel, nebel_nebula_desc *nebula)
         if (press("Remove the last", "Without any colour all particles shine alike.")) wanted--;
     }
     if (wanted == nebula->color_count) return changed;
-    panel->is_out_of_memory |= nb_edition_set_colors(nebula, wanted) != 0;
+    panel->is_out_of_memory |= nb_document_state_set_colors(nebula, wanted) != 0;
     return true;
 }
 

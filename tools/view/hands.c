@@ -178,7 +178,7 @@ static int has_command(const nb_input *hands)
     return hands->wants_undo || hands->wants_redo || hands->wants_save || hands->wants_reload || hands->steps != 0;
 }
 
-void nb_hands_move(nb_input *hands, nb_window *window, nebel_camera *camera, nb_display *look)
+void nb_input_move(nb_input *hands, nb_window *window, nebel_camera *camera, nb_display *look)
 {
     *hands = (nb_input){
         .x = hands->x, .y = hands->y, .grip = hands->grip, .button = hands->button, .keys_down = hands->keys_down};
@@ -194,7 +194,7 @@ void nb_hands_move(nb_input *hands, nb_window *window, nebel_camera *camera, nb_
     fly(hands, keys, window, camera);
 }
 
-int nb_hands_are_busy(const nb_input *hands)
+int nb_input_are_busy(const nb_input *hands)
 {
     return hands->keys_down != 0;
 }

@@ -22,7 +22,7 @@ typedef struct nb_input {
     int button;         /* that took hold */
     unsigned keys_down; /* of those that fly, a bit each */
 
-    /* Answers of the last nb_hands_move. */
+    /* Answers of the last nb_input_move. */
     int moved_camera, changed_look;
     int wants_home, wants_help, wants_panel, wants_picture, wants_window_picture, wants_save, wants_reload, wants_undo,
         wants_redo, wants_end, wants_play;
@@ -30,9 +30,9 @@ typedef struct nb_input {
 } nb_input;
 
 /* Takes what has happened since the last turn, and what is held down. */
-void nb_hands_move(nb_input *hands, nb_window *window, nebel_camera *camera, nb_display *look);
+void nb_input_move(nb_input *hands, nb_window *window, nebel_camera *camera, nb_display *look);
 
 /* Whether something moves as long as nothing happens. */
-int nb_hands_are_busy(const nb_input *hands);
+int nb_input_are_busy(const nb_input *hands);
 
 #endif

@@ -7,14 +7,14 @@ static const size_t most = (size_t)64 << 20;
 
 static void forget_from(nb_undo_stack *history, size_t first)
 {
-    for (size_t i = first; i < history->count; i++) nb_edition_free(&history->steps[i]);
+    for (size_t i = first; i < history->count; i++) nb_document_state_free(&history->steps[i]);
     history->count = first;
     if (history->at > first) history->at = first;
 }
 
 static void forget_oldest(nb_undo_stack *history)
 {
-    nb_edition_free(&history->steps[0]);
+    nb_document_state_free(&history->steps[0]);
     history->count--;
     history->at -= history->at > 0;
     memmove(history->steps, history->steps + 1, history->count * sizeof *history->steps);
@@ -31,8 +31,8 @@ void nb_history_note(nb_undo_stack *history, const nb_document_state *before)
     if (history->is_open) return;
     history->is_open = 1;
     forget_from(history, history->at);
-    while (history->count >= find_limit(nb_edition_size(before))) forget_oldest(history);
-    if (nb_edition_copy(before, &history->steps[history->count]) != 0) return;
+    while (history->count >= find_limit(nb_document_state_size(before))) forget_oldest(history);
+    if (nb_document_state_copy(before, &history->steps[history->count]) != 0) return;
     history->at = ++history->count;
 }
 

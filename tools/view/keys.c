@@ -126,13 +126,13 @@ static int store(nb_document_state *edition, const nb_document_state *before, si
     store_kind((nebel_volume_desc *)entry->base, &now);
     for (size_t i = 0; i < entry->key_count; i++) store_kind(&keys_of(entry)[i].volume, &now);
     store_kind(&was, &now);
-    return nb_edition_is_same_volume(&was, &now) ? 0 : nb_keys_set(edition, index, frame);
+    return nb_document_state_is_same_volume(&was, &now) ? 0 : nb_keys_set(edition, index, frame);
 }
 
 int nb_keys_store(nb_document_state *edition, const nb_document_state *before, double frame)
 {
     int result = 0;
-    if (!nb_edition_has_same_sources(edition, before)) return 0;
+    if (!nb_document_state_has_same_sources(edition, before)) return 0;
     for (size_t i = 0; i < edition->count && result == 0; i++) result = store(edition, before, i, frame);
     return result;
 }

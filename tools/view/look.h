@@ -22,9 +22,9 @@ typedef enum nb_display_compare {
 
 /* How OpenGL draws the particles of nebulae. */
 typedef enum nb_display_particles {
-    NB_LOOK_AS_BALLS = 0, /* one by one, from the farthest: a closed form each, overlaps as if they were layers */
-    NB_LOOK_AS_DISCS,     /* the same, cut by surfaces after the comparison of depth at five places */
-    NB_LOOK_AS_FOG,       /* among the fog, exactly as the CPU does: slow */
+    NB_LOOK_AS_SPHERES = 0, /* one by one, from the farthest: a closed form each, overlaps as if they were layers */
+    NB_LOOK_AS_DISCS,       /* the same, cut by surfaces after the comparison of depth at five places */
+    NB_LOOK_AS_FOG,         /* among the fog, exactly as the CPU does: slow */
     NB_LOOK_PARTICLES
 } nb_display_particles;
 

@@ -24,13 +24,13 @@ static const char copy_text[] = "uniform sampler2D plane_texture, color_texture;
                                 "    picture = vec4(is_depth ? vec3(depth) : plane.rgb, 1.0);\n"
                                 "}\n";
 
-nebel_result nb_stage_open(const nebel_scene_data *scene, const nebel_log *log, nb_gl_preview *stage)
+nebel_result nb_gl_preview_open(const nebel_scene_data *scene, const nebel_log *log, nb_gl_preview *stage)
 {
     const nebel_gl_renderer_desc desc = {.log = *log};
     nebel_result result = nebel_create_gl_renderer(scene, NULL, &desc, &stage->renderer);
     if (result == NEBEL_OK) result = nb_program_make(copy_text, log, &stage->program);
     if (result != NEBEL_OK) {
-        nb_stage_close(stage);
+        nb_gl_preview_close(stage);
         return result;
     }
     glGenTextures(1, &stage->texture);
@@ -39,7 +39,7 @@ nebel_result nb_stage_open(const nebel_scene_data *scene, const nebel_log *log, 
     return NEBEL_OK;
 }
 
-void nb_stage_close(nb_gl_preview *stage)
+void nb_gl_preview_close(nb_gl_preview *stage)
 {
     if (stage->renderer == NULL) return;
     nebel_destroy_gl_renderer(stage->renderer);
@@ -178,8 +178,8 @@ static nebel_result draw_moving(nb_gl_preview *stage, const nebel_camera *camera
     return result;
 }
 
-nebel_result nb_stage_draw(nb_gl_preview *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
-                           const nb_display *look, int moving)
+nebel_result nb_gl_preview_draw(nb_gl_preview *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
+                                const nb_display *look, int moving)
 {
     if (moving) return draw_moving(stage, camera, width, height, look);
     if (stage->state == NB_STAGE_FINE) return NEBEL_OK;

@@ -32,14 +32,14 @@ typedef struct nb_gl_preview {
 } nb_gl_preview;
 
 /* In a current context of OpenGL 3.3 core, without fog. `scene` must outlive the stage. */
-nebel_result nb_stage_open(const nebel_scene_data *scene, const nebel_log *log, nb_gl_preview *stage);
+nebel_result nb_gl_preview_open(const nebel_scene_data *scene, const nebel_log *log, nb_gl_preview *stage);
 
 /* Fine with zeros. */
-void nb_stage_close(nb_gl_preview *stage);
+void nb_gl_preview_close(nb_gl_preview *stage);
 
 /* Draws the next better picture. `moving`: another one will follow soon, so this one has to be quick. Where the fine
  * picture was given up the one before stays. */
-nebel_result nb_stage_draw(nb_gl_preview *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
-                           const nb_display *look, int moving);
+nebel_result nb_gl_preview_draw(nb_gl_preview *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
+                                const nb_display *look, int moving);
 
 #endif

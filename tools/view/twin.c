@@ -201,7 +201,7 @@ static int start(nb_cpu_preview *twin)
     return -1;
 }
 
-nb_cpu_preview *nb_twin_open(const nebel_scene_data *scene)
+nb_cpu_preview *nb_cpu_preview_open(const nebel_scene_data *scene)
 {
     nb_cpu_preview *const twin = calloc(1, sizeof *twin);
     if (twin == NULL) return NULL;
@@ -211,7 +211,7 @@ nb_cpu_preview *nb_twin_open(const nebel_scene_data *scene)
     return NULL;
 }
 
-void nb_twin_close(nb_cpu_preview *twin)
+void nb_cpu_preview_close(nb_cpu_preview *twin)
 {
     if (twin == NULL) return;
     mtx_lock(&twin->lock);
@@ -228,7 +228,7 @@ void nb_twin_close(nb_cpu_preview *twin)
     free(twin);
 }
 
-void nb_twin_rest(nb_cpu_preview *twin)
+void nb_cpu_preview_rest(nb_cpu_preview *twin)
 {
     if (twin == NULL) return;
     mtx_lock(&twin->lock);
@@ -239,7 +239,7 @@ void nb_twin_rest(nb_cpu_preview *twin)
     mtx_unlock(&twin->lock);
 }
 
-void nb_twin_ask(nb_cpu_preview *twin, const nb_preview_request *wish)
+void nb_cpu_preview_ask(nb_cpu_preview *twin, const nb_preview_request *wish)
 {
     nebel_snapshot *const fog = nebel_retain_snapshot(wish->fog);
     mtx_lock(&twin->lock);
@@ -252,7 +252,7 @@ void nb_twin_ask(nb_cpu_preview *twin, const nb_preview_request *wish)
     forget(&before);
 }
 
-int nb_twin_take(nb_cpu_preview *twin, nb_preview_image *picture)
+int nb_cpu_preview_take(nb_cpu_preview *twin, nb_preview_image *picture)
 {
     mtx_lock(&twin->lock);
     const int is_fresh = twin->is_fresh;
@@ -267,7 +267,7 @@ int nb_twin_take(nb_cpu_preview *twin, nb_preview_image *picture)
     return is_fresh;
 }
 
-int nb_twin_is_done(nb_cpu_preview *twin)
+int nb_cpu_preview_is_done(nb_cpu_preview *twin)
 {
     mtx_lock(&twin->lock);
     const int is = !twin->is_asked && !twin->is_working && !twin->is_fresh;

@@ -30,21 +30,21 @@ typedef struct nb_preview_image {
 } nb_preview_image;
 
 /* The meshes and textures of `scene` must outlive the twin. NULL where memory or threads are out. */
-nb_cpu_preview *nb_twin_open(const nebel_scene_data *scene);
+nb_cpu_preview *nb_cpu_preview_open(const nebel_scene_data *scene);
 
 /* Waits for the thread. NULL is fine. */
-void nb_twin_close(nb_cpu_preview *twin);
+void nb_cpu_preview_close(nb_cpu_preview *twin);
 
 /* Forgets what was asked for. Until the next wish the thread does not look at the scene. NULL is fine. */
-void nb_twin_rest(nb_cpu_preview *twin);
+void nb_cpu_preview_rest(nb_cpu_preview *twin);
 
 /* In place of what was asked for before. */
-void nb_twin_ask(nb_cpu_preview *twin, const nb_preview_request *wish);
+void nb_cpu_preview_ask(nb_cpu_preview *twin, const nb_preview_request *wish);
 
 /* The latest picture, where there is one that was not taken yet: nonzero. It is good until the next call. */
-int nb_twin_take(nb_cpu_preview *twin, nb_preview_image *picture);
+int nb_cpu_preview_take(nb_cpu_preview *twin, nb_preview_image *picture);
 
 /* Whether nothing better than the last picture will come. */
-int nb_twin_is_done(nb_cpu_preview *twin);
+int nb_cpu_preview_is_done(nb_cpu_preview *twin);
 
 #endif

@@ -123,7 +123,7 @@ static nebel_result set_fog(viewer *all)
     nb_document *const draft = &all->draft;
     nebel_snapshot *fog = draft->volumes;
     const int is_whole = all->look.particles == NB_LOOK_AS_FOG;
-    nebel_result result = is_whole ? nb_draft_whole(draft, &fog) : NEBEL_OK;
+    nebel_result result = is_whole ? nb_document_whole(draft, &fog) : NEBEL_OK;
     if (result == NEBEL_OK) result = nebel_set_gl_renderer_fog(all->stage.renderer, fog);
     if (result != NEBEL_OK) return result;
     return nebel_set_gl_renderer_particles(all->stage.renderer, draft->particles, is_whole ? 0 : draft->particle_count);
@@ -132,7 +132,7 @@ static nebel_result set_fog(viewer *all)
 static nebel_result open_stage(viewer *all)
 {
     all->stage = (nb_gl_preview){.is_needed = is_needed, .user = all};
-    const nebel_result result = nb_stage_open(&all->draft.data, &all->log, &all->stage);
+    const nebel_result result = nb_gl_preview_open(&all->draft.data, &all->log, &all->stage);
     return result == NEBEL_OK ? set_fog(all) : result;
 }
 
@@ -161,7 +161,7 @@ static int open_window(viewer *all, uint32_t width, uint32_t height)
 static void close_window(viewer *all)
 {
     if (all->window.has_panel) nb_panel_close();
-    nb_stage_close(&all->stage);
+    nb_gl_preview_close(&all->stage);
     nb_screen_close(&all->screen);
     nb_window_close(&all->window);
     all->window.has_panel = 0;
@@ -170,7 +170,7 @@ static void close_window(viewer *all)
 static int open_viewer(viewer *all)
 {
     const nb_viewer_options *const settings = all->settings;
-    const nebel_result result = nb_draft_open(settings->scene, settings->frame, &all->log, &all->draft);
+    const nebel_result result = nb_document_open(settings->scene, settings->frame, &all->log, &all->draft);
     if (result != NEBEL_OK) return fail(all, result);
     if (nb_target_check_window(settings->screenshot, settings->controls, settings->scene, &all->draft.data) != NB_DONE)
         return NB_FAILED;
@@ -181,10 +181,10 @@ static int open_viewer(viewer *all)
 
 static void close_viewer(viewer *all)
 {
-    nb_twin_close(all->twin);
+    nb_cpu_preview_close(all->twin);
     close_window(all);
     nb_watch_close(&all->watch);
-    nb_draft_close(&all->draft);
+    nb_document_close(&all->draft);
     free(all->origins);
 }
 
@@ -258,11 +258,11 @@ static nebel_result renew_stage(viewer *all)
     nb_gl_preview old = all->stage;
     const nebel_result result = open_stage(all);
     if (result != NEBEL_OK) {
-        nb_stage_close(&all->stage);
+        nb_gl_preview_close(&all->stage);
         all->stage = old;
         return result;
     }
-    nb_stage_close(&old);
+    nb_gl_preview_close(&old);
     return NEBEL_OK;
 }
 
@@ -275,9 +275,9 @@ static nebel_result renew_renderers(viewer *all)
     const int waits = all->panel.is_held && all->placing_seconds > quick_placing;
     if (!draft->planets_are_new && (!draft->models_are_stale || waits)) return NEBEL_OK;
     const double start = nb_window_now();
-    nb_twin_close(all->twin);
+    nb_cpu_preview_close(all->twin);
     all->twin = NULL;
-    nebel_result result = draft->models_are_stale ? nb_draft_place_models(draft) : NEBEL_OK;
+    nebel_result result = draft->models_are_stale ? nb_document_place_models(draft) : NEBEL_OK;
     if (result == NEBEL_OK) result = renew_stage(all);
     draft->planets_are_new = 0;
     all->placing_seconds = nb_window_now() - start;
@@ -299,21 +299,21 @@ static nebel_result use_fog(viewer *all, nebel_result committed)
 static void rest_twin(viewer *all)
 {
     if (all->draft.data.planet_count == 0) return;
-    nb_twin_rest(all->twin);
+    nb_cpu_preview_rest(all->twin);
     all->twin_is_stale = 1;
 }
 
 static nebel_result set_frame(viewer *all, double frame)
 {
     rest_twin(all);
-    return use_fog(all, nb_draft_set_frame(&all->draft, frame));
+    return use_fog(all, nb_document_set_frame(&all->draft, frame));
 }
 
 /* Air is slow to be made: other planets come once the control is let go. */
 static int must_wait(const viewer *all)
 {
     const nb_document *const draft = &all->draft;
-    return all->panel.is_held && !nb_edition_has_same_planets(&draft->now, &draft->good);
+    return all->panel.is_held && !nb_document_state_has_same_planets(&draft->now, &draft->good);
 }
 
 static nebel_result commit(viewer *all)
@@ -321,14 +321,14 @@ static nebel_result commit(viewer *all)
     all->has_changes = 0;
     say(all, "");
     rest_twin(all);
-    return use_fog(all, nb_draft_commit(&all->draft));
+    return use_fog(all, nb_document_commit(&all->draft));
 }
 
 static nebel_result step(viewer *all, int back)
 {
     nebel_result result = NEBEL_OK;
     rest_twin(all);
-    if (!(back ? nb_draft_undo(&all->draft, &result) : nb_draft_redo(&all->draft, &result))) return NEBEL_OK;
+    if (!(back ? nb_document_undo(&all->draft, &result) : nb_document_redo(&all->draft, &result))) return NEBEL_OK;
     say(all, "");
     return use_fog(all, result);
 }
@@ -345,18 +345,18 @@ static int is_same_camera(const nebel_camera *a, const nebel_camera *b)
 static nebel_result replace_draft(viewer *all, const nb_document *fresh)
 {
     nb_document old = all->draft;
-    nb_twin_close(all->twin);
+    nb_cpu_preview_close(all->twin);
     all->twin = NULL;
     all->draft = *fresh;
-    nb_draft_show(&all->draft);
+    nb_document_show(&all->draft);
     const nebel_result result = renew_stage(all);
     if (result != NEBEL_OK) {
-        nb_draft_close(&all->draft);
+        nb_document_close(&all->draft);
         all->draft = old;
-        nb_draft_show(&all->draft);
+        nb_document_show(&all->draft);
         return result;
     }
-    nb_draft_close(&old);
+    nb_document_close(&old);
     check_method(all);
     return NEBEL_OK;
 }
@@ -370,7 +370,7 @@ static nebel_result read_again(viewer *all)
     say(all, "");
     nb_watch_take(&all->watch);
     all->panel.file_is_newer = 0;
-    if (nb_draft_open(all->settings->scene, all->draft.frame, &all->log, &fresh) != NEBEL_OK) return NEBEL_OK;
+    if (nb_document_open(all->settings->scene, all->draft.frame, &all->log, &fresh) != NEBEL_OK) return NEBEL_OK;
     note_change(all);
     const nebel_result result = replace_draft(all, &fresh);
     if (result != NEBEL_OK) return forgive(result);
@@ -384,7 +384,7 @@ static nebel_result read_again(viewer *all)
 static nebel_result watch_file(viewer *all)
 {
     if (nb_watch_find_changed(&all->watch) == NULL) return NEBEL_OK;
-    if (!nb_draft_is_changed(&all->draft)) return read_again(all);
+    if (!nb_document_is_changed(&all->draft)) return read_again(all);
     all->panel.file_is_newer = 1;
     return NEBEL_OK;
 }
@@ -403,7 +403,7 @@ static nebel_result say_not_saved(viewer *all, nebel_result why)
 /* Where the file has gone or is broken it does not have what the window shows. */
 static nebel_result say_nothing_to_save(viewer *all)
 {
-    const nebel_result result = nb_draft_try_file(all->settings->scene, &all->log);
+    const nebel_result result = nb_document_try_file(all->settings->scene, &all->log);
     if (result != NEBEL_OK) return say_not_saved(all, result);
     say(all, "Nothing to save: the file has it all.");
     nb_report_message("view: nothing to save");
@@ -415,16 +415,16 @@ static nebel_result say_nothing_to_save(viewer *all)
 static nebel_result save(viewer *all)
 {
     const char *const path = all->settings->scene;
-    const int was_newer = all->panel.file_is_newer, must_read = nb_draft_must_be_read(&all->draft);
+    const int was_newer = all->panel.file_is_newer, must_read = nb_document_must_be_read(&all->draft);
     say(all, "");
     if (!was_newer && nb_watch_find_changed(&all->watch) != NULL) {
         all->panel.file_is_newer = 1;
         return NEBEL_OK;
     }
-    if (!was_newer && !must_read && !all->panel.saves_camera && !nb_draft_is_changed(&all->draft))
+    if (!was_newer && !must_read && !all->panel.saves_camera && !nb_document_is_changed(&all->draft))
         return say_nothing_to_save(all);
     rest_twin(all);
-    const nebel_result result = nb_draft_save(&all->draft, path, all->panel.saves_camera);
+    const nebel_result result = nb_document_save(&all->draft, path, all->panel.saves_camera);
     if (result != NEBEL_OK) return say_not_saved(all, result);
     nb_report_message("view: saved %s", path);
     all->panel.file_is_newer = 0;
@@ -555,7 +555,7 @@ static int is_complete(const viewer *all)
 {
     if (all->stage.state != NB_STAGE_FINE) return 0;
     return shown_look(all).compare == NB_LOOK_GL_ALONE || all->twin == NULL ||
-           (!all->twin_is_stale && nb_twin_is_done(all->twin));
+           (!all->twin_is_stale && nb_cpu_preview_is_done(all->twin));
 }
 
 static int list_origins(viewer *all)
@@ -564,7 +564,7 @@ static int list_origins(viewer *all)
     void *const origins = realloc(all->origins, (count + 1) * sizeof *all->origins);
     if (origins == NULL) return -1;
     all->origins = origins;
-    for (size_t i = 0; i < count; i++) all->origins[i] = nb_draft_origin(&all->draft, i);
+    for (size_t i = 0; i < count; i++) all->origins[i] = nb_document_origin(&all->draft, i);
     return 0;
 }
 
@@ -585,12 +585,12 @@ static int fill_panel(viewer *all)
     panel->look = &all->look;
     all->frame = all->draft.frame;
     panel->frame = &all->frame;
-    panel->camera_is_keyed = !nb_draft_can_save_camera(&all->draft);
+    panel->camera_is_keyed = !nb_document_can_save_camera(&all->draft);
     panel->models = nebel_get_scene_data(all->draft.scene)->models;
     panel->note = explain_method(all);
     panel->reason = all->refusal;
-    if (!nb_draft_find_frames(&all->draft, panel->frames)) panel->frames[0] = panel->frames[1] = 0;
-    panel->is_changed = nb_draft_is_changed(&all->draft);
+    if (!nb_document_find_frames(&all->draft, panel->frames)) panel->frames[0] = panel->frames[1] = 0;
+    panel->is_changed = nb_document_is_changed(&all->draft);
     panel->has_past = all->draft.history.at > 0;
     panel->has_future = all->draft.history.at < all->draft.history.count;
     panel->message = all->message;
@@ -634,8 +634,8 @@ static nebel_result ask_twin(viewer *all)
                                .method = all->look.method,
                                .factor = all->draft.good.classic,
                                .light = all->draft.data};
-    nebel_result result = nb_draft_whole(&all->draft, &wish.fog);
-    if (result == NEBEL_OK && all->twin == NULL) all->twin = nb_twin_open(&all->draft.data);
+    nebel_result result = nb_document_whole(&all->draft, &wish.fog);
+    if (result == NEBEL_OK && all->twin == NULL) all->twin = nb_cpu_preview_open(&all->draft.data);
     if (result == NEBEL_OK && all->twin == NULL) {
         say(all, "Memory or threads are out for the picture of the CPU.");
         return NEBEL_ERROR_MEMORY;
@@ -647,7 +647,7 @@ static nebel_result ask_twin(viewer *all)
         nebel_destroy_cells(wish.cells);
         return NEBEL_ERROR_MEMORY;
     }
-    nb_twin_ask(all->twin, &wish);
+    nb_cpu_preview_ask(all->twin, &wish);
     all->twin_is_stale = 0;
     return NEBEL_OK;
 }
@@ -657,7 +657,7 @@ static void compare(viewer *all)
     nb_preview_image picture;
     if (shown_look(all).compare == NB_LOOK_GL_ALONE) return;
     if (all->twin_is_stale) (void)ask_twin(all);
-    if (all->twin == NULL || !nb_twin_take(all->twin, &picture)) return;
+    if (all->twin == NULL || !nb_cpu_preview_take(all->twin, &picture)) return;
     nb_screen_set_cpu(&all->screen, picture.width, picture.height, picture.rgb);
     all->has_cpu = 1;
     all->cpu_seconds = picture.seconds;
@@ -717,7 +717,7 @@ static nebel_result try_frame(viewer *all)
     const nb_display look = shown_look(all);
     all->is_asking = 1;
     const nebel_result result =
-        nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &look, is_moving(all));
+        nb_gl_preview_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &look, is_moving(all));
     all->is_asking = 0;
     if (all->refusal[0] == '\0') return result;
     all->stage.samples = 0;
@@ -732,10 +732,10 @@ enum { BLANK_TURNS = 2 };
 static nebel_result try_first_frame(viewer *all)
 {
     if (all->settings->screenshot == NULL && all->blank_turns < BLANK_TURNS) return all->blank_turns++, NEBEL_OK;
-    nb_progress_bar meter = nb_meter_start(0);
-    nb_meter_say(&meter, "OpenGL: compiling shaders...");
+    nb_progress_bar meter = nb_progress_bar_start(0);
+    nb_progress_bar_say(&meter, "OpenGL: compiling shaders...");
     const nebel_result result = try_frame(all);
-    (void)nb_meter_end(&meter);
+    (void)nb_progress_bar_end(&meter);
     return result;
 }
 
@@ -754,11 +754,11 @@ static nebel_result draw(viewer *all)
 static int turn(viewer *all)
 {
     nb_window *const window = &all->window;
-    nb_window_wait(window, is_moving(all) || !is_complete(all) || nb_hands_are_busy(&all->hands));
+    nb_window_wait(window, is_moving(all) || !is_complete(all) || nb_input_are_busy(&all->hands));
     if (nb_window_is_lost(window)) return recover(all);
     if (window->width == 0 || window->height == 0) return NB_DONE;
     if (window->was_resized) note_change(all);
-    nb_hands_move(&all->hands, window, &all->draft.data.camera, &all->look);
+    nb_input_move(&all->hands, window, &all->draft.data.camera, &all->look);
     obey_keys(all);
     nebel_result result = watch_file(all);
     if (result == NEBEL_OK) result = play(all);
@@ -774,7 +774,7 @@ static int turn(viewer *all)
 static int is_ended(viewer *all)
 {
     if (!nb_window_is_ended(&all->window)) return 0;
-    if (all->settings->screenshot != NULL || all->was_warned || !nb_draft_is_changed(&all->draft)) return 1;
+    if (all->settings->screenshot != NULL || all->was_warned || !nb_document_is_changed(&all->draft)) return 1;
     nb_window_stay(&all->window);
     all->was_warned = 1;
     say(all, "Your changes are not saved. Ctrl+S saves them; Ctrl+Q again leaves without them.");
