@@ -14,7 +14,7 @@ typedef struct nb_group {
     group_fn *on_cpu, *in_opengl; /* NULL: not measured there */
 } nb_group;
 
-/* The process first: see bench/process.c. */
+/* The process first: see bench/bench_process.c. */
 const char *const nb_bench_groups[] = {"process",   "segments", "vertices",    "frame",  "sunlight", "pass",
                                        "particles", "overlap",  "photographs", "planet", NULL};
 

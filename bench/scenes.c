@@ -1,6 +1,6 @@
 #include "scenes.h"
 
-#include "cloud.h"
+#include "noise_cloud.h"
 
 #include "height_map.h"
 #include "measure.h"

@@ -1,10 +1,10 @@
 # The kernel files, compiled once per instruction set. Each object has one global symbol, whose name ends in the level.
 
-set(nebel_kernel_files ${PROJECT_SOURCE_DIR}/src/march/trace_kernel.c ${PROJECT_SOURCE_DIR}/src/kernels/transmit_kernel.c
-    ${PROJECT_SOURCE_DIR}/src/kernels/pixels_kernel.c ${PROJECT_SOURCE_DIR}/src/kernels/picture_kernel.c
-    ${PROJECT_SOURCE_DIR}/src/kernels/vertices_kernel.c
-    ${PROJECT_SOURCE_DIR}/src/planet/cloud_places_kernel.c ${PROJECT_SOURCE_DIR}/src/planet/cloud_drops_kernel.c
-    ${PROJECT_SOURCE_DIR}/src/planet/gather_kernel.c ${PROJECT_SOURCE_DIR}/src/planet/look_kernel.c)
+set(nebel_kernel_files ${PROJECT_SOURCE_DIR}/src/trace/trace_kernel.c ${PROJECT_SOURCE_DIR}/src/stream/segment_kernel.c
+    ${PROJECT_SOURCE_DIR}/src/stream/pixel_kernel.c ${PROJECT_SOURCE_DIR}/src/stream/picture_kernel.c
+    ${PROJECT_SOURCE_DIR}/src/stream/vertex_kernel.c
+    ${PROJECT_SOURCE_DIR}/src/clouds/cloud_position_kernel.c ${PROJECT_SOURCE_DIR}/src/clouds/cloud_density_kernel.c
+    ${PROJECT_SOURCE_DIR}/src/atmosphere/in_scattering_kernel.c ${PROJECT_SOURCE_DIR}/src/atmosphere/sky_view_kernel.c)
 
 set(nebel_flags_scalar "")
 set(nebel_flags_neon "")
@@ -56,7 +56,7 @@ function(nebel_add_kernel file level)
     # gcc's note that vectors wider than the base level change the calling convention: the kernels pass none between objects.
     target_compile_options(${target} PRIVATE -Wno-psabi ${nebel_flags_${level}})
     # The march, air and pictures are full of loops over three colors, which -O2 leaves in memory.
-    if(stem MATCHES "^(trace|gather|look|picture)_kernel$" AND CMAKE_C_COMPILER_ID STREQUAL GNU AND NOT NEBEL_SANITIZE)
+    if(stem MATCHES "^(trace|in_scattering|sky_view|picture)_kernel$" AND CMAKE_C_COMPILER_ID STREQUAL GNU AND NOT NEBEL_SANITIZE)
         target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O3>)
     endif()
 endfunction()

@@ -9,13 +9,13 @@ set(formulas ${SOURCE}/src/formulas)
 set(shader ${SOURCE}/src/shader)
 file(STRINGS ${formulas}/ORDER order REGEX "^[^#]")
 list(TRANSFORM order PREPEND ${formulas}/)
-set(march ${formulas}/prelude_shader.glsl ${order} ${shader}/layout.h)
+set(march ${formulas}/prelude_shader.glsl ${order} ${shader}/texel_layout.h)
 
 set(dialects glsl_330 glsl_300_es glsl_450 hlsl)
-set(last ${shader}/view.glsl ${shader}/grid.glsl ${shader}/media.glsl ${shader}/environment.glsl ${shader}/air.glsl ${shader}/sun_lattice.glsl
-         ${shader}/slots.glsl ${shader}/light.glsl ${shader}/sun.glsl ${shader}/fog.glsl ${shader}/voxels.glsl ${shader}/lamp.glsl
-         ${shader}/diffusion.glsl ${shader}/walk.glsl ${shader}/transparent.glsl)
-set(files_glsl_330 ${formulas}/prelude_glsl.glsl ${march} ${shader}/words.glsl ${last})
+set(last ${shader}/view_rays.glsl ${shader}/grid.glsl ${shader}/medium.glsl ${shader}/environment.glsl ${shader}/sky_view.glsl ${shader}/sun_lattice.glsl
+         ${shader}/medium_slots.glsl ${shader}/shadow_depth.glsl ${shader}/sun.glsl ${shader}/fog.glsl ${shader}/voxels.glsl ${shader}/point_light.glsl
+         ${shader}/diffusion.glsl ${shader}/trace.glsl ${shader}/transparent.glsl)
+set(files_glsl_330 ${formulas}/prelude_glsl.glsl ${march} ${shader}/bindings.glsl ${last})
 set(files_glsl_300_es ${formulas}/prelude_300es.glsl ${files_glsl_330})
 set(files_glsl_450 ${formulas}/prelude_glsl.glsl ${march} ${last})
 set(files_hlsl ${formulas}/prelude_hlsl.hlsl ${march} ${last})
@@ -39,7 +39,7 @@ if(DEFINED DIALECT)
     return()
 endif()
 
-set(code "/* Made by cmake/NebelShaderText.cmake. */\n#include \"shader/text.h\"\n")
+set(code "/* Made by cmake/NebelShaderText.cmake. */\n#include \"shader/shader_source.h\"\n")
 foreach(dialect IN LISTS dialects)
     read_text(${dialect} text)
     string(HEX "${text}" bytes)

@@ -57,6 +57,14 @@ function(nebel_glob result)
     set(${result} ${sources} PARENT_SCOPE)
 endfunction()
 
+# The sources of several rooms.
+function(nebel_glob_rooms result)
+    list(TRANSFORM ARGN PREPEND ${PROJECT_SOURCE_DIR}/src/ OUTPUT_VARIABLE patterns)
+    list(TRANSFORM patterns APPEND /*.c)
+    nebel_glob(sources ${patterns})
+    set(${result} ${sources} PARENT_SCOPE)
+endfunction()
+
 # Compiles objects once; makes the library <name> of them and of the kernel objects named after the sources.
 function(nebel_add_library name sources extra_objects)
     add_library(${name}_objects OBJECT ${sources})
@@ -85,15 +93,17 @@ function(nebel_add_shader_text result)
     nebel_glob(parts ${PROJECT_SOURCE_DIR}/src/formulas/* ${PROJECT_SOURCE_DIR}/src/shader/*.glsl)
     add_custom_command(OUTPUT ${output}
         COMMAND ${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR} -DOUTPUT=${output} -P ${script}
-        DEPENDS ${script} ${parts} ${PROJECT_SOURCE_DIR}/src/shader/layout.h VERBATIM)
+        DEPENDS ${script} ${parts} ${PROJECT_SOURCE_DIR}/src/shader/texel_layout.h VERBATIM)
     set(${result} ${output} PARENT_SCOPE)
 endfunction()
 
 function(nebel_add_core)
-    nebel_glob(sources src/base/*.c src/media/*.c src/march/*.c src/kernels/*.c src/shader/*.c src/nebula/*.c
-        src/classic/*.c src/planet/*.c)
+    nebel_glob_rooms(sources base math medium fog light stream trace diffusion classic cells particles atmosphere planet clouds
+        shader)
+    # Only scenes need these; they bring them along, see nebel_add_layer.
+    list(FILTER sources EXCLUDE REGEX "/(base/(arena|bytes)|math/affine)\\.c$")
     # Clouds are short loops over three axes and eight corners, which -O2 of gcc does not unroll.
-    nebel_glob(clouds src/planet/cloud*.c)
+    nebel_glob(clouds src/clouds/*.c)
     if(CMAKE_C_COMPILER_ID STREQUAL GNU)
         set_source_files_properties(${clouds} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
     endif()
@@ -107,11 +117,16 @@ function(nebel_add_core)
     add_library(nebel::nebel ALIAS nebel)
 endfunction()
 
-# A library on top of the core, with what nebel_find_<room>_dependencies has found. It sees the core through include/ only and
-# brings its own copy of the memory helpers.
+# A library on top of the core, of the room <room> and those that follow it, with what nebel_find_<room>_dependencies has found. It
+# sees the core through include/ only and brings its own copies of the helpers of base and math that it needs.
 function(nebel_add_layer name room)
-    nebel_glob(sources src/${room}/*.c)
-    nebel_add_library(${name} "${sources};${PROJECT_SOURCE_DIR}/src/base/base.c" "")
+    nebel_glob_rooms(sources ${room} ${ARGN})
+    list(APPEND sources ${PROJECT_SOURCE_DIR}/src/base/base.c)
+    if(room STREQUAL scene)
+        list(APPEND sources ${PROJECT_SOURCE_DIR}/src/base/arena.c ${PROJECT_SOURCE_DIR}/src/base/bytes.c
+            ${PROJECT_SOURCE_DIR}/src/math/affine.c)
+    endif()
+    nebel_add_library(${name} "${sources}" "")
     target_link_libraries(${name}_objects PRIVATE ${nebel_${room}_dependencies})
     target_link_libraries(${name} PUBLIC nebel PRIVATE m ${nebel_${room}_dependencies})
     set_target_properties(${name} PROPERTIES EXPORT_NAME ${room})
@@ -132,7 +147,7 @@ function(nebel_add_openvdb)
         REGEX "^#define OPENVDB_LIBRARY_(MAJOR|MINOR|PATCH)_VERSION_NUMBER [0-9]+$")
     string(REGEX MATCHALL "[0-9]+" numbers "${lines}")
     list(JOIN numbers "." version)
-    add_library(nebel_vdb_objects OBJECT ${PROJECT_SOURCE_DIR}/src/scene/openvdb_read.cpp)
+    add_library(nebel_vdb_objects OBJECT ${PROJECT_SOURCE_DIR}/src/grid_file/openvdb_read.cpp)
     nebel_set_cxx_options(nebel_vdb_objects)
     set_target_properties(nebel_vdb_objects PROPERTIES CXX_STANDARD 17 POSITION_INDEPENDENT_CODE ON)
     target_include_directories(nebel_vdb_objects PRIVATE ${PROJECT_SOURCE_DIR}/src)
@@ -148,8 +163,8 @@ function(nebel_add_model_reader)
     get_target_property(objects nebel_scene nebel_objects)
     add_library(nebel_model_parts STATIC EXCLUDE_FROM_ALL ${objects})
     set_target_properties(nebel_model_parts PROPERTIES LINKER_LANGUAGE C)
-    nebel_glob(sources src/scene/reader/*.c)
-    list(FILTER sources EXCLUDE REGEX "/program\\.c$")
+    nebel_glob(sources src/model_reader/*.c)
+    list(FILTER sources EXCLUDE REGEX "/reader_path\\.c$")
     nebel_add_program(nebel_read_model "${sources}" nebel_model_parts ${nebel_model_dependencies} m)
     target_include_directories(nebel_read_model PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
     set_target_properties(nebel_read_model PROPERTIES
@@ -163,7 +178,7 @@ endfunction()
 
 # Tells the library <target> which program reads models where its caller names none.
 function(nebel_name_model_reader target path)
-    add_library(${target}_reader OBJECT ${PROJECT_SOURCE_DIR}/src/scene/reader/program.c)
+    add_library(${target}_reader OBJECT ${PROJECT_SOURCE_DIR}/src/model_reader/reader_path.c)
     nebel_set_options(${target}_reader)
     target_include_directories(${target}_reader PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
     target_compile_definitions(${target}_reader PRIVATE NEBEL_MODEL_READER="${path}")
@@ -243,8 +258,8 @@ endfunction()
 
 # The window of `nebel view`, with its controls in C++.
 function(nebel_add_viewer)
-    nebel_glob(sources tools/view/*.c)
-    nebel_glob(panel_sources tools/view/*.cpp)
+    nebel_glob(sources tools/viewer/*.c)
+    nebel_glob(panel_sources tools/viewer/*.cpp)
     add_library(nebel_panel OBJECT ${panel_sources})
     nebel_set_cxx_options(nebel_panel)
     set_target_properties(nebel_panel PROPERTIES CXX_STANDARD 11)

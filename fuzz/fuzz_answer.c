@@ -1,7 +1,7 @@
 /* Any bytes as the answer of nebel-read-model: meshes that are what the header promises, or a refusal, and every byte of
  * memory back. */
 #define _GNU_SOURCE
-#include "scene/model_receive.h"
+#include "model/model_receive.h"
 
 #include <math.h>
 #include <stdlib.h>

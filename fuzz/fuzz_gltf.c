@@ -2,8 +2,8 @@
  * memory comes back. */
 #include "witness.h"
 
-#include "scene/gltf_data.h"
-#include "scene/reader/unpack.h"
+#include "model/gltf_data.h"
+#include "model_reader/gltf_unpack.h"
 
 #include <stdlib.h>
 #include <string.h>

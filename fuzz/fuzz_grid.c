@@ -1,7 +1,7 @@
 /* Any bytes as a NanoVDB file: voxels or an error with a message, and every byte of memory back. */
 #include "witness.h"
 
-#include "scene/voxels.h"
+#include "grid_file/grid_file.h"
 
 #include <stdint.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* Any bytes as key frames of a number and frames to look at: the interval holds the frame, and what lies between is a number; where it is
  * limited, one between those of the two keys around; at a key that of the key. */
-#include "scene/keyframes.h"
+#include "keys/keyframes.h"
 
 #include "witness.h"
 

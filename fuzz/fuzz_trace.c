@@ -1,7 +1,7 @@
 /* The reader of rays: any bytes are rays or an error, the same however the input is cut into pieces. */
 #include "decimal.h"
-#include "rays.h"
-#include "shortest.h"
+#include "ray_reader.h"
+#include "shortest_decimal.h"
 
 #include <math.h>
 #include <stdint.h>

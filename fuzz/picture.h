@@ -2,7 +2,7 @@
 #ifndef NB_FUZZ_PICTURE_H
 #define NB_FUZZ_PICTURE_H
 
-#include "scene/codec.h"
+#include "image/image_codec.h"
 
 #include "witness.h"
 

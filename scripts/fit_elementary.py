@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Derives the polynomial coefficients of src/formulas/elementary.inc and src/kernels/packet.h.
+"""Derives the polynomial coefficients of src/formulas/elementary.inc and src/stream/stream_packet.h.
 
 Each table is the weighted minimax polynomial found by the Remez exchange in 60-digit arithmetic: the polynomial p of
 the given degree for which max |weight * (f - p)| over the interval is smallest. Deterministic; needs mpmath.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the table of phase functions of cloud droplets, src/planet/cloud_phase_table.c, by Mie's theory.
+"""Makes the table of phase functions of cloud droplets, src/clouds/cloud_phase_table.c, by Mie's theory.
 
     make_droplets.py FILE      write it (some minutes; needs NumPy)
 
@@ -98,7 +98,7 @@ def phase_functions(color, diameters, cosines):
 
 
 def place_of(angle):
-    """As place_of of src/planet/cloud_phase.c: 0 straight ahead, 1 straight back."""
+    """As place_of of src/clouds/cloud_phase.c: 0 straight ahead, 1 straight back."""
     ahead, back = np.sin(angle / 2), np.cos(angle / 2)
     return 0.2 * 1.02 * ahead / (ahead + 0.02) + 0.15 * (1 - 1.03 * back / (back + 0.03)) + 0.65 * (1 - back)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the tables of sRGB in bytes (IEC 61966-2-1), src/kernels/srgb_table.c.
+"""Makes the tables of sRGB in bytes (IEC 61966-2-1), src/stream/srgb_table.c.
 
     make_srgb.py FILE              write it
     make_srgb.py --check FILE      exit 1 unless it is as written

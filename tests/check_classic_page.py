@@ -39,7 +39,7 @@ class ClassicPage(unittest.TestCase):
     def setUpClass(cls):
         cls.rows = read_rows()
         cls.headers = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "include/nebel").glob("*.h"))
-        cls.words = (ROOT / "src/cpu/renderer.c").read_text(encoding="utf-8")
+        cls.words = (ROOT / "src/cpu/cpu_renderer.c").read_text(encoding="utf-8")
 
     def test_every_technique_has_a_row(self):
         self.assertEqual(list(self.rows), TECHNIQUES)

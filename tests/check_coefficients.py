@@ -12,5 +12,5 @@ def check(script, *files):
     return subprocess.call(command + [os.path.join(root, "src", file) for file in files])
 
 
-sys.exit(check("fit_elementary.py", "formulas/elementary.inc", "kernels/packet.h") or
-         check("make_srgb.py", "kernels/srgb_table.c"))
+sys.exit(check("fit_elementary.py", "formulas/elementary.inc", "stream/stream_packet.h") or
+         check("make_srgb.py", "stream/srgb_table.c"))

@@ -57,7 +57,7 @@ def reader_names():
     for name in READERS:
         for table in TABLE.findall((ROOT / "src/scene" / f"{name}.c").read_text()):
             found |= set(re.findall(r'"([A-Za-z_0-9]+)"', table))
-    presets = (ROOT / "src/media/presets.c").read_text()
+    presets = (ROOT / "src/medium/fog_presets.c").read_text()
     return found | set(re.findall(r'\.name = "(\w+)"', presets))
 
 

@@ -2,7 +2,7 @@
 #ifndef EVEN_LAYER_H
 #define EVEN_LAYER_H
 
-#include "planet/cloud_view.h"
+#include "clouds/cloud_lighting.h"
 
 #include "cloud_help.h"
 

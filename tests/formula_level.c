@@ -7,7 +7,7 @@
 #include "formulas/profiles.inc"
 #include "formulas/medium.inc"
 #include "formulas/phase.inc"
-#include "formulas/lamp.inc"
+#include "formulas/point_light.inc"
 
 #define JOIN_EXPANDED(a, b) a##b
 #define JOIN(a, b) JOIN_EXPANDED(a, b)

@@ -1,6 +1,6 @@
 /* A reader of models that is not as it should be, in the way that the name of the model says: for test_model_reader. */
 #define _GNU_SOURCE
-#include "scene/model_wire.h"
+#include "model/model_wire.h"
 
 #include <nebel/nebel.h>
 

@@ -2,7 +2,7 @@
 
 #include "dice.h"
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 #include <math.h>
 #include <string.h>

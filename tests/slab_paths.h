@@ -2,7 +2,7 @@
 #ifndef SLAB_PATHS_H
 #define SLAB_PATHS_H
 
-#include "planet/cloud_phase.h"
+#include "clouds/cloud_phase.h"
 
 #include "dice.h"
 

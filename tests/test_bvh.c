@@ -1,5 +1,5 @@
 /* The hierarchy against every box tried in long double. */
-#include "march/bvh.h"
+#include "fog/bvh.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* Light that comes through broken clouds to the ground: nebel_compute_cloud_sun_transmittance against paths through the same clouds. */
-#include "planet/cloud_view.h"
+#include "clouds/cloud_lighting.h"
 
-#include "base/vector.h"
+#include "math/vector.h"
 #include "cloud_help.h"
 #include "dice.h"
 #include "near.h"

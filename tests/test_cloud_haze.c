@@ -1,5 +1,5 @@
 /* Clouds and air along a ray: what is told of the means between knots. */
-#include "base/cloud_haze.h"
+#include "aerial/cloud_compose.h"
 
 #include "dice.h"
 #include "unit.h"

@@ -1,5 +1,5 @@
 /* The model of light in clouds: slabs, and ways to the sun. */
-#include "planet/cloud_view.h"
+#include "clouds/cloud_lighting.h"
 
 #include "cloud_help.h"
 #include "dice.h"

@@ -1,6 +1,6 @@
 /* Phase functions of clouds against Mie's theory, worked out here in another way than the table was: for each sphere the
  * functions of Riccati and Bessel come from their ratios by downward recurrence, and sizes are those of quantiles. */
-#include "planet/cloud_phase.h"
+#include "clouds/cloud_phase.h"
 
 #include "cloud_help.h"
 #include "dice.h"

@@ -1,12 +1,12 @@
 /* What pixels of a width see of clouds, against thin rays within them: how much comes through, and what light. */
-#include "planet/cloud_view.h"
+#include "clouds/cloud_lighting.h"
 
 #include "cloud_help.h"
 #include "dice.h"
 #include "near.h"
 #include "unit.h"
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 #include <math.h>
 

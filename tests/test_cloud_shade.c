@@ -1,5 +1,5 @@
 /* The shade of clouds: on the ground, of the sky, on air and on fog. */
-#include "planet/cloud_view.h"
+#include "clouds/cloud_lighting.h"
 
 #include "cloud_help.h"
 #include "near.h"

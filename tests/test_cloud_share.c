@@ -1,5 +1,5 @@
 /* Clouds through pixels between others: who has rays, and what the others have. */
-#include "base/cloud_share.h"
+#include "aerial/cloud_pixels.h"
 
 #include "unit.h"
 

@@ -1,8 +1,8 @@
 /* Clouds with volume: their density, what quadrature makes of it, and bad input. */
-#include "planet/cloud_looks.h"
-#include "planet/cloud_view.h"
+#include "clouds/cloud_density.h"
+#include "clouds/cloud_lighting.h"
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 #include "cloud_help.h"
 #include "dice.h"

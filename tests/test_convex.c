@@ -1,5 +1,5 @@
 /* Bounds of convex bodies against corners found by trying all triples of planes in long double. */
-#include "media/convex.h"
+#include "medium/convex.h"
 
 #include <math.h>
 #include <stdio.h>

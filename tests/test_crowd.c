@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "fog_help.h"
-#include "march/snapshot.h"
+#include "fog/snapshot.h"
 
 enum { BALLS = 500, RAYS = 40 };
 

@@ -1,8 +1,8 @@
 /* Soft edges of every shape: what they are by hand, and that the place and the ray know the same. */
 #include "random_fog.h"
 
-#include "media/density.h"
-#include "media/volume.h"
+#include "medium/density.h"
+#include "medium/volume.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
 #include "scene_help.h"
 
 #include "near.h"
-#include "scene/voxels.h"
+#include "grid_file/grid_file.h"
 
 #include <math.h>
 #include <png.h>

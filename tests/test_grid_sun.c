@@ -5,7 +5,7 @@
 #include "fog_help.h"
 
 #include "base/base.h"
-#include "media/grid_lattice.h"
+#include "light/sun_lattice.h"
 
 #include <math.h>
 #include <stdlib.h>

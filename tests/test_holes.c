@@ -2,7 +2,7 @@
  * masks that are none. */
 #include "test_render_scene.h"
 
-#include "cpu/mask.h"
+#include "cpu/alpha_mask.h"
 #include "dice.h"
 
 enum { SIZE = 120 };

@@ -1,7 +1,7 @@
 /* JPEG pictures of textures that are not read. */
 #include "scene_help.h"
 
-#include "scene/codec.h"
+#include "image/image_codec.h"
 
 #include <jpeglib.h>
 

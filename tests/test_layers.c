@@ -1,7 +1,7 @@
 /* The planet of tutorials: its formulas against a rendition of their own, its maps, and bad input. */
 #include <nebel/layers.h>
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 #include "dice.h"
 #include "scarce_memory.h"

@@ -3,7 +3,7 @@
 #include "fog_help.h"
 #include "random_fog.h"
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 enum { RAYS = 4200, KINDS = 8 };
 

@@ -2,7 +2,7 @@
  * does harms this one. */
 #define _GNU_SOURCE
 #include "model_help.h"
-#include "scene/model_budget.h"
+#include "model/model_budget.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -4,7 +4,7 @@
 #include "picture_help.h"
 #include "planet_help.h"
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 #include <nebel/clouds.h>
 #include <nebel/environment.h>

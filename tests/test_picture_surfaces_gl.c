@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/camera.h"
+#include "frame/camera_axes.h"
 #include "dice.h"
 #include "fog_help.h"
 #include "pass_help.h"

@@ -1,8 +1,8 @@
 /* The air of planets: T12, T13, T30, T31, T40 and T41 of the collected physics, the furnace, and bad input. */
 #include <nebel/planet.h>
 
-#include "planet/atmosphere.h"
-#include "planet/path.h"
+#include "atmosphere/atmosphere.h"
+#include "atmosphere/ray_quadrature.h"
 
 #include <float.h>
 #include <math.h>
@@ -13,7 +13,7 @@
 #include "formulas/prelude.h"
 
 #include "formulas/elementary.inc"
-#include "formulas/planet.inc"
+#include "formulas/atmosphere.inc"
 
 #include "scarce_memory.h"
 #include "unit.h"

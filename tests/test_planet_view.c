@@ -1,7 +1,7 @@
 /* Tables of air from one place: how far they are from nebel_trace_atmosphere, and whether they say so. */
 #include <nebel/planet.h>
 
-#include "planet/view.h"
+#include "atmosphere/sky_view.h"
 
 #include <math.h>
 #include <stdio.h>

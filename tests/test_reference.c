@@ -1,7 +1,7 @@
 /* The reference renderer: the collected physics (T14, T15, T16, T32 to T36, T38) and its contracts. */
 #include "test_render_scene.h"
 
-#include "cpu/renderer.h"
+#include "cpu/cpu_renderer.h"
 #include "dice.h"
 
 #include <string.h>

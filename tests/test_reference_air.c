@@ -2,7 +2,7 @@
  * quadrature, sums along rays, and furnaces, which know nothing of each other. */
 #include "test_render_scene.h"
 
-#include "cpu/renderer.h"
+#include "cpu/cpu_renderer.h"
 #include "dice.h"
 
 #include <nebel/clouds.h>

@@ -1,8 +1,8 @@
 /* Lamps in the reference renderer: the collected physics (T17, T19, T20), light that has nowhere to go but out, shadows. */
 #include "test_render_scene.h"
 
-#include "cpu/lampchance.h"
-#include "cpu/renderer.h"
+#include "cpu/light_sampling.h"
+#include "cpu/cpu_renderer.h"
 #include "dice.h"
 
 #include <string.h>

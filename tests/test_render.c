@@ -1,7 +1,7 @@
 /* Pictures whose pixels are known. */
 #include "test_render_scene.h"
 
-#include "cpu/renderer.h"
+#include "cpu/cpu_renderer.h"
 
 static const nebel_cpu_renderer_desc plain = {.thread_count = 1};
 

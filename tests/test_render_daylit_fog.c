@@ -3,8 +3,8 @@
 #include "planet_help.h"
 #include "test_render_scene.h"
 
-#include "base/vector.h"
-#include "cpu/daylight.h"
+#include "math/vector.h"
+#include "cpu/cpu_irradiance.h"
 
 enum { WIDTH = 32, HEIGHT = 20 };
 

@@ -4,7 +4,7 @@
 #include "planet_help.h"
 #include "test_render_scene.h"
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 enum { WIDTH = 4, HEIGHT = 64, HEIGHTS = 71 };
 

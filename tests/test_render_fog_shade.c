@@ -3,7 +3,7 @@
 #include "planet_help.h"
 #include "test_render_scene.h"
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 #include <nebel/clouds.h>
 

@@ -3,7 +3,7 @@
 #include "planet_help.h"
 #include "test_render_scene.h"
 
-#include "cpu/daylight.h"
+#include "cpu/cpu_irradiance.h"
 
 enum { WIDTH = 40, HEIGHT = 24 };
 

@@ -1,7 +1,7 @@
 /* Two ways to the first hit: triangle by triangle and ray by ray. */
 #include "test_render_scene.h"
 
-#include "cpu/renderer.h"
+#include "cpu/cpu_renderer.h"
 
 enum { SIDE = NB_REGION, PIXELS = SIDE * SIDE };
 

@@ -5,7 +5,7 @@
 #include "test_render_scene.h"
 #include "worlds_help.h"
 
-#include "base/eclipse.h"
+#include "aerial/eclipse.h"
 
 #include <nebel/clouds.h>
 

@@ -2,7 +2,7 @@
 /* Models, multiple scattering and pictures are counted within the memory of the whole scene: each of them is within its limits, all of
  * them together are not. */
 #include "model_help.h"
-#include "scene/model_budget.h"
+#include "model/model_budget.h"
 
 #include <png.h>
 

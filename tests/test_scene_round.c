@@ -1,7 +1,7 @@
 /* Every number and name of good scenes is changed, saved and read again: what the reader keeps, saving must write. */
 #define _POSIX_C_SOURCE 200809L
 
-#include "scene/scene_internal.h"
+#include "scene/scene_data.h"
 #include "scene_help.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 /* Ambient light by direction as words for shaders: sizes, places, what is the same, and what is refused. */
 #include "fog_help.h"
 
-#include "shader/layout.h"
+#include "shader/texel_layout.h"
 #include <nebel/environment.h>
 #include <nebel/shader.h>
 

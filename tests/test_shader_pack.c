@@ -1,7 +1,7 @@
 /* Packed fog without a graphics interface: limits, numbers, determinism, texts. */
 #include "random_fog.h"
 
-#include "shader/layout.h"
+#include "shader/texel_layout.h"
 #include <nebel/shader.h>
 
 #include <math.h>

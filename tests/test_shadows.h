@@ -4,7 +4,7 @@
 
 #include "test_render_scene.h"
 
-#include "cpu/renderer.h"
+#include "cpu/cpu_renderer.h"
 
 /* Whether something is between the place and `reach` m from it in this direction. */
 static inline int is_hidden(const nb_geometry *geometry, const float place[3], const double way[3], float reach)

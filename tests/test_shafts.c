@@ -2,7 +2,7 @@
  * and fine steps. */
 #include "test_shadows.h"
 
-#include "cpu/renderer.h"
+#include "cpu/cpu_renderer.h"
 #include "dice.h"
 
 /* ---- ends of shadows ------------------------------------------------------------------------- */
@@ -602,7 +602,7 @@ static void set_lamplit_pillars(pillars *p, nebel_light lamps[2])
     p->fog = lamplit_fog(&volume, 2, lamps);
 }
 
-/* What the lamp brings to a place, of intensity 1 on its axis, in even fog; see formulas/lamp.inc. */
+/* What the lamp brings to a place, of intensity 1 on its axis, in even fog; see formulas/point_light.inc. */
 static double lamp_fluence(const nb_geometry *geometry, const float place[3], const nebel_light *lamp)
 {
     double way[3], axis[3];

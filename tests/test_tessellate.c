@@ -1,7 +1,7 @@
 /* Tessellation: the bound that it proves, against dense sampling; no T-junctions; limits; bad input. */
 #include <nebel/classic.h>
 
-#include "classic/fog_bound.h"
+#include "classic/vertex_error_bound.h"
 
 #include <math.h>
 #include <stdlib.h>

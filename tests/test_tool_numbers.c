@@ -1,6 +1,6 @@
 /* Numbers of the command line: text to doubles and back. */
 #include "decimal.h"
-#include "shortest.h"
+#include "shortest_decimal.h"
 #include "unit.h"
 
 #include <math.h>

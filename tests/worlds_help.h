@@ -2,7 +2,7 @@
 #ifndef WORLDS_HELP_H
 #define WORLDS_HELP_H
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 #include <nebel/scene.h>
 

@@ -5,9 +5,9 @@
 #if defined(NEBEL_HAVE_GL)
 #include "gl_context.h"
 #endif
-#include "machine.h"
-#include "report.h"
-#include "target.h"
+#include "system_info.h"
+#include "messages.h"
+#include "output_check.h"
 
 #include "bench/bench.h"
 

@@ -2,9 +2,9 @@
 #define _POSIX_C_SOURCE 200809L
 
 #include "commands.h"
-#include "interrupt.h"
-#include "report.h"
-#include "target.h"
+#include "signals.h"
+#include "messages.h"
+#include "output_check.h"
 
 #include <nebel/scene.h>
 

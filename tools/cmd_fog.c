@@ -3,10 +3,10 @@
 #include "fog_call.h"
 #include "fog_list.h"
 #include "fog_work.h"
-#include "interrupt.h"
-#include "load.h"
+#include "signals.h"
+#include "load_scene.h"
 #include "record.h"
-#include "workers.h"
+#include "thread_pool.h"
 
 #include <limits.h>
 #include <stdio.h>

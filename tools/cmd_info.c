@@ -1,12 +1,12 @@
 /* nebel info: what this program is, and what is in a scene. */
 #include "commands.h"
 #include "info_scene.h"
-#include "isa.h"
-#include "machine.h"
+#include "isa_option.h"
+#include "system_info.h"
 #include "ranks.h"
 #include "reader.h"
-#include "report.h"
-#include "workers.h"
+#include "messages.h"
+#include "thread_pool.h"
 
 #include <nebel/nebel.h>
 #include <nebel/render.h>

@@ -1,25 +1,25 @@
 /* nebel render: a scene to a picture, to many, or to a film. */
 #define _POSIX_C_SOURCE 200809L
 
-#include "air_depth.h"
+#include "warn_atmosphere.h"
 #include "commands.h"
-#include "endless.h"
-#include "finer.h"
-#include "interrupt.h"
-#include "layers.h"
-#include "load.h"
-#include "meter.h"
-#include "render_call.h"
+#include "warn_endless_fog.h"
+#include "refine_meshes.h"
+#include "signals.h"
+#include "aov.h"
+#include "load_scene.h"
+#include "progress_bar.h"
+#include "render_options.h"
 #include "render_out.h"
-#include "report.h"
+#include "messages.h"
 #include "shutter.h"
-#include "spread.h"
+#include "noise_estimate.h"
 
 #include <nebel/render.h>
 #include <nebel/shader.h>
 
 #if defined(NEBEL_HAVE_GL)
-#include "gl_painter.h"
+#include "gl_offscreen.h"
 #endif
 
 #include <math.h>

@@ -1,17 +1,17 @@
 /* nebel trace: rays in, numbers out. */
 #define _POSIX_C_SOURCE 200809L
 
-#include "air_depth.h"
+#include "warn_atmosphere.h"
 #include "commands.h"
-#include "endless.h"
-#include "isa.h"
-#include "load.h"
-#include "output.h"
-#include "rays.h"
+#include "warn_endless_fog.h"
+#include "isa_option.h"
+#include "load_scene.h"
+#include "fd_output.h"
+#include "ray_reader.h"
 #include "reader.h"
-#include "report.h"
-#include "shortest.h"
-#include "workers.h"
+#include "messages.h"
+#include "shortest_decimal.h"
+#include "thread_pool.h"
 
 #include <errno.h>
 #include <float.h>

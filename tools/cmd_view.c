@@ -2,11 +2,11 @@
 #include "commands.h"
 #include "decimal.h"
 #include "reader.h"
-#include "report.h"
-#include "target.h"
+#include "messages.h"
+#include "output_check.h"
 
 #if defined(NEBEL_HAVE_VIEWER)
-#include "view/view.h"
+#include "viewer/viewer.h"
 #endif
 
 #include <nebel/scene.h>

@@ -1,8 +1,8 @@
 #include "fog_call.h"
 
 #include "decimal.h"
-#include "report.h"
-#include "workers.h"
+#include "messages.h"
+#include "thread_pool.h"
 
 #include <math.h>
 #include <string.h>

@@ -3,7 +3,7 @@
 
 #include "fingerprint.h"
 #include "folder.h"
-#include "report.h"
+#include "messages.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -3,7 +3,7 @@
 #include "fog_names.h"
 
 #include "fog_spare.h"
-#include "report.h"
+#include "messages.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -4,7 +4,7 @@
 
 #include "fog_record.h"
 #include "fog_twice.h"
-#include "report.h"
+#include "messages.h"
 
 #include <stdint.h>
 #include <stdlib.h>

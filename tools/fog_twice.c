@@ -1,7 +1,7 @@
 #define _XOPEN_SOURCE 700
 #include "fog_twice.h"
 
-#include "report.h"
+#include "messages.h"
 
 #include <stdlib.h>
 #include <string.h>

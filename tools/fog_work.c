@@ -1,8 +1,8 @@
 #include "fog_work.h"
 
-#include "interrupt.h"
+#include "signals.h"
 #include "record.h"
-#include "workers.h"
+#include "thread_pool.h"
 
 #include <math.h>
 #include <stdarg.h>

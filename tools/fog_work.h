@@ -4,7 +4,7 @@
 
 #include "fog_call.h"
 #include "fog_record.h"
-#include "report.h"
+#include "messages.h"
 
 /* What all pictures share. */
 typedef struct nb_fog_shared {

@@ -1,7 +1,7 @@
 #define _POSIX_C_SOURCE 200809L
 #include "folder.h"
 
-#include "report.h"
+#include "messages.h"
 
 #include <errno.h>
 #include <stdlib.h>

@@ -1,9 +1,9 @@
 #include "info_scene.h"
 
-#include "air_depth.h"
-#include "endless.h"
-#include "load.h"
-#include "report.h"
+#include "warn_atmosphere.h"
+#include "warn_endless_fog.h"
+#include "load_scene.h"
+#include "messages.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -2,8 +2,8 @@
 
 #include "decimal.h"
 #include "ranks.h"
-#include "report.h"
-#include "target.h"
+#include "messages.h"
+#include "output_check.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -16,7 +16,7 @@
 #ifndef NB_JOBS_H
 #define NB_JOBS_H
 
-#include "meter.h"
+#include "progress_bar.h"
 #include "options.h"
 
 #include <stdint.h>

@@ -1,8 +1,8 @@
 /* nebel: exact fog from the command line. */
-#include "abort.h"
+#include "abort_guard.h"
 #include "commands.h"
-#include "output.h"
-#include "report.h"
+#include "fd_output.h"
+#include "messages.h"
 
 #include <nebel/nebel.h>
 

@@ -1,7 +1,7 @@
 #include "options.h"
 
 #include "decimal.h"
-#include "report.h"
+#include "messages.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -2,7 +2,7 @@
 #include "parts.h"
 
 #include "folder.h"
-#include "interrupt.h"
+#include "signals.h"
 #include "record.h"
 
 #include <dirent.h>

@@ -2,7 +2,7 @@
 #ifndef NB_PARTS_H
 #define NB_PARTS_H
 
-#include "report.h"
+#include "messages.h"
 
 #include <nebel/scene.h>
 

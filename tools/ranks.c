@@ -1,8 +1,8 @@
 #define _POSIX_C_SOURCE 200809L
 #include "ranks.h"
 
-#include "interrupt.h"
-#include "report.h"
+#include "signals.h"
+#include "messages.h"
 
 #include <stdlib.h>
 

@@ -2,11 +2,11 @@
 #include "render_out.h"
 
 #include "folder.h"
-#include "interrupt.h"
+#include "signals.h"
 #include "parts.h"
-#include "pattern.h"
+#include "frame_pattern.h"
 #include "record.h"
-#include "target.h"
+#include "output_check.h"
 
 #include <nebel/nebel.h>
 

@@ -9,8 +9,8 @@
 
 #include "fingerprint.h"
 #include "jobs.h"
-#include "render_call.h"
-#include "report.h"
+#include "render_options.h"
+#include "messages.h"
 
 typedef struct nb_render_out {
     const nb_render_arguments *wanted;

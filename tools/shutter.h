@@ -2,7 +2,7 @@
 #ifndef NB_SHUTTER_H
 #define NB_SHUTTER_H
 
-#include "layers.h"
+#include "aov.h"
 
 #include <stddef.h>
 #include <stdint.h>

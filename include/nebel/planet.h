@@ -10,7 +10,7 @@
  *
  * The planet is a ball; its air is up to NEBEL_MAX_COMPONENTS kinds of it over each other, each of which thins out with height,
  * or is a layer, and ends where the atmosphere does. Light that was scattered once comes from quadrature with the exact
- * optical depth (formulas/planet.inc) in both directions. What was scattered more often comes from a table over height
+ * optical depth (formulas/atmosphere.inc) in both directions. What was scattered more often comes from a table over height
  * and the sun's height, made when the atmosphere is: there the light from everywhere is kept by its moments, as much of
  * it as Rayleigh's phase function sees; that is exact for air, and smoothes what dust sends ahead.
  *

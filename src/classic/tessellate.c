@@ -7,7 +7,7 @@
  * What lies in its middle is one vertex for each pair of vertices that triangles have there. */
 #include <nebel/classic.h>
 
-#include "classic/fog_bound.h"
+#include "vertex_error_bound.h"
 
 #include <math.h>
 #include <string.h>

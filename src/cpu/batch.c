@@ -1,9 +1,9 @@
 /* One sample of 64 x 4 pixels: rays, hits, shadows, fog, light. Everything is an array over the batch. */
-#include "classic_fog.h"
-#include "cloudscape.h"
-#include "daylit_fog.h"
-#include "haze.h"
-#include "shells.h"
+#include "cpu_classic.h"
+#include "cpu_clouds.h"
+#include "cpu_fog_irradiance.h"
+#include "aerial_compose.h"
+#include "cpu_textured_planet.h"
 
 #include <math.h>
 #include <string.h>

@@ -2,7 +2,7 @@
 #ifndef NB_CPU_CLOUD_AIR_H
 #define NB_CPU_CLOUD_AIR_H
 
-#include "renderer.h"
+#include "cpu_renderer.h"
 
 /* Without an end. */
 nebel_ray nb_cloud_air_ray(const nb_frame *frame, const nb_cloud_scratch *clouds, uint32_t lane);

@@ -2,8 +2,8 @@
 #ifndef NB_CPU_HITS_H
 #define NB_CPU_HITS_H
 
-#include "geometry.h"
-#include "view.h"
+#include "embree_scene.h"
+#include "camera_rays.h"
 
 typedef struct nb_hits {
     uint32_t surface[NB_BATCH]; /* NB_NONE: nothing is met, the other members are undefined */

@@ -1,7 +1,7 @@
 /* What rays of the reference meet: surfaces, by Embree, and the ground of planets. */
-#include "path.h"
+#include "path_tracer.h"
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 #include <math.h>
 #include <string.h>

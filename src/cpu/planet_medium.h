@@ -3,7 +3,7 @@
 #ifndef NB_CPU_PLANET_MEDIUM_H
 #define NB_CPU_PLANET_MEDIUM_H
 
-#include "base/worlds.h"
+#include "aerial/planets.h"
 
 #include <nebel/clouds.h>
 

@@ -2,7 +2,7 @@
 #ifndef NB_CPU_SHAFT_RAYS_H
 #define NB_CPU_SHAFT_RAYS_H
 
-#include "shafts.h"
+#include "sun_shafts.h"
 
 #include <math.h>
 

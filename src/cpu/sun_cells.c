@@ -1,6 +1,6 @@
 #include "sun_cells.h"
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 #include <math.h>
 #include <string.h>

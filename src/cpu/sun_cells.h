@@ -6,12 +6,12 @@
  * whose texels could be too coarse.
  *
  * The plane that the sun looks at is divided into cells of few triangles each. Of each cell is known before which depth
- * nothing in it is in shadow, and often a depth from which on all of it is (cover.h): only where a ray passes between
+ * nothing in it is in shadow, and often a depth from which on all of it is (sun_cell_occlusion.h): only where a ray passes between
  * both are prisms cut out of it. */
 #ifndef NB_CPU_SUN_CELLS_H
 #define NB_CPU_SUN_CELLS_H
 
-#include "walls.h"
+#include "shadow_boundaries.h"
 
 enum {
     NB_CELL_FAN = 16,    /* children of a node */

@@ -1,7 +1,7 @@
 #include "frame_check.h"
 
 #include "method.h"
-#include "panorama.h"
+#include "gl_panorama.h"
 
 #include <math.h>
 

@@ -1,7 +1,7 @@
 /* Parallel rays show the same picture from anywhere along them. The eye goes up to what is seen, because floats hold places relative to it. */
-#include "frame.h"
+#include "gl_frame.h"
 
-#include "base/camera.h"
+#include "frame/camera_axes.h"
 
 /* Depth along the view of the nearest of some places. */
 static double least_depth(const nb_camera_axes *axes, const double from[3], const double low[3], const double high[3])

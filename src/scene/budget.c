@@ -1,5 +1,5 @@
 /* What a scene may take in all, counted before the work. */
-#include "scene/scene_internal.h"
+#include "scene_data.h"
 
 #include <math.h>
 #include <stdio.h>

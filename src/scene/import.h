@@ -3,7 +3,7 @@
 #ifndef NB_SCENE_IMPORT_H
 #define NB_SCENE_IMPORT_H
 
-#include "scene/scene_internal.h"
+#include "scene_data.h"
 
 /* The settings that numbers of the volumes were made of, for messages about these; NULL: none in the file. */
 typedef struct nb_import_causes {

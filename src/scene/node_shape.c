@@ -1,5 +1,5 @@
 /* Fog in a node of a model: the shapes it may name, and its way into the world. */
-#include "scene/scene_internal.h"
+#include "scene_data.h"
 
 #include <math.h>
 

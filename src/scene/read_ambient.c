@@ -1,8 +1,8 @@
 /* The sections "ambient" and "background": a colour, or what depends on the direction. */
-#include "scene/codec.h"
-#include "scene/model.h"
-#include "scene/path.h"
-#include "scene/scene_internal.h"
+#include "image/image_codec.h"
+#include "model/model.h"
+#include "file/path.h"
+#include "scene_data.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* The sections "camera", its turntable and its keys. */
-#include "scene/scene_internal.h"
+#include "scene_data.h"
 
 enum { POSITION, LOOK_AT, UP, VERTICAL_FOV, VIEW_HEIGHT, PROJECTION, TURNTABLE, KEYS, FRAME, CAMERA_KEY_COUNT };
 

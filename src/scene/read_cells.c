@@ -1,5 +1,5 @@
 /* The section "cells": convex cells of fog and the portals between them. */
-#include "scene/scene_internal.h"
+#include "scene_data.h"
 
 #include <string.h>
 

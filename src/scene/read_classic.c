@@ -1,5 +1,5 @@
 /* The section "classic": what the methods of old hardware need. */
-#include "scene/scene_internal.h"
+#include "scene_data.h"
 
 #include "base/device.h"
 

@@ -1,5 +1,5 @@
 /* The clouds of a physical planet. */
-#include "scene/scene_internal.h"
+#include "scene_data.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* Density profiles and phase functions. */
-#include "scene/scene_internal.h"
+#include "scene_data.h"
 
 #include <string.h>
 

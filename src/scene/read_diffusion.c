@@ -1,5 +1,5 @@
 /* The section "multiple_scattering". */
-#include "scene/scene_internal.h"
+#include "scene_data.h"
 
 /* Level, and of one height. */
 static bool read_ground(nb_scene_reader *in, const nb_json_node *node, nebel_diffusion_desc *desc)

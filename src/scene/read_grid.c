@@ -1,7 +1,9 @@
 /* A density whose voxels are in files, which are read at once. */
-#include "scene/model.h"
-#include "scene/path.h"
-#include "scene/voxels.h"
+#include "scene_data.h"
+
+#include "model/model.h"
+#include "file/path.h"
+#include "grid_file/grid_file.h"
 
 #include <string.h>
 

@@ -1,8 +1,8 @@
 /* A planet of the model "layers": a ball, shells of clouds, a shell of air. */
-#include "scene/codec.h"
-#include "scene/model.h"
-#include "scene/path.h"
-#include "scene/scene_internal.h"
+#include "image/image_codec.h"
+#include "model/model.h"
+#include "file/path.h"
+#include "scene_data.h"
 
 #include <string.h>
 

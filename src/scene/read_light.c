@@ -1,5 +1,5 @@
 /* The sections "sun" and "lights". */
-#include "scene/scene_internal.h"
+#include "scene_data.h"
 
 #include <float.h>
 #include <string.h>

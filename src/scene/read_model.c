@@ -1,7 +1,10 @@
 /* One entry of the section "models", whose files are read later, by nebel_load_scene_models; and the points of a
  * nebula, which are read at once, since a scene knows how many particles it has. */
-#include "scene/model.h"
-#include "scene/path.h"
+
+#include "scene_data.h"
+
+#include "model/model.h"
+#include "file/path.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* One entry of the section "nebula". nebel_generate_scene_particles makes the particles later. */
-#include "scene/save_places.h"
-#include "scene/scene_internal.h"
+#include "keys/key_table.h"
+#include "scene_data.h"
 
 #include <string.h>
 

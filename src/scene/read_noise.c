@@ -1,5 +1,5 @@
 /* A density of noise: its voxels are made at once. */
-#include "scene/model.h"
+#include "scene_data.h"
 
 #include <limits.h>
 #include <string.h>

@@ -1,8 +1,8 @@
 /* The section "planet". */
-#include "scene/save_places.h"
-#include "scene/scene_internal.h"
+#include "keys/key_table.h"
+#include "scene_data.h"
 
-#include "base/vector.h"
+#include "math/vector.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* Shapes of fog, and their transforms. */
-#include "scene/scene_internal.h"
+#include "scene_data.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* Changed ambient light and background, back into the file that the scene came from. */
-#include "scene/save.h"
+#include "key_patch.h"
 
 #include <stdio.h>
 #include <string.h>

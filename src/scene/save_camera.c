@@ -1,5 +1,5 @@
 /* A changed camera and its motion, back into the file. */
-#include "scene/save.h"
+#include "key_patch.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,5 +1,5 @@
 /* Changed cells and portals, back into the file. */
-#include "scene/save.h"
+#include "key_patch.h"
 
 #include <string.h>
 

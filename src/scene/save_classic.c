@@ -1,5 +1,5 @@
 /* Changed classic fog, back into the section of that name. */
-#include "scene/save.h"
+#include "key_patch.h"
 
 #include <math.h>
 #include <string.h>

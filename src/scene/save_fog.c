@@ -1,5 +1,5 @@
 /* Changed, new and lost volumes of fog, back into the file. */
-#include "scene/save.h"
+#include "key_patch.h"
 
 #include <math.h>
 #include <stdio.h>

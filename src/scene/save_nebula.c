@@ -1,5 +1,5 @@
 /* Changed nebulae, back into the file. */
-#include "scene/save.h"
+#include "key_patch.h"
 
 #include <stdio.h>
 #include <string.h>

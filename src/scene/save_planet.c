@@ -1,5 +1,5 @@
 /* Changed planets, back into the file: numbers of their air, clouds and shells. */
-#include "scene/save.h"
+#include "key_patch.h"
 
 #include <string.h>
 

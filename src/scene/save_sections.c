@@ -1,5 +1,5 @@
 /* Changed light and models, back into the file that the scene came from. */
-#include "scene/save.h"
+#include "key_patch.h"
 
 #include <math.h>
 #include <stdio.h>

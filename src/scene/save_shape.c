@@ -1,5 +1,5 @@
 /* What sections share: numbers, shapes and densities, back into the file. */
-#include "scene/save.h"
+#include "key_patch.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* Whole volumes as JSON, for those that the file has not, or has as something else. */
-#include "scene/save.h"
+#include "key_patch.h"
 
 #include <math.h>
 #include <stdio.h>

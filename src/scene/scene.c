@@ -1,11 +1,11 @@
 /* Scenes: read, kept, given back. */
-#include "base/hash.h"
-#include "scene/codec.h"
-#include "scene/file.h"
-#include "scene/model.h"
-#include "scene/path.h"
-#include "scene/save.h"
-#include "scene/scene_internal.h"
+#include "math/hash.h"
+#include "image/image_codec.h"
+#include "file/file.h"
+#include "model/model.h"
+#include "file/path.h"
+#include "key_patch.h"
+#include "scene_data.h"
 
 #include <stdio.h>
 #include <math.h>

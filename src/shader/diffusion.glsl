@@ -1,4 +1,4 @@
-/* Light that fog scatters more than once, as src/march/diffusion_light.c gathers it along a ray: the source radiance of the lattice's
+/* Light that fog scatters more than once, as src/diffusion/diffusion_gather.c gathers it along a ray: the source radiance of the lattice's
  * nodes, which layout.h describes, between places a cell apart; in each such piece the exact transmittance. */
 #ifndef NEBEL_DIFFUSION_TEXEL
 #define NEBEL_DIFFUSION_TEXEL(i) nb_vec4(0.0, 0.0, 0.0, 0.0)
@@ -181,7 +181,7 @@ float nb_diffusion_lattice_lobe(float g, nb_turn turn)
     return nb_phase_lobe(rest * (1.0 + abs(g)) * 0.079577471545947667884, 0.0, rest * rest, 2.0 * g, turn);
 }
 
-/* See diffuse_source in diffusion_light.c. `numbers`: mean over directions, and flux. */
+/* See diffuse_source in diffusion_gather.c. `numbers`: mean over directions, and flux. */
 float nb_diffuse_source(nb_vec4 numbers, float most, nb_vec3 direction)
 {
     float size = length(numbers.yzw);

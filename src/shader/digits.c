@@ -16,11 +16,11 @@
  * A surface in fog ends a ray at a distance that is off by a 2^-22 of it: a 2^-23 each for its place and for the ray. That changes
  * transmittance by 2^-22 s d exp(-x), with s the extinction there and x the optical depth up to the surface: by no more than 2^-22 s d, with d the
  * distance at which fog begins. */
-#include "march/snapshot.h"
-#include "view.h"
+#include "fog/snapshot.h"
+#include "view_rays.h"
 
-#include "base/vector.h"
-#include "media/grid.h"
+#include "math/vector.h"
+#include "medium/grid.h"
 
 #include <math.h>
 

@@ -1,4 +1,4 @@
-/* Ambient light by direction, from the words of nebel_pack_environment: what src/media/sky.c and sky_map.c say of it, in float. Without
+/* Ambient light by direction, from the words of nebel_pack_environment: what src/light/environment.c and environment_map.c say of it, in float. Without
  * NEBEL_ENVIRONMENT_TEXEL it is dark. */
 #ifndef NEBEL_ENVIRONMENT_TEXEL
 #define NEBEL_ENVIRONMENT_TEXEL(i) nb_vec4(0.0, 0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-/* The march in shading languages: what src/march does, for one ray, from the words of layout.h; walk.glsl puts it together.
+/* The march in shading languages: what src/march does, for one ray, from the words of layout.h; trace.glsl puts it together.
  *
  * Transmittance is a plain sum over media, and so is light where one medium or one radiance is met: most rays end there
  * (nb_sum_media). Where light of different colour mixes, or one medium takes away another's fog, nb_walk goes from event to event

@@ -1,4 +1,4 @@
-/* What a ray meets in voxels, from the texels of layout.h, as src/media/grid_walk.c has it: bricks, and the cells of those that are
+/* What a ray meets in voxels, from the texels of layout.h, as src/medium/grid_walk.c has it: bricks, and the cells of those that are
  * not even. Without NEBEL_VOXEL_TEXEL there are none. */
 #ifndef NEBEL_VOXEL_TEXEL
 #define NEBEL_VOXEL_TEXEL(i) nb_uvec4(0u, 0u, 0u, 0u)

@@ -1,4 +1,4 @@
-/* The way from places on a ray to the sun, as src/march/trace_sun.h and trace_turns.h have it: the optical depth there, and the
+/* The way from places on a ray to the sun, as src/trace/trace_sun.h and trace_breakpoints.h have it: the optical depth there, and the
  * *turns*, where that way begins or ends to meet a body or passes one of its edges. Between turns the depth is smooth along the ray.
  *
  * What surfaces keep away is the host's to say, by a function that it defines before this text:

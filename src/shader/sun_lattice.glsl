@@ -1,4 +1,4 @@
-/* How much fog lies between places in voxels and the sun: from the sun lattices of layout.h, whose nodes src/media/grid_lattice.c finds,
+/* How much fog lies between places in voxels and the sun: from the sun lattices of layout.h, whose nodes src/light/sun_lattice.c finds,
  * or by a walk to the sun where they do not hold what lies between them. */
 
 /* A ray in nodes of a lattice: from + slope s, s in metres. */

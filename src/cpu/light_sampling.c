@@ -1,0 +1,112 @@
+#include "light_sampling.h"
+
+#include "light/light_radius.h"
+#include "math/vector.h"
+
+#define PI 3.14159265358979323846
+
+static double largest(const double rgb[3])
+{
+    return fmax(rgb[0], fmax(rgb[1], rgb[2]));
+}
+
+/* ---- places ---------------------------------------------------------------------------------- */
+
+/* The part of its light that a spot sends off its axis. */
+static double cone_of(const nebel_light *lamp, const double direction[3])
+{
+    if (lamp->type != NEBEL_LIGHT_SPOT) return 1;
+    const double outer = cos(lamp->outer_angle * (PI / 180)), inner = cos(lamp->inner_angle * (PI / 180));
+    double axis[3] = {lamp->direction[0], lamp->direction[1], lamp->direction[2]};
+    (void)nb_vector_make_unit(axis);
+    const double cosine = -nb_vector_dot(axis, direction);
+    if (cosine >= inner) return 1;
+    if (cosine <= outer) return 0;
+    const double s = (cosine - outer) / (inner - outer);
+    return s * s * (3 - 2 * s);
+}
+
+nb_sampled_light nb_light_sight_from(const nebel_light *lamp, const double place[3])
+{
+    nb_sampled_light sight;
+    for (int i = 0; i < 3; i++) sight.direction[i] = lamp->position[i] - place[i];
+    const double distance = nb_vector_length(sight.direction), radius = nb_light_radius(lamp->radius);
+    for (int i = 0; i < 3 && distance > 0; i++) sight.direction[i] /= distance;
+    const double nearest = fmax(distance, radius), part = radius / nearest;
+    sight.reach = fmax(distance - lamp->radius, 0);
+    sight.shadowed = fmax(distance - radius, 0);
+    sight.beam = cone_of(lamp, sight.direction) / (nearest * nearest);
+    sight.fluence = sight.beam * 2 / (1 + sqrt(1 - part * part));
+    return sight;
+}
+
+/* ---- rays ------------------------------------------------------------------------------------ */
+
+nb_light_pass nb_passing_of(const nebel_light *lamp, const nebel_ray *ray)
+{
+    double to_lamp[3], aside[3];
+    for (int i = 0; i < 3; i++) to_lamp[i] = lamp->position[i] - ray->origin[i];
+    nb_light_pass p = {.start = -nb_vector_dot(to_lamp, ray->direction), .t_max = ray->t_max};
+    for (int i = 0; i < 3; i++) aside[i] = to_lamp[i] + p.start * ray->direction[i];
+    p.aside = fmax(nb_vector_length(aside), nb_light_radius(lamp->radius));
+    /* One angle between two places; as the difference of two it would be lost to rounding far from the lamp. */
+    p.angle = atan2(p.aside * p.t_max, p.aside * p.aside + p.start * (p.start + p.t_max));
+    return p;
+}
+
+double nb_passing_draw(const nb_light_pass *p, double chance)
+{
+    const double angle = chance * p->angle, square = p->start * p->start + p->aside * p->aside;
+    const double down = p->aside * cos(angle) - p->start * sin(angle);
+    return down > 0 ? fmin(square * sin(angle) / down, p->t_max) : p->t_max;
+}
+
+double nb_passing_density(const nb_light_pass *p, double t)
+{
+    const double from = p->start + t;
+    return p->aside / (p->angle * (p->aside * p->aside + from * from));
+}
+
+/* ---- one of many ----------------------------------------------------------------------------- */
+
+double nb_light_weight_at(const nebel_light *lamp, const nebel_ray *ray)
+{
+    return largest(lamp->intensity) * nb_light_sight_from(lamp, ray->origin).fluence;
+}
+
+double nb_light_weight_along(const nebel_light *lamp, const nebel_ray *ray)
+{
+    const nb_light_pass passing = nb_passing_of(lamp, ray);
+    return largest(lamp->intensity) * passing.angle / passing.aside;
+}
+
+double nb_lights_sum(const nebel_scene_data *scene, nb_light_weigh *weigh, const nebel_ray *ray)
+{
+    double sum = 0;
+    for (size_t i = 0; i < scene->light_count; i++) sum += weigh(&scene->lights[i], ray);
+    return sum;
+}
+
+const nebel_light *nb_lights_choose(const nebel_scene_data *scene, nb_light_weigh *weigh, const nebel_ray *ray,
+                                    double sum, double chance)
+{
+    const nebel_light *chosen = NULL;
+    double left = chance * sum;
+    for (size_t i = 0; i < scene->light_count && (chosen == NULL || left >= 0); i++) {
+        const double weight = weigh(&scene->lights[i], ray);
+        if (weight > 0) chosen = &scene->lights[i]; /* the last one, where rounding leaves some */
+        left -= weight;
+    }
+    return chosen;
+}
+
+double nb_lights_density(const nebel_scene_data *scene, const nebel_ray *ray, double sum, double t)
+{
+    double density = 0;
+    for (size_t i = 0; i < scene->light_count; i++) {
+        const nb_light_pass passing = nb_passing_of(&scene->lights[i], ray);
+        const double part = nb_light_weight_along(&scene->lights[i], ray) / sum;
+        if (part > 0) density += part * nb_passing_density(&passing, t);
+    }
+    return density;
+}

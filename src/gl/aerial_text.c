@@ -1,0 +1,413 @@
+#include "aerial_text.h"
+
+#include "aerial/irradiance_table.h"
+
+#include <stdio.h>
+
+const char *nb_air_head(int worlds, char text[NB_AIR_HEAD])
+{
+    text[0] = '\0';
+    if (worlds > 0)
+        (void)snprintf(text, NB_AIR_HEAD,
+                       "#define NEBEL_SKY_VIEW\n#define SCENE_WORLDS %d\n#define NB_IRRADIANCE_HEIGHTS %d.0\n#define "
+                       "NB_IRRADIANCE_SUNS %d.0\n#define NB_IRRADIANCE_SKIES %d.0\n#define NB_IRRADIANCE_TWILIGHT %g\n"
+                       "#define NB_IRRADIANCE_OF_SURFACES %d\n#define NB_IRRADIANCE_OF_FOG %d\n",
+                       worlds, NB_IRRADIANCE_HEIGHTS, NB_IRRADIANCE_SUNS, NB_IRRADIANCE_SKIES, NB_IRRADIANCE_TWILIGHT,
+                       NB_IRRADIANCE_OF_SURFACES, NB_IRRADIANCE_OF_FOG);
+    return text;
+}
+
+/* The tables of several planets lie in one texture, one behind the other. */
+const char nb_air_words_text[] =
+    "uniform highp sampler2D nebel_sky_view_texture;\n"
+    "highp int air_first = 0;\n" /* of the planet that is asked */
+    "#define NEBEL_SKY_VIEW_TEXEL(i) texelFetch(nebel_sky_view_texture, ivec2((air_first + (i)) & "
+    "1023, (air_first + (i)) >> 10), 0)\n"
+    /* What fog has of the sun, and of the sky of the origin. */
+    "#if defined(PASS_DAYLIGHT) || defined(PASS_SHADE)\n"
+    "#define PASS_RELIT\n"
+    "highp vec3 fog_sun = vec3(1.0), fog_sky = vec3(1.0);\n"
+    "#define NEBEL_SUN_SCALE fog_sun\n"
+    "#define NEBEL_ENVIRONMENT_SCALE fog_sky\n"
+    "#endif\n"
+    "#ifdef PASS_DAYLIGHT\n"
+    "uniform highp vec3 scene_sun;\n"
+    "#endif\n";
+
+const char nb_air_planets_text[] =
+    "uniform ivec3 world_words[SCENE_WORLDS];\n" /* of its table; from there on of light at places, -1: none; has it air? */
+    "uniform vec4 world_eyes[SCENE_WORLDS];\n"  /* up from its centre to the eye; how high that is above the ground */
+    "uniform vec2 world_sizes[SCENE_WORLDS];\n" /* radius; how thick the air is */
+    "uniform vec3 world_albedos[SCENE_WORLDS];\n"
+    "void choose_world(int world) { air_first = world_words[world].x; }\n"
+    /* The nearest one; and whose it is. */
+    "nebel_ground nearest_ground(vec3 direction, out int world)\n"
+    "{\n"
+    "    world = 0;\n"
+    "    choose_world(0);\n"
+    "    nebel_ground nearest = nebel_trace_ground(direction);\n"
+    "    for (int k = 1; k < SCENE_WORLDS; k++) {\n"
+    "        choose_world(k);\n"
+    "        nebel_ground ground = nebel_trace_ground(direction);\n"
+    "        if (ground.distance < nearest.distance) {\n"
+    "            nearest = ground;\n"
+    "            world = k;\n"
+    "        }\n"
+    "    }\n"
+    "    return nearest;\n"
+    "}\n"
+    /* In their order, in which rays pass them. */
+    "nb_air_ray world_rays[SCENE_WORLDS];\n"
+    "void find_airs(vec3 direction, out float begin, out float end)\n"
+    "{\n"
+    "    begin = 1e18;\n"
+    "    end = 0.0;\n"
+    "    for (int k = 0; k < SCENE_WORLDS; k++) {\n"
+    "        choose_world(k);\n"
+    "        world_rays[k] = nb_find_air(direction);\n"
+    "        if (world_words[k].z == 0 || !(world_rays[k].span > 0.0)) continue;\n"
+    "        begin = min(begin, world_rays[k].begin);\n"
+    "        end = max(end, world_rays[k].begin + world_rays[k].span);\n"
+    "    }\n"
+    "    begin = min(begin, end);\n"
+    "}\n"
+    "nebel_transfer airs_up_to(float t)\n"
+    "{\n"
+    "    nebel_transfer all;\n"
+    "    all.transmittance = vec3(1.0);\n"
+    "    all.in_scattering = vec3(0.0);\n"
+    "    for (int k = 0; k < SCENE_WORLDS; k++) {\n"
+    "        if (world_words[k].z == 0) continue;\n"
+    "        choose_world(k);\n"
+    "        nebel_transfer one = nb_air_light(world_rays[k], t);\n"
+    "        all.in_scattering += all.transmittance * one.in_scattering;\n"
+    "        all.transmittance *= one.transmittance;\n"
+    "    }\n"
+    "    return all;\n"
+    "}\n";
+
+const char nb_air_places_text[] =
+    "uniform float disc_radius;\n" /* radians; 0: there is none */
+    "uniform bool sky_is_ambient;\n"
+    /* What of the disc another leaves, as aerial/eclipse.h has it: both count as flat. */
+    "float disc_left(float ball, float apart)\n"
+    "{\n"
+    "    float sun = disc_radius;\n"
+    "    if (!(apart < sun + ball)) return 1.0;\n"
+    "    if (apart <= ball - sun) return 0.0;\n"
+    "    if (apart <= sun - ball) return 1.0 - ball * ball / (sun * sun);\n"
+    "    float across = (apart - ball) * (apart + ball);\n"
+    "    float a = acos(clamp((across + sun * sun) / (2.0 * apart * sun), -1.0, 1.0));\n"
+    "    float b = acos(clamp((across + 2.0 * ball * ball - sun * sun) / (2.0 * apart * ball), -1.0, 1.0));\n"
+    "    float overlap = sun * sun * (a - sin(a) * cos(a)) + ball * ball * (b - sin(b) * cos(b));\n"
+    "    return clamp(1.0 - overlap / (3.14159265358979 * sun * sun), 0.0, 1.0);\n"
+    "}\n"
+    /* What other planets leave of it at a place, from the eye. */
+    "float uneclipsed(int world, vec3 at)\n"
+    "{\n"
+    "    float left = 1.0;\n"
+    "    for (int k = 0; k < SCENE_WORLDS; k++) {\n"
+    "        float radius = world_sizes[k].x;\n"
+    "        vec3 to_ball = -(radius + world_eyes[k].w) * world_eyes[k].xyz - at;\n"
+    "        float far = length(to_ball), tangent = sqrt(max((far - radius) * (far + radius), 0.0));\n"
+    "        if (k == world) continue;\n"
+    "        if (!(far > radius)) return 0.0;\n"
+    "        left *= disc_left(atan(radius, tangent),\n"
+    "                          atan(length(cross(to_ball, scene_sun)), dot(to_ball, scene_sun)));\n"
+    "    }\n"
+    "    return left;\n"
+    "}\n"
+    /* The square of the tangent from a place to the ball that ends `above` the ground of a planet. */
+    "float world_power(int world, vec3 at, float above)\n"
+    "{\n"
+    "    float radius = world_sizes[world].x, height = world_eyes[world].w;\n"
+    "    return (height - above) * (2.0 * radius + height + above) +\n"
+    "           2.0 * (radius + height) * dot(world_eyes[world].xyz, at) + dot(at, at);\n"
+    "}\n"
+    "float height_of(float radius, float power) { return power / (radius + sqrt(max(radius * radius + power, 0.0))); "
+    "}\n"
+    /* The table of aerial/irradiance_table.h: of the way to a sun that is not below the level. */
+    "vec3 daylight_depth(int first, float height, float cosine)\n"
+    "{\n"
+    "    vec2 h = nb_air_place(sqrt(clamp(height, 0.0, 1.0)) * (NB_IRRADIANCE_HEIGHTS - 1.0), NB_IRRADIANCE_HEIGHTS);\n"
+    "    vec2 s = nb_air_place(sqrt(clamp(cosine, 0.0, 1.0)) * (NB_IRRADIANCE_SUNS - 1.0), NB_IRRADIANCE_SUNS);\n"
+    "    int at = first + int(h.x) * int(NB_IRRADIANCE_SUNS) + int(s.x), above = at + int(NB_IRRADIANCE_SUNS);\n"
+    "    vec3 low = nb_toward(NEBEL_SKY_VIEW_TEXEL(at).xyz, NEBEL_SKY_VIEW_TEXEL(at + 1).xyz, s.y);\n"
+    "    vec3 high = nb_toward(NEBEL_SKY_VIEW_TEXEL(above).xyz, NEBEL_SKY_VIEW_TEXEL(above + 1).xyz, s.y);\n"
+    "    return nb_toward(low, high, h.y);\n"
+    "}\n"
+    /* A sun below the level is seen along the whole level ray through the lowest place of the way to it, but for the part
+       behind the eye. */
+    "vec3 daylight_sun(int world, int first, float power, float rise)\n"
+    "{\n"
+    "    float radius = world_sizes[world].x, top = world_sizes[world].y;\n"
+    "    float height = height_of(radius, power), cosine = rise / (radius + height);\n"
+    "    vec3 own = vec3(0), low = vec3(0);\n"
+    "    if (height <= top) own = daylight_depth(first, height / top, abs(cosine));\n"
+    "    if (cosine >= 0.0) return exp(-own);\n"
+    "    float lowest = height_of(radius, power - rise * rise);\n"
+    "    if (!(lowest >= 0.0)) return vec3(0.0);\n"
+    "    if (lowest <= top) low = daylight_depth(first, lowest / top, 0.0);\n"
+    "    return exp(min(own - 2.0 * low, 0.0));\n"
+    "}\n"
+    "vec3 daylight_sky(int first, int of, float cosine)\n"
+    "{\n"
+    "    float x = sign(cosine) * log(1.0 + abs(cosine) / NB_IRRADIANCE_TWILIGHT) / log(1.0 + 1.0 / "
+    "NB_IRRADIANCE_TWILIGHT);\n"
+    "    vec2 s = nb_air_place(0.5 * (x + 1.0) * (NB_IRRADIANCE_SKIES - 1.0), NB_IRRADIANCE_SKIES);\n"
+    "    int at = first + int(NB_IRRADIANCE_HEIGHTS * NB_IRRADIANCE_SUNS) + of * int(NB_IRRADIANCE_SKIES) + int(s.x);\n"
+    "    return exp(nb_toward(NEBEL_SKY_VIEW_TEXEL(at).xyz, NEBEL_SKY_VIEW_TEXEL(at + 1).xyz, s.y));\n"
+    "}\n"
+    /* What is left of the sun, and how much brighter the sky is than at the scene's origin, for whom: those of the planet that is
+       nearest by tangents to the balls of air. */
+    "void daylight_at(vec3 at, int of, out vec3 sun, out vec3 sky)\n"
+    "{\n"
+    "    int world = 0;\n"
+    "    for (int k = 1; k < SCENE_WORLDS; k++)\n"
+    "        if (world_power(k, at, world_sizes[k].y) < world_power(world, at, world_sizes[world].y)) world = k;\n"
+    "    int first = world_words[world].y;\n"
+    "    sun = sky = vec3(1.0);\n"
+    "    if (first < 0) return;\n"
+    "    float radius = world_sizes[world].x, power = world_power(world, at, 0.0);\n"
+    "    float rise = dot((radius + world_eyes[world].w) * world_eyes[world].xyz + at, scene_sun);\n"
+    "    choose_world(world);\n"
+    "    sun = uneclipsed(world, at) * daylight_sun(world, first, power, rise);\n"
+    "    float far = radius + height_of(radius, power);\n"
+    "    if (sky_is_ambient) sky = daylight_sky(first, of, far > 0.0 ? clamp(rise / far, -1.0, 1.0) : 1.0);\n"
+    "}\n";
+
+/* Air and fog let through less the farther a ray goes and add light all the way, so that between two places the integral
+ * of T_fog dS_air + T_air dS_fog is within what it is with the transmittances of the one place and of the other: the mean
+ * is taken, and pieces are shorter where half of the products of differences is more than the tolerance
+ * (src/cpu/aerial_compose.c). Here they follow each other from where air begins, the first one up to where it begins to count, and
+ * the walk through fog goes on from piece to piece: what is in doubt goes with the square of a piece's length, what is
+ * wrong with its cube, so that less than a tenth of that is. Before air and behind it is one piece each, without doubt. The
+ * last piece is what is left where there are too many, or too many turns of loops.
+ *
+ * In daylight that changes, fog within a piece has the mean of the sun and of the sky at both of its ends, half of whose difference is
+ * in doubt. From the lowest place of a ray on daylight changes one way, but in shadows of other planets. There may be fog in doubt
+ * outside the air, too; beyond all planets it has the light of both ends of its piece. Where clouds shade it by its place it has the
+ * mean of their shade over the piece, too, which may be off by as much as shade is anywhere on it. */
+const char nb_air_pieces_text[] =
+    "#ifndef PASS_CLOUDS\n"
+    "nebel_transfer pass_air(float t) { return airs_up_to(t); }\n"
+    "#endif\n"
+    "#ifdef PASS_SHADE\n"
+    "#define PASS_KNOTS 192\n"
+    "#else\n"
+    "#define PASS_KNOTS 64\n"
+    "struct pass_shade { vec2 mean; vec2 doubt; float cut; };\n"
+    "void pass_leave_fog_shade(float at) { }\n"
+    "pass_shade pass_fog_shade_between(float a, float b) { return pass_shade(vec2(1.0), vec2(0.0), 0.0); }\n"
+    "#endif\n"
+    "struct pass_knot { float at; nebel_transfer fog; nebel_transfer air; vec3 sun; vec3 sky; };\n" /* the last two: of daylight */
+    /* Goes on with the fog of a ray, up to t. */
+    "nebel_transfer pass_on(inout nb_progress progress, nebel_view_ray view, int entry, float t)\n"
+    "{\n"
+    "    if (!nb_is_ray(view.origin, view.direction, t)) return nb_clear();\n"
+    "#ifdef NEBEL_TILES\n"
+    "    nb_media media = nb_media_of(NEBEL_TILE_ENTRY(entry), NEBEL_TILE_ENTRY(entry + 1), true);\n"
+    "#else\n"
+    "    nb_media media = nb_media_of(0, int(NEBEL_FOG_TEXEL(0).x), false);\n"
+    "#endif\n"
+    "    progress.stage = NB_STAGE_WALK;\n"
+    "    return nb_trace_further(progress, nb_ray_up_to(view.origin, view.direction, t, true), media, true, true);\n"
+    "}\n"
+    "float pass_largest(vec3 v) { return max(v.x, max(v.y, v.z)); }\n"
+    "#ifdef PASS_RELIT\n"
+    "uniform float daylight_reach;\n" /* no planet is farther off */
+    /* Of light in the mean of what it is at both ends, and in the shade between. Of what the sky adds the fog's own light is not told
+       apart. */
+    "vec3 pass_daylight_doubt(pass_knot a, pass_knot b, pass_shade shade, nb_gathered near, nb_gathered far)\n"
+    "{\n"
+    "    vec3 of_sun = max(far.sunlight - near.sunlight, 0.0);\n"
+    "    vec3 of_sky = max(far.radiance - near.radiance - of_sun, 0.0);\n"
+    "    vec2 by_shade = shade.doubt / max(shade.mean, vec2(1e-6));\n"
+    "    return 0.5 * (a.air.transmittance + b.air.transmittance) *\n"
+    "           ((by_shade.x + abs(b.sun - a.sun) / max(a.sun + b.sun, 1e-30)) * of_sun +\n"
+    "            (by_shade.y + abs(b.sky - a.sky) / max(a.sky + b.sky, 1e-30)) * of_sky);\n"
+    "}\n"
+    "#endif\n"
+    "#ifdef PASS_DAYLIGHT\n"
+    "uniform float even_shade;\n"
+    "void pass_set_daylight(inout pass_knot knot, vec3 direction)\n"
+    "{\n"
+    "    daylight_at(knot.at * direction, NB_IRRADIANCE_OF_FOG, knot.sun, knot.sky);\n"
+    "    knot.sun *= even_shade;\n"
+    "}\n"
+    "float pass_next_lowest(vec3 direction, float after)\n"
+    "{\n"
+    "    float next = 1e18;\n"
+    "    for (int k = 0; k < SCENE_WORLDS; k++) {\n"
+    "        float lowest = -(world_sizes[k].x + world_eyes[k].w) * dot(world_eyes[k].xyz, direction);\n"
+    "        if (lowest > after) next = min(next, lowest);\n"
+    "    }\n"
+    "    return next;\n"
+    "}\n"
+    "#elif defined(PASS_SHADE)\n"
+    "void pass_set_daylight(inout pass_knot knot, vec3 direction) { knot.sun = knot.sky = vec3(1.0); }\n"
+    "#endif\n"
+    /* `light`: what is in doubt of the fog's own. */
+    "float pass_doubt(pass_knot a, pass_knot b, vec3 light)\n"
+    "{\n"
+    "    vec3 fog = (a.fog.transmittance - b.fog.transmittance) * (b.air.in_scattering - a.air.in_scattering);\n"
+    "    vec3 air = (a.air.transmittance - b.air.transmittance) * (b.fog.in_scattering - a.fog.in_scattering);\n"
+    "    return pass_largest(0.5 * (abs(fog) + abs(air)) + light);\n"
+    "}\n"
+    "vec3 pass_piece(pass_knot a, pass_knot b)\n"
+    "{\n"
+    "    return 0.5 * ((a.fog.transmittance + b.fog.transmittance) * (b.air.in_scattering - a.air.in_scattering) +\n"
+    "                  (a.air.transmittance + b.air.transmittance) * (b.fog.in_scattering - a.fog.in_scattering));\n"
+    "}\n";
+
+const char nb_air_aerial_text[] =
+    "nebel_transfer pass_haze(nebel_view_ray view, int entry)\n"
+    "{\n"
+    "    nb_progress progress = nb_open_progress();\n"
+    "    pass_knot from, here;\n"
+    "    float begin, end;\n"
+    "    find_airs(view.direction, begin, end);\n"
+    "#ifdef PASS_CLOUDS\n"
+    "    pass_open_shade();\n"
+    "#endif\n"
+    "    begin = min(begin, view.t_max);\n"
+    "    end = min(end, view.t_max);\n"
+    "    nebel_transfer air = airs_up_to(end);\n"
+    "    float brightest = pass_largest(air.in_scattering);\n"
+    "    float counts = max(brightest, pass_largest(1.0 - air.transmittance));\n"
+    "    float tolerance = 1e-3 * max(1.0, brightest);\n"
+    "    float way = (end - begin) * clamp(tolerance / max(counts, 1e-6), 1e-6, 0.5);\n"
+    "    from.at = 0.0;\n"
+    "    from.fog = from.air = nb_clear();\n"
+    "#ifdef PASS_RELIT\n"
+    "    float reach = min(daylight_reach, view.t_max);\n"
+    "    pass_set_daylight(from, view.direction);\n"
+    "#endif\n"
+    "#ifdef PASS_SHADE\n"
+    "    pass_open_fog_shade();\n"
+    "#endif\n"
+    "    vec3 light = vec3(0.0);\n"
+    "    float far = 1e30;\n" /* the nearest end that was too far */
+    "    bool is_last = false;\n"
+    "    for (int i = 0; i < PASS_KNOTS && from.at < view.t_max && !is_last; i++) {\n"
+    "        nb_progress further = progress;\n"
+    "        is_last = i + 1 == PASS_KNOTS || nb_is_tired(progress.turns);\n"
+    "        here.at = from.at < begin ? begin : from.at < end ? min(from.at + way, end) : view.t_max;\n"
+    "#ifdef PASS_DAYLIGHT\n"
+    "        here.at = min(here.at, pass_next_lowest(view.direction, from.at));\n"
+    "#endif\n"
+    "        if (is_last || !(here.at > from.at)) here.at = view.t_max;\n"
+    "#ifdef PASS_RELIT\n"
+    "        pass_shade shade = pass_fog_shade_between(from.at, here.at);\n"
+    "        pass_set_daylight(here, view.direction);\n"
+    "        fog_sun = 0.5 * shade.mean.x * (from.sun + here.sun);\n"
+    "        fog_sky = 0.5 * shade.mean.y * (from.sky + here.sky);\n"
+    "#endif\n"
+    "        here.fog = pass_on(further, view, entry, here.at);\n"
+    "        here.air = pass_air(here.at);\n"
+    "        vec3 in_doubt = vec3(0.0);\n"
+    "#ifdef PASS_RELIT\n"
+    "        in_doubt = pass_daylight_doubt(from, here, shade, progress.walked, further.walked);\n"
+    "#endif\n"
+    "        float doubt = pass_doubt(from, here, in_doubt);\n"
+    /* What cannot be walked once more is kept: the rest of a ray that never was walked has no sunlight. */
+    "        bool is_done = doubt <= tolerance || is_last || nb_is_tired(2 * further.turns - progress.turns);\n"
+    "        if (from.at >= begin) way = (here.at - from.at) * clamp(0.9 * sqrt(tolerance / max(doubt, 1e-9)), 0.1, "
+    "4.0);\n"
+    "        progress.turns = further.turns;\n"
+    "#ifdef PASS_RELIT\n"
+    "        if (!is_done && from.at < begin) begin = from.at;\n"
+    "        if (!is_done && from.at >= end) end = reach;\n"
+    "        is_done = is_done || from.at >= end;\n"
+    "        if (!is_done && shade.cut > from.at && pass_largest(in_doubt) > 0.5 * doubt) way = shade.cut - from.at;\n"
+    "#endif\n"
+    /* The way to what was too far once would cost as many turns again, were it tried from each place on: pieces come to it by halves. */
+    "        if (!is_done) far = here.at;\n"
+    "        if (is_done && far > here.at) way = min(way, max(0.5 * (far - here.at), here.at - from.at));\n"
+    "        if (is_done) {\n"
+    "            light += pass_piece(from, here);\n"
+    "            from = here;\n"
+    "            progress = further;\n"
+    "            pass_leave_fog_shade(from.at);\n"
+    "        }\n"
+    "    }\n"
+    "    nebel_transfer all;\n"
+    "    all.transmittance = from.fog.transmittance * from.air.transmittance;\n"
+    "    all.in_scattering = max(light, 0.0);\n"
+    "    return all;\n"
+    "}\n";
+
+/* Surfaces on the ground touch it: they are seen where they lie this little behind it, which is more than rounding. From
+ * on the ground or below it all surfaces are seen before it. */
+const char nb_air_ground_text[] =
+    "layout(location = 0) out highp vec4 out_place;\n"
+    "layout(location = 1) out highp vec4 out_normal;\n"
+    "layout(location = 2) out highp vec4 out_reflectance;\n"
+    "void main()\n"
+    "{\n"
+    "    int world;\n"
+    "    nebel_ground ground = nearest_ground(ray_direction(gl_FragCoord.xy), world);\n"
+    "    if (!(ground.distance < 1e17)) discard;\n"
+    "    out_place = vec4(max(ground.distance, 1e-30), ground.normal);\n"
+    "    out_normal = vec4(ground.normal, 0.0);\n"
+    "    out_reflectance = vec4(world_albedos[world], 1.0);\n"
+    "    gl_FragDepth = ground.distance > 0.0 ? 1.0 / (1.001 + 1.00001 * ground.distance) : 1e-30;\n"
+    "}\n";
+
+/* The disc is darker towards its edge, mu^a (src/cpu/cpu_planets.c says by whom). Its edge is spread over a pixel, and one of less is
+ * widened to that; rings say how much light it would have then. */
+const char nb_air_sun_text[] =
+    "uniform vec3 disc_light;\n" /* mean radiance above the air */
+    "float pixel_width(vec2 pixel)\n"
+    "{\n"
+    "#ifdef SCENE_PANORAMA\n"
+    "    return 1.5707963267949 * RAY_WORD(1).y;\n"
+    "#else\n"
+    "    return length(RAY_WORD(5)) / length(RAY_WORD(3) + pixel.x * RAY_WORD(4) + pixel.y * RAY_WORD(5));\n"
+    "#endif\n"
+    "}\n"
+    "vec3 disc_at(float radius, float width, float angle)\n"
+    "{\n"
+    "    vec3 powers = vec3(-0.023) + 0.292 / vec3(0.68, 0.55, 0.44);\n"
+    "    float cover = clamp((radius - angle) / width + 0.5, 0.0, 1.0), part = angle / (radius + 0.5 * width);\n"
+    "    float mu = sqrt(max(1.0 - part * part, 1e-12));\n"
+    "    return 0.5 * cover * (powers + 2.0) * pow(vec3(mu), powers);\n"
+    "}\n"
+    "vec3 sun_disc(vec3 direction, vec2 pixel)\n"
+    "{\n"
+    "    float width = pixel_width(pixel), radius = max(disc_radius, 0.5 * width);\n"
+    "    float angle = length(direction - scene_sun), far = radius + 0.5 * width, ring = far / 32.0;\n"
+    "    int rings = disc_radius > 0.0 && angle < far ? 32 : 0;\n"
+    "    vec3 sum = vec3(0.0);\n"
+    "    for (int i = 0; i < rings; i++) {\n"
+    "        float at = (float(i) + 0.5) * ring;\n"
+    "        sum += 2.0 * at * ring * disc_at(radius, width, at);\n"
+    "    }\n"
+    "    if (rings == 0) return vec3(0.0);\n"
+    "    return disc_light * disc_radius * disc_radius / sum * disc_at(radius, width, angle);\n"
+    "}\n";
+
+const char nb_air_light_text[] = "float sky_left()\n"
+                                 "{\n"
+                                 "#ifdef SCENE_CLOUDS\n"
+                                 "    return texelFetch(scene_dimming, ivec2(gl_FragCoord.xy), 0).a;\n"
+                                 "#else\n"
+                                 "    return 1.0;\n"
+                                 "#endif\n"
+                                 "}\n"
+                                 "void light_ground(vec3 direction, vec3 at, inout vec3 light, inout vec3 shining)\n"
+                                 "{\n"
+                                 "    int world;\n"
+                                 "    nebel_ground ground = nearest_ground(direction, world);\n"
+                                 "    light = 0.31830988618379 * sky_left() * ground.sky;\n"
+                                 "    shining = 0.31830988618379 * uneclipsed(world, at) * ground.sun;\n"
+                                 "}\n"
+                                 /* Of a white surface, without shadows. */
+                                 "void light_model(vec3 at, inout vec3 light, inout vec3 shining)\n"
+                                 "{\n"
+                                 "    vec3 sun, sky;\n"
+                                 "    daylight_at(at, NB_IRRADIANCE_OF_SURFACES, sun, sky);\n"
+                                 "    shining *= sun;\n"
+                                 "    light *= sky;\n"
+                                 "    if (sky_is_ambient) light *= sky_left();\n"
+                                 "}\n";

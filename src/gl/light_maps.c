@@ -1,0 +1,335 @@
+#include "light_maps.h"
+
+#include "gl_camera.h"
+#include "scene_programs.h"
+#include "gl_state.h"
+#include "gl_targets.h"
+
+#include "light/light_radius.h"
+#include "math/vector.h"
+
+#include <nebel/shader.h>
+
+#include <epoxy/gl.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+/* What maps may take together [texels]: 128 MiB. */
+#define MOST_TEXELS ((size_t)1 << 25)
+
+enum { FACES = 6, LEAST_FACE = 64 };
+
+static nebel_result out_of_memory(const nebel_log *log)
+{
+    return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory for lamps");
+}
+
+/* ---- words ----------------------------------------------------------------------------------- */
+
+/* As formulas/point_light.inc has it. Without a cone everything is within. */
+static void set_cone(const nebel_light *lamp, float *axis, float *rise)
+{
+    const double edge = cos(lamp->outer_angle * (PI / 180)), inner = cos(lamp->inner_angle * (PI / 180));
+    double direction[3] = {lamp->direction[0], lamp->direction[1], lamp->direction[2]};
+    const int is_spot = lamp->type == NEBEL_LIGHT_SPOT && nb_vector_make_unit(direction);
+    for (int i = 0; i < 3; i++) axis[i] = is_spot ? (float)direction[i] : 0;
+    axis[3] = is_spot ? (float)edge : -1;
+    *rise = is_spot ? (float)fmin(1 / (inner - edge), 1e30) : 1e30f;
+}
+
+static void set_words(const nebel_light *lamp, const double eye[3], int layer, int fog_layer, float *words)
+{
+    const double radius = nb_light_radius(lamp->radius);
+    nb_camera_subtract(lamp->position, eye, words);
+    words[3] = (float)layer;
+    for (int i = 0; i < 3; i++) words[4 + i] = (float)lamp->intensity[i];
+    words[7] = (float)(radius * radius);
+    set_cone(lamp, words + 8, words + 12);
+    words[13] = (float)lamp->radius;
+    words[14] = (float)fog_layer;
+    words[15] = 0;
+}
+
+/* Whether it is the lamp of this number in the fog, too. */
+static int is_in_fog(const nebel_light *lamp, const nebel_snapshot *fog, size_t number)
+{
+    double place[3], radius;
+    if (fog == NULL || number >= nebel_snapshot_lamp_count(fog)) return 0;
+    nebel_snapshot_lamp(fog, number, place, &radius);
+    return place[0] == lamp->position[0] && place[1] == lamp->position[1] && place[2] == lamp->position[2] &&
+           radius == lamp->radius;
+}
+
+static void fill_words(nb_light_maps *lamps, uint32_t rows)
+{
+    if (lamps->words == 0) {
+        glGenTextures(1, &lamps->words);
+        lamps->rows = 0;
+    }
+    glBindTexture(GL_TEXTURE_2D, lamps->words);
+    if (rows > lamps->rows) {
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, NEBEL_TEXTURE_WIDTH, (GLsizei)rows, 0, GL_RGBA, GL_FLOAT, NULL);
+        lamps->rows = rows;
+    }
+    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, NEBEL_TEXTURE_WIDTH, (GLsizei)rows, GL_RGBA, GL_FLOAT, lamps->texels);
+}
+
+static int make_room(nb_light_maps *lamps, const nebel_allocator *allocator, uint32_t rows)
+{
+    const size_t wanted = (size_t)rows * (NEBEL_TEXTURE_WIDTH / NB_LIGHT_MAP_TEXELS);
+    if (wanted <= lamps->capacity) return 1;
+    nb_release(allocator, lamps->texels);
+    nb_release(allocator, lamps->layers);
+    lamps->texels = nb_allocate_zero(allocator, 4 * (size_t)NEBEL_TEXTURE_WIDTH * rows, sizeof *lamps->texels);
+    lamps->layers = nb_allocate(allocator, wanted, sizeof *lamps->layers);
+    lamps->capacity = lamps->texels != NULL && lamps->layers != NULL ? wanted : 0;
+    return lamps->capacity > 0;
+}
+
+/* ---- which lamps have maps ------------------------------------------------------------------- */
+
+typedef struct candidate {
+    double light; /* at the eye */
+    size_t lamp;
+} candidate;
+
+static int compare_candidates(const void *a, const void *b)
+{
+    const candidate *const p = a, *const q = b;
+    if (p->light < q->light || p->light > q->light) return p->light > q->light ? -1 : 1;
+    return p->lamp < q->lamp ? -1 : p->lamp > q->lamp;
+}
+
+static double light_at(const nebel_light *lamp, const double eye[3])
+{
+    const double way[3] = {lamp->position[0] - eye[0], lamp->position[1] - eye[1], lamp->position[2] - eye[2]};
+    const double most = fmax(fmax(lamp->intensity[0], lamp->intensity[1]), lamp->intensity[2]);
+    return most / fmax(nb_vector_dot(way, way), 1);
+}
+
+static size_t choose_lamps(const nebel_scene_data *scene, const double eye[3], size_t room, candidate *list)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < scene->light_count; i++) {
+        const double light = light_at(&scene->lights[i], eye);
+        if (light > 0) list[count++] = (candidate){light, i};
+    }
+    if (count <= room) return count;
+    qsort(list, count, sizeof *list, compare_candidates);
+    return room;
+}
+
+static uint32_t face_for(const nb_light_maps *lamps, size_t count)
+{
+    uint32_t face = lamps->most_face;
+    while (face > LEAST_FACE && count * FACES * face * face > MOST_TEXELS) face /= 2;
+    return face;
+}
+
+static void delete_maps(nb_light_maps *lamps)
+{
+    glDeleteFramebuffers(1, &lamps->buffer);
+    glDeleteTextures(1, &lamps->maps);
+    lamps->maps = lamps->buffer = 0;
+}
+
+static int resize(nb_light_maps *lamps, const nebel_allocator *allocator, size_t count)
+{
+    const uint32_t face = face_for(lamps, count);
+    if (count == lamps->layer_count && face == lamps->face) return 1;
+    delete_maps(lamps);
+    nb_release(allocator, lamps->sources);
+    lamps->sources = count > 0 ? nb_allocate_zero(allocator, count, sizeof *lamps->sources) : NULL;
+    lamps->layer_count = lamps->sources != NULL ? count : 0;
+    lamps->face = face;
+    return lamps->layer_count == count;
+}
+
+static int shows(const nb_light_map_source *source, const nebel_light *lamp)
+{
+    return source->is_drawn && memcmp(source->place, lamp->position, sizeof source->place) == 0 &&
+           memcmp(&source->radius, &lamp->radius, sizeof source->radius) == 0;
+}
+
+/* Lamps whose maps are there keep them; others take the layers that are left. */
+static void assign_layers(nb_light_maps *lamps, const nebel_scene_data *scene, const candidate *list)
+{
+    const size_t count = lamps->layer_count;
+    for (size_t i = 0; i < scene->light_count; i++) lamps->layers[i] = -1;
+    for (size_t k = 0; k < count; k++) {
+        int kept = 0;
+        for (size_t i = 0; i < count && !kept; i++) {
+            const size_t lamp = list[i].lamp;
+            kept = lamps->layers[lamp] < 0 && shows(&lamps->sources[k], &scene->lights[lamp]);
+            if (kept) lamps->layers[lamp] = (int)k;
+        }
+        if (!kept) lamps->sources[k].is_drawn = 0;
+    }
+    size_t next = 0;
+    for (size_t i = 0; i < count; i++) {
+        const nebel_light *const lamp = &scene->lights[list[i].lamp];
+        if (lamps->layers[list[i].lamp] >= 0) continue;
+        while (lamps->sources[next].is_drawn) next++;
+        memcpy(lamps->sources[next].place, lamp->position, sizeof lamp->position);
+        lamps->sources[next].radius = lamp->radius;
+        lamps->layers[list[i].lamp] = (int)next++;
+    }
+}
+
+static int choose_layers(nb_light_maps *lamps, const nebel_allocator *allocator, const nebel_scene_data *scene,
+                         const double eye[3])
+{
+    GLint most = 0;
+    glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &most);
+    candidate *const list = nb_allocate(allocator, scene->light_count, sizeof *list);
+    if (list == NULL) return 0;
+    const size_t room = MOST_TEXELS / (FACES * LEAST_FACE * LEAST_FACE);
+    const size_t count = choose_lamps(scene, eye, (size_t)most < room ? (size_t)most : room, list);
+    const int good = resize(lamps, allocator, count);
+    if (good) assign_layers(lamps, scene, list);
+    nb_release(allocator, list);
+    return good;
+}
+
+nebel_result nb_light_maps_set(nb_light_maps *lamps, const nebel_allocator *allocator, const nebel_log *log,
+                               const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3])
+{
+    const uint32_t rows = (uint32_t)(scene->light_count * NB_LIGHT_MAP_TEXELS / NEBEL_TEXTURE_WIDTH + 1);
+    if (scene->light_count == 0) return NEBEL_OK;
+    if (scene->light_count > NB_MAX_SHADED_LIGHTS) {
+        return nb_fail(log, NEBEL_ERROR_LIMIT,
+                       "frame: %zu lamps; OpenGL lights with at most %d. The CPU renderer has no such bound",
+                       scene->light_count, (int)NB_MAX_SHADED_LIGHTS);
+    }
+    if (!make_room(lamps, allocator, rows) || !choose_layers(lamps, allocator, scene, eye)) return out_of_memory(log);
+    for (size_t i = 0; i < scene->light_count; i++) {
+        const nebel_light *const lamp = &scene->lights[i];
+        const int layer = lamps->layers[i];
+        set_words(lamp, eye, layer, is_in_fog(lamp, fog, i) ? layer : -1, lamps->texels + 4 * NB_LIGHT_MAP_TEXELS * i);
+    }
+    fill_words(lamps, rows);
+    return nb_context_check_memory(log, "the lamps");
+}
+
+/* ---- maps ------------------------------------------------------------------------------------ */
+
+static nebel_result make_maps(nb_light_maps *lamps, const nebel_log *log)
+{
+    const GLenum none = GL_NONE;
+    glActiveTexture(GL_TEXTURE0 + NB_UNIT_LIGHT_MAPS);
+    lamps->maps = nb_targets_make_array();
+    glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_DEPTH_COMPONENT32F, (GLsizei)(3 * lamps->face), (GLsizei)(2 * lamps->face),
+                 (GLsizei)lamps->layer_count, 0, GL_DEPTH_COMPONENT, GL_FLOAT, NULL);
+    glGenFramebuffers(1, &lamps->buffer);
+    glBindFramebuffer(GL_FRAMEBUFFER, lamps->buffer);
+    glDrawBuffers(1, &none);
+    glReadBuffer(GL_NONE);
+    return nb_context_check_memory(log, "the shadow maps of lamps; use fewer lamps, or smaller maps");
+}
+
+/* Of a face, 2 axis + 1 where it looks down that axis. */
+static void set_turn(int face, float turn[9])
+{
+    for (int row = 0; row < 3; row++) {
+        for (int column = 0; column < 3; column++) turn[3 * column + row] = (face / 2 + 1 + row) % 3 == column ? 1 : 0;
+    }
+    if (face % 2 == 1) turn[3 * (face / 2) + 2] = -1;
+}
+
+/* Whether a box about the lamp reaches into the pyramid of a face, which is `wide` at a distance of 1. */
+static int is_in_face(const float low[3], const float high[3], int face, float wide)
+{
+    const int axis = face / 2;
+    const float away = face % 2 == 0 ? high[axis] : -low[axis];
+    if (!(away > 0)) return 0;
+    for (int k = 1; k < 3; k++) {
+        const int i = (axis + k) % 3;
+        if (low[i] > wide * away || high[i] < -wide * away) return 0;
+    }
+    return 1;
+}
+
+static void draw_face(const nb_light_maps *lamps, const nb_light_map_source *source, int face, unsigned program,
+                      const nb_meshes *meshes)
+{
+    const float share = 1 - 2.f * NB_LIGHT_BORDER / (float)lamps->face;
+    const GLint offset = glGetUniformLocation(program, "scene_offset"),
+                cutoff = glGetUniformLocation(program, "scene_cutoff");
+    float turn[9];
+    set_turn(face, turn);
+    glUniformMatrix3fv(glGetUniformLocation(program, "map_turn"), 1, GL_FALSE, turn);
+    glUniform1f(glGetUniformLocation(program, "map_share"), share);
+    glUniform1f(glGetUniformLocation(program, "map_radius"), (float)nb_light_radius(source->radius));
+    glUniform1f(glGetUniformLocation(program, "map_near"), .5f * (float)nb_light_radius(source->radius));
+    for (size_t i = 0; i < meshes->count; i++) {
+        const nb_mesh *const mesh = &meshes->list[i];
+        float from_lamp[3], low[3], high[3];
+        nb_camera_subtract(mesh->origin, source->place, from_lamp);
+        for (int k = 0; k < 3; k++) {
+            low[k] = mesh->low[k] + from_lamp[k];
+            high[k] = mesh->high[k] + from_lamp[k];
+        }
+        if (!is_in_face(low, high, face, 1 / share)) continue;
+        glUniform3fv(offset, 1, from_lamp);
+        nb_meshes_bind_mask(mesh, cutoff);
+        glBindVertexArray(mesh->vertex_array);
+        glDrawElements(GL_TRIANGLES, mesh->index_count, GL_UNSIGNED_INT, NULL);
+    }
+}
+
+static void draw_layer(const nb_light_maps *lamps, const nb_context *context, size_t layer, unsigned program,
+                       const nb_meshes *meshes)
+{
+    static const GLfloat empty = 0;
+    const uint32_t size = lamps->face;
+    glFramebufferTextureLayer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, lamps->maps, 0, (GLint)layer);
+    glClearBufferfv(GL_DEPTH, 0, &empty);
+    for (int face = 0; face < FACES; face++) {
+        nb_state_clear(context, (uint32_t)(face / 2) * size, (uint32_t)(face % 2) * size, size, size);
+        glEnable(GL_DEPTH_TEST);
+        draw_face(lamps, &lamps->sources[layer], face, program, meshes);
+    }
+}
+
+nebel_result nb_light_maps_draw(nb_light_maps *lamps, const nb_context *context, const nebel_log *log, unsigned program,
+                                const nb_meshes *meshes)
+{
+    if (lamps->layer_count == 0) return NEBEL_OK;
+    if (lamps->maps == 0) {
+        const nebel_result result = make_maps(lamps, log);
+        if (result != NEBEL_OK) {
+            delete_maps(lamps);
+            return result;
+        }
+    }
+    glBindFramebuffer(GL_FRAMEBUFFER, lamps->buffer);
+    nb_state_clear(context, 0, 0, 3 * lamps->face, 2 * lamps->face);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_GREATER);
+    glUseProgram(program);
+    for (size_t i = 0; i < lamps->layer_count; i++) {
+        if (!lamps->sources[i].is_drawn) draw_layer(lamps, context, i, program, meshes);
+        lamps->sources[i].is_drawn = 1;
+    }
+    return NEBEL_OK;
+}
+
+void nb_light_maps_delete(const nb_light_maps *lamps)
+{
+    glDeleteFramebuffers(1, &lamps->buffer);
+    glDeleteTextures(1, &lamps->maps);
+    glDeleteTextures(1, &lamps->words);
+}
+
+void nb_light_maps_release(const nebel_allocator *allocator, const nb_light_maps *lamps)
+{
+    nb_release(allocator, lamps->sources);
+    nb_release(allocator, lamps->texels);
+    nb_release(allocator, lamps->layers);
+}

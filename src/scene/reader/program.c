@@ -1,7 +1,0 @@
-/* Where nebel-read-model is: for an installed library in its prefix, for the tests' in the build. */
-#include "scene/model.h"
-
-const char *nb_model_default_program(void)
-{
-    return NEBEL_MODEL_READER;
-}

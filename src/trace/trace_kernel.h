@@ -1,0 +1,54 @@
+/* One kernel per instruction set, from one text; the table is filled in trace.c. */
+#ifndef NB_TRACE_TRACE_KERNEL_H
+#define NB_TRACE_TRACE_KERNEL_H
+
+#include "fog/snapshot.h"
+
+/* Rays and lights are structures or, in float, planes. */
+typedef struct nb_trace_job {
+    const nebel_snapshot *snapshot;
+    double budget;   /* what adaptive integration may add to the error of in-scattering, absolute */
+    double promised; /* where the error would be larger than this, more digits are asked */
+    int transmittance_only;
+    int wants_error;
+    int ignore_distances;
+    size_t count;
+    const nebel_ray *rays; /* checked; strides in bytes */
+    size_t ray_stride, transfer_stride;
+    nebel_transfer *transfers;
+    const nebel_ray_planes *ray_planes; /* NULL: structures. What all rays share is checked, no stride is 0 */
+    const nebel_transfer_planes *light_planes;
+    const uint32_t *first_toggle; /* of each ray in `toggles`, and one more; NULL: the sun reaches all of every ray */
+    const float *toggles;         /* checked */
+    const nebel_ray_visibility *lamplit; /* of each lamp; NULL: every lamp reaches all of every ray. Checked */
+    size_t first_lamplit;                /* by which number the job's first ray goes there */
+    size_t failed;                       /* out: the ray that was an error */
+} nb_trace_job;
+
+typedef nebel_result nb_trace_fn(nb_trace_job *job);
+
+nb_trace_fn nb_trace_scalar, nb_trace_sse2, nb_trace_avx2, nb_trace_avx512, nb_trace_neon, nb_trace_double,
+    nb_trace_quad;
+
+/* A ray of planes none of whose strides is 0. */
+nebel_ray nb_trace_ray_in_planes(const nebel_ray_planes *planes, size_t i);
+
+/* The first of `count` rays in planes that is none; first + count where all are right. A ray of no length is, whatever
+ * else it says. */
+size_t nb_trace_first_fault(const nebel_ray_planes *rays, size_t first, size_t count);
+
+/* Distances to a transmittance; only the double kernels have it. */
+typedef struct nb_invert_job {
+    const nebel_snapshot *snapshot;
+    double depth; /* optical depth sought, > 0 */
+    int channel;
+    size_t count;
+    const nebel_ray *rays;
+    size_t ray_stride;
+    double *distances;
+} nb_invert_job;
+
+nebel_result nb_invert_double(nb_invert_job *job);
+nebel_result nb_invert_quad(nb_invert_job *job);
+
+#endif

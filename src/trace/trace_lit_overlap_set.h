@@ -1,0 +1,592 @@
+/* Sunlight and lamplight in many bodies that lie over each other and shade each other: those of which depths add.
+ *
+ * From piece to piece, as trace_sun.h and trace_point_light.h go, the cost is quadratic in the bodies: each has two ends and two turns on the ray, and
+ * after each of them places are asked for the depth to the light, of all bodies. Here steps know nothing of ends. In
+ *
+ *     sum over bodies of the integral of glow density(t) seen(t),    seen = fluence e^-(depth(t) + depth to the light(t)),
+ *
+ * `seen` is continuous, as all its depths are, and a density that begins or ends has an integral in closed form. So a step
+ * takes `seen` at five places, and between three of them the parabola through it, of which a body needs the integral of its
+ * density and its first two moments: nothing but sums over bodies. The error that is told is by how much the parabola through
+ * the first, third and fifth place misses the others, and what bodies may do that are too small to be seen from place to place.
+ *
+ * Included by trace_kernel.c after trace_point_light.h. */
+
+/* What part of the error all steps together may be off by is left to what lies beyond the last. */
+#define TAIL_SHARE 0.01
+
+/* And to steps in which shadows begin or end: light may jump there, and what a step misses is no less for each metre
+ * however short it is. Each shadow does so twice. */
+#define EDGE_SHARE 0.02
+
+/* More steps of bodies over each other than of one: around each edge of a shadow they are halved. */
+#define MOST_CROWD_STEPS (16 * MOST_SUN_STEPS)
+
+/* What a root that begins within a step is off by, more or less. */
+#define EDGE_ERROR NB_F(0.02)
+
+/* By what part of a body's stretch its mean place may be off where its density is taken for linear, and its integral by all
+ * of itself. */
+#define MOMENT_ERROR 0.25
+
+#include "trace_lit_shadow.h"
+
+/* ---- places ---------------------------------------------------------------------------------- */
+
+/* A place on each ray: optical depth up to it, and what light comes from it to the eye where it is scattered alike from everywhere. */
+typedef struct lit_point {
+    nb_wide t;
+    nb_real depth[3], depth_error[3];
+    nb_real behind[3];          /* e^-depth */
+    nb_real way[3];             /* optical depth from there to the light, */
+    nb_real comes[3];           /* through which this comes */
+    nb_real before[3], here[3]; /* see shadowed_way; no way between the place before and this is less deep than both */
+    nb_real arrives;            /* what comes through no fog, of intensity 1 */
+    nb_real cut, cut_depth;     /* see lit_between: of those between the place before and this */
+    nb_real seen[3];
+    nb_real doubt;    /* by what factor that may be off */
+    nb_mask has_edge; /* a shadow begins or ends between the place before and this */
+} lit_point;
+
+/* Where a ray starts, with no light. */
+static lit_point no_place(void)
+{
+    const nb_real zero = NB_F(0.0);
+    lit_point place = {
+        .t = NB_W(0.0), .arrives = zero, .cut = zero, .cut_depth = zero, .doubt = zero, .has_edge = nb_mask_false};
+    for (int c = 0; c < 3; c++) {
+        place.depth[c] = place.depth_error[c] = place.behind[c] = zero;
+        place.way[c] = place.comes[c] = place.seen[c] = place.before[c] = place.here[c] = zero;
+    }
+    return place;
+}
+
+static nb_wvec3 apart_from_lamp(const packet_state *m, const light_pass *pass, nb_wide t)
+{
+    return nb_wadd3(pass->foot, nb_wscale3(m->rays.direction, t - pass->closest));
+}
+
+/* What a lamp brings to t, and from where; how far it is. Light jumps at the edge of a hard cone, where steps begin and
+ * end: whether t is in the cone is asked at `beside`, within the step. */
+static nb_real lamp_arrives(const packet_state *m, const light_pass *pass, const nb_phase *phase, nb_wide t,
+                            nb_wide beside, nb_wvec3 *towards, nb_wide *reach)
+{
+    const nb_light *lamp = pass->lamp;
+    const nb_wvec3 apart = apart_from_lamp(m, pass, t);
+    const nb_wide square = nb_wdot3(apart, apart), distance = nb_wsqrt(square);
+    *towards = nb_wscale3(apart, -nb_wrcp_bounded(distance));
+    *reach = nb_wmax(distance - WIDE(lamp->clear), NB_W(0.0));
+    const nb_real fluence = nb_narrow(nb_light_fluence(square, WIDE(lamp->radius2)));
+    const nb_real light = fluence * scattered(phase, nb_turn_between(m->rays.direction, *towards));
+    if (!lamp->is_spot) return light;
+    const nb_wvec3 from = apart_from_lamp(m, pass, beside);
+    return light * part_in_cone(lamp, nb_wscale3(from, -nb_wrcp_bounded(nb_wsqrt(nb_wdot3(from, from)))));
+}
+
+/* The light that is scattered: of the sun where `pass` is NULL. */
+typedef struct overlap_light {
+    const light_pass *pass;
+    const nb_phase *phase; /* of a lamp: all media that it lights have this one */
+    nb_real most;          /* radiance of fog that is opaque, at most */
+    double share;          /* what its steps may add to the error */
+} overlap_light;
+
+/* What is seen of a place that has its depths and what arrives there. */
+static void set_seen(const sunlight *sun, const overlap_light *light, lit_point *at)
+{
+    nb_real through[3];
+    map_channels(sun->snapshot, transmitted, at->way, through);
+    for (int c = 0; c < 3; c++) {
+        const double intensity = light->pass != NULL ? light->pass->lamp->intensity[c] : 1;
+        at->comes[c] = through[c] * at->arrives * REAL(intensity);
+        at->seen[c] = at->behind[c] * at->comes[c];
+    }
+}
+
+/* `beside`: see lamp_arrives. */
+static void look_from(const sunlight *sun, const packet_state *m, const overlap_light *light, const lit_point *before,
+                      nb_wide beside, lit_point *at)
+{
+    nb_wvec3 towards = sun->direction;
+    nb_wide reach = NB_WFAR;
+    nb_real arriving = NB_F(1.0);
+    if (light->pass != NULL) arriving = lamp_arrives(m, light->pass, light->phase, at->t, beside, &towards, &reach);
+    const shadowed_way all = way_through_shadows(sun, m, before->t, at->t, towards, reach);
+    const light_depth way = all.depth;
+    at->doubt = NB_F(0.0);
+    at->arrives = arriving;
+    at->has_edge = nb_mask_false;
+    for (int c = 0; c < 3; c++) {
+        const nb_real edges = before->way[c] + way.depth[c] - (all.before[c] + all.here[c]);
+        at->has_edge = nb_or(at->has_edge, edges > (before->way[c] + way.depth[c]) * (NB_F(1024.0) * NB_EPSILON));
+        at->way[c] = way.depth[c];
+        at->before[c] = all.before[c];
+        at->here[c] = all.here[c];
+        const nb_real rounding = (at->depth[c] + way.depth[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
+        at->doubt = nb_max(at->doubt, nb_min(at->depth_error[c] + way.error[c], NB_F(1.0)) + rounding);
+    }
+    map_channels(sun->snapshot, transmitted, at->depth, at->behind);
+    set_seen(sun, light, at);
+}
+
+/* ---- what bodies scatter between places ------------------------------------------------------ */
+
+/* Half a step: glow times the density's integral, and its moments over places from 0 to 2. */
+typedef struct lit_half {
+    nb_real sum[3], first[3], second[3];
+    nb_real doubt
+        [3]; /* by how much the first moment may be off through densities that are not linear, or half the second */
+} lit_half;
+
+/* Of the sun its radiance per metre; of a lamp what scatters. */
+static nb_real glow_in(const medium_hit *k, const overlap_light *light, int c)
+{
+    if (light->pass == NULL) return k->glow[c];
+    return k->medium->is_lamplit ? k->extinction[c] * REAL(k->medium->body.albedo[c]) : NB_F(0.0);
+}
+
+/* The mean place and the mean of its square within a part from s on, of length l. Densities are linear from end to end of it: what that
+ * misses is in the moments alone. */
+static void find_moments_of(const medium_hit *k, nb_wide enter, nb_wide leave, nb_real s, nb_real l, nb_real *first,
+                            nb_real *second)
+{
+    nb_real last = NB_F(0.5);
+    if (k->medium->body.density.type != NEBEL_DENSITY_CONSTANT) {
+        const nb_real a = contact_density(k, enter), b = contact_density(k, leave);
+        last = nb_select(a + b > NB_TINY, b / nb_max(a + b, NB_TINY), last);
+    }
+    const nb_real mean = (NB_F(1.0) + last) * REAL(1.0 / 3), square = (NB_F(1.0) + last + last) * REAL(1.0 / 6);
+    *first = s + l * mean;
+    *second = s * (s + NB_F(2.0) * l * mean) + l * l * square;
+}
+
+/* What bodies add between two places: optical depth and its error, how many depths are summed, light that is not seen from
+ * places, and by how much light is off, per optical depth, of bodies that end there together with shadows. */
+typedef struct lit_between {
+    nb_real depth[3], error[3], terms, unresolved, cut, cut_depth;
+} lit_between;
+
+/* Adds what a body gives from `from` to `to`, which has the places from `place` to place + 1 of its half. */
+static void add_part(const medium_hit *k, const leaf_span *span, const overlap_light *light, const lit_point *from,
+                     nb_wide to, int place, nb_real quarter, lit_half *half, lit_between *sum)
+{
+    const nb_wide enter = nb_wmin(nb_wmax(span->enter, from->t), to);
+    const nb_wide leave = nb_wmax(nb_wmin(span->leave, to), enter);
+    const nb_mask some = nb_narrow_mask(enter < leave);
+    if (!nb_any(some)) return;
+    const nb_real zero = NB_F(0.0), h = nb_narrow(leave - enter);
+    const nb_estimate along = contact_integral(k, enter, leave, h);
+    const nb_real value = nb_select(some, along.value, zero), error = nb_select(some, along.error, zero);
+    const nb_real scale = nb_rcp_bounded(quarter), most = nb_min(most_depth(&k->medium->body), NB_F(1.0));
+    const nb_mask narrow = nb_narrow_mask(span->leave - span->enter < nb_widen(quarter + quarter));
+    const int varies = k->medium->body.density.type != NEBEL_DENSITY_CONSTANT;
+    nb_real first, second, hidden = zero, doubt = zero, most_light = zero, deepest = zero;
+    if (varies) {
+        const nb_real even = NB_F(0.5) * h * (contact_density(k, enter) + contact_density(k, leave));
+        const nb_real bent = nb_min(nb_abs(value - even) / nb_max(value, NB_TINY), NB_F(1.0));
+        doubt = nb_select(some, bent * h * scale * REAL(MOMENT_ERROR), zero);
+    }
+    find_moments_of(k, enter, leave, nb_narrow(enter - from->t) * scale + REAL(place), h * scale, &first, &second);
+    for (int c = 0; c < 3; c++) {
+        const nb_real glow = glow_in(k, light, c) * value;
+        sum->depth[c] = sum->depth[c] + k->extinction[c] * value;
+        sum->error[c] = sum->error[c] + k->extinction[c] * error;
+        half->sum[c] = half->sum[c] + glow;
+        half->first[c] = half->first[c] + glow * nb_select(some, first, zero);
+        half->second[c] = half->second[c] + glow * nb_select(some, second, zero);
+        if (varies) half->doubt[c] = half->doubt[c] + glow * doubt;
+        hidden = nb_max(hidden, glow * most * from->seen[c]);
+        most_light = nb_max(most_light, glow);
+        deepest = nb_max(deepest, k->extinction[c] * value);
+    }
+    sum->terms = sum->terms + nb_select(some, NB_F(1.0), zero);
+    sum->unresolved = sum->unresolved + nb_select(narrow, hidden, zero);
+    /* depth and a body's own shadow have a kink where it ends, and its light is all on one side of that */
+    const nb_real open = nb_max(NB_F(1.0) - h * scale, zero);
+    sum->cut = sum->cut + nb_select(some, most_light * open * NB_F(0.5), zero);
+    sum->cut_depth = sum->cut_depth + nb_select(nb_and(some, open > NB_F(1e-3)), deepest, zero);
+}
+
+/* All of them. */
+static void add_parts(const packet_state *m, const overlap_light *light, const lit_point *from, lit_point *to,
+                      int place, nb_real quarter, lit_half *half, nb_real *unresolved)
+{
+    const nb_real zero = NB_F(0.0);
+    lit_between sum = {{zero, zero, zero}, {zero, zero, zero}, NB_F(2.0), zero, zero, zero};
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const medium_hit *k = &m->contacts[i];
+        add_part(k, &m->spans[k->first_span], light, from, to->t, place, quarter, half, &sum);
+    }
+    for (int c = 0; c < 3; c++) {
+        to->depth[c] = from->depth[c] + sum.depth[c];
+        const nb_real rounding = (sum.depth[c] * sum.terms + to->depth[c]) * NB_EPSILON;
+        to->depth_error[c] = from->depth_error[c] + sum.error[c] + rounding;
+    }
+    *unresolved = *unresolved + sum.unresolved;
+    to->cut = sum.cut;
+    to->cut_depth = sum.cut_depth;
+}
+
+static lit_half nothing_scattered(void)
+{
+    const nb_real zero = NB_F(0.0);
+    return (lit_half){{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
+}
+
+/* What the parabola through what is seen at three places makes of a half. */
+static nb_real light_of_half(const lit_half *half, int c, nb_real a, nb_real b, nb_real e)
+{
+    const nb_real slope = NB_F(2.0) * b - NB_F(0.5) * (NB_F(3.0) * a + e), bend = NB_F(0.5) * (a + e) - b;
+    return a * half->sum[c] + slope * half->first[c] + bend * half->second[c];
+}
+
+/* By how much that may be off through moments. */
+static nb_real doubt_of_half(const lit_half *half, int c, nb_real a, nb_real b, nb_real e)
+{
+    const nb_real slope = NB_F(2.0) * b - NB_F(0.5) * (NB_F(3.0) * a + e), bend = NB_F(0.5) * (a + e) - b;
+    return half->doubt[c] * (nb_abs(slope) + NB_F(2.0) * nb_abs(bend));
+}
+
+/* ---- steps ----------------------------------------------------------------------------------- */
+
+typedef struct overlap_step {
+    lit_point end;
+    nb_real light[3], error, rounding, drop;
+    nb_mask has_edge; /* a shadow begins or ends in it */
+} overlap_step;
+
+/* What shadows may do that the places of a step do not show, as a part of its light: all of them that are too narrow, and where
+ * they begin or end, which is as steep as a root. The root of x - a, x and a from 0 to 1, is integrated here to 0.042, in the mean over a to 0.015;
+ * as a shadow begins its depth is amount 2 sqrt(x / width). Some are too large and others too small: the root of their squares. */
+static nb_real hidden_in_shadows(const sunlight *sun, nb_wide start, nb_wide end, nb_real length)
+{
+    const nb_real zero = NB_F(0.0), one = NB_F(1.0);
+    nb_real hidden = zero, edges = zero;
+    for (size_t i = sun->first_shadow; i < sun->shadow_count; i = sun->shadows[i].next) {
+        const lit_shadow *s = &sun->shadows[i];
+        const nb_mask begins = nb_narrow_mask(nb_wand(s->first > start, s->first < end));
+        const nb_mask stops = nb_narrow_mask(nb_wand(s->last > start, s->last < end));
+        const nb_mask some = nb_and(nb_or(begins, stops), nb_narrow_mask(s->first < s->last));
+        if (!nb_any(some)) continue;
+        const nb_real width = nb_narrow(nb_wmax(s->last - s->first, NB_W(0.0))), most = nb_min(s->amount, one);
+        const nb_real longer = nb_min(length * nb_rcp_bounded(width), one / NB_TINY);
+        const nb_mask narrow = nb_and(some, longer > NB_F(2.0));
+        const nb_real count = nb_select(begins, one, zero) + nb_select(stops, one, zero);
+        const nb_mask steep = nb_and(some, nb_not(narrow));
+        hidden = hidden + nb_select(narrow, most * width * nb_rcp_bounded(length), zero);
+        edges = edges + nb_select(steep, count * (most * most) * (NB_F(4.0) * EDGE_ERROR * EDGE_ERROR) * longer, zero);
+    }
+    return nb_min(hidden + nb_sqrt(edges), one);
+}
+
+/* What places do not show between two of them: see unseen_light of trace_lit_quadrature.h. */
+static nb_real unseen_between_places(const lit_point at[5], int c, const overlap_light *light)
+{
+    const nb_real most = light->pass != NULL ? NB_F(1.0) : light->most;
+    const double intensity = light->pass != NULL ? light->pass->lamp->intensity[c] : 1;
+    nb_real unseen = NB_F(0.0);
+    for (int i = 0; i < 4; i++) {
+        const lit_point *from = &at[i], *to = &at[i + 1];
+        const nb_real cover = nb_min(to->before[c], to->here[c]);
+        const nb_real dip = nb_max(nb_min(from->way[c], to->way[c]) - cover, NB_F(0.0));
+        const nb_real change = nb_abs((to->depth[c] - from->depth[c]) + (to->way[c] - from->way[c])) + dip;
+        const nb_real lost = nb_max(from->behind[c] - to->behind[c], NB_F(0.0));
+        nb_real comes = nb_max(from->comes[c], to->comes[c]);
+        if (light->pass != NULL && light->pass->lamp->is_spot) {
+            /* At the edge of its cone there is no light yet, and behind it all at once. */
+            const nb_real arrives = nb_max(from->arrives, to->arrives) * REAL(intensity);
+            comes = nb_max(comes, arrives * nb_exp(-nb_min(from->way[c], to->way[c])));
+        }
+        if (nb_any(dip > NB_F(0.0))) {
+            const nb_real arrives = nb_max(from->arrives, to->arrives) * REAL(intensity);
+            comes = nb_select(dip > NB_F(0.0), arrives * nb_exp(-cover), comes);
+        }
+        unseen = unseen + most * lost * comes * unseen_share(change);
+    }
+    return unseen;
+}
+
+/* What depths and shadows that begin or end between two places do to the light of bodies that do so, too. */
+static nb_real light_of_cut_bodies(const lit_point at[5], int c)
+{
+    nb_real light = NB_F(0.0);
+    for (int i = 0; i < 4; i++) {
+        const lit_point *from = &at[i], *to = &at[i + 1];
+        const nb_real shadows =
+            to->cut_depth + nb_max(from->way[c] + to->way[c] - (to->before[c] + to->here[c]), NB_F(0.0));
+        light = light + to->cut * nb_max(from->seen[c], to->seen[c]) * nb_min(shadows, NB_F(1.0));
+    }
+    return light;
+}
+
+/* How far beside the ends of a step cones are looked at, as a part of it. */
+#define CONE_MARGIN 1e-6
+
+/* A step that starts at a cone's edge has the other side's light than the step that ended there. */
+static lit_point look_ahead_from(const sunlight *sun, const packet_state *m, const overlap_light *light,
+                                 const lit_point *start, nb_wide margin)
+{
+    lit_point at = *start;
+    nb_wvec3 towards;
+    nb_wide reach;
+    if (light->pass == NULL || !light->pass->lamp->is_spot) return at;
+    at.arrives = lamp_arrives(m, light->pass, light->phase, at.t, at.t + margin, &towards, &reach);
+    set_seen(sun, light, &at);
+    return at;
+}
+
+static overlap_step try_crowd_step(const sunlight *sun, const packet_state *m, const overlap_light *light,
+                                   const lit_point *start, nb_real length, nb_wide end)
+{
+    const nb_real quarter = NB_F(0.25) * length;
+    const nb_wide margin = (end - start->t) * WIDE(CONE_MARGIN);
+    lit_point at[5] = {look_ahead_from(sun, m, light, start, margin)};
+    lit_half half[2] = {nothing_scattered(), nothing_scattered()};
+    nb_real unresolved = NB_F(0.0);
+    for (int i = 1; i < 5; i++) {
+        at[i].t = i == 4 ? end : nb_wmin(start->t + nb_widen(quarter * REAL(i)), end);
+        add_parts(m, light, &at[i - 1], &at[i], (i - 1) % 2, quarter, &half[(i - 1) / 2], &unresolved);
+        look_from(sun, m, light, &at[i - 1], i == 4 ? end - margin : at[i].t, &at[i]);
+    }
+    overlap_step s = {.end = at[4],
+                      .error = NB_F(0.0),
+                      .rounding = NB_F(0.0),
+                      .drop = NB_F(0.0),
+                      .has_edge = nb_or(nb_or(at[1].has_edge, at[2].has_edge), nb_or(at[3].has_edge, at[4].has_edge))};
+    nb_real doubt = NB_F(0.0), full = NB_F(0.0), unseen = NB_F(0.0);
+    for (int i = 0; i < 5; i++) doubt = nb_max(doubt, at[i].doubt);
+    for (int c = 0; c < 3; c++) {
+        const nb_real a = at[0].seen[c], b = at[2].seen[c], e = at[4].seen[c], eighth = NB_F(0.125);
+        const nb_real first = nb_abs(at[1].seen[c] - eighth * (NB_F(3.0) * a + NB_F(6.0) * b - e));
+        const nb_real last = nb_abs(at[3].seen[c] - eighth * (NB_F(3.0) * e + NB_F(6.0) * b - a));
+        const nb_real most = nb_max(nb_max(nb_max(a, at[1].seen[c]), b), nb_max(at[3].seen[c], e));
+        const nb_real light_of_all =
+            light_of_half(&half[0], c, a, at[1].seen[c], b) + light_of_half(&half[1], c, b, at[3].seen[c], e);
+        s.light[c] = nb_max(light_of_all, NB_F(0.0));
+        s.error = nb_max(s.error, first * half[0].sum[c] + last * half[1].sum[c]);
+        const nb_real moments =
+            doubt_of_half(&half[0], c, a, at[1].seen[c], b) + doubt_of_half(&half[1], c, b, at[3].seen[c], e);
+        s.rounding = nb_max(s.rounding, (half[0].sum[c] + half[1].sum[c]) * most * doubt + moments);
+        full = nb_max(full, (half[0].sum[c] + half[1].sum[c]) * most);
+        s.drop = nb_max(s.drop, at[0].behind[c] - at[4].behind[c]);
+        unseen = nb_max(unseen, unseen_between_places(at, c, light) + light_of_cut_bodies(at, c));
+    }
+    s.error = s.error + unseen + unresolved + full * hidden_in_shadows(sun, start->t, end, length);
+    return s;
+}
+
+/* Where a lane has come to. */
+typedef struct overlap_walk {
+    lit_point at;
+    nb_wide last;
+    nb_wmask lanes;
+    nb_real guess, left, whole; /* length of the next step; steps that may still be tried; of all */
+} overlap_walk;
+
+static void select_place(nb_mask mask, lit_point *to, const lit_point *from)
+{
+    to->t = nb_wselect(nb_widen_mask(mask), from->t, to->t);
+    select_reals(mask, to->depth, from->depth);
+    select_reals(mask, to->depth_error, from->depth_error);
+    select_reals(mask, to->behind, from->behind);
+    select_reals(mask, to->way, from->way);
+    select_reals(mask, to->comes, from->comes);
+    select_reals(mask, to->seen, from->seen);
+    to->arrives = nb_select(mask, from->arrives, to->arrives);
+    to->doubt = nb_select(mask, from->doubt, to->doubt);
+}
+
+/* The place at t behind one that is known. */
+static lit_point place_behind(sunlight *sun, const packet_state *m, const overlap_light *light, const lit_point *from,
+                              nb_wide t, nb_wmask lanes)
+{
+    lit_half none = nothing_scattered();
+    nb_real unresolved = NB_F(0.0);
+    lit_point at = {.t = t};
+    list_shadows_of_step(sun, from->t, t, lanes);
+    add_parts(m, light, from, &at, 0, NB_F(1.0), &none, &unresolved);
+    look_from(sun, m, light, from, t, &at);
+    return at;
+}
+
+/* After a step: twice as long where its error was far below what was allowed, shorter where it was near or beyond. The
+ * error goes with the third power of the length, and where bodies begin and end with less. */
+static nb_real next_length(nb_real length, nb_real error, nb_real allowed)
+{
+    const nb_real two = NB_F(2.0), half = NB_F(0.5);
+    const nb_real next = nb_select(error * NB_F(8.0) <= allowed, two, NB_F(1.0));
+    return length * nb_select(error <= allowed, next, half);
+}
+
+static void step_through_crowd(sunlight *sun, const packet_state *m, const overlap_light *light, nb_wide bright,
+                               overlap_walk *w, gathered_light *g)
+{
+    const nb_mask final = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
+    const nb_real rest = nb_narrow(bright - w->at.t);
+    const nb_real length = nb_select(final, rest, nb_min(w->guess, rest));
+    const nb_wide end = nb_wselect(nb_widen_mask(length >= rest), bright, w->at.t + nb_widen(length));
+    list_shadows_of_step(sun, w->at.t, end, w->lanes);
+    const overlap_step s = try_crowd_step(sun, m, light, &w->at, length, end);
+    const nb_real least = NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
+    const nb_real steady = REAL(0.5 * (1 - EDGE_SHARE)) * (s.drop + length * nb_rcp_bounded(w->whole));
+    const nb_real at_edge =
+        nb_select(s.has_edge, REAL(EDGE_SHARE / (double)(2 * sun->snapshot->medium_count)), NB_F(0.0));
+    const nb_real allowed = least + REAL(light->share * (1 - TAIL_SHARE) / ESTIMATE_MARGIN) * (steady + at_edge);
+    const nb_mask taken = nb_and(nb_or(final, s.error <= allowed), nb_narrow_mask(w->lanes));
+    nb_real most = NB_F(0.0);
+    for (int c = 0; c < 3; c++) {
+        g->radiance[c] = g->radiance[c] + nb_select(taken, s.light[c], NB_F(0.0));
+        most = nb_max(most, g->radiance[c]);
+    }
+    const nb_real error = s.error * REAL(ESTIMATE_MARGIN) + s.rounding + most * NB_EPSILON;
+    g->radiance_error = g->radiance_error + nb_select(taken, error, NB_F(0.0));
+    select_place(taken, &w->at, &s.end);
+    start_from_last(sun, taken);
+    w->guess = nb_select(nb_narrow_mask(w->lanes), next_length(length, s.error, allowed), w->guess);
+    w->left = w->left - NB_F(1.0);
+}
+
+/* ---- the walk -------------------------------------------------------------------------------- */
+
+/* From the first lit body of each ray to the last. */
+static nb_mask find_lit_stretch(const packet_state *m, int by_lamp, nb_wide *first, nb_wide *last)
+{
+    *first = NB_WFAR;
+    *last = NB_W(0.0);
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const medium_hit *k = &m->contacts[i];
+        if (!(by_lamp ? k->medium->is_lamplit : k->medium->is_sunlit)) continue;
+        const nb_wmask met = k->hull_enter < k->hull_leave;
+        *first = nb_wselect(met, nb_wmin(*first, k->hull_enter), *first);
+        *last = nb_wselect(met, nb_wmax(*last, k->hull_leave), *last);
+    }
+    return nb_narrow_mask(*first < *last);
+}
+
+static void transmittance_at(const packet_state *m, nb_wide t, nb_real behind[3])
+{
+    nb_real depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const medium_hit *k = &m->contacts[i];
+        const leaf_span *span = &m->spans[k->first_span];
+        const nb_wide leave = nb_wmax(nb_wmin(span->leave, t), span->enter);
+        const nb_mask some = nb_narrow_mask(span->enter < leave);
+        if (!nb_any(some)) continue;
+        const nb_real value = contact_integral(k, span->enter, leave, nb_narrow(leave - span->enter)).value;
+        for (int c = 0; c < 3; c++) depth[c] = depth[c] + nb_select(some, k->extinction[c] * value, NB_F(0.0));
+    }
+    map_channels(m->sun->snapshot, transmitted, depth, behind);
+}
+
+/* What fog between two places may give at most. */
+static nb_real most_between(const packet_state *m, const overlap_light *light, nb_wide start, nb_wide end)
+{
+    nb_real before[3], behind[3], drop = NB_F(0.0);
+    transmittance_at(m, start, before);
+    transmittance_at(m, end, behind);
+    for (int c = 0; c < 3; c++) drop = nb_max(drop, before[c] - behind[c]);
+    const nb_real arriving = light->pass != NULL ? most_fluence(light->pass, start, end) : NB_F(1.0);
+    return drop * arriving * light->most;
+}
+
+/* The least `last` behind which nothing matters, but for a factor of 2: rays without an end would have steps that are halved for ever. */
+static nb_wide trim_stretch(const packet_state *m, const overlap_light *light, nb_wide first, nb_wide last,
+                            nb_real allowed)
+{
+    nb_wmask lanes = first < last;
+    for (int i = 0; i < 64 && nb_wany(lanes); i++) {
+        const nb_wide middle = first + NB_W(0.5) * (last - first);
+        lanes = nb_wand(lanes, nb_widen_mask(most_between(m, light, middle, last) <= allowed));
+        last = nb_wselect(lanes, middle, last);
+    }
+    return last;
+}
+
+/* Steps end where a surface's shadow begins or ends, and pass over it. */
+static void walk_through_crowd(sunlight *sun, const packet_state *m, const overlap_light *light,
+                               sun_attenuation *shadows, nb_mask lanes, nb_wide first, nb_wide last, gathered_light *g)
+{
+    const lit_point origin = no_place();
+    overlap_walk w = {
+        .last = last, .lanes = nb_wand(nb_widen_mask(lanes), first < last), .left = REAL(MOST_CROWD_STEPS)};
+    w.at = place_behind(sun, m, light, &origin, nb_wselect(w.lanes, first, NB_W(0.0)), w.lanes);
+    start_from_last(sun, nb_mask_true);
+    w.whole = nb_max(nb_narrow(last - first), NB_TINY);
+    w.guess = NB_F(0.5) * w.whole;
+    while (nb_wany(w.lanes)) {
+        if (shadows != NULL) pass_toggles(shadows, w.at.t, w.lanes);
+        const nb_wide bright = shadows != NULL ? nb_wmin(shadows->toggle, last) : last;
+        const nb_wmask dark = shadows != NULL ? nb_wand(w.lanes, shadows->is_dark) : nb_wmask_false;
+        if (nb_wany(dark)) {
+            const lit_point behind = place_behind(sun, m, light, &w.at, nb_wselect(dark, bright, w.at.t), w.lanes);
+            select_place(nb_narrow_mask(dark), &w.at, &behind);
+            start_from_last(sun, nb_narrow_mask(dark));
+            w.left = nb_select(nb_narrow_mask(dark), REAL(MOST_CROWD_STEPS), w.left);
+        } else {
+            step_through_crowd(sun, m, light, next_turn(sun, w.at.t, bright), &w, g);
+        }
+        w.lanes = nb_wand(w.lanes, w.at.t < last);
+    }
+}
+
+static void gather_light_of_crowd(sunlight *sun, const packet_state *m, const overlap_light *light,
+                                  sun_attenuation *shadows, gathered_light *g)
+{
+    nb_wide first, last;
+    const nb_mask lit = find_lit_stretch(m, light->pass != NULL, &first, &last);
+    if (!nb_any(lit)) return;
+    const nb_wide end = trim_stretch(m, light, first, last, REAL(0.5 * TAIL_SHARE * light->share));
+    const nb_real arriving = light->pass != NULL ? most_fluence(light->pass, end, last) : NB_F(1.0);
+    const nb_real rounding =
+        arriving * light->most * (NB_F(8.0) * NB_EPSILON); /* of the difference of transmittances */
+    const nb_real beyond =
+        most_between(m, light, end, last) + nb_select(nb_narrow_mask(end < last), rounding, NB_F(0.0));
+    g->radiance_error = g->radiance_error + nb_select(lit, beyond, NB_F(0.0));
+    sun->turn_count = 0;
+    if (light->pass != NULL) {
+        note_lamp(sun, m, light->pass);
+        note_turn(sun, light->pass->closest, nb_wmask_true); /* on either side what arrives rises or falls */
+    }
+    list_shadows(sun, &m->rays, light->pass != NULL ? light->pass->lamp : NULL);
+    if (sun->out_of_memory) return;
+    walk_through_crowd(sun, m, light, shadows, lit, first, end, g);
+}
+
+/* ---- all lights ------------------------------------------------------------------------------ */
+
+static nb_real most_sunlight(const packet_state *m)
+{
+    nb_real most = NB_F(0.0);
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const medium_hit *k = &m->contacts[i];
+        const nb_mask met = is_met(k);
+        for (int c = 0; c < 3; c++) {
+            const nb_real radiance = k->glow[c] / nb_max(k->extinction[c], NB_TINY);
+            most = nb_max(most, nb_select(met, radiance, NB_F(0.0)));
+        }
+    }
+    return most;
+}
+
+/* Adds what all lights give along the rays. */
+static void gather_crowd_lights(sunlight *sun, const packet_state *m, gathered_light *g)
+{
+    const nebel_snapshot *snapshot = sun->snapshot;
+    if (snapshot->is_sunlit) {
+        const overlap_light light = {.most = most_sunlight(m), .share = sun->share};
+        gather_light_of_crowd(sun, m, &light, sun->shade.toggles != NULL ? &sun->shade : NULL, g);
+    }
+    nb_real most = NB_F(0.0);
+    const nb_phase *phase = NULL;
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const medium_hit *k = &m->contacts[i];
+        if (!k->medium->is_lamplit) continue;
+        phase = &k->medium->body.phase;
+        most = nb_max(most, nb_select(is_met(k), REAL(most_scattered(&k->medium->body)), NB_F(0.0)));
+    }
+    for (size_t i = 0; i < snapshot->lamp_count && phase != NULL; i++) {
+        light_pass pass = pass_lamp(m, &snapshot->lamps[i]);
+        const overlap_light light = {&pass, phase, most, sun->share / (double)snapshot->lamp_count};
+        gather_light_of_crowd(sun, m, &light, sun->lamp_shades != NULL ? &sun->lamp_shades[i] : NULL, g);
+    }
+}
