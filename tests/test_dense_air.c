@@ -228,7 +228,7 @@ static void haze_has_its_light(void **state)
 {
     enum { SCENES = 24 };
     static const double most[NEBEL_ATMOSPHERE_QUALITY_COUNT] = {
-        [NEBEL_ATMOSPHERE_FAST] = 0.3, [NEBEL_ATMOSPHERE_PRECISE] = 0.2};
+        [NEBEL_ATMOSPHERE_FAST] = 0.08, [NEBEL_ATMOSPHERE_PRECISE] = 0.06};
     double told[NEBEL_ATMOSPHERE_QUALITY_COUNT] = {0}, off[NEBEL_ATMOSPHERE_QUALITY_COUNT] = {0};
     size_t count = 0;
     (void)state;
@@ -274,7 +274,40 @@ static void error_covers_glow_around_the_sun(void **state)
     for (size_t q = 0; q < 2; q++) {
         if (!nb_test_tries(1 - q, 2)) continue;
         nebel_atmosphere *air = make_of(&of, glow.depth, SCALE, q ? NEBEL_ATMOSPHERE_PRECISE : NEBEL_ATMOSPHERE_FAST);
-        assert_told(&glow, air, 0.9, q ? "glow, precise" : "glow, fast");
+        assert_told(&glow, air, 0.25, q ? "glow, precise" : "glow, fast");
+        nebel_destroy_atmosphere(air);
+    }
+}
+
+/* Haze of depth 1 around a ball as large as the Earth: level ways past it and to its ground, seen from orbit, and low suns. Light is that of
+ * 774,400 paths each (`nebel render --method reference`), with standard errors; views are of tests/check_air_truth.py with the seed 7.
+ * When light that peaks turn went as if it came straight, these were up to 34 % (`fast`) and 15 % too bright. */
+static void haze_around_a_ball_has_its_light(void **state)
+{
+    static const struct {
+        double height, elevation, azimuth, sun, light, by_chance;
+    } views[] = {{4.178e5, -19.69, 25.5, 16.4, 0.18133, 2.2e-4},   {2.642e5, -16.28, 101.5, 52.6, 0.033324, 6.1e-5},
+                 {3.808e5, -19.26, 157.4, 33.2, 0.021146, 4.9e-5}, {2.339e5, -14.46, 177.4, 82.0, 0.025405, 4.0e-5},
+                 {2, 84.85, 74.9, 7.6, 0.0090402, 3.3e-5},         {1.092e4, 0.62, 14.8, 4.1, 0.16669, 3.0e-4}};
+    nebel_atmosphere_desc desc = {.radius = 6.36e6, .thickness = 1e5, .component_count = 1};
+    (void)state;
+    desc.components[0] =
+        (nebel_atmosphere_component){.scale_height = 1e4, .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.8}};
+    for (int c = 0; c < 3; c++) desc.components[0].scattering[c] = 1 / (1e4 * -expm1(-10));
+    for (int q = 0; q < NEBEL_ATMOSPHERE_QUALITY_COUNT; q++) {
+        nebel_atmosphere *air;
+        desc.quality = (nebel_atmosphere_quality)q;
+        assert_int_equal(nebel_create_atmosphere(&desc, &air), NEBEL_OK);
+        for (size_t i = 0; i < sizeof views / sizeof *views; i++) {
+            const double up = views[i].elevation * PI / 180, turn = views[i].azimuth * PI / 180;
+            const nebel_transfer transfer = trace(air, sin(views[i].sun * PI / 180), views[i].height,
+                                                  (const double[3]){cos(up) * cos(turn), sin(up), cos(up) * sin(turn)});
+            const double off = (double)transfer.in_scattering[0] - views[i].light;
+            print_message("around a ball, quality %d: off %+.1f %%, told %.1f %%\n", q, 100 * off / views[i].light,
+                          100 * (double)transfer.error / views[i].light);
+            assert_true(fabs(off) <= (double)transfer.error + 3 * views[i].by_chance);
+            assert_true(fabs(off) <= 0.05 * views[i].light + 3 * views[i].by_chance);
+        }
         nebel_destroy_atmosphere(air);
     }
 }
@@ -286,6 +319,7 @@ int main(void)
         cmocka_unit_test(error_covers_what_chance_finds),
         cmocka_unit_test(thin_air_has_its_light),
         cmocka_unit_test(haze_has_its_light),
+        cmocka_unit_test(haze_around_a_ball_has_its_light),
         cmocka_unit_test(error_covers_glow_around_the_sun),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

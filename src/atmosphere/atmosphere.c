@@ -64,11 +64,10 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
     made->rule = nb_gauss_rule_make(NB_MAX_RULE);
     made->gather = nb_gather_choose(NEBEL_ISA_DEFAULT);
     const nb_parallel parts = {whole.run, whole.run_user};
-    nb_air_components_smooth(&made->airs, whole.quality == NEBEL_ATMOSPHERE_PRECISE ? NB_MOMENTS : NB_FEW_MOMENTS,
-                             &made->smooth);
+    nb_air_components_smooth(&made->airs, nb_scatter_orders(&made->airs, whole.quality), &made->smooth);
     result = nb_scattering_table_make(&allocator, &parts, &made->airs, &made->smooth, whole.quality,
-                                      whole.ground_albedo, &made->scatter);
-    made->share_off = (whole.quality == NEBEL_ATMOSPHERE_PRECISE ? 0.02 : 0.1) + made->scatter.missing;
+                                      whole.ground_albedo, &made->scatter, &made->stray);
+    made->share_off = (made->scatter.orders == NB_MOMENTS ? 0.02 : 0.1) + made->scatter.missing;
     if (result == NEBEL_OK) {
         *atmosphere = made;
         return NEBEL_OK;
@@ -82,5 +81,6 @@ void nebel_destroy_atmosphere(nebel_atmosphere *atmosphere)
     if (atmosphere == NULL) return;
     const nebel_allocator allocator = atmosphere->allocator;
     nb_scattering_table_free(&allocator, &atmosphere->scatter);
+    nb_stray_free(&allocator, &atmosphere->stray);
     nb_release(&allocator, atmosphere);
 }

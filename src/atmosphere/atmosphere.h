@@ -4,6 +4,7 @@
 
 #include "in_scattering.h"
 #include "math/gauss_rule.h"
+#include "stray.h"
 
 struct nebel_atmosphere {
     nebel_allocator allocator;
@@ -12,6 +13,7 @@ struct nebel_atmosphere {
     double ground_albedo[3];
     nb_gauss_rule rule;
     nb_scattering_table scatter;
+    nb_stray stray;
     nb_gather_fn *gather;
     double share_off; /* how much of light that was scattered often may be wrong for want of entries and directions */
 };

@@ -53,6 +53,7 @@ static void gather_nodes(nb_gathering *gathering, int from, int to, nb_peak_sums
             job->first = from;
             job->count = smaller(NB_GATHER_NODES, job->path->count + 1 - from);
             gathering->atmosphere->gather(job, &gathering->light);
+            if (job->strays) nb_stray_add(&gathering->atmosphere->stray, job, &gathering->light);
         }
         const int next = smaller(to, job->first + job->count);
         nb_peaks_add(&gathering->peaks, job, &gathering->light, from, next, sums);
@@ -201,6 +202,7 @@ nb_in_scattered nb_gather_path(const nebel_atmosphere *atmosphere, nb_atmosphere
                                     .smooth = nb_atmosphere_smooth(atmosphere),
                                     .scatter = &atmosphere->scatter,
                                     .wants_sun = 1,
+                                    .strays = atmosphere->stray.count > 0,
                                     .track = track,
                                     .aspect = aspect,
                                     .path = path};
@@ -211,7 +213,7 @@ nb_in_scattered nb_gather_path(const nebel_atmosphere *atmosphere, nb_atmosphere
     gather_nodes(&gathering, path->count, path->count + 1, &start);
     nb_in_scattered first = finish(&gathering, &start);
     for (int k = 0; k < count; k++) gathered[k] = finish(&gathering, &sums[k]);
-    if (gathering.job.smooth == NULL || path->ends == 0) return first;
+    if (gathering.job.smooth == NULL || gathering.job.strays || path->ends == 0) return first;
     find_ground(atmosphere, track, aspect, path, ends[count - 1], ground);
     for (int k = 0; k + 1 < count; k++) {
         const nb_behind behind = behind_end(path, ends[k], radiance[k]);

@@ -53,7 +53,7 @@ static void aim_air(const nb_air_component *air, int orders, double cosine, nb_p
 
 nb_peaks nb_peaks_aim(const nb_gather_job *job)
 {
-    nb_peaks peaks = {.air_count = job->airs->count};
+    nb_peaks peaks = {.air_count = job->airs->count, .strays = job->strays};
     for (int k = 0; k < job->airs->count && job->smooth != NULL; k++)
         aim_air(&job->airs->airs[k], job->scatter->orders, job->aspect.sun, &peaks, k);
     return peaks;
@@ -95,7 +95,7 @@ void nb_peaks_add(const nb_peaks *peaks, const nb_gather_job *job, const nb_node
             const double scattering = job->airs->airs[k].scattering[c], *density = job->path->density[k] + job->first;
             for (int i = from - job->first; i < to - job->first && scattering > 0; i++) {
                 const double scattered = scattering * density[i], straight = scattered * light->sun[c][i];
-                if (job->smooth != NULL) sums->ahead[k][c] += scattered * light->ahead[c][i];
+                if (job->smooth != NULL) sums->ahead[k][c] += scattered * light->lit[c][i];
                 if (peaks->peak[k] > 0)
                     add_powers(straight, scattered * light->ahead[c][i], light->turns[c][i], sums->powers[k][c]);
                 else
@@ -109,6 +109,8 @@ void nb_peaks_add(const nb_peaks *peaks, const nb_gather_job *job, const nb_node
 
 /* What is off of light that peaks turn. Measured on flat haze of depths 0.1 to 4 and g up to 0.9 the most is 0.65 (test_dense_air). */
 #define TURNED_OFF 0.7
+/* The same where it is known what strays. */
+#define TURNED_OFF_IN_HAZE 0.3
 
 nb_peak_light nb_peaks_before(const nb_peaks *peaks, const nb_peak_sums *before)
 {
@@ -126,7 +128,7 @@ nb_peak_light nb_peaks_before(const nb_peaks *peaks, const nb_peak_sums *before)
             }
         }
         sum.light[c] = before->often[c] + turned;
-        sum.missing[c] = before->missing[c] + TURNED_OFF * size;
+        sum.missing[c] = before->missing[c] + (peaks->strays ? TURNED_OFF_IN_HAZE : TURNED_OFF) * size;
     }
     return sum;
 }

@@ -17,6 +17,8 @@ typedef struct nb_node_light {
     /* Where there is smooth air: sunlight with what peaks turn of it on its way, and how often in the mean those turn what is scattered. */
     double radiance[3][NB_GATHER_NODES]; /* of the table at the node itself, in the ray's direction */
     double ahead[3][NB_GATHER_NODES], turns[3][NB_GATHER_NODES];
+    double lit[3][NB_GATHER_NODES];  /* sunlight that smooth air scatters: `ahead`, or without peaks behind the node */
+    double mean[3][NB_GATHER_NODES]; /* the first moment of the table there, as it comes to the start */
 } nb_node_light;
 
 typedef struct nb_gather_job {
@@ -24,6 +26,7 @@ typedef struct nb_gather_job {
     const nb_air_components *smooth;    /* what light scattered often is scattered by, if it is not `airs`; else NULL */
     const nb_scattering_table *scatter; /* NULL: sunlight alone */
     int wants_sun;
+    int strays; /* what peaks turn on the way from a node to the start is not counted: nb_stray_add has it */
     nb_atmosphere_ray track;
     nb_moment_basis aspect;            /* of the ray's direction, where it starts */
     double rest[NEBEL_MAX_COMPONENTS]; /* by nb_gather_aim, else 0: nothing is missing */

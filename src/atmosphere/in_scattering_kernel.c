@@ -19,6 +19,8 @@
  * 10 degrees below the horizon a far finer table has up to 5, 8 and 21 % more or less of all light (`precise`: 3, 7 and 8).
  * Measured on the Earth; others may be worse. */
 #define TWILIGHT_OFF 3.0
+/* The same of haze, which is off most where the terminator is seen from space. */
+#define TWILIGHT_OFF_IN_HAZE 5.0
 
 /* Nodes in lanes; `at` is the number of the first. */
 typedef struct nb_nodes {
@@ -65,10 +67,12 @@ static void add_sun(const nb_gather_job *job, const nb_nodes *nodes, nb_node_lig
         const nb_real sun = nb_select(dark, NB_F(0.0), nb_exp(-nb_depth_of(job->airs, met, c)));
         const nb_real straight = left_of(nodes, job->path->transmittance[c]) * sun;
         nb_store_lanes(light->sun[c] + to, straight);
-        if (job->smooth == NULL || job->scatter == NULL) continue;
+        if (job->smooth == NULL) continue;
         const nb_real smooth_sun = nb_select(dark, NB_F(0.0), nb_exp(-nb_depth_of(job->smooth, met, c)));
         const nb_real ahead = left_of(nodes, job->path->smooth[c]) * smooth_sun, tiny = NB_F(1e-300);
         nb_store_lanes(light->ahead[c] + to, ahead);
+        nb_store_lanes(light->lit[c] + to,
+                       job->strays ? left_of(nodes, job->path->transmittance[c]) * smooth_sun : ahead);
         nb_store_lanes(light->turns[c] + to, nb_log(nb_max(ahead, tiny) / nb_max(straight, tiny)));
     }
 }
@@ -131,6 +135,7 @@ NB_MOMENTS_INLINE nb_scattered scatter(const nb_gather_job *job, int orders, con
         seen = seen + nb_splat(2 * order + 1) * part;
     }
     *radiance = nb_max(NB_F(0.0), seen) * nb_splat(1 / NB_FOUR_PI);
+    if (job->strays) return (nb_scattered){sum, NB_F(0.0)}; /* nb_stray has all orders */
     nb_real missing = weigh_rest(job, at, c) * nb_sqrt(square);
     if (job->smooth != NULL)
         missing = missing + NB_F(PEAK_OFF) * peak_part(job, at, c) * nb_max(nb_abs(sum), weigh(job, at, 0, c));
@@ -141,15 +146,17 @@ NB_MOMENTS_INLINE void add_often(const nb_gather_job *job, int orders, const nb_
 {
     const int to = nodes->at - job->first;
     const nb_moment_samples spots = nb_spots_of(job->scatter, job->airs, nodes->radius, nodes->sun);
-    const nb_real dark = NB_F(TWILIGHT_OFF) * nb_max(NB_F(0.0), -nodes->sun);
+    const nb_real dark = nb_splat(job->strays ? TWILIGHT_OFF_IN_HAZE : TWILIGHT_OFF) * nb_max(NB_F(0.0), -nodes->sun);
     nb_real basis[NB_FIELD];
     nb_basis_of(orders, (nb_moment_basis_lanes){nodes->zenith, nb_splat(job->aspect.sun), nodes->sun}, basis);
     for (int c = 0; c < 3; c++) {
-        const double(*left)[NB_MAX_PATH] = job->smooth != NULL ? job->path->smooth : job->path->transmittance;
+        const double(*left)[NB_MAX_PATH] =
+            job->smooth != NULL && !job->strays ? job->path->smooth : job->path->transmittance;
         const nb_real mean = nb_exp(nb_moment_at(&spots, 0, c)), all = left_of(nodes, left[c]) * mean;
         nb_real radiance;
         const nb_scattered scattered = scatter(job, orders, &spots, nodes->at, basis, c, &radiance);
         nb_store_lanes(light->radiance[c] + to, mean * radiance);
+        nb_store_lanes(light->mean[c] + to, all);
         nb_store_lanes(light->often[c] + to, all * scattered.light);
         nb_store_lanes(light->missing[c] + to, all * (scattered.missing + dark * scattered.light));
     }

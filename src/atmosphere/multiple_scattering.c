@@ -2,6 +2,7 @@
 
 #include "in_scattering.h"
 #include "scattering_orders.h"
+#include "stray.h"
 
 #include <math.h>
 #include <string.h>
@@ -153,15 +154,31 @@ static const nb_table_resolution efforts[NEBEL_ATMOSPHERE_QUALITY_COUNT] = {
     [NEBEL_ATMOSPHERE_PRECISE] = {20, 40, 8, 5, 4, 5, NB_MOMENTS, 2e-3},
 };
 
+/* Of haze by few moments half of all light would be in peaks. */
+static const nb_table_resolution fast_of_haze = {9, 22, 8, 5, 3, 4, NB_MOMENTS, 1e-2};
+
+static const nb_table_resolution *effort_of(const nb_air_components *airs, nebel_atmosphere_quality quality)
+{
+    return quality == NEBEL_ATMOSPHERE_FAST && nb_airs_are_hazy(airs) ? &fast_of_haze : &efforts[quality];
+}
+
+int nb_scatter_orders(const nb_air_components *airs, nebel_atmosphere_quality quality)
+{
+    return effort_of(airs, quality)->moments;
+}
+
 typedef struct nb_table_builder {
-    const nb_air_components *airs;
-    nb_scattering_table *sealed; /* of the light to be scattered; in the end of all */
+    const nb_air_components *airs, *all; /* airs: those of nb_air_components_smooth */
+    nb_scattering_table *sealed;         /* of the light to be scattered; in the end of all */
     nb_scattering_table *next;
     const double *albedo;
     const nb_table_resolution *effort;
     nb_gauss_rule slopes, nodes;
     double turn_cosines[MOST_TURNS];
-    int first; /* the light to be scattered is the sun's */
+    const nb_stray *stray; /* the layout of what follows */
+    double *radiance;      /* NULL, or to which light is added: [height][sun][side][slope][turn][colour] */
+    int first;             /* the light to be scattered is the sun's */
+    int peaks;             /* of that, what peaks turn alone */
     nb_gather_fn *gather;
 } nb_table_builder;
 
@@ -200,7 +217,7 @@ static void add_sunlight(const nb_direction_fan *fan, const double phases[], con
             double scattered = 0;
             for (int k = 0; k < airs->count; k++)
                 scattered += airs->airs[k].scattering[c] * fan->path.density[k][first + i] * phases[k];
-            light[c] += nodes->sun[c][i] * scattered;
+            light[c] += (fan->maker->stray->count > 0 ? nodes->lit : nodes->sun)[c][i] * scattered;
         }
 }
 
@@ -226,10 +243,44 @@ static void gather_air(const nb_direction_fan *fan, nb_moment_basis aspect, doub
         const int left = fan->path.count - job.first;
         job.count = left < NB_GATHER_NODES ? left : NB_GATHER_NODES;
         maker->gather(&job, &nodes);
+        if (maker->first && maker->stray->count > 0) nb_stray_add_sun(maker->stray, maker->sealed, &job, &nodes);
         if (maker->first)
             add_sunlight(fan, phases, &nodes, job.first, job.count, light);
         else
             add_last(&nodes, job.count, light);
+    }
+}
+
+/* What peaks turn n times on a bent way, of t times in the mean, has t^(n - 1) / n! of the sunlight that comes straight: peaks.h. */
+static void add_turned_once(const nb_direction_fan *fan, const nb_node_light *nodes, int first, int count,
+                            double light[3])
+{
+    const nb_air_components *airs = fan->maker->all;
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < count; i++) {
+            const double t = nodes->turns[c][i];
+            double turned = 0;
+            for (int k = 0; k < airs->count; k++)
+                turned += airs->airs[k].peak * airs->airs[k].scattering[c] * fan->path.density[k][first + i];
+            light[c] += turned * nodes->ahead[c][i] * (t > 1e-6 ? (1 - nb_exp(-t)) / t : 1);
+        }
+}
+
+static void gather_turned(const nb_direction_fan *fan, nb_moment_basis aspect, double light[3])
+{
+    const nb_table_builder *maker = fan->maker;
+    nb_gather_job job = {.airs = maker->all,
+                         .smooth = maker->airs,
+                         .wants_sun = 1,
+                         .track = fan->track,
+                         .aspect = aspect,
+                         .path = &fan->path};
+    for (; job.first < fan->path.count; job.first += NB_GATHER_NODES) {
+        nb_node_light nodes;
+        const int left = fan->path.count - job.first;
+        job.count = left < NB_GATHER_NODES ? left : NB_GATHER_NODES;
+        maker->gather(&job, &nodes);
+        add_turned_once(fan, &nodes, job.first, job.count, light);
     }
 }
 
@@ -252,30 +303,47 @@ static void gather_ground(const nb_direction_fan *fan, nb_moment_basis aspect, d
 static void gather(const nb_direction_fan *fan, nb_moment_basis aspect, double light[3])
 {
     for (int c = 0; c < 3; c++) light[c] = 0;
+    if (fan->maker->peaks) {
+        gather_turned(fan, aspect, light);
+        return;
+    }
     gather_air(fan, aspect, light);
     if (fan->hits_ground) gather_ground(fan, aspect, light);
 }
 
+static void keep(const nb_table_builder *maker, int entry, int side, int slope, int turn, const double light[3])
+{
+    const nb_stray *stray = maker->stray;
+    const size_t way = (size_t)((side * stray->slopes.count + slope) * stray->turns + turn);
+    if (maker->radiance == NULL) return;
+    double *to = maker->radiance + 3 * ((size_t)entry * nb_stray_ways(stray) + way);
+    for (int c = 0; c < 3; c++) to[c] += light[c];
+}
+
 /* Adds what comes to all entries of one height from directions of one slope. */
-static void add_slope(const nb_table_builder *maker, int height, double zenith, double weight)
+static void add_slope(const nb_table_builder *maker, int height, int side, int slope)
 {
     const nb_air_components *airs = maker->airs;
     const nb_table_resolution *effort = maker->effort;
     const double radius = airs->radius + height_at(maker->next, airs, height);
+    double weight;
+    const double zenith = nb_stray_zenith(maker->stray, nb_stray_horizon(airs, radius), side, slope, &weight);
     nb_direction_fan fan;
     fan.maker = maker;
     fan.track = (nb_atmosphere_ray){radius, radius * zenith};
     const double ground = nb_atmosphere_ray_enter(fan.track, airs->radius), level = sqrt(fmax(0, 1 - zenith * zenith));
     fan.hits_ground = ground < HUGE_VAL;
     fan.end = fan.hits_ground ? ground : nb_atmosphere_ray_leave(fan.track, airs->top);
-    nb_ray_nodes_lay(airs, NULL, &maker->nodes, fan.track, fan.end, 0, NULL, &fan.path);
+    nb_ray_nodes_lay(maker->peaks ? maker->all : airs, maker->peaks ? airs : NULL, &maker->nodes, fan.track, fan.end, 0,
+                     NULL, &fan.path);
     for (int i = 0; i < effort->suns; i++) {
-        const double sun = sun_at(maker->next, i), side = sqrt(fmax(0, 1 - sun * sun));
+        const double sun = sun_at(maker->next, i), aside = sqrt(fmax(0, 1 - sun * sun));
         for (int k = 0; k < effort->turns; k++) {
             const double x = level * maker->turn_cosines[k];
-            const nb_moment_basis aspect = {zenith, x * side + zenith * sun, sun};
+            const nb_moment_basis aspect = {zenith, x * aside + zenith * sun, sun};
             double light[3];
             gather(&fan, aspect, light);
+            keep(maker, height * effort->suns + i, side, slope, k, light);
             for (int c = 0; c < 3; c++) light[c] *= weight * 2 * PI / effort->turns;
             nb_radiance_moments_add(&maker->next->fields[height * effort->suns + i], effort->moments, aspect, light);
             if (height == 0 && zenith > 0)
@@ -288,14 +356,8 @@ static void add_slope(const nb_table_builder *maker, int height, double zenith, 
 static void add_height(void *data, size_t height)
 {
     const nb_table_builder *maker = data;
-    const nb_air_components *airs = maker->airs;
-    const double ratio = airs->radius / (airs->radius + height_at(maker->next, airs, (int)height));
-    const double horizon = -sqrt(fmax(0, 1 - ratio * ratio));
-    for (int k = 0; k < maker->slopes.count; k++) {
-        const double part = 0.5 * (1 + maker->slopes.nodes[k]), weight = maker->slopes.weights[k] * part;
-        add_slope(maker, (int)height, horizon + (1 - horizon) * part * part, (1 - horizon) * weight);
-        add_slope(maker, (int)height, horizon - (1 + horizon) * part * part, (1 + horizon) * weight);
-    }
+    for (int k = 0; k < maker->slopes.count; k++)
+        for (int side = NB_STRAY_SIDES - 1; side >= 0; side--) add_slope(maker, (int)height, side, k);
 }
 
 /* Of all air straight up, of the colour of which it is the most. */
@@ -427,11 +489,52 @@ static int run_cycle(nb_table_builder *maker, const nb_parallel *parts, nb_scatt
     return done;
 }
 
+/* What strays of the light of the last table. */
+typedef struct nb_straying {
+    nb_table_builder *maker;
+    const nb_air_components *airs;
+    const nb_scattering_table *sum;
+    nb_stray *stray;
+} nb_straying;
+
+static void stray_at_height(void *data, size_t height)
+{
+    const nb_straying *straying = data;
+    const nb_scattering_table *sum = straying->sum;
+    const size_t first = height * (size_t)sum->suns;
+    const double radius = straying->airs->radius + height_at(sum, straying->airs, (int)height);
+    const double *radiance = straying->maker->radiance + 3 * first * nb_stray_ways(straying->stray);
+    double suns[MOST_SUNS];
+    for (int i = 0; i < sum->suns; i++) suns[i] = sun_at(sum, i);
+    if (straying->maker->peaks)
+        nb_stray_fill_sun(straying->stray, straying->airs, straying->maker->airs, sum->orders, (int)height, radius,
+                          suns, radiance);
+    else
+        nb_stray_fill(straying->stray, straying->airs, sum->orders, (int)height, radius, radiance, sum->fields + first);
+}
+
+/* Makes scratch of a table. */
+static void bend_sunlight(nb_table_builder *maker, const nb_parallel *parts, const nb_air_components *airs,
+                          nb_scattering_table *table, nb_stray *stray)
+{
+    nb_straying straying = {maker, airs, table, stray};
+    const size_t numbers = 3 * nb_scattering_table_entries(table) * nb_stray_ways(stray);
+    maker->peaks = 1;
+    scatter_again(maker, parts, 1, table);
+    nb_parallel_for(parts, (size_t)table->heights, stray_at_height, &straying);
+    maker->peaks = 0;
+    memset(maker->radiance, 0, numbers * sizeof *maker->radiance);
+}
+
 /* Each cycle begins where the one before leads. */
-static void sum_orders(nb_table_builder *maker, const nb_parallel *parts, nb_scattering_rounds *rounds)
+static void sum_orders(nb_table_builder *maker, const nb_parallel *parts, const nb_air_components *airs,
+                       nb_scattering_rounds *rounds, nb_stray *stray)
 {
     const int most = deepest(maker->airs) > HOPELESS ? FEW_ROUNDS : MOST_ROUNDS;
+    double *const radiance = maker->radiance;
+    if (maker->stray->count > 0) bend_sunlight(maker, parts, airs, &rounds->once, stray);
     scatter_again(maker, parts, 1, &rounds->once);
+    maker->radiance = NULL;
     for (int done = 0; done < most;) {
         done = run_cycle(maker, parts, rounds, done);
         if (rounds->sum.missing <= maker->effort->most_missing) break;
@@ -439,6 +542,26 @@ static void sum_orders(nb_table_builder *maker, const nb_parallel *parts, nb_sca
     }
     seal(&rounds->sum, maker->sealed);
     maker->sealed->missing = rounds->sum.missing;
+    maker->radiance = radiance;
+}
+
+static void find_stray(nb_table_builder *maker, const nb_parallel *parts, const nb_air_components *airs,
+                       nb_scattering_rounds *rounds, nb_stray *stray)
+{
+    nb_straying straying = {maker, airs, &rounds->sum, stray};
+    scatter_again(maker, parts, 0, &rounds->tables[0]);
+    nb_parallel_for(parts, (size_t)rounds->sum.heights, stray_at_height, &straying);
+}
+
+static nebel_result allocate_stray(const nebel_allocator *allocator, nb_table_builder *maker, nb_stray *stray)
+{
+    const size_t entries = (size_t)(stray->heights * stray->suns);
+    if (stray->count == 0) return NEBEL_OK;
+    stray->sun = nb_allocate_zero(allocator, entries, sizeof *stray->sun);
+    stray->parts =
+        nb_allocate_zero(allocator, entries * nb_stray_entry(stray) * (size_t)stray->count, sizeof *stray->parts);
+    maker->radiance = nb_allocate_zero(allocator, entries * nb_stray_ways(stray), 3 * sizeof *maker->radiance);
+    return stray->sun != NULL && stray->parts != NULL && maker->radiance != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
 }
 
 /* Light that peaks of phase functions turn was sunlight so far; on the ground it comes from the sky around the sun. */
@@ -475,10 +598,11 @@ static void free_rounds(const nebel_allocator *allocator, nb_scattering_rounds *
 nebel_result nb_scattering_table_make(const nebel_allocator *allocator, const nb_parallel *parts,
                                       const nb_air_components *airs, const nb_air_components *smooth,
                                       nebel_atmosphere_quality quality, const double albedo[3],
-                                      nb_scattering_table *scatter)
+                                      nb_scattering_table *scatter, nb_stray *stray)
 {
-    const nb_table_resolution *effort = &efforts[quality];
+    const nb_table_resolution *effort = effort_of(airs, quality);
     nb_table_builder maker = {.airs = smooth,
+                              .all = airs,
                               .albedo = albedo,
                               .effort = effort,
                               .sealed = scatter,
@@ -489,6 +613,8 @@ nebel_result nb_scattering_table_make(const nebel_allocator *allocator, const nb
     const nb_scattering_table layout = layout_of(smooth, effort);
     nb_scattering_table fine = layout;
     nb_scattering_rounds rounds = {.once = {.heights = 0}};
+    *stray = nb_stray_plan(airs, &layout, &maker.slopes, effort->turns);
+    maker.stray = stray;
     fine.suns = FINE * (layout.suns - 1) + 1;
     nebel_result result = allocate(allocator, &fine, scatter);
     if (result != NEBEL_OK) return result;
@@ -497,9 +623,12 @@ nebel_result nb_scattering_table_make(const nebel_allocator *allocator, const nb
         return NEBEL_OK;
     }
     result = allocate_rounds(allocator, &layout, &rounds);
-    if (result == NEBEL_OK) sum_orders(&maker, parts, &rounds);
+    if (result == NEBEL_OK) result = allocate_stray(allocator, &maker, stray);
+    if (result == NEBEL_OK) sum_orders(&maker, parts, airs, &rounds, stray);
+    if (result == NEBEL_OK && stray->count > 0) find_stray(&maker, parts, airs, &rounds, stray);
     if (result == NEBEL_OK && !smooth->is_smooth) add_turned(airs, smooth, scatter);
     scatter->missing += find_unresolved(smooth, scatter);
+    nb_release(allocator, maker.radiance);
     free_rounds(allocator, &rounds);
     return result;
 }

@@ -6,6 +6,8 @@
 #include "base/parallel.h"
 #include "math/gauss_rule.h"
 
+typedef struct nb_stray nb_stray;
+
 typedef struct nb_scattering_table {
     int heights, suns;
     double first_sun, last_sun, sun_scale; /* what entries over the sun's height are spread over */
@@ -26,11 +28,14 @@ nb_radiance_moments nb_scattering_table_look_up(const nb_scattering_table *scatt
                                                 double radius, double sun);
 void nb_scattering_table_look_up_ground(const nb_scattering_table *scatter, double sun, double irradiance[3]);
 
-/* Makes the table; `albedo` is the ground's; smooth: nb_air_components_smooth of the airs. Errors: MEMORY. */
+/* Of moments that the table of a quality keeps. */
+int nb_scatter_orders(const nb_air_components *airs, nebel_atmosphere_quality quality);
+
+/* Makes the table, and what strays from it; `albedo` is the ground's; smooth: nb_air_components_smooth of the airs. Errors: MEMORY. */
 nebel_result nb_scattering_table_make(const nebel_allocator *allocator, const nb_parallel *parts,
                                       const nb_air_components *airs, const nb_air_components *smooth,
                                       nebel_atmosphere_quality quality, const double albedo[3],
-                                      nb_scattering_table *scatter);
+                                      nb_scattering_table *scatter, nb_stray *stray);
 void nb_scattering_table_free(const nebel_allocator *allocator, nb_scattering_table *scatter);
 
 #endif

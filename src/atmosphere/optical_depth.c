@@ -36,6 +36,16 @@ static double scattering_depth(const nb_air_components *airs, const nb_air_compo
  * horizon and none of it up to 4 % too little. Hazes of 0.1 and more need it all. */
 #define THIN_DEPTH 0.01
 
+/* Of what peaks turn, as an optical depth. The Earth's dust has 0.003, that of Mars 0.2. */
+#define HAZY_DEPTH 0.01
+
+int nb_airs_are_hazy(const nb_air_components *airs)
+{
+    for (int k = 0; k < airs->count; k++)
+        if (airs->airs[k].moments[NB_FEW_MOMENTS] * scattering_depth(airs, &airs->airs[k]) > HAZY_DEPTH) return 1;
+    return 0;
+}
+
 static void set_peaks(nb_air_components *airs, int orders)
 {
     for (int k = 0; k < airs->count; k++) {

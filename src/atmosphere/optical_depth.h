@@ -43,6 +43,9 @@ double nb_air_density(const nb_air_component *air, double height);
 /* Whether there is no air at all. */
 int nb_air_components_are_empty(const nb_air_components *airs);
 
+/* Whether peaks turn so much light that it matters where it comes from (nb_stray). */
+int nb_airs_are_hazy(const nb_air_components *airs);
+
 /* Sets the peaks of airs, and `smooth` to air whose phase functions have no more than `orders` moments. It scatters light that comes from
  * all sides as the other does: the part that goes nearly straight ahead counts as not scattered at all (delta-M: Wiscombe, Journal of the
  * Atmospheric Sciences 34, 1977). is_smooth says that both are the same. */
