@@ -8,7 +8,7 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_ambient", "read_camera", "read_cells", "read_classic", "read_clouds", "read_diffusion", "read_density", "read_grid", "read_layers", "read_light", "read_model", "read_nebula", "read_noise", "read_planet", "read_shape", "read_volume", "save_places"]
+READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_ambient", "read_camera", "read_cells", "read_classic", "read_clouds", "read_diffusion", "read_density", "read_grid", "read_layers", "read_light", "read_model", "read_nebula", "read_noise", "read_planet", "read_shape", "read_volume", "key_table"]
 TABLE = re.compile(r"^ *(?:static )?const char \*const (?:\w+_)?(?:names|types)\[\w*\] = \{(.*?)\}", re.S | re.M)
 COMMENT = re.compile(r'("(?:\\.|[^"\\])*")|//[^\n]*|/\*.*?\*/', re.S)
 BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [], "planet": {}}', '{"nebel": 1, "fog": [], "planet": []}', '{"nebel": 1, "fog": [], "planet": [{"model": "layers"}]}',
@@ -55,7 +55,8 @@ def reader_names():
     """Every key and every choice that the reader's tables hold."""
     found = set()
     for name in READERS:
-        for table in TABLE.findall((ROOT / "src/scene" / f"{name}.c").read_text()):
+        file = next((ROOT / "src").glob(f"*/{name}.c"))
+        for table in TABLE.findall(file.read_text()):
             found |= set(re.findall(r'"([A-Za-z_0-9]+)"', table))
     presets = (ROOT / "src/medium/fog_presets.c").read_text()
     return found | set(re.findall(r'\.name = "(\w+)"', presets))
