@@ -84,6 +84,7 @@ asan: $(MODELS)
 lint: all
 	@scripts/install_packages.sh build test lint
 	@python3 scripts/check_includes.py
+	@python3 scripts/check_tags.py
 	@python3 scripts/check_style.py
 	@clang-format --dry-run -Werror $(SOURCES)
 	@scripts/check_formulas.sh

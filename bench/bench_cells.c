@@ -13,7 +13,7 @@ static const char failed[] = "cells: a query failed or gave another fog than the
 enum { MOST_ROOMS = 64, POINTS = 4096 };
 
 /* Rooms 1 m long along x, each with a fog of its own, so that none are grouped; the eye is in the first. */
-typedef struct nb_row {
+typedef struct nb_cell_row {
     size_t room_count;
     nebel_cell rooms[MOST_ROOMS];
     nb_old_box boxes[MOST_ROOMS];
@@ -22,13 +22,13 @@ typedef struct nb_row {
     nebel_cell_fog fog[POINTS];
     nb_old_vertex old[POINTS];
     int rounds;
-} nb_row;
+} nb_cell_row;
 
 static const nebel_cell_view view = {.eye = {.5, 1, 1.5}, .forward = {1, 0, 0}};
 
 static double run_cells(void *user)
 {
-    nb_row *const row = user;
+    nb_cell_row *const row = user;
     const double start = nb_clock_cpu();
     for (int i = 0; i < row->rounds; i++)
         if (nebel_compute_cell_fog(row->cells, &view, POINTS, row->points, 0, row->fog, 0) != NEBEL_OK) return -1;
@@ -37,21 +37,21 @@ static double run_cells(void *user)
 
 static double run_magazine(void *user)
 {
-    nb_row *const row = user;
+    nb_cell_row *const row = user;
     const nb_old_camera camera = {{(float)view.eye[0], (float)view.eye[1], (float)view.eye[2]}};
     const double start = nb_clock_cpu();
     for (int i = 0; i < row->rounds; i++) nb_magazine_fog(&camera, row->boxes, row->room_count, row->old, POINTS);
     return nb_clock_cpu() - start;
 }
 
-static int agree(const nb_row *row)
+static int agree(const nb_cell_row *row)
 {
     for (size_t i = 0; i < POINTS; i++)
         if (!(fabs(1 - row->fog[i].alpha - (double)row->old[i].transmittance) < 1e-4)) return 0;
     return 1;
 }
 
-static void make_rooms(nb_row *row)
+static void make_rooms(nb_cell_row *row)
 {
     for (size_t i = 0; i < row->room_count; i++) {
         const double low = (double)i, density = .5 * (double)(1 + i % 3) / (double)row->room_count;
@@ -62,7 +62,7 @@ static void make_rooms(nb_row *row)
 }
 
 /* In the last room, so that every way goes through all of them. */
-static void make_points(nb_row *row)
+static void make_points(nb_cell_row *row)
 {
     for (size_t i = 0; i < POINTS; i++) {
         const double x = (double)row->room_count - .5, y = .05 + 2.9 * (double)(i % 64) / 63,
@@ -72,7 +72,7 @@ static void make_points(nb_row *row)
     }
 }
 
-static const char *measure_row(nb_row *row, const nb_bench_desc *desc, nb_figures *figures)
+static const char *measure_row(nb_cell_row *row, const nb_bench_desc *desc, nb_figures *figures)
 {
     nb_contest contests[2] = {{.run = run_magazine, .user = row}, {.run = run_cells, .user = row}};
     make_rooms(row);
@@ -96,7 +96,7 @@ static const char *measure_row(nb_row *row, const nb_bench_desc *desc, nb_figure
 
 const char *nb_bench_cells(const nb_bench_desc *desc, nb_figures *figures)
 {
-    static nb_row row;
+    static nb_cell_row row;
     const char *fault = NULL;
     for (row.room_count = 4; row.room_count <= MOST_ROOMS && fault == NULL; row.room_count *= 4) {
         row.rounds = desc->quick ? 1 : (int)(256 / row.room_count);

@@ -17,12 +17,12 @@ typedef struct nb_sprite {
     float color[4];
 } nb_sprite;
 
-typedef struct nb_drawing {
+typedef struct nb_gl_drawing {
     nb_sky sky;
     nebel_scene_data scene, walled; /* without surfaces; with one across the picture, in the nebula's middle */
     nebel_gl_renderer *renderer, *with_wall;
     unsigned target, framebuffer, vertex_array, buffer, program;
-} nb_drawing;
+} nb_gl_drawing;
 
 /* ---- sprites --------------------------------------------------------------------------------- */
 
@@ -58,7 +58,7 @@ static void attach(unsigned program, GLenum kind, const char *text)
     glDeleteShader(shader);
 }
 
-static int make_program(nb_drawing *d)
+static int make_program(nb_gl_drawing *d)
 {
     float matrices[2][16];
     GLint good = 0;
@@ -80,7 +80,7 @@ static int make_program(nb_drawing *d)
     return 0;
 }
 
-static int make_sprites(nb_drawing *d)
+static int make_sprites(nb_gl_drawing *d)
 {
     nb_sprite *const sprites = malloc(d->sky.count * sizeof *sprites);
     if (sprites == NULL) return -1;
@@ -106,7 +106,7 @@ static int make_sprites(nb_drawing *d)
     return 0;
 }
 
-static int make_target(nb_drawing *d)
+static int make_target(nb_gl_drawing *d)
 {
     glGenTextures(1, &d->target);
     glBindTexture(GL_TEXTURE_2D, d->target);
@@ -120,7 +120,7 @@ static int make_target(nb_drawing *d)
 
 static double run_sprites(void *user)
 {
-    const nb_drawing *const d = user;
+    const nb_gl_drawing *const d = user;
     glFinish();
     const double start = nb_clock_wall();
     glBindFramebuffer(GL_FRAMEBUFFER, d->framebuffer);
@@ -137,7 +137,7 @@ static double run_sprites(void *user)
 
 /* ---- particles ------------------------------------------------------------------------------- */
 
-static double run_frame(const nb_drawing *d, nebel_gl_renderer *renderer)
+static double run_frame(const nb_gl_drawing *d, nebel_gl_renderer *renderer)
 {
     const nebel_gl_frame_desc desc = {
         .camera = d->sky.camera, .width = d->sky.width, .height = d->sky.height, .samples = 1};
@@ -150,17 +150,17 @@ static double run_frame(const nb_drawing *d, nebel_gl_renderer *renderer)
 
 static double run_particles(void *user)
 {
-    const nb_drawing *const d = user;
+    const nb_gl_drawing *const d = user;
     return run_frame(d, d->renderer);
 }
 
 static double run_with_wall(void *user)
 {
-    const nb_drawing *const d = user;
+    const nb_gl_drawing *const d = user;
     return run_frame(d, d->with_wall);
 }
 
-static int set_particles(nb_drawing *d)
+static int set_particles(nb_gl_drawing *d)
 {
     const nebel_particle *const particles = d->sky.particles;
     return nebel_set_gl_renderer_particles(d->renderer, particles, d->sky.count) == NEBEL_OK &&
@@ -169,7 +169,7 @@ static int set_particles(nb_drawing *d)
                : -1;
 }
 
-static int make_renderers(nb_drawing *d)
+static int make_renderers(nb_gl_drawing *d)
 {
     static const float corners[] = {-40, -40, 0, 40, -40, 0, 40, 40, 0, -40, 40, 0};
     static const uint32_t indices[] = {0, 1, 2, 0, 2, 3};
@@ -191,7 +191,7 @@ static int make_renderers(nb_drawing *d)
 }
 
 /* Particles of one colour take all of the light alike: they need one pass. */
-static void make_grey(nb_drawing *d)
+static void make_grey(nb_gl_drawing *d)
 {
     for (size_t i = 0; i < d->sky.count; i++) {
         double *const extinction = d->sky.particles[i].extinction;
@@ -201,7 +201,7 @@ static void make_grey(nb_drawing *d)
 
 /* ---- figures --------------------------------------------------------------------------------- */
 
-static int count_overlap(const nb_drawing *d, double *overlap)
+static int count_overlap(const nb_gl_drawing *d, double *overlap)
 {
     float *const transmittance = malloc(3 * sizeof(float) * d->sky.width * d->sky.height);
     if (transmittance == NULL) return -1;
@@ -212,7 +212,7 @@ static int count_overlap(const nb_drawing *d, double *overlap)
     return result == NEBEL_OK ? 0 : -1;
 }
 
-static void add(nb_figures *figures, const nb_drawing *d, const char *what, nb_figure figure)
+static void add(nb_figures *figures, const nb_gl_drawing *d, const char *what, nb_figure figure)
 {
     figure.group = "A nebula of particles in OpenGL, 1280x720, one sample: the whole frame";
     (void)snprintf(figure.name, sizeof figure.name, "%zu %s", d->sky.count, what);
@@ -220,7 +220,7 @@ static void add(nb_figures *figures, const nb_drawing *d, const char *what, nb_f
 }
 
 /* The one with a surface has no target: sprites are not tested against depth, and half of the particles are hidden. */
-static const char *measure(nb_drawing *d, const char *what, const char *what_with_wall, int repetitions,
+static const char *measure(nb_gl_drawing *d, const char *what, const char *what_with_wall, int repetitions,
                            nb_figures *figures)
 {
     nb_contest contests[] = {
@@ -240,7 +240,7 @@ static const char *measure(nb_drawing *d, const char *what, const char *what_wit
     return NULL;
 }
 
-static const char *measure_all(nb_drawing *d, int repetitions, nb_figures *figures)
+static const char *measure_all(nb_gl_drawing *d, int repetitions, nb_figures *figures)
 {
     double overlap = 0;
     const char *fault =
@@ -254,7 +254,7 @@ static const char *measure_all(nb_drawing *d, int repetitions, nb_figures *figur
     return NULL;
 }
 
-static void delete_all(nb_drawing *d)
+static void delete_all(nb_gl_drawing *d)
 {
     nebel_destroy_gl_renderer(d->renderer);
     nebel_destroy_gl_renderer(d->with_wall);
@@ -268,7 +268,7 @@ static void delete_all(nb_drawing *d)
 
 const char *nb_bench_opengl_particles(const nb_bench_desc *desc, nb_figures *figures)
 {
-    nb_drawing d = {0};
+    nb_gl_drawing d = {0};
     const char *fault = out_of_memory;
     if (nb_sky_make(desc->quick, &d.sky) == 0 && make_sprites(&d) == 0) {
         fault = failed;

@@ -33,10 +33,10 @@ typedef struct nb_field {
     int rounds; /* in one measurement */
 } nb_field;
 
-typedef struct nb_entry {
+typedef struct nb_segment_entry {
     const nb_field *field;
     nebel_isa isa;
-} nb_entry;
+} nb_segment_entry;
 
 /* ---- what is fogged -------------------------------------------------------------------------- */
 
@@ -78,7 +78,7 @@ static int make_field(const nb_terrain *terrain, nb_setting setting, size_t coun
 
 static double run_kernel(void *user)
 {
-    const nb_entry *const c = user;
+    const nb_segment_entry *const c = user;
     const nebel_segments segments = {.from = eye, .to = c->field->points};
     const double start = nb_clock_cpu();
     for (int i = 0; i < c->field->rounds; i++) {
@@ -92,7 +92,7 @@ static double run_kernel(void *user)
 
 static double run_magazine(void *user)
 {
-    const nb_entry *const c = user;
+    const nb_segment_entry *const c = user;
     const nb_old_camera camera = {{eye[0], eye[1], eye[2]}};
     const double start = nb_clock_cpu();
     for (int i = 0; i < c->field->rounds; i++) {
@@ -103,7 +103,7 @@ static double run_magazine(void *user)
 
 static double run_stream(void *user)
 {
-    const nb_entry *const c = user;
+    const nb_segment_entry *const c = user;
     const double start = nb_clock_cpu();
     for (int i = 0; i < c->field->rounds; i++)
         nb_stream_three_to_one(c->field->points, c->field->found, c->field->count);
@@ -126,8 +126,8 @@ static double million_per_second(const nb_field *field, double seconds)
     return 1e-6 * (double)field->count * field->rounds / seconds;
 }
 
-static void add_against_magazine(nb_figures *figures, const nb_entry *entry, const char *setting, double seconds,
-                                 double floor)
+static void add_against_magazine(nb_figures *figures, const nb_segment_entry *entry, const char *setting,
+                                 double seconds, double floor)
 {
     const nb_field *const field = entry->field;
     nb_figure figure = {.group = "Segments from one eye to the points of a terrain, one thread",
@@ -144,14 +144,14 @@ static void add_against_magazine(nb_figures *figures, const nb_entry *entry, con
 static const char *measure_against_magazine(const nb_field *field, const char *setting, int repetitions,
                                             nb_figures *figures)
 {
-    nb_entry entries[NEBEL_ISA_COUNT];
+    nb_segment_entry entries[NEBEL_ISA_COUNT];
     nb_contest contests[NEBEL_ISA_COUNT];
     size_t count = 1;
-    entries[0] = (nb_entry){.field = field};
+    entries[0] = (nb_segment_entry){.field = field};
     contests[0] = (nb_contest){.run = run_magazine, .user = &entries[0]};
     for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
         if (!nebel_isa_available((nebel_isa)isa)) continue;
-        entries[count] = (nb_entry){field, (nebel_isa)isa};
+        entries[count] = (nb_segment_entry){field, (nebel_isa)isa};
         contests[count] = (nb_contest){.run = run_kernel, .user = &entries[count]};
         count++;
     }
@@ -162,7 +162,7 @@ static const char *measure_against_magazine(const nb_field *field, const char *s
     return NULL;
 }
 
-static void add_against_memory(nb_figures *figures, const nb_entry *entry, const char *name, double seconds,
+static void add_against_memory(nb_figures *figures, const nb_segment_entry *entry, const char *name, double seconds,
                                double floor)
 {
     const nb_field *const field = entry->field;
@@ -179,7 +179,7 @@ static void add_against_memory(nb_figures *figures, const nb_entry *entry, const
 /* With AVX2 and what is better, where there is either. */
 static const char *measure_against_memory(const nb_field *field, int repetitions, nb_figures *figures, const char *name)
 {
-    nb_entry entries[] = {
+    nb_segment_entry entries[] = {
         {.field = field}, {field, NEBEL_ISA_AVX2}, {field, NEBEL_ISA_AVX512}, {field, NEBEL_ISA_NEON}};
     nb_contest contests[4] = {{.run = run_stream, .user = &entries[0]}};
     size_t count = 1;

@@ -28,7 +28,7 @@ static const struct {
                     {NB_FOG_HEIGHT, "C: height fog, pillars", 200, 1},
                     {NB_FOG_CLOUD, "D: cloud", 300, 8}};
 
-typedef struct nb_setup {
+typedef struct nb_sunlight_setup {
     nb_bench_scene scene;
     nb_embree_floor *floor;
     nebel_snapshot *fog;
@@ -39,17 +39,17 @@ typedef struct nb_setup {
     double commit_seconds;
     size_t fog_bytes;
     unsigned char *memory; /* as large as the fog, and a picture behind it */
-} nb_setup;
+} nb_sunlight_setup;
 
 static double run_embree(void *user)
 {
-    const nb_embree_rays rays = nb_embree_floor_trace(((const nb_setup *)user)->floor);
+    const nb_embree_rays rays = nb_embree_floor_trace(((const nb_sunlight_setup *)user)->floor);
     return rays.primary_seconds + rays.shadow_seconds;
 }
 
 static double run_nebel(void *user)
 {
-    const nb_setup *const setup = user;
+    const nb_sunlight_setup *const setup = user;
     const nebel_frame_desc desc = {.camera = setup->scene.data.camera,
                                    .width = setup->width,
                                    .height = setup->height,
@@ -63,7 +63,7 @@ static double run_nebel(void *user)
 /* Reads as much as the fog has, voxels and all, and writes a picture. */
 static double run_memory(void *user)
 {
-    nb_setup *const setup = user;
+    nb_sunlight_setup *const setup = user;
     const size_t picture = 3 * sizeof(float) * setup->width * setup->height;
     const double start = nb_clock_cpu();
     uint64_t sum = 0, word;
@@ -75,7 +75,7 @@ static double run_memory(void *user)
     return nb_clock_cpu() - start;
 }
 
-static int prepare(const nb_bench_desc *desc, nb_bench_fog fog, nb_setup *setup)
+static int prepare(const nb_bench_desc *desc, nb_bench_fog fog, nb_sunlight_setup *setup)
 {
     setup->width = desc->quick ? 160 : NB_BENCH_WIDTH;
     setup->height = desc->quick ? 88 : NB_BENCH_HEIGHT;
@@ -93,7 +93,7 @@ static int prepare(const nb_bench_desc *desc, nb_bench_fog fog, nb_setup *setup)
     return nebel_create_cpu_renderer(&setup->scene.data, setup->fog, &renderer, &setup->renderer) == NEBEL_OK ? 0 : -1;
 }
 
-static void tear_down(nb_setup *setup)
+static void tear_down(nb_sunlight_setup *setup)
 {
     nebel_destroy_renderer(setup->renderer);
     nebel_release_snapshot(setup->fog);
@@ -111,7 +111,7 @@ static double encode_srgb(float linear)
 
 /* Of all channels of the picture, against the same at a five-hundredth of the tolerance, in 255ths of sRGB. Below 0:
  * it failed. */
-static double root_mean_square(nb_setup *setup, uint32_t part)
+static double root_mean_square(nb_sunlight_setup *setup, uint32_t part)
 {
     setup->width /= part;
     setup->height /= part;
@@ -133,7 +133,7 @@ static double root_mean_square(nb_setup *setup, uint32_t part)
 static const char group[] = "A frame of fog in sunlight, one sample, shadows everywhere, one thread";
 
 /* Of fog that is kept for light, what is there before the first frame. */
-static void add_costs(nb_figures *figures, int number, const nb_setup *setup)
+static void add_costs(nb_figures *figures, int number, const nb_sunlight_setup *setup)
 {
     const struct {
         const char *what, *unit;
@@ -149,7 +149,8 @@ static void add_costs(nb_figures *figures, int number, const nb_setup *setup)
 }
 
 /* The same frame beside both floors. */
-static int add_figures(nb_figures *figures, int number, nb_setup *setup, double seconds, double rays, double memory)
+static int add_figures(nb_figures *figures, int number, nb_sunlight_setup *setup, double seconds, double rays,
+                       double memory)
 {
     nb_figure time = {.group = group,
                       .unit = "CPU ms",
@@ -174,7 +175,7 @@ static int add_figures(nb_figures *figures, int number, nb_setup *setup, double 
     return 0;
 }
 
-static const char *measure(const nb_bench_desc *desc, nb_setup *setups, nb_figures *figures)
+static const char *measure(const nb_bench_desc *desc, nb_sunlight_setup *setups, nb_figures *figures)
 {
     nb_contest contests[3 * SETUPS];
     for (int i = 0; i < SETUPS; i++) {
@@ -194,7 +195,7 @@ static const char *measure(const nb_bench_desc *desc, nb_setup *setups, nb_figur
 
 const char *nb_bench_sunlight(const nb_bench_desc *desc, nb_figures *figures)
 {
-    nb_setup setups[SETUPS] = {{.fog = NULL}};
+    nb_sunlight_setup setups[SETUPS] = {{.fog = NULL}};
     const char *const fault = measure(desc, setups, figures);
     for (int i = 0; i < SETUPS; i++) tear_down(&setups[i]);
     return fault;

@@ -15,7 +15,7 @@ static const char out_of_memory[] = "vertices: out of memory";
 static const char failed[] = "vertices: a query failed or gave other bytes than the magazine's code";
 
 /* The terrain's points, as an array and in the magazine's structures, and what both ways make of them. */
-typedef struct nb_mesh {
+typedef struct nb_terrain_mesh {
     size_t count;
     const float *points;          /* 3 each */
     unsigned char *colors;        /* 4 each */
@@ -24,19 +24,19 @@ typedef struct nb_mesh {
     nb_boxes boxes;
     nebel_snapshot *fog;
     int rounds; /* in one measurement */
-} nb_mesh;
+} nb_terrain_mesh;
 
-typedef struct nb_entry {
-    const nb_mesh *mesh;
+typedef struct nb_vertex_entry {
+    const nb_terrain_mesh *mesh;
     nebel_isa isa;
     int structures; /* positions and colours in the magazine's structures, not in arrays */
-} nb_entry;
+} nb_vertex_entry;
 
 /* ---- contestants ----------------------------------------------------------------------------- */
 
-static nebel_result fog_mesh(const nb_entry *entry)
+static nebel_result fog_mesh(const nb_vertex_entry *entry)
 {
-    const nb_mesh *const mesh = entry->mesh;
+    const nb_terrain_mesh *const mesh = entry->mesh;
     nebel_vertices vertices = {.positions = mesh->points, .eye = {(double)eye[0], (double)eye[1], (double)eye[2]}};
     nebel_vertex_output output = {NEBEL_VERTEX_RGBA8, mesh->colors, 0};
     if (entry->structures) {
@@ -50,7 +50,7 @@ static nebel_result fog_mesh(const nb_entry *entry)
 
 static double run_kernel(void *user)
 {
-    const nb_entry *const entry = user;
+    const nb_vertex_entry *const entry = user;
     const double start = nb_clock_cpu();
     for (int i = 0; i < entry->mesh->rounds; i++)
         if (fog_mesh(entry) != NEBEL_OK) return -1;
@@ -59,7 +59,7 @@ static double run_kernel(void *user)
 
 static double run_magazine(void *user)
 {
-    const nb_mesh *const mesh = ((const nb_entry *)user)->mesh;
+    const nb_terrain_mesh *const mesh = ((const nb_vertex_entry *)user)->mesh;
     const nb_old_camera camera = {{eye[0], eye[1], eye[2]}};
     const float color[3] = {(float)nb_boxes_color[0], (float)nb_boxes_color[1], (float)nb_boxes_color[2]};
     const double start = nb_clock_cpu();
@@ -69,7 +69,7 @@ static double run_magazine(void *user)
 }
 
 /* Both did the same work; a number that is nearly a half may be rounded either way. */
-static int agree(const nb_mesh *mesh)
+static int agree(const nb_terrain_mesh *mesh)
 {
     for (size_t i = 0; i < mesh->count; i++)
         for (int c = 0; c < 4; c++) {
@@ -81,14 +81,15 @@ static int agree(const nb_mesh *mesh)
 
 /* ---- figures --------------------------------------------------------------------------------- */
 
-static double million_per_second(const nb_mesh *mesh, double seconds)
+static double million_per_second(const nb_terrain_mesh *mesh, double seconds)
 {
     return 1e-6 * (double)mesh->count * mesh->rounds / seconds;
 }
 
-static void add_figure(nb_figures *figures, const nb_entry *entry, const char *setting, double seconds, double floor)
+static void add_figure(nb_figures *figures, const nb_vertex_entry *entry, const char *setting, double seconds,
+                       double floor)
 {
-    const nb_mesh *const mesh = entry->mesh;
+    const nb_terrain_mesh *const mesh = entry->mesh;
     nb_figure figure = {.group = "Fog per vertex of a terrain into RGBA8, one box, one thread",
                         .unit = "M vertices/s",
                         .value = million_per_second(mesh, seconds),
@@ -101,15 +102,15 @@ static void add_figure(nb_figures *figures, const nb_entry *entry, const char *s
 }
 
 /* The magazine's code and every instruction set in turn. */
-static const char *measure(const nb_mesh *mesh, const char *setting, int repetitions, nb_figures *figures)
+static const char *measure(const nb_terrain_mesh *mesh, const char *setting, int repetitions, nb_figures *figures)
 {
-    nb_entry entries[2 * NEBEL_ISA_COUNT] = {{.mesh = mesh}};
+    nb_vertex_entry entries[2 * NEBEL_ISA_COUNT] = {{.mesh = mesh}};
     nb_contest contests[2 * NEBEL_ISA_COUNT] = {{.run = run_magazine, .user = &entries[0]}};
     size_t count = 1;
     for (int structures = 0; structures < 2; structures++)
         for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
             if (!nebel_isa_available((nebel_isa)isa)) continue;
-            entries[count] = (nb_entry){mesh, (nebel_isa)isa, structures};
+            entries[count] = (nb_vertex_entry){mesh, (nebel_isa)isa, structures};
             contests[count] = (nb_contest){.run = run_kernel, .user = &entries[count]};
             count++;
         }
@@ -119,7 +120,7 @@ static const char *measure(const nb_mesh *mesh, const char *setting, int repetit
     return NULL;
 }
 
-static int make_mesh(const nb_terrain *terrain, nb_setting setting, nb_mesh *mesh)
+static int make_mesh(const nb_terrain *terrain, nb_setting setting, nb_terrain_mesh *mesh)
 {
     mesh->count = terrain->vertex_count;
     mesh->points = terrain->positions;
@@ -140,7 +141,7 @@ static int make_mesh(const nb_terrain *terrain, nb_setting setting, nb_mesh *mes
 static const char *measure_setting(const nb_terrain *terrain, nb_setting setting, const nb_bench_desc *desc,
                                    nb_figures *figures)
 {
-    nb_mesh mesh = {.rounds = desc->quick ? 1 : 8};
+    nb_terrain_mesh mesh = {.rounds = desc->quick ? 1 : 8};
     const char *fault = out_of_memory;
     if (make_mesh(terrain, setting, &mesh) == 0)
         fault = measure(&mesh, nb_setting_names[setting], desc->quick ? 1 : 15, figures);

@@ -6,19 +6,19 @@
 #include <string.h>
 
 /* A number taken apart: digits * 10^exponent, as far as 19 digits reach. */
-typedef struct parts {
+typedef struct decimal_parts {
     uint64_t digits;
     int significant; /* digits taken, leading zeros apart; more than 19: `digits` is not all of them */
     int exponent;
     int negative;
-} parts;
+} decimal_parts;
 
 static int is_digit(char c)
 {
     return c >= '0' && c <= '9';
 }
 
-static void take_digit(parts *number, char c)
+static void take_digit(decimal_parts *number, char c)
 {
     if (number->significant == 0 && c == '0') return;
     if (number->significant < 19) number->digits = number->digits * 10 + (uint64_t)(c - '0');
@@ -26,7 +26,7 @@ static void take_digit(parts *number, char c)
 }
 
 /* Reads digits with at most one point; returns where they end, or NULL where there is no digit. */
-static const char *read_mantissa(const char *at, const char *end, parts *number)
+static const char *read_mantissa(const char *at, const char *end, decimal_parts *number)
 {
     int count = 0;
     int point = 0;
@@ -45,7 +45,7 @@ static const char *read_mantissa(const char *at, const char *end, parts *number)
 }
 
 /* Reads what follows the e; exponents beyond any double are kept at a bound that still is. */
-static const char *read_exponent(const char *at, const char *end, parts *number)
+static const char *read_exponent(const char *at, const char *end, decimal_parts *number)
 {
     const int negative = at < end && *at == '-';
     if (at < end && (*at == '-' || *at == '+')) at++;
@@ -71,7 +71,7 @@ static int is_infinity(const char *text, size_t size)
 
 /* Exact where digits and power of ten both are doubles without rounding: then there is one rounding only, that of the
  * product or quotient (W. D. Clinger, How to read floating point numbers accurately, 1990). */
-static int combine_exactly(const parts *number, double *value)
+static int combine_exactly(const decimal_parts *number, double *value)
 {
     static const double powers[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                                     1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
@@ -95,7 +95,7 @@ nb_decimal_result nb_decimal_read(const char *text, size_t size, double *value)
 {
     if (size == 0 || size > NB_DECIMAL_LONGEST) return NB_DECIMAL_MALFORMED;
     const char *const end = text + size;
-    parts number = {.negative = text[0] == '-'};
+    decimal_parts number = {.negative = text[0] == '-'};
     const char *const start = text + (text[0] == '-' || text[0] == '+');
     double magnitude = (double)INFINITY;
     if (!is_infinity(start, (size_t)(end - start))) {

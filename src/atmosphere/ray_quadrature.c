@@ -48,10 +48,10 @@ static void set_node(const nb_air_components *airs, nb_atmosphere_ray track, dou
 }
 
 /* What a path leads through, and the rule for its pieces. */
-typedef struct nb_medium {
+typedef struct nb_ray_medium {
     const nb_air_components *airs, *smooth;
     const nb_gauss_rule *rule;
-} nb_medium;
+} nb_ray_medium;
 
 /* Optical depth from the start of a ray, of all air and of smooth air. */
 typedef struct nb_depths {
@@ -81,7 +81,7 @@ static void lose_light(const nb_air_components *airs, const nb_gauss_rule *rule,
 }
 
 /* Adds the nodes from a to b; `depth` is that of the ray up to a, and becomes that up to b. */
-static void lay_piece(const nb_medium *medium, nb_atmosphere_ray track, double a, double b, nb_depths *depth,
+static void lay_piece(const nb_ray_medium *medium, nb_atmosphere_ray track, double a, double b, nb_depths *depth,
                       nb_ray_nodes *path)
 {
     const nb_gauss_rule *rule = medium->rule;
@@ -125,7 +125,7 @@ static int is_dark(const double depth[3])
 }
 
 /* Adds the nodes from a to b in pieces that are not too deep, as long as there are halvings left. */
-static void lay_pieces(const nb_medium *medium, nb_atmosphere_ray track, double a, double b, int *halvings,
+static void lay_pieces(const nb_ray_medium *medium, nb_atmosphere_ray track, double a, double b, int *halvings,
                        nb_depths *depth, nb_ray_nodes *path)
 {
     const int first = path->count;
@@ -154,7 +154,7 @@ static void add_start(const nb_air_components *airs, nb_atmosphere_ray track, nb
 void nb_ray_nodes_lay(const nb_air_components *airs, const nb_air_components *smooth, const nb_gauss_rule *rule,
                       nb_atmosphere_ray track, double length, int cut_count, const double cuts[], nb_ray_nodes *path)
 {
-    const nb_medium medium = {airs, smooth, rule};
+    const nb_ray_medium medium = {airs, smooth, rule};
     nb_quadrature_ends ends;
     nb_depths depth = {.all = {0}};
     int halvings = NB_PATH_HALVINGS;

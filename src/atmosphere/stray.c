@@ -193,16 +193,16 @@ static size_t corner_at(const nb_stray *stray, const nb_corner *corner, int i, d
 }
 
 /* Where a direction is among those of a height: before the next one. */
-typedef struct nb_depth_ray {
+typedef struct nb_stray_ray {
     int first;
     double part;
-} nb_depth_ray;
+} nb_stray_ray;
 
-static nb_depth_ray find_way(const nb_stray *stray, double horizon, double zenith)
+static nb_stray_ray find_way(const nb_stray *stray, double horizon, double zenith)
 {
     const int side = zenith > horizon;
     const double part = sqrt(fmin(1, (zenith - horizon) / (side ? 1 - horizon : -1 - horizon)));
-    nb_depth_ray way;
+    nb_stray_ray way;
     way.first = side * stray->slopes.count + find_slope(stray, part, &way.part);
     return way;
 }
@@ -210,7 +210,7 @@ static nb_depth_ray find_way(const nb_stray *stray, double horizon, double zenit
 static nb_place find_place(const nb_stray *stray, const nb_air_components *airs, const nb_corner *corner,
                            nb_moment_basis aspect, double radius)
 {
-    const nb_depth_ray way = find_way(stray, nb_stray_horizon(airs, radius), aspect.zenith);
+    const nb_stray_ray way = find_way(stray, nb_stray_horizon(airs, radius), aspect.zenith);
     nb_place place;
     for (int i = 0; i < 8; i++) {
         const int n = i >> 2;
@@ -263,7 +263,7 @@ void nb_stray_fill_sun(nb_stray *stray, const nb_air_components *airs, const nb_
     for (int i = 0; i < stray->suns; i++) {
         float parts[MAX_WAYS * NB_STRAY_SIZE] = {0};
         fill_entry(&kernel, air->peak, radiance + 3 * nb_stray_ways(stray) * (size_t)i, ones, parts);
-        nb_depth_ray way = find_way(stray, horizon, suns[i]);
+        nb_stray_ray way = find_way(stray, horizon, suns[i]);
         double turns[NB_STRAY_TURNS], around[3] = {0};
         find_turns(stray, suns[i], suns[i], 1, turns);
         for (int m = 0; m < stray->turns; m++)

@@ -42,12 +42,12 @@ nebel_result nb_fog_shadow_find(const nb_frame *frame, nb_scratch *scratch)
     return result;
 }
 
-typedef struct sum {
+typedef struct shadow_sum {
     float length, integral, within;
     nb_value_range range;
-} sum;
+} shadow_sum;
 
-static void add(sum *s, float length, float part, float within)
+static void add(shadow_sum *s, float length, float part, float within)
 {
     s->length += length;
     s->integral += length * part;
@@ -55,7 +55,7 @@ static void add(sum *s, float length, float part, float within)
     nb_part_widen(&s->range, part);
 }
 
-static float mean_of(const sum *s, float *doubt, float *within)
+static float mean_of(const shadow_sum *s, float *doubt, float *within)
 {
     const float mean = s->length > 0 ? s->integral / s->length : 1;
     *doubt = s->length > 0 ? fmaxf(0, fmaxf(s->range.most - mean, mean - s->range.least)) : 0;
@@ -67,7 +67,7 @@ nb_segment_shadow nb_fog_shadow_between(const nb_fog_shadow *shade, float a, flo
 {
     const nebel_fog_shadow *const p = &shade->pieces;
     nb_segment_shadow between;
-    sum sun = {.range = {HUGE_VALF, -HUGE_VALF}}, sky = sun;
+    shadow_sum sun = {.range = {HUGE_VALF, -HUGE_VALF}}, sky = sun;
     for (uint32_t k = 0; k < p->count && p->t[k] < b; k++) {
         const float length = fminf(b, p->t[k + 1]) - fmaxf(a, p->t[k]);
         if (!(length > 0)) continue;

@@ -22,12 +22,12 @@ static int is_within(const nb_sun_cell *a, const nb_sun_cell *b)
            (a->high[1] <= b->high[1]);
 }
 
-nb_depths nb_depths_in(const nb_occluder *t, const nb_sun_cell *bounds, const nb_sun_cell *cell)
+nb_occlusion_depths nb_depths_in(const nb_occluder *t, const nb_sun_cell *bounds, const nb_sun_cell *cell)
 {
     const float a = t->corner[0][2], b = t->corner[1][2], c = t->corner[2][2];
     const float least = nb_least(nb_least(a, b), c), most = nb_most(nb_most(a, b), c);
     double slope[2], middle = (double)a, reach = 0;
-    if (is_within(bounds, cell)) return (nb_depths){least, most};
+    if (is_within(bounds, cell)) return (nb_occlusion_depths){least, most};
     slope_of(t, slope);
     for (int i = 0; i < 2; i++) {
         const double low = (double)nb_most(bounds->low[i], cell->low[i]);
@@ -36,10 +36,10 @@ nb_depths nb_depths_in(const nb_occluder *t, const nb_sun_cell *bounds, const nb
         reach += fabs(slope[i]) * 0.5 * (high - low);
     }
     const double rounding = 1e-6 * (fabs(middle) + reach);
-    if (!(reach < 1e30)) return (nb_depths){least, most};
+    if (!(reach < 1e30)) return (nb_occlusion_depths){least, most};
     const float near = nb_most(least, (float)(middle - reach - rounding));
     const float far = nb_least(most, (float)(middle + reach + rounding));
-    return near < far ? (nb_depths){near, far} : (nb_depths){far, near};
+    return near < far ? (nb_occlusion_depths){near, far} : (nb_occlusion_depths){far, near};
 }
 
 /* ---- edges ----------------------------------------------------------------------------------- */
@@ -105,7 +105,7 @@ static void add_triangle(const nb_occluder *t, const double place[2], const doub
     layer->passes += (left == 3) - (left == 0);
 }
 
-static void sort_by_depth(const nb_depths *depths, size_t count, uint8_t *order)
+static void sort_by_depth(const nb_occlusion_depths *depths, size_t count, uint8_t *order)
 {
     for (size_t i = 0; i < count; i++) {
         size_t k = i;
@@ -114,8 +114,8 @@ static void sort_by_depth(const nb_depths *depths, size_t count, uint8_t *order)
     }
 }
 
-float nb_covered_from(const nb_occluders *casters, const uint32_t *list, const nb_depths *depths, size_t count,
-                      const nb_sun_cell *cell)
+float nb_covered_from(const nb_occluders *casters, const uint32_t *list, const nb_occlusion_depths *depths,
+                      size_t count, const nb_sun_cell *cell)
 {
     uint8_t order[NB_MAX_COVER];
     double place[2], reach[2];
@@ -127,7 +127,7 @@ float nb_covered_from(const nb_occluders *casters, const uint32_t *list, const n
     }
     nb_occlusion_layer layer = {-INFINITY, 0, 0};
     for (size_t i = 0; i < count; i++) {
-        const nb_depths *next = &depths[order[i]];
+        const nb_occlusion_depths *next = &depths[order[i]];
         if (nb_has_holes(casters, list[order[i]])) continue;
         if (next->nearest > layer.farthest) {
             if (layer.passes != 0 && layer.edges == 0) return layer.farthest;

@@ -91,7 +91,8 @@ static int add_node(nb_division *d, uint32_t *number)
     return 1;
 }
 
-static void set_child(nb_division *d, uint32_t number, int k, const nb_sun_cell *cell, nb_depths depths, uint32_t child)
+static void set_child(nb_division *d, uint32_t number, int k, const nb_sun_cell *cell, nb_occlusion_depths depths,
+                      uint32_t child)
 {
     nb_cell_node *node = &d->cells->nodes[number];
     for (int i = 0; i < 2; i++) {
@@ -115,7 +116,7 @@ static inline nb_sun_cell common(const nb_sun_cell *a, const nb_sun_cell *b)
 }
 
 /* A node of triangles, or of nodes of as many as there are for each. */
-static int add_leaf(nb_division *d, const nb_sun_cell *cell, const uint32_t *list, const nb_depths *depths,
+static int add_leaf(nb_division *d, const nb_sun_cell *cell, const uint32_t *list, const nb_occlusion_depths *depths,
                     size_t count, uint32_t *number)
 {
     size_t each = 1;
@@ -124,7 +125,7 @@ static int add_leaf(nb_division *d, const nb_sun_cell *cell, const uint32_t *lis
     for (size_t first = 0, k = 0; first < count; first += each, k++) {
         const size_t here = count - first < each ? count - first : each;
         const nb_sun_cell bounds = each == 1 ? common(&d->bounds[list[first]], cell) : *cell;
-        nb_depths below = {INFINITY, INFINITY};
+        nb_occlusion_depths below = {INFINITY, INFINITY};
         uint32_t child;
         for (size_t i = first; i < first + here; i++) below.nearest = nb_least(below.nearest, depths[i].nearest);
         const int made = each == 1 ? prism_of(d, list[first], &child)
@@ -139,15 +140,15 @@ static int add_leaf(nb_division *d, const nb_sun_cell *cell, const uint32_t *lis
 
 /* Drops triangles that are behind the cover of the cell: their shadows add nothing to it. `child` has where shadows
  * begin, and from where on all is shadow. */
-static int finish_cell(nb_division *d, const nb_sun_cell_part *part, nb_depths *child, uint32_t *number)
+static int finish_cell(nb_division *d, const nb_sun_cell_part *part, nb_occlusion_depths *child, uint32_t *number)
 {
     uint32_t *list = d->list + part->first;
-    nb_depths *depths = nb_allocate(d->allocator, part->count, sizeof *depths);
+    nb_occlusion_depths *depths = nb_allocate(d->allocator, part->count, sizeof *depths);
     size_t kept = 0;
     if (depths == NULL) return 0;
     for (size_t i = 0; i < part->count; i++)
         depths[i] = nb_depths_in(&d->casters.triangles[list[i]], &d->bounds[list[i]], &part->cell);
-    *child = (nb_depths){INFINITY, nb_covered_from(&d->casters, list, depths, part->count, &part->cell)};
+    *child = (nb_occlusion_depths){INFINITY, nb_covered_from(&d->casters, list, depths, part->count, &part->cell)};
     for (size_t i = 0; i < part->count; i++) {
         if (depths[i].nearest > child->farthest) continue;
         child->nearest = nb_least(child->nearest, depths[i].nearest);
@@ -213,7 +214,7 @@ static int largest_part(const nb_sun_cell_part *parts, int count)
     return largest;
 }
 
-static int divide(nb_division *d, const nb_sun_cell_part *whole, int level, nb_depths *all, uint32_t *number)
+static int divide(nb_division *d, const nb_sun_cell_part *whole, int level, nb_occlusion_depths *all, uint32_t *number)
 {
     nb_sun_cell_part parts[NB_CELL_FAN] = {*whole};
     const size_t used = d->list_count;
@@ -221,9 +222,9 @@ static int divide(nb_division *d, const nb_sun_cell_part *whole, int level, nb_d
     if (!add_node(d, number)) return 0;
     while (count < NB_CELL_FAN && (k = largest_part(parts, count)) >= 0)
         if (!halve(d, &parts[k], &parts[count++])) return 0;
-    *all = (nb_depths){INFINITY, -INFINITY};
+    *all = (nb_occlusion_depths){INFINITY, -INFINITY};
     for (k = 0; k < count; k++) {
-        nb_depths depths;
+        nb_occlusion_depths depths;
         uint32_t child;
         const int ends = parts[k].count <= ENOUGH || parts[k].is_whole || level + 1 == NB_CELL_LEVELS;
         if (parts[k].count == 0)
@@ -293,7 +294,7 @@ static nebel_result build(nb_division *d, const nb_geometry *geometry, const dou
     d->cells->sheets = d->casters.sheets;
     d->casters.sheets = NULL;
     const nb_sun_cell_part all = list_all(d, count);
-    nb_depths depths;
+    nb_occlusion_depths depths;
     uint32_t number;
     d->all = all.cell;
     return divide(d, &all, 0, &depths, &number) && nb_shadow_boundaries_finish(&d->cells->walls, d->allocator, &d->all)

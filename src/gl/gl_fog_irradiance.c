@@ -8,16 +8,16 @@
 #include <nebel/shader.h>
 
 /* Of the light of fog by its place. */
-typedef struct changes {
+typedef struct irradiance_changes {
     int by_air;
     nb_cloud_shadow_extent roof;
-} changes;
+} irradiance_changes;
 
 static nebel_result find_changes(const nebel_scene_data *scene, nebel_cloud_workspace *clouds,
-                                 const nebel_snapshot *fog, changes *found)
+                                 const nebel_snapshot *fog, irradiance_changes *found)
 {
     double min[3], max[3];
-    *found = (changes){.by_air = 0};
+    *found = (irradiance_changes){.by_air = 0};
     if (fog == NULL || nb_gl_planets_planet(scene) == NULL || !scene->has_sun) return NEBEL_OK;
     found->by_air = nebel_snapshot_scattering_fog(fog, min, max) &&
                     !nb_irradiance_is_near(&scene->planets[0], scene->sun_direction, min, max);
@@ -51,7 +51,7 @@ static nebel_sun dim(const nebel_scene_data *scene, nebel_sun sun)
 }
 
 static int is_same(const nb_gl_daylit_fog *daylit, const nebel_snapshot *fog, const nebel_sun *sun,
-                   const changes *found)
+                   const irradiance_changes *found)
 {
     int same = daylit->of == fog && daylit->by_air == found->by_air && daylit->roof.is_shaded == found->roof.is_shaded;
     for (int c = 0; c < 3; c++)
@@ -60,7 +60,7 @@ static int is_same(const nb_gl_daylit_fog *daylit, const nebel_snapshot *fog, co
 }
 
 static nebel_result relight(nb_gl_daylit_fog *daylit, const nebel_log *log, const nebel_scene_data *scene,
-                            const changes *found, nebel_snapshot *fog)
+                            const irradiance_changes *found, nebel_snapshot *fog)
 {
     nebel_result result = NEBEL_OK;
     nb_gl_daylit_fog_release(daylit);
@@ -81,7 +81,7 @@ nebel_result nb_gl_daylit_fog_set(nb_gl_daylit_fog *daylit, const nebel_log *log
                                   nebel_cloud_workspace *clouds, nebel_snapshot *fog)
 {
     const nebel_sun sun = nb_surface_lighting_sun(scene);
-    changes found;
+    irradiance_changes found;
     nebel_result result = find_changes(scene, clouds, fog, &found);
     if (result == NEBEL_OK && !is_same(daylit, fog, &sun, &found)) result = relight(daylit, log, scene, &found, fog);
     daylit->by_air = found.by_air;

@@ -14,16 +14,16 @@
 /* Bytes that are looked at in one go. */
 enum { PIECE = 16384 };
 
-typedef struct reader {
+typedef struct record_reader {
     int file;
     uint64_t size;
     char *record; /* room for NEBEL_MAX_RECORD and the end */
-} reader;
+} record_reader;
 
 /* A file of more parts or channels is not ours. */
 enum { MAX_PARTS = 1 << 22, MAX_CHANNELS = 1024 };
 
-static bool read_at(const reader *in, uint64_t at, void *bytes, size_t size)
+static bool read_at(const record_reader *in, uint64_t at, void *bytes, size_t size)
 {
     if (at > in->size || size > in->size - at) return false;
     for (size_t got = 0; got < size;) {
@@ -44,7 +44,7 @@ static uint32_t number_be(const unsigned char *at)
     return (uint32_t)at[0] << 24 | (uint32_t)at[1] << 16 | (uint32_t)at[2] << 8 | at[3];
 }
 
-static bool take(const reader *in, uint64_t at, uint32_t size)
+static bool take(const record_reader *in, uint64_t at, uint32_t size)
 {
     if (size > NEBEL_MAX_RECORD || !read_at(in, at, in->record, size)) return false;
     in->record[size] = '\0';
@@ -53,7 +53,7 @@ static bool take(const reader *in, uint64_t at, uint32_t size)
 
 /* ---- PNG: chunks up to IEND ------------------------------------------------------------------- */
 
-static bool take_text(const reader *in, uint64_t at, uint32_t size)
+static bool take_text(const record_reader *in, uint64_t at, uint32_t size)
 {
     static const char key[] = NB_RECORD_KEY;
     char found[sizeof key];
@@ -62,7 +62,7 @@ static bool take_text(const reader *in, uint64_t at, uint32_t size)
 }
 
 /* The checksum of a chunk counts its kind and its data, and stands behind them. */
-static bool has_png_checksum(const reader *in, uint64_t at, uint32_t size)
+static bool has_png_checksum(const record_reader *in, uint64_t at, uint32_t size)
 {
     unsigned char bytes[PIECE];
     uLong sum = crc32(0, NULL, 0);
@@ -77,7 +77,7 @@ static bool has_png_checksum(const reader *in, uint64_t at, uint32_t size)
 }
 
 /* True where the file is whole. */
-static bool walk_png(const reader *in)
+static bool walk_png(const record_reader *in)
 {
     unsigned char head[8];
     uint64_t at = 8;
@@ -94,7 +94,7 @@ static bool walk_png(const reader *in)
 /* ---- OpenEXR: attributes, then the blocks as the table of their places names them ----------------- */
 
 /* Text up to its 0; the place behind that, 0 where it is longer. */
-static uint64_t read_name(const reader *in, uint64_t at, char name[256])
+static uint64_t read_name(const record_reader *in, uint64_t at, char name[256])
 {
     for (size_t i = 0; i < 256; i++) {
         if (!read_at(in, at + i, &name[i], 1)) return 0;
@@ -108,7 +108,7 @@ typedef struct exr_facts {
 } exr_facts;
 
 /* A list has a name, its 0 and 16 bytes for each channel, and a 0. */
-static bool count_channels(const reader *in, uint64_t at, uint32_t size, exr_facts *facts)
+static bool count_channels(const record_reader *in, uint64_t at, uint32_t size, exr_facts *facts)
 {
     char name[256];
     const uint64_t end = at + size;
@@ -121,7 +121,7 @@ static bool count_channels(const reader *in, uint64_t at, uint32_t size, exr_fac
     return false;
 }
 
-static bool take_attribute(const reader *in, const char *name, uint64_t at, uint32_t size, exr_facts *facts)
+static bool take_attribute(const record_reader *in, const char *name, uint64_t at, uint32_t size, exr_facts *facts)
 {
     unsigned char bytes[16];
     if (strcmp(name, NB_RECORD_KEY) == 0) return take(in, at, size);
@@ -140,7 +140,7 @@ static bool take_attribute(const reader *in, const char *name, uint64_t at, uint
 }
 
 /* Whether `size` bytes from there on decompress to `wanted` bytes and have their checksum. */
-static bool decompresses(const reader *in, uint64_t at, uint32_t size, uint64_t wanted, z_stream *zip)
+static bool decompresses(const record_reader *in, uint64_t at, uint32_t size, uint64_t wanted, z_stream *zip)
 {
     unsigned char packed[PIECE], bytes[PIECE];
     int found = inflateReset(zip);
@@ -162,7 +162,7 @@ static bool decompresses(const reader *in, uint64_t at, uint32_t size, uint64_t 
 }
 
 /* Blocks stand one behind the other. One that is as large as its pixels is not compressed, and has no checksum. */
-static bool hold_blocks(const reader *in, uint64_t table, const exr_facts *facts, z_stream *zip)
+static bool hold_blocks(const record_reader *in, uint64_t table, const exr_facts *facts, z_stream *zip)
 {
     const uint64_t count = facts->rows / facts->block_rows + (facts->rows % facts->block_rows != 0);
     uint64_t free_from = table + 8 * count;
@@ -183,7 +183,7 @@ static bool hold_blocks(const reader *in, uint64_t table, const exr_facts *facts
     return true;
 }
 
-static bool check_blocks(const reader *in, uint64_t table, const exr_facts *facts)
+static bool check_blocks(const record_reader *in, uint64_t table, const exr_facts *facts)
 {
     z_stream zip = {0};
     if (facts->rows == 0 || facts->width == 0 || facts->block_rows == 0) return false;
@@ -193,7 +193,7 @@ static bool check_blocks(const reader *in, uint64_t table, const exr_facts *fact
     return good;
 }
 
-static bool walk_exr(const reader *in)
+static bool walk_exr(const record_reader *in)
 {
     exr_facts facts = {0};
     char name[256], type[256];
@@ -213,7 +213,7 @@ static bool walk_exr(const reader *in)
 
 /* ---- WebP: chunks, as many as the first one says ------------------------------------------------ */
 
-static bool walk_webp(const reader *in)
+static bool walk_webp(const record_reader *in)
 {
     unsigned char head[8];
     if (!read_at(in, 0, head, sizeof head)) return false;
@@ -231,7 +231,7 @@ static bool walk_webp(const reader *in)
 
 /* ---- which of them ------------------------------------------------------------------------------ */
 
-static bool walk(const reader *in)
+static bool walk(const record_reader *in)
 {
     static const unsigned char png[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'}, exr[] = {0x76, 0x2f, 0x31, 0x01};
     unsigned char head[12];
@@ -249,7 +249,7 @@ nebel_result nebel_read_record(const char *path, char record[NEBEL_MAX_RECORD + 
     record[0] = '\0';
     if (nb_file_open(&(nebel_log){0}, NULL, "picture", path, &file) != NEBEL_OK) return NEBEL_OK;
     if (fstat(file, &status) == 0) {
-        const reader in = {file, (uint64_t)status.st_size, record};
+        const record_reader in = {file, (uint64_t)status.st_size, record};
         if (!walk(&in)) record[0] = '\0';
     }
     close(file);

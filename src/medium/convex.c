@@ -31,13 +31,13 @@ enum { ATTEMPTS = 3 };
 /* Weights up to this are rounding of zero; what is lost by dropping them goes into the slack. */
 static const double level = 1e-14;
 
-typedef struct program {
+typedef struct linear_program {
     const double (*planes)[4];
     size_t count;
     int dimension;
     double cube;
     double objective[DIMENSION];
-} program;
+} linear_program;
 
 typedef struct row {
     double a[DIMENSION];
@@ -58,12 +58,12 @@ typedef struct proof {
 } proof;
 
 /* Rows: the planes, the faces of the cube, and in four dimensions a lid on the radius. */
-static size_t row_count(const program *p)
+static size_t row_count(const linear_program *p)
 {
     return p->count + CUBE_FACES + (p->dimension == DIMENSION ? 1 : 0);
 }
 
-static row row_at(const program *p, size_t index)
+static row row_at(const linear_program *p, size_t index)
 {
     row r = {{0}, p->cube};
     if (index < p->count) {
@@ -109,7 +109,7 @@ static int solve(int n, double matrix[DIMENSION][DIMENSION], double right[DIMENS
 }
 
 /* The corner where the planes of the basis meet. */
-static int find_corner(const program *p, const basis *b, double corner[DIMENSION])
+static int find_corner(const linear_program *p, const basis *b, double corner[DIMENSION])
 {
     double matrix[DIMENSION][DIMENSION];
     for (int i = 0; i < p->dimension; i++) {
@@ -121,7 +121,8 @@ static int find_corner(const program *p, const basis *b, double corner[DIMENSION
 }
 
 /* `target` as a combination of the normals of the basis. */
-static int find_combination(const program *p, const basis *b, const double target[DIMENSION], double weights[DIMENSION])
+static int find_combination(const linear_program *p, const basis *b, const double target[DIMENSION],
+                            double weights[DIMENSION])
 {
     double matrix[DIMENSION][DIMENSION];
     for (int i = 0; i < p->dimension; i++) {
@@ -141,7 +142,7 @@ static double violation(const double a[3], double radius_share, double d, const 
 }
 
 /* The row that shall enter the basis; row_count when none does: the basis is optimal. */
-static size_t choose_entering(const program *p, const double corner[DIMENSION], int greedy)
+static size_t choose_entering(const linear_program *p, const double corner[DIMENSION], int greedy)
 {
     const double share = p->dimension == DIMENSION ? 1 : 0;
     const size_t rows = row_count(p);
@@ -167,7 +168,7 @@ static size_t choose_entering(const program *p, const double corner[DIMENSION], 
 
 /* The member whose weight falls to zero first as the new row comes in; -1 when none falls. Of equals the one with the
  * largest share leaves (a well conditioned basis remains), or the smallest index where cycling has to be ruled out. */
-static int choose_leaving(const program *p, const basis *b, const double share[DIMENSION], int greedy)
+static int choose_leaving(const linear_program *p, const basis *b, const double share[DIMENSION], int greedy)
 {
     int chosen = -1;
     double least = HUGE_VAL;
@@ -185,7 +186,7 @@ static int choose_leaving(const program *p, const basis *b, const double share[D
 }
 
 /* The corner of the cube that lies furthest along the objective. */
-static basis first_basis(const program *p)
+static basis first_basis(const linear_program *p)
 {
     basis b = {{0}, {0}};
     for (int k = 0; k < p->dimension; k++) {
@@ -196,7 +197,7 @@ static basis first_basis(const program *p)
     return b;
 }
 
-static basis optimize(const program *p)
+static basis optimize(const linear_program *p)
 {
     basis b = first_basis(p);
     for (int step = 0; step < STEPS; step++) {
@@ -217,7 +218,7 @@ static basis optimize(const program *p)
     return b;
 }
 
-static proof prove(const program *p, const basis *b)
+static proof prove(const linear_program *p, const basis *b)
 {
     proof result = {0};
     double sum[3] = {0}, size[3] = {0};
@@ -248,7 +249,7 @@ static double largest_distance(const double (*planes)[4], size_t n)
 }
 
 /* Grows the cube until the answer does not lean on it. `good_enough` ends the search early. */
-static proof solve_program(program *p, double scale, int (*good_enough)(const proof *))
+static proof solve_program(linear_program *p, double scale, int (*good_enough)(const proof *))
 {
     proof result = {0};
     for (int attempt = 0; attempt < ATTEMPTS; attempt++) {
@@ -278,7 +279,7 @@ static int decides_emptiness(const proof *result)
 
 static int has_interior(const double (*planes)[4], size_t n, double scale)
 {
-    program p = {planes, n, DIMENSION, 0, {0, 0, 0, 1}};
+    linear_program p = {planes, n, DIMENSION, 0, {0, 0, 0, 1}};
     const proof result = solve_program(&p, scale, decides_emptiness);
     return holds_ball(&result);
 }
@@ -320,7 +321,7 @@ int nb_convex_bounds(const double (*planes)[4], size_t n, double low[3], double 
 
     proof faces[CUBE_FACES];
     for (int face = 0; face < CUBE_FACES; face++) {
-        program p = {planes, n, 3, 0, {0}};
+        linear_program p = {planes, n, 3, 0, {0}};
         p.objective[face / 2] = face % 2 == 0 ? 1 : -1;
         faces[face] = solve_program(&p, scale, leans_on_planes_only);
     }

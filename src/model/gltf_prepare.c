@@ -245,14 +245,14 @@ typedef struct change {
     char *text;
 } change;
 
-typedef struct changes {
+typedef struct text_changes {
     change *items;
     size_t count, capacity;
     nb_arena *arena;
     const nebel_allocator *allocator;
-} changes;
+} text_changes;
 
-static bool replace(changes *list, nb_gltf_span span, const char *text)
+static bool replace(text_changes *list, nb_gltf_span span, const char *text)
 {
     void *items = list->items;
     char *copy = nb_arena_copy_text(list->arena, text, strlen(text));
@@ -271,7 +271,7 @@ static int compare(const void *a, const void *b)
 }
 
 /* Everything between the changes stays. */
-static nebel_result write_text(const nb_gltf_data *data, changes *list, nb_bytes *text)
+static nebel_result write_text(const nb_gltf_data *data, text_changes *list, nb_bytes *text)
 {
     size_t size = data->text.size, at = 0;
     for (size_t i = 0; i < list->count; i++) size += strlen(list->items[i].text);
@@ -298,7 +298,7 @@ static nb_gltf_span behind(const nb_gltf_span *span)
     return (nb_gltf_span){span->end, span->end};
 }
 
-static bool change_views(const nb_gltf_data *data, changes *list)
+static bool change_views(const nb_gltf_data *data, text_changes *list)
 {
     char text[OBJECT_SIZE], stride[64] = "";
     bool good = true;
@@ -317,7 +317,7 @@ static bool change_views(const nb_gltf_data *data, changes *list)
 
 /* Buffers that are in no file: that of the chunk gets a name, and those that stand for compressed data alone are not
  * looked for. */
-static bool change_buffers(const nb_gltf_data *data, changes *list)
+static bool change_buffers(const nb_gltf_data *data, text_changes *list)
 {
     char text[OBJECT_SIZE];
     bool good = true;
@@ -332,7 +332,7 @@ static bool change_buffers(const nb_gltf_data *data, changes *list)
     return good;
 }
 
-static nebel_result change_accessors(nb_gltf_data *data, changes *list)
+static nebel_result change_accessors(nb_gltf_data *data, text_changes *list)
 {
     char text[OBJECT_SIZE];
     size_t made = 0;
@@ -359,7 +359,7 @@ static nebel_result change_accessors(nb_gltf_data *data, changes *list)
     return NEBEL_OK;
 }
 
-static nebel_result make(nb_gltf_data *data, changes *list, nb_gltf_files *made)
+static nebel_result make(nb_gltf_data *data, text_changes *list, nb_gltf_files *made)
 {
     char text[OBJECT_SIZE];
     nebel_result result = NEBEL_OK;
@@ -418,7 +418,7 @@ static bool takes_making(const nb_gltf_data *data)
 
 static nebel_result prepare(nb_gltf_data *data, nb_gltf_files *made)
 {
-    changes list = {.arena = &data->arena, .allocator = &data->load->allocator};
+    text_changes list = {.arena = &data->arena, .allocator = &data->load->allocator};
     nebel_result result = nb_gltf_read_data(data);
     memcpy(made->fault, data->fault, sizeof made->fault);
     if (result == NEBEL_ERROR_FORMAT && data->fault[0] != '\0') return NEBEL_OK;

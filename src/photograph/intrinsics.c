@@ -11,12 +11,12 @@
 
 enum { FILE_LIMIT = 1 << 20, MOST_NUMBERS = 16 };
 
-typedef struct reader {
+typedef struct intrinsics_reader {
     const nb_codec *codec;
     const char *text; /* `size` bytes, and a zero */
     size_t size;
     locale_t c_locale;
-} reader;
+} intrinsics_reader;
 
 /* ---- numbers in text ------------------------------------------------------------------------- */
 
@@ -45,7 +45,7 @@ static const char *end_of_number(const char *at)
 }
 
 /* Up to `most` numbers from `at` to `end`, with nothing else between them; -1: something else stands there. */
-static int read_numbers(const reader *in, const char *at, const char *end, int most, double *numbers)
+static int read_numbers(const intrinsics_reader *in, const char *at, const char *end, int most, double *numbers)
 {
     int count = 0;
     for (;; count++) {
@@ -59,7 +59,7 @@ static int read_numbers(const reader *in, const char *at, const char *end, int m
 }
 
 /* What stands behind a word at the beginning of a line, up to the line's end; NULL: no line begins so. */
-static const char *find_line(const reader *in, const char *word, const char **end)
+static const char *find_line(const intrinsics_reader *in, const char *word, const char **end)
 {
     for (const char *line = in->text; line != NULL && *line != '\0';) {
         *end = strchr(line, '\n');
@@ -73,7 +73,7 @@ static const char *find_line(const reader *in, const char *word, const char **en
     return NULL;
 }
 
-static nebel_result fail(const reader *in, const char *what)
+static nebel_result fail(const intrinsics_reader *in, const char *what)
 {
     return nb_fail(&in->codec->log, NEBEL_ERROR_FORMAT, "%s: not a camera: %s", in->codec->name, what);
 }
@@ -85,7 +85,7 @@ static void take_matrix(const double *m, int columns, nebel_intrinsics *camera)
     *camera = (nebel_intrinsics){.fx = m[0], .fy = m[columns + 1], .cx = m[2], .cy = m[columns + 2]};
 }
 
-static nebel_result read_plain(const reader *in, nebel_intrinsics *camera)
+static nebel_result read_plain(const intrinsics_reader *in, nebel_intrinsics *camera)
 {
     double m[MOST_NUMBERS];
     const int count = read_numbers(in, in->text, in->text + in->size, MOST_NUMBERS, m);
@@ -102,7 +102,8 @@ static nebel_result read_plain(const reader *in, nebel_intrinsics *camera)
 
 /* The left color camera is 2, the right one 3; the fourth column is -fx times the way from camera 0 (A. Geiger and others,
  * "Vision meets robotics: the KITTI dataset", 2013). */
-static nebel_result read_kitti(const reader *in, const char *left, const char *right, nebel_intrinsics *camera)
+static nebel_result read_kitti(const intrinsics_reader *in, const char *left, const char *right,
+                               nebel_intrinsics *camera)
 {
     double m[12], other[12];
     const char *end, *at = find_line(in, left, &end);
@@ -114,7 +115,7 @@ static nebel_result read_kitti(const reader *in, const char *left, const char *r
     return NEBEL_OK;
 }
 
-static nebel_result read_yaml(const reader *in, nebel_intrinsics *camera)
+static nebel_result read_yaml(const intrinsics_reader *in, nebel_intrinsics *camera)
 {
     double m[9];
     const char *line_end, *at = find_line(in, "camera_matrix:", &line_end);
@@ -155,7 +156,7 @@ static bool take_section(nb_json *json, const nb_json_node *value, void *user)
     return true;
 }
 
-static nebel_result read_cityscapes(const reader *in, nebel_intrinsics *camera)
+static nebel_result read_cityscapes(const intrinsics_reader *in, nebel_intrinsics *camera)
 {
     static const char *const streamed[] = {NULL};
     cityscapes all = {0};
@@ -175,7 +176,7 @@ static nebel_result read_cityscapes(const reader *in, nebel_intrinsics *camera)
     return NEBEL_OK;
 }
 
-static nebel_result read_text(const reader *in, nebel_intrinsics *camera)
+static nebel_result read_text(const intrinsics_reader *in, nebel_intrinsics *camera)
 {
     const char *end, *first = in->text;
     while (isspace((unsigned char)*first)) first++;
@@ -201,7 +202,7 @@ static const char *fault_of(const nebel_intrinsics *camera)
 
 static nebel_result read_checked(const nb_codec *codec, const nb_bytes *bytes, nebel_intrinsics *camera)
 {
-    reader in = {codec, nb_allocate_zero(&codec->allocator, bytes->size + 1, 1), bytes->size, (locale_t)0};
+    intrinsics_reader in = {codec, nb_allocate_zero(&codec->allocator, bytes->size + 1, 1), bytes->size, (locale_t)0};
     in.c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     nebel_result result = NEBEL_ERROR_MEMORY;
     if (in.text != NULL && in.c_locale != (locale_t)0) {

@@ -317,16 +317,16 @@ static double depth_of(const sight *s, const nb_volume *body)
 }
 
 /* Errors of volumes add where a ray meets several, but depth is divided among them: no more than of the worst if all depth were its own. */
-typedef struct sum {
+typedef struct digit_sum {
     nebel_view_error worst;
     double error, most, by_surface;
     int emits;
-} sum;
+} digit_sum;
 
 /* So little that it does not matter whether the volume is seen. */
 #define LITTLE 1e-4
 
-static void add(const sight *s, const nb_medium *medium, double little, sum *total)
+static void add(const sight *s, const nb_medium *medium, double little, digit_sum *total)
 {
     const nebel_view_error one = error_of(s, medium);
     const double by_surface = nb_volume_has_fog(&medium->body) && isfinite(medium->densest)
@@ -340,7 +340,7 @@ static void add(const sight *s, const nb_medium *medium, double little, sum *tot
     if (one.error > total->worst.error) total->worst = one;
 }
 
-static nebel_view_error end(const sum *total)
+static nebel_view_error end(const digit_sum *total)
 {
     nebel_view_error error = total->worst;
     if (!(error.error > 0)) return error;
@@ -355,7 +355,7 @@ nebel_result nebel_find_view_error(const nebel_snapshot *snapshot, const nebel_v
 {
     nebel_rays rays;
     sight s;
-    sum total = {.error = 0};
+    digit_sum total = {.error = 0};
     if (snapshot == NULL || view == NULL || error == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_result result = nebel_compute_view_rays(view, NULL, &rays);
     if (result != NEBEL_OK) return result;
