@@ -4,7 +4,7 @@
 #include "scalar_baseline.h"
 #include "measure.h"
 
-#include <nebel/cells.h>
+#include <nebel/classic.h>
 
 #include <math.h>
 

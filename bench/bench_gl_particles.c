@@ -5,7 +5,7 @@
 #include "nebula_scene.h"
 
 #include <epoxy/gl.h>
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 #include <stdio.h>
 #include <stdlib.h>
 

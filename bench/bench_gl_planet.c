@@ -5,7 +5,7 @@
 #include "scenes.h"
 
 #include <epoxy/gl.h>
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -3,7 +3,7 @@
 #include "measure.h"
 #include "nebula_scene.h"
 
-#include <nebel/nebula.h>
+#include <nebel/particles.h>
 #include <nebel/render.h>
 
 #include <stdlib.h>

@@ -4,7 +4,6 @@
 #include "measure.h"
 #include "scenes.h"
 
-#include <nebel/clouds.h>
 #include <nebel/planet.h>
 #include <nebel/render.h>
 

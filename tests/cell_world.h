@@ -5,7 +5,7 @@
 
 #include "fog_help.h"
 
-#include <nebel/cells.h>
+#include <nebel/classic.h>
 
 #include <math.h>
 

@@ -5,7 +5,7 @@
 
 #include "pass_help.h"
 
-#include <nebel/gl_classic.h>
+#include <nebel/gl.h>
 
 /* Makes a context current and watches it. Where there is no OpenGL the test is left out, but in CI. */
 void classic_open(nb_gl *context, nb_gl_language language);

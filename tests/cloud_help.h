@@ -4,7 +4,7 @@
 
 #include "unit.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 #include <math.h>
 #include <string.h>

@@ -4,7 +4,7 @@
 
 #include "unit.h"
 
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 #include <nebel/render.h>
 
 #include <stdio.h>

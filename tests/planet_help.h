@@ -4,7 +4,7 @@
 
 #include "unit.h"
 
-#include <nebel/environment.h>
+#include <nebel/light.h>
 #include <nebel/nebel.h>
 #include <nebel/render.h>
 

@@ -3,8 +3,7 @@
 #include "fog_help.h"
 #include "random_fog.h"
 
-#include <nebel/diffusion.h>
-#include <nebel/environment.h>
+#include <nebel/light.h>
 
 static uint64_t random_count;
 static const double pi = 3.14159265358979323846;

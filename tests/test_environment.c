@@ -5,7 +5,7 @@
 #include "fog_help.h"
 
 #include <nebel/classic.h>
-#include <nebel/environment.h>
+#include <nebel/light.h>
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* The planet of tutorials: its formulas against a rendition of their own, its maps, and bad input. */
-#include <nebel/layers.h>
+#include <nebel/planet.h>
 
 #include "math/vector.h"
 

@@ -1,5 +1,5 @@
 /* Particles of nebulae: where they are, what they are, and that they are fog like any other. */
-#include <nebel/nebula.h>
+#include <nebel/particles.h>
 
 #include <math.h>
 #include <string.h>

@@ -3,16 +3,12 @@
  * result, or FILE where a path is good: there is nothing at it. */
 #include "scene_help.h"
 
-#include <nebel/cells.h>
 #include <nebel/classic.h>
-#include <nebel/clouds.h>
-#include <nebel/diffusion.h>
-#include <nebel/environment.h>
-#include <nebel/layers.h>
-#include <nebel/nebula.h>
+#include <nebel/planet.h>
+#include <nebel/light.h>
+#include <nebel/particles.h>
 #include <nebel/photograph.h>
 #include <nebel/places.h>
-#include <nebel/planet.h>
 #include <nebel/render.h>
 #include <nebel/shader.h>
 

@@ -1,8 +1,7 @@
 /* The same as test_null.c of the functions that call OpenGL, in a context. */
 #include "pass_help.h"
 
-#include <nebel/gl_classic.h>
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 
 #include <string.h>
 

@@ -9,7 +9,7 @@
 #include "pass_help.h"
 
 #include <epoxy/gl.h>
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 
 /* ---- counting -------------------------------------------------------------------------------- */
 

@@ -5,7 +5,7 @@
 #include "test_render_scene.h"
 
 #include <epoxy/gl.h>
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 
 #include "gl_errors.h"
 

@@ -8,7 +8,7 @@
 #include "fog_help.h"
 #include "pass_help.h"
 
-#include <nebel/environment.h>
+#include <nebel/light.h>
 
 #include <epoxy/gl.h>
 

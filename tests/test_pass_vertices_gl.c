@@ -9,7 +9,7 @@
 #include "pass_help.h"
 
 #include <nebel/classic.h>
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 
 enum { WIDTH = 64, HEIGHT = 48, PIXELS = WIDTH * HEIGHT, FINEST = 96 };
 

@@ -5,7 +5,7 @@
 #include "picture_help.h"
 #include "planet_help.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 #include <math.h>
 #include <stdio.h>

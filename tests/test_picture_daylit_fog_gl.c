@@ -5,8 +5,7 @@
 #include "planet_help.h"
 #include "worlds_help.h"
 
-#include <nebel/diffusion.h>
-#include <nebel/environment.h>
+#include <nebel/light.h>
 
 #include <math.h>
 #include <stdlib.h>

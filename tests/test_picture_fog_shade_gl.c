@@ -6,8 +6,8 @@
 
 #include "math/vector.h"
 
-#include <nebel/clouds.h>
-#include <nebel/environment.h>
+#include <nebel/planet.h>
+#include <nebel/light.h>
 
 #include <math.h>
 #include <stdlib.h>

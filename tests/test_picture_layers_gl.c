@@ -4,7 +4,7 @@
 #include "pass_help.h"
 #include "picture_help.h"
 
-#include <nebel/layers.h>
+#include <nebel/planet.h>
 
 #include <math.h>
 #include <stdio.h>

@@ -9,7 +9,7 @@
 #include "picture_help.h"
 #include "test_render_scene.h"
 
-#include <nebel/cells.h>
+#include <nebel/classic.h>
 
 enum { WIDTH = 192, HEIGHT = 96, MANY = 60, PARTICLES = 40 };
 

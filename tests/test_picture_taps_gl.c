@@ -9,8 +9,8 @@
 #include "pass_help.h"
 #include "test_render_scene.h"
 
-#include <nebel/gl_render.h>
-#include <nebel/nebula.h>
+#include <nebel/gl.h>
+#include <nebel/particles.h>
 
 enum { WIDTH = 160, HEIGHT = 120, PIXELS = WIDTH * HEIGHT, PARTICLES = 60 };
 

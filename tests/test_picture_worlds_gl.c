@@ -5,8 +5,8 @@
 #include "planet_help.h"
 #include "worlds_help.h"
 
-#include <nebel/clouds.h>
-#include <nebel/environment.h>
+#include <nebel/planet.h>
+#include <nebel/light.h>
 
 #include <math.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
  * Direct3D 9 leaves 24 behind, where the double precision of the library counts on 64. */
 #include "random_fog.h"
 
-#include <nebel/nebula.h>
+#include <nebel/particles.h>
 #include <nebel/shader.h>
 
 #include <float.h>

@@ -5,7 +5,7 @@
 #include "cpu/cpu_renderer.h"
 #include "dice.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 #include <string.h>
 

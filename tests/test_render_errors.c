@@ -1,7 +1,7 @@
 /* What the renderer says to input that is wrong, and that nothing is lost on the way out. */
 #include "test_render_scene.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 typedef struct test_log {
     int messages;

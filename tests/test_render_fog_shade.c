@@ -5,7 +5,7 @@
 
 #include "math/vector.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 enum { WIDTH = 32, HEIGHT = 20 };
 

@@ -7,7 +7,7 @@
 
 #include "aerial/eclipse.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 enum { WIDTH = 40, HEIGHT = 24 };
 

@@ -2,7 +2,7 @@
 #include "near.h"
 #include "scene_help.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 #include <math.h>
 

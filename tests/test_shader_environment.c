@@ -2,7 +2,7 @@
 #include "fog_help.h"
 
 #include "shader/texel_layout.h"
-#include <nebel/environment.h>
+#include <nebel/light.h>
 #include <nebel/shader.h>
 
 static const nebel_environment dusk = {

@@ -1,8 +1,7 @@
 /* Fog by its lights apart: they add up to the whole, each is its own light's, and lost memory is told and leaks nothing. */
 #include "fog_help.h"
 
-#include <nebel/diffusion.h>
-#include <nebel/environment.h>
+#include <nebel/light.h>
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 #include "gl_fixed_function.h"
 
-#include <nebel/gl_classic.h>
+#include <nebel/gl.h>
 #include <nebel/render.h>
 
 #include <epoxy/gl.h>

@@ -1,9 +1,9 @@
 /* Classic fog drawn by the fixed pipeline of OpenGL: fog coordinates, blending and Gouraud's interpolation as hardware
- * has them (nebel/gl_classic.h), over surfaces whose light nebel's renderer has made. */
+ * has them (nebel/gl.h), over surfaces whose light nebel's renderer has made. */
 #ifndef NB_TOOLS_GL_FIXED_FUNCTION_H
 #define NB_TOOLS_GL_FIXED_FUNCTION_H
 
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 
 typedef struct nb_gl_fixed_function {
     nebel_gl_renderer *renderer;

@@ -5,7 +5,7 @@
 #include "gl_context.h"
 #include "load_scene.h"
 
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 #include <nebel/render.h>
 
 typedef struct nb_gl_offscreen {

@@ -485,7 +485,7 @@ nebel_result nebel_update_volume(nebel_fog *fog, nebel_volume_id id, const nebel
 /* Removes a volume. Cost O(1). An id that is unknown or was removed is ARGUMENT. */
 nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id);
 
-/* Sets the ambient radiance, 0 to 1e9, the same from everywhere, in place of any environment before (nebel/environment.h). Cost O(1).
+/* Sets the ambient radiance, 0 to 1e9, the same from everywhere, in place of any environment before (nebel/light.h). Cost O(1).
  * Errors: ARGUMENT, VALUE. */
 nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3]);
 
@@ -506,7 +506,7 @@ nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity);
 
 /* Makes an immutable snapshot of the fog as it is. Cost O(n log n) in the number of volumes. The same volumes give the
  * same bits in every query, in whatever order they were added. Free it with nebel_release_snapshot. Errors: ARGUMENT,
- * MEMORY, UNSUPPORTED (see nebel/diffusion.h), LIMIT (see nebel/environment.h). */
+ * MEMORY, UNSUPPORTED (see nebel/light.h), LIMIT (see nebel/light.h). */
 nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot);
 
 /* One more owner of the snapshot; any thread. Returns its argument. */

@@ -12,7 +12,6 @@
 #ifndef NEBEL_RENDER_H
 #define NEBEL_RENDER_H
 
-#include <nebel/cells.h>
 #include <nebel/classic.h>
 #include <nebel/nebel.h>
 #include <nebel/scene.h>
@@ -65,7 +64,7 @@ typedef enum nebel_method {
     NEBEL_METHOD_LINEAR,   /* a fog factor in place of the snapshot's fog, at vertices or at each sample */
     NEBEL_METHOD_EXP,
     NEBEL_METHOD_EXP2,
-    NEBEL_METHOD_FIVE_TAP,  /* of OpenGL: nebel/gl_render.h */
+    NEBEL_METHOD_FIVE_TAP,  /* of OpenGL: nebel/gl.h */
     NEBEL_METHOD_FOG_COORD, /* the snapshot's fog at vertices, as what hardware takes: a coordinate, with one colour */
     NEBEL_METHOD_TWO_PASS, /* the light that it adds and its amount: as VERTEX, but with a response curve or a colour */
     NEBEL_METHOD_ALPHA,    /* a byte of alpha over polygons in one colour, of bytes, too */

@@ -13,15 +13,11 @@
 #ifndef NEBEL_SCENE_H
 #define NEBEL_SCENE_H
 
-#include <nebel/cells.h>
 #include <nebel/classic.h>
-#include <nebel/diffusion.h>
-#include <nebel/environment.h>
-#include <nebel/layers.h>
-#include <nebel/nebel.h>
-#include <nebel/nebula.h>
-#include <nebel/clouds.h>
+#include <nebel/light.h>
 #include <nebel/planet.h>
+#include <nebel/nebel.h>
+#include <nebel/particles.h>
 
 #ifdef __cplusplus
 extern "C" {

@@ -124,7 +124,7 @@
  *
  *     vec3 nebel_evaluate_environment(vec3 direction);
  *     vec3 nebel_evaluate_environment_diffuse(vec3 normal);
- *         As in nebel/environment.h, of unit length; also of a constant one.
+ *         As in nebel/light.h, of unit length; also of a constant one.
  *
  * With NEBEL_SKY_VIEW_TEXEL(i), a vec4 of nebel_pack_sky_view, or NEBEL_SKY_VIEW, which makes GLSL define it and declare
  * `uniform highp sampler2D nebel_sky_view_texture;` (rows of NEBEL_TEXTURE_WIDTH texels RGBA32F), the text also declares the
@@ -216,7 +216,7 @@ int nebel_is_same_voxels(const nebel_snapshot *a, const nebel_snapshot *b);
 nebel_result nebel_pack_diffusion(const nebel_snapshot *snapshot, nebel_texel_f32 *words, size_t capacity,
                                   size_t *count);
 
-/* Packs what a snapshot's environment (nebel/environment.h) is to the fog that it lights, and where `surfaces` is not 0
+/* Packs what a snapshot's environment (nebel/light.h) is to the fog that it lights, and where `surfaces` is not 0
  * what nebel_evaluate_environment and nebel_evaluate_environment_diffuse of the text want. *count receives the number of words
  * needed, 0 where no fog scatters light by direction and surfaces are not asked for; they are written when `capacity` is
  * at least that. A gradient takes 4, and 127 for each phase function; a map up to 524,289 (8 MiB) for each, the same once
@@ -253,7 +253,7 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot);
 /* The feature of fog that lamps light, which transmittance has no need of. */
 #define NEBEL_FEATURE_LIGHTS 2097152u
 
-/* The feature of fog whose light is scattered more than once (nebel/diffusion.h), which transmittance has no need of:
+/* The feature of fog whose light is scattered more than once (nebel/light.h), which transmittance has no need of:
  * the text needs NEBEL_DIFFUSION, or NEBEL_DIFFUSION_TEXEL, defined before it. */
 #define NEBEL_FEATURE_DIFFUSION 4194304u
 

@@ -2,7 +2,7 @@
 #ifndef NB_AERIAL_CLOUD_COMPOSE_H
 #define NB_AERIAL_CLOUD_COMPOSE_H
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 #include <math.h>
 

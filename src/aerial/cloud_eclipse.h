@@ -4,7 +4,7 @@
 
 #include "planets.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 /* What other planets leave of the light of clouds at a place: of the sun's part, which is as large as in what falls on level ground
  * and from all sides there. */

@@ -8,7 +8,7 @@
 #ifndef NB_AERIAL_CLOUD_PIXELS_H
 #define NB_AERIAL_CLOUD_PIXELS_H
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 #include <math.h>
 

@@ -4,7 +4,7 @@
 
 #include "math/vector.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 #include <nebel/nebel.h>
 
 #include <math.h>

@@ -2,7 +2,7 @@
 #ifndef NB_AERIAL_SHADOWED_AIR_H
 #define NB_AERIAL_SHADOWED_AIR_H
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 enum { NB_SHADED_PIECES = NEBEL_MAX_AIR_SHADOW_SEGMENTS + 1 };
 

@@ -4,7 +4,7 @@
 
 #include "base/base.h"
 
-#include <nebel/cells.h>
+#include <nebel/classic.h>
 
 /* Inside where normal . x <= distance; `normal` is of unit length. tie < 0: a way that lies in the plane is inside. */
 typedef struct nb_cell_plane {

@@ -2,7 +2,7 @@
 #ifndef NB_CLOUDS_CLOUD_NODES_H
 #define NB_CLOUDS_CLOUD_NODES_H
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 /* Up to a place: e to the minus optical depth, of all scattering and of what leads away; and the light of so many stretches, of it
  * apart what comes through all clouds on the ray, as if none of it were lost. */

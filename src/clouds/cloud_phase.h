@@ -6,7 +6,7 @@
 
 #include "medium/phase.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 enum {
     NB_CLOUD_PHASE_DIAMETERS = 12, /* from 4 to 50 micrometers, evenly spread logarithms */

@@ -6,7 +6,7 @@
 #include "cloud_slab.h"
 #include "planet/planet_map.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 enum {
     NB_CLOUD_OCTAVES = 5, /* of where heaps are */

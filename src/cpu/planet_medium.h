@@ -5,7 +5,7 @@
 
 #include "aerial/planets.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 enum { NB_TURNS = 1024 };
 

@@ -7,7 +7,7 @@
 #include "light/environment.h"
 #include "medium/volume.h"
 
-#include <nebel/diffusion.h>
+#include <nebel/light.h>
 
 typedef struct nb_fog_slot {
     nb_volume volume;

@@ -8,7 +8,7 @@
 #include "light/environment.h"
 #include "medium/volume.h"
 
-#include <nebel/diffusion.h>
+#include <nebel/light.h>
 
 #include <stdatomic.h>
 

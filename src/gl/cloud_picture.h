@@ -9,7 +9,7 @@
 #include "frame/pixel_samples.h"
 #include "aerial/planets.h"
 
-#include <nebel/clouds.h>
+#include <nebel/planet.h>
 #include <nebel/shader.h>
 
 /* Parts of a picture, which threads take; each keeps some 19 MB of what it found. */

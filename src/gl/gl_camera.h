@@ -5,7 +5,7 @@
 #include "base/base.h"
 #include "frame/pixel_samples.h"
 
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 
 /* The view of a camera as nebel_view_from_camera makes it; of a panorama its size and eye_from_world alone, clip_from_eye
  * 0. */

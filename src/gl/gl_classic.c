@@ -2,7 +2,7 @@
  * fixed pipeline, as numbers where it has not. */
 #include "gl_state.h"
 
-#include <nebel/gl_classic.h>
+#include <nebel/gl.h>
 
 #include <math.h>
 

@@ -4,7 +4,7 @@
 
 #include "gl_caps.h"
 
-#include <nebel/environment.h>
+#include <nebel/light.h>
 #include <nebel/shader.h>
 
 typedef struct nb_environment {

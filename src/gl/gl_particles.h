@@ -4,7 +4,7 @@
 
 #include "gl_caps.h"
 
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 
 /* As the eye sees one. */
 typedef struct nb_particle_sphere {

@@ -1,4 +1,4 @@
-/* The state of the context that the renderer changes beside that of the passes, kept and put back. nebel/gl_render.h
+/* The state of the context that the renderer changes beside that of the passes, kept and put back. nebel/gl.h
  * has the list in words. */
 #ifndef NB_GL_GL_SCENE_STATE_H
 #define NB_GL_GL_SCENE_STATE_H

@@ -4,7 +4,7 @@
 
 #include "base/device.h"
 
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 
 typedef struct nb_method {
     nebel_gl_method kind;

@@ -5,7 +5,7 @@
 #include "base/base.h"
 #include "medium/phase.h"
 
-#include <nebel/environment.h>
+#include <nebel/light.h>
 
 /* What a phase function makes of a sky: of a gradient the mean of |sine of elevation| about a direction, of a map
  * a table of the radiance that is scattered. Never changes; counted by its owners. */

@@ -1,4 +1,4 @@
-#include <nebel/nebula.h>
+#include <nebel/particles.h>
 
 #include "base/base.h"
 #include "base/precision.h"

@@ -4,7 +4,7 @@
 
 #include "base/base.h"
 
-#include <nebel/layers.h>
+#include <nebel/planet.h>
 
 enum { NB_MAP_LEVELS = 15 }; /* of NEBEL_MAX_PLANET_MAP_SIZE, each half the one before */
 

@@ -4,7 +4,7 @@
 
 #include "display.h"
 
-#include <nebel/gl_render.h>
+#include <nebel/gl.h>
 
 typedef enum nb_preview_quality {
     NB_STAGE_STALE = 0, /* nothing of what it should show */

@@ -11,8 +11,8 @@
  * Particles overlap, absorb and shine exactly, in any order, among themselves and with all other fog. Link with
  * libnebel.
  */
-#ifndef NEBEL_NEBULA_H
-#define NEBEL_NEBULA_H
+#ifndef NEBEL_PARTICLES_H
+#define NEBEL_PARTICLES_H
 
 #include <nebel/nebel.h>
 
