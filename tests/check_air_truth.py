@@ -30,7 +30,7 @@ def haze():
     """White haze of optical depth 1 over black ground, g 0.8."""
     height = 1e4
     scattering = 1 / (height * -math.expm1(-DEPTHS["haze"] / height))
-    return {"airs": [{"type": "exponential", "scattering": scattering, "scale_height": height,
+    return {"components": [{"type": "exponential", "scattering": scattering, "scale_height": height,
                       "phase": {"type": "henyey_greenstein", "g": 0.8}}], "ground_albedo": 0}
 
 
