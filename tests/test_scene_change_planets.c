@@ -123,7 +123,7 @@ static void test_what_is_wrong(void **state)
     assert_int_equal(nebel_update_scene_planets(NULL, own), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     assert_int_equal(nebel_update_scene_planets(scene, NULL), NEBEL_ERROR_ARGUMENT);
-    wrong faults[] = {{*own, "planet: sun_diameter"},
+    wrong faults[] = {{*own, "planet: sun_angular_diameter"},
                       {*own, "ground_albedo"},
                       {*own, "scale_height"},
                       {*own, "top: is 50 m; must be above the base, 60 m"},
