@@ -104,7 +104,7 @@ def render(scene, side, folder):
     """Means over a picture and their standard errors, each color."""
     path, picture = folder / "scene.json", folder / "picture.exr"
     path.write_text(json.dumps(scene))
-    subprocess.run([NEBEL, "render", path, "-o", picture, "--quiet", "--aov", "--method", "reference", "--size",
+    subprocess.run([NEBEL, "render", path, "-o", picture, "--quiet", "--aov", "--method", "path", "--size",
                     f"{side}x{side}", "--samples", "64"], check=True)
     planes = read_exr(picture.read_bytes())
     light = [planes[c].astype(float).mean() for c in "RGB"]

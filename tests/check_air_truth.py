@@ -112,7 +112,7 @@ class Tally:
 
 def judge(view, side, folder, tallies):
     """Prints a view. The most by which a quality is beyond what it tells, in standard errors."""
-    paths = render(view.scene("fast"), folder, "--method", "reference", "--size", f"{side}x{side}", "--samples", 64)
+    paths = render(view.scene("fast"), folder, "--method", "path", "--size", f"{side}x{side}", "--samples", 64)
     truth, chance = light_of(paths), error_of(paths)
     beyond, row = {}, []
     for quality in ("fast", "precise"):

@@ -491,14 +491,14 @@ class RenderTest(PictureCase):
         self.assertIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / "b.exr").out)
 
     def test_the_reference_tells_its_standard_error(self):
-        paths = ("--method", "reference", "--samples", "8")
+        paths = ("--method", "path", "--samples", "8")
         done = self.render("a.exr", *paths, "--aov")
         self.assert_done(done)
         self.assertRegex(done.err, r"note: standard error [\d.e-]+ of a pixel, [\d.e-]+ of the mean of all")
         picture = (self.folder / "a.exr").read_bytes()
         self.assertIn(b"standard_error.G\0", picture)
         self.assertNotIn(b"\0error\0", picture)
-        self.assert_done(self.render("b.exr", *paths, "--aov", "--threads", "1", "--seed", "0"))
+        self.assert_done(self.render("b.exr", "--method", "reference", *paths[2:], "--aov", "--threads", "1", "--seed", "0"))
         self.assertEqual((self.folder / "b.exr").read_bytes(), picture)
         self.assertNotIn("note", self.render("c.exr", *paths, "--seed", "1", "--bounces", "1", "--quiet").err)
         self.assertNotIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / "c.exr").out)
@@ -631,11 +631,11 @@ class RenderTest(PictureCase):
         for samples in ("0", "4097", "2.5", "-1"):
             self.assert_misused(self.render("a.png", "--samples", samples), "--samples")
         self.assert_misused(self.render("a.png", "--device", "gpu"), "--device", "cpu, gl")
-        self.assert_misused(self.render("a.png", "--bounces", "2"), "--bounces", "--method reference")
-        self.assert_misused(self.render("a.png", "--method", "reference", "--bounces", "0"), "--bounces", "1 to 10000")
+        self.assert_misused(self.render("a.png", "--bounces", "2"), "--bounces", "--method path")
+        self.assert_misused(self.render("a.png", "--method", "path", "--bounces", "0"), "--bounces", "1 to 10000")
         self.assert_misused(self.render("a.png", "--multiple-scattering", "octaves"), "--multiple-scattering", "off, diffusion")
-        self.assert_misused(self.render("a.png", "--multiple-scattering", "off", "--method", "reference"), "--bounces")
-        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, vertex, additive, linear, exp, exp2, five-tap, fog-coord, two-pass, alpha, d3d9, reference")
+        self.assert_misused(self.render("a.png", "--multiple-scattering", "off", "--method", "path"), "--bounces")
+        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, vertex, additive, linear, exp, exp2, five-tap, fog-coord, two-pass, alpha, d3d9, path, reference")
         self.assert_misused(self.render("a.png", "--method", "cells", "--tolerance", "0.1"), "--tolerance", "exact")
         self.assert_misused(self.render("a.png", "--method", "five-tap"), "--method", "--device gl")
         self.assertEqual(self.files(), self.given)
@@ -818,7 +818,7 @@ class FramesTest(PictureCase):
         self.assert_done(self.render("b.png", "--samples", "7", "--shutter", "0.5"))
         pictures = [(self.folder / name).read_bytes() for name in ("a.png", "b.png")]
         self.assertEqual(*[picture[picture.index(b"IDAT"):] for picture in pictures])
-        notes = [self.render("a.png", "--samples", "3", "--method", "reference", *words).err for words in ([], ["--shutter", "1"])]
+        notes = [self.render("a.png", "--samples", "3", "--method", "path", *words).err for words in ([], ["--shutter", "1"])]
         self.assertEqual(*[re.search(r"standard error [\d.e-]+ of a pixel, [\d.e-]+ of", note)[0] for note in notes])
         for value in ("-0.1", "1.1", "x", ""):
             self.assert_misused(self.render("c.png", "--shutter", value), "--shutter")

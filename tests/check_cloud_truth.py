@@ -83,7 +83,7 @@ def main():
                 row = []
                 for view in VIEWS:
                     of = scene(layer, sun, view, chosen == "earth")
-                    paths = render(of, folder, "--method", "reference", "--size", f"{SIDE}x{SIDE}", "--samples", samples, "--seed", seed)
+                    paths = render(of, folder, "--method", "path", "--size", f"{SIDE}x{SIDE}", "--samples", samples, "--seed", seed)
                     fast = render(of, folder, "--size", f"{FINE}x{FINE}", "--samples", 1)
                     truth, chance, light = light_of(paths), error_of(paths), light_of(fast)
                     row.append(f"{view} {light / truth:.2f} ({chance / truth:.0%})")

@@ -29,7 +29,7 @@ class PicturesTest(ViewTest):
         viewer.end()
 
     def test_picture_and_list_need_a_file_each(self):
-        done = nebel("view", self.scene, "--screenshot", "one.png", "--controls", "./one.png", cwd=self.folder)
+        done = nebel("view", self.scene, "--screenshot", "one.png", "--widgets", "./one.png", cwd=self.folder)
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("need a file each", done.err)
 
