@@ -115,7 +115,7 @@ static const char *measure(const nb_bench_desc *desc, nb_gl_planet_bench *b, nb_
     static const char *const names[CONTESTS] = {[GROUND] = "sky and ground, 1.7 m above it",
                                                 [SPACE] = "the planet from 2,000 km",
                                                 [FLIGHT] = "sky and ground, the eye moves: with the table",
-                                                [LAYERS] = "a planet of layers, two shells of clouds"};
+                                                [LAYERS] = "a textured planet, two shells of clouds"};
     nb_gl_planet_bench space = *b, flight = *b, layers = *b;
     layers.renderer = b->layered_renderer;
     layers.frame.camera = (nebel_camera){.position = {0, 0, 2.2e7}, .up = {0, 1, 0}, .vertical_fov = 40};

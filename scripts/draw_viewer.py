@@ -64,8 +64,8 @@ class DrawViewer(ViewTest):
             "sun": {"direction": [-0.1, 0.06, -1], "irradiance": 20}, "planet": {"model": "physical", "preset": "earth"}, "fog": []}))
         viewer = Viewer(self, "--size", "960x600")
         viewer.press("Planet")
-        viewer.press("planet[0].airs[1].open")
-        viewer.type("planet[0].airs[1].density", "0.02", 0.1)
+        viewer.press("planet[0].components[1].open")
+        viewer.type("planet[0].components[1].density", "0.02", 0.1)
         self.keep(viewer, "viewer-planet.png")
 
 

@@ -96,15 +96,15 @@ class Mixture:
                 "camera": {"position": [0, height, 0], "look_at": [0, height + (-1 if is_down else 1), 0],
                            "up": [1, 0, 0], "vertical_fov": 0.01},
                 "sun": {"direction": [math.sqrt(1 - self.sun ** 2), self.sun, 0], "irradiance": 1},
-                "planet": {"model": "physical", "radius": 1e10, "thickness": TOP, "airs": airs,
-                           "ground_albedo": self.ground, "sun_diameter": 0}}
+                "planet": {"model": "physical", "radius": 1e10, "thickness": TOP, "components": airs,
+                           "ground_albedo": self.ground, "sun_angular_diameter": 0}}
 
 
 def render(scene, side, folder):
     """Means over a picture and their standard errors, each color."""
     path, picture = folder / "scene.json", folder / "picture.exr"
     path.write_text(json.dumps(scene))
-    subprocess.run([NEBEL, "render", path, "-o", picture, "--quiet", "--aov", "--method", "reference", "--size",
+    subprocess.run([NEBEL, "render", path, "-o", picture, "--quiet", "--aov", "--method", "path", "--size",
                     f"{side}x{side}", "--samples", "64"], check=True)
     planes = read_exr(picture.read_bytes())
     light = [planes[c].astype(float).mean() for c in "RGB"]

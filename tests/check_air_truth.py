@@ -30,7 +30,7 @@ def haze():
     """White haze of optical depth 1 over black ground, g 0.8."""
     height = 1e4
     scattering = 1 / (height * -math.expm1(-DEPTHS["haze"] / height))
-    return {"airs": [{"type": "exponential", "scattering": scattering, "scale_height": height,
+    return {"components": [{"type": "exponential", "scattering": scattering, "scale_height": height,
                       "phase": {"type": "henyey_greenstein", "g": 0.8}}], "ground_albedo": 0}
 
 
@@ -119,7 +119,7 @@ def judge(view, side, folder, tallies):
     # Where few paths meet air at all, as in two metres of it, the most light is of the fewest of them, whose spread a sample does not show:
     # what seems to be beyond is looked at again with 16 times as many, and once more.
     for finer in (1, 4, 16):
-        paths = render(view.scene("fast"), folder, "--method", "reference", "--size", f"{finer * side}x{finer * side}",
+        paths = render(view.scene("fast"), folder, "--method", "path", "--size", f"{finer * side}x{finer * side}",
                        "--samples", 64)
         truth, chance = light_of(paths), error_of(paths)
         beyond = {quality: float(np.max((np.abs(light - truth) - told) / np.maximum(chance, 1e-30)))

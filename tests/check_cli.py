@@ -491,14 +491,14 @@ class RenderTest(PictureCase):
         self.assertIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / "b.exr").out)
 
     def test_the_reference_tells_its_standard_error(self):
-        paths = ("--method", "reference", "--samples", "8")
+        paths = ("--method", "path", "--samples", "8")
         done = self.render("a.exr", *paths, "--aov")
         self.assert_done(done)
         self.assertRegex(done.err, r"note: standard error [\d.e-]+ of a pixel, [\d.e-]+ of the mean of all")
         picture = (self.folder / "a.exr").read_bytes()
         self.assertIn(b"standard_error.G\0", picture)
         self.assertNotIn(b"\0error\0", picture)
-        self.assert_done(self.render("b.exr", *paths, "--aov", "--threads", "1", "--seed", "0"))
+        self.assert_done(self.render("b.exr", "--method", "reference", *paths[2:], "--aov", "--threads", "1", "--seed", "0"))
         self.assertEqual((self.folder / "b.exr").read_bytes(), picture)
         self.assertNotIn("note", self.render("c.exr", *paths, "--seed", "1", "--bounces", "1", "--quiet").err)
         self.assertNotIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / "c.exr").out)
@@ -507,7 +507,7 @@ class RenderTest(PictureCase):
         scene = self.folder / "ball.json"
         scene.write_text('{"nebel": 1, "camera": {"position": [0, 0, 9]}, "sun": {"direction": [1, 1, 1], "irradiance": 3},'
                          '"fog": [{"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 2}, "extinction": 2, "albedo": 1}],'
-                         '"multiple_scattering": {"model": "diffusion", "cells": 8000}}')
+                         '"multiple_scattering": {"model": "diffusion", "max_cells": 8000}}')
         def render(name, *options):
             done = nebel("render", scene, "-o", self.folder / name, "--size", "16x16", *options)
             self.assert_done(done)
@@ -631,11 +631,11 @@ class RenderTest(PictureCase):
         for samples in ("0", "4097", "2.5", "-1"):
             self.assert_misused(self.render("a.png", "--samples", samples), "--samples")
         self.assert_misused(self.render("a.png", "--device", "gpu"), "--device", "cpu, gl")
-        self.assert_misused(self.render("a.png", "--bounces", "2"), "--bounces", "--method reference")
-        self.assert_misused(self.render("a.png", "--method", "reference", "--bounces", "0"), "--bounces", "1 to 10000")
+        self.assert_misused(self.render("a.png", "--bounces", "2"), "--bounces", "--method path")
+        self.assert_misused(self.render("a.png", "--method", "path", "--bounces", "0"), "--bounces", "1 to 10000")
         self.assert_misused(self.render("a.png", "--multiple-scattering", "octaves"), "--multiple-scattering", "off, diffusion")
-        self.assert_misused(self.render("a.png", "--multiple-scattering", "off", "--method", "reference"), "--bounces")
-        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, vertex, additive, linear, exp, exp2, five-tap, fog-coord, two-pass, alpha, d3d9, reference")
+        self.assert_misused(self.render("a.png", "--multiple-scattering", "off", "--method", "path"), "--bounces")
+        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, vertex, additive, linear, exp, exp2, five-tap, fog-coord, two-pass, alpha, d3d9, path, reference")
         self.assert_misused(self.render("a.png", "--method", "cells", "--tolerance", "0.1"), "--tolerance", "exact")
         self.assert_misused(self.render("a.png", "--method", "five-tap"), "--method", "--device gl")
         self.assertEqual(self.files(), self.given)
@@ -818,7 +818,7 @@ class FramesTest(PictureCase):
         self.assert_done(self.render("b.png", "--samples", "7", "--shutter", "0.5"))
         pictures = [(self.folder / name).read_bytes() for name in ("a.png", "b.png")]
         self.assertEqual(*[picture[picture.index(b"IDAT"):] for picture in pictures])
-        notes = [self.render("a.png", "--samples", "3", "--method", "reference", *words).err for words in ([], ["--shutter", "1"])]
+        notes = [self.render("a.png", "--samples", "3", "--method", "path", *words).err for words in ([], ["--shutter", "1"])]
         self.assertEqual(*[re.search(r"standard error [\d.e-]+ of a pixel, [\d.e-]+ of", note)[0] for note in notes])
         for value in ("-0.1", "1.1", "x", ""):
             self.assert_misused(self.render("c.png", "--shutter", value), "--shutter")
@@ -1000,8 +1000,8 @@ class InfoTest(PictureCase):
                   ({"ambient": {"type": "environment", "file": "sky.exr", "rotation": 90, "intensity": 2},
                     "sun": {"direction": [0, 1, 0], "irradiance": 1, "keys": [{"frame": 1}, {"frame": 3, "direction": [1, 1, 0]}]}},
                    ["sun: 2 keys, frames 1 to 3"]),
-                  ({"nebula": [{"points": {"file": "triangle.obj"}, "size": [0.4, 0.5], "emission": 1},
-                               {"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 2}, "count": 12, "size": [0.4, 0.5], "emission": 1}]},
+                  ({"nebula": [{"points": {"file": "triangle.obj"}, "radius_range": [0.4, 0.5], "emission": 1},
+                               {"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 2}, "count": 12, "radius_range": [0.4, 0.5], "emission": 1}]},
                    ["nebula: 3 particles at the vertices of a model", "nebula: 12 particles in a shape of type sphere"]),
                   ({"cells": {"cells": rooms, "portals": [door]}}, ["cells: 2, 1 of them with fog, 1 portal"]))
         for entries, lines in scenes:
@@ -1021,7 +1021,7 @@ class InfoTest(PictureCase):
     def test_visibility_in_air(self):
         """Of air that is as good as even: -ln(0.05) mean free paths; fog takes its part; and air is no lack of fog."""
         planet = {"model": "physical", "radius": 1e9, "thickness": 1e6,
-                  "airs": [{"type": "exponential", "scattering": 1e-4, "scale_height": 1e9}]}
+                  "components": [{"type": "exponential", "scattering": 1e-4, "scale_height": 1e9}]}
         camera = {"position": [0, 1000, 0], "look_at": [1, 1000, 0]}
         for fog, wanted in (([], -math.log(0.05) / 1e-4),
                             ([{"shape": {"type": "world"}, "extinction": 3e-4, "source": 1}], -math.log(0.05) / 4e-4)):
@@ -1033,7 +1033,7 @@ class InfoTest(PictureCase):
     def test_the_depth_of_air(self):
         """Scattering times scale height, but for what is above the air; and clouds cover a part of the planet."""
         air = {"type": "exponential", "scattering": [2e-5, 0, 0], "absorption": [0, 0, 1], "scale_height": 8000}
-        planet = {"model": "physical", "airs": [air], "clouds": [{"coverage": 0.3}]}
+        planet = {"model": "physical", "components": [air], "clouds": [{"coverage": 0.3}]}
         out = nebel("info", self.write_scene("air.json", [], planet=planet)).out
         self.assertIn("air: optical depth straight up from the ground 0.16 0 more than 80\nwarning: air deeper than 12 ", out)
         self.assertIn("clouds: cumulus, 900 to 2700 m, 0.3 of the planet\n", out)
@@ -1045,7 +1045,7 @@ class InfoTest(PictureCase):
     def test_deep_air_is_said_with_its_picture(self):
         air = {"type": "exponential", "scattering": [2e-3, 2e-3, 2e-3], "scale_height": 8000}
         for airs, told in (([air], 1), ([], 0)):
-            scene = self.write_scene("air.json", [], planet={"model": "physical", "airs": airs} if airs else {"model": "physical"})
+            scene = self.write_scene("air.json", [], planet={"model": "physical", "components": airs} if airs else {"model": "physical"})
             warning = f"nebel: warning: {scene}: planet: air deeper than 12 "
             for command in (["render", scene, "-o", self.folder / "a.png", "-s", "8x8", "-q"], ["trace", scene]):
                 said = nebel(*command, text=RAY).err
@@ -1055,7 +1055,7 @@ class InfoTest(PictureCase):
     def make_layers(self):
         """A planet that is made at once: generated maps take seconds."""
         self.assert_done(nebel("render", self.scene, "-o", self.folder / "ground.png", "-s", "2x1", "-q"))
-        return {"model": "layers", "map": "ground.png"}
+        return {"model": "textured", "color_map": "ground.png"}
 
     def test_a_camera_below_the_ground_of_a_planet(self):
         for planet, radius in (({"model": "physical", "preset": "mars"}, 3389500), (self.make_layers(), 6360000)):

@@ -26,16 +26,16 @@ SUNS = (60, 30, 10)
 VIEWS = ("above", "below", "aslant")
 MOST_OFF = 0.1
 
-CUMULUS = {"kind": "cumulus", "coverage": 0.5}
+CUMULUS = {"type": "cumulus", "coverage": 0.5}
 SETS = {
     "few": [{**CUMULUS, "seed": 11}, {**CUMULUS, "coverage": 0.7, "seed": 12}],
     "many": [{**CUMULUS, "coverage": 0.3, "seed": 21}, {**CUMULUS, "seed": 22}, {**CUMULUS, "coverage": 0.8, "seed": 23},
              {**CUMULUS, "extinction": 0.02, "seed": 24}, {**CUMULUS, "extinction": 0.1, "seed": 25},
-             {**CUMULUS, "size": 3500, "seed": 26}, {**CUMULUS, "size": 1300, "seed": 27}],
-    "sheets": [{"kind": "stratus", "coverage": c, "seed": 31} for c in (0.5, 0.85)],
+             {**CUMULUS, "cell_size": 3500, "seed": 26}, {**CUMULUS, "cell_size": 1300, "seed": 27}],
+    "sheets": [{"type": "stratus", "coverage": c, "seed": 31} for c in (0.5, 0.85)],
     "earth": [{**CUMULUS, "seed": 41}, {**CUMULUS, "coverage": 0.8, "seed": 42}],
 }
-VACUUM = {"airs": [{"type": "exponential", "scattering": 1e-12, "scale_height": 8000, "phase": {"type": "henyey_greenstein", "g": 0}}],
+VACUUM = {"components": [{"type": "exponential", "scattering": 1e-12, "scale_height": 8000, "phase": {"type": "henyey_greenstein", "g": 0}}],
           "ground_albedo": 0}
 
 
@@ -83,7 +83,7 @@ def main():
                 row = []
                 for view in VIEWS:
                     of = scene(layer, sun, view, chosen == "earth")
-                    paths = render(of, folder, "--method", "reference", "--size", f"{SIDE}x{SIDE}", "--samples", samples, "--seed", seed)
+                    paths = render(of, folder, "--method", "path", "--size", f"{SIDE}x{SIDE}", "--samples", samples, "--seed", seed)
                     fast = render(of, folder, "--size", f"{FINE}x{FINE}", "--samples", 1)
                     truth, chance, light = light_of(paths), error_of(paths), light_of(fast)
                     row.append(f"{view} {light / truth:.2f} ({chance / truth:.0%})")

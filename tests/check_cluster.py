@@ -221,12 +221,12 @@ class ResumeTest(ClusterCase):
     def test_options_that_change_pixels(self):
         self.assert_done(self.run_in("a", PICTURES))
         for more in (["--samples", "2"], ["--exposure", "1"], ["--tolerance", "0.1"], ["--method", "vertex"],
-                     ["--method", "reference", "--bounces", "2"], ["--method", "reference", "--seed", "2"],
+                     ["--method", "path", "--bounces", "2"], ["--method", "path", "--seed", "2"],
                      ["--multiple-scattering", "diffusion"]):
             done = self.run_in("a", (PICTURES[0], ["--frames", "0-1"]), "--resume", *more)
             self.assert_done(done)
             self.assertIn(": 2 pictures, 64 x 36", done.err)
-        other = self.run_in("a", (PICTURES[0], ["--frames", "0-2", "--method", "reference", "--seed", "2"]), "--resume")
+        other = self.run_in("a", (PICTURES[0], ["--frames", "0-2", "--method", "path", "--seed", "2"]), "--resume")
         self.assertIn(": 3 pictures, 64 x 36", other.err, "the last options were others")
 
     def test_what_is_damaged_or_missing_is_made_again(self):

@@ -57,7 +57,7 @@ class GlDeviceTest(PictureCase):
 
     def test_noise_drifts_as_on_the_cpu(self):
         wisps = {"shape": {"type": "box", "min": [-2, -1, -2], "max": [2, 1, 2]}, "extinction": 2, "source": [0.3, 0.5, 0.7],
-                 "density": {"type": "noise", "size": [24, 12, 24], "cells": [4, 2, 4], "octaves": 2, "drift": [0.3, 0, 0], "change": 0.2}}
+                 "density": {"type": "noise", "size": [24, 12, 24], "cells": [4, 2, 4], "octaves": 2, "velocity": [0.3, 0, 0], "evolution": 0.2}}
         self.scene = self.write_scene("wisps.json", [wisps, FOG], models=[{"file": "triangle.obj"}], background=1,
                                       camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
         words = ("--aov", "--samples", 1, "--frames", "0-2")
@@ -230,7 +230,7 @@ class GlDeviceTest(PictureCase):
             self.assertIn("OpenGL ES, because the driver has no OpenGL 3.3 core", done.err)
 
     def test_no_warning_of_what_dims_alone(self):
-        cloud = {"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 1}, "count": 200, "size": [0.5, 1], "absorption": 1,
+        cloud = {"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 1}, "count": 200, "radius_range": [0.5, 1], "absorption": 1,
                  "emission": [1, 2, 3], "colors": [[1, 0, 0], [0, 0, 1]]}
         self.scene = self.write_scene("cloud.json", [], nebula=[cloud], models=[{"file": "triangle.obj"}],
                                       sun={"direction": [0, 0, 1], "irradiance": 1}, camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})

@@ -11,7 +11,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_ambient", "read_camera", "read_cells", "read_classic", "read_clouds", "read_diffusion", "read_density", "read_grid", "read_layers", "read_light", "read_model", "read_nebula", "read_noise", "read_planet", "read_shape", "read_volume", "key_table"]
 TABLE = re.compile(r"^ *(?:static )?const char \*const (?:\w+_)?(?:names|types)\[\w*\] = \{(.*?)\}", re.S | re.M)
 COMMENT = re.compile(r'("(?:\\.|[^"\\])*")|//[^\n]*|/\*.*?\*/', re.S)
-BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [], "planet": {}}', '{"nebel": 1, "fog": [], "planet": []}', '{"nebel": 1, "fog": [], "planet": [{"model": "layers"}]}',
+BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [], "planet": {}}', '{"nebel": 1, "fog": [], "planet": []}', '{"nebel": 1, "fog": [], "planet": [{"model": "textured"}]}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}}]}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "visibility": 2}]}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "source": 1, "albedo": 1}]}',

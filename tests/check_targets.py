@@ -53,7 +53,7 @@ class TargetTest(check_cli.PictureCase):
         for output in ("inner/skin.png", "inner/../inner//skin.png", "hard.png", "soft.png", "inner.mtl.png", inner / "skin.png"):
             self.assert_failed(self.render(output), "cannot write", "the scene reads")
         self.assert_done(self.render("inner/bump.png", "--size", "4x4", "-q"))
-        self.scene = self.write_scene("textured.json", [FOG], nebula=[{"points": {"file": "inner/b.gltf"}, "absorption": 1, "size": [0.1, 0.2]}])
+        self.scene = self.write_scene("textured.json", [FOG], nebula=[{"points": {"file": "inner/b.gltf"}, "absorption": 1, "radius_range": [0.1, 0.2]}])
         self.assert_failed(self.render("inner/b.png"), "cannot write", "the scene reads")
         self.scene = self.write_scene("textured.json", [FOG], models=[{"file": "inner/b.gltf"}])
         for output in ("inner/b.png", "inner/bump.png"):
@@ -88,9 +88,9 @@ class TargetTest(check_cli.PictureCase):
             yield {"fog": [{**FOG, "density": grid}]}
             yield {"models": [{"file": name}]}
             yield {"models": [{"heightfield": {"file": name, "size": [1, 1], "height": 1}}]}
-            yield {"nebula": [{"points": {"file": name}, "absorption": 1, "size": [0.1, 0.1]}]}
+            yield {"nebula": [{"points": {"file": name}, "absorption": 1, "radius_range": [0.1, 0.1]}]}
             yield {"ambient": {"type": "environment", "file": name}}
-            yield {"planet": {"model": "layers", "map": name}}
+            yield {"planet": {"model": "textured", "color_map": name}}
 
         for name, reason in (("pipe", "a pipe"), ("/dev/zero", "a device"), ("folder", "Is a directory")):
             self.assert_failed(nebel("info", name, cwd=self.folder), reason)
@@ -150,7 +150,7 @@ class InterruptTest(check_cli.PictureCase):
     def test_preparing_a_frame_ends_at_once(self):
         fog = {"shape": FOG["shape"], "extinction": 1, "albedo": 0.9, "keys": [{"frame": 0, "extinction": 0}, {"frame": 1, "extinction": 200}, {"frame": 99, "extinction": 201}]}
         self.scene = self.write_scene("film.json", [fog], sun={"direction": [1, 1, 1], "irradiance": 1},
-                                      multiple_scattering={"model": "diffusion", "cells": 4000000})
+                                      multiple_scattering={"model": "diffusion", "max_cells": 4000000})
         process = subprocess.Popen([NEBEL, "render", self.scene, "-o", "f%d.png", "--frames", "0-99", "--size", "8x8"], cwd=self.folder, stdin=subprocess.DEVNULL,
                                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
         while process.poll() is None and not (self.folder / "f0.png").exists():

@@ -29,7 +29,7 @@ class PicturesTest(ViewTest):
         viewer.end()
 
     def test_picture_and_list_need_a_file_each(self):
-        done = nebel("view", self.scene, "--screenshot", "one.png", "--controls", "./one.png", cwd=self.folder)
+        done = nebel("view", self.scene, "--screenshot", "one.png", "--widgets", "./one.png", cwd=self.folder)
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("need a file each", done.err)
 
@@ -218,7 +218,7 @@ BOTH_DRAW = 2.5 / 255
 
 
 NOISE = {"shape": {"type": "box", "min": [-3, -3, -2], "max": [3, 3, 0]}, "extinction": 0.6, "source": [0.9, 0.8, 0.7],
-         "density": {"type": "noise", "size": [24, 24, 8], "cells": [4, 4, 2], "drift": [0.2, 0, 0], "change": 0.1}}
+         "density": {"type": "noise", "size": [24, 24, 8], "cells": [4, 4, 2], "velocity": [0.2, 0, 0], "evolution": 0.1}}
 EYE = {"position": [0, 0, 6], "look_at": [0, 0, 0]}
 
 
@@ -327,17 +327,17 @@ class PlanetTest(FilmTest):
         before = self.scene.read_text()
         first = viewer.take_picture()
         viewer.press("Planet")
-        viewer.press("planet[0].airs[1].open")
-        viewer.type("planet[0].airs[1].density", "0.1", 0.1)
+        viewer.press("planet[0].components[1].open")
+        viewer.type("planet[0].components[1].density", "0.1", 0.1)
         hazy = viewer.take_picture()
         self.assertFalse(self.same(hazy, first, 0.02))
         viewer.type("planet[0].ground albedo", "0.75", 0.1)
         changed = viewer.take_picture()
         planet = viewer.save()["planet"]
-        self.assertEqual(planet.keys(), {"model", "preset", "ground_albedo", "airs"})
+        self.assertEqual(planet.keys(), {"model", "preset", "ground_albedo", "components"})
         self.assertEqual(planet["ground_albedo"][0], 0.75)
-        self.assertEqual([air["type"] for air in planet["airs"]], ["exponential", "exponential", "layer"])
-        self.assertGreater(planet["airs"][1]["scattering"], 1e-5)
+        self.assertEqual([air["type"] for air in planet["components"]], ["exponential", "exponential", "tent"])
+        self.assertGreater(planet["components"][1]["scattering"], 1e-5)
         self.assert_frame(viewer, 0, "gl", BOTH_DRAW)
         self.assertTrue(self.same(changed, self.folder / "film-gl-0.png", BOTH_DRAW))
         for _ in range(2):
@@ -376,9 +376,9 @@ class PlanetTest(FilmTest):
         self.assert_frame(viewer, 9, "gl", BOTH_DRAW)
         viewer.end()
 
-    def test_a_planet_of_layers_turns(self):
+    def test_a_textured_planet_turns(self):
         camera = {"position": [0, 0, 0], "look_at": [0, 0, -1], "vertical_fov": 25}
-        planet = {"model": "layers", "center": [0, 0, -500], "radius": 300, "day": 400, "clouds": [{"height": 10, "day": -300}]}
+        planet = {"model": "textured", "center": [0, 0, -500], "radius": 300, "rotation_period": 400, "clouds": [{"height": 10, "rotation_period": -300}]}
         viewer = self.open([], camera=camera, planet=planet, sun={"direction": [1, 1, 1], "irradiance": 4})
         first = self.assert_frame(viewer, 0, "cpu", BOTH_DRAW)
         viewer.type("frame", "150")
@@ -387,12 +387,12 @@ class PlanetTest(FilmTest):
         self.assertNotIn("--device", viewer.log.read_text())
         viewer.press("Time")
         viewer.press("Planet")
-        viewer.type("planet[0].day", "300")
+        viewer.type("planet[0].rotation period", "300")
         viewer.type("planet[0].air brightness", "0")
         viewer.press("planet[0].clouds[0].open")
         viewer.type("planet[0].clouds[0].gain", "1.5")
         changed = viewer.take_picture()
-        wanted = {**planet, "day": 300, "air": {"brightness": 0}, "clouds": [{**planet["clouds"][0], "gain": 1.5}]}
+        wanted = {**planet, "rotation_period": 300, "atmosphere": {"brightness": 0}, "clouds": [{**planet["clouds"][0], "gain": 1.5}]}
         self.assertEqual(viewer.save()["planet"], wanted)
         self.assert_frame(viewer, 150, "gl")
         self.assertTrue(self.same(changed, self.folder / "film-gl-150.png", ROUNDING))

@@ -242,7 +242,7 @@ class EditTest(ViewTest):
     def test_nebulae_cells_and_the_files_of_a_scene(self):
         cell = {"name": "room", "shape": {"type": "box", "min": [-2, -2, -2], "max": [-1, 2, 2]}, "density": 0.5, "color": 0.2}
         nebula = {"name": "dust", "shape": {"type": "sphere", "center": [0, 0, -3], "radius": 2}, "count": 12,
-                  "size": [0.8, 1.2], "absorption": 3, "emission": 0.5}
+                  "radius_range": [0.8, 1.2], "absorption": 3, "emission": 0.5}
         self.scene = self.write_scene("scene.json", [FOG], models=[{"file": "triangle.obj"}], nebula=[nebula],
                                       camera={"position": [0, 0, 6], "look_at": [0, 0, 0]}, max_opacity=0.4, ambient=1,
                                       sun={"direction": [0, 0, 1], "irradiance": 3}, cells={"cells": [cell]})
@@ -363,9 +363,9 @@ class KeysTest(ViewTest):
         viewer.type("samples", "1")
         first = viewer.take_picture()
         wanted = {"cells": [6, 4, 2], "size": [32, 24, 8], "octaves": 2, "gain": 0.75, "coverage": 0.5, "edge": [0.25, 0, 0], "seed": 5,
-                  "drift": [0.5, 0, 0], "change": 0.25}
+                  "velocity": [0.5, 0, 0], "evolution": 0.25}
         for name, text in (("cells", "6"), ("voxels", "32"), ("octaves", "2"), ("gain", "0.75"), ("coverage", "0.5"),
-                           ("soft faces", "0.25"), ("noise seed", "5"), ("drift", "0.5"), ("change", "0.25")):
+                           ("soft faces", "0.25"), ("noise seed", "5"), ("velocity", "0.5"), ("evolution", "0.25")):
             viewer.type(f"fog[0].{name}", text, 0.1)
         picture = viewer.take_picture()
         self.assertFalse(self.same(picture, first, 0.02))
@@ -375,7 +375,7 @@ class KeysTest(ViewTest):
         viewer.settle()
         self.assertTrue(self.same(viewer.take_picture(), self.draw_at("1.png", 1), ROUNDING_TOGETHER), "still noise now moves")
         viewer.key("ctrl+z")
-        self.assertEqual(viewer.save()["fog"][0]["density"]["change"], 0)
+        self.assertEqual(viewer.save()["fog"][0]["density"]["evolution"], 0)
         viewer.end()
 
     def test_time_goes_on(self):
@@ -523,7 +523,7 @@ class SceneTest(ViewTest):
         viewer.end()
 
     def test_contrast_phase_and_colours(self):
-        nebula = {"shape": {"type": "sphere", "center": [0, 0, -3], "radius": 2}, "count": 3, "emission": 5, "size": [0.8, 1]}
+        nebula = {"shape": {"type": "sphere", "center": [0, 0, -3], "radius": 2}, "count": 3, "emission": 5, "radius_range": [0.8, 1]}
         self.scene = self.write_scene("scene.json", [{**FOG, "albedo": 0.5, "source": None}], nebula=[nebula], ambient=1)
         scene = json.loads(self.scene.read_text())
         del scene["fog"][0]["source"]
@@ -556,7 +556,7 @@ class SceneTest(ViewTest):
 
     def test_points_of_a_nebula(self):
         (self.folder / "points.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\np 1 2 3\n")
-        nebula = {"points": {"file": "points.obj"}, "size": [0.4, 0.5], "emission": 1}
+        nebula = {"points": {"file": "points.obj"}, "radius_range": [0.4, 0.5], "emission": 1}
         self.scene = self.write_scene("scene.json", [FOG], nebula=[nebula], camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
         viewer = self.open()
         viewer.press("nebula[0].open")

@@ -612,9 +612,9 @@ static void test_what_is_said_of_bad_layers(void **state)
     assert_layer_fault(&(nebel_cloud_layer){.base = 99000},
                        "cloud layer: top: is 100800 m, as none is given; must be within the air, 100000 m");
     assert_layer_fault(&(nebel_cloud_layer){.coverage = 1.5},
-                       "cloud layer: coverage: is 1.5; must be within 0 and 1 (0: the number of its kind)");
+                       "cloud layer: coverage: is 1.5; must be within 0 and 1 (0: the number of its type)");
     assert_layer_fault(&(nebel_cloud_layer){.erosion = -.5},
-                       "cloud layer: detail: is -0.5; must be within 0 and 1, or none (-1)");
+                       "cloud layer: erosion: is -0.5; must be within 0 and 1, or none (-1)");
     assert_layer_fault(&(nebel_cloud_layer){.wind = {0, 1e13}},
                        "cloud layer: wind: is 1e+13 m; must be within -1e12 and 1e12");
 }

@@ -280,7 +280,7 @@ static void error_covers_glow_around_the_sun(void **state)
 }
 
 /* Haze of depth 1 around a ball as large as the Earth: level ways past it and to its ground, seen from orbit, and low suns. Light is that of
- * 774,400 paths each (`nebel render --method reference`), with standard errors; views are of tests/check_air_truth.py with the seed 7.
+ * 774,400 paths each (`nebel render --method path`), with standard errors; views are of tests/check_air_truth.py with the seed 7.
  * When light that peaks turn went as if it came straight, these were up to 34 % (`fast`) and 15 % too bright. */
 static void haze_around_a_ball_has_its_light(void **state)
 {

@@ -347,8 +347,9 @@ static void scenes_give_back_all_memory(void **state)
 #define NOISE                                                                                                          \
     "{\"nebel\": 1, \"fog\": [{\"shape\": {\"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1]}, "               \
     "\"extinction\": 1, \"density\": {\"type\": \"noise\", \"size\": [12, 12, 12], \"cells\": [2, 3, 2], "             \
-    "\"octaves\": 2, \"gain\": 0.6, \"coverage\": 0.8, \"edge\": [0.1, 0, 0], \"seed\": 4, \"drift\": [0.5, 0, 0], "   \
-    "\"change\": 0.25}}]}"
+    "\"octaves\": 2, \"gain\": 0.6, \"coverage\": 0.8, \"edge\": [0.1, 0, 0], \"seed\": 4, \"velocity\": [0.5, 0, "    \
+    "0], "                                                                                                             \
+    "\"evolution\": 0.25}}]}"
 
 static double light_at_frame(const nebel_scene *scene, double frame)
 {

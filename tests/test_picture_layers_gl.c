@@ -1,4 +1,4 @@
-/* Planets of layers in OpenGL are those of the CPU: the scenes of them, eyes at all heights and of all kinds, fog and models
+/* Textured planets in OpenGL are those of the CPU: the scenes of them, eyes at all heights and of all kinds, fog and models
  * between the shells. With an argument in pictures so many times wider. */
 #include "odd_state.h"
 #include "pass_help.h"

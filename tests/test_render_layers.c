@@ -1,4 +1,4 @@
-/* Planets of layers in pictures of the CPU: what nebel_trace_textured_planet says, laid over each other through the fog between. */
+/* Textured planets in pictures of the CPU: what nebel_trace_textured_planet says, laid over each other through the fog between. */
 #include "test_render_scene.h"
 
 enum { WIDTH = 48, HEIGHT = 32, PIXELS = WIDTH * HEIGHT };

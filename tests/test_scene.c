@@ -229,7 +229,7 @@ static void test_altitudes(void **state)
         ALTITUDE(
             0.04) ", \"planet\": [{\"model\": \"physical\", \"radius\": 500, \"center\": [1, 2, -490]}, {\"model\": "
                   "\"physical\", \"preset\": \"moon\", \"center\": [0, 0, 9000]}], \"unit\": 1000, \"up\": \"z\"}",
-        ALTITUDE(40) ", \"planet\": {\"model\": \"layers\", \"radius\": 3000}}"};
+        ALTITUDE(40) ", \"planet\": {\"model\": \"textured\", \"radius\": 3000}}"};
     const nebel_density wanted[] = {
         {.scale_height = 40, .center = {0, -6.36e6, 0}, .radius = 6.36e6},
         {.scale_height = 40, .center = {0, -2000, 0}, .radius = 2000, .base = 3, .below = NEBEL_BELOW_CONSTANT},
@@ -447,7 +447,7 @@ static void test_a_nebula_is_fog(void **state)
         "{\"nebel\": 1, \"fog\": [{\"shape\": {\"type\": \"world\"}, \"extinction\": 1}], \"nebula\": [{\"name\": "
         "\"a\", "
         "\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 2}, \"count\": 70, \"emission\": 1, "
-        "\"colors\": [[1, 0, 0], [0, 0, 1]], \"profile\": \"ball\"}, "
+        "\"colors\": [[1, 0, 0], [0, 0, 1]], \"profile\": \"uniform\"}, "
         "{\"shape\": {\"type\": \"box\", \"min\": [5, 5, 5], \"max\": [6, 6, 6]}, \"seed\": 3, \"count\": 30}]}";
     assert_int_equal(nebel_parse_scene(text, sizeof text - 1, "nebula", &(nebel_scene_desc){0}, &scene), NEBEL_OK);
     const nebel_scene_data *data = nebel_get_scene_data(scene);

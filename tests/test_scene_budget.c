@@ -71,10 +71,10 @@ static void test_what_was_read_before_counts(void **state)
 {
     (void)state;
     journal kept;
-    nebel_scene *scene =
-        open_scene("{\"nebel\": 1, \"fog\": [], \"multiple_scattering\": {\"model\": \"diffusion\", \"cells\": 22000}, "
-                   "\"models\": [{\"heightfield\": {\"file\": \"h.png\", \"size\": [9, 9], \"height\": 1}}]}",
-                   50 * MEGABYTE, 0, &kept);
+    nebel_scene *scene = open_scene(
+        "{\"nebel\": 1, \"fog\": [], \"multiple_scattering\": {\"model\": \"diffusion\", \"max_cells\": 22000}, "
+        "\"models\": [{\"heightfield\": {\"file\": \"h.png\", \"size\": [9, 9], \"height\": 1}}]}",
+        50 * MEGABYTE, 0, &kept);
     assert_too_much(scene, &kept, "models[0]", "brings the scene to 52 MB of memory");
 }
 

@@ -24,7 +24,7 @@ static void test_everything_it_may_say(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good(SCENE("\"cells\": [" HALL ", " CRYPT "], \"model\": \"exponential\", \"span\": "
-                                          "\"faithful\", \"grouping\": false, \"portals\": [{\"cells\": [\"crypt\", "
+                                          "\"printed\", \"grouping\": false, \"portals\": [{\"cells\": [\"crypt\", "
                                           "\"hall\"], \"polygon\": " DOOR "}]"));
     const nebel_scene_data *data = nebel_get_scene_data(scene);
     const nebel_cells_desc *cells = data->cells;
@@ -187,7 +187,7 @@ static void test_what_no_portal_has(void **state)
              "[`{\"cells\": [\"hall\", \"crypt\"], \"polygon\": [[4, 0, 4], [4, 2, 4], [4, 0.5, 4.5], [4, 0, 6]]}]"),
          "cells.portals[0]: is not convex"},
         {FORMAT, AND("\"model\": `\"exp\""), "cells.model: unknown; must be one of: linear, exponential"},
-        {FORMAT, AND("\"span\": `\"z\""), "cells.span: unknown; must be one of: ray, depth, faithful"},
+        {FORMAT, AND("\"span\": `\"z\""), "cells.span: unknown; must be one of: ray, depth, printed"},
         {FORMAT, AND("\"grouping\": `1"), "cells.grouping: is a number; must be true or false"},
     };
     CHECK(rules);

@@ -35,16 +35,18 @@ static void same_light(const nebel_scene *a, const nebel_scene *b)
 static void test_air_and_clouds(void **state)
 {
     (void)state;
-    nebel_scene *const scene = load(TOY(", \"clouds\": [{}, {\"kind\": \"cirrus\"}]"));
+    nebel_scene *const scene = load(TOY(", \"clouds\": [{}, {\"type\": \"cirrus\"}]"));
     nebel_planet planet = nebel_get_scene_data(scene)->planets[0];
     nebel_sun before, now;
     assert_int_equal(nebel_find_scene_sunlight(scene, 3, &before), NEBEL_OK);
-    nebel_scene *const other = load(
-        TOY(", \"airs\": [{\"type\": \"exponential\", \"scattering\": 0.001, \"absorption\": [0, 1e-4, 0], \"phase\": "
-            "{\"type\": \"henyey_greenstein\", \"g\": 0.5}, \"scale_height\": 25}, {\"type\": \"exponential\", "
-            "\"scattering\": 0.002, \"scale_height\": 4}], \"ground_albedo\": 0.75, \"sun_diameter\": 2, \"clouds\": "
-            "[{\"coverage\": 0.9, \"size\": "
-            "30, \"detail\": 0, \"wind\": [3, 4]}, {\"kind\": \"cirrus\", \"extinction\": 0.03}]"));
+    nebel_scene *const other =
+        load(TOY(", \"components\": [{\"type\": \"exponential\", \"scattering\": 0.001, \"absorption\": [0, 1e-4, 0], "
+                 "\"phase\": "
+                 "{\"type\": \"henyey_greenstein\", \"g\": 0.5}, \"scale_height\": 25}, {\"type\": \"exponential\", "
+                 "\"scattering\": 0.002, \"scale_height\": 4}], \"ground_albedo\": 0.75, \"sun_angular_diameter\": 2, "
+                 "\"clouds\": "
+                 "[{\"coverage\": 0.9, \"cell_size\": "
+                 "30, \"erosion\": 0, \"wind\": [3, 4]}, {\"type\": \"cirrus\", \"extinction\": 0.03}]"));
     const nebel_planet *const wanted = nebel_get_scene_data(other)->planets;
     assert_int_equal(planet.atmosphere_desc.component_count, wanted->atmosphere_desc.component_count);
     memcpy(planet.atmosphere_desc.components, wanted->atmosphere_desc.components,
@@ -76,8 +78,8 @@ static void test_layers(void **state)
 {
     (void)state;
     /* One map is made; that takes a second. */
-    nebel_scene *const scene = load(SCENE("{\"model\": \"layers\", \"map\": \"" PICTURE
-                                          "\", \"clouds\": [{\"map\": \"" PICTURE "\"}, {\"seed\": 4}]}"));
+    nebel_scene *const scene = load(SCENE("{\"model\": \"textured\", \"color_map\": \"" PICTURE
+                                          "\", \"clouds\": [{\"coverage_map\": \"" PICTURE "\"}, {\"seed\": 4}]}"));
     nebel_planet planet = nebel_get_scene_data(scene)->planets[0];
     planet.textured_desc.rotation_period = 24;
     planet.textured_desc.radius = 3;
@@ -110,7 +112,7 @@ typedef struct wrong {
 static void test_what_is_wrong(void **state)
 {
     (void)state;
-    const char *const text = TOY(", \"clouds\": [{}, {\"kind\": \"cirrus\"}]");
+    const char *const text = TOY(", \"clouds\": [{}, {\"type\": \"cirrus\"}]");
     meter m;
     journal kept;
     nebel_scene *scene = NULL;
@@ -121,7 +123,7 @@ static void test_what_is_wrong(void **state)
     assert_int_equal(nebel_update_scene_planets(NULL, own), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     assert_int_equal(nebel_update_scene_planets(scene, NULL), NEBEL_ERROR_ARGUMENT);
-    wrong faults[] = {{*own, "planet: sun_diameter"},
+    wrong faults[] = {{*own, "planet: sun_angular_diameter"},
                       {*own, "ground_albedo"},
                       {*own, "scale_height"},
                       {*own, "top: is 50 m; must be above the base, 60 m"},

@@ -13,7 +13,7 @@ static void test_an_empty_layer_is_a_good_one(void **state)
 {
     (void)state;
     nebel_cloud_layer layer;
-    nebel_scene *scene = parse_good(PLANET("", "[{}, {\"kind\": \"cirrus\"}]"));
+    nebel_scene *scene = parse_good(PLANET("", "[{}, {\"type\": \"cirrus\"}]"));
     const nebel_planet *planet = nebel_get_scene_data(scene)->planets;
     assert_int_equal(planet->cloud_layer_count, 2);
     assert_int_equal(planet->cloud_layers[1].type, NEBEL_CLOUD_CIRRUS);
@@ -47,8 +47,9 @@ static void test_everything_they_may_say(void **state)
     (void)state;
     nebel_scene *scene = parse_good(PLANET(
         "\"up\": \"z\", \"unit\": 1000, ",
-        "[{\"kind\": \"stratus\", \"base\": 1, \"top\": 2, \"coverage\": 0.25, \"extinction\": 5, \"size\": 3, "
-        "\"detail\": 0, \"variation\": 1, \"diameter\": 12, \"seed\": 7, \"wind\": [2, 3]}, {\"coverage\": 0}]"));
+        "[{\"type\": \"stratus\", \"base\": 1, \"top\": 2, \"coverage\": 0.25, \"extinction\": 5, \"cell_size\": 3, "
+        "\"erosion\": 0, \"patchiness\": 1, \"droplet_diameter\": 12, \"seed\": 7, \"wind\": [2, 3]}, {\"coverage\": "
+        "0}]"));
     const nebel_planet *planet = nebel_get_scene_data(scene)->planets;
     const nebel_cloud_layer *layer = planet->cloud_layers;
     assert_int_equal(planet->cloud_layer_count, 1);
@@ -81,9 +82,9 @@ static void test_what_is_wrong(void **state)
          "planet.clouds[4]: is one too many"},
         {LIMIT, PLANET("", "[{}, {}, {}, {}, `{}]"), "planet.clouds[4]: is one too many"},
         {FORMAT, AIRLESS("\"preset\": \"moon\""), "planet.clouds: need air, and the planet has none"},
-        {FORMAT, AIRLESS("\"airs\": []"), "planet.clouds: need air, and the planet has none"},
-        {FORMAT, ONE("\"kind\": `\"fluffy\""),
-         "planet.clouds[0].kind: unknown; must be one of: cumulus, stratus, cirrus"},
+        {FORMAT, AIRLESS("\"components\": []"), "planet.clouds: need air, and the planet has none"},
+        {FORMAT, ONE("\"type\": `\"fluffy\""),
+         "planet.clouds[0].type: unknown; must be one of: cumulus, stratus, cirrus"},
         {FORMAT, ONE("\"base\": `0"), "planet.clouds[0].base: is 0"},
         {FORMAT, ONE("\"base\": `-100"), "planet.clouds[0].base: is -100"},
         {FORMAT, PLANET("", "[`{\"base\": 99000}]"),
@@ -93,8 +94,8 @@ static void test_what_is_wrong(void **state)
         {FORMAT, ONE("\"base\": 1000, \"top\": `1000"),
          "planet.clouds[0].top: is 1000 m; must be above the base, 1000 m"},
         {FORMAT, PLANET("", "[{\"base\": `1e-300}]"), "planet.clouds[0].base: is 1e-300; must be a height"},
-        {FORMAT, ONE("\"size\": `3e7"),
-         "planet.clouds[0].size: is 3e+07 m; must be at most 2.544e+07 m, which is 4 times the radius"},
+        {FORMAT, ONE("\"cell_size\": `3e7"),
+         "planet.clouds[0].cell_size: is 3e+07 m; must be at most 2.544e+07 m, which is 4 times the radius"},
         {FORMAT, ONE("\"top\": `2e5"), "planet.clouds[0].top: is 200000 m; must be within the air, 100000 m"},
         {FORMAT, ONE("\"base\": `2e5, \"top\": 3e5"),
          "planet.clouds[0].base: is 200000 m; must be within the air, 100000 m"},
@@ -110,13 +111,13 @@ static void test_what_is_wrong(void **state)
         {FORMAT, ONE("\"coverage\": `1.5"), "planet.clouds[0].coverage: is 1.5"},
         {FORMAT, ONE("\"coverage\": `-0.1"), "planet.clouds[0].coverage: is -0.1"},
         {FORMAT, ONE("\"extinction\": `0"), "planet.clouds[0].extinction: is 0"},
-        {FORMAT, ONE("\"size\": `0"), "planet.clouds[0].size: is 0"},
-        {FORMAT, ONE("\"detail\": `2"), "planet.clouds[0].detail: is 2"},
-        {FORMAT, ONE("\"diameter\": `100"), "planet.clouds[0].diameter: is 100"},
+        {FORMAT, ONE("\"cell_size\": `0"), "planet.clouds[0].cell_size: is 0"},
+        {FORMAT, ONE("\"erosion\": `2"), "planet.clouds[0].erosion: is 2"},
+        {FORMAT, ONE("\"droplet_diameter\": `100"), "planet.clouds[0].droplet_diameter: is 100"},
         {FORMAT, ONE("\"seed\": `0.5"), "planet.clouds[0].seed: is 0.5"},
         {FORMAT, ONE("\"wind\": `[1]"), "planet.clouds[0].wind: "},
-        {FORMAT, ONE("\"weather\": `\"w.txt\""),
-         "planet.clouds[0].weather: is \"w.txt\"; must be the path of a picture"},
+        {FORMAT, ONE("\"weather_map\": `\"w.txt\""),
+         "planet.clouds[0].weather_map: is \"w.txt\"; must be the path of a picture"},
         {FORMAT, ONE("`\"hight\": 3"), "planet.clouds[0].hight: unknown key"},
     };
     CHECK(rules);
@@ -175,7 +176,7 @@ static void test_fog_has_less_sky(void **state)
         (void)snprintf(
             text, sizeof text,
             "{\"nebel\": 1, \"sun\": {\"direction\": [0, 1, 0.2], \"irradiance\": 3}, %s\"planet\": "
-            "{\"model\": \"physical\", \"clouds\": [{\"kind\": \"stratus\", \"coverage\": 1}]}, \"fog\": []}",
+            "{\"model\": \"physical\", \"clouds\": [{\"type\": \"stratus\", \"coverage\": 1}]}, \"fog\": []}",
             ambients[k]);
         nebel_scene *scene = parse_good(text);
         assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);

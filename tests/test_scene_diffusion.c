@@ -9,9 +9,9 @@
 static void test_everything_it_may_say(void **state)
 {
     (void)state;
-    nebel_scene *scene =
-        parse_good(SCENE("\"unit\": 0.5, ", "{\"model\": \"diffusion\", \"cells\": 1000, \"ground\": {\"height\": -3, "
-                                            "\"albedo\": [0.1, 0.2, 0.3]}}"));
+    nebel_scene *scene = parse_good(
+        SCENE("\"unit\": 0.5, ", "{\"model\": \"diffusion\", \"max_cells\": 1000, \"ground\": {\"height\": -3, "
+                                 "\"albedo\": [0.1, 0.2, 0.3]}}"));
     const nebel_diffusion_desc *desc = nebel_get_scene_data(scene)->diffusion;
     assert_int_equal(desc->max_cells, 1000);
     assert_int_equal(desc->has_ground, 1);
@@ -76,8 +76,8 @@ static void test_what_is_wrong(void **state)
         {FORMAT, SCENE("", "`{}"), "multiple_scattering: "},
         {FORMAT, SCENE("", "{\"model\": `\"octaves\"}"),
          "multiple_scattering.model: unknown; must be one of: diffusion"},
-        {FORMAT, SCENE("", "{\"model\": \"diffusion\", \"cells\": `100}"),
-         "multiple_scattering.cells: is 100; must be"},
+        {FORMAT, SCENE("", "{\"model\": \"diffusion\", \"max_cells\": `100}"),
+         "multiple_scattering.max_cells: is 100; must be"},
         {FORMAT, SCENE("", "{\"model\": \"diffusion\", \"ground\": `2}"), "multiple_scattering.ground: is a number"},
         {FORMAT, SCENE("", "{\"model\": \"diffusion\", \"ground\": {\"height\": `2e15}}"),
          "multiple_scattering.ground.height: is 2e+15"},

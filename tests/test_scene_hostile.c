@@ -267,9 +267,9 @@ static void test_maps_start_there_too(void **state)
     char path[200], expected[300];
     in_folder(path, *state, "models.json");
     FILE *file = fopen(path, "w");
-    fputs("{\"nebel\": 1, \"fog\": [],\n\"planet\": {\"model\": \"layers\", \"map\": \"is/none.png\"}}", file);
+    fputs("{\"nebel\": 1, \"fog\": [],\n\"planet\": {\"model\": \"textured\", \"color_map\": \"is/none.png\"}}", file);
     fclose(file);
-    snprintf(expected, sizeof expected, "planet.map: cannot read the picture \"%s/is/none.png\": No such file",
+    snprintf(expected, sizeof expected, "planet.color_map: cannot read the picture \"%s/is/none.png\": No such file",
              (char *)*state);
     assert_int_equal(load(path, &kept), NEBEL_ERROR_FILE);
     assert_non_null(strstr(kept.last, expected));

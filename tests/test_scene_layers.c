@@ -1,4 +1,4 @@
-/* The section "planet" of the model "layers": what it becomes, its maps, and what is wrong. */
+/* The section "planet" of the model "textured": what it becomes, its maps, and what is wrong. */
 #define _POSIX_C_SOURCE 200809L
 #include "near.h"
 #include "scene_help.h"
@@ -10,12 +10,12 @@
 #include <unistd.h>
 
 #define SCENE(top, members) "{\"nebel\": 1, " top "\"fog\": [], \"planet\": " members "}"
-#define LAYERS(members) SCENE("", "{\"model\": \"layers\", " members "}")
+#define LAYERS(members) SCENE("", "{\"model\": \"textured\", " members "}")
 
 static void test_defaults(void **state)
 {
     (void)state;
-    nebel_scene *scene = parse_good(SCENE("", "{\"model\": \"layers\"}"));
+    nebel_scene *scene = parse_good(SCENE("", "{\"model\": \"textured\"}"));
     const nebel_planet *planet = nebel_get_scene_data(scene)->planets;
     assert_int_equal(planet->model, NEBEL_PLANET_TEXTURED);
     assert_number(planet->textured_desc.radius, 6.36e6);
@@ -36,12 +36,14 @@ static void test_defaults(void **state)
 static void test_everything_it_may_say(void **state)
 {
     (void)state;
-    nebel_scene *scene = parse_good(
-        SCENE("\"up\": \"z\", \"unit\": 1000, ",
-              "{\"model\": \"layers\", \"center\": [1, 2, 3], \"radius\": 20, \"rotation\": [0, 0, 1, 0], \"day\": 5, "
-              "\"coverage\": 0.25, \"seed\": 9, \"clouds\": [{\"height\": 2, \"day\": -7, \"color\": [0.1, 0.2, 0.3], "
-              "\"wrap\": [1, -2, 3], \"gain\": 4, \"coverage\": 0.75, \"seed\": 11}, {}], \"air\": {\"height\": 3, "
-              "\"brightness\": 2, \"ramp\": [[0, 0, 0], [0.5, 0.25, 1]]}}"));
+    nebel_scene *scene = parse_good(SCENE("\"up\": \"z\", \"unit\": 1000, ",
+                                          "{\"model\": \"textured\", \"center\": [1, 2, 3], \"radius\": 20, "
+                                          "\"rotation\": [0, 0, 1, 0], \"rotation_period\": 5, "
+                                          "\"land_coverage\": 0.25, \"seed\": 9, \"clouds\": [{\"height\": 2, "
+                                          "\"rotation_period\": -7, \"color\": [0.1, 0.2, 0.3], "
+                                          "\"uv_tiling\": [1, -2, 3], \"gain\": 4, \"coverage\": 0.75, \"seed\": 11}, "
+                                          "{}], \"atmosphere\": {\"height\": 3, "
+                                          "\"brightness\": 2, \"ramp\": [[0, 0, 0], [0.5, 0.25, 1]]}}"));
     const nebel_textured_planet_desc *desc = &nebel_get_scene_data(scene)->planets[0].textured_desc;
     assert_number(desc->center[0], 1000);
     assert_number(desc->center[1], 3000);
@@ -66,7 +68,7 @@ static void test_everything_it_may_say(void **state)
     assert_number(desc->atmosphere.ramp[1][1], .25);
     assert_int_equal(desc->atmosphere.is_disabled, 0);
     nebel_destroy_scene(scene);
-    scene = parse_good(LAYERS("\"air\": {\"brightness\": 0}"));
+    scene = parse_good(LAYERS("\"atmosphere\": {\"brightness\": 0}"));
     assert_int_equal(nebel_get_scene_data(scene)->planets[0].textured_desc.atmosphere.is_disabled, 1);
     nebel_destroy_scene(scene);
 }
@@ -95,7 +97,7 @@ static nebel_result load(const char *members, nebel_scene **scene)
 {
     FILE *file = fopen(in_folder("scene.json"), "w");
     assert_non_null(file);
-    (void)fprintf(file, "{\"nebel\": 1, \"fog\": [], \"planet\": {\"model\": \"layers\", %s}}", members);
+    (void)fprintf(file, "{\"nebel\": 1, \"fog\": [], \"planet\": {\"model\": \"textured\", %s}}", members);
     assert_int_equal(fclose(file), 0);
     return nebel_load_scene(in_folder("scene.json"), &(nebel_scene_desc){.log = {0}}, scene);
 }
@@ -109,9 +111,10 @@ static void test_maps_come_from_pictures(void **state)
     write_picture("colors.exr", 3, .5F);
     write_picture("grey.exr", 1, .5F);
     write_picture("bright.exr", 3, 2);
-    assert_int_equal(
-        load("\"map\": \"colors.png\", \"clouds\": [{\"map\": \"grey.exr\", \"detail\": \"colors.exr\"}]", &scene),
-        NEBEL_OK);
+    assert_int_equal(load("\"color_map\": \"colors.png\", \"clouds\": [{\"coverage_map\": \"grey.exr\", "
+                          "\"detail_map\": \"colors.exr\"}]",
+                          &scene),
+                     NEBEL_OK);
     const nebel_textured_planet_desc *desc = &nebel_get_scene_data(scene)->planets[0].textured_desc;
     assert_int_equal(desc->color_map.width, 2);
     assert_int_equal(desc->color_map.channels, 3);
@@ -122,16 +125,16 @@ static void test_maps_come_from_pictures(void **state)
     assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     assert_int_equal(nebel_get_scene_data(scene)->path_count, 3);
     nebel_destroy_scene(scene);
-    assert_int_equal(load("\"map\": \"grey.exr\"", &scene), NEBEL_OK);
+    assert_int_equal(load("\"color_map\": \"grey.exr\"", &scene), NEBEL_OK);
     desc = &nebel_get_scene_data(scene)->planets[0].textured_desc;
     assert_int_equal(desc->color_map.channels, 3);
     for (int i = 0; i < 6; i++) assert_true(fabs((double)desc->color_map.texels[i] - .5) < 1e-3);
     nebel_destroy_scene(scene);
     assert_int_equal(mkfifo(in_folder("pipe.png"), 0600), 0);
-    assert_int_equal(load("\"map\": \"pipe.png\"", &scene), NEBEL_ERROR_FILE);
-    assert_int_equal(load("\"map\": \"bright.exr\"", &scene), NEBEL_ERROR_FORMAT);
-    assert_int_equal(load("\"map\": \"none.png\"", &scene), NEBEL_ERROR_FILE);
-    assert_int_equal(load("\"map\": \"scene.json\"", &scene), NEBEL_ERROR_FORMAT);
+    assert_int_equal(load("\"color_map\": \"pipe.png\"", &scene), NEBEL_ERROR_FILE);
+    assert_int_equal(load("\"color_map\": \"bright.exr\"", &scene), NEBEL_ERROR_FORMAT);
+    assert_int_equal(load("\"color_map\": \"none.png\"", &scene), NEBEL_ERROR_FILE);
+    assert_int_equal(load("\"color_map\": \"scene.json\"", &scene), NEBEL_ERROR_FORMAT);
     static const char *const names[] = {"colors.png", "colors.exr", "grey.exr", "bright.exr", "scene.json", "pipe.png"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) (void)remove(in_folder(names[i]));
     (void)rmdir(folder);
@@ -143,21 +146,21 @@ static void test_what_is_wrong(void **state)
 {
     (void)state;
     const rule rules[] = {
-        {FORMAT, LAYERS("`\"preset\": \"earth\""), "planet.preset: unknown key; a planet of layers has: model, center"},
+        {FORMAT, LAYERS("`\"preset\": \"earth\""), "planet.preset: unknown key; a textured planet has: model, center"},
         {FORMAT, LAYERS("\"radius\": `0"), "planet.radius: is 0; must be a length from 1 to 1e12 m"},
-        {FORMAT, LAYERS("\"day\": `2e12"), "planet.day: is 2000000000000; must be"},
+        {FORMAT, LAYERS("\"rotation_period\": `2e12"), "planet.rotation_period: is 2000000000000; must be"},
         {FORMAT, LAYERS("\"rotation\": `[0, 0, 0, 0]"), "planet.rotation: "},
-        {FORMAT, LAYERS("\"coverage\": `1"), "planet.coverage: is 1; must be a number between 0 and 1"},
+        {FORMAT, LAYERS("\"land_coverage\": `1"), "planet.land_coverage: is 1; must be a number between 0 and 1"},
         {FORMAT, LAYERS("\"seed\": `0.5"), "planet.seed: is 0.5"},
-        {FORMAT, LAYERS("\"map\": `\"a.obj\""), "planet.map: is \"a.obj\"; must be the path of a picture"},
+        {FORMAT, LAYERS("\"color_map\": `\"a.obj\""), "planet.color_map: is \"a.obj\"; must be the path of a picture"},
         {FORMAT, LAYERS("\"clouds\": `{}"), "planet.clouds: is an object; must be an array"},
         {FORMAT, LAYERS("\"clouds\": [{\"height\": `0}]"), "planet.clouds[0].height: is 0"},
         {FORMAT, LAYERS("\"clouds\": [{\"gain\": `0}]"), "planet.clouds[0].gain: is 0"},
-        {FORMAT, LAYERS("\"clouds\": [{\"wrap\": [1, 2, `2000]}]"), "planet.clouds[0].wrap[2]: is 2000"},
+        {FORMAT, LAYERS("\"clouds\": [{\"uv_tiling\": [1, 2, `2000]}]"), "planet.clouds[0].uv_tiling[2]: is 2000"},
         {LIMIT, LAYERS("\"clouds\": [{},{},{},{},{},{},{},{},`{}]"), "planet.clouds[8]: is one too many"},
-        {FORMAT, LAYERS("\"air\": {\"ramp\": `[]}"), "planet.air.ramp: is empty"},
-        {FORMAT, LAYERS("\"air\": {\"ramp\": [`2]}"), "planet.air.ramp[0]: is 2"},
-        {FORMAT, LAYERS("\"air\": {\"brightness\": `-1}"), "planet.air.brightness: is -1"},
+        {FORMAT, LAYERS("\"atmosphere\": {\"ramp\": `[]}"), "planet.atmosphere.ramp: is empty"},
+        {FORMAT, LAYERS("\"atmosphere\": {\"ramp\": [`2]}"), "planet.atmosphere.ramp[0]: is 2"},
+        {FORMAT, LAYERS("\"atmosphere\": {\"brightness\": `-1}"), "planet.atmosphere.brightness: is -1"},
     };
     CHECK(rules);
 }
@@ -165,7 +168,7 @@ static void test_what_is_wrong(void **state)
 static void test_without_memory(void **state)
 {
     (void)state;
-    const char *text = LAYERS("\"air\": {\"ramp\": [0, 1]}");
+    const char *text = LAYERS("\"atmosphere\": {\"ramp\": [0, 1]}");
     parse_without_memory(text);
     for (long calls = 0;; calls++) {
         meter m;

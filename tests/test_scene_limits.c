@@ -164,7 +164,7 @@ static void test_what_is_too_much_in_all(void **state)
          "fog[1].density: brings the scene to about 1 s of preparation; 1 s is the most with 64 MB"},
         {FILE_IN("1", "\"fog\": [], \"nebula\": [" SWARM("20000") ", " SWARM("20000") "]"), (uint64_t)64 << 20,
          "nebula[1]: brings the scene to 114 MB of memory; 64 MB is the most"},
-        {FILE_IN("1", "\"fog\": [], \"multiple_scattering\": {\"model\": \"diffusion\", \"cells\": 16777216}"),
+        {FILE_IN("1", "\"fog\": [], \"multiple_scattering\": {\"model\": \"diffusion\", \"max_cells\": 16777216}"),
          (uint64_t)256 << 20, "multiple_scattering: brings the scene to 14400 MB of memory; 256 MB is the most"},
         {FILE_IN("1", "\"fog\": [], \"planet\": {\"model\": \"physical\", \"quality\": \"precise\"}"),
          (uint64_t)64 << 20, "planet: brings the scene to about 2 s of preparation; 1 s is the most with 64 MB"},

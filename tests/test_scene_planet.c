@@ -38,9 +38,10 @@ static void test_everything_it_may_say(void **state)
     nebel_scene *scene = parse_good(SCENE(
         "\"up\": \"z\", \"unit\": 1000, ",
         "{\"model\": \"physical\", \"preset\": \"toy\", \"center\": [1, 2, -30], \"radius\": 20, \"thickness\": 5, "
-        "\"ground_albedo\": [0.1, 0.2, 0.3], \"quality\": \"precise\", \"sun_diameter\": 2, \"airs\": [{\"type\": "
+        "\"ground_albedo\": [0.1, 0.2, 0.3], \"quality\": \"precise\", \"sun_angular_diameter\": 2, \"components\": "
+        "[{\"type\": "
         "\"exponential\", \"scattering\": [1, 2, 3], \"phase\": {\"type\": \"henyey_greenstein\", \"g\": 0.5}, "
-        "\"scale_height\": 0.5}, {\"type\": \"layer\", \"absorption\": 4, \"middle\": 3, \"width\": 1}]}"));
+        "\"scale_height\": 0.5}, {\"type\": \"tent\", \"absorption\": 4, \"center_height\": 3, \"half_width\": 1}]}"));
     const nebel_planet *planet = nebel_get_scene_data(scene)->planets;
     const nebel_atmosphere_component *air = planet->atmosphere_desc.components;
     assert_number(planet->atmosphere_desc.ground_point[0], 1000);
@@ -81,7 +82,7 @@ static void test_gravity_stretches_presets(void **state)
     nebel_destroy_scene(scene);
     scene =
         parse_good(SCENE("", "{\"model\": \"physical\", \"preset\": \"mars\", \"gravity\": 1.865, \"thickness\": 2e5, "
-                             "\"airs\": [{\"type\": \"exponential\", \"scale_height\": 8000}]}"));
+                             "\"components\": [{\"type\": \"exponential\", \"scale_height\": 8000}]}"));
     air = &nebel_get_scene_data(scene)->planets[0].atmosphere_desc;
     assert_number(air->thickness, 2e5);
     assert_number(air->components[0].scale_height, 8000);
@@ -139,7 +140,7 @@ static void test_sky_is_that_of_the_air(void **state)
 {
     (void)state;
     nebel_scene *scene = parse_good(
-        SCENE(SUN, "{\"model\": \"physical\", \"ground_albedo\": 0.5, \"airs\": [{\"type\": \"exponential\", "
+        SCENE(SUN, "{\"model\": \"physical\", \"ground_albedo\": 0.5, \"components\": [{\"type\": \"exponential\", "
                    "\"scattering\": 2e-5, \"phase\": {\"type\": \"rayleigh\"}, \"scale_height\": 8000}]}"));
     const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
@@ -169,11 +170,11 @@ static void test_what_is_wrong(void **state)
 {
     (void)state;
 #define PHYSICAL(members) SCENE("", "{\"model\": \"physical\", " members "}")
-#define AIR(members) PHYSICAL("\"airs\": [{\"type\": \"exponential\", \"scale_height\": 8000, " members "}]")
+#define AIR(members) PHYSICAL("\"components\": [{\"type\": \"exponential\", \"scale_height\": 8000, " members "}]")
     const rule rules[] = {
         {FORMAT, SCENE("", "`\"earth\""), "planet: is a string; must be an object"},
         {FORMAT, SCENE("", "`{}"), "planet: the key \"model\" is missing"},
-        {FORMAT, SCENE("", "{\"model\": `\"shells\"}"), "planet.model: unknown; must be one of: physical, layers"},
+        {FORMAT, SCENE("", "{\"model\": `\"shells\"}"), "planet.model: unknown; must be one of: physical, textured"},
         {FORMAT, PHYSICAL("\"preset\": `\"venus\""), "planet.preset: unknown; must be one of: earth, mars, toy, moon"},
         {FORMAT, PHYSICAL("`\"ozone\": 1"), "planet.ozone: unknown key; a physical planet has: model, preset"},
         {FORMAT, PHYSICAL("\"gravity\": `0"), "planet.gravity: is 0; must be a number from 0.1 to 1000, in m/s^2"},
@@ -185,45 +186,49 @@ static void test_what_is_wrong(void **state)
         {FORMAT, SCENE("\"unit\": 0.01, ", "{\"model\": \"physical\", \"thickness\": `1}"),
          "planet.thickness: is 1; must be a length (radius / 1e6 or more) from 636 to 1e14 units of 0.01 m"},
         {FORMAT, SCENE("", "`{\"model\": \"physical\", \"thickness\": 1e8}"),
-         "planet.airs[0].scale_height: is 8000 m; must be within 100000 m (a thousandth of the thickness) and 1e+15 m; "
-         "these airs are the preset's"},
+         "planet.components[0].scale_height: is 8000 m; must be within 100000 m (a thousandth of the thickness) and "
+         "1e+15 m; "
+         "these components are the preset's"},
         {FORMAT, SCENE("", "`{\"model\": \"physical\", \"thickness\": 9000}"),
-         "planet.airs[2].middle: is 25000 m; must be within 0 m and 9000 m (the thickness); these airs are the "
+         "planet.components[2].center_height: is 25000 m; must be within 0 m and 9000 m (the thickness); these "
+         "components are the "
          "preset's"},
-        {FORMAT, PHYSICAL("\"airs\": [{\"type\": \"exponential\", \"scale_height\": `1}]"),
-         "planet.airs[0].scale_height: is 1 m; must be within 100 m (a thousandth of the thickness) and 1e+15 m"},
+        {FORMAT, PHYSICAL("\"components\": [{\"type\": \"exponential\", \"scale_height\": `1}]"),
+         "planet.components[0].scale_height: is 1 m; must be within 100 m (a thousandth of the thickness) and 1e+15 m"},
         {FORMAT,
-         SCENE("", "[" EARTH ", {\"model\": \"physical\", \"center\": [0, 9e7, 0], \"airs\": [{\"type\": \"layer\", "
-                   "\"middle\": 1, \"width\": 1e3}, {\"type\": \"layer\", \"middle\": `2e5, \"width\": 1e3}]}]"),
-         "planet[1].airs[1].middle: is 200000 m; must be within 0 m and 100000 m (the thickness)"},
+         SCENE("",
+               "[" EARTH ", {\"model\": \"physical\", \"center\": [0, 9e7, 0], \"components\": [{\"type\": \"tent\", "
+               "\"center_height\": 1, \"half_width\": 1e3}, {\"type\": \"tent\", \"center_height\": `2e5, "
+               "\"half_width\": 1e3}]}]"),
+         "planet[1].components[1].center_height: is 200000 m; must be within 0 m and 100000 m (the thickness)"},
         {FORMAT, PHYSICAL("\"center\": `[0, 1e15, 0]"), "planet.center: lies so high"},
         {FORMAT, PHYSICAL("\"center\": [0, `2e15, 0]"), "planet.center[1]: is 2e+15"},
         {FORMAT, PHYSICAL("\"center\": `[0, 0]"), "planet.center: has 2 elements"},
         {FORMAT, PHYSICAL("\"ground_albedo\": `1.5"), "planet.ground_albedo: is 1.5"},
         {FORMAT, PHYSICAL("\"quality\": `\"best\""), "planet.quality: unknown; must be one of: fast, precise"},
-        {FORMAT, PHYSICAL("\"sun_diameter\": `11"), "planet.sun_diameter: is 11"},
-        {FORMAT, PHYSICAL("\"airs\": `{}"), "planet.airs: is an object; must be an array"},
-        {FORMAT, PHYSICAL("\"airs\": [{\"type\": `\"vacuum\"}]"),
-         "planet.airs[0].type: unknown; must be one of: exponential, layer"},
-        {FORMAT, AIR("\"scattering\": `2000"), "planet.airs[0].scattering: is 2000"},
-        {FORMAT, AIR("\"absorption\": [0, `-1, 0]"), "planet.airs[0].absorption[1]: is -1"},
-        {FORMAT, AIR("`\"width\": 5"), "planet.airs[0].width: unknown key"},
-        {FORMAT, AIR("\"phase\": {\"type\": `\"mie\"}"), "planet.airs[0].phase.type: unknown"},
-        {LIMIT, PHYSICAL("\"airs\": [1, 2, 3, 4, `5]"),
-         "planet.airs[4]: is one too many; a planet has at most 4 kinds of air"},
+        {FORMAT, PHYSICAL("\"sun_angular_diameter\": `11"), "planet.sun_angular_diameter: is 11"},
+        {FORMAT, PHYSICAL("\"components\": `{}"), "planet.components: is an object; must be an array"},
+        {FORMAT, PHYSICAL("\"components\": [{\"type\": `\"vacuum\"}]"),
+         "planet.components[0].type: unknown; must be one of: exponential, tent"},
+        {FORMAT, AIR("\"scattering\": `2000"), "planet.components[0].scattering: is 2000"},
+        {FORMAT, AIR("\"absorption\": [0, `-1, 0]"), "planet.components[0].absorption[1]: is -1"},
+        {FORMAT, AIR("`\"half_width\": 5"), "planet.components[0].half_width: unknown key"},
+        {FORMAT, AIR("\"phase\": {\"type\": `\"mie\"}"), "planet.components[0].phase.type: unknown"},
+        {LIMIT, PHYSICAL("\"components\": [1, 2, 3, 4, `5]"),
+         "planet.components[4]: is one too many; a planet has at most 4 kinds of air"},
         {LIMIT,
-         PHYSICAL("\"airs\": [{\"type\": \"exponential\", \"scale_height\": 8000}, {\"type\": \"exponential\", "
+         PHYSICAL("\"components\": [{\"type\": \"exponential\", \"scale_height\": 8000}, {\"type\": \"exponential\", "
                   "\"scale_height\": 8000}, {\"type\": \"exponential\", \"scale_height\": 8000}, {\"type\": "
                   "\"exponential\", \"scale_height\": 8000}, `{\"type\": \"exponential\", \"scale_height\": 1}]"),
-         "planet.airs[4]: is one too many"},
+         "planet.components[4]: is one too many"},
         {FORMAT, SCENE("", "`[]"), "planet: is empty; leave it out for no planet"},
         {FORMAT, SCENE("", "`5"), "planet: is a number; must be an object {\"model\": ...}, or an array of those"},
         {FORMAT, SCENE("", "[" EARTH ", `7]"), "planet[1]: is a number"},
         {FORMAT, SCENE("", "[" EARTH ", `" EARTH "]"),
          "planet[1]: overlaps planet[0], air included; give it a \"center\" of its own"},
         {FORMAT, SCENE("", "[" EARTH ", `" MOON_AT("1.83e6") "]"), "planet[1]: overlaps planet[0]"},
-        {FORMAT, SCENE("", "[" EARTH ", `{\"model\": \"layers\", \"center\": [0, 9e7, 0]}]"),
-         "planet[1]: is a planet of layers, which stands alone"},
+        {FORMAT, SCENE("", "[" EARTH ", `{\"model\": \"textured\", \"center\": [0, 9e7, 0]}]"),
+         "planet[1]: is a textured planet, which stands alone"},
         {FORMAT, SCENE("", "[" EARTH ", `{\"model\": \"physical\", \"center\": [0, 9e7, 0], \"clouds\": [{}]}]"),
          "planet[1]: has clouds; the first planet alone may"},
         {LIMIT,
@@ -242,7 +247,7 @@ static void test_several(void **state)
     nebel_scene *scene =
         parse_good(SCENE("\"sun\": {\"direction\": [0, 1, 0], \"irradiance\": 4}, ",
                          "[" EARTH "," MOON_AT("8.3e6") ", {\"model\": \"physical\", \"preset\": \"toy\", \"center\": "
-                                                        "[0, -2e7, 0], \"airs\": []}]"));
+                                                        "[0, -2e7, 0], \"components\": []}]"));
     const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_int_equal(data->planet_count, 3);
     assert_number(data->planets[1].atmosphere_desc.ground_point[1], 8.3e6 + 1.7374e6);
@@ -280,8 +285,9 @@ static void test_without_memory(void **state)
 {
     (void)state;
     parse_without_memory(SCENE("", "[" EARTH "," MOON_AT("1e8") "]"));
-    parse_without_memory(SCENE("", "{\"model\": \"physical\", \"airs\": [{\"type\": \"exponential\", \"scale_height\": "
-                                   "8000}]}"));
+    parse_without_memory(
+        SCENE("", "{\"model\": \"physical\", \"components\": [{\"type\": \"exponential\", \"scale_height\": "
+                  "8000}]}"));
     const char *text = SCENE(SUN, "[{\"model\": \"physical\", \"preset\": \"toy\"}, " MOON_AT("1e8") "]");
     for (long calls = 0;; calls += 2) {
         meter m;

@@ -584,7 +584,7 @@ static void test_nebulae(void **state)
     (void)state;
     draft d = open_draft(SCENE("\"max_opacity\": 0.5, \"unit\": 0.1, \"fog\": [], \"nebula\": [ {\"shape\": {\"type\": "
                                "\"sphere\", \"center\": [0, 0, 0], \"radius\": 20}, \"count\": 10, \"turbulence\": 3, "
-                               "\"turbulence_size\": 4, \"size\": [1, 2]} ]"));
+                               "\"turbulence_scale\": 4, \"radius_range\": [1, 2]} ]"));
     d.data.max_opacity = .75;
     d.nebulae[0].shape.radius = 3;
     d.nebulae[0].count = 20;
@@ -595,7 +595,7 @@ static void test_nebulae(void **state)
     for (int c = 0; c < 3; c++) d.nebulae[0].emission[c] = 10;
     check_saved(&d, SCENE("\"max_opacity\": 0.75, \"unit\": 0.1, \"fog\": [], \"nebula\": [ {\"shape\": {\"type\": "
                           "\"sphere\", \"center\": [0, 0, 0], \"radius\": 30}, \"count\": 20, \"turbulence\": 3, "
-                          "\"size\": [1, 5], \"emission\": 1, \"seed\": 7, \"profile\": \"ball\"} ]"));
+                          "\"radius_range\": [1, 5], \"emission\": 1, \"seed\": 7, \"profile\": \"uniform\"} ]"));
 }
 
 static void test_colors_of_a_nebula(void **state)
@@ -635,7 +635,7 @@ static void test_noise(void **state)
     noise.velocity[0] = .25;
     assert_int_equal(nebel_update_scene_noise(d.scene, grid, &noise, &changed), NEBEL_OK);
     d.volumes[0].density.grid = changed;
-    check_saved(&d, NOISE("[1, 2, 1]", ", \"drift\": [0.25, 0, 0]"));
+    check_saved(&d, NOISE("[1, 2, 1]", ", \"velocity\": [0.25, 0, 0]"));
     nebel_release_grid(changed);
 }
 

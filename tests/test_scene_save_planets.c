@@ -20,14 +20,14 @@ static draft open_planets(const char *text)
 static void test_layers_of_no_coverage_are_passed_over(void **state)
 {
     (void)state;
-    draft d = open_planets(CLOUDS("{\"coverage\": 0}, {\"top\": 300}, {\"kind\": \"cirrus\", \"coverage\": 0}, "
-                                  "{ /* thin */ \"kind\": \"cirrus\" }"));
+    draft d = open_planets(CLOUDS("{\"coverage\": 0}, {\"top\": 300}, {\"type\": \"cirrus\", \"coverage\": 0}, "
+                                  "{ /* thin */ \"type\": \"cirrus\" }"));
     assert_int_equal(planets[0].cloud_layer_count, 2);
     planets[0].cloud_layers[0].top = 2500;
     planets[0].cloud_layers[1].erosion = NEBEL_CLOUD_NONE;
     planets[0].cloud_layers[1].extinction = .002;
-    check_saved(&d, CLOUDS("{\"coverage\": 0}, {\"top\": 250}, {\"kind\": \"cirrus\", \"coverage\": 0}, "
-                           "{ /* thin */ \"kind\": \"cirrus\", \"extinction\": 0.02, \"detail\": 0 }"));
+    check_saved(&d, CLOUDS("{\"coverage\": 0}, {\"top\": 250}, {\"type\": \"cirrus\", \"coverage\": 0}, "
+                           "{ /* thin */ \"type\": \"cirrus\", \"extinction\": 0.02, \"erosion\": 0 }"));
 }
 
 /* What a kind stands for is not written, whoever writes it out. */
@@ -52,16 +52,17 @@ static void test_airs(void **state)
     draft d = open_planets(PLANET("{\"model\": \"physical\", \"preset\": \"moon\", \"ground_albedo\": 0.5}"));
     planets[0].atmosphere_desc.components[0].scattering[1] = .001;
     planets[0].atmosphere_desc.components[0].scale_height = 3000;
-    check_saved(&d, PLANET("{\"model\": \"physical\", \"preset\": \"moon\", \"ground_albedo\": 0.5, \"airs\": [{ "
+    check_saved(&d, PLANET("{\"model\": \"physical\", \"preset\": \"moon\", \"ground_albedo\": 0.5, \"components\": [{ "
                            "\"type\": \"exponential\", \"phase\": { \"type\": \"isotropic\" }, \"scattering\": [0, "
                            "0.01, 0], \"absorption\": 0, \"scale_height\": 300 }]}"));
     d = open_planets(
-        PLANET("{\"model\": \"physical\", \"airs\": [ {\"type\": \"exponential\", \"scale_height\": 800} ]}"));
+        PLANET("{\"model\": \"physical\", \"components\": [ {\"type\": \"exponential\", \"scale_height\": 800} ]}"));
     planets[0].atmosphere_desc.components[0].phase = (nebel_phase){.type = NEBEL_PHASE_RAYLEIGH};
     planets[0].atmosphere_desc.ground_albedo[0] = planets[0].atmosphere_desc.ground_albedo[1] =
         planets[0].atmosphere_desc.ground_albedo[2] = 1;
-    check_saved(&d, PLANET("{\"model\": \"physical\", \"airs\": [ {\"type\": \"exponential\", \"scale_height\": 800, "
-                           "\"phase\": { \"type\": \"rayleigh\" }} ], \"ground_albedo\": 1}"));
+    check_saved(&d,
+                PLANET("{\"model\": \"physical\", \"components\": [ {\"type\": \"exponential\", \"scale_height\": 800, "
+                       "\"phase\": { \"type\": \"rayleigh\" }} ], \"ground_albedo\": 1}"));
 }
 
 /* The file is what it was after every error. */
@@ -82,8 +83,8 @@ static void test_what_is_refused(void **state)
         *const others[] = {
             PLANET("[{\"model\": \"physical\", \"clouds\": [{}]}, {\"model\": \"physical\", \"preset\": \"moon\", "
                    "\"center\": [0, 1e8, 0]}]"),
-            CLOUDS(""), PLANET("{\"model\": \"layers\"}"), SCENE("\"fog\": []"),
-            PLANET("{\"model\": \"physical\", \"airs\": [{\"type\": \"exponential\", \"scale_height\": 8000, "
+            CLOUDS(""), PLANET("{\"model\": \"textured\"}"), SCENE("\"fog\": []"),
+            PLANET("{\"model\": \"physical\", \"components\": [{\"type\": \"exponential\", \"scale_height\": 8000, "
                    "\"scattering\": 1e-6}], \"clouds\": [{}]}")};
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
         draft d = open_planets(one);

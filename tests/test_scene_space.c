@@ -217,7 +217,7 @@ static void write_file(const char *name, const char *text)
 #define BOX_IN "\"fog\": [{\"shape\": {\"type\": \"box\", B(-8 -7 -6 8 6 7)" TRANSFORM "}, \"extinction\": K(.3), "
 #define NOISE                                                                                                          \
     "{\"type\": \"noise\", \"size\": S(14 10 12), \"cells\": S(3 2 4), \"octaves\": 2, \"edge\": S(.1 .2 .3), "        \
-    "\"drift\": D(.3 -.2 .1), \"change\": 0.1}"
+    "\"velocity\": D(.3 -.2 .1), \"evolution\": 0.1}"
 
 static nebel_grid *first_grid(const nebel_scene *scene)
 {
@@ -328,7 +328,7 @@ static void test_noise_in_nodes(void **state)
         "test_scene_space.gltf",
         "{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}], \"nodes\": [{\"scale\": "
         "[8, 7, 6], \"extras\": {\"nebel\": {\"extinction\": 0.3, \"source\": 1, \"density\": {\"type\": "
-        "\"noise\", \"size\": [14, 10, 12], \"cells\": [3, 2, 4], \"drift\": [0.3, -0.2, 0.1]}}}}]}");
+        "\"noise\", \"size\": [14, 10, 12], \"cells\": [3, 2, 4], \"velocity\": [0.3, -0.2, 0.1]}}}}]}");
     for (size_t k = 0; k <= sizeof others / sizeof *others; k++) {
         nebel_scene *scene = parse_in("\"models\": [{\"file\": \"test_scene_space.gltf\"}], \"fog\": []}",
                                       k > 0 ? &others[k - 1] : &ours);
@@ -344,9 +344,10 @@ static void test_a_nebula(void **state)
     (void)state;
     assert_same_light(
         "\"fog\": [], \"nebula\": [{\"shape\": {\"type\": \"ellipsoid\", \"center\": P(1 2 3), \"radii\": E(5 6 7)}, "
-        "\"count\": 200, \"size\": [L(.5), L(2)], \"absorption\": K(.4), \"emission\": K(.2), \"colors\": [\"#f00\", "
+        "\"count\": 200, \"radius_range\": [L(.5), L(2)], \"absorption\": K(.4), \"emission\": K(.2), \"colors\": "
+        "[\"#f00\", "
         "\"#00f\"],"
-        "\"turbulence\": L(1), \"turbulence_size\": L(3)}, {\"shape\": {\"type\": \"box\", B(-8 -8 -8 -5 -5 -5)}, "
+        "\"turbulence\": L(1), \"turbulence_scale\": L(3)}, {\"shape\": {\"type\": \"box\", B(-8 -8 -8 -5 -5 -5)}, "
         "\"count\": 500, "
         "\"absorption\": K(4)}]}");
 }

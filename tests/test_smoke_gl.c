@@ -75,15 +75,16 @@ static const smoke smokes[] = {
      .text = "{\"nebel\":1," CAMERA SUN "\"fog\":[{" BALL
              "\"extinction\":2,\"albedo\":0.99}],\"multiple_scattering\":{\"model\":\"diffusion\"}}"},
     {.name = "particles",
-     .text =
-         "{\"nebel\":1," CAMERA SUN "\"fog\":[],\"nebula\":[{" BALL
-         "\"density\":{\"type\":\"radial\",\"power\":2},\"count\":60,\"seed\":1,"
-         "\"size\":[0.3,0.6],\"absorption\":[0.3,0.4,0.5],\"emission\":0.3,\"colors\":[[0.9,0.3,0.2],[0.2,0.5,0.9]]}]}",
+     .text = "{\"nebel\":1," CAMERA SUN "\"fog\":[],\"nebula\":[{" BALL
+             "\"density\":{\"type\":\"radial\",\"power\":2},\"count\":60,\"seed\":1,"
+             "\"radius_range\":[0.3,0.6],\"absorption\":[0.3,0.4,0.5],\"emission\":0.3,\"colors\":[[0.9,0.3,0.2],[0.2,"
+             "0.5,0.9]]}]}",
      .particles = 1},
     {.name = "the same as fog",
      .text = "{\"nebel\":1," CAMERA "\"fog\":[],\"nebula\":[{" BALL
              "\"density\":{\"type\":\"radial\",\"power\":2},\"count\":60,\"seed\":1,"
-             "\"size\":[0.3,0.6],\"absorption\":[0.3,0.4,0.5],\"emission\":0.3,\"colors\":[[0.9,0.3,0.2],[0.2,0.5,0.9]]"
+             "\"radius_range\":[0.3,0.6],\"absorption\":[0.3,0.4,0.5],\"emission\":0.3,\"colors\":[[0.9,0.3,0.2],[0.2,"
+             "0.5,0.9]]"
              "}]}"},
     {.name = "fog at vertices",
      .text = "{\"nebel\":1," CAMERA SUN "\"fog\":[{" BOX "\"extinction\":0.2,\"source\":[0.5,0.6,0.7]}]}",
@@ -105,11 +106,11 @@ static const smoke smokes[] = {
          ",\"clouds\":[{}]},\"fog\":[]}",
      .tolerance = NEBEL_DEFAULT_TOLERANCE, /* that OpenGL takes for clouds */
      .alone = 1},
-    {.name = "a planet of layers",
-     .text =
-         "{\"nebel\":1,\"camera\":{\"position\":[9e6,3e6,16e6],\"look_at\":[0,0,0],\"vertical_fov\":46}," SUN
-         "\"planet\":{\"model\":\"layers\",\"center\":[0,0,0],\"radius\":6.4e6,\"clouds\":[{\"height\":40e3}],"
-         "\"air\":{\"height\":160e3,\"brightness\":0.3,\"ramp\":[\"#000000\",\"#5c98ff\",\"#1848c0\"]}},\"fog\":[]}",
+    {.name = "a textured planet",
+     .text = "{\"nebel\":1,\"camera\":{\"position\":[9e6,3e6,16e6],\"look_at\":[0,0,0],\"vertical_fov\":46}," SUN
+             "\"planet\":{\"model\":\"textured\",\"center\":[0,0,0],\"radius\":6.4e6,\"clouds\":[{\"height\":40e3}],"
+             "\"atmosphere\":{\"height\":160e3,\"brightness\":0.3,\"ramp\":[\"#000000\",\"#5c98ff\",\"#1848c0\"]}},"
+             "\"fog\":[]}",
      .alone = 1},
 };
 

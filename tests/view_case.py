@@ -75,7 +75,7 @@ class Viewer:
         self.environment = {**os.environ, "DISPLAY": case.screen.name, **(env or {})}
         with self.log.open("wb") as log:
             self.process = subprocess.Popen(
-                [NEBEL, "view", str(case.scene), "--controls", str(self.controls), *map(str, words or SMALL_WINDOW)],
+                [NEBEL, "view", str(case.scene), "--widgets", str(self.controls), *map(str, words or SMALL_WINDOW)],
                 stderr=log, env=self.environment, cwd=case.folder)
         case.addCleanup(self.close)
         self.wait(self.controls.exists, "a window")

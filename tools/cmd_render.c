@@ -400,7 +400,7 @@ static int do_item(nb_render_state *all, uint64_t number)
 static const char *name_movers(const nebel_scene_data *scene)
 {
     if (scene->planet_count == 0) return "";
-    return scene->planets->model == NEBEL_PLANET_TEXTURED ? ", a planet of layers turns with \"day\""
+    return scene->planets->model == NEBEL_PLANET_TEXTURED ? ", a textured planet turns with \"rotation_period\""
                                                           : ", clouds drift with \"wind\"";
 }
 

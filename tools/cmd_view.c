@@ -13,7 +13,7 @@
 
 #include <string.h>
 
-enum { SIZE, EXPOSURE, FRAME, UI_SCALE, SCREENSHOT, CONTROLS, MEMORY };
+enum { SIZE, EXPOSURE, FRAME, UI_SCALE, SCREENSHOT, WIDGETS, MEMORY };
 
 static const nb_option options[] = {
     [SIZE] = {"size", 's', "WxH", "Of the picture in the window, each side 64 to 8192.\nDefault: 1280x720."},
@@ -22,10 +22,9 @@ static const nb_option options[] = {
     [UI_SCALE] = {"ui-scale", 0, "N", "How large the controls are, 0.5 to 4. Default: what\nthe screen says."},
     [SCREENSHOT] = {"screenshot", 0, "FILE",
                     "Writes the window (.png or .exr) when its picture is\ncomplete, and ends."},
-    [CONTROLS] =
-        {"controls", 0, "FILE",
-         "Keeps a list of the controls in FILE, a line\n\"x y width height name\" for each: for programs that\n"
-         "press them."},
+    [WIDGETS] = {"widgets", 0, "FILE",
+                 "Keeps a list of the controls in FILE, a line\n\"x y width height name\" for each: for programs that\n"
+                 "press them."},
     [MEMORY] = NB_MEMORY_OPTION,
 };
 
@@ -66,7 +65,7 @@ static int view(nb_arguments *arguments)
     wanted.scale = nb_options_number(arguments, UI_SCALE, 0.5, 4, 0);
     nb_reader_limit(nb_options_memory(arguments, MEMORY));
     wanted.screenshot = arguments->values[SCREENSHOT];
-    wanted.controls = arguments->values[CONTROLS];
+    wanted.controls = arguments->values[WIDGETS];
     if (wanted.screenshot != NULL && nebel_get_image_format(wanted.screenshot) == NEBEL_IMAGE_NONE)
         nb_options_reject(arguments, SCREENSHOT, "is no name that ends in .png or .exr");
     if (arguments->misused) return nb_report_misuse("view", "view: nothing was done");

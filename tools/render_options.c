@@ -64,7 +64,7 @@ const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
     [QUALITY] = {"quality", 0, "N", "Of a film, 1 to 100: more is larger and better, 100\nwithout loss. Default: 85."},
     [AOV] = {"aov", 0, NULL,
              "EXR only: adds transmittance.{R,G,B},\nin_scattering.{R,G,B}, depth.Z (m, inf: nothing\n"
-             "there), normal.{X,Y,Z} and, of the CPU, error (its\nbound) or, of reference, standard_error.{R,G,B}."},
+             "there), normal.{X,Y,Z} and, of the CPU, error (its\nbound) or, of path, standard_error.{R,G,B}."},
     [TOLERANCE] = {"tolerance", 0, "E",
                    "How far off the fog may be where it is integrated:\nabsolute on transmittance, relative to max(1,\n"
                    "largest source radiance) on in-scattering.\n0 < E <= 1. Default: 0.002."},
@@ -73,8 +73,8 @@ const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
          "exact (default); on surfaces alone: vertex: the\nfog at vertices; additive: the same, but it only\nadds; "
          "linear, exp, exp2: the factors of section\n\"classic\"; fog-coord, two-pass, alpha: the fog at\nvertices as "
          "OpenGL 1.x takes it; d3d9: the states\nin \"classic\"; cells, cells-pixel: section \"cells\"\nat vertices or "
-         "pixels; five-tap, of --device gl:\nparticles meet surfaces by five depths; reference,\nof the CPU: paths of "
-         "light, by chance and without\nbias, slow."},
+         "pixels; five-tap, of --device gl:\nparticles meet surfaces by five depths; path, of the\nCPU: paths of "
+         "light, by chance and without bias,\nslow (its old name: reference)."},
     [MULTIPLE_SCATTERING] = {"multiple-scattering", 0, "MODEL",
                              "Of sunlight in fog, in place of what the scene says:\ndiffusion, which adds what comes "
                              "after the first\nscattering; or off."},
@@ -94,10 +94,10 @@ const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
     [THREADS] = {"threads", 't', "N", "Threads, 0 for all (default). Any number gives the\nsame picture."},
     [MEMORY] = NB_MEMORY_OPTION,
     [BOUNCES] = {"bounces", 0, "N",
-                 "With --method reference: how often light is\nscattered or reflected at most, 1 to 10000. 1 is what\n"
+                 "With --method path: how often light is\nscattered or reflected at most, 1 to 10000. 1 is what\n"
                  "exact shows. Default: as often as it happens."},
     [SEED] = {"seed", 0, "N",
-              "With --method reference: 0 to 4294967295; other\nseeds give independent pictures. Default: 0."},
+              "With --method path: 0 to 4294967295; other\nseeds give independent pictures. Default: 0."},
     [SHARD] = NB_SHARD_OPTION,
     [RESUME] = NB_RESUME_OPTION,
     [BANDS] = {"bands", 0, "ROWS",
@@ -234,14 +234,14 @@ static void read_tessellate(nb_arguments *arguments, nb_render_arguments *wanted
         nb_options_refuse(arguments, TESSELLATE, "is for one frame: another camera needs other triangles");
 }
 
-static void read_reference(nb_arguments *arguments, nb_render_arguments *wanted)
+static void read_path(nb_arguments *arguments, nb_render_arguments *wanted)
 {
-    static const int of_reference[] = {BOUNCES, SEED};
+    static const int of_path[] = {BOUNCES, SEED};
     wanted->bounces = nb_options_whole(arguments, BOUNCES, 1, 10000, 0);
     wanted->seed = nb_options_whole(arguments, SEED, 0, UINT32_MAX, 0);
-    for (size_t i = 0; i < sizeof of_reference / sizeof *of_reference; i++)
-        if (arguments->values[of_reference[i]] != NULL && wanted->method != NEBEL_METHOD_PATH)
-            nb_options_refuse(arguments, of_reference[i], "needs --method reference; say so, or leave it out");
+    for (size_t i = 0; i < sizeof of_path / sizeof *of_path; i++)
+        if (arguments->values[of_path[i]] != NULL && wanted->method != NEBEL_METHOD_PATH)
+            nb_options_refuse(arguments, of_path[i], "needs --method path; say so, or leave it out");
     if (wanted->method == NEBEL_METHOD_PATH && wanted->gl)
         nb_options_reject(arguments, METHOD, "is for --device cpu; leave out --device gl");
 }
@@ -250,9 +250,11 @@ static void read_device(nb_arguments *arguments, nb_render_arguments *wanted)
 {
     static const char *const devices[] = {"cpu", "gl", NULL};
     static const int of_cpu[] = {TOLERANCE, ISA, THREADS};
-    const char *methods[NEBEL_METHOD_COUNT + 1] = {NULL};
+    const char *methods[NEBEL_METHOD_COUNT + 2] = {NULL};
     for (int i = 0; i < NEBEL_METHOD_COUNT; i++) methods[i] = nebel_method_name((nebel_method)i);
-    wanted->method = (nebel_method)nb_options_choice(arguments, METHOD, methods, NEBEL_METHOD_EXACT);
+    methods[NEBEL_METHOD_COUNT] = "reference"; /* the old name of path */
+    const int method = nb_options_choice(arguments, METHOD, methods, NEBEL_METHOD_EXACT);
+    wanted->method = method == NEBEL_METHOD_COUNT ? NEBEL_METHOD_PATH : (nebel_method)method;
     wanted->gl = nb_options_choice(arguments, DEVICE, devices, 0);
     for (size_t i = 0; i < sizeof of_cpu / sizeof *of_cpu && wanted->gl; i++) {
         if (arguments->values[of_cpu[i]] != NULL) {
@@ -281,12 +283,11 @@ static void read_scattering(nb_arguments *arguments, nb_render_arguments *wanted
 {
     static const char *const models[] = {"off", "diffusion", NULL};
     static const nb_scattering_option chosen[] = {NB_SCATTERING_OFF, NB_SCATTERING_DIFFUSION};
-    const int is_reference = wanted->method == NEBEL_METHOD_PATH;
-    /* The reference scatters light as often as it likes: a solution would be work for nothing. */
-    wanted->scattering = is_reference ? NB_SCATTERING_OFF : NB_SCATTERING_OF_FILE;
+    const int is_path = wanted->method == NEBEL_METHOD_PATH;
+    /* A path scatters light as often as it likes: a solution would be work for nothing. */
+    wanted->scattering = is_path ? NB_SCATTERING_OFF : NB_SCATTERING_OF_FILE;
     if (arguments->values[MULTIPLE_SCATTERING] == NULL) return;
-    if (is_reference)
-        nb_options_refuse(arguments, MULTIPLE_SCATTERING, "is not for --method reference, which has --bounces");
+    if (is_path) nb_options_refuse(arguments, MULTIPLE_SCATTERING, "is not for --method path, which has --bounces");
     wanted->scattering = chosen[nb_options_choice(arguments, MULTIPLE_SCATTERING, models, 0)];
 }
 
@@ -323,7 +324,7 @@ int nb_render_call_read(nb_arguments *arguments, nb_render_arguments *wanted)
     read_output(arguments, wanted);
     read_film(arguments, wanted);
     read_device(arguments, wanted);
-    read_reference(arguments, wanted);
+    read_path(arguments, wanted);
     read_scattering(arguments, wanted);
     read_tessellate(arguments, wanted);
     read_shutter(arguments, wanted);

@@ -18,7 +18,7 @@ typedef struct nb_render_arguments {
     const char *scene, *output;
     nebel_image_format format; /* of pictures; a film has none */
     uint32_t width, height, samples;
-    uint32_t bounces, seed; /* of the reference; 0 bounces: no limit */
+    uint32_t bounces, seed; /* of paths; 0 bounces: no limit */
     double exposure, tolerance;
     double shutter;                       /* how long a picture looks, in frames; 0: a moment */
     nebel_tessellation_desc tessellation; /* bound 0: the triangles of the models */

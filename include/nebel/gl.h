@@ -405,7 +405,7 @@ typedef struct nebel_gl_frame_desc {
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not, or without what it
  * needs), VALUE (a camera, light or time as for nebel_render_frame; taps that are not finite or negative; a factor as for
  * nebel_resolve_factor), LIMIT (a picture, or a map of layers, too large for this context; fog or triangles that floats do not hold in this view; more than 4,096 lamps; stopped by progress),
- * MEMORY, UNSUPPORTED (more than one sample, or a planet of layers, where OpenGL ES cannot blend floats; a planet with
+ * MEMORY, UNSUPPORTED (more than one sample, or a textured planet, where OpenGL ES cannot blend floats; a planet with
  * clouds of volume where the processor may not walk through them, by another method than EXACT, or, if it has air, in an
  * orthographic view or with particles; a shader that the driver does not take; the context is another one, or lost). The first panorama copies the triangles of all
  * meshes: 108 bytes each, with fog per vertex 48 more. */

@@ -18,7 +18,7 @@ nebel_atmosphere_desc nb_atmosphere_resolve(const nebel_atmosphere_desc *desc)
     return whole;
 }
 
-/* What is said of: "airs[2]." or "" where it is no kind of air. */
+/* What is said of: "components[2]." or "" where it is no kind of air. */
 typedef struct nb_atmosphere_subject {
     const nebel_log *log;
     char name[24];
@@ -63,8 +63,9 @@ static nebel_result check_profile(const nb_atmosphere_subject *of, const nebel_a
     case NEBEL_COMPONENT_EXPONENTIAL:
         return check(of, "scale_height", air->scale_height, least, NEBEL_MAX_LENGTH, &at_least);
     case NEBEL_COMPONENT_TENT:
-        result = check(of, "middle", air->center_height, 0, thickness, &within);
-        return result == NEBEL_OK ? check(of, "width", air->half_width, least, NEBEL_MAX_LENGTH, &at_least) : result;
+        result = check(of, "center_height", air->center_height, 0, thickness, &within);
+        return result == NEBEL_OK ? check(of, "half_width", air->half_width, least, NEBEL_MAX_LENGTH, &at_least)
+                                  : result;
     default:
         return refuse(of, "profile", "is unknown");
     }
@@ -85,16 +86,17 @@ nebel_result nb_atmosphere_check(const nebel_atmosphere_desc *desc)
 {
     static const meaning at_least = {" m", " (a millionth of the radius)", ""};
     nb_atmosphere_subject of = {&desc->log, ""};
-    nebel_result result = check_all(&of, "ground", desc->ground_point, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH, &length);
+    nebel_result result =
+        check_all(&of, "ground_point", desc->ground_point, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH, &length);
     if (result == NEBEL_OK) result = check(&of, "radius", desc->radius, 1, 1e12, &length);
     if (result == NEBEL_OK) result = check(&of, "thickness", desc->thickness, desc->radius / 1e6, 1e12, &at_least);
     if (result == NEBEL_OK) result = check_all(&of, "ground_albedo", desc->ground_albedo, 0, 1, &pure);
     if (result != NEBEL_OK) return result;
-    if (desc->component_count > NEBEL_MAX_COMPONENTS) return refuse(&of, "air_count", "must be at most 4");
+    if (desc->component_count > NEBEL_MAX_COMPONENTS) return refuse(&of, "component_count", "must be at most 4");
     if ((int)desc->quality < 0 || desc->quality >= NEBEL_ATMOSPHERE_QUALITY_COUNT)
         return refuse(&of, "quality", "is unknown");
     for (uint32_t i = 0; i < desc->component_count && result == NEBEL_OK; i++) {
-        (void)snprintf(of.name, sizeof of.name, "airs[%u].", (unsigned)i);
+        (void)snprintf(of.name, sizeof of.name, "components[%u].", (unsigned)i);
         result = check_air(&of, &desc->components[i], desc->thickness);
     }
     return result;

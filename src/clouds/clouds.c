@@ -270,19 +270,19 @@ static nebel_result check_looks(const nebel_cloud_layer *layer, const nebel_log 
 {
     static const char part[] = "within 0 and 1, or none (-1)";
     if (!(layer->coverage > 0 && layer->coverage <= 1))
-        return refuse(log, "coverage", layer->coverage, "", "within 0 and 1 (0: the number of its kind)");
+        return refuse(log, "coverage", layer->coverage, "", "within 0 and 1 (0: the number of its type)");
     if (!(layer->extinction > 0 && layer->extinction <= NEBEL_MAX_COMPONENT_EXTINCTION))
-        return refuse(log, "extinction", layer->extinction, " per m", "within 0 and 1e3 (0: the number of its kind)");
+        return refuse(log, "extinction", layer->extinction, " per m", "within 0 and 1e3 (0: the number of its type)");
     if (!(layer->cell_size >= 1e-3 && layer->cell_size <= 1e9))
-        return refuse(log, "size", layer->cell_size, " m", "within 1e-3 and 1e9");
-    if (!is_part(layer->erosion)) return refuse(log, "detail", layer->erosion, "", part);
-    if (!is_part(layer->patchiness)) return refuse(log, "variation", layer->patchiness, "", part);
+        return refuse(log, "cell_size", layer->cell_size, " m", "within 1e-3 and 1e9");
+    if (!is_part(layer->erosion)) return refuse(log, "erosion", layer->erosion, "", part);
+    if (!is_part(layer->patchiness)) return refuse(log, "patchiness", layer->patchiness, "", part);
     if (!(layer->droplet_diameter >= 4 && layer->droplet_diameter <= NEBEL_MAX_DROPLET_DIAMETER))
-        return refuse(log, "diameter", layer->droplet_diameter, " um", "within 4 and 50");
+        return refuse(log, "droplet_diameter", layer->droplet_diameter, " um", "within 4 and 50");
     for (int i = 0; i < 2; i++)
         if (!(fabs(layer->wind[i]) <= 1e12)) return refuse(log, "wind", layer->wind[i], " m", "within -1e12 and 1e12");
     const char *fault = nb_map_fault(&layer->weather_map, 1);
-    return fault == NULL ? NEBEL_OK : nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: weather: %s", fault);
+    return fault == NULL ? NEBEL_OK : nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: weather_map: %s", fault);
 }
 
 nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer *desc, const nebel_log *log,
@@ -290,7 +290,7 @@ nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer
 {
     if (desc == NULL || resolved == NULL || !(thickness > 0)) return NEBEL_ERROR_ARGUMENT;
     if ((int)desc->type < 0 || desc->type >= NEBEL_CLOUD_TYPE_COUNT)
-        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: kind: is unknown");
+        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: type: is unknown");
     const nebel_cloud_layer whole = resolve(thickness, desc);
     nebel_result result = check_heights(thickness, desc, &whole, log);
     if (result == NEBEL_OK) result = check_looks(&whole, log);

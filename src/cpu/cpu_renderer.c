@@ -128,7 +128,7 @@ const char *nebel_method_name(nebel_method method)
         [NEBEL_METHOD_TWO_PASS] = "two-pass",
         [NEBEL_METHOD_ALPHA] = "alpha",
         [NEBEL_METHOD_D3D9] = "d3d9",
-        [NEBEL_METHOD_PATH] = "reference",
+        [NEBEL_METHOD_PATH] = "path",
     };
     _Static_assert(sizeof words / sizeof *words == NEBEL_METHOD_COUNT, "each method has its word");
     return (unsigned)method < NEBEL_METHOD_COUNT ? words[method] : NULL;

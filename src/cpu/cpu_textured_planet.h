@@ -1,10 +1,10 @@
-/* A planet of layers in pictures: its ground ends rays, its shells lie before it. */
+/* A textured planet in pictures: its ground ends rays, its shells lie before it. */
 #ifndef NB_CPU_CPU_TEXTURED_PLANET_H
 #define NB_CPU_CPU_TEXTURED_PLANET_H
 
 #include "cpu_renderer.h"
 
-/* Finds what the frame's layers are; without a planet of layers there are none. Errors: UNSUPPORTED. */
+/* Finds what the frame's layers are; without a textured planet there are none. Errors: UNSUPPORTED. */
 nebel_result nb_cpu_textured_set(nb_frame *frame, const nebel_frame_desc *desc);
 
 /* What rays meet before their surfaces; behind the planet's ground nothing is a hit. */

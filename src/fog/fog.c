@@ -208,7 +208,7 @@ static const char *fault_of_diffusion(const nebel_diffusion_desc *desc)
 {
     if (desc->max_cells != 0 &&
         (desc->max_cells < NEBEL_MIN_DIFFUSION_CELLS || desc->max_cells > NEBEL_MAX_DIFFUSION_CELLS))
-        return "cells: must be 0 or within " NB_TEXT(NEBEL_MIN_DIFFUSION_CELLS) " and " NB_TEXT(
+        return "max_cells: must be 0 or within " NB_TEXT(NEBEL_MIN_DIFFUSION_CELLS) " and " NB_TEXT(
             NEBEL_MAX_DIFFUSION_CELLS);
     if (!desc->has_ground) return NULL;
     if (!(fabs(desc->ground_height) <= NEBEL_MAX_LENGTH)) return "ground_height: must be at most 1e15 m";

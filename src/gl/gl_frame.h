@@ -70,7 +70,7 @@ nebel_result nb_gl_frame_prepare_sun(nb_gl_frame *f);
 void nb_gl_frame_set_shadows(const nb_gl_frame *f, unsigned program);
 void nb_gl_frame_set_tiles(const nb_gl_frame *f, const nebel_gl_fog_resources *fog, unsigned program);
 
-/* ---- planets of layers ----------------------------------------------------------------------- */
+/* ---- textured planets ----------------------------------------------------------------------- */
 
 /* Of the whole frame: maps, targets, programs. MEMORY, LIMIT, UNSUPPORTED. */
 nebel_result nb_gl_frame_prepare_shells(const nb_gl_frame *f);

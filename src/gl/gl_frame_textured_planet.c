@@ -1,4 +1,4 @@
-/* A planet of layers in a frame. Its ground is drawn among the surfaces. Its shells follow each other from the eye on: along a
+/* A textured planet in a frame. Its ground is drawn among the surfaces. Its shells follow each other from the eye on: along a
  * ray sides that it enters come before those that it leaves, the large before the small and then the small before the
  * large. Each is a surface of which a part is seen, with its own fog before it. */
 #include "gl_frame.h"

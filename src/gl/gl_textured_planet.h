@@ -1,4 +1,4 @@
-/* A planet of layers in OpenGL: its maps, what its shells are drawn into, and by which programs. */
+/* A textured planet in OpenGL: its maps, what its shells are drawn into, and by which programs. */
 #ifndef NB_GL_GL_TEXTURED_PLANET_H
 #define NB_GL_GL_TEXTURED_PLANET_H
 

@@ -44,7 +44,7 @@ typedef struct nb_composite_key {
     int has_fog;
     int shafts; /* surfaces shade fog */
     int air;    /* of so many planets, with their ground and the sun */
-    int shells; /* of a planet of layers, over everything */
+    int shells; /* of a textured planet, over everything */
     int clouds; /* with volume, whose shadow is what dims */
     int in_texture, tiled;
     uint32_t features;

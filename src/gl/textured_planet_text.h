@@ -1,4 +1,4 @@
-/* GLSL of planets of layers: their ground, their clouds, their air, and how they are laid over each other. */
+/* GLSL of textured planets: their ground, their clouds, their air, and how they are laid over each other. */
 #ifndef NB_GL_TEXTURED_PLANET_TEXT_H
 #define NB_GL_TEXTURED_PLANET_TEXT_H
 

@@ -70,16 +70,16 @@ const unsigned nb_density_masks[NEBEL_DENSITY_COUNT] = {
 };
 
 const nb_key_entry nb_nebula_places[] = {
-    NAMED(nebel_nebula_desc, "size", radius_range, 2, NB_EDIT_EACH),
+    NAMED(nebel_nebula_desc, "radius_range", radius_range, 2, NB_EDIT_EACH),
     PLACE(nebel_nebula_desc, absorption, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_nebula_desc, emission, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_nebula_desc, turbulence, 1, NB_EDIT_EACH),
-    NAMED(nebel_nebula_desc, "turbulence_size", turbulence_scale, 1, NB_EDIT_EACH),
+    NAMED(nebel_nebula_desc, "turbulence_scale", turbulence_scale, 1, NB_EDIT_EACH),
     END,
 };
 
 const nb_key_entry nb_generated_places[] = {
-    NAMED(nebel_nebula_desc, "fade", dimming, 1, NB_EDIT_EACH),
+    NAMED(nebel_nebula_desc, "dimming", dimming, 1, NB_EDIT_EACH),
     END,
 };
 
@@ -120,13 +120,13 @@ const char *const nb_density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",
                                                            "gaussian", "soft_edge", "grid",   "altitude"};
 const char *const nb_operation_names[NEBEL_OPERATION_COUNT] = {"add", "exclude", "replace"};
 const char *const nb_below_names[2] = {"grow", "constant"};
-const char *const nb_profile_names[NEBEL_PARTICLE_PROFILE_COUNT] = {"soft", "gaussian", "ball"};
-const char *const nb_air_profile_names[NEBEL_COMPONENT_PROFILE_COUNT] = {"exponential", "layer"};
+const char *const nb_profile_names[NEBEL_PARTICLE_PROFILE_COUNT] = {"soft", "gaussian", "uniform"};
+const char *const nb_air_profile_names[NEBEL_COMPONENT_PROFILE_COUNT] = {"exponential", "tent"};
 /* By nebel_phase_type. */
 const char *const nb_phase_names[NEBEL_PHASE_COUNT] = {"isotropic",       "rayleigh", "henyey_greenstein",
                                                        "cornette_shanks", "draine",   "droplets"};
 const char *const nb_cell_model_names[NEBEL_CELL_MODEL_COUNT] = {"linear", "exponential"};
-const char *const nb_cell_span_names[NEBEL_SPAN_COUNT] = {"ray", "depth", "faithful"};
+const char *const nb_cell_span_names[NEBEL_SPAN_COUNT] = {"ray", "depth", "printed"};
 
 const double *nb_place_numbers(const void *structure, const nb_key_entry *place)
 {

@@ -72,7 +72,7 @@ bool nb_key_value_at_most(nb_json *json, const nb_json_node *array, uint32_t mos
 #define NB_UNIT_NOTE 64
 const char *nb_key_value_note_unit(const nb_json *json, char note[NB_UNIT_NOTE]);
 
-/* Fails with what the core said of numbers of an object, "airs[2].middle: is ...", and more. Points at the number, or at the
+/* Fails with what the core said of numbers of an object, "components[2].center_height: is ...", and more. Points at the number, or at the
  * innermost of what is around it that the file has. Returns false. */
 bool nb_key_value_fail_within(nb_json *json, const nb_json_node *object, const char *message, const char *more);
 

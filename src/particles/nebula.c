@@ -82,14 +82,15 @@ static nebel_result check_lengths(const nebel_nebula_desc *desc)
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: sizes are %g to %g m; the smaller must come first",
                        desc->radius_range[0], desc->radius_range[1]);
     if (!(desc->dimming >= 0 && desc->dimming <= 1))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: fade is %g; it must be from 0 to 1", desc->dimming);
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: dimming is %g; it must be from 0 to 1", desc->dimming);
     if (!(desc->turbulence >= 0 && desc->turbulence <= NEBEL_MAX_LENGTH))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: turbulence is %g m; it must be from 0 to %g",
                        desc->turbulence, NEBEL_MAX_LENGTH);
     const double eddy = desc->turbulence_scale;
     if (!(eddy == 0 || (eddy >= NEBEL_MIN_LENGTH && eddy <= NEBEL_MAX_LENGTH)))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: turbulence_size is %g m; it must be 0, or from %g to %g",
-                       eddy, NEBEL_MIN_LENGTH, NEBEL_MAX_LENGTH);
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+                       "nebula: turbulence_scale is %g m; it must be 0, or from %g to %g", eddy, NEBEL_MIN_LENGTH,
+                       NEBEL_MAX_LENGTH);
     return NEBEL_OK;
 }
 

@@ -111,24 +111,24 @@ static nebel_result check_map(const nb_textured_subject *of, const char *what, c
 
 static nebel_result check_shell(const nb_textured_subject *of, const nebel_cloud_shell *shell)
 {
-    nebel_result result = check_map(of, "map", &shell->coverage_map, 1);
-    if (result == NEBEL_OK) result = check_map(of, "detail", &shell->detail_map, 1);
+    nebel_result result = check_map(of, "coverage_map", &shell->coverage_map, 1);
+    if (result == NEBEL_OK) result = check_map(of, "detail_map", &shell->detail_map, 1);
     if (result == NEBEL_OK) result = check_height(of, "height", shell->height);
-    if (result == NEBEL_OK) result = check_one(of, "day", shell->rotation_period, -1e12, 1e12);
+    if (result == NEBEL_OK) result = check_one(of, "rotation_period", shell->rotation_period, -1e12, 1e12);
     if (result == NEBEL_OK) result = check_all(of, "color", shell->color, 3, 0, 1);
-    if (result == NEBEL_OK) result = check_all(of, "wrap", shell->uv_tiling, 3, -1e3, 1e3);
+    if (result == NEBEL_OK) result = check_all(of, "uv_tiling", shell->uv_tiling, 3, -1e3, 1e3);
     if (result == NEBEL_OK) result = check_one(of, "gain", shell->gain, 0, 1e3);
     return result == NEBEL_OK ? check_one(of, "coverage", shell->coverage, 0, 1) : result;
 }
 
 static nebel_result check_air(const nb_textured_subject *of, const nebel_atmosphere_shell *air)
 {
-    nebel_result result = check_height(of, "air.height", air->height);
-    if (result == NEBEL_OK) result = check_one(of, "air.brightness", air->brightness, 0, 1e6);
+    nebel_result result = check_height(of, "atmosphere.height", air->height);
+    if (result == NEBEL_OK) result = check_one(of, "atmosphere.brightness", air->brightness, 0, 1e6);
     if (result == NEBEL_OK && air->ramp_count > NEBEL_MAX_RAMP_COLORS)
-        result = refuse(of, "air.ramp_count", "must be at most 16");
+        result = refuse(of, "atmosphere.ramp_count", "must be at most 16");
     for (uint32_t i = 0; result == NEBEL_OK && i < air->ramp_count; i++)
-        result = check_all(of, "air.ramp", air->ramp[i], 3, 0, 1e6);
+        result = check_all(of, "atmosphere.ramp", air->ramp[i], 3, 0, 1e6);
     return result;
 }
 
@@ -137,11 +137,11 @@ static nebel_result check_ball(const nb_textured_subject *of, const nebel_textur
     nebel_result result = check_all(of, "center", desc->center, 3, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH);
     if (result == NEBEL_OK) result = check_one(of, "radius", desc->radius, 1, 1e12);
     if (result == NEBEL_OK) result = check_all(of, "rotation", desc->rotation, 4, -1e6, 1e6);
-    if (result == NEBEL_OK) result = check_one(of, "day", desc->rotation_period, -1e12, 1e12);
-    if (result == NEBEL_OK) result = check_one(of, "coverage", desc->land_coverage, 0, 1);
+    if (result == NEBEL_OK) result = check_one(of, "rotation_period", desc->rotation_period, -1e12, 1e12);
+    if (result == NEBEL_OK) result = check_one(of, "land_coverage", desc->land_coverage, 0, 1);
     if (result == NEBEL_OK && desc->cloud_shell_count > NEBEL_MAX_CLOUD_SHELLS)
-        result = refuse(of, "cloud_count", "must be at most 8");
-    return result == NEBEL_OK ? check_map(of, "ground", &desc->color_map, 3) : result;
+        result = refuse(of, "cloud_shell_count", "must be at most 8");
+    return result == NEBEL_OK ? check_map(of, "color_map", &desc->color_map, 3) : result;
 }
 
 static nebel_result check(const nebel_textured_planet_desc *desc)

@@ -5,7 +5,7 @@
 
 /* In the order of nebel_cell_model and nebel_cell_span. */
 static const char *const model_names[] = {"linear", "exponential"};
-static const char *const span_names[] = {"ray", "depth", "faithful"};
+static const char *const span_names[] = {"ray", "depth", "printed"};
 
 /* ---- cells ----------------------------------------------------------------------------------- */
 

@@ -4,10 +4,25 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { KIND, BASE, TOP, COVERAGE, EXTINCTION, SIZE, DETAIL, VARIATION, DIAMETER, SEED, WIND, WEATHER, KEY_COUNT };
+enum {
+    TYPE,
+    BASE,
+    TOP,
+    COVERAGE,
+    EXTINCTION,
+    CELL_SIZE,
+    EROSION,
+    PATCHINESS,
+    DROPLET_DIAMETER,
+    SEED,
+    WIND,
+    WEATHER_MAP,
+    KEY_COUNT
+};
 
-static const char *const names[] = {"kind",   "base",      "top",      "coverage", "extinction", "size",
-                                    "detail", "variation", "diameter", "seed",     "wind",       "weather"};
+static const char *const names[] = {"type",      "base",       "top",        "coverage",         "extinction",
+                                    "cell_size", "erosion",    "patchiness", "droplet_diameter", "seed",
+                                    "wind",      "weather_map"};
 static const nb_key_set keys = {names, KEY_COUNT, NB_BIT(KEY_COUNT) - 1, 0, "a layer of clouds"};
 
 /* A part that 0 leaves nothing of. */
@@ -33,9 +48,9 @@ static bool read_numbers(nb_scene_reader *in, const nb_json_node *const *found, 
         !nb_key_value_number(json, found[TOP], &height_range, &layer->top) ||
         !nb_key_value_number(json, found[COVERAGE], &nb_range_fraction, &layer->coverage) ||
         !nb_key_value_number(json, found[EXTINCTION], &amount_range, &layer->extinction) ||
-        !nb_key_value_number(json, found[SIZE], &size_range, &layer->cell_size) ||
-        !read_part(json, found[DETAIL], &layer->erosion) || !read_part(json, found[VARIATION], &layer->patchiness) ||
-        !nb_key_value_number(json, found[DIAMETER], &diameter_range, &layer->droplet_diameter) ||
+        !nb_key_value_number(json, found[CELL_SIZE], &size_range, &layer->cell_size) ||
+        !read_part(json, found[EROSION], &layer->erosion) || !read_part(json, found[PATCHINESS], &layer->patchiness) ||
+        !nb_key_value_number(json, found[DROPLET_DIAMETER], &diameter_range, &layer->droplet_diameter) ||
         !nb_key_value_numbers(json, found[WIND], &wind_range, 2, layer->wind))
         return false;
     const double unit = in->space.unit;
@@ -81,7 +96,7 @@ static bool check_size(nb_json *json, const nb_json_node *node, const nebel_plan
 {
     const double most = NEBEL_MAX_CLOUD_CELL_RADII * planet->atmosphere_desc.radius;
     char message[140];
-    snprintf(message, sizeof message, "size: is %g m%s; must be at most %g m, which is %g times the radius", size,
+    snprintf(message, sizeof message, "cell_size: is %g m%s; must be at most %g m, which is %g times the radius", size,
              is_given ? "" : ", as none is given", most, NEBEL_MAX_CLOUD_CELL_RADII);
     return size <= most || nb_key_value_fail_within(json, node, message, "");
 }
@@ -89,7 +104,7 @@ static bool check_size(nb_json *json, const nb_json_node *node, const nebel_plan
 /* Of no coverage: no layer. */
 static bool read_layer(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
 {
-    static const char *const kind_names[] = {"cumulus", "stratus", "cirrus"};
+    static const char *const type_names[] = {"cumulus", "stratus", "cirrus"};
     const nb_json_node *found[KEY_COUNT];
     nb_json *json = in->json;
     nebel_cloud_layer *layer = &planet->cloud_layers[planet->cloud_layer_count];
@@ -97,16 +112,16 @@ static bool read_layer(nb_scene_reader *in, const nb_json_node *node, nebel_plan
     if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {...}") ||
         !nb_key_value_members(json, node, &keys, found))
         return false;
-    const int kind =
-        found[KIND] != NULL ? nb_key_value_choice(json, found[KIND], kind_names, NEBEL_CLOUD_TYPE_COUNT) : 0;
-    if (kind < 0 || !read_numbers(in, found, layer) || !nb_keys_read_seed(in, found[SEED], &layer->seed) ||
-        !nb_keys_read_map(in, found[WEATHER], 1, &layer->weather_map))
+    const int type =
+        found[TYPE] != NULL ? nb_key_value_choice(json, found[TYPE], type_names, NEBEL_CLOUD_TYPE_COUNT) : 0;
+    if (type < 0 || !read_numbers(in, found, layer) || !nb_keys_read_seed(in, found[SEED], &layer->seed) ||
+        !nb_keys_read_map(in, found[WEATHER_MAP], 1, &layer->weather_map))
         return false;
-    layer->type = (nebel_cloud_type)kind;
+    layer->type = (nebel_cloud_type)type;
     nebel_cloud_layer resolved;
     if (!try_layer(in, node, planet->atmosphere_desc.thickness, layer, &resolved)) return false;
     if (found[COVERAGE] != NULL && layer->coverage == 0) return true;
-    if (!check_size(json, node, planet, found[SIZE] != NULL, resolved.cell_size) ||
+    if (!check_size(json, node, planet, found[CELL_SIZE] != NULL, resolved.cell_size) ||
         !check_apart(in, node, planet, &resolved))
         return false;
     planet->cloud_layer_count++;
@@ -131,6 +146,7 @@ bool nb_keys_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_pl
     for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_layer(in, one, planet)) return false;
     return planet->cloud_layer_count == 0 || has_air(&planet->atmosphere_desc) ||
-           nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
-                        "need air, and the planet has none; leave them out, or give it another \"preset\" or \"airs\"");
+           nb_json_fail(
+               in->json, NEBEL_ERROR_FORMAT, node,
+               "need air, and the planet has none; leave them out, or give it another \"preset\" or \"components\"");
 }

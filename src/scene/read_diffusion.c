@@ -21,8 +21,8 @@ static bool read_ground(nb_scene_reader *in, const nb_json_node *node, nebel_dif
 
 bool nb_keys_read_multiple_scattering(nb_scene_reader *in, const nb_json_node *node)
 {
-    enum { MODEL, CELLS, GROUND, COUNT };
-    static const char *const names[] = {"model", "cells", "ground"};
+    enum { MODEL, MAX_CELLS, GROUND, COUNT };
+    static const char *const names[] = {"model", "max_cells", "ground"};
     static const char *const model_names[] = {"diffusion"};
     static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(MODEL), "multiple scattering"};
     const nb_json_node *found[COUNT];
@@ -34,8 +34,8 @@ bool nb_keys_read_multiple_scattering(nb_scene_reader *in, const nb_json_node *n
     if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {\"model\": ...}") ||
         !nb_key_value_members(json, node, &keys, found) ||
         nb_key_value_choice(json, found[MODEL], model_names, 1) < 0 ||
-        (found[CELLS] != NULL &&
-         !nb_key_value_integer(json, found[CELLS], NEBEL_MIN_DIFFUSION_CELLS, NEBEL_MAX_DIFFUSION_CELLS, &cells)) ||
+        (found[MAX_CELLS] != NULL &&
+         !nb_key_value_integer(json, found[MAX_CELLS], NEBEL_MIN_DIFFUSION_CELLS, NEBEL_MAX_DIFFUSION_CELLS, &cells)) ||
         !read_ground(in, found[GROUND], desc))
         return false;
     desc->max_cells = (uint32_t)cells;

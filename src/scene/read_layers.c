@@ -1,4 +1,4 @@
-/* A planet of the model "layers": a ball, shells of clouds, a shell of air. */
+/* A planet of the model "textured": a ball, shells of clouds, a shell of air. */
 #include "image/image_codec.h"
 #include "model/model.h"
 #include "file/path.h"
@@ -9,7 +9,7 @@
 static const nb_range radius_range = {.low = 1, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
 static const nb_range height_range = {
     .low = 0, .high = 1e12, .open = true, .dimension = NB_LENGTH, .text = "a height above the ground"};
-static const nb_range day_range = {.low = -1e12, .high = 1e12, .text = "a number of frames from -1e12 to 1e12"};
+static const nb_range period_range = {.low = -1e12, .high = 1e12, .text = "a number of frames from -1e12 to 1e12"};
 static const nb_range part_range = {
     .low = 0, .high = 1, .open = true, .text = "a number between 0 and 1, without them"};
 
@@ -104,10 +104,11 @@ bool nb_keys_read_seed(nb_scene_reader *in, const nb_json_node *node, uint32_t *
 
 static bool read_cloud(nb_scene_reader *in, const nb_json_node *node, nebel_cloud_shell *shell)
 {
-    enum { HEIGHT, DAY, COLOR, MAP, DETAIL, WRAP, GAIN, COVERAGE, SEED, COUNT };
-    static const char *const names[] = {"height", "day", "color", "map", "detail", "wrap", "gain", "coverage", "seed"};
+    enum { HEIGHT, ROTATION_PERIOD, COLOR, COVERAGE_MAP, DETAIL_MAP, UV_TILING, GAIN, COVERAGE, SEED, COUNT };
+    static const char *const names[] = {"height", "rotation_period", "color", "coverage_map", "detail_map", "uv_tiling",
+                                        "gain",   "coverage",        "seed"};
     static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a shell of clouds"};
-    static const nb_range wrap_range = {.low = -1e3, .high = 1e3, .text = "a number from -1000 to 1000"};
+    static const nb_range tiling_range = {.low = -1e3, .high = 1e3, .text = "a number from -1000 to 1000"};
     static const nb_range gain_range = {
         .low = 0, .high = 1e3, .open = true, .text = "a number between 0 and 1000, without them"};
     const nb_json_node *found[COUNT];
@@ -115,11 +116,11 @@ static bool read_cloud(nb_scene_reader *in, const nb_json_node *node, nebel_clou
     if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {...}") ||
         !nb_key_value_members(json, node, &keys, found) ||
         !nb_key_value_number(json, found[HEIGHT], &height_range, &shell->height) ||
-        !nb_key_value_number(json, found[DAY], &day_range, &shell->rotation_period) ||
+        !nb_key_value_number(json, found[ROTATION_PERIOD], &period_range, &shell->rotation_period) ||
         !nb_key_value_color(json, found[COLOR], &nb_range_fraction, shell->color) ||
-        !nb_keys_read_map(in, found[MAP], 1, &shell->coverage_map) ||
-        !nb_keys_read_map(in, found[DETAIL], 1, &shell->detail_map) ||
-        !nb_key_value_numbers(json, found[WRAP], &wrap_range, 3, shell->uv_tiling) ||
+        !nb_keys_read_map(in, found[COVERAGE_MAP], 1, &shell->coverage_map) ||
+        !nb_keys_read_map(in, found[DETAIL_MAP], 1, &shell->detail_map) ||
+        !nb_key_value_numbers(json, found[UV_TILING], &tiling_range, 3, shell->uv_tiling) ||
         !nb_key_value_number(json, found[GAIN], &gain_range, &shell->gain) ||
         !nb_key_value_number(json, found[COVERAGE], &part_range, &shell->coverage) ||
         !nb_keys_read_seed(in, found[SEED], &shell->seed))
@@ -182,10 +183,22 @@ static bool turns(const nebel_textured_planet_desc *planet)
 
 bool nb_keys_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_textured_planet_desc *desc)
 {
-    enum { MODEL, CENTER, RADIUS, ROTATION, DAY, MAP, COVERAGE, SEED, CLOUDS, AIR, COUNT };
-    static const char *const names[] = {"model", "center",   "radius", "rotation", "day",
-                                        "map",   "coverage", "seed",   "clouds",   "air"};
-    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(MODEL), "a planet of layers"};
+    enum {
+        MODEL,
+        CENTER,
+        RADIUS,
+        ROTATION,
+        ROTATION_PERIOD,
+        COLOR_MAP,
+        LAND_COVERAGE,
+        SEED,
+        CLOUDS,
+        ATMOSPHERE,
+        COUNT
+    };
+    static const char *const names[] = {"model",     "center",        "radius", "rotation", "rotation_period",
+                                        "color_map", "land_coverage", "seed",   "clouds",   "atmosphere"};
+    static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(MODEL), "a textured planet"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     double radius = 6.36e6 / in->space.unit, scale[3] = {1, 1, 1};
@@ -194,11 +207,11 @@ bool nb_keys_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_te
         !nb_key_value_number(json, found[RADIUS], &radius_range, &radius) ||
         !nb_key_value_place(json, found[CENTER], desc->center) ||
         !nb_key_value_rotation(json, found[ROTATION], desc->rotation) ||
-        !nb_key_value_number(json, found[DAY], &day_range, &desc->rotation_period) ||
-        !nb_keys_read_map(in, found[MAP], 3, &desc->color_map) ||
-        !nb_key_value_number(json, found[COVERAGE], &part_range, &desc->land_coverage) ||
+        !nb_key_value_number(json, found[ROTATION_PERIOD], &period_range, &desc->rotation_period) ||
+        !nb_keys_read_map(in, found[COLOR_MAP], 3, &desc->color_map) ||
+        !nb_key_value_number(json, found[LAND_COVERAGE], &part_range, &desc->land_coverage) ||
         !nb_keys_read_seed(in, found[SEED], &desc->seed) || !read_clouds(in, found[CLOUDS], desc) ||
-        !read_air(in, found[AIR], &desc->atmosphere))
+        !read_air(in, found[ATMOSPHERE], &desc->atmosphere))
         return false;
     desc->radius = radius * in->space.unit;
     nb_file_units_convert_placement(&in->space, desc->center, desc->rotation, scale);

@@ -10,21 +10,21 @@ enum {
     POINTS,
     DENSITY,
     COUNT,
-    FADE,
+    DIMMING,
     SEED,
     PROFILE,
-    SIZE,
+    RADIUS_RANGE,
     ABSORPTION,
     EMISSION,
     COLORS,
     TURBULENCE,
-    TURBULENCE_SIZE,
+    TURBULENCE_SCALE,
     NEBULA_KEY_COUNT
 };
 
-static const char *const key_names[] = {"name",     "shape",  "points",     "density",        "count",
-                                        "fade",     "seed",   "profile",    "size",           "absorption",
-                                        "emission", "colors", "turbulence", "turbulence_size"};
+static const char *const key_names[] = {"name",     "shape",  "points",     "density",         "count",
+                                        "dimming",  "seed",   "profile",    "radius_range",    "absorption",
+                                        "emission", "colors", "turbulence", "turbulence_scale"};
 
 static const nb_key_set nebula_keys = {key_names, NEBULA_KEY_COUNT, NB_BIT(NEBULA_KEY_COUNT) - 1, 0, "a nebula"};
 
@@ -35,7 +35,7 @@ static bool read_counts(nb_json *json, const nb_json_node *const *found, nebel_n
 {
     int count = 10000, seed = 0;
     if (!nb_key_value_integer(json, found[COUNT], 1, MOST_PARTICLES, &count) ||
-        !nb_key_value_number(json, found[FADE], &nb_range_fraction, &nebula->dimming) ||
+        !nb_key_value_number(json, found[DIMMING], &nb_range_fraction, &nebula->dimming) ||
         !nb_key_value_integer(json, found[SEED], 0, INT32_MAX, &seed))
         return false;
     nebula->count = (size_t)count;
@@ -46,7 +46,7 @@ static bool read_counts(nb_json *json, const nb_json_node *const *found, nebel_n
 /* In the order of nebel_particle_profile. */
 static bool read_profile(nb_json *json, const nb_json_node *node, nebel_particle_profile *profile)
 {
-    static const char *const names[] = {"soft", "gaussian", "ball"};
+    static const char *const names[] = {"soft", "gaussian", "uniform"};
     if (node == NULL) return true;
     const int choice = nb_key_value_choice(json, node, names, NEBEL_PARTICLE_PROFILE_COUNT);
     if (choice >= 0) *profile = (nebel_particle_profile)choice;
@@ -57,12 +57,13 @@ static bool read_sizes(nb_json *json, const nb_json_node *const *found, nebel_ne
 {
     nb_range radius = nb_range_extent;
     if (nebula->profile == NEBEL_PARTICLE_GAUSSIAN) radius.low *= 3; /* its sigma is a third of the radius */
-    if (!nb_key_value_numbers(json, found[SIZE], &radius, 2, nebula->radius_range) ||
+    if (!nb_key_value_numbers(json, found[RADIUS_RANGE], &radius, 2, nebula->radius_range) ||
         !nb_key_value_number(json, found[TURBULENCE], &nb_range_distance, &nebula->turbulence) ||
-        !nb_key_value_number(json, found[TURBULENCE_SIZE], &nb_range_extent, &nebula->turbulence_scale))
+        !nb_key_value_number(json, found[TURBULENCE_SCALE], &nb_range_extent, &nebula->turbulence_scale))
         return false;
     if (nebula->radius_range[0] <= nebula->radius_range[1]) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[SIZE], "is larger first; must be [smallest, largest] radius");
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[RADIUS_RANGE],
+                        "is larger first; must be [smallest, largest] radius");
 }
 
 /* Of a particle of this color. */
@@ -125,7 +126,7 @@ static bool keep_nebula(nb_scene_reader *in, const nb_json_node *node, const neb
 
 static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_node *const *found)
 {
-    static const int strewn[] = {SHAPE, DENSITY, COUNT, FADE};
+    static const int strewn[] = {SHAPE, DENSITY, COUNT, DIMMING};
     if (found[POINTS] == NULL && found[SHAPE] == NULL)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is nowhere; a nebula has \"shape\" or \"points\"");
     for (size_t i = 0; i < sizeof strewn / sizeof *strewn && found[POINTS] != NULL; i++)

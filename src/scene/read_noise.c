@@ -4,10 +4,10 @@
 #include <limits.h>
 #include <string.h>
 
-enum { TYPE, SIZE, CELLS, OCTAVES, GAIN, COVERAGE, EDGE, DRIFT, CHANGE, SEED, NOISE_KEY_COUNT };
+enum { TYPE, SIZE, CELLS, OCTAVES, GAIN, COVERAGE, EDGE, VELOCITY, EVOLUTION, SEED, NOISE_KEY_COUNT };
 
-static const char *const key_names[] = {"type",     "size", "cells", "octaves", "gain",
-                                        "coverage", "edge", "drift", "change",  "seed"};
+static const char *const key_names[] = {"type",     "size", "cells",    "octaves",   "gain",
+                                        "coverage", "edge", "velocity", "evolution", "seed"};
 
 static const nb_key_set noise_keys = {key_names, NOISE_KEY_COUNT, NB_BIT(NOISE_KEY_COUNT) - 1,
                                       NB_BIT(SIZE) | NB_BIT(CELLS), "noise"};
@@ -29,8 +29,8 @@ static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_
         !nb_key_value_number(json, found[GAIN], &part, &desc->gain) ||
         !nb_key_value_number(json, found[COVERAGE], &part, &desc->coverage) ||
         !nb_key_value_numbers(json, found[EDGE], &half, 3, desc->falloff) ||
-        !nb_key_value_numbers(json, found[DRIFT], &motion, 3, noise->velocity) ||
-        !nb_key_value_number(json, found[CHANGE], &motion, &noise->evolution) ||
+        !nb_key_value_numbers(json, found[VELOCITY], &motion, 3, noise->velocity) ||
+        !nb_key_value_number(json, found[EVOLUTION], &motion, &noise->evolution) ||
         !nb_key_value_integer(json, found[SEED], 0, INT_MAX, &seed))
         return false;
     desc->seed = (uint32_t)seed;

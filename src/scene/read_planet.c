@@ -11,23 +11,24 @@ static const nb_range length_range = {
 
 /* ---- kinds of air ---------------------------------------------------------------------------- */
 
-enum { TYPE, SCATTERING, ABSORPTION, PHASE, SCALE_HEIGHT, MIDDLE, WIDTH, AIR_KEY_COUNT };
+enum { TYPE, SCATTERING, ABSORPTION, PHASE, SCALE_HEIGHT, CENTER_HEIGHT, HALF_WIDTH, AIR_KEY_COUNT };
 
-static const char *const air_names[] = {"type", "scattering", "absorption", "phase", "scale_height", "middle", "width"};
+static const char *const air_names[] = {"type",         "scattering",    "absorption", "phase",
+                                        "scale_height", "center_height", "half_width"};
 
 #define AIR_KEYS (NB_BIT(TYPE) | NB_BIT(SCATTERING) | NB_BIT(ABSORPTION) | NB_BIT(PHASE))
 
 static const nb_key_set air_keys[NEBEL_COMPONENT_PROFILE_COUNT] = {
     [NEBEL_COMPONENT_EXPONENTIAL] = {air_names, AIR_KEY_COUNT, AIR_KEYS | NB_BIT(SCALE_HEIGHT),
                                      NB_BIT(TYPE) | NB_BIT(SCALE_HEIGHT), "air that thins out"},
-    [NEBEL_COMPONENT_TENT] = {air_names, AIR_KEY_COUNT, AIR_KEYS | NB_BIT(MIDDLE) | NB_BIT(WIDTH),
-                              NB_BIT(TYPE) | NB_BIT(MIDDLE) | NB_BIT(WIDTH), "a layer of air"}};
+    [NEBEL_COMPONENT_TENT] = {air_names, AIR_KEY_COUNT, AIR_KEYS | NB_BIT(CENTER_HEIGHT) | NB_BIT(HALF_WIDTH),
+                              NB_BIT(TYPE) | NB_BIT(CENTER_HEIGHT) | NB_BIT(HALF_WIDTH), "a layer of air"}};
 
 static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_atmosphere_component *air)
 {
     static const nb_range amount_range = {
         .low = 0, .high = NEBEL_MAX_COMPONENT_EXTINCTION, .dimension = NB_PER_LENGTH, .text = "an amount"};
-    static const nb_range middle_range = {.low = 0, .high = 1e12, .dimension = NB_LENGTH, .text = "a height"};
+    static const nb_range height_range = {.low = 0, .high = 1e12, .dimension = NB_LENGTH, .text = "a height"};
     const nb_json_node *found[AIR_KEY_COUNT];
     nb_json *json = in->json;
     *air = (nebel_atmosphere_component){.scale_height = 0};
@@ -37,8 +38,8 @@ static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_atmosp
         !nb_key_value_amount(json, found[ABSORPTION], &amount_range, air->absorption) ||
         !nb_keys_read_phase(in, found[PHASE], &air->phase) ||
         !nb_key_value_number(json, found[SCALE_HEIGHT], &length_range, &air->scale_height) ||
-        !nb_key_value_number(json, found[MIDDLE], &middle_range, &air->center_height) ||
-        !nb_key_value_number(json, found[WIDTH], &length_range, &air->half_width))
+        !nb_key_value_number(json, found[CENTER_HEIGHT], &height_range, &air->center_height) ||
+        !nb_key_value_number(json, found[HALF_WIDTH], &length_range, &air->half_width))
         return false;
     air->profile = (nebel_component_profile)type;
     for (int c = 0; c < 3; c++) {
@@ -51,7 +52,7 @@ static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_atmosp
     return true;
 }
 
-static bool read_airs(nb_scene_reader *in, const nb_json_node *node, nebel_atmosphere_desc *desc)
+static bool read_components(nb_scene_reader *in, const nb_json_node *node, nebel_atmosphere_desc *desc)
 {
     uint32_t count = 0;
     if (node == NULL) return true;
@@ -75,16 +76,18 @@ enum {
     RADIUS,
     GRAVITY,
     THICKNESS,
-    AIRS,
+    COMPONENTS,
     GROUND_ALBEDO,
     QUALITY,
-    SUN_DIAMETER,
+    SUN_ANGULAR_DIAMETER,
     CLOUDS,
     PLANET_KEY_COUNT
 };
 
-static const char *const planet_names[] = {"model", "preset",        "center",  "radius",       "gravity", "thickness",
-                                           "airs",  "ground_albedo", "quality", "sun_diameter", "clouds"};
+static const char *const planet_names[] = {
+    "model",     "preset",     "center",        "radius",  "gravity",
+    "thickness", "components", "ground_albedo", "quality", "sun_angular_diameter",
+    "clouds"};
 static const nb_key_set planet_keys = {planet_names, PLANET_KEY_COUNT, NB_BIT(PLANET_KEY_COUNT) - 1, NB_BIT(MODEL),
                                        "a physical planet"};
 
@@ -92,7 +95,7 @@ static const nb_key_set planet_keys = {planet_names, PLANET_KEY_COUNT, NB_BIT(PL
  * m/s^2: NASA's fact sheets; of the toy the Earth's. */
 static const struct {
     const char *name;
-    double sun_diameter, gravity;
+    double sun_angular_diameter, gravity;
 } presets[] = {{"earth", 0.5334, 9.82}, {"mars", 0.3501, 3.73}, {"toy", 0.5334, 9.82}, {"moon", 0.5334, 1.62}};
 
 /* Air of the same pressure and temperature at the ground: heights go by 1 / gravity, R T / (M g) of each gas. */
@@ -115,7 +118,7 @@ static bool read_preset(nb_json *json, const nb_json_node *const *found, nebel_p
     double gravity = presets[preset].gravity;
     if (!nb_key_value_number(json, found[GRAVITY], &gravity_range, &gravity)) return false;
     planet->atmosphere_desc = *nebel_lookup_atmosphere(presets[preset].name);
-    planet->sun_angular_diameter = presets[preset].sun_diameter;
+    planet->sun_angular_diameter = presets[preset].sun_angular_diameter;
     if (found[GRAVITY] != NULL) stretch(&planet->atmosphere_desc, presets[preset].gravity / gravity);
     return true;
 }
@@ -128,7 +131,7 @@ static bool read_sizes(nb_scene_reader *in, const nb_json_node *const *found, ne
     double radius = desc->radius / in->space.unit, thickness = desc->thickness / in->space.unit, center[3];
     if (!nb_key_value_number(in->json, found[RADIUS], &radius_range, &radius) ||
         !nb_key_value_place(in->json, found[CENTER], center) ||
-        !nb_key_value_number(in->json, found[SUN_DIAMETER], &diameter_range, &planet->sun_angular_diameter))
+        !nb_key_value_number(in->json, found[SUN_ANGULAR_DIAMETER], &diameter_range, &planet->sun_angular_diameter))
         return false;
     if (found[RADIUS] != NULL) desc->radius = radius * in->space.unit;
     const nb_range thickness_range = {
@@ -174,17 +177,17 @@ nb_ground_sphere nb_find_sphere(const nb_json *json, const nb_json_node *planet)
 }
 
 /* The core knows what numbers do not go with each other. */
-static bool try_planet(nb_scene_reader *in, const nb_json_node *node, bool has_airs, nebel_planet *planet)
+static bool try_planet(nb_scene_reader *in, const nb_json_node *node, bool has_components, nebel_planet *planet)
 {
     static const char subject[] = "atmosphere: ",
-                      advice[] = "; these airs are the preset's: give \"airs\" that go with the other keys";
+                      advice[] = "; these components are the preset's: give \"components\" that go with the other keys";
     planet->atmosphere_desc.log = (nebel_log){nb_keys_read_keep_message, in};
     const nebel_result result = nebel_resolve_atmosphere(&planet->atmosphere_desc, &planet->atmosphere_desc);
     planet->atmosphere_desc.log = (nebel_log){NULL, NULL};
     if (result == NEBEL_OK) return true;
     const char *message = in->core_message;
     if (strncmp(message, subject, sizeof subject - 1) == 0) message += sizeof subject - 1;
-    const bool is_of_preset = !has_airs && strncmp(message, "airs[", 5) == 0;
+    const bool is_of_preset = !has_components && strncmp(message, "components[", 11) == 0;
     return nb_key_value_fail_within(in->json, node, message, is_of_preset ? advice : "");
 }
 
@@ -203,25 +206,25 @@ static bool read_physical(nb_scene_reader *in, const nb_json_node *node, nebel_p
     const nb_json_node *found[PLANET_KEY_COUNT];
     nb_json *json = in->json;
     if (!nb_key_value_members(json, node, &planet_keys, found) || !read_preset(json, found, planet) ||
-        !read_sizes(in, found, planet) || !read_airs(in, found[AIRS], &planet->atmosphere_desc) ||
+        !read_sizes(in, found, planet) || !read_components(in, found[COMPONENTS], &planet->atmosphere_desc) ||
         !nb_key_value_color(json, found[GROUND_ALBEDO], &nb_range_fraction, planet->atmosphere_desc.ground_albedo))
         return false;
     const int quality = found[QUALITY] != NULL ? nb_key_value_choice(json, found[QUALITY], quality_names, 2) : 0;
     if (quality < 0) return false;
     planet->atmosphere_desc.quality = (nebel_atmosphere_quality)quality;
-    return try_planet(in, node, found[AIRS] != NULL, planet) && nb_keys_read_clouds(in, found[CLOUDS], planet) &&
+    return try_planet(in, node, found[COMPONENTS] != NULL, planet) && nb_keys_read_clouds(in, found[CLOUDS], planet) &&
            charge(in, node, planet);
 }
 
 /* The model says which keys there may be. */
 static int read_model(nb_json *json, const nb_json_node *node)
 {
-    static const char *const model_names[] = {"physical", "layers"};
+    static const char *const model_names[] = {"physical", "textured"};
     for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one))
         if (nb_key_value_is_key(one, "", "model"))
             return nb_key_value_choice(json, one, model_names, NEBEL_PLANET_MODEL_COUNT);
     (void)nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
-                       "the key \"model\" is missing; must be one of: physical, layers");
+                       "the key \"model\" is missing; must be one of: physical, textured");
     return -1;
 }
 
@@ -259,7 +262,7 @@ static bool read_one_of_many(nb_scene_reader *in, const nb_json_node *node, nebe
 {
     if (!read_planet(in, node, &planets[number])) return false;
     if (planets[number].model != NEBEL_PLANET_PHYSICAL)
-        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is a planet of layers, which stands alone");
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is a textured planet, which stands alone");
     if (number > 0 && planets[number].cloud_layer_count > 0)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "has clouds; the first planet alone may");
     return check_apart(in, node, planets, number);

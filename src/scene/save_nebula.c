@@ -70,7 +70,7 @@ static void change_nebula(nb_key_patch *save, const nb_scene_reader *in, const n
     const nb_json_patch_object nebula = nb_json_patch_find(json, node);
     const bool loses_size = now.turbulence_scale == 0;
     nb_removed_keys lost = {{NULL}};
-    if (loses_size) nb_key_patch_lose(&lost, "turbulence_size");
+    if (loses_size) nb_key_patch_lose(&lost, "turbulence_scale");
     if (now.color_count == 0) nb_key_patch_lose(&lost, "colors");
     nb_key_patch_shape(save, in, nb_json_patch_member(json, node, "shape"), &was.shape, &now.shape);
     nb_file_units_restore_nebula(&in->space, &was);

@@ -15,7 +15,7 @@
 
 static const nb_key_entry physical_places[] = {
     PLACE(nebel_planet, "ground_albedo", atmosphere_desc.ground_albedo, 3, NB_EDIT_AMOUNT),
-    PLACE(nebel_planet, "sun_diameter", sun_angular_diameter, 1, NB_EDIT_EACH),
+    PLACE(nebel_planet, "sun_angular_diameter", sun_angular_diameter, 1, NB_EDIT_EACH),
     END,
 };
 
@@ -23,8 +23,8 @@ static const nb_key_entry air_places[] = {
     PLACE(nebel_atmosphere_component, "scattering", scattering, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_atmosphere_component, "absorption", absorption, 3, NB_EDIT_AMOUNT),
     NUMBER(nebel_atmosphere_component, scale_height),
-    PLACE(nebel_atmosphere_component, "middle", center_height, 1, NB_EDIT_EACH),
-    PLACE(nebel_atmosphere_component, "width", half_width, 1, NB_EDIT_EACH),
+    PLACE(nebel_atmosphere_component, "center_height", center_height, 1, NB_EDIT_EACH),
+    PLACE(nebel_atmosphere_component, "half_width", half_width, 1, NB_EDIT_EACH),
     END,
 };
 
@@ -38,25 +38,25 @@ static const nb_key_entry cloud_places[] = {
     NUMBER(nebel_cloud_layer, top),
     NUMBER(nebel_cloud_layer, coverage),
     NUMBER(nebel_cloud_layer, extinction),
-    PLACE(nebel_cloud_layer, "size", cell_size, 1, NB_EDIT_EACH),
-    PLACE(nebel_cloud_layer, "detail", erosion, 1, NB_EDIT_EACH),
-    PLACE(nebel_cloud_layer, "variation", patchiness, 1, NB_EDIT_EACH),
-    PLACE(nebel_cloud_layer, "diameter", droplet_diameter, 1, NB_EDIT_EACH),
+    PLACE(nebel_cloud_layer, "cell_size", cell_size, 1, NB_EDIT_EACH),
+    PLACE(nebel_cloud_layer, "erosion", erosion, 1, NB_EDIT_EACH),
+    PLACE(nebel_cloud_layer, "patchiness", patchiness, 1, NB_EDIT_EACH),
+    PLACE(nebel_cloud_layer, "droplet_diameter", droplet_diameter, 1, NB_EDIT_EACH),
     PLACE(nebel_cloud_layer, "wind", wind, 2, NB_EDIT_EACH),
     END,
 };
 
 static const nb_key_entry layers_places[] = {
-    PLACE(nebel_textured_planet_desc, "day", rotation_period, 1, NB_EDIT_EACH),
-    PLACE(nebel_textured_planet_desc, "coverage", land_coverage, 1, NB_EDIT_EACH),
+    PLACE(nebel_textured_planet_desc, "rotation_period", rotation_period, 1, NB_EDIT_EACH),
+    PLACE(nebel_textured_planet_desc, "land_coverage", land_coverage, 1, NB_EDIT_EACH),
     END,
 };
 
 static const nb_key_entry shell_places[] = {
     NUMBER(nebel_cloud_shell, height),
-    PLACE(nebel_cloud_shell, "day", rotation_period, 1, NB_EDIT_EACH),
+    PLACE(nebel_cloud_shell, "rotation_period", rotation_period, 1, NB_EDIT_EACH),
     PLACE(nebel_cloud_shell, "color", color, 3, NB_EDIT_AMOUNT),
-    PLACE(nebel_cloud_shell, "wrap", uv_tiling, 3, NB_EDIT_EACH),
+    PLACE(nebel_cloud_shell, "uv_tiling", uv_tiling, 3, NB_EDIT_EACH),
     NUMBER(nebel_cloud_shell, gain),
     NUMBER(nebel_cloud_shell, coverage),
     END,
@@ -185,14 +185,14 @@ static void write_airs(nb_key_patch *save, const nb_json_patch_object *planet, c
     if (words != NULL && array != NULL)
         nb_json_patch_replace(&save->edit, array, words);
     else if (words != NULL)
-        nb_json_patch_add(&save->edit, planet, "airs", words);
+        nb_json_patch_add(&save->edit, planet, "components", words);
     nb_release(&save->edit.arena.allocator, out.bytes.data);
 }
 
 static void save_airs(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *planet,
                       const nebel_atmosphere_desc *was, const nebel_atmosphere_desc *now)
 {
-    const nb_json_node *array = nb_json_patch_member(json, planet->node, "airs");
+    const nb_json_node *array = nb_json_patch_member(json, planet->node, "components");
     if (are_same_airs(was, now)) return;
     if (array == NULL || array->count != now->component_count) {
         write_airs(save, planet, array, now);
@@ -230,7 +230,7 @@ static void save_shells(nb_key_patch *save, const nb_json *json, const nb_json_p
                         const nebel_textured_planet_desc *was, const nebel_textured_planet_desc *now)
 {
     nb_key_patch_places(save, json, planet, layers_places, NB_ALL_PLACES, was, now);
-    nb_key_patch_object(save, json, planet, "air", air_shell_places, &was->atmosphere, &now->atmosphere);
+    nb_key_patch_object(save, json, planet, "atmosphere", air_shell_places, &was->atmosphere, &now->atmosphere);
     if (now->cloud_shell_count == 0) return;
     const nb_json_node *node = nb_json_first(json, nb_json_patch_member(json, planet->node, "clouds"));
     for (uint32_t i = 0; i < now->cloud_shell_count; i++, node = nb_json_next(json, node))

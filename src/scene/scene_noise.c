@@ -124,7 +124,7 @@ nebel_result nebel_get_scene_grid(const nebel_scene *scene, nebel_grid *grid, do
 static const nb_key_entry places[] = {
     NOISE_PLACE("cells", desc.frequency, 3),   NOISE_PLACE("gain", desc.gain, 1),
     NOISE_PLACE("coverage", desc.coverage, 1), NOISE_PLACE("edge", desc.falloff, 3),
-    NOISE_PLACE("drift", velocity, 3),         NOISE_PLACE("change", evolution, 1),
+    NOISE_PLACE("velocity", velocity, 3),      NOISE_PLACE("evolution", evolution, 1),
 };
 
 void nb_key_patch_noise(nb_edit *edit, const nb_json *json, const nb_json_patch_object *object,

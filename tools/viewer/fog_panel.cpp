@@ -345,7 +345,7 @@ bool draw_strewing(nb_panel *panel, nebel_nebula_desc *nebula, nebel_transform *
     if (nebula->points == nullptr) {
         changed |= slide_whole("particles", &count, 1, MOST_PARTICLES, true, "How many there are.");
         changed |= draw_density(panel, &nebula->density, reach, false);
-        changed |= slide("fade", &nebula->dimming, 0, 1, "%.2f", false,
+        changed |= slide("dimming", &nebula->dimming, 0, 1, "%.2f", false,
                          "How much the density dims particles, in place of thinning them out.");
         changed |= draw_shape(panel, &nebula->shape, reach, true);
     } else {
@@ -392,13 +392,13 @@ bool draw_colors(nb_panel *panel, nebel_nebula_desc *nebula)
 
 bool draw_nebula_numbers(nb_panel *panel, nebel_nebula_desc *nebula, nebel_transform *place, double reach)
 {
-    static const char *const profiles[] = {"soft", "gaussian", "ball"};
+    static const char *const profiles[] = {"soft", "gaussian", "uniform"};
     int profile = nebula->profile;
     bool changed = draw_strewing(panel, nebula, place, reach);
     changed |= choose("profile", &profile, profiles, NEBEL_PARTICLE_PROFILE_COUNT,
                       "How a particle thins from its middle to its surface.");
     nebula->profile = nebel_particle_profile(profile);
-    changed |= drag("size [m]", nebula->radius_range, 2, 0.01, 1e-6, "%.4g",
+    changed |= drag("radius range [m]", nebula->radius_range, 2, 0.01, 1e-6, "%.4g",
                     "Radius of the smallest and the largest particle.");
     changed |= drag("absorption [1/m]", nebula->absorption, 3, 0.01, 0, "%.4g", "In the middle of a particle.");
     changed |=

@@ -64,8 +64,9 @@ bool draw_air(nebel_atmosphere_component *air)
         changed |=
             drag_length("scale height", &air->scale_height, "Where it is 1 / e = 0.37 as dense as at the ground.");
     if (air->profile == NEBEL_COMPONENT_TENT) {
-        changed |= drag("middle", &air->center_height, 1, 1, 0, "%.4g m", "Above the ground: where it is densest.");
-        changed |= drag_length("width", &air->half_width, "From its middle to either end.");
+        changed |=
+            drag("center height", &air->center_height, 1, 1, 0, "%.4g m", "Above the ground: where it is densest.");
+        changed |= drag_length("half width", &air->half_width, "From its center to either end.");
     }
     if (phase == NEBEL_PHASE_HENYEY_GREENSTEIN || phase == NEBEL_PHASE_CORNETTE_SHANKS || phase == NEBEL_PHASE_DRAINE)
         changed |= slide("g", &air->phase.g, -0.95, 0.95, "%.3f", false,
@@ -77,7 +78,7 @@ bool draw_airs(nebel_planet *planet)
 {
     bool changed = false;
     for (uint32_t i = 0; i < planet->atmosphere_desc.component_count; i++) {
-        const Owner owner("airs", i);
+        const Owner owner("components", i);
         if (!open_entry(name_of(planet->atmosphere_desc.components[i]))) continue;
         changed |= draw_air(&planet->atmosphere_desc.components[i]);
         close_entry();
@@ -135,10 +136,10 @@ bool draw_layer(nebel_cloud_layer *layer, double thickness)
     changed |= drag_height(layer, shown, &nebel_cloud_layer::base, "base", "Above the ground.");
     changed |= drag_height(layer, shown, &nebel_cloud_layer::top, "top", "Above the ground; more than the base.");
     changed |= slide_extinction(layer, shown);
-    changed |= drag_height(layer, shown, &nebel_cloud_layer::cell_size, "size",
+    changed |= drag_height(layer, shown, &nebel_cloud_layer::cell_size, "cell size",
                            "Of the largest heaps: half of the distance from one to the next.");
-    changed |= slide_part(layer, shown, &nebel_cloud_layer::erosion, "detail", "How deep billows cut into clouds.");
-    changed |= slide_part(layer, shown, &nebel_cloud_layer::patchiness, "variation",
+    changed |= slide_part(layer, shown, &nebel_cloud_layer::erosion, "erosion", "How deep billows cut into clouds.");
+    changed |= slide_part(layer, shown, &nebel_cloud_layer::patchiness, "patchiness",
                           "How much more clouds are here than there, over ten sizes and more.");
     return drag("wind [m]", layer->wind, 2, 1, -DBL_MAX, "%.4g", "From frame to frame, along x and z.") || changed;
 }
@@ -184,9 +185,9 @@ bool slide_share(double *coverage, const char *name, const char *help)
     return true;
 }
 
-bool drag_day(double *day)
+bool drag_period(double *period)
 {
-    return drag("day", day, 1, 10, -DBL_MAX, "%.4g frames",
+    return drag("rotation period", period, 1, 10, -DBL_MAX, "%.4g frames",
                 "Frames of a turn to the east; less than 0 to the west; 0: it stands still.");
 }
 
@@ -194,7 +195,7 @@ bool drag_day(double *day)
 bool draw_shell(nebel_cloud_shell *shell, const nebel_cloud_shell &made)
 {
     double height = shell->height > 0 ? shell->height : made.height, gain = shell->gain > 0 ? shell->gain : made.gain;
-    bool changed = drag_day(&shell->rotation_period);
+    bool changed = drag_period(&shell->rotation_period);
     if (drag_length("height", &height, "Above the ground.")) {
         shell->height = height;
         changed = true;
@@ -229,7 +230,7 @@ bool draw_air_shell(nebel_atmosphere_shell *air, const nebel_atmosphere_shell &m
 
 bool draw_layers(nebel_textured_planet_desc *layers, const nebel_textured_planet_desc &made)
 {
-    bool changed = drag_day(&layers->rotation_period);
+    bool changed = drag_period(&layers->rotation_period);
     if (layers->color_map.texels == nullptr)
         changed |= slide_share(&layers->land_coverage, "land", "Of ground that is generated.");
     changed |= draw_air_shell(&layers->atmosphere, made.atmosphere);

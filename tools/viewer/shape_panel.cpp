@@ -306,8 +306,8 @@ bool draw_octaves(nebel_noise_desc *desc)
 
 bool draw_motion(nebel_scene_noise *noise)
 {
-    bool changed = drag("drift", noise->velocity, 3, 0.1, -DBL_MAX, "%.4g", "Wind: in cells for each frame.");
-    changed |= drag("change", &noise->evolution, 1, 0.1, -DBL_MAX, "%.4g a frame",
+    bool changed = drag("velocity", noise->velocity, 3, 0.1, -DBL_MAX, "%.4g", "Wind: in cells for each frame.");
+    changed |= drag("evolution", &noise->evolution, 1, 0.1, -DBL_MAX, "%.4g a frame",
                     "At 1 it is another after each frame; smaller octaves change sooner.");
     limit(noise->velocity, 3, -most_motion, most_motion);
     limit(&noise->evolution, 1, -most_motion, most_motion);
