@@ -1,6 +1,6 @@
 # Calls with NULL of every function that the headers declare.
-set(null_cpu cells classic clouds diffusion environment layers nebel nebula photograph places planet render scene shader)
-set(null_gl gl gl_classic gl_render)
+set(null_cpu classic light nebel particles photograph places planet render scene shader)
+set(null_gl gl)
 foreach(library IN ITEMS cpu gl)
     if(NOT TARGET nebel_test_${library})
         continue()
