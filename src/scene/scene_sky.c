@@ -341,7 +341,8 @@ nebel_result nebel_update_scene_planets(nebel_scene *scene, const nebel_planet *
         return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < scene->data.planet_count; i++)
         if (!has_good_sun(&planets[i]))
-            return nb_fail(&scene->log, NEBEL_ERROR_VALUE, "planet: sun_angular_diameter: must be within 0 and 10 degrees");
+            return nb_fail(&scene->log, NEBEL_ERROR_VALUE,
+                           "planet: sun_angular_diameter: must be within 0 and 10 degrees");
     nb_made_planets kept;
     keep_made(scene, &kept);
     detach_made(scene);
