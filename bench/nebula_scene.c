@@ -7,7 +7,7 @@
 
 enum { COUNT = 100000, QUICK_COUNT = 500 };
 
-static int strew(nb_sky *sky)
+static int generate_particles(nb_sky *sky)
 {
     static const double colors[3][3] = {{.2, .1, .8}, {.9, .3, .4}, {1, .8, .5}};
     const nebel_nebula_desc desc = {.shape = {.type = NEBEL_SHAPE_ELLIPSOID, .radii = {8, 4.5, 4}},
@@ -28,7 +28,7 @@ int nb_sky_make(int quick, nb_sky *sky)
                     .height = quick ? 90 : NB_BENCH_HEIGHT,
                     .camera = {.position = {0, 0, 18}, .up = {0, 1, 0}, .vertical_fov = 38}};
     sky->particles = malloc(sky->count * sizeof *sky->particles);
-    return sky->particles != NULL ? strew(sky) : -1;
+    return sky->particles != NULL ? generate_particles(sky) : -1;
 }
 
 void nb_sky_free(nb_sky *sky)

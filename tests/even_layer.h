@@ -89,10 +89,10 @@ static inline double radiance(const even *e, double down, double around)
     const double height = down > 0 ? TOP + 500 : BASE - 500, way = (height - middle) / down, spread = 1e-4;
     const nebel_ray ray = {
         {-way * level * around, height, -way * level * side}, {level * around, -down, level * side}, HUGE_VAL};
-    nebel_cloud_transfer knots;
-    assert_int_equal(nebel_trace_clouds(e->workspace, 1, &ray, 0, &spread, 0, &knots, 0), NEBEL_OK);
-    assert_true(knots.count > 0);
-    return (double)knots.in_scattering[knots.count - 1][1];
+    nebel_cloud_transfer nodes;
+    assert_int_equal(nebel_trace_clouds(e->workspace, 1, &ray, 0, &spread, 0, &nodes, 0), NEBEL_OK);
+    assert_true(nodes.count > 0);
+    return (double)nodes.in_scattering[nodes.count - 1][1];
 }
 
 #endif

@@ -1,4 +1,4 @@
-/* Clouds and air along a ray: what is told of the means between knots. */
+/* Clouds and air along a ray: what is told of the means between nodes. */
 #include "aerial/cloud_compose.h"
 
 #include "dice.h"
@@ -11,7 +11,7 @@ typedef struct along {
     double left[2][STEPS + 1], light[2][STEPS + 1];
 } along;
 
-/* Most steps are empty, so that media lie anywhere between knots. */
+/* Most steps are empty, so that media lie anywhere between nodes. */
 static along throw_media(uint64_t *numbers)
 {
     along media;
@@ -39,14 +39,14 @@ static double light_of(const along *media)
 }
 
 /* Clouds are 0, air is 1. */
-static void sample(const along *media, nebel_cloud_transfer *knots, nb_aerial_nodes *haze)
+static void sample(const along *media, nebel_cloud_transfer *nodes, nb_aerial_nodes *haze)
 {
-    knots->count = KNOTS;
+    nodes->count = KNOTS;
     for (int k = 0; k < KNOTS; k++) {
-        knots->t[k] = (float)k;
-        knots->transmittance[k] = (float)media->left[0][k * EVERY];
+        nodes->t[k] = (float)k;
+        nodes->transmittance[k] = (float)media->left[0][k * EVERY];
         for (int c = 0; c < 3; c++) {
-            knots->in_scattering[k][c] = (float)media->light[0][k * EVERY];
+            nodes->in_scattering[k][c] = (float)media->light[0][k * EVERY];
             haze->left[c][k] = (float)media->left[1][k * EVERY];
             haze->light[c][k] = (float)media->light[1][k * EVERY];
         }
@@ -61,18 +61,18 @@ static void test_what_means_miss_is_told(void **state)
     double most = 0;
     for (int i = 0; i < TIMES; i++) {
         const along media = throw_media(&numbers);
-        nebel_cloud_transfer knots;
+        nebel_cloud_transfer nodes;
         nb_aerial_nodes haze;
         float over[NEBEL_MAX_CLOUD_NODES];
-        sample(&media, &knots, &haze);
-        nb_cloud_compose_sum(&knots, 0, &haze, over);
-        const double told = (double)nb_cloud_compose_missed(&knots, &haze);
+        sample(&media, &nodes, &haze);
+        nb_cloud_compose_sum(&nodes, 0, &haze, over);
+        const double told = (double)nb_cloud_compose_missed(&nodes, &haze);
         const double sum = (double)over[KNOTS - 1] + media.left[0][STEPS] * media.light[1][STEPS];
         const double off = fabs(sum - light_of(&media));
         assert_true(off <= told + 1e-5);
         most = fmax(most, off / fmax(told, 1e-3));
     }
-    print_message("means between knots are off by %.2g of what is told at most\n", most);
+    print_message("means between nodes are off by %.2g of what is told at most\n", most);
     assert_true(most > .5);
 }
 
@@ -80,7 +80,7 @@ static void test_what_means_miss_is_told(void **state)
 static void test_the_bound_is_met(void **state)
 {
     (void)state;
-    nebel_cloud_transfer knots = {.count = 2, .t = {1, 2}, .transmittance = {1, .25f}};
+    nebel_cloud_transfer nodes = {.count = 2, .t = {1, 2}, .transmittance = {1, .25f}};
     nb_aerial_nodes haze;
     float over[NEBEL_MAX_CLOUD_NODES];
     for (int c = 0; c < 3; c++)
@@ -88,8 +88,8 @@ static void test_the_bound_is_met(void **state)
             haze.left[c][k] = 1;
             haze.light[c][k] = .5f * (float)k;
         }
-    nb_cloud_compose_sum(&knots, 0, &haze, over);
-    const float sum = over[1] + .25f * .5f, told = nb_cloud_compose_missed(&knots, &haze);
+    nb_cloud_compose_sum(&nodes, 0, &haze, over);
+    const float sum = over[1] + .25f * .5f, told = nb_cloud_compose_missed(&nodes, &haze);
     assert_float_equal(sum + told, .5f, 1e-6);
     assert_float_equal(sum - told, .25f * .5f, 1e-6);
 }

@@ -172,10 +172,10 @@ static void test_ways_to_a_sun_below_level(void **state)
 /* 0 where more than a twentieth is seen through clouds. */
 static double light_of_opaque(nebel_cloud_workspace *workspace, const nebel_ray *ray, double spread)
 {
-    nebel_cloud_transfer knots;
-    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &spread, 0, &knots, 0), NEBEL_OK);
-    return knots.count > 0 && knots.transmittance[knots.count - 1] < .05f
-               ? (double)knots.in_scattering[knots.count - 1][1]
+    nebel_cloud_transfer nodes;
+    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &spread, 0, &nodes, 0), NEBEL_OK);
+    return nodes.count > 0 && nodes.transmittance[nodes.count - 1] < .05f
+               ? (double)nodes.in_scattering[nodes.count - 1][1]
                : 0;
 }
 
@@ -291,14 +291,14 @@ static void test_light_of_dense_clouds(void **state)
         for (int i = 0; i < 2000; i++) {
             const double down = dice(&numbers, .01, .5), turn = dice(&numbers, -PI, PI), level = sqrt(1 - down * down);
             const nebel_ray ray = {{0, 3000, 0}, {level * sin(turn), -down, level * cos(turn)}, HUGE_VAL};
-            nebel_cloud_transfer knots;
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){.01}, 0, &knots, 0), NEBEL_OK);
-            for (uint32_t k = 0; k < knots.count; k++)
+            nebel_cloud_transfer nodes;
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){.01}, 0, &nodes, 0), NEBEL_OK);
+            for (uint32_t k = 0; k < nodes.count; k++)
                 for (int c = 0; c < 3; c++)
-                    assert_true(isfinite(knots.in_scattering[k][c]) && knots.in_scattering[k][c] >= 0);
-            if (knots.count == 0 || knots.transmittance[knots.count - 1] > .01f) continue;
+                    assert_true(isfinite(nodes.in_scattering[k][c]) && nodes.in_scattering[k][c] >= 0);
+            if (nodes.count == 0 || nodes.transmittance[nodes.count - 1] > .01f) continue;
             opaque++;
-            assert_true(knots.in_scattering[knots.count - 1][1] > .05f && knots.error < 2);
+            assert_true(nodes.in_scattering[nodes.count - 1][1] > .05f && nodes.error < 2);
         }
         assert_true(opaque > 1000);
         nebel_destroy_cloud_workspace(workspace);

@@ -28,11 +28,11 @@ static void check_rays(const sky_case *is)
     int between = 0, untold = 0;
     for (int i = 0; i < is->rays; i++) {
         const nebel_ray ray = draw_ray(&numbers);
-        nebel_cloud_transfer knots;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
-        const double up = ray.direction[1], left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+        nebel_cloud_transfer nodes;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_OK);
+        const double up = ray.direction[1], left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
         const double truth = brute_force(clouds, &ray, .5 * is->low / up, (is->high + 20) / up, 1);
-        const double off = fabs(left - truth), more = off - (double)knots.error;
+        const double off = fabs(left - truth), more = off - (double)nodes.error;
         worst = fmax(worst, off);
         sum += off / is->rays;
         between += truth > .02 && truth < .98;

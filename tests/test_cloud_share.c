@@ -14,7 +14,7 @@ static int at(int x, int y)
 
 typedef struct picture {
     nb_cloud_pixel_block block;
-    nebel_cloud_transfer knots[ALL], truth[ALL];
+    nebel_cloud_transfer nodes[ALL], truth[ALL];
     int is_asked[ALL];
 } picture;
 
@@ -34,7 +34,7 @@ static void begin(picture *p)
     memset(p, 0, sizeof *p);
     for (int i = 0; i < ALL; i++) {
         p->block.is_wanted[i] = p->block.is_open[i] = 1;
-        p->block.knots[i] = &p->knots[i];
+        p->block.nodes[i] = &p->nodes[i];
         p->truth[i] = wall(.2f, 1);
     }
 }
@@ -49,7 +49,7 @@ static int trace(picture *p)
         nb_cloud_pixels_block_ask(&p->block, level, is_asked);
         for (int i = 0; i < ALL; i++) {
             if (!is_asked[i]) continue;
-            p->knots[i] = p->truth[i];
+            p->nodes[i] = p->truth[i];
             p->is_asked[i] = 1;
             count++;
         }
@@ -75,8 +75,8 @@ static void test_even_clouds_need_a_quarter_of_rays(void **state)
     /* A quarter, and at the left and the right border of each row at most two more. */
     assert_in_range(trace(&p), ALL / 4, ALL / 4 + 2 * ROWS);
     for (int i = 0; i < ALL; i++) {
-        assert_same(&p.knots[i], &p.truth[i]);
-        assert_true(p.knots[i].error >= p.truth[i].error);
+        assert_same(&p.nodes[i], &p.truth[i]);
+        assert_true(p.nodes[i].error >= p.truth[i].error);
     }
 }
 
@@ -91,8 +91,8 @@ static void test_slopes_are_kept(void **state)
     }
     assert_true(trace(&p) < ALL / 2);
     for (int i = 0; i < ALL; i++) {
-        assert_float_equal(p.knots[i].transmittance[2], p.truth[i].transmittance[2], 1e-6);
-        assert_float_equal(p.knots[i].in_scattering[2][0], p.truth[i].in_scattering[2][0], 1e-6);
+        assert_float_equal(p.nodes[i].transmittance[2], p.truth[i].transmittance[2], 1e-6);
+        assert_float_equal(p.nodes[i].in_scattering[2][0], p.truth[i].in_scattering[2][0], 1e-6);
     }
 }
 
@@ -105,12 +105,12 @@ static void test_edges_have_rays(void **state)
         for (int i = 0; i < ALL; i++)
             if (i % COLUMNS < x) p.truth[i] = wall(.6f, 1);
         trace(&p);
-        for (int i = 0; i < ALL; i++) assert_same(&p.knots[i], &p.truth[i]);
+        for (int i = 0; i < ALL; i++) assert_same(&p.nodes[i], &p.truth[i]);
         begin(&p);
         for (int i = 0; i < ALL; i++)
             if (i % COLUMNS < x) p.truth[i] = wall(.2f, .8f);
         trace(&p);
-        for (int i = 0; i < ALL; i++) assert_same(&p.knots[i], &p.truth[i]);
+        for (int i = 0; i < ALL; i++) assert_same(&p.nodes[i], &p.truth[i]);
     }
 }
 
@@ -126,7 +126,7 @@ static void test_puffs_beside_clear_rays_are_seen(void **state)
             p.truth[puff] = wall(.2f, 1);
             const int count = trace(&p);
             assert_true(looks == 1 ? count == ALL : count < ALL / 2);
-            assert_true(looks == 0 || p.knots[puff].count == 3);
+            assert_true(looks == 0 || p.nodes[puff].count == 3);
         }
 }
 
@@ -177,8 +177,8 @@ static void test_sheets_lie_over_the_ground(void **state)
     }
     assert_true(trace(&p) < ALL / 2);
     for (int i = 0; i < ALL; i++) {
-        assert_int_equal(p.knots[i].count, 3);
-        for (int k = 0; k < 3; k++) assert_float_equal(p.knots[i].t[k], p.truth[i].t[k], 1);
+        assert_int_equal(p.nodes[i].count, 3);
+        for (int k = 0; k < 3; k++) assert_float_equal(p.nodes[i].t[k], p.truth[i].t[k], 1);
     }
 }
 
@@ -190,7 +190,7 @@ static void test_heaps_stand_before_the_ground(void **state)
     begin(&p);
     for (int i = 0; i < ALL; i++) p.block.ground[i] = 1e5f / (1 + .2f * (float)(i / COLUMNS));
     assert_true(trace(&p) < ALL / 2);
-    for (int i = 0; i < ALL; i++) assert_same(&p.knots[i], &p.truth[i]);
+    for (int i = 0; i < ALL; i++) assert_same(&p.nodes[i], &p.truth[i]);
 }
 
 /* Beside the planet's edge all have rays. */

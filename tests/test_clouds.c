@@ -210,9 +210,9 @@ static void test_no_lines_in_thin_clouds(void **state)
         const double x = -.25 + .7 * (i % WIDE) / WIDE, y = .2 + .35 * (double)(i / WIDE) / HIGH;
         const double length = sqrt(x * x + y * y + 1);
         const nebel_ray ray = {{0, 1359.375, 0}, {x / length, y / length, -1 / length}, 300};
-        nebel_cloud_transfer knots;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
-        const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+        nebel_cloud_transfer nodes;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_OK);
+        const double left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
         const double truth = brute_force(clouds, &ray, 0, 300, 1), step = fabs(left - truth - last);
         last = left - truth;
         between += truth > .02 && truth < .98;
@@ -251,7 +251,7 @@ static nebel_ray pixel_ray(const window *w, int x, int y)
 static double find_grain(const nebel_cloud_layer *layer, const nebel_sun *sun, const window *w, double *most)
 {
     enum { COUNT = SIDE * SIDE };
-    static nebel_cloud_transfer knots[COUNT];
+    static nebel_cloud_transfer nodes[COUNT];
     nebel_clouds *clouds = make(1, layer);
     const nebel_cloud_lighting_desc desc = {.clouds = clouds, .sun = *sun};
     const double pixel = sqrt(nb_vector_dot(w->right, w->right));
@@ -263,14 +263,14 @@ static double find_grain(const nebel_cloud_layer *layer, const nebel_sun *sun, c
     assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
     for (int i = 0; i < COUNT; i++) {
         const nebel_ray ray = pixel_ray(w, i % SIDE, i / SIDE);
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &pixel, 0, &knots[i], 0), NEBEL_OK);
-        assert_true(knots[i].count > 0);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &pixel, 0, &nodes[i], 0), NEBEL_OK);
+        assert_true(nodes[i].count > 0);
     }
     for (int i = SIDE; i < COUNT - SIDE; i++) {
         double light[5];
         const int at[5] = {i, i - 1, i + 1, i - SIDE, i + SIDE};
         if (i % SIDE == 0 || i % SIDE == SIDE - 1) continue;
-        for (int k = 0; k < 5; k++) light[k] = (double)knots[at[k]].in_scattering[knots[at[k]].count - 1][0];
+        for (int k = 0; k < 5; k++) light[k] = (double)nodes[at[k]].in_scattering[nodes[at[k]].count - 1][0];
         const double off = 4 * light[0] / (light[1] + light[2] + light[3] + light[4]) - 1;
         square += off * off;
         *most = fmax(*most, fabs(off));
@@ -351,11 +351,11 @@ static void test_billows_that_are_missed(void **state)
                                i % 3 == 2 ? 4120 / -rise : HUGE_VAL};
         const double begin = i % 3 == 0 ? 0 : (i % 3 == 1 ? 800 : 2200) / fabs(rise),
                      end = (i % 3 == 2 ? 4120 : 2720 - height) / fabs(rise);
-        nebel_cloud_transfer knots;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
-        const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+        nebel_cloud_transfer nodes;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_OK);
+        const double left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
         const double off = fabs(left - brute_force(clouds, &ray, begin, end, 1));
-        const double beyond = off - (knots.count > 0 ? (double)knots.error : 0);
+        const double beyond = off - (nodes.count > 0 ? (double)nodes.error : 0);
         sum += off / rays;
         most = fmax(most, beyond);
         untold += beyond > 2e-3;
@@ -371,9 +371,9 @@ static void test_billows_that_are_missed(void **state)
 /* What is left of a ray by short steps, less what is traced. */
 static double excess_of(const nebel_clouds *clouds, nebel_cloud_workspace *workspace, const nebel_ray *ray, double end)
 {
-    nebel_cloud_transfer knots;
-    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
-    const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+    nebel_cloud_transfer nodes;
+    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_OK);
+    const double left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
     return left - brute_force(clouds, ray, 0, end, 2);
 }
 
@@ -434,10 +434,10 @@ static void test_thin_layers(void **state)
     for (int i = 0; i < RAYS; i++) {
         const double length = sqrt(1.04);
         const nebel_ray ray = {{200. * (i - .5 * RAYS), 0, 0}, {0, 1 / length, .2 / length}, HUGE_VAL};
-        nebel_cloud_transfer knots;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &knots, 0), NEBEL_OK);
+        nebel_cloud_transfer nodes;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &nodes, 0), NEBEL_OK);
         const double truth = brute_force(clouds, &ray, 860 * length, 911 * length, .05);
-        const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+        const double left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
         met += truth < .9;
         missed += fabs(left - truth) > .05;
     }
@@ -448,8 +448,8 @@ static void test_thin_layers(void **state)
     nebel_destroy_clouds(clouds);
 }
 
-/* Where nothing behind is seen any more the last knot is there, not where the ray leaves the layer, which is hundreds of kilometres
- * on for a ray that just passes over its base: a walk ends at an optical depth, which is that up to the knot. */
+/* Where nothing behind is seen any more the last node is there, not where the ray leaves the layer, which is hundreds of kilometres
+ * on for a ray that just passes over its base: a walk ends at an optical depth, which is that up to the node. */
 static void test_thick_cloud_ends_where_it_is_seen(void **state)
 {
     (void)state;
@@ -460,9 +460,9 @@ static void test_thick_cloud_ends_where_it_is_seen(void **state)
     for (int i = 0; i < 40; i++) {
         const double rise = -.03 + .0015 * i;
         const nebel_ray ray = {{0, 600, 0}, {cos(rise), sin(rise), 0}, HUGE_VAL};
-        nebel_cloud_transfer knots;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &knots, 0), NEBEL_OK);
-        const double end = (double)knots.t[knots.count - 1];
+        nebel_cloud_transfer nodes;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &nodes, 0), NEBEL_OK);
+        const double end = (double)nodes.t[nodes.count - 1];
         double depth = 0;
         assert_true(end < 1e4);
         for (double t = 0; t < end; t += 100) depth -= log(brute_force(clouds, &ray, t, fmin(t + 100, end), 1));
@@ -515,20 +515,20 @@ static void compare_orders(double spread)
     nebel_clouds *clouds = make(2, (const nebel_cloud_layer[]){{.seed = 2}, {.type = NEBEL_CLOUD_CIRRUS}});
     nebel_cloud_workspace *workspace, *other;
     nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
-    nebel_cloud_transfer knots[2][RAYS];
+    nebel_cloud_transfer nodes[2][RAYS];
     nebel_ray rays[RAYS];
-    memset(knots, 0, sizeof knots);
+    memset(nodes, 0, sizeof nodes);
     assert_int_equal(nebel_create_cloud_workspace(view, &other), NEBEL_OK);
     lay_rays(rays);
     assert_int_equal(
-        nebel_trace_clouds(workspace, RAYS, rays, sizeof *rays, &(double){spread}, 0, knots[0], sizeof **knots),
+        nebel_trace_clouds(workspace, RAYS, rays, sizeof *rays, &(double){spread}, 0, nodes[0], sizeof **nodes),
         NEBEL_OK);
     for (int i = RAYS - 1; i >= 0; i--)
-        assert_int_equal(nebel_trace_clouds(other, 1, &rays[i], 0, &(double){spread}, 0, &knots[1][i], 0), NEBEL_OK);
-    assert_memory_equal(knots[0], knots[1], sizeof knots[0]);
+        assert_int_equal(nebel_trace_clouds(other, 1, &rays[i], 0, &(double){spread}, 0, &nodes[1][i], 0), NEBEL_OK);
+    assert_memory_equal(nodes[0], nodes[1], sizeof nodes[0]);
     int some = 0;
     for (int i = 0; i < RAYS; i++) {
-        const nebel_cloud_transfer *k = &knots[0][i];
+        const nebel_cloud_transfer *k = &nodes[0][i];
         some += k->count > 0;
         for (uint32_t n = 0; n < k->count; n++) {
             assert_true(k->transmittance[n] >= 0 && k->transmittance[n] <= 1 && k->in_scattering[n][1] >= 0);
@@ -554,13 +554,13 @@ static void test_order_of_rays_makes_no_difference(void **state)
 static void test_instruction_sets_agree(void **state)
 {
     (void)state;
-    static nebel_cloud_transfer knots[2][RAYS];
+    static nebel_cloud_transfer nodes[2][RAYS];
     nebel_ray rays[RAYS];
     int some = 0;
     lay_rays(rays);
     for (int kind = 0; kind < NEBEL_CLOUD_TYPE_COUNT; kind++) {
         nebel_clouds *clouds = make(1, &(const nebel_cloud_layer){.type = (nebel_cloud_type)kind, .seed = 3});
-        memset(knots, 0, sizeof knots);
+        memset(nodes, 0, sizeof nodes);
         for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
             const nebel_cloud_lighting_desc desc = {
                 .clouds = clouds, .sun = {.direction = {.6, .7, .1}, .irradiance = {5, 4, 3}}, .isa = (nebel_isa)isa};
@@ -570,17 +570,17 @@ static void test_instruction_sets_agree(void **state)
                 assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_ERROR_UNSUPPORTED);
                 continue;
             }
-            nebel_cloud_transfer *seen = knots[isa != NEBEL_ISA_SCALAR];
+            nebel_cloud_transfer *seen = nodes[isa != NEBEL_ISA_SCALAR];
             assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_OK);
             assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
             assert_int_equal(
                 nebel_trace_clouds(workspace, RAYS, rays, sizeof *rays, &(double){1e-3}, 0, seen, sizeof *seen),
                 NEBEL_OK);
-            if (isa != NEBEL_ISA_SCALAR) assert_memory_equal(knots[0], knots[1], sizeof knots[0]);
+            if (isa != NEBEL_ISA_SCALAR) assert_memory_equal(nodes[0], nodes[1], sizeof nodes[0]);
             nebel_destroy_cloud_workspace(workspace);
             nebel_destroy_cloud_lighting(view);
         }
-        for (int i = 0; i < RAYS; i++) some += knots[0][i].count > 0;
+        for (int i = 0; i < RAYS; i++) some += nodes[0][i].count > 0;
         nebel_destroy_clouds(clouds);
     }
     assert_true(some > RAYS);
@@ -692,7 +692,7 @@ static void test_bad_calls_are_refused(void **state)
     nebel_cloud_lighting *view = view_of(clouds, 0, &workspace), *other;
     const double none = (double)NAN, place[1][3] = {{0, none, 0}};
     nebel_ray ray = {{0, 0, 0}, {0, 1, 0}, HUGE_VAL};
-    nebel_cloud_transfer knots;
+    nebel_cloud_transfer nodes;
     float number;
     char said[200] = "";
     const nebel_cloud_lighting_desc unknown = {.clouds = clouds, .isa = (nebel_isa)77, .log = {keep_text, said}};
@@ -715,12 +715,12 @@ static void test_bad_calls_are_refused(void **state)
     assert_int_equal(nebel_compute_cloud_extinction(clouds, 0, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_compute_cloud_extinction(clouds, none, 0, 0, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_compute_cloud_sun_transmittance(workspace, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){-1}, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){-1}, 0, &nodes, 0), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
     ray.t_max = none;
-    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_ERROR_ARGUMENT);
     ray = (nebel_ray){{0, 0, 0}, {0, 0, 0}, 1};
-    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_ERROR_ARGUMENT);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_workspace(NULL);
     nebel_destroy_cloud_lighting(view);

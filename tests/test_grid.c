@@ -422,7 +422,7 @@ static void errors_of_sunlight_admit_the_truth(void **state)
 /* What the sun lights and what surfaces keep from it is all that it would light. */
 static void shadows_of_surfaces_part_the_sunlight(void **test)
 {
-    static const float toggles[] = {0, .7F, 1.9F, 2.5F, 3.25F, .7F, 1.9F, 2.5F, 3.25F};
+    static const float boundaries[] = {0, .7F, 1.9F, 2.5F, 3.25F, .7F, 1.9F, 2.5F, 3.25F};
     static const uint32_t lit[] = {0, 5}, dark[] = {5, 9};
     static block b;
     (void)test;
@@ -431,7 +431,7 @@ static void shadows_of_surfaces_part_the_sunlight(void **test)
         double sun[3];
         nebel_snapshot *fog = lone_fog(&state, &b, (nebel_grid_filter)(seed % 2), sun);
         const nebel_ray ray = random_ray(&state);
-        const nebel_ray_visibility seen[2] = {{lit, toggles}, {dark, toggles}};
+        const nebel_ray_visibility seen[2] = {{lit, boundaries}, {dark, boundaries}};
         nebel_transfer part[2];
         const nebel_transfer all = trace(fog, NEBEL_PRECISION_FLOAT, 1e-4, &ray);
         for (int i = 0; i < 2; i++) {

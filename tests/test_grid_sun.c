@@ -180,19 +180,19 @@ static void check_transmittance(uint64_t seed)
     static const float shadow[] = {6.5F, 7.25F};
     float origin[3][COUNT], direction[3][COUNT], alone[3][COUNT], with_light[3][COUNT], light[3][COUNT];
     uint32_t first[COUNT + 1];
-    float toggles[2 * COUNT];
+    float boundaries[2 * COUNT];
     uint64_t state = seed;
     const cloud c = random_cloud(&state);
     nebel_snapshot *fog = fog_of(&c);
     nebel_ray_planes rays = {.offset_stride = sizeof(float), .direction_stride = sizeof(float)};
     nebel_transfer_planes dark = {.transmittance_stride = sizeof(float)}, lit = dark;
-    const nebel_ray_visibility pieces = {first, toggles};
+    const nebel_ray_visibility pieces = {first, boundaries};
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .sun_visibility = &pieces};
     lit.in_scattering_stride = sizeof(float);
     for (int n = 0; n < COUNT; n++) {
         const nebel_ray ray = random_ray(&state, &c);
         first[n] = 2 * (uint32_t)n;
-        memcpy(&toggles[first[n]], shadow, sizeof shadow);
+        memcpy(&boundaries[first[n]], shadow, sizeof shadow);
         for (int i = 0; i < 3; i++) {
             origin[i][n] = (float)ray.origin[i];
             direction[i][n] = (float)ray.direction[i];

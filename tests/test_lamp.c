@@ -298,7 +298,7 @@ static void light_is_the_same_in_any_set_and_split(void **state)
 {
     (void)state;
     for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
-        static float toggles[RAYS * 8];
+        static float boundaries[RAYS * 8];
         uint32_t first[RAYS + 1] = {0};
         uint64_t numbers = (uint64_t)kind + 5;
         nebel_ray rays[RAYS];
@@ -309,10 +309,10 @@ static void light_is_the_same_in_any_set_and_split(void **state)
         for (uint32_t i = 0; i < RAYS; i++) {
             const uint32_t count = (uint32_t)dice(&numbers, 0, 8);
             double t = 0;
-            for (uint32_t k = 0; k < count; k++) toggles[first[i] + k] = (float)(t += dice(&numbers, 0, 4));
+            for (uint32_t k = 0; k < count; k++) boundaries[first[i] + k] = (float)(t += dice(&numbers, 0, 4));
             first[i + 1] = first[i] + count;
         }
-        const nebel_ray_visibility none = {(const uint32_t[RAYS + 1]){0}, NULL}, some = {first, toggles};
+        const nebel_ray_visibility none = {(const uint32_t[RAYS + 1]){0}, NULL}, some = {first, boundaries};
         const nebel_ray_visibility pieces[LAMPS] = {some, none, some};
         nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
         trace(snapshot, &desc, rays, all);
@@ -326,7 +326,7 @@ static void light_is_the_same_in_any_set_and_split(void **state)
             trace(snapshot, &desc, rays, other);
             assert_memory_equal(expected, other, sizeof expected);
             for (size_t i = 0; i < nb_test_count(RAYS); i++) {
-                const nebel_ray_visibility one[LAMPS] = {{first + i, toggles}, none, {first + i, toggles}};
+                const nebel_ray_visibility one[LAMPS] = {{first + i, boundaries}, none, {first + i, boundaries}};
                 desc.light_visibility = one;
                 assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
             }

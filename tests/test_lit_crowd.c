@@ -265,7 +265,7 @@ static void expect_the_same_bits(const nebel_snapshot *snapshot, const nebel_tra
 
 static void expect_brute_force(size_t count, int mixed, int light, int in_shadow)
 {
-    float toggles[2 * RAYS];
+    float boundaries[2 * RAYS];
     static crowd of;
     uint32_t first[RAYS + 1];
     nebel_ray rays[RAYS];
@@ -273,13 +273,13 @@ static void expect_brute_force(size_t count, int mixed, int light, int in_shadow
     forced force[FORCED];
     const int forced_rays = (int)nb_test_count(FORCED);
     for (uint32_t i = 0; i <= RAYS; i++) first[i] = 2 * i;
-    for (int i = 0; i < 2 * RAYS; i++) toggles[i] = i % 2 == 0 ? 7 : 9.5f;
-    const nebel_ray_visibility pieces = {first, toggles};
+    for (int i = 0; i < 2 * RAYS; i++) boundaries[i] = i % 2 == 0 ? 7 : 9.5f;
+    const nebel_ray_visibility pieces = {first, boundaries};
     make_crowd(&of, count, mixed, light, 17 * count + (uint64_t)light);
     make_rays(rays, 5 * count + 3);
     nebel_snapshot *snapshot = commit_crowd(&of), *turned = commit_turned(&of);
     for (int i = 0; i < forced_rays; i++)
-        force[i] = light_by_force(&of, snapshot, turned, &rays[i], in_shadow ? toggles : NULL);
+        force[i] = light_by_force(&of, snapshot, turned, &rays[i], in_shadow ? boundaries : NULL);
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         for (int fine = 0; fine < 2; fine++) {
             nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = fine ? 2e-5 : 0};

@@ -354,7 +354,7 @@ static void frames_stop_amid_clouds(void **state)
     assert_int_equal(nebel_gl_read_planes(renderer, &(nebel_gl_planes){.color = again}), NEBEL_OK);
     assert_memory_equal(once, again, sizeof once);
     print_message("%zu times asked, %zu of them before the first sample\n", whole.calls, whole.early);
-    assert_true(whole.early >= 6); /* two rounds of rows each: knots, fog among them, and their sums */
+    assert_true(whole.early >= 6); /* two rounds of rows each: nodes, fog among them, and their sums */
     nebel_destroy_gl_renderer(renderer);
     pass_close(&context);
     assert_int_equal(m.in_use, 0);

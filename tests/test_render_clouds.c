@@ -25,31 +25,31 @@ static nebel_transfer shaded_to(const world *w, const nebel_sun *sun, const nebe
     return transfer;
 }
 
-/* The table of air in pictures is off by up to 2.7e-2 for rays that end in it. Clouds and air in short pieces: sum of T_air dS_cloud + T_cloud dS_air, with clouds as a straight line between knots. */
-static void compose(const world *w, const nebel_sun *sun, const nebel_ray *ray, const nebel_cloud_transfer *knots,
+/* The table of air in pictures is off by up to 2.7e-2 for rays that end in it. Clouds and air in short pieces: sum of T_air dS_cloud + T_cloud dS_air, with clouds as a straight line between nodes. */
+static void compose(const world *w, const nebel_sun *sun, const nebel_ray *ray, const nebel_cloud_transfer *nodes,
                     const nebel_air_shadow *shade, double light[3])
 {
     enum { STEPS = 24 };
     const nebel_transfer all = shaded_to(w, sun, ray, shade, HUGE_VAL);
-    const uint32_t last = knots->count - 1;
-    nebel_transfer before = shaded_to(w, sun, ray, shade, knots->count > 0 ? (double)knots->t[0] : 0);
-    for (int c = 0; c < 3; c++) light[c] = knots->count > 0 ? before.in_scattering[c] : 0;
-    for (uint32_t k = 1; k < knots->count; k++)
+    const uint32_t last = nodes->count - 1;
+    nebel_transfer before = shaded_to(w, sun, ray, shade, nodes->count > 0 ? (double)nodes->t[0] : 0);
+    for (int c = 0; c < 3; c++) light[c] = nodes->count > 0 ? before.in_scattering[c] : 0;
+    for (uint32_t k = 1; k < nodes->count; k++)
         for (int i = 1; i <= STEPS; i++) {
             const double part = (double)i / STEPS,
-                         t = (double)knots->t[k - 1] * (1 - part) + (double)knots->t[k] * part;
-            const double left = (double)knots->transmittance[k - 1] +
-                                (part - .5 / STEPS) * (double)(knots->transmittance[k] - knots->transmittance[k - 1]);
+                         t = (double)nodes->t[k - 1] * (1 - part) + (double)nodes->t[k] * part;
+            const double left = (double)nodes->transmittance[k - 1] +
+                                (part - .5 / STEPS) * (double)(nodes->transmittance[k] - nodes->transmittance[k - 1]);
             const nebel_transfer here = shaded_to(w, sun, ray, shade, t);
             for (int c = 0; c < 3; c++)
                 light[c] += left * (here.in_scattering[c] - before.in_scattering[c]) +
                             .5 * (here.transmittance[c] + before.transmittance[c]) / STEPS *
-                                (double)(knots->in_scattering[k][c] - knots->in_scattering[k - 1][c]);
+                                (double)(nodes->in_scattering[k][c] - nodes->in_scattering[k - 1][c]);
             before = here;
         }
     for (int c = 0; c < 3; c++)
-        light[c] += (knots->count > 0 ? (double)knots->transmittance[last] : 1) *
-                    (all.in_scattering[c] - (knots->count > 0 ? before.in_scattering[c] : 0));
+        light[c] += (nodes->count > 0 ? (double)nodes->transmittance[last] : 1) *
+                    (all.in_scattering[c] - (nodes->count > 0 ? before.in_scattering[c] : 0));
 }
 
 static void clouds_and_air_are_one(void **state)
@@ -77,14 +77,14 @@ static void clouds_and_air_are_one(void **state)
             if (!nb_test_tries(i, WIDTH * HEIGHT)) continue;
             const nebel_ray ray = planet_ray(&camera, views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
             const double length = sqrt(pow(ray.direction[0], 2) + pow(ray.direction[1], 2) + pow(ray.direction[2], 2));
-            nebel_cloud_transfer knots;
+            nebel_cloud_transfer nodes;
             nebel_air_shadow shade;
             double light[3];
             assert_int_equal(nebel_trace_cloud_shadow_on_air(workspace, 1, &ray, 0, &shade, 0), NEBEL_OK);
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){spread / length}, 0, &knots, 0),
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){spread / length}, 0, &nodes, 0),
                              NEBEL_OK);
-            compose(&w, &sun, &ray, &knots, &shade, light);
-            cloudy += knots.count > 0;
+            compose(&w, &sun, &ray, &nodes, &shade, light);
+            cloudy += nodes.count > 0;
             for (int c = 0; c < 3; c++)
                 worst = fmax(worst, fabs((double)picture.planes.in_scattering[3 * i + (uint32_t)c] - light[c]));
         }
@@ -148,13 +148,13 @@ static void clouds_end_at_surfaces(void **state)
     for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
         nebel_ray ray = planet_ray(&camera, 0, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
         const double length = sqrt(pow(ray.direction[0], 2) + pow(ray.direction[1], 2) + pow(ray.direction[2], 2));
-        nebel_cloud_transfer knots;
+        nebel_cloud_transfer nodes;
         if (i % WIDTH >= WIDTH / 2) continue;
         ray.t_max = way * length / fabs(ray.direction[2]);
         assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0,
-                                            &(double){2 * tan(30 * test_pi / 180) / HEIGHT / length}, 0, &knots, 0),
+                                            &(double){2 * tan(30 * test_pi / 180) / HEIGHT / length}, 0, &nodes, 0),
                          NEBEL_OK);
-        const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+        const double left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
         const nebel_transfer air = air_to(&w, &sun, ray, ray.t_max);
         cloudy += left > .05 && left < .95;
         worst = fmax(worst, fabs((double)picture.planes.transmittance[3 * i + 1] - left * air.transmittance[1]));
@@ -209,34 +209,34 @@ static int ascend(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Clouds, straight between knots, and the ball: T_ball dS_cloud + T_cloud dS_ball in short pieces between all places where either
+/* Clouds, straight between nodes, and the ball: T_ball dS_cloud + T_cloud dS_ball in short pieces between all places where either
  * begins to change. */
-static void compose_ball(const ball *b, const nebel_ray *ray, const nebel_cloud_transfer *knots, double light[3])
+static void compose_ball(const ball *b, const nebel_ray *ray, const nebel_cloud_transfer *nodes, double light[3])
 {
     enum { STEPS = 200 };
     double ends[2], places[NEBEL_MAX_CLOUD_NODES + 3] = {0};
     uint32_t count = 1, next = 0;
     meet_ball(b, ray, ends);
-    for (uint32_t k = 0; k < knots->count; k++) places[count++] = (double)knots->t[k];
+    for (uint32_t k = 0; k < nodes->count; k++) places[count++] = (double)nodes->t[k];
     for (int i = 0; i < 2; i++) places[count++] = ends[i];
     qsort(places, count, sizeof *places, ascend);
     memset(light, 0, 3 * sizeof *light);
     for (uint32_t p = 0; p + 1 < count; p++) {
         const double step = (places[p + 1] - places[p]) / STEPS, middle = .5 * (places[p] + places[p + 1]);
-        while (next < knots->count && (double)knots->t[next] < middle) next++;
+        while (next < nodes->count && (double)nodes->t[next] < middle) next++;
         const uint32_t k = next > 0 ? next - 1 : 0;
-        const int among = next > 0 && next < knots->count;
-        const double way = among ? (double)knots->t[next] - (double)knots->t[k] : 1;
+        const int among = next > 0 && next < nodes->count;
+        const double way = among ? (double)nodes->t[next] - (double)nodes->t[k] : 1;
         for (int i = 0; i < STEPS; i++) {
-            const double t = places[p] + (i + .5) * step, part = (t - (double)knots->t[k]) / way;
+            const double t = places[p] + (i + .5) * step, part = (t - (double)nodes->t[k]) / way;
             const double left = exp(-b->extinction * fmax(0, fmin(t, ends[1]) - ends[0]));
-            double cloud = next > 0 ? (double)knots->transmittance[k] : 1;
-            if (among) cloud += part * (double)(knots->transmittance[next] - knots->transmittance[k]);
+            double cloud = next > 0 ? (double)nodes->transmittance[k] : 1;
+            if (among) cloud += part * (double)(nodes->transmittance[next] - nodes->transmittance[k]);
             for (int c = 0; c < 3; c++) {
                 if (t > ends[0] && t < ends[1]) light[c] += step * cloud * left * b->extinction * shine[c];
                 if (among)
                     light[c] +=
-                        step / way * left * (double)(knots->in_scattering[next][c] - knots->in_scattering[k][c]);
+                        step / way * left * (double)(nodes->in_scattering[next][c] - nodes->in_scattering[k][c]);
             }
         }
     }
@@ -249,25 +249,25 @@ typedef struct off {
 
 /* Steps through clouds may lie elsewhere as the last digit of a ray does. Whether they do not: those of a few rays that differ in it
  * are alike, and the picture without fog shows them. */
-static int have_same_knots(nebel_cloud_workspace *workspace, const nebel_ray *ray, double spread, const float shown[3],
-                           double tolerance, nebel_cloud_transfer *knots)
+static int have_same_nodes(nebel_cloud_workspace *workspace, const nebel_ray *ray, double spread, const float shown[3],
+                           double tolerance, nebel_cloud_transfer *nodes)
 {
     enum { OTHERS = 6 };
-    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &(double){spread}, 0, knots, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &(double){spread}, 0, nodes, 0), NEBEL_OK);
     for (int i = 0; i < OTHERS; i++) {
         nebel_ray other = *ray;
         nebel_cloud_transfer its;
         other.direction[i % 3] *= 1 + (i < 3 ? 1e-13 : -1e-13);
         assert_int_equal(nebel_trace_clouds(workspace, 1, &other, 0, &(double){spread}, 0, &its, 0), NEBEL_OK);
-        if (its.count != knots->count) return 0;
+        if (its.count != nodes->count) return 0;
         for (uint32_t k = 0; k < its.count; k++)
-            if (fabs((double)its.t[k] / (double)knots->t[k] - 1) > 1e-6 ||
-                fabs((double)its.transmittance[k] - (double)knots->transmittance[k]) > 1e-6)
+            if (fabs((double)its.t[k] / (double)nodes->t[k] - 1) > 1e-6 ||
+                fabs((double)its.transmittance[k] - (double)nodes->transmittance[k]) > 1e-6)
                 return 0;
     }
-    for (int c = 0; c < 3 && knots->count > 0; c++)
-        if (fabs((double)shown[c] - (double)knots->in_scattering[knots->count - 1][c]) > tolerance) return 0;
-    return knots->count > 0;
+    for (int c = 0; c < 3 && nodes->count > 0; c++)
+        if (fabs((double)shown[c] - (double)nodes->in_scattering[nodes->count - 1][c]) > tolerance) return 0;
+    return nodes->count > 0;
 }
 
 /* Air adds its light, and takes some of what is behind it. */
@@ -282,17 +282,17 @@ static void compare_ball(const world *w, const ball *b, nebel_cloud_workspace *w
         nebel_ray ray = planet_ray(camera, .4, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
         const double length = sqrt(pow(ray.direction[0], 2) + pow(ray.direction[1], 2) + pow(ray.direction[2], 2));
         const double spread = 2 * tan(30 * test_pi / 180) / HEIGHT / length;
-        nebel_cloud_transfer knots;
+        nebel_cloud_transfer nodes;
         double light[3], ends[2];
         nebel_ray unit = ray;
         for (int c = 0; c < 3; c++) unit.direction[c] /= length;
         meet_ball(b, &unit, ends);
         if (!(ends[1] > ends[0])) continue;
         const nebel_transfer air = air_to(w, &sun, ray, HUGE_VAL);
-        if (!have_same_knots(workspace, &ray, spread, clear->planes.in_scattering + 3 * i, 1e-4 + air.in_scattering[0],
-                             &knots))
+        if (!have_same_nodes(workspace, &ray, spread, clear->planes.in_scattering + 3 * i, 1e-4 + air.in_scattering[0],
+                             &nodes))
             continue;
-        compose_ball(b, &unit, &knots, light);
+        compose_ball(b, &unit, &nodes, light);
         is->both++;
         for (int c = 0; c < 3; c++) {
             const double far = fabs((double)picture->planes.in_scattering[3 * i + (uint32_t)c] - light[c]);

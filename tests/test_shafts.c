@@ -69,7 +69,7 @@ typedef struct trial {
     nb_view view;
     float distance[NB_BATCH];
     nb_eye_visibility eye;
-    size_t toggles, shadows, wrong;
+    size_t boundaries, shadows, wrong;
 } trial;
 
 /* Whether a place t m from the fog's start is in shadow; NAN where an end is too near to say. */
@@ -131,8 +131,8 @@ static nebel_camera trial_camera(uint64_t seed)
 
 static void report_trial(const trial *run)
 {
-    print_message("%zu ends, %zu places in shadow, %zu wrong\n", run->toggles, run->shadows, run->wrong);
-    assert_true(run->toggles > 10000 && run->shadows > 10000);
+    print_message("%zu ends, %zu places in shadow, %zu wrong\n", run->boundaries, run->shadows, run->wrong);
+    assert_true(run->boundaries > 10000 && run->shadows > 10000);
     assert_true(run->wrong <= run->shadows / 10000);
 }
 
@@ -175,8 +175,8 @@ static void try_scene(const nebel_scene_data *scene, uint64_t seed, uint64_t num
         assert_int_equal(nb_sun_shafts_find(&run->shafts, &geometry.allocator, &run->cells, seed == 2 ? &box : &all,
                                             &run->rays, run->view.advance, run->distance, run->eye),
                          NEBEL_OK);
-        run->toggles += run->shafts.toggle_count;
-        const nebel_ray_visibility lit = {run->shafts.first, run->shafts.toggles};
+        run->boundaries += run->shafts.boundary_count;
+        const nebel_ray_visibility lit = {run->shafts.first, run->shafts.boundaries};
         for (int i = 0; i < NB_BATCH; i++) {
             expect_rising(&lit, i);
             if (seed != 2) compare_places(run, &geometry, &lit, sun, NULL, i, &numbers);
@@ -402,7 +402,7 @@ static void ends_of_lamplight_are_those_of_visibility(void **state)
             assert_int_equal(nb_light_shafts_find(&shafts, &geometry.allocator, &run.tree, fog, &all, &run.rays,
                                                   run.view.advance, run.distance),
                              NEBEL_OK);
-            run.toggles += shafts.shafts.toggle_count;
+            run.boundaries += shafts.shafts.boundary_count;
             for (int l = 0; l < LAMPS; l++)
                 for (int i = 0; i < NB_BATCH; i++) {
                     expect_rising(&shafts.pieces[l], i);
@@ -746,7 +746,7 @@ static void lost_memory_is_told(void **state)
     nebel_light lamps[2];
     (void)state;
     set_pillars(&p);
-    assert_true(lose_memory(&p) >= 10); /* the tree's eight, shadows, and what toggles are made in */
+    assert_true(lose_memory(&p) >= 10); /* the tree's eight, shadows, and what boundaries are made in */
     nebel_release_snapshot(p.fog);
     set_lamplit_pillars(&p, lamps);
     assert_true(lose_memory(&p) >= 12); /* and the lamps' pieces, and their numbers */

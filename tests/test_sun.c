@@ -211,14 +211,14 @@ enum { MANY = 5121 };
 static void pieces_are_those_of_the_closed_form(void **state)
 {
     static float comb[MANY];
-    static const float toggles[] = {2, 3, 0, 0, 5, 1, 1, 4, 50, HUGE_VALF, 7};
+    static const float boundaries[] = {2, 3, 0, 0, 5, 1, 1, 4, 50, HUGE_VALF, 7};
     static const uint32_t first[] = {0, 2, 3, 5, 10, 10, 11};
     static const struct {
         size_t count;
         double ends[4];
     } lit[] = {{2, {0, 2, 3, 20}}, {0, {0}}, {1, {5, 20}}, {1, {0, 4}}, {1, {0, 20}}, {1, {0, 7}}};
     enum { CASES = sizeof lit / sizeof lit[0] };
-    const nebel_ray_visibility pieces = {first, toggles};
+    const nebel_ray_visibility pieces = {first, boundaries};
     nebel_snapshot *snapshot = make_slab();
     nebel_ray rays[CASES];
     (void)state;
@@ -274,7 +274,7 @@ static void pieces_are_the_same_in_any_set_and_split(void **state)
 {
     (void)state;
     for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
-        static float toggles[RAYS * 8];
+        static float boundaries[RAYS * 8];
         uint32_t first[RAYS + 1] = {0};
         uint64_t numbers = (uint64_t)kind + 5;
         nebel_ray rays[RAYS];
@@ -285,10 +285,10 @@ static void pieces_are_the_same_in_any_set_and_split(void **state)
         for (uint32_t i = 0; i < RAYS; i++) {
             const uint32_t count = (uint32_t)dice(&numbers, 0, 8);
             double t = 0;
-            for (uint32_t k = 0; k < count; k++) toggles[first[i] + k] = (float)(t += dice(&numbers, 0, 4));
+            for (uint32_t k = 0; k < count; k++) boundaries[first[i] + k] = (float)(t += dice(&numbers, 0, 4));
             first[i + 1] = first[i] + count;
         }
-        const nebel_ray_visibility pieces = {first, toggles};
+        const nebel_ray_visibility pieces = {first, boundaries};
         nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
         trace(snapshot, &desc, rays, all);
         desc.sun_visibility = &pieces;
@@ -301,7 +301,7 @@ static void pieces_are_the_same_in_any_set_and_split(void **state)
             trace(snapshot, &desc, rays, other);
             assert_memory_equal(expected, other, sizeof expected);
             for (size_t i = 0; i < nb_test_count(RAYS); i++) {
-                const nebel_ray_visibility one = {first + i, toggles};
+                const nebel_ray_visibility one = {first + i, boundaries};
                 desc.sun_visibility = &one;
                 assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
             }
@@ -387,11 +387,11 @@ static void expect_the_same_in_any_set(const nebel_snapshot *snapshot, const neb
 /* Rays up, down, level, through, beside and within, some partly in shadow. */
 static void closed_forms_are_what_marches_find(void **state)
 {
-    static const float toggles[] = {1, 2.5f, 3, 6};
+    static const float boundaries[] = {1, 2.5f, 3, 6};
     uint32_t first[RAYS + 1];
     (void)state;
     for (uint32_t i = 0; i <= RAYS; i++) first[i] = i <= RAYS / 2 ? 0 : 4;
-    const nebel_ray_visibility pieces = {first, toggles};
+    const nebel_ray_visibility pieces = {first, boundaries};
     for (uint64_t seed = 0; seed < 4 * nb_test_count(11); seed++) {
         uint64_t numbers = 77 * seed + 1;
         nebel_volume_desc volumes[BODIES + 1];

@@ -315,7 +315,7 @@ nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *layers, const
  *     nebel_create_clouds(&(nebel_clouds_desc){.atmosphere = air, .layer_count = 1}, &clouds); // cumulus
  *     nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.clouds = clouds, .sun = sun}, &view);
  *     nebel_create_cloud_workspace(view, &workspace);                                          // one per thread
- *     nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0.001}, 0, &knots, 0);
+ *     nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0.001}, 0, &nodes, 0);
  *
  * The extinction of a layer at a place is one formula of the place, the same from everywhere (docs/clouds.md): noise in
  * three dimensions in the planet's axes, so that there is no seam and no pole; who looks from afar gets its mean over
@@ -446,8 +446,8 @@ typedef struct nebel_cloud_transfer {
  * a mean. Strides in bytes; of spreads 0 is one for all rays. Sixteen rays and more at once take half as long as one by one, and
  * have the same bits. One thread per workspace. Errors: ARGUMENT (NULL, a ray or spread not in order); then nothing is written. */
 nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
-                                const double *spreads, size_t spread_stride, nebel_cloud_transfer *knots,
-                                size_t knot_stride);
+                                const double *spreads, size_t spread_stride, nebel_cloud_transfer *nodes,
+                                size_t node_stride);
 
 /* What part of the sun's light comes through clouds to n places, straight or scattered on the way; width as of
  * nebel_compute_cloud_extinction. Nothing tells an error: of even layers it is within 0.01, but 0.025 where the sun is less than four

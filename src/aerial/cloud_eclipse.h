@@ -28,21 +28,21 @@ static inline void nb_cloud_uneclipsed(const nb_planet *worlds, int count, int c
 /* Dims what clouds send from between two places of a ray by what is left in the middle. `to_sun` and `disc` as of
  * nb_planets_light. */
 static inline void nb_cloud_eclipse(const nb_planet *worlds, int count, const nebel_ray *ray, const double to_sun[3],
-                                    double disc, nebel_cloud_transfer *knots)
+                                    double disc, nebel_cloud_transfer *nodes)
 {
     const nb_planet *const cloudy = nb_planets_cloudy(worlds, count);
     const double length = nb_vector_length(ray->direction);
     float before[3] = {0, 0, 0}, light[3] = {0, 0, 0};
     if (cloudy == NULL || count < 2) return;
-    for (uint32_t k = 0; k < knots->count; k++) {
-        const double t = 0.5 * ((double)knots->t[k > 0 ? k - 1 : 0] + (double)knots->t[k]) / length;
+    for (uint32_t k = 0; k < nodes->count; k++) {
+        const double t = 0.5 * ((double)nodes->t[k > 0 ? k - 1 : 0] + (double)nodes->t[k]) / length;
         double place[3], part[3];
         for (int c = 0; c < 3; c++) place[c] = ray->origin[c] + t * ray->direction[c];
         nb_cloud_uneclipsed(worlds, count, (int)(cloudy - worlds), place, to_sun, disc, part);
         for (int c = 0; c < 3; c++) {
-            light[c] += (float)part[c] * (knots->in_scattering[k][c] - before[c]);
-            before[c] = knots->in_scattering[k][c];
-            knots->in_scattering[k][c] = light[c];
+            light[c] += (float)part[c] * (nodes->in_scattering[k][c] - before[c]);
+            before[c] = nodes->in_scattering[k][c];
+            nodes->in_scattering[k][c] = light[c];
         }
     }
 }

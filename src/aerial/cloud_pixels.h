@@ -26,7 +26,7 @@ typedef struct nb_cloud_pixel_block {
     int is_wanted[NB_CLOUD_SHARE]; /* they need clouds */
     int is_open[NB_CLOUD_SHARE];   /* and end at no surface: in the sky, or on the planet's ground */
     float ground[NB_CLOUD_SHARE];  /* m, of the planet with clouds, through their middles; 0: they do not meet it */
-    nebel_cloud_transfer *knots[NB_CLOUD_SHARE]; /* and keep them here */
+    nebel_cloud_transfer *nodes[NB_CLOUD_SHARE]; /* and keep them here */
     int level[NB_CLOUD_SHARE];                   /* by nb_cloud_pixels_block_begin */
 } nb_cloud_pixel_block;
 
@@ -42,15 +42,15 @@ static const float nb_cloud_pixels_alike[NB_CLOUD_PIXELS_LEVELS] = {0, 0.05f, 0.
 /* ---- what is alike --------------------------------------------------------------------------- */
 
 /* Of clouds up to t: what they leave, and the light of each colour. */
-static inline void nb_cloud_pixels_up_to(const nebel_cloud_transfer *knots, float t, float of[4])
+static inline void nb_cloud_pixels_up_to(const nebel_cloud_transfer *nodes, float t, float of[4])
 {
     uint32_t k = 0;
-    while (k < knots->count && knots->t[k] <= t) k++;
-    const uint32_t a = k > 0 ? k - 1 : 0, b = k < knots->count ? k : a;
-    const float part = b > a ? (t - knots->t[a]) / (knots->t[b] - knots->t[a]) : 0;
-    of[0] = k > 0 ? (1 - part) * knots->transmittance[a] + part * knots->transmittance[b] : 1;
+    while (k < nodes->count && nodes->t[k] <= t) k++;
+    const uint32_t a = k > 0 ? k - 1 : 0, b = k < nodes->count ? k : a;
+    const float part = b > a ? (t - nodes->t[a]) / (nodes->t[b] - nodes->t[a]) : 0;
+    of[0] = k > 0 ? (1 - part) * nodes->transmittance[a] + part * nodes->transmittance[b] : 1;
     for (int c = 0; c < 3; c++)
-        of[c + 1] = k > 0 ? (1 - part) * knots->in_scattering[a][c] + part * knots->in_scattering[b][c] : 0;
+        of[c + 1] = k > 0 ? (1 - part) * nodes->in_scattering[a][c] + part * nodes->in_scattering[b][c] : 0;
 }
 
 /* The least and the largest of all that is left behind clouds, and of light. */
@@ -83,7 +83,7 @@ static inline float nb_cloud_pixels_apart(const nebel_cloud_transfer *const arou
     return is_alike ? high[0] - low[0] : HUGE_VALF;
 }
 
-/* In the mean, at the knots of that which has more, from where the first begins to where the last ends. */
+/* In the mean, at the nodes of that which has more, from where the first begins to where the last ends. */
 static inline nebel_cloud_transfer nb_cloud_pixels_mean(const nebel_cloud_transfer *a, const nebel_cloud_transfer *b)
 {
     const nebel_cloud_transfer *most = a->count < b->count ? b : a, *least = most == a ? b : a;
@@ -106,9 +106,9 @@ static inline nebel_cloud_transfer nb_cloud_pixels_mean(const nebel_cloud_transf
 
 /* ---- where they are -------------------------------------------------------------------------- */
 
-static inline void nb_cloud_pixels_stretch(nebel_cloud_transfer *knots, float times)
+static inline void nb_cloud_pixels_stretch(nebel_cloud_transfer *nodes, float times)
 {
-    for (uint32_t k = 0; k < knots->count; k++) knots->t[k] *= times;
+    for (uint32_t k = 0; k < nodes->count; k++) nodes->t[k] *= times;
 }
 
 /* How far from each other clouds begin and end along two rays. */
@@ -133,7 +133,7 @@ static inline int nb_cloud_pixels_is_by_ground(const nebel_cloud_transfer *a, fl
 /* The mean of pixels a and b for pixel i, which is between them. */
 static inline nebel_cloud_transfer nb_cloud_pixels_between(const nb_cloud_pixel_block *block, int i, int a, int b)
 {
-    nebel_cloud_transfer of_a = *block->knots[a], of_b = *block->knots[b];
+    nebel_cloud_transfer of_a = *block->nodes[a], of_b = *block->nodes[b];
     const float *const ground = block->ground;
     if (nb_cloud_pixels_is_by_ground(&of_a, ground[a], &of_b, ground[b], ground[i])) {
         nb_cloud_pixels_stretch(&of_a, ground[i] / ground[a]);
@@ -181,27 +181,27 @@ static inline void nb_cloud_pixels_block_begin(nb_cloud_pixel_block *block)
 }
 
 /* Whether hardly any cloud is along a ray but it is not far from some: others beside it may see puffs. */
-static inline int nb_cloud_pixels_is_lone(const nebel_cloud_transfer *knots)
+static inline int nb_cloud_pixels_is_lone(const nebel_cloud_transfer *nodes)
 {
-    return knots->density_queries > 0 &&
-           (knots->count == 0 || knots->transmittance[knots->count - 1] > NB_CLOUD_HARDLY);
+    return nodes->density_queries > 0 &&
+           (nodes->count == 0 || nodes->transmittance[nodes->count - 1] > NB_CLOUD_HARDLY);
 }
 
 /* Whether a pixel has the mean of two beside it, those above and below where they are nearer than left and right. */
 static inline int nb_cloud_pixels_interpolate(const nb_cloud_pixel_block *block, int i)
 {
     const int level = block->level[i];
-    const nebel_cloud_transfer *knots[NB_CLOUD_PIXELS_AROUND];
+    const nebel_cloud_transfer *nodes[NB_CLOUD_PIXELS_AROUND];
     int around[NB_CLOUD_PIXELS_AROUND];
     const int count = nb_cloud_pixels_around(block, i, around), first = level == 1 && count == 4 ? 2 : 0;
     for (int k = 0; k < count; k++) {
-        knots[k] = block->knots[around[k]];
-        if (nb_cloud_pixels_is_lone(knots[k])) return 0;
+        nodes[k] = block->nodes[around[k]];
+        if (nb_cloud_pixels_is_lone(nodes[k])) return 0;
     }
-    const float apart = nb_cloud_pixels_apart(knots, count, nb_cloud_pixels_alike[level]);
+    const float apart = nb_cloud_pixels_apart(nodes, count, nb_cloud_pixels_alike[level]);
     if (!(apart < HUGE_VALF)) return 0;
-    *block->knots[i] = nb_cloud_pixels_between(block, i, around[first], around[first + 1]);
-    block->knots[i]->error += apart;
+    *block->nodes[i] = nb_cloud_pixels_between(block, i, around[first], around[first + 1]);
+    block->nodes[i]->error += apart;
     return 1;
 }
 

@@ -19,7 +19,7 @@ typedef struct nb_cloud_node_builder {
     double end;            /* of the last cloud */
     nb_cloud_node gap_end; /* the end of the last long gap between clouds */
     uint32_t count;
-    nb_cloud_node knots[NEBEL_MAX_CLOUD_NODES];
+    nb_cloud_node nodes[NEBEL_MAX_CLOUD_NODES];
 } nb_cloud_node_builder;
 
 /* Cloud begins at t, behind a gap or none. */
@@ -31,6 +31,6 @@ void nb_cloud_nodes_leave(nb_cloud_node_builder *tally, double t);
 /* Light of the first stretch that has none yet, for all that lies behind it. */
 void nb_cloud_nodes_light(nb_cloud_node_builder *tally, const double light[3], const double ahead[3]);
 /* Nothing follows, and all light has come; so much comes through all clouds. Sets all but the error. */
-void nb_cloud_nodes_end(nb_cloud_node_builder *tally, double through, nebel_cloud_transfer *knots);
+void nb_cloud_nodes_end(nb_cloud_node_builder *tally, double through, nebel_cloud_transfer *nodes);
 
 #endif

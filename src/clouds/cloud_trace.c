@@ -152,7 +152,7 @@ typedef struct nb_cloud_walk {
     double missed;
     nb_cloud_segment stretch;
     nb_cloud_node_builder tally;
-    nebel_cloud_transfer *knots;
+    nebel_cloud_transfer *nodes;
 } nb_cloud_walk;
 
 static double radius_at(const nb_cloud_walk *walk, double t, double place[3])
@@ -652,14 +652,14 @@ static double through_all(nb_cloud_walk *walk)
 }
 
 static void begin(nebel_cloud_workspace *workspace, nb_cloud_ray_group *party, const nebel_ray *ray,
-                  const double unit[3], double spread, nebel_cloud_transfer *knots, nb_cloud_walk *walk)
+                  const double unit[3], double spread, nebel_cloud_transfer *nodes, nb_cloud_walk *walk)
 {
     const nebel_atmosphere *atmosphere = workspace->view->clouds->atmosphere;
     *walk = (nb_cloud_walk){.view = workspace->view,
                             .workspace = workspace,
                             .party = party,
                             .spread = spread,
-                            .knots = knots,
+                            .nodes = nodes,
                             .tally = {.left = 1, .left_apart = 1}};
     nb_air_from_center(atmosphere, ray->origin, walk->from);
     nb_air_raise(atmosphere->airs.radius, walk->from);
@@ -683,8 +683,8 @@ typedef struct nb_cloud_rays {
     size_t n, next;
     const nebel_ray *rays;
     const double *spreads;
-    nebel_cloud_transfer *knots;
-    size_t ray_stride, spread_stride, knot_stride;
+    nebel_cloud_transfer *nodes;
+    size_t ray_stride, spread_stride, node_stride;
 } nb_cloud_rays;
 
 static const nebel_ray *ray_at(const nb_cloud_rays *rays, size_t i)
@@ -704,7 +704,7 @@ static void begin_next(nb_cloud_rays *rays, nb_cloud_walk *walk, nb_cloud_ray_gr
     (void)nb_air_is_ray(ray_at(rays, i), unit);
     nb_vector_round(unit);
     begin(rays->workspace, party, ray_at(rays, i), unit, (double)(float)spread_at(rays, i),
-          nb_stride_to(rays->knots, rays->knot_stride, i), walk);
+          nb_stride_to(rays->nodes, rays->node_stride, i), walk);
     party->ready[party->ready_count++] = walk;
 }
 
@@ -747,9 +747,9 @@ static void attend(nb_cloud_rays *rays, nb_cloud_walk *walk, nb_cloud_ray_group 
         walk->wait = NB_WAIT_LIGHT;
         return;
     }
-    nb_cloud_nodes_end(&walk->tally, through_all(walk), walk->knots);
-    walk->knots->error = (float)walk->missed;
-    walk->knots->density_queries = walk->looks;
+    nb_cloud_nodes_end(&walk->tally, through_all(walk), walk->nodes);
+    walk->nodes->error = (float)walk->missed;
+    walk->nodes->density_queries = walk->looks;
     if (rays->next < rays->n) begin_next(rays, walk, party);
 }
 
@@ -778,18 +778,18 @@ static void trace(nb_cloud_rays *rays)
 /* ---- the face -------------------------------------------------------------------------------- */
 
 nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
-                                const double *spreads, size_t spread_stride, nebel_cloud_transfer *knots,
-                                size_t knot_stride)
+                                const double *spreads, size_t spread_stride, nebel_cloud_transfer *nodes,
+                                size_t node_stride)
 {
     nb_cloud_rays all = {.workspace = workspace,
                          .n = n,
                          .rays = rays,
                          .spreads = spreads,
-                         .knots = knots,
+                         .nodes = nodes,
                          .ray_stride = ray_stride,
                          .spread_stride = spread_stride,
-                         .knot_stride = knot_stride};
-    if (workspace == NULL || (n > 0 && (rays == NULL || spreads == NULL || knots == NULL))) return NEBEL_ERROR_ARGUMENT;
+                         .node_stride = node_stride};
+    if (workspace == NULL || (n > 0 && (rays == NULL || spreads == NULL || nodes == NULL))) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
         double unit[3];
         if (!nb_air_is_ray(ray_at(&all, i), unit) || !(spread_at(&all, i) >= 0 && spread_at(&all, i) <= 10))

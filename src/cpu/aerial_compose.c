@@ -6,45 +6,45 @@
 #include <math.h>
 #include <string.h>
 
-/* The knot 0 of a lane is where its ray ends. The start is none: nothing is before it. */
+/* The node 0 of a lane is where its ray ends. The start is none: nothing is before it. */
 typedef struct nb_aerial_node {
     float at, fog_left[3], fog_light[3], air_left[3], air_light[3];
     float fog_sun[3], fog_sky[3], sun[3], sky[3]; /* of daylit fog, else 0 */
-    nb_segment_shadow shade;                      /* of clouds, from the knot before */
+    nb_segment_shadow shade;                      /* of clouds, from the node before */
     float fog_sum[3], limit[3]; /* of daylit fog with max_opacity: its light, what the limit keeps of it */
 } nb_aerial_node;
 
 static nb_aerial_node start_of(const nb_air_frame *air)
 {
-    nb_aerial_node knot = {.fog_left = {1, 1, 1}, .air_left = {1, 1, 1}, .limit = {1, 1, 1}};
+    nb_aerial_node node = {.fog_left = {1, 1, 1}, .air_left = {1, 1, 1}, .limit = {1, 1, 1}};
     for (int c = 0; c < 3 && nb_fog_irradiance_is(air); c++) {
-        knot.sun[c] = (float)air->sun_at_eye[c];
-        knot.sky[c] = (float)air->sky_at_eye[c];
+        node.sun[c] = (float)air->sun_at_eye[c];
+        node.sky[c] = (float)air->sky_at_eye[c];
     }
-    return knot;
+    return node;
 }
 
-static nb_aerial_node knot_of(const nb_air_frame *air, const nb_cpu_planets_scratch *scratch, int lane, int place)
+static nb_aerial_node node_of(const nb_air_frame *air, const nb_cpu_planets_scratch *scratch, int lane, int place)
 {
-    const nb_aerial_batch_nodes *knots = &scratch->knots[scratch->order[lane][place]];
-    nb_aerial_node knot = {.at = knots->at[lane], .shade = {.sun = 1, .sky = 1}, .limit = {1, 1, 1}};
-    if (air->roof.is_shaded) knot.shade = knots->shade[lane];
+    const nb_aerial_batch_nodes *nodes = &scratch->nodes[scratch->order[lane][place]];
+    nb_aerial_node node = {.at = nodes->at[lane], .shade = {.sun = 1, .sky = 1}, .limit = {1, 1, 1}};
+    if (air->roof.is_shaded) node.shade = nodes->shade[lane];
     for (int c = 0; c < 3; c++) {
-        knot.fog_left[c] = knots->fog_left[c][lane];
-        knot.fog_light[c] = knots->fog_light[c][lane];
-        knot.air_left[c] = knots->air_left[c][lane];
-        knot.air_light[c] = knots->air_light[c][lane];
+        node.fog_left[c] = nodes->fog_left[c][lane];
+        node.fog_light[c] = nodes->fog_light[c][lane];
+        node.air_left[c] = nodes->air_left[c][lane];
+        node.air_light[c] = nodes->air_light[c][lane];
     }
     for (int c = 0; c < 3 && nb_fog_irradiance_is(air); c++) {
-        knot.fog_sun[c] = knots->fog_sun[c][lane];
-        knot.fog_sky[c] = knots->fog_sky[c][lane];
-        knot.sun[c] = knots->sun[c][lane];
-        knot.sky[c] = knots->sky[c][lane];
+        node.fog_sun[c] = nodes->fog_sun[c][lane];
+        node.fog_sky[c] = nodes->fog_sky[c][lane];
+        node.sun[c] = nodes->sun[c][lane];
+        node.sky[c] = nodes->sky[c][lane];
     }
-    return knot;
+    return node;
 }
 
-/* Without clouds' shade, what fog between two knots has from the sun and from the sky, in the mean of the light of both. */
+/* Without clouds' shade, what fog between two nodes has from the sun and from the sky, in the mean of the light of both. */
 static float sun_between(const nb_aerial_node *a, const nb_aerial_node *b, int c)
 {
     return 0.5f * (a->sun[c] + b->sun[c]) * (b->fog_sun[c] - a->fog_sun[c]);
@@ -63,13 +63,13 @@ static float unlimited_between(const nb_aerial_node *a, const nb_aerial_node *b,
 }
 
 /* max_opacity limits all light up to a place, not that of pieces (see nebel_set_max_opacity). */
-static void limit_opacity(const nb_air_frame *air, const nb_aerial_node *before, nb_aerial_node *knot)
+static void limit_opacity(const nb_air_frame *air, const nb_aerial_node *before, nb_aerial_node *node)
 {
     const float most = (float)air->fog.max_opacity;
     for (int c = 0; c < 3; c++) {
-        knot->fog_sum[c] = before->fog_sum[c] + unlimited_between(before, knot, c);
-        knot->limit[c] = most > 0 ? most / fmaxf(most, 1 - knot->fog_left[c]) : knot->fog_left[c] < 1 ? 0 : 1;
-        knot->fog_left[c] = fmaxf(knot->fog_left[c], 1 - most);
+        node->fog_sum[c] = before->fog_sum[c] + unlimited_between(before, node, c);
+        node->limit[c] = most > 0 ? most / fmaxf(most, 1 - node->fog_left[c]) : node->fog_left[c] < 1 ? 0 : 1;
+        node->fog_left[c] = fmaxf(node->fog_left[c], 1 - most);
     }
 }
 
@@ -78,16 +78,16 @@ static int is_limited(const nb_air_frame *air)
     return nb_fog_irradiance_is(air) && air->fog.max_opacity < 1;
 }
 
-/* The knot of a place behind the one before. */
-static nb_aerial_node knot_after(const nb_air_frame *air, const nb_cpu_planets_scratch *scratch, int lane, int place,
+/* The node of a place behind the one before. */
+static nb_aerial_node node_after(const nb_air_frame *air, const nb_cpu_planets_scratch *scratch, int lane, int place,
                                  const nb_aerial_node *before)
 {
-    nb_aerial_node knot = knot_of(air, scratch, lane, place);
-    if (is_limited(air)) limit_opacity(air, before, &knot);
-    return knot;
+    nb_aerial_node node = node_of(air, scratch, lane, place);
+    if (is_limited(air)) limit_opacity(air, before, &node);
+    return node;
 }
 
-/* The light of fog between two knots. */
+/* The light of fog between two nodes. */
 static float fog_between(const nb_aerial_node *a, const nb_aerial_node *b, int c)
 {
     if (!(b->limit[c] < 1)) return unlimited_between(a, b, c);
@@ -131,7 +131,7 @@ static void sum_light(const nb_air_frame *air, const nb_cpu_planets_scratch *scr
     nb_aerial_node before = start_of(air);
     for (int c = 0; c < 3; c++) light[c] = 0;
     for (int i = 0; i < scratch->count[lane]; i++) {
-        const nb_aerial_node here = knot_after(air, scratch, lane, i, &before);
+        const nb_aerial_node here = node_after(air, scratch, lane, i, &before);
         for (int c = 0; c < 3; c++)
             light[c] += 0.5f * (before.fog_left[c] + here.fog_left[c]) * (here.air_light[c] - before.air_light[c]) +
                         0.5f * (before.air_left[c] + here.air_left[c]) * fog_between(&before, &here, c);
@@ -147,7 +147,7 @@ static void find_scales(const nb_air_frame *air, const nb_cpu_planets_scratch *s
     for (int c = 0; c < 3; c++) scales[c] = fmaxf(light[c], fmaxf(LEAST_PART, fminf(1, light[c] / DARK)));
 }
 
-/* What is in doubt of the light between two knots. */
+/* What is in doubt of the light between two nodes. */
 static float color_doubt(const nb_aerial_node *a, const nb_aerial_node *b, int c)
 {
     return 0.5f * fabsf((a->fog_left[c] - b->fog_left[c]) * (b->air_light[c] - a->air_light[c])) +
@@ -162,7 +162,7 @@ static float doubt(const nb_aerial_node *a, const nb_aerial_node *b, const float
     return most;
 }
 
-/* The piece of a lane that is in doubt most, with the knots at its ends, and all doubts, in those scales. */
+/* The piece of a lane that is in doubt most, with the nodes at its ends, and all doubts, in those scales. */
 static int find_worst(const nb_air_frame *air, const nb_cpu_planets_scratch *scratch, int lane, const float scales[3],
                       nb_aerial_node *a, nb_aerial_node *b, float *all)
 {
@@ -171,7 +171,7 @@ static int find_worst(const nb_air_frame *air, const nb_cpu_planets_scratch *scr
     nb_aerial_node before = start_of(air);
     *all = 0;
     for (int i = 0; i < scratch->count[lane]; i++) {
-        const nb_aerial_node here = knot_after(air, scratch, lane, i, &before);
+        const nb_aerial_node here = node_after(air, scratch, lane, i, &before);
         const float is = doubt(&before, &here, scales);
         *all += is;
         if (is > most) {
@@ -211,29 +211,29 @@ static float cut(const nb_frame *frame, const nb_scratch *scratch, int lane, con
     return b->at * fminf(0.5f, fmaxf(1e-6f, frame->air.tolerance / counts));
 }
 
-/* Of the piece up to a knot. */
+/* Of the piece up to a node. */
 static void shade_piece(nb_cpu_planets_scratch *scratch, int lane, int place)
 {
     static const nb_segment_shadow none = {.sun = 1, .sky = 1};
     const uint8_t *const order = scratch->order[lane];
     const nb_fog_shadow *const shade = &scratch->fog_shade[lane];
-    nb_aerial_batch_nodes *const knots = &scratch->knots[order[place]];
-    const float before = place > 0 ? scratch->knots[order[place - 1]].at[lane] : 0;
-    knots->shade[lane] = shade->is_found ? nb_fog_shadow_between(shade, before, knots->at[lane]) : none;
+    nb_aerial_batch_nodes *const nodes = &scratch->nodes[order[place]];
+    const float before = place > 0 ? scratch->nodes[order[place - 1]].at[lane] : 0;
+    nodes->shade[lane] = shade->is_found ? nb_fog_shadow_between(shade, before, nodes->at[lane]) : none;
 }
 
-static void insert(nb_cpu_planets_scratch *scratch, int lane, int place, int knot)
+static void insert(nb_cpu_planets_scratch *scratch, int lane, int place, int node)
 {
     uint8_t *order = scratch->order[lane];
     memmove(order + place + 1, order + place, (size_t)(scratch->count[lane] - place));
-    order[place] = (uint8_t)knot;
+    order[place] = (uint8_t)node;
     scratch->count[lane]++;
 }
 
 /* A fresh one, before the one at a place. */
 static void cut_at(const nb_air_frame *air, nb_cpu_planets_scratch *scratch, int lane, int place, float at)
 {
-    scratch->fresh.at[lane] = scratch->knots[scratch->known[lane]].at[lane] = at;
+    scratch->fresh.at[lane] = scratch->nodes[scratch->known[lane]].at[lane] = at;
     insert(scratch, lane, place, scratch->known[lane]++);
     for (int i = place; i < place + 2 && air->roof.is_shaded; i++) shade_piece(scratch, lane, i);
 }
@@ -253,77 +253,77 @@ static void copy_lane(const nb_aerial_batch_nodes *from, int lane, nb_aerial_bat
     }
 }
 
-/* Fresh knots have been found. */
+/* Fresh nodes have been found. */
 static void keep_fresh(nb_cpu_planets_scratch *scratch)
 {
     for (int i = 0; i < NB_BATCH; i++)
-        if (scratch->fresh.at[i] > 0) copy_lane(&scratch->fresh, i, &scratch->knots[scratch->known[i] - 1]);
+        if (scratch->fresh.at[i] > 0) copy_lane(&scratch->fresh, i, &scratch->nodes[scratch->known[i] - 1]);
 }
 
-/* Before which knot a place is. */
+/* Before which node a place is. */
 static int place_of(const nb_cpu_planets_scratch *scratch, int lane, float at)
 {
     int place = 0;
-    while (scratch->knots[scratch->order[lane][place]].at[lane] < at) place++;
+    while (scratch->nodes[scratch->order[lane][place]].at[lane] < at) place++;
     return place;
 }
 
 /* All that is known of a ray before its end, which comes last. */
 static void put_in_order(const nb_air_frame *air, nb_cpu_planets_scratch *scratch, int lane)
 {
-    const float end = scratch->knots[0].at[lane];
+    const float end = scratch->nodes[0].at[lane];
     scratch->order[lane][0] = 0;
     scratch->count[lane] = 1;
     for (int k = 1; k < scratch->known[lane]; k++) {
-        const float at = scratch->knots[k].at[lane];
+        const float at = scratch->nodes[k].at[lane];
         if (at < end) insert(scratch, lane, place_of(scratch, lane, at), k);
     }
     for (int i = 0; i < scratch->count[lane] && air->roof.is_shaded; i++) shade_piece(scratch, lane, i);
 }
 
 /* By clouds. */
-static void shade(const nb_cloud_scratch *clouds, nb_aerial_batch_nodes *knot)
+static void shade(const nb_cloud_scratch *clouds, nb_aerial_batch_nodes *node)
 {
     for (int c = 0; c < 3; c++)
         for (int i = 0; i < NB_BATCH; i++)
-            knot->air_light[c][i] = nb_shadowed_air_light(clouds->shaded[i], clouds->shaded_count[i], c, knot->at[i],
-                                                          knot->air_light[c][i]);
+            node->air_light[c][i] = nb_shadowed_air_light(clouds->shaded[i], clouds->shaded_count[i], c, node->at[i],
+                                                          node->air_light[c][i]);
 }
 
-static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
-                               nb_scratch *scratch, nb_aerial_batch_nodes *knot)
+static nebel_result trace_node(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
+                               nb_scratch *scratch, nb_aerial_batch_nodes *node)
 {
     const double *const direction[3] = {scratch->rays.direction[0], scratch->rays.direction[1],
                                         scratch->rays.direction[2]};
     nebel_ray_planes rays = *fog;
-    nebel_transfer_planes transfers = {.error = NULL}, air = {.error = knot->air_error};
-    rays.t_max = knot->at;
+    nebel_transfer_planes transfers = {.error = NULL}, air = {.error = node->air_error};
+    rays.t_max = node->at;
     for (int c = 0; c < 3; c++) {
-        transfers.transmittance[c] = knot->fog_left[c];
-        transfers.in_scattering[c] = knot->fog_light[c];
-        air.transmittance[c] = knot->air_left[c];
-        air.in_scattering[c] = knot->air_light[c];
+        transfers.transmittance[c] = node->fog_left[c];
+        transfers.in_scattering[c] = node->fog_light[c];
+        air.transmittance[c] = node->air_left[c];
+        air.in_scattering[c] = node->air_light[c];
     }
-    nebel_result result = nb_fog_irradiance_trace(frame, &rays, trace, &transfers, knot);
-    if (nb_fog_irradiance_is(&frame->air)) nb_fog_irradiance_light(frame, &scratch->rays, knot);
-    if (result == NEBEL_OK) result = nb_cpu_planets_trace(&frame->air, NB_BATCH, direction, knot->at, &air);
-    if (result == NEBEL_OK && frame->cloud_view != NULL) shade(&scratch->clouds, knot);
+    nebel_result result = nb_fog_irradiance_trace(frame, &rays, trace, &transfers, node);
+    if (nb_fog_irradiance_is(&frame->air)) nb_fog_irradiance_light(frame, &scratch->rays, node);
+    if (result == NEBEL_OK) result = nb_cpu_planets_trace(&frame->air, NB_BATCH, direction, node->at, &air);
+    if (result == NEBEL_OK && frame->cloud_view != NULL) shade(&scratch->clouds, node);
     return result;
 }
 
-/* The first knot of daylit fog, which light at both ends of a ray does not tell of; 0: none, or it is there already. */
+/* The first node of daylit fog, which light at both ends of a ray does not tell of; 0: none, or it is there already. */
 static float first_cut(const nb_frame *frame, const nb_scratch *scratch, int lane)
 {
-    const nb_aerial_batch_nodes *end = &scratch->air.knots[0];
+    const nb_aerial_batch_nodes *end = &scratch->air.nodes[0];
     const float place = nb_fog_irradiance_lowest(&frame->air, &scratch->rays, lane);
     float light = 0;
     for (int c = 0; c < 3; c++) light = fmaxf(light, end->fog_sun[c][lane] + end->fog_sky[c][lane]);
     for (int k = 1; k < scratch->air.known[lane]; k++)
-        if (scratch->air.knots[k].at[lane] == place) return 0;
+        if (scratch->air.nodes[k].at[lane] == place) return 0;
     return place < end->at[lane] && light > frame->air.tolerance ? place : 0;
 }
 
-/* One more knot for each lane that needs it; returns whether any did. */
+/* One more node for each lane that needs it; returns whether any did. */
 static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
 {
     nb_cpu_planets_scratch *air = &scratch->air;
@@ -353,7 +353,7 @@ static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
 /* Of rays without fog. */
 static void take_air(nb_scratch *scratch)
 {
-    const nb_aerial_batch_nodes *all = &scratch->air.knots[0];
+    const nb_aerial_batch_nodes *all = &scratch->air.nodes[0];
     for (int c = 0; c < 3; c++) {
         memcpy(scratch->samples.transmittance[c], all->air_left[c], sizeof all->air_left[c]);
         memcpy(scratch->samples.in_scattering[c], all->air_light[c], sizeof all->air_light[c]);
@@ -380,7 +380,7 @@ static void sum_up(const nb_air_frame *of, nb_scratch *scratch, int lane)
     float light[3], all = 0;
     (void)find_worst(of, air, lane, plain, &a, &b, &all);
     for (int i = 0; i < air->count[lane]; i++) {
-        const nb_aerial_node here = knot_after(of, air, lane, i, &before);
+        const nb_aerial_node here = node_after(of, air, lane, i, &before);
         all += within(&before, &here);
         before = here;
     }
@@ -388,10 +388,10 @@ static void sum_up(const nb_air_frame *of, nb_scratch *scratch, int lane)
     if (is_limited(of)) all += limit_error(&before, (float)of->fog.max_opacity, samples->error[lane]);
     for (int c = 0; c < 3; c++) {
         if (is_limited(of)) samples->transmittance[c][lane] = before.fog_left[c];
-        samples->transmittance[c][lane] *= air->knots[0].air_left[c][lane];
+        samples->transmittance[c][lane] *= air->nodes[0].air_left[c][lane];
         samples->in_scattering[c][lane] = fmaxf(light[c], 0);
     }
-    samples->error[lane] += air->knots[0].air_error[lane] + all;
+    samples->error[lane] += air->nodes[0].air_error[lane] + all;
 }
 
 /* Air has an end, rays need not: beyond it neither adds anything to the other. */
@@ -400,11 +400,11 @@ static void set_first(const nb_frame *frame, nb_scratch *scratch)
     nb_cpu_planets_scratch *air = &scratch->air;
     for (int i = 0; i < NB_BATCH; i++) {
         if (!air->is_kept) air->known[i] = 1;
-        air->knots[0].at[i] = scratch->inside[i] ? fminf(scratch->distance[i], (float)frame->air.reach) : 0;
+        air->nodes[0].at[i] = scratch->inside[i] ? fminf(scratch->distance[i], (float)frame->air.reach) : 0;
     }
     for (int c = 0; c < 3; c++) {
-        memcpy(air->knots[0].fog_left[c], scratch->samples.transmittance[c], sizeof air->knots[0].fog_left[c]);
-        memcpy(air->knots[0].fog_light[c], scratch->samples.in_scattering[c], sizeof air->knots[0].fog_light[c]);
+        memcpy(air->nodes[0].fog_left[c], scratch->samples.transmittance[c], sizeof air->nodes[0].fog_left[c]);
+        memcpy(air->nodes[0].fog_light[c], scratch->samples.in_scattering[c], sizeof air->nodes[0].fog_light[c]);
     }
 }
 
@@ -413,8 +413,8 @@ void nb_aerial_keep(nb_scratch *scratch)
     nb_cpu_planets_scratch *air = &scratch->air;
     air->is_kept = 1;
     for (int i = 0; i < NB_BATCH; i++)
-        if (air->knots[0].at[i] > 0 && air->known[i] < NB_AIR_NODES)
-            copy_lane(&air->knots[0], i, &air->knots[air->known[i]++]);
+        if (air->nodes[0].at[i] > 0 && air->known[i] < NB_AIR_NODES)
+            copy_lane(&air->nodes[0], i, &air->nodes[air->known[i]++]);
 }
 
 void nb_aerial_forget(nb_scratch *scratch)
@@ -425,7 +425,7 @@ void nb_aerial_forget(nb_scratch *scratch)
 nebel_result nb_aerial_add(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
                            nb_scratch *scratch)
 {
-    nb_aerial_batch_nodes *first = &scratch->air.knots[0];
+    nb_aerial_batch_nodes *first = &scratch->air.nodes[0];
     const double *const direction[3] = {scratch->rays.direction[0], scratch->rays.direction[1],
                                         scratch->rays.direction[2]};
     nebel_transfer_planes transfers = {.error = first->air_error};
@@ -445,7 +445,7 @@ nebel_result nb_aerial_add(const nb_frame *frame, const nebel_ray_planes *fog, c
     if (result == NEBEL_OK && frame->air.roof.is_shaded) result = nb_fog_shadow_find(frame, scratch);
     for (int i = 0; i < NB_BATCH; i++) put_in_order(&frame->air, &scratch->air, i);
     for (int k = 1; result == NEBEL_OK && choose(frame, scratch, k == 1); k++) {
-        result = trace_knot(frame, fog, trace, scratch, &scratch->air.fresh);
+        result = trace_node(frame, fog, trace, scratch, &scratch->air.fresh);
         keep_fresh(&scratch->air);
     }
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) sum_up(&frame->air, scratch, i);

@@ -82,7 +82,7 @@ static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebe
     if (frame->has_shafts) {
         result = nb_sun_shafts_find(&scratch->shafts, &renderer->allocator, &renderer->sun_cells, &frame->sunlit_box,
                                     &scratch->rays, frame->view.advance, scratch->distance, frame->eye);
-        *sunlit = (nebel_ray_visibility){scratch->shafts.first, scratch->shafts.toggles};
+        *sunlit = (nebel_ray_visibility){scratch->shafts.first, scratch->shafts.boundaries};
         trace->sun_visibility = sunlit;
     }
     if (frame->has_lamp_shafts && result == NEBEL_OK) {
@@ -110,7 +110,7 @@ static nebel_result trace_haze(const nb_frame *frame, nb_scratch *scratch)
     nebel_trace_desc trace = frame->trace;
     nebel_ray_visibility pieces;
     nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
-    if (result == NEBEL_OK) result = nb_fog_irradiance_trace(frame, &rays, &trace, &transfers, &scratch->air.knots[0]);
+    if (result == NEBEL_OK) result = nb_fog_irradiance_trace(frame, &rays, &trace, &transfers, &scratch->air.nodes[0]);
     return result == NEBEL_OK ? nb_aerial_add(frame, &rays, &trace, scratch) : result;
 }
 
@@ -137,7 +137,7 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
     nebel_ray_visibility pieces;
     const nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
     if (result != NEBEL_OK) return result;
-    const nebel_result traced = nb_fog_irradiance_trace(frame, &rays, &trace, &transfers, &scratch->air.knots[0]);
+    const nebel_result traced = nb_fog_irradiance_trace(frame, &rays, &trace, &transfers, &scratch->air.nodes[0]);
     if (traced == NEBEL_OK && has_air) return nb_aerial_add(frame, &rays, &trace, scratch);
     return traced == NEBEL_OK && has_shells ? nb_cpu_textured_trace(frame, &rays, &trace, scratch) : traced;
 }

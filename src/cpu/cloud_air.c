@@ -186,22 +186,22 @@ nebel_result nb_cloud_air_shade(const nb_frame *frame, const nb_batch_place *pla
     return result == NEBEL_OK ? find_shade(frame, is_later, clouds) : result;
 }
 
-/* ---- up to knots ----------------------------------------------------------------------------- */
+/* ---- up to nodes ----------------------------------------------------------------------------- */
 
-/* What the air does up to the knots of those that were asked; begins anew. */
+/* What the air does up to the nodes of those that were asked; begins anew. */
 static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_cpu_planets_asked *asked)
 {
     if (asked->count == 0) return NEBEL_OK;
     const nebel_result result = trace(frame, asked);
     for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
         const uint32_t lane = asked->lanes[i], first = asked->first[i];
-        const nebel_cloud_transfer *knots = &clouds->knots[lane];
+        const nebel_cloud_transfer *nodes = &clouds->nodes[lane];
         nb_aerial_nodes *air = &clouds->air[lane];
         for (int c = 0; c < 3; c++)
-            for (uint32_t k = 0; k < knots->count; k++) {
+            for (uint32_t k = 0; k < nodes->count; k++) {
                 air->left[c][k] = asked->left[c][first + k];
                 air->light[c][k] = nb_shadowed_air_light(clouds->shaded[lane], clouds->shaded_count[lane], c,
-                                                         knots->t[k], asked->light[c][first + k]);
+                                                         nodes->t[k], asked->light[c][first + k]);
             }
     }
     asked->lane_count = asked->count = 0;
@@ -214,10 +214,10 @@ nebel_result nb_cloud_air_find(const nb_frame *frame, const int is_asked[NB_BATC
     nb_cpu_planets_asked asked;
     asked.lane_count = asked.count = 0;
     for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
-        const nebel_cloud_transfer *knots = &clouds->knots[i];
+        const nebel_cloud_transfer *nodes = &clouds->nodes[i];
         if (!is_asked[i]) continue;
-        if (!has_room(&asked, knots->count)) result = set_air(frame, clouds, &asked);
-        ask(clouds, i, knots->count, knots->t, &asked);
+        if (!has_room(&asked, nodes->count)) result = set_air(frame, clouds, &asked);
+        ask(clouds, i, nodes->count, nodes->t, &asked);
     }
     return result == NEBEL_OK ? set_air(frame, clouds, &asked) : result;
 }

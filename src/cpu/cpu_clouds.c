@@ -72,7 +72,7 @@ nebel_result nb_cpu_clouds_start(const nb_frame *frame, const nb_batch_place *pl
     memset(clouds->reach, 0, sizeof clouds->reach);
     lift_rays(frame, clouds);
     nb_fog_shadow_start(scratch);
-    for (uint32_t i = 0; i < NB_BATCH; i++) clouds->knots[i].count = clouds->shaded_count[i] = 0;
+    for (uint32_t i = 0; i < NB_BATCH; i++) clouds->nodes[i].count = clouds->shaded_count[i] = 0;
     return nb_cloud_air_shade(frame, place, clouds);
 }
 
@@ -105,9 +105,9 @@ static float end_of(const nb_frame *frame, const nb_scratch *scratch, uint32_t l
 /* Whether what was found for another sample of a pixel does for one. */
 static int is_found(const nb_cloud_scratch *clouds, int lane)
 {
-    const nebel_cloud_transfer *knots = &clouds->knots[lane];
-    const float last = knots->count > 0 ? knots->t[knots->count - 1] : 0;
-    return nb_cloud_is_found(knots->count, knots->t[0], last, clouds->reach[lane], clouds->end[lane]);
+    const nebel_cloud_transfer *nodes = &clouds->nodes[lane];
+    const float last = nodes->count > 0 ? nodes->t[nodes->count - 1] : 0;
+    return nb_cloud_is_found(nodes->count, nodes->t[0], last, clouds->reach[lane], clouds->end[lane]);
 }
 
 static void take_ray(const nb_ray_batch *from, int lane, nb_ray_batch *to)
@@ -127,7 +127,7 @@ static void choose_ray(const nb_scratch *scratch, int lane, nb_cloud_scratch *cl
     if (!clouds->has_lifted[lane] || clouds->is_lifted[lane] == sees_sky) return;
     take_ray(sees_sky ? &clouds->lifted : &clouds->middles, lane, &clouds->rays);
     clouds->is_lifted[lane] = sees_sky;
-    clouds->knots[lane].count = 0;
+    clouds->nodes[lane].count = 0;
     clouds->reach[lane] = 0;
 }
 
@@ -154,7 +154,7 @@ static nebel_result trace_pixels(const nb_frame *frame, const int is_asked[NB_CL
                            sizeof *clouds->spreads, clouds->found, sizeof *clouds->found);
     for (uint32_t k = 0; k < count && result == NEBEL_OK; k++) {
         nb_cloud_eclipse(air->worlds, air->count, &clouds->asked[k], air->to_sun, air->sun_radius, &clouds->found[k]);
-        clouds->knots[lanes[k]] = clouds->found[k];
+        clouds->nodes[lanes[k]] = clouds->found[k];
     }
     return result;
 }
@@ -186,14 +186,14 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
         block.is_wanted[i] = scratch->inside[lane] && !is_found(clouds, (int)lane);
         block.is_open[i] = scratch->distance[lane] == HUGE_VALF || scratch->air.ground.distance[lane] < HUGE_VALF;
         block.is_open[i] &= !clouds->is_lifted[lane];
-        block.knots[i] = &clouds->knots[lane];
+        block.nodes[i] = &clouds->nodes[lane];
     }
     const nebel_result result = trace_block(frame, &block, clouds);
     *any = 0;
     for (int i = 0; i < NB_CLOUD_SHARE; i++) {
         const uint32_t lane = lane_of(i);
         if (block.is_wanted[i]) clouds->reach[lane] = clouds->end[lane];
-        clouds->is_new[lane] = block.is_wanted[i] && clouds->knots[lane].count > 0;
+        clouds->is_new[lane] = block.is_wanted[i] && clouds->nodes[lane].count > 0;
         *any |= clouds->is_new[lane];
     }
     return result;
@@ -201,12 +201,12 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
 
 /* ---- among air and fog ----------------------------------------------------------------------- */
 
-/* Marks the knots that are next. */
+/* Marks the nodes that are next. */
 static nebel_result mark(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *scratch)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
     for (int i = 0; i < NB_BATCH; i++)
-        scratch->distance[i] = clouds->next[i] >= 0 ? clouds->knots[i].t[clouds->next[i]] : 0;
+        scratch->distance[i] = clouds->next[i] >= 0 ? clouds->nodes[i].t[clouds->next[i]] : 0;
     const nebel_result result = haze(frame, scratch);
     for (int i = 0; i < NB_BATCH; i++) {
         float left[3], light[3];
@@ -226,14 +226,14 @@ static nebel_result choose(const nb_frame *frame, nb_cloud_scratch *clouds, int 
     int is_longer[NB_BATCH] = {0};
     *any = 0;
     for (int i = 0; i < NB_BATCH; i++) {
-        nebel_cloud_transfer *knots = &clouds->knots[i];
-        const uint32_t count = knots->count;
+        nebel_cloud_transfer *nodes = &clouds->nodes[i];
+        const uint32_t count = nodes->count;
         clouds->next[i] = -1;
         if (!clouds->is_new[i]) continue;
         clouds->next[i] =
-            nb_cloud_compose_next(knots, &clouds->marks[i], &clouds->air[i], frame->air.tolerance, &clouds->doubt[i]);
+            nb_cloud_compose_next(nodes, &clouds->marks[i], &clouds->air[i], frame->air.tolerance, &clouds->doubt[i]);
         *any |= clouds->next[i] >= 0;
-        is_longer[i] = knots->count > count;
+        is_longer[i] = nodes->count > count;
     }
     return nb_cloud_air_find(frame, is_longer, clouds);
 }
@@ -259,16 +259,16 @@ static nebel_result find_fog(const nb_frame *frame, nb_aerial_fn haze, nb_scratc
 /* Of one ray. */
 static void mix_lane(int has_fog, nb_cloud_scratch *clouds, int lane)
 {
-    const nebel_cloud_transfer *knots = &clouds->knots[lane];
+    const nebel_cloud_transfer *nodes = &clouds->nodes[lane];
     const nb_aerial_nodes *air = &clouds->air[lane];
     nb_aerial_nodes haze = *air;
     for (int c = 0; c < 3; c++) {
         float over[NEBEL_MAX_CLOUD_NODES];
-        if (has_fog) nb_cloud_compose_add_fog(knots, &clouds->marks[lane], c, air, &haze);
-        nb_cloud_compose_sum(knots, c, &haze, over);
-        for (uint32_t k = 0; k < knots->count; k++) clouds->over[k][c][lane] = over[k];
+        if (has_fog) nb_cloud_compose_add_fog(nodes, &clouds->marks[lane], c, air, &haze);
+        nb_cloud_compose_sum(nodes, c, &haze, over);
+        for (uint32_t k = 0; k < nodes->count; k++) clouds->over[k][c][lane] = over[k];
     }
-    clouds->doubt[lane] += nb_cloud_compose_missed(knots, &haze);
+    clouds->doubt[lane] += nb_cloud_compose_missed(nodes, &haze);
 }
 
 static nebel_result mix(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *scratch)
@@ -289,24 +289,24 @@ static nebel_result mix(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *sc
     return result;
 }
 
-/* Before a surface within the clouds they are as between the knots around it. */
+/* Before a surface within the clouds they are as between the nodes around it. */
 static void lay_over(nb_scratch *scratch, int lane)
 {
     const nb_cloud_scratch *clouds = &scratch->clouds;
-    const nebel_cloud_transfer *knots = &clouds->knots[lane];
+    const nebel_cloud_transfer *nodes = &clouds->nodes[lane];
     nb_light_samples *samples = &scratch->samples;
     const float end = clouds->end[lane];
     float part;
-    if (!(end > knots->t[0])) return;
-    const uint32_t k = nb_cloud_compose_find(knots->count, knots->t, end, &part);
+    if (!(end > nodes->t[0])) return;
+    const uint32_t k = nb_cloud_compose_find(nodes->count, nodes->t, end, &part);
     const uint32_t next = part > 0 ? k + 1 : k;
-    const float left = (1 - part) * knots->transmittance[k] + part * knots->transmittance[next];
+    const float left = (1 - part) * nodes->transmittance[k] + part * nodes->transmittance[next];
     for (int c = 0; c < 3; c++) {
         const float over = (1 - part) * clouds->over[k][c][lane] + part * clouds->over[next][c][lane];
         samples->in_scattering[c][lane] = fmaxf(0, left * samples->in_scattering[c][lane] + over);
         samples->transmittance[c][lane] *= left;
     }
-    samples->error[lane] += knots->error + clouds->doubt[lane];
+    samples->error[lane] += nodes->error + clouds->doubt[lane];
 }
 
 nebel_result nb_cpu_clouds_add(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *scratch)
@@ -315,7 +315,7 @@ nebel_result nb_cpu_clouds_add(const nb_frame *frame, nb_aerial_fn haze, nb_scra
     nebel_result result = trace(frame, scratch, &any);
     if (result == NEBEL_OK && any) result = mix(frame, haze, scratch);
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++)
-        if (scratch->clouds.knots[i].count > 0) lay_over(scratch, i);
+        if (scratch->clouds.nodes[i].count > 0) lay_over(scratch, i);
     return result;
 }
 

@@ -16,7 +16,7 @@ typedef nebel_result (*nb_aerial_fn)(const nb_frame *frame, nb_scratch *scratch)
 nebel_result nb_cpu_clouds_start(const nb_frame *frame, const nb_batch_place *place, nb_scratch *scratch);
 
 /* Puts clouds among the air and fog of a batch that scratch->samples holds up to scratch->distance. With T and S of clouds
- * (c) and of what else is there (h), light up to a knot is the sum of T_h dS_c + T_c dS_h with the means of both ends. */
+ * (c) and of what else is there (h), light up to a node is the sum of T_h dS_c + T_c dS_h with the means of both ends. */
 nebel_result nb_cpu_clouds_add(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *scratch);
 
 /* What clouds leave of the sun's light where it is lit at all, times `color`. */

@@ -119,7 +119,7 @@ static nebel_result trace_part(const nebel_snapshot *fog, const nebel_ray_planes
 }
 
 nebel_result nb_fog_irradiance_trace(const nb_frame *frame, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
-                                     const nebel_transfer_planes *transfers, nb_aerial_batch_nodes *knot)
+                                     const nebel_transfer_planes *transfers, nb_aerial_batch_nodes *node)
 {
     const nebel_split_fog *fog = &frame->air.fog;
     if (!nb_fog_irradiance_is(&frame->air))
@@ -127,29 +127,29 @@ nebel_result nb_fog_irradiance_trace(const nb_frame *frame, const nebel_ray_plan
     nebel_trace_desc by_sky = *trace, by_sun = *trace;
     nebel_transfer_planes with_sky = *transfers;
     by_sky.sun_visibility = by_sky.light_visibility = by_sun.light_visibility = NULL;
-    for (int c = 0; c < 3; c++) with_sky.in_scattering[c] = knot->fog_sky[c];
+    for (int c = 0; c < 3; c++) with_sky.in_scattering[c] = node->fog_sky[c];
     nebel_result result = nebel_trace_planes(fog->sky, &by_sky, NB_BATCH, rays, &with_sky);
     if (result == NEBEL_OK)
         result = trace_part(fog->sun, rays, &by_sun, transfers->error,
-                            (float *const[]){knot->fog_sun[0], knot->fog_sun[1], knot->fog_sun[2]});
+                            (float *const[]){node->fog_sun[0], node->fog_sun[1], node->fog_sun[2]});
     if (fog->own != NULL && result == NEBEL_OK)
         return trace_part(fog->own, rays, trace, transfers->error, transfers->in_scattering);
     for (int c = 0; c < 3; c++) memset(transfers->in_scattering[c], 0, NB_BATCH * sizeof(float));
     return result;
 }
 
-void nb_fog_irradiance_light(const nb_frame *frame, const nb_ray_batch *rays, nb_aerial_batch_nodes *knot)
+void nb_fog_irradiance_light(const nb_frame *frame, const nb_ray_batch *rays, nb_aerial_batch_nodes *node)
 {
     const nb_air_frame *air = &frame->air;
     for (int i = 0; i < NB_BATCH; i++) {
         double place[3], sun[3], sky[3];
-        if (!(knot->at[i] > 0)) continue;
+        if (!(node->at[i] > 0)) continue;
         for (int c = 0; c < 3; c++)
-            place[c] = air->position[c] + (double)knot->at[i] * rays->direction[c][i] / (double)rays->length[i];
+            place[c] = air->position[c] + (double)node->at[i] * rays->direction[c][i] / (double)rays->length[i];
         if (!air->is_fog_even) light_at(air, place, sun, sky);
         for (int c = 0; c < 3; c++) {
-            knot->sun[c][i] = (float)(air->is_fog_even ? air->sun_at_eye : sun)[c];
-            knot->sky[c][i] = (float)(air->is_fog_even ? air->sky_at_eye : sky)[c];
+            node->sun[c][i] = (float)(air->is_fog_even ? air->sun_at_eye : sun)[c];
+            node->sky[c][i] = (float)(air->is_fog_even ? air->sky_at_eye : sky)[c];
         }
     }
 }

@@ -31,7 +31,7 @@ void nb_fog_shadow_start(nb_scratch *scratch)
 
 nebel_result nb_fog_shadow_find(const nb_frame *frame, nb_scratch *scratch)
 {
-    const nb_aerial_batch_nodes *const end = &scratch->air.knots[0];
+    const nb_aerial_batch_nodes *const end = &scratch->air.nodes[0];
     nebel_result result = NEBEL_OK;
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
         nb_fog_shadow *const shade = &scratch->air.fog_shade[i];

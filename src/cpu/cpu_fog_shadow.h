@@ -11,7 +11,7 @@ nebel_result nb_fog_shadow_set(nb_frame *frame);
 /* For a batch to come: no ray has any. */
 void nb_fog_shadow_start(nb_scratch *scratch);
 
-/* Along the rays that see fog up to scratch->air.knots[0] and have none yet. */
+/* Along the rays that see fog up to scratch->air.nodes[0] and have none yet. */
 nebel_result nb_fog_shadow_find(const nb_frame *frame, nb_scratch *scratch);
 
 /* Between two places of a ray. */

@@ -66,11 +66,11 @@ typedef struct nb_cpu_planets_scratch {
     int world[NB_BATCH];                                 /* whose ground it is */
     float start[3][NB_BATCH];                            /* of rays to lights, relative to the camera */
     float sun_left[3][NB_BATCH], sky_there[3][NB_BATCH]; /* of models: see nb_irradiance_at */
-    nb_aerial_batch_nodes knots[NB_AIR_NODES], fresh;    /* the first where rays end; one that is being found */
-    int known[NB_BATCH];                                 /* a ray's knots */
+    nb_aerial_batch_nodes nodes[NB_AIR_NODES], fresh;    /* the first where rays end; one that is being found */
+    int known[NB_BATCH];                                 /* a ray's nodes */
     uint8_t order[NB_BATCH][NB_AIR_NODES];               /* of those along it up to its end */
     int count[NB_BATCH];
-    int is_kept;                       /* knots but the first are of the rays that are followed next, too */
+    int is_kept;                       /* nodes but the first are of the rays that are followed next, too */
     nb_fog_shadow fog_shade[NB_BATCH]; /* through the middles of pixels, of fog that is shaded by its place */
 } nb_cpu_planets_scratch;
 
@@ -84,7 +84,7 @@ void nb_cpu_planets_free(nb_air_frame *air);
 /* Makes tables of daylight where there are none. Errors: MEMORY. */
 nebel_result nb_cpu_planets_set_irradiances(nb_air_frame *air, const nebel_planet *home, const nebel_log *log);
 
-/* By these: what is left of the sun at a place, and how much brighter the sky is than at the origin, for whom. */
+/* Computes by these the transmittance of sunlight to a point, and the radiance of the sky there over that at the origin, for whom. */
 void nb_cpu_planets_light_at(const nb_air_frame *air, nb_irradiance_receiver of, const double place[3], double sun[3],
                              double sky[3]);
 

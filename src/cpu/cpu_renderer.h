@@ -54,17 +54,17 @@ typedef struct nb_cloud_scratch {
     int is_lifted[NB_BATCH], has_lifted[NB_BATCH];
     float reach[NB_BATCH]; /* m, how far they are known */
     int is_new[NB_BATCH];
-    nebel_cloud_transfer knots[NB_BATCH];
+    nebel_cloud_transfer nodes[NB_BATCH];
     nebel_ray asked[NB_BATCH]; /* one behind the other: rays that clouds are looked for along, and what is found */
     double spreads[NB_BATCH];
     nebel_cloud_transfer found[NB_BATCH];
     nb_shadowed_segment shaded[NB_BATCH][NB_SHADED_PIECES]; /* the air */
     uint32_t shaded_count[NB_BATCH];
-    float over[NEBEL_MAX_CLOUD_NODES][3][NB_BATCH]; /* what a knot adds to light that came from behind */
+    float over[NEBEL_MAX_CLOUD_NODES][3][NB_BATCH]; /* what a node adds to light that came from behind */
     nb_aerial_nodes air[NB_BATCH];
     nb_cloud_fog_nodes marks[NB_BATCH];
-    int next[NB_BATCH];    /* the knot to mark; -1: none */
-    float doubt[NB_BATCH]; /* of light: by means between knots, and as fog counts as spread evenly between marks */
+    int next[NB_BATCH];    /* the node to mark; -1: none */
+    float doubt[NB_BATCH]; /* of light: by means between nodes, and as fog counts as spread evenly between marks */
     float end[NB_BATCH];   /* m, how far clouds matter to a sample */
     float distance[NB_BATCH];
     nb_light_samples samples;

@@ -330,7 +330,7 @@ static int find_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, co
                      double advance, uint32_t *numbers)
 {
     for (int p = 0; p < NB_BATCH; p += NB_PACKET) {
-        for (int i = 0; i < NB_PACKET; i++) numbers[p + i] = (uint32_t)shafts->toggle_count;
+        for (int i = 0; i < NB_PACKET; i++) numbers[p + i] = (uint32_t)shafts->boundary_count;
         if (tree->count == 0 || nb_is_empty(from + p, to + p)) continue;
         nb_shaft_rays packet;
         for (int i = 0; i < NB_PACKET; i++) {
@@ -341,7 +341,7 @@ static int find_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, co
             !nb_sun_shafts_finish(shafts, allocator, &packet, rays->length + p, advance, numbers + p))
             return 0;
     }
-    numbers[NB_BATCH] = (uint32_t)shafts->toggle_count;
+    numbers[NB_BATCH] = (uint32_t)shafts->boundary_count;
     return 1;
 }
 
@@ -373,7 +373,7 @@ nebel_result nb_light_shafts_find(nb_light_shafts *shafts, const nebel_allocator
     float from[NB_BATCH], to[NB_BATCH];
     if (!make_room(shafts, allocator, count)) return NEBEL_ERROR_MEMORY;
     nb_sun_shafts_clip(box, rays, advance, distance, from, to);
-    shafts->shafts.toggle_count = 0;
+    shafts->shafts.boundary_count = 0;
     for (size_t i = 0; i < count; i++) {
         const nb_light_place lamp = place_lamp(fog, i, tree->origin);
         uint32_t *numbers = shafts->numbers + i * (NB_BATCH + 1);
@@ -381,7 +381,7 @@ nebel_result nb_light_shafts_find(nb_light_shafts *shafts, const nebel_allocator
             return NEBEL_ERROR_MEMORY;
         shafts->pieces[i].offsets = numbers;
     }
-    for (size_t i = 0; i < count; i++) shafts->pieces[i].boundaries = shafts->shafts.toggles;
+    for (size_t i = 0; i < count; i++) shafts->pieces[i].boundaries = shafts->shafts.boundaries;
     return NEBEL_OK;
 }
 

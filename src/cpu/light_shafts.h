@@ -9,7 +9,7 @@
 
 /* What a thread works in; all zero at first. */
 typedef struct nb_light_shafts {
-    nb_sun_shafts shafts; /* the toggles of all lamps */
+    nb_sun_shafts shafts; /* the boundaries of all lamps */
     uint32_t *numbers;    /* the member `first` of all pieces */
     size_t number_capacity;
     nebel_ray_visibility *pieces; /* one for each lamp of the fog: what nebel_trace_desc.lamplit takes */

@@ -278,7 +278,7 @@ NB_CLONES static int walk(nb_sun_shafts *shafts, const nebel_allocator *allocato
     return 1;
 }
 
-/* ---- toggles --------------------------------------------------------------------------------- */
+/* ---- boundaries --------------------------------------------------------------------------------- */
 
 static int compare_shadows(const void *a, const void *b)
 {
@@ -315,34 +315,34 @@ static void sort_by_lane(nb_sun_shafts *shafts, size_t ends[NB_PACKET])
 }
 
 /* From where fog begins to count, in which a shadow that begins with it begins at 0. */
-static void toggle(nb_sun_shafts *shafts, float t)
+static void boundary(nb_sun_shafts *shafts, float t)
 {
-    shafts->toggles[shafts->toggle_count++] = nb_most(t, 0);
+    shafts->boundaries[shafts->boundary_count++] = nb_most(t, 0);
 }
 
-/* The shadows of one lane, sorted, as toggles. */
+/* The shadows of one lane, sorted, as boundaries. */
 static void join(nb_sun_shafts *shafts, const nb_shadow *shadows, size_t count, float skipped)
 {
     float enter = shadows[0].enter, leave = shadows[0].leave;
     for (size_t i = 1; i < count; i++) {
         if (shadows[i].enter > leave + nb_closeness * fabsf(leave)) {
-            toggle(shafts, enter + skipped);
-            toggle(shafts, leave + skipped);
+            boundary(shafts, enter + skipped);
+            boundary(shafts, leave + skipped);
             enter = shadows[i].enter;
             leave = shadows[i].leave;
         }
         leave = nb_most(leave, shadows[i].leave);
     }
-    toggle(shafts, enter + skipped);
-    toggle(shafts, leave + skipped);
+    boundary(shafts, enter + skipped);
+    boundary(shafts, leave + skipped);
 }
 
-static int reserve_toggles(nb_sun_shafts *shafts, const nebel_allocator *allocator, size_t more)
+static int reserve_boundaries(nb_sun_shafts *shafts, const nebel_allocator *allocator, size_t more)
 {
-    void *toggles = shafts->toggles;
-    const int grown = nb_grow(allocator, &toggles, sizeof *shafts->toggles, shafts->toggle_count,
-                              &shafts->toggle_capacity, shafts->toggle_count + more);
-    shafts->toggles = toggles;
+    void *boundaries = shafts->boundaries;
+    const int grown = nb_grow(allocator, &boundaries, sizeof *shafts->boundaries, shafts->boundary_count,
+                              &shafts->boundary_capacity, shafts->boundary_count + more);
+    shafts->boundaries = boundaries;
     return grown;
 }
 
@@ -352,7 +352,7 @@ static int make_room(nb_sun_shafts *shafts, const nebel_allocator *allocator)
     const int grown =
         nb_grow(allocator, &sorted, sizeof *shafts->sorted, 0, &shafts->sorted_capacity, shafts->shadow_count);
     shafts->sorted = sorted;
-    return grown && reserve_toggles(shafts, allocator, 2 * shafts->shadow_count);
+    return grown && reserve_boundaries(shafts, allocator, 2 * shafts->shadow_count);
 }
 
 int nb_sun_shafts_finish(nb_sun_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays,
@@ -364,7 +364,7 @@ int nb_sun_shafts_finish(nb_sun_shafts *shafts, const nebel_allocator *allocator
     if (shafts->shadow_count > 0 && !make_room(shafts, allocator)) return 0;
     if (shafts->shadow_count > 0) sort_by_lane(shafts, ends);
     for (uint32_t i = 0; i < NB_PACKET; i++) {
-        first[i] = (uint32_t)shafts->toggle_count;
+        first[i] = (uint32_t)shafts->boundary_count;
         if (shafts->shadow_count == 0 || ends[i] == begin) continue;
         join(shafts, shafts->sorted + begin, ends[i] - begin, (float)(advance * (double)length[i]));
         begin = ends[i];
@@ -388,18 +388,18 @@ static int find_by_prisms(nb_sun_shafts *shafts, const nebel_allocator *allocato
            nb_sun_shafts_finish(shafts, allocator, packet, length, advance, first);
 }
 
-/* What of the passages of a ray is asked for, as toggles. There is room for them. */
-static void toggle_passages(nb_sun_shafts *shafts, const nb_boundary_crossings *passages, int ray, int is_dark,
-                            float from, float to, float skipped)
+/* What of the passages of a ray is asked for, as boundaries. There is room for them. */
+static void add_crossings(nb_sun_shafts *shafts, const nb_boundary_crossings *passages, int ray, int is_dark,
+                          float from, float to, float skipped)
 {
     int k = 0;
     for (; k < passages->count && passages->rows[k][ray] <= from; k++) is_dark = nb_enters(passages->rows[k][ray]);
-    if (is_dark) toggle(shafts, from + skipped);
+    if (is_dark) boundary(shafts, from + skipped);
     for (; k < passages->count && passages->rows[k][ray] < to; k++) {
         is_dark = nb_enters(passages->rows[k][ray]);
-        toggle(shafts, passages->rows[k][ray] + skipped);
+        boundary(shafts, passages->rows[k][ray] + skipped);
     }
-    if (is_dark) toggle(shafts, to + skipped);
+    if (is_dark) boundary(shafts, to + skipped);
 }
 
 /* By walls, from the eye on. Returns 0 where that is not possible. */
@@ -427,11 +427,11 @@ static int find_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, 
     shafts->by_prisms += (size_t)!by_walls;
     if (!by_walls)
         return find_by_prisms(shafts, allocator, cells, rays->length + first, advance, shafts->first + first, packet);
-    if (!reserve_toggles(shafts, allocator, (size_t)(passages.count + 2) * NB_PACKET)) return 0;
+    if (!reserve_boundaries(shafts, allocator, (size_t)(passages.count + 2) * NB_PACKET)) return 0;
     for (int i = 0; i < NB_PACKET; i++) {
-        shafts->first[first + i] = (uint32_t)shafts->toggle_count;
+        shafts->first[first + i] = (uint32_t)shafts->boundary_count;
         if (packet->from[i] < packet->to[i])
-            toggle_passages(shafts, &passages, i, eye == NB_EYE_IN_SHADOW, packet->from[i], packet->to[i], skipped[i]);
+            add_crossings(shafts, &passages, i, eye == NB_EYE_IN_SHADOW, packet->from[i], packet->to[i], skipped[i]);
     }
     return 1;
 }
@@ -442,9 +442,9 @@ nebel_result nb_sun_shafts_find(nb_sun_shafts *shafts, const nebel_allocator *al
 {
     float from[NB_BATCH], to[NB_BATCH];
     clip(box, rays, advance, distance, from, to);
-    shafts->toggle_count = 0;
+    shafts->boundary_count = 0;
     for (int p = 0; p < NB_BATCH; p += NB_PACKET) {
-        for (int i = 0; i < NB_PACKET; i++) shafts->first[p + i] = (uint32_t)shafts->toggle_count;
+        for (int i = 0; i < NB_PACKET; i++) shafts->first[p + i] = (uint32_t)shafts->boundary_count;
         if (cells->node_count == 0 || nb_is_empty(from + p, to + p)) continue;
         nb_shaft_rays packet;
         for (int i = 0; i < NB_PACKET; i++) {
@@ -453,7 +453,7 @@ nebel_result nb_sun_shafts_find(nb_sun_shafts *shafts, const nebel_allocator *al
         }
         if (!find_packet(shafts, allocator, cells, rays, advance, eye, p, &packet)) return NEBEL_ERROR_MEMORY;
     }
-    shafts->first[NB_BATCH] = (uint32_t)shafts->toggle_count;
+    shafts->first[NB_BATCH] = (uint32_t)shafts->boundary_count;
     return NEBEL_OK;
 }
 
@@ -461,5 +461,5 @@ void nb_sun_shafts_free(nb_sun_shafts *shafts, const nebel_allocator *allocator)
 {
     nb_release(allocator, shafts->shadows);
     nb_release(allocator, shafts->sorted);
-    nb_release(allocator, shafts->toggles);
+    nb_release(allocator, shafts->boundaries);
 }

@@ -29,8 +29,8 @@ typedef struct nb_sun_shafts {
     size_t shadow_count, shadow_capacity;
     nb_shadow *sorted; /* the same by lane, as many as there is room for the others */
     size_t sorted_capacity;
-    float *toggles; /* m from where fog begins to count, which is before a ray is advanced */
-    size_t toggle_count, toggle_capacity;
+    float *boundaries; /* m from where fog begins to count, which is before a ray is advanced */
+    size_t boundary_count, boundary_capacity;
     uint32_t first[NB_BATCH + 1]; /* see nebel_ray_visibility */
     size_t by_walls, by_prisms;   /* packets, up to now */
 } nb_sun_shafts;

@@ -118,7 +118,7 @@ static int sees_clouds_alone(const nb_frame *frame, const nb_scratch *scratch)
     if (frame->cloud_view == NULL) return 0;
     for (int i = 0; i < NB_BATCH; i++) {
         if (scratch->air.ground.distance[i] < HUGE_VALF) return 0;
-        any |= scratch->clouds.knots[i].count > 0;
+        any |= scratch->clouds.nodes[i].count > 0;
     }
     return any;
 }

@@ -111,7 +111,7 @@ static int lift(const nb_cloud_picture *picture, double spread, nebel_ray *ray)
            nb_planets_lift(picture->worlds, picture->world_count, ray->origin, spread, ray->direction);
 }
 
-/* Along which knots are found for all samples at once: among fog, which is not asked again, it is lifted. */
+/* Along which nodes are found for all samples at once: among fog, which is not asked again, it is lifted. */
 static double first_ray_at(const nb_cloud_picture *picture, uint32_t x, uint32_t y, nebel_ray *ray)
 {
     const double spread = ray_at(picture, x, y, ray);
@@ -161,7 +161,7 @@ void nb_cloud_picture_release(nb_gl_clouds *clouds)
     forget(clouds);
     for (int i = 0; i < NB_CLOUD_PARTS; i++) {
         nb_release(&clouds->allocator, clouds->parts[i].bundle);
-        nb_release(&clouds->allocator, clouds->parts[i].knots);
+        nb_release(&clouds->allocator, clouds->parts[i].nodes);
         nb_release(&clouds->allocator, clouds->parts[i].before);
         nb_release(&clouds->allocator, clouds->parts[i].pieces);
     }
@@ -170,26 +170,26 @@ void nb_cloud_picture_release(nb_gl_clouds *clouds)
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
-static void set_knots(const nebel_cloud_transfer *knots, nb_cloud_pixel_node *list)
+static void set_nodes(const nebel_cloud_transfer *nodes, nb_cloud_pixel_node *list)
 {
-    for (uint32_t k = 0; k < knots->count; k++) {
-        list[k] = (nb_cloud_pixel_node){.t = knots->t[k], .left = knots->transmittance[k]};
-        memcpy(list[k].light, knots->in_scattering[k], sizeof list[k].light);
+    for (uint32_t k = 0; k < nodes->count; k++) {
+        list[k] = (nb_cloud_pixel_node){.t = nodes->t[k], .left = nodes->transmittance[k]};
+        memcpy(list[k].light, nodes->in_scattering[k], sizeof list[k].light);
     }
 }
 
-static nebel_result keep_knots(const job *j, nb_cloud_part *part, const nebel_cloud_transfer *knots,
+static nebel_result keep_nodes(const job *j, nb_cloud_part *part, const nebel_cloud_transfer *nodes,
                                nb_cloud_pixel *pixel)
 {
-    void *list = part->knots;
-    if (!nb_grow(&j->clouds->allocator, &list, sizeof *part->knots, part->count, &part->capacity,
-                 part->count + knots->count))
+    void *list = part->nodes;
+    if (!nb_grow(&j->clouds->allocator, &list, sizeof *part->nodes, part->count, &part->capacity,
+                 part->count + nodes->count))
         return NEBEL_ERROR_MEMORY;
-    part->knots = list;
+    part->nodes = list;
     pixel->first = (uint32_t)part->count;
-    pixel->count = knots->count;
-    if (knots->count > 0) set_knots(knots, part->knots + part->count); /* the list of none may be NULL */
-    part->count += knots->count;
+    pixel->count = nodes->count;
+    if (nodes->count > 0) set_nodes(nodes, part->nodes + part->count); /* the list of none may be NULL */
+    part->count += nodes->count;
     return NEBEL_OK;
 }
 
@@ -229,12 +229,12 @@ static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray
 }
 
 static nebel_result trace_rays(const nb_cloud_picture *picture, nb_cloud_part *part, uint32_t count,
-                               const nebel_ray *rays, const double *spreads, nebel_cloud_transfer *knots)
+                               const nebel_ray *rays, const double *spreads, nebel_cloud_transfer *nodes)
 {
     const nebel_result result =
-        nebel_trace_clouds(part->workspace, count, rays, sizeof *rays, spreads, sizeof *spreads, knots, sizeof *knots);
+        nebel_trace_clouds(part->workspace, count, rays, sizeof *rays, spreads, sizeof *spreads, nodes, sizeof *nodes);
     for (uint32_t i = 0; i < count && result == NEBEL_OK; i++)
-        nb_cloud_eclipse(picture->worlds, picture->world_count, &rays[i], picture->to_sun, picture->disc, &knots[i]);
+        nb_cloud_eclipse(picture->worlds, picture->world_count, &rays[i], picture->to_sun, picture->disc, &nodes[i]);
     return result;
 }
 
@@ -252,7 +252,7 @@ static nebel_result trace_pixels(const job *j, nb_cloud_part *part, const int is
         trace_rays(j->picture, part, count, bundle->asked, bundle->asked_spreads, bundle->found);
     count = 0;
     for (int i = 0; i < NB_CLOUD_SHARE && result == NEBEL_OK; i++)
-        if (is_asked[i]) bundle->knots[i] = bundle->found[count++];
+        if (is_asked[i]) bundle->nodes[i] = bundle->found[count++];
     return result;
 }
 
@@ -276,7 +276,7 @@ static nebel_result trace_block(const job *j, nb_cloud_part *part, uint32_t left
         const uint32_t x = left + i % NB_CLOUD_PIXELS_COLUMNS, y = top + i / NB_CLOUD_PIXELS_COLUMNS;
         block.is_wanted[i] = x < view->width && y < end;
         block.is_open[i] = 1;
-        block.knots[i] = &bundle->knots[i];
+        block.nodes[i] = &bundle->nodes[i];
         if (!block.is_wanted[i]) continue;
         bundle->spreads[i] = first_ray_at(j->picture, x, view->height - 1 - y, &bundle->rays[i]);
         block.ground[i] = ground_of(j, &bundle->rays[i]);
@@ -301,7 +301,7 @@ static nebel_result keep_block(const job *j, nb_cloud_part *part, uint32_t left,
         nebel_ray ray = part->bundle->rays[i];
         (void)lift(j->picture, part->bundle->spreads[i], &ray);
         result = shade_air(j, part, &ray, pixel);
-        if (result == NEBEL_OK) result = keep_knots(j, part, &part->bundle->knots[i], pixel);
+        if (result == NEBEL_OK) result = keep_nodes(j, part, &part->bundle->nodes[i], pixel);
     }
     return result;
 }
@@ -371,7 +371,7 @@ static float shaded_at(const nb_cloud_part *part, const nb_cloud_pixel *pixel, i
 
 /* All that is known of a ray. */
 typedef struct nb_cloud_mix {
-    nebel_cloud_transfer knots;
+    nebel_cloud_transfer nodes;
     nb_aerial_nodes air;
     nb_cloud_fog_nodes marks;
 } nb_cloud_mix;
@@ -380,16 +380,16 @@ static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_c
                              const nb_cloud_pixel *pixel, const double direction[3], nb_cloud_mix *mix)
 {
     nb_cloud_air_rays rays;
-    mix->knots = (nebel_cloud_transfer){.count = pixel->count};
+    mix->nodes = (nebel_cloud_transfer){.count = pixel->count};
     memset(&mix->marks, 0, sizeof mix->marks);
     for (uint32_t k = 0; k < pixel->count; k++) {
-        mix->knots.t[k] = list[k].t;
-        mix->knots.transmittance[k] = list[k].left;
-        memcpy(mix->knots.in_scattering[k], list[k].light, sizeof list[k].light);
+        mix->nodes.t[k] = list[k].t;
+        mix->nodes.transmittance[k] = list[k].left;
+        memcpy(mix->nodes.in_scattering[k], list[k].light, sizeof list[k].light);
     }
-    nb_cloud_compose_ask(&mix->knots, direction, &mix->air, &rays);
+    nb_cloud_compose_ask(&mix->nodes, direction, &mix->air, &rays);
     const nebel_result result = nb_planets_trace(j->picture->worlds, j->picture->world_count, pixel->count,
-                                                 rays.direction, mix->knots.t, &rays.transfers);
+                                                 rays.direction, mix->nodes.t, &rays.transfers);
     for (uint32_t k = 0; k < pixel->count && result == NEBEL_OK; k++) {
         if (list[k].is_marked) nb_cloud_mark(&mix->marks, k, list[k].haze_left, list[k].haze_light);
         for (int c = 0; c < 3; c++) mix->air.light[c][k] = shaded_at(part, pixel, c, list[k].t, mix->air.light[c][k]);
@@ -406,14 +406,14 @@ static nebel_result choose_pixel(const job *j, nb_cloud_part *part, nb_cloud_pix
     nebel_result result = find_mix(j, part, before, pixel, direction, &mix);
     if (result != NEBEL_OK) return result;
     const uint32_t count = pixel->count;
-    pixel->next = nb_cloud_compose_next(&mix.knots, &mix.marks, &mix.air, (float)NEBEL_DEFAULT_TOLERANCE, &doubt);
-    result = keep_knots(j, part, &mix.knots, pixel);
+    pixel->next = nb_cloud_compose_next(&mix.nodes, &mix.marks, &mix.air, (float)NEBEL_DEFAULT_TOLERANCE, &doubt);
+    result = keep_nodes(j, part, &mix.nodes, pixel);
     for (uint32_t k = 0; k < count && result == NEBEL_OK; k++) {
         const uint32_t at = pixel->count > count && (int)k >= pixel->next ? k + 1 : k;
-        nb_cloud_pixel_node *const knot = &part->knots[pixel->first + at];
-        knot->is_marked = before[k].is_marked;
-        memcpy(knot->haze_left, before[k].haze_left, sizeof knot->haze_left);
-        memcpy(knot->haze_light, before[k].haze_light, sizeof knot->haze_light);
+        nb_cloud_pixel_node *const node = &part->nodes[pixel->first + at];
+        node->is_marked = before[k].is_marked;
+        memcpy(node->haze_left, before[k].haze_left, sizeof node->haze_left);
+        memcpy(node->haze_light, before[k].haze_light, sizeof node->haze_light);
     }
     return result;
 }
@@ -429,7 +429,7 @@ static void choose_row(const job *j, nb_cloud_part *part, uint32_t y)
         pixel->next = -1;
         if (pixel->count > 0) part->result = choose_pixel(j, part, pixel, ray.direction);
         if (part->result != NEBEL_OK) return;
-        mark[0] = pixel->next >= 0 ? part->knots[pixel->first + (uint32_t)pixel->next].t : 0;
+        mark[0] = pixel->next >= 0 ? part->nodes[pixel->first + (uint32_t)pixel->next].t : 0;
         for (int c = 0; c < 3; c++) mark[1 + c] = (float)(ray.direction[c] * inverse);
     }
 }
@@ -439,11 +439,11 @@ nebel_result nb_cloud_picture_choose(nb_gl_clouds *clouds, const nb_cloud_pictur
     const size_t pixels = (size_t)picture->view->width * picture->view->height;
     for (int i = 0; i < NB_CLOUD_PARTS; i++) {
         nb_cloud_part *const part = &clouds->parts[i];
-        nb_cloud_pixel_node *const knots = part->knots;
+        nb_cloud_pixel_node *const nodes = part->nodes;
         const size_t capacity = part->capacity;
-        part->knots = part->before;
+        part->nodes = part->before;
         part->capacity = part->capacity_before;
-        part->before = knots;
+        part->before = nodes;
         part->capacity_before = capacity;
         part->count = 0;
     }
@@ -470,10 +470,10 @@ void nb_cloud_picture_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture
             const size_t i = (size_t)y * picture->view->width + x;
             const nb_cloud_pixel *const pixel = &clouds->pixels[i];
             if (pixel->count == 0 || pixel->next < 0) continue;
-            nb_cloud_pixel_node *const knot = &part->knots[pixel->first + (uint32_t)pixel->next];
-            knot->is_marked = 1;
-            memcpy(knot->haze_left, left + 4 * i, sizeof knot->haze_left);
-            memcpy(knot->haze_light, light + 4 * i, sizeof knot->haze_light);
+            nb_cloud_pixel_node *const node = &part->nodes[pixel->first + (uint32_t)pixel->next];
+            node->is_marked = 1;
+            memcpy(node->haze_left, left + 4 * i, sizeof node->haze_left);
+            memcpy(node->haze_light, light + 4 * i, sizeof node->haze_light);
         }
     }
 }
@@ -488,8 +488,8 @@ static nebel_result mix_pixel(const job *j, const nb_cloud_part *part, const nb_
     nb_aerial_nodes haze = mix.air;
     for (int c = 0; c < 3; c++) {
         float over[NEBEL_MAX_CLOUD_NODES];
-        if (mix.marks.is_set[0]) nb_cloud_compose_add_fog(&mix.knots, &mix.marks, c, &mix.air, &haze);
-        nb_cloud_compose_sum(&mix.knots, c, &haze, over);
+        if (mix.marks.is_set[0]) nb_cloud_compose_add_fog(&mix.nodes, &mix.marks, c, &mix.air, &haze);
+        nb_cloud_compose_sum(&mix.nodes, c, &haze, over);
         for (uint32_t k = 0; k < pixel->count; k++) list[k].light[c] = over[k];
     }
     return NEBEL_OK;
@@ -501,7 +501,7 @@ static void mix_row(const job *j, nb_cloud_part *part, uint32_t y)
         const nb_cloud_pixel *const pixel = &j->clouds->pixels[(size_t)y * j->picture->view->width + x];
         nebel_ray ray;
         (void)first_ray_at(j->picture, x, y, &ray);
-        if (pixel->count > 0) part->result = mix_pixel(j, part, pixel, ray.direction, part->knots + pixel->first);
+        if (pixel->count > 0) part->result = mix_pixel(j, part, pixel, ray.direction, part->nodes + pixel->first);
     }
 }
 
@@ -516,16 +516,16 @@ nebel_result nb_cloud_picture_mix(nb_gl_clouds *clouds, const nb_cloud_picture *
 /* A surface is on the ground where it is no higher than that part of its distance and of the planet's radius. */
 #define NEAR_GROUND 1e-6
 
-/* Before a surface within the clouds they are as between the knots around it. */
-static void lay_over(const nb_cloud_pixel_node *knots, uint32_t count, float end, float over[4])
+/* Before a surface within the clouds they are as between the nodes around it. */
+static void lay_over(const nb_cloud_pixel_node *nodes, uint32_t count, float end, float over[4])
 {
     static const float clear[4] = {0, 0, 0, 1};
     float t[NEBEL_MAX_CLOUD_NODES], part;
     memcpy(over, clear, sizeof clear);
-    if (count == 0 || !(end > knots[0].t)) return;
-    for (uint32_t i = 0; i < count; i++) t[i] = knots[i].t;
+    if (count == 0 || !(end > nodes[0].t)) return;
+    for (uint32_t i = 0; i < count; i++) t[i] = nodes[i].t;
     const uint32_t k = nb_cloud_compose_find(count, t, end, &part);
-    const nb_cloud_pixel_node *const a = &knots[k], *const b = &knots[part > 0 ? k + 1 : k];
+    const nb_cloud_pixel_node *const a = &nodes[k], *const b = &nodes[part > 0 ? k + 1 : k];
     for (int c = 0; c < 3; c++) over[c] = (1 - part) * a->light[c] + part * b->light[c];
     over[3] = (1 - part) * a->left + part * b->left;
 }
@@ -555,18 +555,18 @@ static nb_cloud_end end_at(const job *j, const double direction[3], float t)
     return (nb_cloud_end){.t = t};
 }
 
-/* NULL for a pixel without knots: the list of none may be NULL, to which nothing is added. */
-static const nb_cloud_pixel_node *knots_of(const nb_cloud_part *part, const nb_cloud_pixel *pixel)
+/* NULL for a pixel without nodes: the list of none may be NULL, to which nothing is added. */
+static const nb_cloud_pixel_node *nodes_of(const nb_cloud_part *part, const nb_cloud_pixel *pixel)
 {
-    return pixel->count > 0 ? part->knots + pixel->first : NULL;
+    return pixel->count > 0 ? part->nodes + pixel->first : NULL;
 }
 
-/* Whether knots up to the ground do for a ray that ends there: among fog they must. */
+/* Whether nodes up to the ground do for a ray that ends there: among fog they must. */
 static int is_found(const job *j, const nb_cloud_part *part, const nb_cloud_pixel *pixel, float end)
 {
-    const nb_cloud_pixel_node *const knots = knots_of(part, pixel);
+    const nb_cloud_pixel_node *const nodes = nodes_of(part, pixel);
     if (pixel->count == 0 || j->picture->has_fog) return 1;
-    return nb_cloud_is_found(pixel->count, knots[0].t, knots[pixel->count - 1].t, HUGE_VALF, end);
+    return nb_cloud_is_found(pixel->count, nodes[0].t, nodes[pixel->count - 1].t, HUGE_VALF, end);
 }
 
 /* Along another ray, or up to another place. */
@@ -575,13 +575,13 @@ static nebel_result lay_anew(const job *j, nb_cloud_part *part, const nb_cloud_p
 {
     nb_cloud_pixel anew = *pixel;
     nb_cloud_pixel_node list[NEBEL_MAX_CLOUD_NODES];
-    nebel_cloud_transfer knots;
-    nebel_result result = trace_rays(j->picture, part, 1, ray, &spread, &knots);
+    nebel_cloud_transfer nodes;
+    nebel_result result = trace_rays(j->picture, part, 1, ray, &spread, &nodes);
     if (result != NEBEL_OK) return result;
-    anew.count = knots.count;
-    set_knots(&knots, list);
-    if (knots.count > 0) result = mix_pixel(j, part, &anew, ray->direction, list);
-    lay_over(list, knots.count, (float)ray->t_max, over);
+    anew.count = nodes.count;
+    set_nodes(&nodes, list);
+    if (nodes.count > 0) result = mix_pixel(j, part, &anew, ray->direction, list);
+    lay_over(list, nodes.count, (float)ray->t_max, over);
     return result;
 }
 
@@ -598,7 +598,7 @@ static nebel_result lay_pixel(const job *j, nb_cloud_part *part, uint32_t x, uin
     ray.t_max = lifted.t_max = (double)end->t;
     if ((has_other && (j->picture->has_fog ? end->is_on_ground : end->is_in_sky)) || !is_found(j, part, pixel, end->t))
         return lay_anew(j, part, pixel, end->is_in_sky ? &lifted : &ray, spread, over);
-    lay_over(knots_of(part, pixel), pixel->count, end->t, over);
+    lay_over(nodes_of(part, pixel), pixel->count, end->t, over);
     return NEBEL_OK;
 }
 

@@ -27,13 +27,13 @@ typedef struct nb_cloud_pixel_node {
 typedef struct nb_cloud_bundle {
     nebel_ray rays[NB_CLOUD_SHARE], asked[NB_CLOUD_SHARE];
     double spreads[NB_CLOUD_SHARE], asked_spreads[NB_CLOUD_SHARE];
-    nebel_cloud_transfer knots[NB_CLOUD_SHARE], found[NB_CLOUD_SHARE];
+    nebel_cloud_transfer nodes[NB_CLOUD_SHARE], found[NB_CLOUD_SHARE];
 } nb_cloud_bundle;
 
 typedef struct nb_cloud_part {
     nebel_cloud_workspace *workspace;
     nb_cloud_bundle *bundle;
-    nb_cloud_pixel_node *knots, *before; /* before: while more are put between them */
+    nb_cloud_pixel_node *nodes, *before; /* before: while more are put between them */
     size_t count, capacity, capacity_before;
     nb_shadowed_segment *pieces;
     size_t piece_count, piece_capacity;
@@ -41,10 +41,10 @@ typedef struct nb_cloud_part {
     nebel_result result;
 } nb_cloud_part;
 
-/* The knots of a pixel, and its pieces of shaded air, in those of its part. */
+/* The nodes of a pixel, and its pieces of shaded air, in those of its part. */
 typedef struct nb_cloud_pixel {
     uint32_t first, count, first_piece, piece_count;
-    int next; /* the knot to mark; -1: none */
+    int next; /* the node to mark; -1: none */
 } nb_cloud_pixel;
 
 typedef struct nb_gl_clouds {
@@ -82,7 +82,7 @@ nebel_result nb_cloud_picture_set(nb_gl_clouds *clouds, const nebel_clouds *of, 
 /* A workspace of theirs, for the caller's thread. MEMORY. */
 nebel_result nb_cloud_picture_workspace(nb_gl_clouds *clouds, nebel_cloud_workspace **workspace);
 
-/* Finds all pixels' knots, in clear space, and their shade on the air, which is that of the eye. MEMORY. */
+/* Finds all pixels' nodes, in clear space, and their shade on the air, which is that of the eye. MEMORY. */
 nebel_result nb_cloud_picture_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture);
 
 /* Their shade on the air, and on fog, NULL: which is the same everywhere: texels as nb_gl_cloud_shade_write has them, of

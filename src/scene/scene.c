@@ -305,7 +305,7 @@ nebel_volume_origin nebel_get_volume_origin(const nebel_scene *scene, size_t ind
     return scene->volume_origins[index];
 }
 
-static nebel_result strew(const nebel_scene *scene, nebel_particle *particles)
+static nebel_result generate_particles(const nebel_scene *scene, nebel_particle *particles)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < scene->data.nebula_count && result == NEBEL_OK; i++) {
@@ -325,7 +325,7 @@ nebel_result nebel_generate_scene_particles(const nebel_scene *scene, nebel_part
     const size_t count = scene->data.particle_count;
     nebel_particle *made = nb_allocate(&scene->allocator, count, sizeof *made);
     if (made == NULL) return nb_fail(&scene->log, NEBEL_ERROR_MEMORY, "out of memory for %zu particles", count);
-    const nebel_result result = strew(scene, made);
+    const nebel_result result = generate_particles(scene, made);
     if (result == NEBEL_OK)
         *particles = made;
     else

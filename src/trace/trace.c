@@ -182,8 +182,8 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
     const nebel_result shadows = check_shadows(snapshot, desc, n);
     if (shadows != NEBEL_OK) return shadows;
     if (desc->sun_visibility != NULL) {
-        job->first_toggle = desc->sun_visibility->offsets;
-        job->toggles = desc->sun_visibility->boundaries;
+        job->first_boundary = desc->sun_visibility->offsets;
+        job->boundaries = desc->sun_visibility->boundaries;
     }
     job->lamplit = desc->light_visibility;
     job->snapshot = snapshot;

@@ -16,9 +16,9 @@ static nb_mask in_doubt(const nb_trace_job *job, nb_real error)
 
 #if !defined(NB_DOUBLE) || defined(ASKS_QUAD)
 
-static const uint32_t *toggles_of(const nb_trace_job *job, size_t i)
+static const uint32_t *boundaries_of(const nb_trace_job *job, size_t i)
 {
-    return job->first_toggle != NULL ? job->first_toggle + i : NULL;
+    return job->first_boundary != NULL ? job->first_boundary + i : NULL;
 }
 
 #endif
@@ -34,8 +34,8 @@ static double settle_lane(const nb_trace_job *job, size_t i, const nebel_ray *ra
                         .transmittance_only = job->transmittance_only,
                         .ignore_distances = job->ignore_distances,
                         .wants_error = 1,
-                        .first_toggle = toggles_of(job, i),
-                        .toggles = job->toggles,
+                        .first_boundary = boundaries_of(job, i),
+                        .boundaries = job->boundaries,
                         .lamplit = job->lamplit,
                         .first_lamplit = job->first_lamplit + i,
                         .count = 1,
@@ -87,7 +87,7 @@ static nebel_result ask_again(nb_trace_job *job, size_t i)
 {
     nb_trace_job one = *job;
     one.count = 1;
-    one.first_toggle = toggles_of(job, i);
+    one.first_boundary = boundaries_of(job, i);
     one.first_lamplit = job->first_lamplit + i;
     one.rays = nb_stride_from(job->rays, job->ray_stride, i);
     one.transfers = nb_stride_to(job->transfers, job->transfer_stride, i);

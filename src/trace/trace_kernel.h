@@ -18,8 +18,9 @@ typedef struct nb_trace_job {
     nebel_transfer *transfers;
     const nebel_ray_planes *ray_planes; /* NULL: structures. What all rays share is checked, no stride is 0 */
     const nebel_transfer_planes *light_planes;
-    const uint32_t *first_toggle; /* of each ray in `toggles`, and one more; NULL: the sun reaches all of every ray */
-    const float *toggles;         /* checked */
+    const uint32_t
+        *first_boundary;     /* of each ray in `boundaries`, and one more; NULL: the sun reaches all of every ray */
+    const float *boundaries; /* checked */
     const nebel_ray_visibility *lamplit; /* of each lamp; NULL: every lamp reaches all of every ray. Checked */
     size_t first_lamplit;                /* by which number the job's first ray goes there */
     size_t failed;                       /* out: the ray that was an error */

@@ -514,8 +514,8 @@ static void walk_through_crowd(sunlight *sun, const packet_state *m, const overl
     w.whole = nb_max(nb_narrow(last - first), NB_TINY);
     w.guess = NB_F(0.5) * w.whole;
     while (nb_wany(w.lanes)) {
-        if (shadows != NULL) pass_toggles(shadows, w.at.t, w.lanes);
-        const nb_wide bright = shadows != NULL ? nb_wmin(shadows->toggle, last) : last;
+        if (shadows != NULL) pass_boundaries(shadows, w.at.t, w.lanes);
+        const nb_wide bright = shadows != NULL ? nb_wmin(shadows->boundary, last) : last;
         const nb_wmask dark = shadows != NULL ? nb_wand(w.lanes, shadows->is_dark) : nb_wmask_false;
         if (nb_wany(dark)) {
             const lit_point behind = place_behind(sun, m, light, &w.at, nb_wselect(dark, bright, w.at.t), w.lanes);
@@ -574,7 +574,7 @@ static void gather_crowd_lights(sunlight *sun, const packet_state *m, gathered_l
     const nebel_snapshot *snapshot = sun->snapshot;
     if (snapshot->is_sunlit) {
         const overlap_light light = {.most = most_sunlight(m), .share = sun->share};
-        gather_light_of_crowd(sun, m, &light, sun->shade.toggles != NULL ? &sun->shade : NULL, g);
+        gather_light_of_crowd(sun, m, &light, sun->shade.boundaries != NULL ? &sun->shade : NULL, g);
     }
     nb_real most = NB_F(0.0);
     const nb_phase *phase = NULL;

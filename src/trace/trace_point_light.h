@@ -152,7 +152,7 @@ static void step_past_lamp(sunlight *sun, const packet_state *m, const light_pas
                            sun_walk *w, gathered_light *g)
 {
     const nb_mask last = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
-    const nb_wide bright = pass->shade != NULL ? nb_wmin(pass->shade->toggle, along->p->end) : along->p->end;
+    const nb_wide bright = pass->shade != NULL ? nb_wmin(pass->shade->boundary, along->p->end) : along->p->end;
     const nb_wide next = nb_wmin(next_turn(sun, w->t, bright), nearest_kink(m, w->t, bright));
     const nb_wide stop = nb_wselect(nb_widen_mask(last), bright, next);
     const nb_swing swing = nb_swing_between(pass->closest, pass->aside, w->t, stop);
@@ -186,7 +186,7 @@ static void walk_past_lamp(sunlight *sun, const packet_state *m, const light_pas
     sun_walk w = begin_walk(m, s->p, &s->before, lanes);
     w.guess = nb_narrow(nb_swing_between(pass->closest, pass->aside, w.t, w.t + nb_widen(w.guess)).end);
     while (nb_wany(w.lanes)) {
-        if (pass->shade != NULL) pass_toggles(pass->shade, w.t, w.lanes);
+        if (pass->shade != NULL) pass_boundaries(pass->shade, w.t, w.lanes);
         const nb_wmask dark = pass->shade != NULL ? nb_wand(w.lanes, pass->shade->is_dark) : nb_wmask_false;
         if (nb_wany(dark))
             pass_shadow(pass->shade, m, s, &w, dark);
@@ -277,7 +277,7 @@ static int open_lamp_shades(sunlight *sun, const nb_trace_job *job)
 static void begin_lights(sunlight *sun, const nb_trace_job *job, size_t first, size_t count)
 {
     sun->has_turns = 0;
-    begin_shade(&sun->shade, job->first_toggle != NULL ? job->first_toggle + first : NULL, job->toggles, count);
+    begin_shade(&sun->shade, job->first_boundary != NULL ? job->first_boundary + first : NULL, job->boundaries, count);
     for (size_t i = 0; sun->lamp_shades != NULL && i < sun->snapshot->lamp_count; i++) {
         const nebel_ray_visibility *lit = &job->lamplit[i];
         begin_shade(&sun->lamp_shades[i], lit->offsets + job->first_lamplit + first, lit->boundaries, count);

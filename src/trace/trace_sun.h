@@ -17,12 +17,12 @@
 /* More turns than these take memory once. */
 #define STACK_TURNS 64
 
-/* Where surfaces keep the sun away, lane by lane. A lane passes its toggles once, as its pieces come along the ray. */
+/* Where surfaces keep the sun away, lane by lane. A lane passes its boundaries once, as its pieces come along the ray. */
 typedef struct sun_attenuation {
-    const float *toggles; /* NULL: the sun reaches all */
+    const float *boundaries; /* NULL: the sun reaches all */
     size_t next[NB_WIDTH], end[NB_WIDTH];
-    nb_scalar dark[NB_WIDTH]; /* 1 where the sun is kept away before the next toggle */
-    nb_wide toggle;           /* the next one of each lane */
+    nb_scalar dark[NB_WIDTH]; /* 1 where the sun is kept away before the next boundary */
+    nb_wide boundary;         /* the next one of each lane */
     nb_wmask is_dark;
 } sun_attenuation;
 
@@ -104,15 +104,15 @@ static void look_ahead(sun_attenuation *s)
 {
     lane_place lane[NB_WIDTH];
     for (int i = 0; i < NB_WIDTH; i++)
-        lane[i] = s->next[i] < s->end[i] ? (lane_place)s->toggles[s->next[i]] : (lane_place)2e18;
-    s->toggle = load_places(lane);
+        lane[i] = s->next[i] < s->end[i] ? (lane_place)s->boundaries[s->next[i]] : (lane_place)2e18;
+    s->boundary = load_places(lane);
     s->is_dark = nb_widen_mask(nb_load_lanes(s->dark) > NB_F(0.0));
 }
 
-/* Of `count` rays, of which `first` are the toggles' first; NULL: light reaches all. */
-static void begin_shade(sun_attenuation *s, const uint32_t *first, const float *toggles, size_t count)
+/* Of `count` rays, of which `first` are the boundaries' first; NULL: light reaches all. */
+static void begin_shade(sun_attenuation *s, const uint32_t *first, const float *boundaries, size_t count)
 {
-    *s = (sun_attenuation){.toggles = toggles};
+    *s = (sun_attenuation){.boundaries = boundaries};
     for (size_t i = 0; first != NULL && i < count; i++) {
         s->next[i] = first[i];
         s->end[i] = first[i + 1];
@@ -120,15 +120,15 @@ static void begin_shade(sun_attenuation *s, const uint32_t *first, const float *
     look_ahead(s);
 }
 
-/* Passes the toggles up to t. */
-static void pass_toggles(sun_attenuation *s, nb_wide t, nb_wmask lanes)
+/* Passes the boundaries up to t. */
+static void pass_boundaries(sun_attenuation *s, nb_wide t, nb_wmask lanes)
 {
-    const nb_wmask passes = nb_wand(lanes, s->toggle <= t);
+    const nb_wmask passes = nb_wand(lanes, s->boundary <= t);
     if (!nb_wany(passes)) return;
     for (int i = 0; i < NB_WIDTH; i++) {
         if (!nb_lane(passes, i)) continue;
         const lane_place here = nb_lane(t, i);
-        for (; s->next[i] < s->end[i] && (lane_place)s->toggles[s->next[i]] <= here; s->next[i]++)
+        for (; s->next[i] < s->end[i] && (lane_place)s->boundaries[s->next[i]] <= here; s->next[i]++)
             s->dark[i] = 1 - s->dark[i];
     }
     look_ahead(s);
@@ -416,7 +416,7 @@ static void limit_step(const packet_state *m, const nb_real before[3], sun_step 
 typedef struct sun_walk {
     nb_wide t;
     nb_wmask lanes, at_turn;
-    nb_real left;             /* steps that the lane may still try before its next toggle */
+    nb_real left;             /* steps that the lane may still try before its next boundary */
     nb_wmask knows_way;       /* the way to the light from here, */
     light_depth way;          /* which is this */
     nb_real guess, before[3]; /* length of the next step; transmittance up to here */
@@ -595,7 +595,7 @@ static void take_sun_step(gathered_light *g, sun_walk *w, const sun_step *s, nb_
 static void step_along(sunlight *sun, const packet_state *m, const sun_piece *s, sun_walk *w, gathered_light *g)
 {
     const nb_mask last = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
-    const nb_wide bright = nb_wmin(sun->shade.toggle, s->p->end);
+    const nb_wide bright = nb_wmin(sun->shade.boundary, s->p->end);
     const nb_wide kink = is_grid_alone(sun) ? nearest_border(m, w->t, bright) : nearest_kink(m, w->t, bright);
     const nb_wide next = nb_wmin(next_turn(sun, w->t, bright), kink);
     const nb_wide stop = nb_wselect(nb_widen_mask(last), bright, next);
@@ -621,7 +621,7 @@ static void step_along(sunlight *sun, const packet_state *m, const sun_piece *s,
 static void pass_shadow(const sun_attenuation *shadow, const packet_state *m, const sun_piece *s, sun_walk *w,
                         nb_wmask dark)
 {
-    const nb_wide end = nb_wmin(shadow->toggle, s->p->end);
+    const nb_wide end = nb_wmin(shadow->boundary, s->p->end);
     const nb_mask lanes = nb_narrow_mask(dark);
     const sun_origin from = origin_of(s, w);
     sun_step passed;
@@ -682,7 +682,7 @@ static void gather_sunlight(sunlight *sun, const packet_state *m, const ray_segm
     g->radiance_error = g->radiance_error + doubt_at_faces(sun, m, NULL, p, most, lit);
     sun_walk w = begin_walk(m, p, g, lit);
     while (nb_wany(w.lanes)) {
-        pass_toggles(&sun->shade, w.t, w.lanes);
+        pass_boundaries(&sun->shade, w.t, w.lanes);
         const nb_wmask dark = nb_wand(w.lanes, sun->shade.is_dark);
         if (nb_wany(dark) && is_grid_alone(sun)) pass_voxels(&sun->shade, m, p, &w, dark);
         if (nb_wany(dark))

@@ -143,7 +143,7 @@ static nb_wide end_of_light(const sunlight *sun, const packet_state *m, const ra
     return nb_wmin(p->end, p->start + nb_widen(OPAQUE_DEPTH * nb_rcp_bounded(thinnest)));
 }
 
-/* From toggle to toggle, and where the sun shines from turn to turn; all lanes go on at once, those in shadow, too. */
+/* From boundary to boundary, and where the sun shines from turn to turn; all lanes go on at once, those in shadow, too. */
 static void gather_in_closed_form(sunlight *sun, const packet_state *m, const ray_segment *p, nb_mask lit,
                                   gathered_light *g)
 {
@@ -152,9 +152,9 @@ static void gather_in_closed_form(sunlight *sun, const packet_state *m, const ra
     sun_place from = first_place(p, g);
     if (sun->snapshot->way_to_sun == NB_SUN_DEPTH_HEIGHT) from.to_sun = depth_to_sun(sun, m, from.t, lanes);
     while (nb_wany(lanes)) {
-        pass_toggles(&sun->shade, from.t, lanes);
+        pass_boundaries(&sun->shade, from.t, lanes);
         const nb_wmask dark = nb_wand(lanes, sun->shade.is_dark);
-        const nb_wide bright = nb_wmin(sun->shade.toggle, last);
+        const nb_wide bright = nb_wmin(sun->shade.boundary, last);
         const nb_wide turn = nb_wmin(next_turn(sun, from.t, bright), nearest_kink(m, from.t, bright));
         const nb_wide end = nb_wselect(lanes, nb_wselect(dark, bright, turn), from.t);
         const sun_interval between = stretch_between(m, from.t, end);

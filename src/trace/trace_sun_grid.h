@@ -125,7 +125,7 @@ static void pass_voxels(const sun_attenuation *shadow, const packet_state *m, co
                         nb_wmask dark)
 {
     const nb_estimate along =
-        grid_integral(present(m, m->present_first), p->start, nb_wmin(shadow->toggle, p->end), NB_HUGE);
+        grid_integral(present(m, m->present_first), p->start, nb_wmin(shadow->boundary, p->end), NB_HUGE);
     w->along = nb_wselect(dark, nb_widen(along.value), w->along);
     w->along_error = nb_wselect(dark, nb_widen(along.error), w->along_error);
 }

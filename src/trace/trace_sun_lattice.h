@@ -321,18 +321,18 @@ static void cross_lit_cell(sunlight *sun, const medium_hit *k, const gathered_li
                            const lattice_rays *to_sun, nb_wide last, nb_wmask going, nb_wmask bright, lit_walk *w,
                            lattice_light *light)
 {
-    pass_toggles(&sun->shade, w->voxels.t, going);
-    const nb_wide toggle = nb_wselect(bright, nb_wmin(last, sun->shade.toggle), last);
-    nb_wide edge = toggle, end = toggle;
+    pass_boundaries(&sun->shade, w->voxels.t, going);
+    const nb_wide boundary = nb_wselect(bright, nb_wmin(last, sun->shade.boundary), last);
+    nb_wide edge = boundary, end = boundary;
     if (to_sun->lattice->ends_in_fog) {
-        edge = nb_wselect(bright, next_edge(to_sun, w->voxels.t, toggle), toggle);
+        edge = nb_wselect(bright, next_edge(to_sun, w->voxels.t, boundary), boundary);
         end = nb_wselect(bright, next_end(to_sun, w->voxels.t, edge), edge);
     }
     cell_voxels voxels;
     const nb_wide start = w->voxels.t, length = step_voxel(rays, &w->voxels, end, going, &voxels);
     add_voxel(&w->sum, length, voxels.mean);
     const nb_wmask first = w->at_edge;
-    w->at_edge = nb_wand(w->voxels.t >= edge, edge < toggle);
+    w->at_edge = nb_wand(w->voxels.t >= edge, edge < boundary);
     w->is_cut = nb_wor(w->is_cut, nb_wand(going, nb_wand(w->voxels.t >= end, end < last)));
     const nb_real along = nb_narrow(amount_of_voxels(rays->grid, &w->sum));
     const nb_wmask filled = nb_wand(bright, nb_widen_mask(along > w->at.along)), enters = nb_wand(w->enters, filled);

@@ -296,7 +296,7 @@ static nebel_result scatter(const nb_document *draft, const nb_document_state *e
 }
 
 /* In place of those that are there. On an error they stay. */
-static nebel_result strew(nb_document *draft, const nb_document_state *edition)
+static nebel_result generate_particles(nb_document *draft, const nb_document_state *edition)
 {
     size_t count = 0;
     for (size_t i = 0; i < edition->nebula_count; i++) count += edition->nebulae[i].count;
@@ -444,7 +444,7 @@ nebel_result nb_document_open(const char *path, double frame, const nebel_log *l
     if (result == NEBEL_OK) nb_document_show(draft);
     if (result == NEBEL_OK) result = make_cells(draft, &draft->good);
     if (result == NEBEL_OK) result = fill_fog(draft, &draft->good);
-    if (result == NEBEL_OK) result = strew(draft, &draft->good);
+    if (result == NEBEL_OK) result = generate_particles(draft, &draft->good);
     if (result != NEBEL_OK) nb_document_close(draft);
     return result;
 }
@@ -485,7 +485,7 @@ static nebel_result apply(nb_document *draft)
     const nb_document_state *const now = &draft->now, *const was = &draft->good;
     nebel_result result = light_scene(draft, now);
     if (result == NEBEL_OK && !nb_document_state_has_same_planets(now, was)) result = make_planets(draft, now);
-    if (result == NEBEL_OK && !nb_document_state_has_same_nebulae(now, was)) result = strew(draft, now);
+    if (result == NEBEL_OK && !nb_document_state_has_same_nebulae(now, was)) result = generate_particles(draft, now);
     const int has_other_cells = !nb_document_state_has_same_cells(now, was);
     if (result == NEBEL_OK && has_other_cells) result = make_cells(draft, now);
     if (result != NEBEL_OK) return result;
@@ -501,7 +501,7 @@ static void revert(nb_document *draft)
     if (draft->planets_are_new && !nb_document_state_has_same_planets(&draft->now, &draft->good))
         (void)make_planets(draft, &draft->good);
     if (!nb_document_state_has_same_cells(&draft->now, &draft->good)) (void)make_cells(draft, &draft->good);
-    if (!nb_document_state_has_same_nebulae(&draft->now, &draft->good)) (void)strew(draft, &draft->good);
+    if (!nb_document_state_has_same_nebulae(&draft->now, &draft->good)) (void)generate_particles(draft, &draft->good);
     nb_document_state_free(&draft->now);
     draft->now = back;
     (void)light_scene(draft, &draft->good);
