@@ -15,8 +15,8 @@ typedef struct nb_group {
 } nb_group;
 
 /* The process first: see bench/bench_process.c. */
-const char *const nb_bench_groups[] = {"process",   "segments", "vertices",    "frame",  "sunlight", "pass",
-                                       "particles", "overlap",  "photographs", "planet", NULL};
+const char *const nb_bench_groups[] = {"process",   "segments", "vertices", "frame",       "sunlight", "pass",
+                                       "particles", "overlap",  "lighting", "photographs", "planet",   NULL};
 
 static const nb_group groups[] = {{nb_bench_process, NULL},
                                   {nb_bench_segments, NULL},
@@ -26,6 +26,7 @@ static const nb_group groups[] = {{nb_bench_process, NULL},
                                   {nb_bench_pass, IN_OPENGL(nb_bench_opengl_pass)},
                                   {nb_bench_particles, IN_OPENGL(nb_bench_opengl_particles)},
                                   {nb_bench_overlap, NULL},
+                                  {nb_bench_lighting, NULL},
                                   {nb_bench_photographs, NULL},
                                   {nb_bench_planet, IN_OPENGL(nb_bench_opengl_planet)}};
 

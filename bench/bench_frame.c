@@ -23,7 +23,7 @@ typedef struct nb_studio {
 
 typedef struct nb_setup {
     nb_studio *studio;
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
     nebel_renderer *renderer;
     double density; /* > 0: exp2 distance fog over the finished frame */
 } nb_setup;
@@ -152,7 +152,7 @@ const char *nb_bench_frame(const nb_bench_desc *desc, nb_figures *figures)
     if (set_up(desc, &studio) == 0) fault = measure(&studio, setups, desc->quick ? 1 : 9, figures);
     for (int i = 0; i < SETUPS; i++) {
         nebel_destroy_renderer(setups[i].renderer);
-        nebel_release_snapshot(setups[i].fog);
+        nebel_release_lighting(setups[i].fog);
     }
     nb_embree_floor_free(studio.floor);
     nb_bench_scene_free(&studio.scene);

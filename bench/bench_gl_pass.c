@@ -233,18 +233,21 @@ static double count_coverage(const nebel_view *view, const nebel_volume_desc *ba
     return (double)met / (double)pixels;
 }
 
-static nebel_snapshot *commit(const nebel_volume_desc *volumes, size_t count)
+static nebel_lighting *commit(const nebel_volume_desc *volumes, size_t count)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
+    nebel_lighting *lighting = NULL;
     nebel_result result = nebel_create_fog(&(nebel_fog_desc){0}, &fog);
     for (size_t i = 0; i < count && result == NEBEL_OK; i++) result = nebel_add_volume(fog, &volumes[i], NULL);
-    if (result == NEBEL_OK) (void)nebel_commit_fog(fog, &snapshot);
+    if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
+    if (result == NEBEL_OK) (void)nebel_create_lighting(snapshot, NULL, &lighting);
+    nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
-    return snapshot;
+    return lighting;
 }
 
-static nebel_snapshot *make_fog(const nb_gl_bench *b, nb_fog_case *c)
+static nebel_lighting *make_fog(const nb_gl_bench *b, nb_fog_case *c)
 {
     uint64_t dice = 1;
     nebel_volume_desc *const volumes = calloc(c->count, sizeof *volumes);
@@ -257,15 +260,15 @@ static nebel_snapshot *make_fog(const nb_gl_bench *b, nb_fog_case *c)
         }
     }
     if (c->radius > 0) c->coverage = count_coverage(&b->view, volumes, c->count);
-    nebel_snapshot *const snapshot = commit(volumes, c->count);
+    nebel_lighting *const lighting = commit(volumes, c->count);
     free(volumes);
-    return snapshot;
+    return lighting;
 }
 
 /* ---- figures --------------------------------------------------------------------------------- */
 
 /* From an eye that has moved: what the last call left is of no use. */
-static nebel_result set_fog_anew(const nb_gl_bench *b, nebel_snapshot *fog, double step)
+static nebel_result set_fog_anew(const nb_gl_bench *b, nebel_lighting *fog, double step)
 {
     nebel_view view = b->view;
     view.eye_from_world[12] += step;
@@ -275,13 +278,13 @@ static nebel_result set_fog_anew(const nb_gl_bench *b, nebel_snapshot *fog, doub
 /* Makes the fog of a case and hands it over. */
 static const char *hand_over(nb_gl_bench *b, nb_fog_case *c)
 {
-    nebel_snapshot *const fog = make_fog(b, c);
+    nebel_lighting *const fog = make_fog(b, c);
     if (fog == NULL) return out_of_memory;
     const double start = nb_clock_wall();
     nebel_result result = NEBEL_OK;
     for (int i = 0; i < 4 && result == NEBEL_OK; i++) result = set_fog_anew(b, fog, 1e-6 * (3 - i));
     c->upload = (nb_clock_wall() - start) / 4;
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     return result == NEBEL_OK ? NULL : failed;
 }
 
@@ -341,9 +344,9 @@ static int fit_coverage(const nb_gl_bench *b, nb_fog_case *c, double wanted)
 {
     c->radius = 12;
     for (int i = 0; i < 8; i++) {
-        nebel_snapshot *const fog = make_fog(b, c);
+        nebel_lighting *const fog = make_fog(b, c);
         if (fog == NULL) return -1;
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
         if (fabs(c->coverage / wanted - 1) < 1e-3) break;
         c->radius *= sqrt(wanted / c->coverage);
     }

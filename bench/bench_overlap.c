@@ -2,7 +2,7 @@
 #include "groups.h"
 #include "measure.h"
 
-#include <nebel/nebel.h>
+#include <nebel/light.h>
 
 #include <math.h>
 #include <stdio.h>
@@ -15,12 +15,14 @@ typedef struct nb_question {
     nebel_precision precision;
     int repetitions; /* in one run, so that it is long enough to be measured */
     int transmittance_only;
+    const nebel_lighting *lighting; /* of the fog; NULL: none */
 } nb_question;
 
 static double run_rays(void *user)
 {
     const nb_question *const question = user;
-    const nebel_trace_desc desc = {.precision = question->precision,
+    const nebel_trace_desc desc = {.lighting = question->lighting,
+                                   .precision = question->precision,
                                    .transmittance_only = question->transmittance_only};
     nebel_ray rays[RAYS];
     nebel_transfer transfers[RAYS];
@@ -83,34 +85,40 @@ static nebel_volume_desc lit_ball(int i, int count, int is_scattered)
                                .albedo = {1, .9, .8}};
 }
 
-static nebel_snapshot *commit_lit(int count, int is_scattered, int lamps)
+static nebel_lighting *commit_lit(int count, int is_scattered, int lamps)
 {
     const nebel_light around[2] = {{.position = {3, 5, -18}, .intensity = {40, 40, 30}, .radius = .2},
                                    {.position = {-4, -1, -23}, .intensity = {30, 40, 40}, .radius = .2}};
-    nebel_fog_desc desc = {.sun = {.direction = {.6, .64, .48}}};
+    nebel_lighting_desc desc = {.sun = {.direction = {.6, .64, .48}}, .lights = around, .light_count = (size_t)lamps};
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
+    nebel_lighting *lighting = NULL;
     for (int c = 0; c < 3 && lamps == 0; c++) desc.sun.irradiance[c] = 1;
-    nebel_result result = nebel_create_fog(&desc, &fog);
+    nebel_result result = nebel_create_fog(&(nebel_fog_desc){0}, &fog);
     for (int i = 0; i < count && result == NEBEL_OK; i++) {
         const nebel_volume_desc volume = lit_ball(i, count, is_scattered);
         result = nebel_add_volume(fog, &volume, NULL);
     }
-    if (result == NEBEL_OK) result = nebel_set_lamps(fog, (size_t)lamps, around);
-    if (result == NEBEL_OK) (void)nebel_commit_fog(fog, &snapshot);
+    if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
+    if (result == NEBEL_OK) (void)nebel_create_lighting(snapshot, &desc, &lighting);
+    nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
-    return snapshot;
+    return lighting;
 }
 
 /* A lit crowd beside the same rays through it without light. */
 static int add_crowd(nb_figures *figures, int count, int is_scattered, int lamps, int quick)
 {
-    nb_question lit = {commit_lit(count, is_scattered, lamps), NEBEL_PRECISION_FLOAT, quick ? 1 : 10, 0};
+    nebel_lighting *const lighting = commit_lit(count, is_scattered, lamps);
+    nb_question lit = {.fog = nebel_get_lighting_snapshot(lighting),
+                       .lighting = lighting,
+                       .precision = NEBEL_PRECISION_FLOAT,
+                       .repetitions = quick ? 1 : 10};
     nb_question dark = lit;
     dark.transmittance_only = 1;
     nb_contest contests[2] = {{.run = run_rays, .user = &dark}, {.run = run_rays, .user = &lit}};
     const int fault = lit.fog == NULL || nb_measure(contests, 2, quick ? 1 : 5) != 0;
-    nebel_release_snapshot(lit.fog);
+    nebel_release_lighting(lighting);
     if (fault) return -1;
     nb_figure figure = {.group = "A crowd of lit balls of constant density on one ray, float, one thread, CPU time",
                         .unit = "us a ray",
@@ -136,7 +144,7 @@ static int add_crowds(nb_figures *figures, int quick)
 /* One line: a ray through `count` volumes. */
 static int add_line(nb_figures *figures, const char *what, int count, int power, nebel_precision precision, int quick)
 {
-    nb_question question = {commit(count, power), precision, quick || count > 100 ? 1 : 100, 0};
+    nb_question question = {commit(count, power), precision, quick || count > 100 ? 1 : 100, 0, NULL};
     nb_contest contest = {.run = run_rays, .user = &question};
     const int fault = question.fog == NULL || nb_measure(&contest, 1, quick ? 1 : 5) != 0;
     nebel_release_snapshot(question.fog);

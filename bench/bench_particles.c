@@ -14,7 +14,7 @@ static const char failed[] = "particles: the renderer failed";
 typedef struct nb_drawing {
     nb_sky sky;
     nebel_scene_data scene;
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
     nebel_renderer *renderer;
     float *color, *transmittance;
 } nb_drawing;
@@ -30,18 +30,21 @@ static double run_frame(void *user)
     return nb_clock_wall() - start;
 }
 
-static nebel_snapshot *commit(const nb_sky *sky)
+static nebel_lighting *commit(const nb_sky *sky)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
+    nebel_lighting *lighting = NULL;
     nebel_result result = nebel_create_fog(&(nebel_fog_desc){0}, &fog);
     for (size_t i = 0; i < sky->count && result == NEBEL_OK; i++) {
         const nebel_volume_desc volume = nebel_volume_from_particle(&sky->particles[i]);
         result = nebel_add_volume(fog, &volume, NULL);
     }
-    if (result == NEBEL_OK) (void)nebel_commit_fog(fog, &snapshot);
+    if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
+    if (result == NEBEL_OK) (void)nebel_create_lighting(snapshot, NULL, &lighting);
+    nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
-    return snapshot;
+    return lighting;
 }
 
 static int set_up(const nb_bench_desc *desc, nb_drawing *d)
@@ -90,7 +93,7 @@ const char *nb_bench_particles(const nb_bench_desc *desc, nb_figures *figures)
     const char *fault = out_of_memory;
     if (set_up(desc, &d) == 0) fault = measure(&d, desc->quick ? 1 : 3, figures);
     nebel_destroy_renderer(d.renderer);
-    nebel_release_snapshot(d.fog);
+    nebel_release_lighting(d.fog);
     nb_sky_free(&d.sky);
     free(d.color);
     free(d.transmittance);

@@ -18,7 +18,7 @@ enum { FRAMES = 8, THREADS_MOST = 2 };
 
 typedef struct nb_gallery {
     nb_bench_scene scene;
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
     uint32_t width, height;
     nebel_pixels frames[FRAMES];
     uint32_t *memory; /* depth, colour and result of all frames */
@@ -141,7 +141,8 @@ static int pass_rows(const nb_gallery *gallery, int isa, int share, int shares)
         if (isa < 0) {
             copy_rows(&frame, first, last - first);
         } else {
-            faults += nebel_apply_fog_to_pixels(gallery->fog, (nebel_isa)isa, &frame) != NEBEL_OK;
+            faults += nebel_apply_fog_to_pixels(nebel_get_lighting_snapshot(gallery->fog), (nebel_isa)isa, &frame) !=
+                      NEBEL_OK;
         }
     }
     return faults;
@@ -221,7 +222,7 @@ const char *nb_bench_pass(const nb_bench_desc *desc, nb_figures *figures)
             fault = measure(&gallery, threads, desc->quick ? 1 : 9, figures);
         }
     }
-    nebel_release_snapshot(gallery.fog);
+    nebel_release_lighting(gallery.fog);
     nb_bench_scene_free(&gallery.scene);
     free(gallery.memory);
     return fault;

@@ -31,7 +31,7 @@ static const struct {
 typedef struct nb_sunlight_setup {
     nb_bench_scene scene;
     nb_embree_floor *floor;
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
     nebel_renderer *renderer;
     uint32_t width, height;
     double tolerance; /* 0: the default */
@@ -96,7 +96,7 @@ static int prepare(const nb_bench_desc *desc, nb_bench_fog fog, nb_sunlight_setu
 static void tear_down(nb_sunlight_setup *setup)
 {
     nebel_destroy_renderer(setup->renderer);
-    nebel_release_snapshot(setup->fog);
+    nebel_release_lighting(setup->fog);
     nb_embree_floor_free(setup->floor);
     nb_bench_scene_free(&setup->scene);
     free(setup->color);

@@ -6,6 +6,7 @@
 
 const char *nb_bench_cells(const nb_bench_desc *desc, nb_figures *figures); /* of the group vertices */
 const char *nb_bench_frame(const nb_bench_desc *desc, nb_figures *figures);
+const char *nb_bench_lighting(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_opengl_particles(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_opengl_pass(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_opengl_planet(const nb_bench_desc *desc, nb_figures *figures);

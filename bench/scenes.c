@@ -147,42 +147,45 @@ static void release_counted(void *block, void *user)
     free(memory);
 }
 
-static nebel_snapshot *commit_fog(nb_bench_fog kind, const nebel_scene_data *scene, const nebel_allocator *allocator,
-                                  double *seconds)
+static nebel_lighting *light_fog(nb_bench_fog kind, const nebel_scene_data *scene, const nebel_allocator *allocator,
+                                 double *seconds)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    nebel_fog_desc desc = {.max_opacity = 1, .allocator = *allocator};
-    memcpy(desc.ambient, scene->ambient, sizeof desc.ambient);
+    nebel_lighting *lighting = NULL;
+    nebel_lighting_desc desc = {.environment = {.type = NEBEL_ENVIRONMENT_CONSTANT}};
+    memcpy(desc.environment.radiance, scene->ambient, sizeof desc.environment.radiance);
     memcpy(desc.sun.direction, scene->sun_direction, sizeof desc.sun.direction);
     memcpy(desc.sun.irradiance, scene->sun_irradiance, sizeof desc.sun.irradiance);
-    if (kind == NB_FOG_NONE || nebel_create_fog(&desc, &fog) != NEBEL_OK) return NULL;
+    if (kind == NB_FOG_NONE || nebel_create_fog(&(nebel_fog_desc){.allocator = *allocator}, &fog) != NEBEL_OK)
+        return NULL;
     nebel_volume_desc volume = volume_of(kind);
     if (kind == NB_FOG_CLOUD) volume.density.grid = nb_cloud_make();
     if (nebel_add_volume(fog, &volume, NULL) == NEBEL_OK) {
         const double start = nb_clock_cpu();
-        (void)nebel_commit_fog(fog, &snapshot);
+        if (nebel_commit_fog(fog, &snapshot) == NEBEL_OK) (void)nebel_create_lighting(snapshot, &desc, &lighting);
         *seconds = nb_clock_cpu() - start;
     }
     nebel_release_grid(volume.density.grid);
+    nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
-    return snapshot;
+    return lighting;
 }
 
-nebel_snapshot *nb_bench_fog_commit(nb_bench_fog kind, const nebel_scene_data *scene)
+nebel_lighting *nb_bench_fog_commit(nb_bench_fog kind, const nebel_scene_data *scene)
 {
     double seconds;
-    return commit_fog(kind, scene, &(nebel_allocator){.user = NULL}, &seconds);
+    return light_fog(kind, scene, &(nebel_allocator){.user = NULL}, &seconds);
 }
 
-nebel_snapshot *nb_bench_fog_measure(nb_bench_fog kind, const nebel_scene_data *scene, double *seconds, size_t *bytes)
+nebel_lighting *nb_bench_fog_measure(nb_bench_fog kind, const nebel_scene_data *scene, double *seconds, size_t *bytes)
 {
     static size_t kept; /* outlives every snapshot */
     const nebel_allocator counting = {allocate_counted, release_counted, &kept};
     const size_t before = kept;
-    nebel_snapshot *const snapshot = commit_fog(kind, scene, &counting, seconds);
+    nebel_lighting *const lighting = light_fog(kind, scene, &counting, seconds);
     *bytes = kept - before;
-    return snapshot;
+    return lighting;
 }
 
 /* ---- files ----------------------------------------------------------------------------------- */

@@ -34,10 +34,10 @@ void nb_bench_scene_free(nb_bench_scene *scene);
 int nb_bench_scene_add_pillars(nb_bench_scene *scene);
 
 /* The fog in the light of the scene. NULL for no fog and on an error. */
-nebel_snapshot *nb_bench_fog_commit(nb_bench_fog fog, const nebel_scene_data *scene);
+nebel_lighting *nb_bench_fog_commit(nb_bench_fog fog, const nebel_scene_data *scene);
 
-/* The same for one thread, with the CPU seconds of the commit and how many bytes it has kept, without voxels. */
-nebel_snapshot *nb_bench_fog_measure(nb_bench_fog fog, const nebel_scene_data *scene, double *seconds, size_t *bytes);
+/* The same for one thread, with the CPU seconds of committing and lighting it and how many bytes it has kept, without voxels. */
+nebel_lighting *nb_bench_fog_measure(nb_bench_fog fog, const nebel_scene_data *scene, double *seconds, size_t *bytes);
 
 /* Writes the scene with the fog of A1 into a folder: mesh.json takes the terrain as a PLY model, map.json as a height
  * map. Returns 0 or -1. */

@@ -45,7 +45,7 @@ function(nebel_install_library name)
     install(EXPORT ${name}_targets NAMESPACE nebel:: DESTINATION ${nebel_package_dir})
 endfunction()
 
-nebel_install_library(nebel nebel.h classic.h light.h particles.h places.h planet.h shader.h)
+nebel_install_library(nebel nebel.h classic.h light.h particles.h planet.h shader.h)
 nebel_write_pkgconfig(nebel "Exact fog for any renderer" "" "" "-lm")
 if(TARGET nebel_scene)
     nebel_install_library(nebel_scene scene.h photograph.h)

@@ -65,10 +65,53 @@ function(nebel_glob_rooms result)
     set(${result} ${sources} PARENT_SCOPE)
 endfunction()
 
+# With CMAKE_UNITY_BUILD the sources of a room in a library are one unit. Formula texts have no guards and are read again for every
+# arithmetic, so sources that read one, or a header that does, are compiled alone. So is base.c, which every library has: the linker
+# takes one of them where it is a member of its own.
+function(nebel_set_unity target)
+    if(NOT nebel_unity_build)
+        return()
+    endif()
+    set(alone "^ *# *include \"formulas/(prelude\\.h|[a-z_]+\\.inc)\"|^ *# *define NB_DOUBLE")
+    nebel_glob(headers ${PROJECT_SOURCE_DIR}/src/*/*.h)
+    foreach(header IN LISTS headers)
+        file(STRINGS ${header} lines REGEX "${alone}" LIMIT_COUNT 1)
+        get_filename_component(name ${header} NAME)
+        if(lines AND NOT header MATCHES "/src/formulas/")
+            string(REPLACE . "\\." name ${name})
+            string(APPEND alone "|^ *# *include \"([a-z_]+/)?${name}\"")
+        endif()
+    endforeach()
+    get_target_property(sources ${target} SOURCES)
+    foreach(source IN LISTS sources)
+        if(NOT source MATCHES "/src/([a-z_]+)/[a-z_0-9]+\\.c$")
+            continue()
+        endif()
+        set(room ${CMAKE_MATCH_1})
+        set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${room})
+        file(STRINGS ${source} lines REGEX "${alone}" LIMIT_COUNT 1)
+        if(lines OR source MATCHES "/base/base\\.c$")
+            set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+            continue()
+        endif()
+        # CMake leaves out of units what has options of its own.
+        get_source_file_property(options ${source} COMPILE_OPTIONS)
+        if(options)
+            set_property(SOURCE ${source} PROPERTY COMPILE_OPTIONS)
+            set_source_files_properties(${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${target}.dir/Unity/unity_${room}_c.c
+                PROPERTIES COMPILE_OPTIONS "${options}")
+        endif()
+    endforeach()
+    # Some sources ask for more of the system's headers than C11; in a unit the first header decides for all.
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP
+        UNITY_BUILD_CODE_BEFORE_INCLUDE "#ifndef _GNU_SOURCE\n#define _GNU_SOURCE\n#endif\n#undef _DEFAULT_SOURCE")
+endfunction()
+
 # Compiles objects once; makes the library <name> of them and of the kernel objects named after the sources.
 function(nebel_add_library name sources extra_objects)
     add_library(${name}_objects OBJECT ${sources})
     nebel_set_options(${name}_objects)
+    nebel_set_unity(${name}_objects)
     target_include_directories(${name}_objects PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
 
     add_library(${name} $<TARGET_OBJECTS:${name}_objects> ${extra_objects})
@@ -166,6 +209,10 @@ function(nebel_add_model_reader)
     nebel_glob(sources src/model_reader/*.c)
     list(FILTER sources EXCLUDE REGEX "/reader_path\\.c$")
     nebel_add_program(nebel_read_model "${sources}" nebel_model_parts ${nebel_model_dependencies} m)
+    # Of an archive only what a program uses is linked; a unit brings its whole room.
+    if(nebel_unity_build)
+        target_link_libraries(nebel_read_model PRIVATE ${nebel_scene_dependencies})
+    endif()
     target_include_directories(nebel_read_model PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
     set_target_properties(nebel_read_model PROPERTIES
         OUTPUT_NAME nebel-read-model RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})

@@ -32,9 +32,10 @@ int main(void)
     const char *why;
     nebel_fog *fog = NULL;
     nebel_snapshot *const snapshot = make_fog(&fog);
+    nebel_lighting *const lighting = light_fog(snapshot);
     nebel_gl *passes = NULL;
     if (!window) return glfwGetError(&why), host_refuse("embed_glfw", why);
-    if (!snapshot || nebel_create_gl(&(nebel_gl_desc){.log = host_log}, &passes) != NEBEL_OK) return 1;
+    if (!lighting || nebel_create_gl(&(nebel_gl_desc){.log = host_log}, &passes) != NEBEL_OK) return 1;
 
     host_say_compiling("embed_glfw");
     engine host = engine_open_textures();
@@ -50,13 +51,14 @@ int main(void)
         nebel_view view = {.width = WIDTH, .height = HEIGHT};
         memcpy(view.eye_from_world, host.eye_from_world, sizeof view.eye_from_world);
         memcpy(view.clip_from_eye, host.clip_from_eye, sizeof view.clip_from_eye);
-        result = nebel_gl_set_fog(passes, snapshot, &view);
+        result = nebel_gl_set_fog(passes, lighting, &view);
         glBindFramebuffer(GL_FRAMEBUFFER, 0);
         if (result == NEBEL_OK) result = nebel_gl_draw_fog(passes, &pass);
         glfwSwapBuffers(window);
         if (glfwGetKey(window, GLFW_KEY_ESCAPE)) glfwSetWindowShouldClose(window, GLFW_TRUE);
     }
     nebel_destroy_gl(passes);
+    nebel_release_lighting(lighting);
     nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
     glfwTerminate();

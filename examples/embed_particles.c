@@ -62,17 +62,19 @@ int main(void)
     const char *why;
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
+    nebel_lighting *lighting = NULL;
     nebel_gl *passes = NULL;
     if (!window) return glfwGetError(&why), host_refuse("embed_particles", why);
     if (nebel_create_fog(&(nebel_fog_desc){.log = host_log}, &fog) != NEBEL_OK ||
         nebel_add_volume(fog, &mist, NULL) != NEBEL_OK || nebel_commit_fog(fog, &snapshot) != NEBEL_OK ||
+        nebel_create_lighting(snapshot, NULL, &lighting) != NEBEL_OK ||
         nebel_create_gl(&(nebel_gl_desc){.log = host_log}, &passes) != NEBEL_OK)
         return 1;
 
     host_say_compiling("embed_particles");
     engine host = engine_open_textures();
     const nebel_gl_pass pass = {.color_texture = host.color, .depth_texture = host.depth};
-    const unsigned program = particles_open(snapshot);
+    const unsigned program = particles_open(lighting);
     glEnable(GL_FRAMEBUFFER_SRGB); /* the window shows sRGB */
 
     nebel_result result = NEBEL_OK;
@@ -84,7 +86,7 @@ int main(void)
         nebel_view view = {.width = WIDTH, .height = HEIGHT};
         memcpy(view.eye_from_world, host.eye_from_world, sizeof view.eye_from_world);
         memcpy(view.clip_from_eye, host.clip_from_eye, sizeof view.clip_from_eye);
-        result = nebel_gl_set_fog(passes, snapshot, &view);
+        result = nebel_gl_set_fog(passes, lighting, &view);
         glBindFramebuffer(GL_FRAMEBUFFER, 0);
         if (result == NEBEL_OK) result = nebel_gl_draw_fog(passes, &pass);
         draw_particles(program, &host, passes, &view, glfwGetKey(window, GLFW_KEY_SPACE));
@@ -92,6 +94,7 @@ int main(void)
         if (glfwGetKey(window, GLFW_KEY_ESCAPE)) glfwSetWindowShouldClose(window, GLFW_TRUE);
     }
     nebel_destroy_gl(passes);
+    nebel_release_lighting(lighting);
     nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
     glfwTerminate();

@@ -27,17 +27,17 @@ static SDL_Window *open_window(void)
 }
 
 /* Packed for the eye of this frame, into the uniform block that the text declares. */
-static nebel_result upload_fog(const nebel_snapshot *snapshot, const double eye[3])
+static nebel_result upload_fog(const nebel_lighting *lighting, const double eye[3])
 {
     static nebel_texel_f32 words[NEBEL_BLOCK_TEXELS]; /* more fog than this goes into a texture: NEBEL_FOG_TEXTURE */
     size_t count;
-    const nebel_result result = nebel_pack_fog(snapshot, eye, words, NEBEL_BLOCK_TEXELS, &count);
+    const nebel_result result = nebel_pack_fog(lighting, eye, words, NEBEL_BLOCK_TEXELS, &count);
     glBufferData(GL_UNIFORM_BUFFER, sizeof words, words, GL_STREAM_DRAW);
     return result;
 }
 
 /* The text leaves out what this fog does not have: without NEBEL_FEATURES drivers compile all that fog can be. */
-static engine open_engine(const nebel_snapshot *snapshot)
+static engine open_engine(const nebel_lighting *lighting)
 {
     char head[128];
     const char *const texts[] = {head, nebel_get_shader_source(NEBEL_DIALECT_GLSL_330),
@@ -50,7 +50,7 @@ static engine open_engine(const nebel_snapshot *snapshot)
                                  "    pixel = vec4(fog.transmittance * color + fog.in_scattering, 1.0);\n"
                                  "}\n"};
     snprintf(head, sizeof head, "#version 330 core\n#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES %u\n",
-             nebel_pack_features(snapshot));
+             nebel_pack_features(lighting));
     host_say_compiling("embed_sdl");
     return engine_open(3, texts);
 }
@@ -61,10 +61,11 @@ int main(void)
     const SDL_GLContext context = window ? SDL_GL_CreateContext(window) : NULL;
     nebel_fog *fog = NULL;
     nebel_snapshot *const snapshot = make_fog(&fog);
+    nebel_lighting *const lighting = light_fog(snapshot);
     if (!context) return host_refuse("embed_sdl", SDL_GetError());
-    if (!snapshot) return 1;
+    if (!lighting) return 1;
 
-    engine host = open_engine(snapshot);
+    engine host = open_engine(lighting);
     unsigned block;
     glGenBuffers(1, &block);
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, block); /* where nebel_fog_block is unless told otherwise */
@@ -78,10 +79,11 @@ int main(void)
             running &= event.type != SDL_QUIT && !(event.type == SDL_KEYDOWN && event.key.keysym.sym == SDLK_ESCAPE);
         angle += .02 * (keys[SDL_SCANCODE_RIGHT] - keys[SDL_SCANCODE_LEFT]);
         engine_turn(&host, angle);
-        result = upload_fog(snapshot, host.eye);
+        result = upload_fog(lighting, host.eye);
         engine_draw(&host);
         SDL_GL_SwapWindow(window);
     }
+    nebel_release_lighting(lighting);
     nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
     SDL_GL_DeleteContext(context);

@@ -4,6 +4,14 @@
 
 #include "host.h"
 
+/* Fog that gives light of its own needs no lights. */
+static inline nebel_lighting *light_fog(nebel_snapshot *snapshot)
+{
+    nebel_lighting *lighting = NULL;
+    if (snapshot != NULL) nebel_create_lighting(snapshot, NULL, &lighting);
+    return lighting;
+}
+
 /* Mist on the ground, and a ball of other fog within it. */
 static inline nebel_snapshot *make_fog(nebel_fog **fog)
 {

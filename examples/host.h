@@ -2,7 +2,7 @@
 #ifndef HOST_H
 #define HOST_H
 
-#include <nebel/nebel.h>
+#include <nebel/light.h>
 
 #include <stdio.h>
 

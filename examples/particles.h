@@ -50,14 +50,14 @@ static const char *const particle_fragment_text =
     "    factor = vec4(blend.factor, 1.0);\n"
     "}\n";
 
-/* For fog that has no more than `snapshot`. */
-static inline unsigned particles_open(const nebel_snapshot *snapshot)
+/* For fog that has no more than this. */
+static inline unsigned particles_open(const nebel_lighting *lighting)
 {
     char features[40];
     const char *const texts[] = {particle_defines, features, nebel_get_shader_source(NEBEL_DIALECT_GLSL_330),
                                  particle_fragment_text};
     const unsigned program = glCreateProgram();
-    snprintf(features, sizeof features, "#define NEBEL_FEATURES %u\n", nebel_pack_features(snapshot));
+    snprintf(features, sizeof features, "#define NEBEL_FEATURES %u\n", nebel_pack_features(lighting));
     engine_add_shader(program, GL_VERTEX_SHADER, 1, &particle_vertex_text);
     engine_add_shader(program, GL_FRAGMENT_SHADER, 4, texts);
     glLinkProgram(program);

@@ -46,6 +46,7 @@ static void check_fog(const nebel_scene *scene)
 {
     const nebel_scene_data *data = nebel_get_scene_data(scene);
     nebel_snapshot *fog = NULL;
+    nebel_lighting *lighting = NULL;
     for (size_t i = 0; i < data->volume_count; i++) {
         const nebel_transform *place = &data->volumes[i].shape.transform;
         demand(data->volume_names[i] != NULL && nebel_get_volume_origin(scene, i) == NEBEL_VOLUME_FROM_NODE);
@@ -53,6 +54,8 @@ static void check_fog(const nebel_scene *scene)
         for (int k = 0; k < 3; k++) demand(data->volumes[i].extinction[k] >= 0);
     }
     demand(nebel_commit_scene_fog(scene, &fog) == NEBEL_OK);
+    demand(nebel_create_scene_lighting(scene, fog, 0, NULL, &lighting) == NEBEL_OK);
+    nebel_release_lighting(lighting);
     nebel_release_snapshot(fog);
 }
 

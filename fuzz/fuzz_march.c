@@ -4,20 +4,24 @@
 #include "march_input.h"
 
 /* NULL where a description is refused. */
-static nebel_snapshot *make_fog(const march_input *in, int backwards)
+static nebel_lighting *make_fog(const march_input *in, int backwards)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
+    nebel_lighting *lighting = NULL;
     nebel_volume_id id;
     nebel_result result = NEBEL_OK;
-    demand(nebel_create_fog(&in->desc, &fog) == NEBEL_OK);
-    demand(nebel_set_lamps(fog, in->lamp_count, in->lamps) == NEBEL_OK);
+    demand(nebel_create_fog(&(nebel_fog_desc){0}, &fog) == NEBEL_OK);
     for (size_t i = 0; i < in->count && result == NEBEL_OK; i++)
         result = nebel_add_volume(fog, &in->volumes[backwards ? in->count - 1 - i : i], &id);
     demand(result == NEBEL_OK || result == NEBEL_ERROR_VALUE);
-    if (result == NEBEL_OK) demand(nebel_commit_fog(fog, &snapshot) == NEBEL_OK);
+    if (result == NEBEL_OK) {
+        demand(nebel_commit_fog(fog, &snapshot) == NEBEL_OK);
+        demand(nebel_create_lighting(snapshot, &in->lighting, &lighting) == NEBEL_OK);
+        nebel_release_snapshot(snapshot);
+    }
     nebel_destroy_fog(fog);
-    return snapshot;
+    return lighting;
 }
 
 static void check_light(const nebel_transfer *transfer)
@@ -29,10 +33,13 @@ static void check_light(const nebel_transfer *transfer)
     demand(isfinite(transfer->error) && transfer->error >= 0);
 }
 
-static void trace(const nebel_snapshot *fog, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
+static void trace(const nebel_lighting *fog, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
                   nebel_transfer *transfers)
 {
-    demand(nebel_trace(fog, desc, n, rays, sizeof *rays, transfers, sizeof *transfers) == NEBEL_OK);
+    nebel_trace_desc lit = *desc;
+    lit.lighting = fog;
+    demand(nebel_trace(nebel_get_lighting_snapshot(fog), &lit, n, rays, sizeof *rays, transfers, sizeof *transfers) ==
+           NEBEL_OK);
     for (size_t i = 0; i < n; i++) check_light(&transfers[i]);
 }
 
@@ -44,7 +51,7 @@ static void check_same(const nebel_transfer *a, const nebel_transfer *b)
 }
 
 /* Results are the same bits for every way of splitting the rays into calls, and for every instruction set. */
-static void check_calls(const nebel_snapshot *fog, const nebel_trace_desc *desc, const march_input *in,
+static void check_calls(const nebel_lighting *fog, const nebel_trace_desc *desc, const march_input *in,
                         const nebel_transfer *together)
 {
     nebel_transfer others[MOST_RAYS];
@@ -82,7 +89,7 @@ static int has_distances(const march_input *in)
 }
 
 /* The ray in two pieces, one after the other. */
-static void check_pieces(const nebel_snapshot *fog, const nebel_ray *ray, const nebel_transfer *whole)
+static void check_pieces(const nebel_lighting *fog, const nebel_ray *ray, const nebel_transfer *whole)
 {
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_DOUBLE};
     nebel_ray pieces[2] = {*ray, *ray};
@@ -104,7 +111,7 @@ static void check_pieces(const nebel_snapshot *fog, const nebel_ray *ray, const 
     check_near(&joined, whole);
 }
 
-static void check(const nebel_snapshot *fog, const nebel_snapshot *backwards, const march_input *in)
+static void check(const nebel_lighting *fog, const nebel_lighting *backwards, const march_input *in)
 {
     const nebel_trace_desc narrow = {.precision = NEBEL_PRECISION_FLOAT}, wide = {.precision = NEBEL_PRECISION_DOUBLE};
     nebel_transfer floats[MOST_RAYS], doubles[MOST_RAYS], others[MOST_RAYS];
@@ -128,11 +135,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static march_input fog;
     input in = {data, size};
     take_all(&in, &fog);
-    nebel_snapshot *forwards = fog.ray_count > 0 ? make_fog(&fog, 0) : NULL;
-    nebel_snapshot *backwards = forwards != NULL ? make_fog(&fog, 1) : NULL;
+    nebel_lighting *forwards = fog.ray_count > 0 ? make_fog(&fog, 0) : NULL;
+    nebel_lighting *backwards = forwards != NULL ? make_fog(&fog, 1) : NULL;
     if (backwards != NULL) check(forwards, backwards, &fog);
-    nebel_release_snapshot(forwards);
-    nebel_release_snapshot(backwards);
+    nebel_release_lighting(forwards);
+    nebel_release_lighting(backwards);
     release_all(&fog);
     return 0;
 }

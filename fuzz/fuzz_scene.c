@@ -13,13 +13,19 @@ enum { MOST_PARTICLES = 2000 };
 static void commit(const nebel_scene *scene, double frame)
 {
     nebel_snapshot *fog = NULL;
+    nebel_lighting *lighting = NULL;
     const nebel_result result = nebel_commit_scene_fog_at(scene, frame, &fog);
-    /* Not all fog can be lit many times. */
-    if (result == NEBEL_ERROR_UNSUPPORTED && nebel_get_scene_data(scene)->diffusion != NULL) return;
     const size_t particles = nebel_get_scene_data(scene)->particle_count;
     if (result != NEBEL_OK && !(result == NEBEL_ERROR_VALUE && particles > 0)) abort();
     if ((result == NEBEL_OK) != (fog != NULL)) abort();
+    if (fog == NULL) return;
+    const nebel_result lit = nebel_create_scene_lighting(scene, fog, frame, NULL, &lighting);
     nebel_release_snapshot(fog);
+    nebel_release_lighting(lighting);
+    /* Not all fog can be lit many times. */
+    const int may_refuse = nebel_get_scene_data(scene)->diffusion != NULL;
+    if (lit != NEBEL_OK && !(lit == NEBEL_ERROR_UNSUPPORTED && may_refuse)) abort();
+    if ((lit == NEBEL_OK) != (lighting != NULL)) abort();
 }
 
 /* What a scene promises to its users. That a shape leaves no place for particles is found when they are strewn. */

@@ -5,6 +5,8 @@
 
 #include "witness.h"
 
+#include <nebel/light.h>
+
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -18,7 +20,7 @@ typedef struct input {
 
 /* The volumes point into it. */
 typedef struct march_input {
-    nebel_fog_desc desc;
+    nebel_lighting_desc lighting; /* its lights are `lamps` */
     size_t count, lamp_count, ray_count;
     nebel_volume_desc volumes[MOST_VOLUMES];
     nebel_light lamps[MOST_LAMPS];
@@ -224,10 +226,10 @@ static inline void take_lights(input *in, march_input *fog)
 {
     const unsigned which = take(in) % 16; /* half of them dark: light takes a hundred times as long */
     if (which >= 8) return;
-    for (int c = 0; c < 3; c++) fog->desc.ambient[c] = (which & 1) != 0 ? take(in) / 64.0 : 0;
+    for (int c = 0; c < 3; c++) fog->lighting.environment.radiance[c] = (which & 1) != 0 ? take(in) / 64.0 : 0;
     if ((which & 2) != 0) {
-        take_direction(in, fog->desc.sun.direction);
-        for (int c = 0; c < 3; c++) fog->desc.sun.irradiance[c] = take(in) / 16.0;
+        take_direction(in, fog->lighting.sun.direction);
+        for (int c = 0; c < 3; c++) fog->lighting.sun.irradiance[c] = take(in) / 16.0;
     }
     fog->lamp_count = (which & 4) != 0 ? 1 + take(in) % MOST_LAMPS : 0;
     for (size_t i = 0; i < fog->lamp_count; i++) {
@@ -240,6 +242,8 @@ static inline void take_lights(input *in, march_input *fog)
         lamp->outer_angle = lamp->inner_angle + 1 + take(in) / 8.0;
         for (int c = 0; c < 3; c++) lamp->intensity[c] = take(in) / 16.0;
     }
+    fog->lighting.lights = fog->lamps;
+    fog->lighting.light_count = fog->lamp_count;
 }
 
 static inline void take_ray(input *in, march_input *fog)

@@ -46,7 +46,7 @@ ROOMS = {
 }
 
 # Arrows against that order, which go when light leaves the snapshot of fog for an object of its own.
-PENDING = {("fog", "light"), ("fog", "diffusion"), ("trace", "diffusion"), ("cpu", "light"), ("gl", "light")}
+PENDING = {("cpu", "light"), ("gl", "light")}
 
 # Everything outside src/ uses the public face and its own folder. Tests and fuzzers may enter every room.
 OUTSIDE = ("tools", "examples", "bench")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks that a name leads to one place: every tag of a structure, union or enumeration, and every name of a type, is defined in one file
-of include/, src/, tools/ and bench/, and the files of src/ have names of their own. Prints every name with two places and exits 1 where
-there is one.
+of include/, src/, tools/ and bench/, the files of src/ have names of their own, and so have the static functions and variables of a room,
+which may be compiled as one unit. Prints every name with two places and exits 1 where there is one.
 """
 
 import collections
@@ -20,11 +20,38 @@ TAG = re.compile(r"^(?:typedef )?(?:struct|union|enum) (\w+)\s*\{", re.M)
 TYPE = re.compile(r"^(?:typedef [^;{]*?\b(\w+)(?:\[\w*\])*;|\} (\w+)(?:\[\w*\])*;)", re.M)
 FORWARD = re.compile(r"^typedef (?:struct|union|enum) (\w+) \1;", re.M)
 
+# Sources that are never in a unit with others; nebel_set_unity in cmake/NebelTargets.cmake finds them in the same manner.
+ALONE = re.compile(r'^ *# *include "formulas/(?:prelude\.h|[a-z_]+\.inc)"|^ *# *define NB_DOUBLE', re.M)
+INCLUDE = re.compile(r'^ *# *include "(?:\w+/)?(\w+\.h)"', re.M)
+
+DIRECTIVE = re.compile(r"^#(?:[^\n]*\\\n)*[^\n]*", re.M)
+STATIC = re.compile(r"^(?:[A-Z_]+ )?(?:static|NB_ALWAYS_INLINE)\b[^;={(]*?\b(\w+)(?:\[[^\]]*\])*(?:\(| =|;)", re.M)
+STATIC_STRUCT = re.compile(r"^static [^;={(]*\{[^}]*^\} (\w+)(?:\[[^\]]*\])*(?: =|;)", re.M)
+
 
 def types_of(text):
     """Tags that a text defines, and names of types; forward declarations define nothing."""
     text = FORWARD.sub("", COMMENT.sub("", text))
     return set(TAG.findall(text)) | {a or b for a, b in TYPE.findall(text)}
+
+
+def statics_of(text):
+    """Functions and variables that a clang-formatted text defines for itself."""
+    text = DIRECTIVE.sub("", COMMENT.sub("", text))
+    return set(STATIC.findall(text)) | set(STATIC_STRUCT.findall(text))
+
+
+def places_in_rooms():
+    """The static names of each room, with the sources that have them."""
+    alone = {path.name for path in ROOT.glob("src/*/*.h") if path.parent.name != "formulas" and ALONE.search(path.read_text())}
+    places = collections.defaultdict(set)
+    for path in sorted(ROOT.glob("src/*/*.c")):
+        text = path.read_text()
+        if path.stem.endswith("_kernel") or ALONE.search(text) or alone & set(INCLUDE.findall(text)):
+            continue
+        for name in statics_of(text):
+            places[f"{path.parent.name}: {name}"].add(str(path.relative_to(ROOT)))
+    return places
 
 
 def main():
@@ -40,9 +67,11 @@ def main():
             if path.suffix != ".glsl" and not PRELUDES.match(name):
                 for tag in types_of(path.read_text()):
                     places[tag].add(name)
-    faults = [f"{name}: {', '.join(sorted(where))}" for table in (places, files) for name, where in sorted(table.items())
-              if len(where) > 1]
-    print("\n".join(faults + [f"check_tags: {len(places)} types, {len(files)} files, {len(faults)} faults"]))
+    statics = places_in_rooms()
+    faults = [f"{name}: {', '.join(sorted(where))}" for table in (places, files, statics)
+              for name, where in sorted(table.items()) if len(where) > 1]
+    counts = f"{len(places)} types, {len(files)} files, {len(statics)} static names, {len(faults)} faults"
+    print("\n".join(faults + [f"check_tags: {counts}"]))
     return 1 if faults else 0
 
 

@@ -14,7 +14,7 @@ enum { CROWD_MOST = 1000 };
 typedef struct crowd {
     nebel_volume_desc volumes[CROWD_MOST + 1];
     size_t count, lamp_count;
-    nebel_fog_desc desc;
+    nebel_sun sun;
     nebel_light lamps[2];
 } crowd;
 
@@ -85,7 +85,7 @@ static inline void crowd_set_albedo(crowd *c)
 static inline void crowd_set_sun(crowd *c)
 {
     crowd_set_albedo(c);
-    c->desc.sun = (nebel_sun){{.4, .8, .3}, {3, 2.5, 2}};
+    c->sun = (nebel_sun){{.4, .8, .3}, {3, 2.5, 2}};
 }
 
 static inline void crowd_set_lamps(crowd *c)
@@ -98,16 +98,11 @@ static inline void crowd_set_lamps(crowd *c)
     }
 }
 
-static inline nebel_snapshot *crowd_commit(const crowd *c)
+/* The only owner of its snapshot. */
+static inline nebel_lighting *crowd_commit(const crowd *c)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&c->desc, &fog), NEBEL_OK);
-    for (size_t i = 0; i < c->count; i++) assert_int_equal(nebel_add_volume(fog, &c->volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, c->lamp_count, c->lamps), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    const nebel_lighting_desc lights = {.sun = c->sun, .lights = c->lamps, .light_count = c->lamp_count};
+    return fog_light(&lights, c->volumes, c->count);
 }
 
 #endif

@@ -6,7 +6,7 @@
 #include "unit.h"
 #include "dice.h"
 
-#include <nebel/nebel.h>
+#include <nebel/light.h>
 
 #include <math.h>
 #include <stdio.h>
@@ -99,6 +99,49 @@ static inline nebel_snapshot *fog_commit(const nebel_fog_desc *desc, const nebel
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     nebel_destroy_fog(fog);
     return snapshot;
+}
+
+/* The lights of a snapshot; desc NULL: none. */
+static inline nebel_lighting *light_fog(nebel_snapshot *snapshot, const nebel_lighting_desc *desc)
+{
+    nebel_lighting *made = NULL;
+    assert_int_equal(nebel_create_lighting(snapshot, desc, &made), NEBEL_OK);
+    return made;
+}
+
+/* Fog and its lights, which are the only owner of its snapshot. */
+static inline nebel_lighting *fog_commit_lit(const nebel_fog_desc *desc, const nebel_volume_desc *volumes, size_t n,
+                                             const nebel_lighting_desc *lights)
+{
+    nebel_snapshot *snapshot = fog_commit(desc, volumes, n);
+    nebel_lighting *lighting = light_fog(snapshot, lights);
+    nebel_release_snapshot(snapshot);
+    return lighting;
+}
+
+/* The same of volumes alone. */
+static inline nebel_lighting *fog_light(const nebel_lighting_desc *lights, const nebel_volume_desc *volumes, size_t n)
+{
+    return fog_commit_lit(&(nebel_fog_desc){0}, volumes, n, lights);
+}
+
+/* Along rays, in these lights. */
+static inline void fog_trace(const nebel_lighting *lighting, nebel_trace_desc desc, size_t n, const nebel_ray *rays,
+                             nebel_transfer *transfers)
+{
+    desc.lighting = lighting;
+    assert_int_equal(
+        nebel_trace(nebel_get_lighting_snapshot(lighting), &desc, n, rays, sizeof *rays, transfers, sizeof *transfers),
+        NEBEL_OK);
+}
+
+/* Along one ray, in double. */
+static inline nebel_transfer fog_along(const nebel_lighting *lighting, const nebel_ray *ray)
+{
+    const nebel_trace_desc desc = {.lighting = lighting};
+    nebel_transfer transfer;
+    assert_int_equal(nebel_trace(nebel_get_lighting_snapshot(lighting), &desc, 1, ray, 0, &transfer, 0), NEBEL_OK);
+    return transfer;
 }
 
 /* The largest difference of two numbers; infinite where one is a NaN. */

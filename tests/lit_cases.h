@@ -3,7 +3,7 @@
 #ifndef LIT_CASES_H
 #define LIT_CASES_H
 
-#include <nebel/nebel.h>
+#include <nebel/light.h>
 
 #include <math.h>
 

@@ -5,6 +5,8 @@
 
 #include "lit_shape.h"
 
+#include <nebel/light.h>
+
 enum { LIT_MAX_VOLUMES = 128, LIT_MAX_LEAVES = 1024, LIT_MAX_EVENTS = 2 * LIT_MAX_LEAVES + 8, LIT_MAX_CUTS = 16384 };
 
 typedef struct lit_scene {

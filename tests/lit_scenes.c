@@ -281,20 +281,22 @@ void lit_draw_rays(uint64_t seed, nebel_ray rays[LIT_RAYS_EACH])
     for (int i = 0; i < LIT_RAYS_EACH; i++) rays[i] = draw_ray(&dices);
 }
 
-nebel_snapshot *lit_draw_commit(const lit_draw *draw)
+nebel_lighting *lit_draw_commit(const lit_draw *draw)
 {
     const lit_scene *s = &draw->scene;
-    nebel_fog_desc desc = {.sun = s->sun};
+    nebel_lighting_desc lights = {.sun = s->sun, .lights = s->lamps, .light_count = s->lamp_count};
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    memcpy(desc.ambient, s->ambient, sizeof desc.ambient);
-    nebel_result result = nebel_create_fog(&desc, &fog);
+    nebel_lighting *lighting = NULL;
+    memcpy(lights.environment.radiance, s->ambient, sizeof s->ambient);
+    nebel_result result = nebel_create_fog(&(nebel_fog_desc){0}, &fog);
     for (size_t i = 0; i < s->volume_count && result == NEBEL_OK; i++)
         result = nebel_add_volume(fog, &s->volumes[i], NULL);
-    if (result == NEBEL_OK) result = nebel_set_lamps(fog, s->lamp_count, s->lamps);
-    if (result == NEBEL_OK) nebel_commit_fog(fog, &snapshot);
+    if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
+    if (result == NEBEL_OK) nebel_create_lighting(snapshot, &lights, &lighting);
     nebel_destroy_fog(fog);
-    return snapshot;
+    nebel_release_snapshot(snapshot);
+    return lighting;
 }
 
 void lit_draw_free(lit_draw *draw)

@@ -54,8 +54,8 @@ void lit_draw_fog(lit_draw *draw, lit_kind kind, lit_source source, uint64_t see
 int lit_ray_count(lit_kind kind);
 void lit_draw_rays(uint64_t seed, nebel_ray rays[LIT_RAYS_EACH]);
 
-/* NULL where nebel refuses the fog. */
-nebel_snapshot *lit_draw_commit(const lit_draw *draw);
+/* The only owner of its snapshot; NULL where nebel refuses the fog. */
+nebel_lighting *lit_draw_commit(const lit_draw *draw);
 void lit_draw_free(lit_draw *draw);
 
 #endif

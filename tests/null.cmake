@@ -1,5 +1,5 @@
 # Calls with NULL of every function that the headers declare.
-set(null_cpu classic light nebel particles photograph places planet render scene shader)
+set(null_cpu classic light nebel particles photograph planet render scene shader)
 set(null_gl gl)
 foreach(library IN ITEMS cpu gl)
     if(NOT TARGET nebel_test_${library})

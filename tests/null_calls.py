@@ -11,18 +11,18 @@ import re
 import sys
 
 # Good values by type; those of output are members of `out`, those of objects members of `made`.
-OBJECTS = ["cells", "fog", "snapshot", "environment_map", "grid", "textured_planet", "atmosphere", "sky_view", "clouds", "cloud_lighting",
+OBJECTS = ["cells", "fog", "snapshot", "lighting", "environment_map", "grid", "textured_planet", "atmosphere", "sky_view", "clouds", "cloud_lighting",
            "cloud_workspace", "scene", "renderer", "movie", "image_writer", "gl", "gl_classic", "gl_renderer"]
 INPUTS = ["cell", "cells_desc", "cell_view", "cell_point", "factor_desc", "d3d9_fog", "d3d9_vertex", "curve", "vertex_desc", "vertices",
           "vertex_output", "tessellation_desc", "triangles", "cloud_layer", "log", "clouds_desc", "cloud_lighting_desc", "ray",
-          "diffusion_desc", "environment_map_desc", "environment", "planet_map_desc", "planet_map", "textured_planet_desc", "textured_planet_query", "grid_desc",
-          "noise_desc", "phase", "droplet_distribution", "fog_desc", "volume_desc", "sun", "light", "trace_desc", "ray_planes", "transfer_planes",
+          "diffusion_desc", "lighting_desc", "environment_map_desc", "environment", "planet_map_desc", "planet_map", "textured_planet_desc", "textured_planet_query", "grid_desc",
+          "noise_desc", "phase", "droplet_distribution", "fog_desc", "volume_desc", "sun", "trace_desc", "ray_planes", "transfer_planes",
           "segments", "pixels", "transfer", "particle", "nebula_desc", "sample_point", "atmosphere_desc", "sky_view_desc", "ground_planes",
           "cpu_renderer_desc", "method_desc", "frame_desc", "frame", "scene_desc", "planet", "scene_model", "camera_key", "sun_key", "volume_key",
           "scene_noise", "image", "image_desc", "movie_desc", "grid_file", "view", "depth_desc", "camera", "gl_desc", "gl_pass", "gl_classic_desc",
           "gl_renderer_desc", "gl_frame_desc", "gl_planes", "photograph", "intrinsics", "depth_source"]
 OUTPUTS = ["cell_fog", "cell_segment", "factor_desc", "d3d9_fog", "curve", "vertex_desc", "cloud_layer", "cloud_transfer", "air_shadow",
-           "fog_shadow", "planet_map", "shell_hits", "droplet_properties", "volume_id", "sunlit_fog", "split_fog", "transfer", "particle", "medium_properties",
+           "fog_shadow", "planet_map", "shell_hits", "droplet_properties", "volume_id", "bounds", "transfer", "particle", "medium_properties",
            "scatterer", "majorant_segment", "atmosphere_desc", "irradiance", "sun", "environment", "scene_noise", "image", "rays", "view_error", "texel_f32", "texel_u32",
            "gl_fog_resources", "gl_textures", "view", "photograph", "intrinsics", "pixels", "depth_map"]
 FRESH = OBJECTS + ["particle", "tessellation"]
@@ -77,6 +77,8 @@ def good_value(parameter):
         return "places", True
     if parameter.startswith("const double *const direction[3]"):
         return "directions", True
+    if parameter.startswith("const nebel_light **"):
+        return "&out.lights", True
     if re.match(r"char \w+\[NEBEL_MAX_RECORD \+ 1\]", parameter):
         return "out.record", True
     array = re.match(r"(const )?(double|float) \w+\[(\d+)\]", parameter)

@@ -228,7 +228,7 @@ static double distance(const pass_picture *p, const line *ray, double x, double 
     }
 }
 
-nebel_transfer pass_trace(const nebel_snapshot *fog, const pass_picture *picture, int x, int y)
+nebel_transfer pass_trace(const nebel_lighting *fog, const pass_picture *picture, int x, int y)
 {
     nebel_ray ray;
     nebel_transfer transfer;
@@ -236,9 +236,7 @@ nebel_transfer pass_trace(const nebel_snapshot *fog, const pass_picture *picture
     const double depth = (double)picture->stored[(uint32_t)y * picture->view.width + (uint32_t)x];
     for (int i = 0; i < 3; i++) ray.origin[i] = (double)way.origin[i], ray.direction[i] = (double)way.direction[i];
     ray.t_max = distance(picture, &way, x + .5, y + .5, depth);
-    assert_int_equal(
-        nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-6}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
-        NEBEL_OK);
+    fog_trace(fog, (nebel_trace_desc){.tolerance = 1e-6}, 1, &ray, &transfer);
     return transfer;
 }
 
@@ -271,7 +269,7 @@ static void set_colors(nebel_volume_desc *v, double extinction, double red, doub
     v->source[2] = blue;
 }
 
-nebel_snapshot *pass_fog(int more)
+nebel_lighting *pass_fog(int more)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
@@ -301,5 +299,7 @@ nebel_snapshot *pass_fog(int more)
     }
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     nebel_destroy_fog(fog);
-    return snapshot;
+    nebel_lighting *const lighting = light_fog(snapshot, NULL);
+    nebel_release_snapshot(snapshot);
+    return lighting;
 }

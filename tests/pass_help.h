@@ -68,7 +68,7 @@ nebel_view pass_view(int kind, range clip, double yaw, double pitch);
 void pass_fill(pass_picture *picture);
 
 /* What nebel_trace says in double about the ray of a pixel up to what is stored there. */
-nebel_transfer pass_trace(const nebel_snapshot *fog, const pass_picture *picture, int x, int y);
+nebel_transfer pass_trace(const nebel_lighting *fog, const pass_picture *picture, int x, int y);
 
 /* ---- comparison ------------------------------------------------------------------------------ */
 
@@ -81,7 +81,7 @@ typedef struct pass_difference {
 void pass_note(pass_difference *difference, const float *got, const double *wanted, int fogged);
 
 /* Boxes, height fog and a ball around pass_eye, which is inside some of it, and `more` small balls; below 0: without
- * any ball. */
-nebel_snapshot *pass_fog(int more);
+ * any ball. Without lights. */
+nebel_lighting *pass_fog(int more);
 
 #endif

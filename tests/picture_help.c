@@ -57,7 +57,18 @@ static void count_message(nebel_result result, const char *message, void *user)
     write_message(result, message, NULL);
 }
 
-static void render_cpu(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera, uint32_t samples,
+nebel_lighting *picture_commit_scene(const nebel_scene *scene, int with_particles)
+{
+    nebel_snapshot *snapshot = NULL;
+    nebel_lighting *lighting = NULL;
+    assert_int_equal((with_particles ? nebel_commit_scene_fog_at : nebel_commit_scene_volumes_at)(scene, 0, &snapshot),
+                     NEBEL_OK);
+    assert_int_equal(nebel_create_scene_lighting(scene, snapshot, 0, NULL, &lighting), NEBEL_OK);
+    nebel_release_snapshot(snapshot);
+    return lighting;
+}
+
+static void render_cpu(const nebel_scene_data *scene, nebel_lighting *fog, const nebel_camera *camera, uint32_t samples,
                        picture_pair *pair)
 {
     nebel_renderer *renderer = NULL;
@@ -73,7 +84,7 @@ static void render_cpu(const nebel_scene_data *scene, nebel_snapshot *fog, const
     nebel_destroy_renderer(renderer);
 }
 
-static void render_gl(const nebel_scene_data *scene, nebel_snapshot *fog, const picture_particles *particles,
+static void render_gl(const nebel_scene_data *scene, nebel_lighting *fog, const picture_particles *particles,
                       const nebel_camera *camera, uint32_t samples, picture_pair *pair)
 {
     nebel_gl_renderer *renderer = NULL;
@@ -90,21 +101,21 @@ static void render_gl(const nebel_scene_data *scene, nebel_snapshot *fog, const 
     assert_int_equal(nebel_create_gl_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
     if (particles != NULL) {
         assert_int_equal(nebel_set_gl_renderer_particles(renderer, particles->list, particles->count), NEBEL_OK);
-        assert_int_equal(nebel_set_gl_renderer_fog(renderer, particles->others), NEBEL_OK);
+        assert_int_equal(nebel_set_gl_renderer_lighting(renderer, particles->others), NEBEL_OK);
     }
     assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
     assert_int_equal(nebel_gl_read_planes(renderer, &planes), NEBEL_OK);
     nebel_destroy_gl_renderer(renderer);
 }
 
-void picture_render_particles(const nebel_scene_data *scene, nebel_snapshot *fog, const picture_particles *particles,
+void picture_render_particles(const nebel_scene_data *scene, nebel_lighting *fog, const picture_particles *particles,
                               const nebel_camera *camera, uint32_t samples, picture_pair *pair)
 {
     render_cpu(scene, fog, camera, samples, pair);
     render_gl(scene, fog, particles, camera, samples, pair);
 }
 
-void picture_render(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera, uint32_t samples,
+void picture_render(const nebel_scene_data *scene, nebel_lighting *fog, const nebel_camera *camera, uint32_t samples,
                     picture_pair *pair)
 {
     picture_render_particles(scene, fog, NULL, camera, samples, pair);

@@ -21,18 +21,21 @@ typedef struct picture_pair {
 picture_pair picture_make(uint32_t width, uint32_t height);
 void picture_free(picture_pair *pair);
 
+/* A scene's fog in its lights, at frame 0; with its particles among it, or without them. */
+nebel_lighting *picture_commit_scene(const nebel_scene *scene, int with_particles);
+
 /* Particles for OpenGL, which the CPU has in its fog; none at first. */
 typedef struct picture_particles {
     const nebel_particle *list;
     size_t count;
-    nebel_snapshot *others; /* the fog without them */
+    nebel_lighting *others; /* the fog without them */
     int leave_sun;          /* in OpenGL: they do not dim it */
 } picture_particles;
 
 /* Renders a scene by both. particles NULL: none. */
-void picture_render_particles(const nebel_scene_data *scene, nebel_snapshot *fog, const picture_particles *particles,
+void picture_render_particles(const nebel_scene_data *scene, nebel_lighting *fog, const picture_particles *particles,
                               const nebel_camera *camera, uint32_t samples, picture_pair *pair);
-void picture_render(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera, uint32_t samples,
+void picture_render(const nebel_scene_data *scene, nebel_lighting *fog, const nebel_camera *camera, uint32_t samples,
                     picture_pair *pair);
 
 /* How far OpenGL is from the CPU. A pixel's difference is the largest of its transmittances, of its in-scattering as a

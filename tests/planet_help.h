@@ -2,7 +2,7 @@
 #ifndef PLANET_HELP_H
 #define PLANET_HELP_H
 
-#include "unit.h"
+#include "fog_help.h"
 
 #include <nebel/light.h>
 #include <nebel/nebel.h>
@@ -48,10 +48,8 @@ static inline nebel_environment_map *planet_even_sky(nebel_scene_data *scene)
 }
 
 /* A ball that shines, far before the camera, in a lit height fog. */
-static inline nebel_snapshot *planet_fog(const double to_sun[3])
+static inline nebel_lighting *planet_fog(const double to_sun[3])
 {
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
     const nebel_volume_desc volumes[] = {
         {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 3000, -9000}, .radius = 2500},
          .extinction = {4e-4, 4e-4, 4e-4},
@@ -60,30 +58,22 @@ static inline nebel_snapshot *planet_fog(const double to_sun[3])
          .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 200},
          .extinction = {1e-4, 2e-4, 3e-4},
          .albedo = {.9, .9, .9}}};
-    const nebel_fog_desc desc = {.sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {2, 1.5, 1}}};
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    for (int i = 0; i < 2; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    const nebel_lighting_desc lights = {
+        .sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {2, 1.5, 1}}};
+    return fog_commit_lit(&(nebel_fog_desc){0}, volumes, 2, &lights);
 }
 
 /* Mist around a whole planet, which thins out upwards. */
-static inline nebel_snapshot *planet_mist(double radius, const double to_sun[3])
+static inline nebel_lighting *planet_mist(double radius, const double to_sun[3])
 {
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
     const nebel_volume_desc mist = {
         .shape = {.type = NEBEL_SHAPE_WORLD},
         .density = {.type = NEBEL_DENSITY_ALTITUDE, .center = {0, -radius, 0}, .radius = radius, .scale_height = 400},
         .extinction = {.002, .002, .002},
         .albedo = {.95, .95, .95}};
-    const nebel_fog_desc desc = {.sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {5, 4, 3}}};
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &mist, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    const nebel_lighting_desc lights = {
+        .sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {5, 4, 3}}};
+    return fog_commit_lit(&(nebel_fog_desc){0}, &mist, 1, &lights);
 }
 
 #endif

@@ -267,8 +267,14 @@ void random_fog_light(random_fog *fog, uint64_t *numbers)
 
 nebel_fog_desc random_fog_desc(const random_fog *fog)
 {
-    return (nebel_fog_desc){.ambient = {fog->ambient[0], fog->ambient[1], fog->ambient[2]},
-                            .max_opacity = fog->max_opacity};
+    return (nebel_fog_desc){.max_opacity = fog->max_opacity};
+}
+
+nebel_lighting_desc random_fog_lights(const random_fog *fog)
+{
+    nebel_lighting_desc lights = {.environment = {.type = NEBEL_ENVIRONMENT_CONSTANT}};
+    memcpy(lights.environment.radiance, fog->ambient, sizeof fog->ambient);
+    return lights;
 }
 
 void random_fog_rotate(const double q[4], double p[3])

@@ -2,7 +2,7 @@
 #ifndef RANDOM_FOG_H
 #define RANDOM_FOG_H
 
-#include <nebel/nebel.h>
+#include <nebel/light.h>
 
 #include <stdio.h>
 
@@ -40,8 +40,11 @@ void random_fog_make(random_fog *fog, random_fog_kind kind, uint64_t seed);
 /* Two of three volumes scatter light in place of their source. Goes on in `numbers`. */
 void random_fog_light(random_fog *fog, uint64_t *numbers);
 
-/* Its ambient light and its limit. */
+/* Its limit. */
 nebel_fog_desc random_fog_desc(const random_fog *fog);
+
+/* Its ambient light. */
+nebel_lighting_desc random_fog_lights(const random_fog *fog);
 
 /* Past, through and from inside the volumes; along axes; in faces; tangent to spheres, cylinders and cones to 1e-3 ..
  * 1e-15 of their size; through corners and along axes of shapes; t_max zero, tiny, ending on a surface, long, infinite;

@@ -70,7 +70,7 @@ static inline void free_world(world *w)
     nebel_destroy_clouds(w->clouds);
 }
 
-static inline nebel_renderer *create_renderer(const world *w, nebel_snapshot *fog, int threads)
+static inline nebel_renderer *create_renderer(const world *w, nebel_lighting *fog, int threads)
 {
     nebel_renderer *renderer;
     assert_int_equal(
@@ -89,7 +89,7 @@ static inline test_picture render_frame(nebel_renderer *renderer, const nebel_ca
     return picture;
 }
 
-static inline test_picture render_in(const world *w, nebel_snapshot *fog, const nebel_camera *camera, int threads,
+static inline test_picture render_in(const world *w, nebel_lighting *fog, const nebel_camera *camera, int threads,
                                      uint32_t samples, double time)
 {
     nebel_renderer *const renderer = create_renderer(w, fog, threads);

@@ -134,4 +134,27 @@ static inline void check_rules(const rule *rules, size_t count)
 #define UNSUPPORTED NEBEL_ERROR_UNSUPPORTED
 #define LIMIT NEBEL_ERROR_LIMIT
 
+/* The scene's fog at a frame in its lights, which are the one owner of the snapshot. */
+static inline nebel_lighting *scene_light(const nebel_scene *scene, double frame)
+{
+    nebel_snapshot *fog = NULL;
+    nebel_lighting *lighting = NULL;
+    assert_int_equal(nebel_commit_scene_fog_at(scene, frame, &fog), NEBEL_OK);
+    assert_int_equal(nebel_create_scene_lighting(scene, fog, frame, NULL, &lighting), NEBEL_OK);
+    nebel_release_snapshot(fog);
+    return lighting;
+}
+
+/* That fog along rays. */
+static inline void scene_trace(const nebel_scene *scene, double frame, nebel_trace_desc desc, size_t n,
+                               const nebel_ray *rays, nebel_transfer *transfers)
+{
+    nebel_lighting *lighting = scene_light(scene, frame);
+    desc.lighting = lighting;
+    assert_int_equal(
+        nebel_trace(nebel_get_lighting_snapshot(lighting), &desc, n, rays, sizeof *rays, transfers, sizeof *transfers),
+        NEBEL_OK);
+    nebel_release_lighting(lighting);
+}
+
 #endif

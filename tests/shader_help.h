@@ -74,13 +74,13 @@ static inline void fill_texture(unsigned name, GLint internal, GLenum format, GL
     free(padded);
 }
 
-static inline void upload_voxels(tracer *t, const nebel_snapshot *snapshot)
+static inline void upload_voxels(tracer *t, const nebel_lighting *lighting)
 {
     size_t count = 0;
-    assert_int_equal(nebel_pack_voxels(snapshot, NULL, 0, &count), NEBEL_OK);
+    assert_int_equal(nebel_pack_voxels(lighting, NULL, 0, &count), NEBEL_OK);
     nebel_texel_u32 *texels = calloc(count, sizeof *texels);
     assert_non_null(texels);
-    assert_int_equal(nebel_pack_voxels(snapshot, texels, count, &count), NEBEL_OK);
+    assert_int_equal(nebel_pack_voxels(lighting, texels, count, &count), NEBEL_OK);
     glActiveTexture(GL_TEXTURE1);
     fill_texture(t->voxels, GL_RGBA32UI, GL_RGBA_INTEGER, GL_UNSIGNED_INT, texels, count);
     glActiveTexture(GL_TEXTURE0);
@@ -103,13 +103,13 @@ static inline void upload(tracer *t, const nebel_texel_f32 *words, size_t count)
     fill_texture(t->texture, GL_RGBA32F, GL_RGBA, GL_FLOAT, words, count);
 }
 
-static inline void pack_and_upload(tracer *t, const nebel_snapshot *snapshot, const double eye[3])
+static inline void pack_and_upload(tracer *t, const nebel_lighting *lighting, const double eye[3])
 {
     size_t count = 0;
-    assert_int_equal(nebel_pack_fog(snapshot, eye, NULL, 0, &count), NEBEL_OK);
+    assert_int_equal(nebel_pack_fog(lighting, eye, NULL, 0, &count), NEBEL_OK);
     nebel_texel_f32 *words = malloc(count * sizeof *words);
     assert_non_null(words);
-    assert_int_equal(nebel_pack_fog(snapshot, eye, words, count, &count), NEBEL_OK);
+    assert_int_equal(nebel_pack_fog(lighting, eye, words, count, &count), NEBEL_OK);
     upload(t, words, count);
     free(words);
 }
@@ -188,7 +188,7 @@ static inline int ascending(const void *a, const void *b)
 
 /* What a ray's own rounding may change: the largest difference among rays turned, moved, or both by a few
  * roundings in any direction. */
-static inline double conditioning(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, const nebel_ray *ray,
+static inline double conditioning(const nebel_lighting *lighting, const nebel_trace_desc *desc, const nebel_ray *ray,
                                   const double eye[3], double scale)
 {
     enum { NEAR = 80 };
@@ -203,8 +203,8 @@ static inline double conditioning(const nebel_snapshot *snapshot, const nebel_tr
             if (i >= 8) near[i].origin[k] += (i >> (k + 3) & 1 ? 3e-7 : -3e-7) * far;
         }
     }
-    assert_int_equal(nebel_trace(snapshot, desc, 1, ray, sizeof *ray, &transfer[NEAR], sizeof *transfer), NEBEL_OK);
-    assert_int_equal(nebel_trace(snapshot, desc, NEAR, near, sizeof *near, transfer, sizeof *transfer), NEBEL_OK);
+    fog_trace(lighting, *desc, 1, ray, &transfer[NEAR]);
+    fog_trace(lighting, *desc, NEAR, near, transfer);
     double most = 0;
     for (int i = 0; i < NEAR; i++)
         for (int c = 0; c < 3; c++) {
@@ -218,16 +218,16 @@ static const nebel_trace_desc precise = {.tolerance = 1e-5};
 static double differences[RAYS];
 
 /* 99.9 % of the foggy rays within 1/255, and 3/255 everywhere but where the ray's own rounding matters as much. */
-static inline void compare(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, const double eye[3],
+static inline void compare(const nebel_lighting *lighting, const nebel_trace_desc *desc, const double eye[3],
                            double scale, int hostile, const char *name)
 {
-    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
+    fog_trace(lighting, *desc, RAYS, rays, transfers);
     size_t foggy = 0;
     double worst = 0, worst_silhouette = 0;
     for (int i = 0; i < RAYS; i++) {
         if (transfers[i].error > 1e-3 * scale) continue; /* the reference does not know either */
         const double off = worst_of(&answers[i], &transfers[i], scale);
-        const int silhouette = off > .25 / 255 && off < 2 * conditioning(snapshot, desc, &rays[i], eye, scale);
+        const int silhouette = off > .25 / 255 && off < 2 * conditioning(lighting, desc, &rays[i], eye, scale);
         if (is_foggy(&transfers[i]) && !(silhouette && hostile)) differences[foggy++] = off;
         if (silhouette) {
             worst_silhouette = fmax(worst_silhouette, off);
@@ -260,10 +260,11 @@ static inline double largest_source(const random_fog *fog)
 
 static random_fog fog;
 
-static inline nebel_snapshot *commit_fog(void)
+static inline nebel_lighting *commit_fog(void)
 {
     const nebel_fog_desc desc = random_fog_desc(&fog);
-    return fog_commit(&desc, fog.volumes, fog.count);
+    const nebel_lighting_desc lights = random_fog_lights(&fog);
+    return fog_commit_lit(&desc, fog.volumes, fog.count, &lights);
 }
 
 static inline void evaluate(tracer *t)
@@ -274,18 +275,18 @@ static inline void evaluate(tracer *t)
 /* `fog`, from an eye that hangs on the seed, every third time within it. */
 static inline void trace_fog(tracer *t, uint64_t seed, const nebel_trace_desc *truth, const char *kind)
 {
-    nebel_snapshot *snapshot = commit_fog();
+    nebel_lighting *lighting = commit_fog();
     uint64_t state = seed;
     double eye[3];
     char name[64];
     for (int k = 0; k < 3; k++) eye[k] = fog.shift[k] + dice(&state, -20, 20) * (seed % 3 == 0 ? .2 : 1);
     snprintf(name, sizeof name, "%s %d", kind, (int)seed);
     camera_rays(eye, fog.shift, seed);
-    pack_and_upload(t, snapshot, eye);
-    if ((nebel_pack_features(snapshot) & NEBEL_FEATURE_GRID) != 0) upload_voxels(t, snapshot);
+    pack_and_upload(t, lighting, eye);
+    if ((nebel_pack_features(lighting) & NEBEL_FEATURE_GRID) != 0) upload_voxels(t, lighting);
     evaluate(t);
-    compare(snapshot, truth, eye, largest_source(&fog), 0, name);
-    nebel_release_snapshot(snapshot);
+    compare(lighting, truth, eye, largest_source(&fog), 0, name);
+    nebel_release_lighting(lighting);
 }
 
 static inline void try_fog(tracer *t, const char *kind, uint64_t seed)

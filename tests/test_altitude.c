@@ -3,8 +3,6 @@
 #include "fog_help.h"
 #include "gauss_rule.h"
 
-#include <nebel/places.h>
-
 #include <float.h>
 
 #define EARTH 6.36e6
@@ -334,29 +332,25 @@ static void test_sunlight(void **state)
     nebel_volume_desc volume = fog_of(&mist, extinction, 0);
     for (int c = 0; c < 3; c++) volume.albedo[c] = .9;
     for (size_t k = 0; k < 2; k++) {
-        nebel_fog *fog = NULL;
-        nebel_snapshot *snapshot = NULL;
-        nebel_sun sun = {.irradiance = {4, 4, 4}};
-        memcpy(sun.direction, suns[k], sizeof sun.direction);
-        assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-        assert_int_equal(nebel_set_sun(fog, &sun), NEBEL_OK);
-        assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
-        assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+        nebel_lighting_desc lights = {.sun = {.irradiance = {4, 4, 4}}};
+        memcpy(lights.sun.direction, suns[k], sizeof lights.sun.direction);
+        nebel_lighting *lighting = fog_light(&lights, &volume, 1);
         for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
             if (!nb_test_tries((i + k) % 2, 2)) continue;
             const double glow = .9 * 4 / (4 * 3.14159265358979323846);
             const double truth =
                 extrapolated(&mist, extinction, suns[k], glow, &cases[i].ray, cases[i].from, cases[i].to);
-            const nebel_transfer exact = trace(snapshot, NEBEL_PRECISION_DOUBLE, &cases[i].ray);
-            const nebel_transfer fast = trace(snapshot, NEBEL_PRECISION_FLOAT, &cases[i].ray);
+            const nebel_transfer exact = fog_along(lighting, &cases[i].ray);
+            const nebel_trace_desc in_float = {.precision = NEBEL_PRECISION_FLOAT};
+            nebel_transfer fast;
+            fog_trace(lighting, in_float, 1, &cases[i].ray, &fast);
             printf("sun %zu, ray %zu: %.9g, off %.2g in double, %.2g in float, told %.2g\n", k, i, truth,
                    fabs(exact.in_scattering[0] - truth), fabs(fast.in_scattering[0] - truth), exact.error);
             assert_true(fabs(exact.in_scattering[0] - truth) <= exact.error + 1e-6);
             assert_true(fabs(fast.in_scattering[0] - truth) <= fast.error + 1e-6);
             assert_true(exact.error <= .002 && fast.error <= .002);
         }
-        nebel_release_snapshot(snapshot);
-        nebel_destroy_fog(fog);
+        nebel_release_lighting(lighting);
     }
 }
 

@@ -40,26 +40,27 @@ static void aim(double height, const double eye[3], const double up[3])
     }
 }
 
-static void try_heights(const nebel_fog_desc *desc, const nebel_volume_desc *volumes, size_t count, const char *what)
+static void try_heights(const nebel_lighting_desc *lights, const nebel_volume_desc *volumes, size_t count,
+                        const char *what)
 {
     static const double heights[] = {2, 300, 2e3, 1e5, 1.5e6};
     const double up[3] = {.6, .64, .48};
     char features[64], name[96];
-    nebel_snapshot *snapshot = fog_commit(desc, volumes, count);
+    nebel_lighting *lighting = fog_light(lights, volumes, count);
     tracer t;
-    snprintf(features, sizeof features, "#define NEBEL_FEATURES %u\n", (unsigned)nebel_pack_features(snapshot));
+    snprintf(features, sizeof features, "#define NEBEL_FEATURES %u\n", (unsigned)nebel_pack_features(lighting));
     open_tracer(&t, NB_GL_330, TEXTURE, features, trace_body);
     for (size_t i = 0; i < sizeof heights / sizeof *heights; i++) {
         double eye[3];
         for (int c = 0; c < 3; c++) eye[c] = center[c] + (EARTH + heights[i]) * up[c];
         snprintf(name, sizeof name, "%s from %g m", what, heights[i]);
         aim(heights[i], eye, up);
-        pack_and_upload(&t, snapshot, eye);
+        pack_and_upload(&t, lighting, eye);
         evaluate(&t);
-        compare(snapshot, &(nebel_trace_desc){.tolerance = 1e-4}, eye, 1, 0, name);
+        compare(lighting, &(nebel_trace_desc){.tolerance = 1e-4}, eye, 1, 0, name);
     }
     nb_gl_close(&t.gl);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 static void test_one(void **state)
@@ -67,8 +68,8 @@ static void test_one(void **state)
     (void)state;
     const nebel_volume_desc grows = mist(0, 200, NEBEL_BELOW_GROW, 9000, 1);
     const nebel_volume_desc capped = mist(150, 120, NEBEL_BELOW_CONSTANT, 5000, 1);
-    try_heights(&(nebel_fog_desc){0}, &grows, 1, "mist");
-    try_heights(&(nebel_fog_desc){0}, &capped, 1, "capped mist");
+    try_heights(NULL, &grows, 1, "mist");
+    try_heights(NULL, &capped, 1, "capped mist");
 }
 
 static void test_two_of_different_light(void **state)
@@ -76,16 +77,16 @@ static void test_two_of_different_light(void **state)
     (void)state;
     const nebel_volume_desc both[2] = {mist(0, 300, NEBEL_BELOW_GROW, 20000, 1),
                                        mist(500, 150, NEBEL_BELOW_CONSTANT, 15000, .4)};
-    try_heights(&(nebel_fog_desc){0}, both, 2, "two mists");
+    try_heights(NULL, both, 2, "two mists");
 }
 
 static void test_sunlight(void **state)
 {
     (void)state;
     nebel_volume_desc lit = mist(0, 300, NEBEL_BELOW_GROW, 9000, 0);
-    const nebel_fog_desc desc = {.sun = {{.3, .9, .2}, {3, 2.5, 2}}};
+    const nebel_lighting_desc lights = {.sun = {{.3, .9, .2}, {3, 2.5, 2}}};
     for (int c = 0; c < 3; c++) lit.albedo[c] = .95;
-    try_heights(&desc, &lit, 1, "sunlit mist");
+    try_heights(&lights, &lit, 1, "sunlit mist");
 }
 
 int main(void)

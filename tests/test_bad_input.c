@@ -324,15 +324,15 @@ static void test_wrong_fog_is_refused(void **unused)
     const nebel_allocator whole = fog_memory_allocator(&memory);
     const nebel_fog_desc wrong[] = {{.log = log, .allocator = {.allocate = whole.allocate}},
                                     {.log = log, .allocator = {.release = whole.release}},
-                                    {.log = log, .ambient = {0, -1, 0}},
-                                    {.log = log, .ambient = {0, 0, NOT_A_NUMBER}},
-                                    {.log = log, .ambient = {ENDLESS, 0, 0}}};
+                                    {.log = log, .max_opacity = -1},
+                                    {.log = log, .max_opacity = NOT_A_NUMBER},
+                                    {.log = log, .max_opacity = ENDLESS}};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         nebel_fog *fog = (nebel_fog *)&memory;
         assert_int_equal(nebel_create_fog(&wrong[i], &fog), i < 2 ? NEBEL_ERROR_ARGUMENT : NEBEL_ERROR_VALUE);
         assert_null(fog);
         assert_int_equal(messages.count, i + 1);
-        assert_non_null(strstr(messages.text, i < 2 ? "allocator" : "ambient"));
+        assert_non_null(strstr(messages.text, i < 2 ? "allocator" : "max_opacity"));
     }
     nebel_fog *fog = (nebel_fog *)&memory;
     assert_int_equal(nebel_create_fog(NULL, &fog), NEBEL_ERROR_ARGUMENT);

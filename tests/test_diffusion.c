@@ -3,8 +3,6 @@
 #include "fog_help.h"
 #include "random_fog.h"
 
-#include <nebel/light.h>
-
 static uint64_t random_count;
 static const double pi = 3.14159265358979323846;
 
@@ -22,24 +20,17 @@ static nebel_volume_desc volume_of(const light *l, double extinction)
                                .phase = l->phase};
 }
 
-static nebel_fog *start(const light *l, const nebel_volume_desc *volume, const nebel_diffusion_desc *diffusion)
+static nebel_lighting_desc lights_of(const light *l, const nebel_diffusion_desc *diffusion)
 {
-    nebel_fog *fog = NULL;
-    const nebel_fog_desc desc = {
-        .sun = {.direction = {-sqrt(1 - l->cosine * l->cosine), l->cosine, 0}, .irradiance = {1, 1, 1}}};
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_diffusion(fog, diffusion), NEBEL_OK);
-    return fog;
+    return (nebel_lighting_desc){
+        .sun = {.direction = {-sqrt(1 - l->cosine * l->cosine), l->cosine, 0}, .irradiance = {1, 1, 1}},
+        .diffusion = diffusion};
 }
 
-static nebel_snapshot *commit(const light *l, const nebel_volume_desc *volume, const nebel_diffusion_desc *diffusion)
+static nebel_lighting *commit(const light *l, const nebel_volume_desc *volume, const nebel_diffusion_desc *diffusion)
 {
-    nebel_snapshot *snapshot = NULL;
-    nebel_fog *fog = start(l, volume, diffusion);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    const nebel_lighting_desc lights = lights_of(l, diffusion);
+    return fog_light(&lights, volume, 1);
 }
 
 /* From 0 to 1 m, without an end to the sides. */
@@ -77,7 +68,7 @@ static void find_rule(double nodes[COSINES], double weights[COSINES])
 
 /* What leaves a layer upwards at `height`, or downwards, of the sun's flux there. Light is the same on both sides of the
  * plane that the sun is in. */
-static double flux_at(const nebel_snapshot *snapshot, const light *l, double height, int down)
+static double flux_at(const nebel_lighting *lighting, const light *l, double height, int down)
 {
     double nodes[COSINES], weights[COSINES], sum = 0;
     find_rule(nodes, weights);
@@ -91,7 +82,7 @@ static double flux_at(const nebel_snapshot *snapshot, const light *l, double hei
                 {0, height, 0}, {sine * cos(angle), down ? nodes[i] : -nodes[i], sine * sin(angle)}, HUGE_VAL};
         }
         const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .tolerance = 1e-4};
-        assert_int_equal(nebel_trace(snapshot, &desc, TURNS, rays, sizeof *rays, out, sizeof *out), NEBEL_OK);
+        fog_trace(lighting, desc, TURNS, rays, out);
         for (int k = 0; k < TURNS; k++)
             sum += weights[i] * nodes[i] * 2 * pi / TURNS * out[k].in_scattering[1] / l->cosine;
     }
@@ -139,9 +130,9 @@ typedef struct fluxes {
 static fluxes measure(const layer *l, const nebel_diffusion_desc *diffusion)
 {
     const nebel_volume_desc volume = layer_of(&l->light, l->depth);
-    nebel_snapshot *snapshot = commit(&l->light, &volume, diffusion);
-    const fluxes found = {flux_at(snapshot, &l->light, 1.5, 0), flux_at(snapshot, &l->light, -.5, 1)};
-    nebel_release_snapshot(snapshot);
+    nebel_lighting *lighting = commit(&l->light, &volume, diffusion);
+    const fluxes found = {flux_at(lighting, &l->light, 1.5, 0), flux_at(lighting, &l->light, -.5, 1)};
+    nebel_release_lighting(lighting);
     return found;
 }
 
@@ -202,18 +193,10 @@ static const struct {
 
 /* ---- ambient light --------------------------------------------------------------------------- */
 
-static nebel_snapshot *commit_under(const nebel_environment *sky, const nebel_volume_desc *volume,
+static nebel_lighting *commit_under(const nebel_environment *sky, const nebel_volume_desc *volume,
                                     const nebel_diffusion_desc *diffusion)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = 0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_set_environment(fog, sky), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_diffusion(fog, diffusion), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return fog_light(&(nebel_lighting_desc){.environment = *sky, .diffusion = diffusion}, volume, 1);
 }
 
 /* In-scattering of a ray down through a layer that is lit from everywhere alike. */
@@ -221,11 +204,10 @@ static double seen_in_even_light(const layer *l, const nebel_diffusion_desc *dif
 {
     static const nebel_environment even = {.radiance = {1, 1, 1}};
     const nebel_volume_desc volume = layer_of(&l->light, l->depth);
-    nebel_snapshot *snapshot = commit_under(&even, &volume, diffusion);
+    nebel_lighting *lighting = commit_under(&even, &volume, diffusion);
     const nebel_ray ray = {{0, 2, 0}, {sqrt(1 - l->light.cosine * l->light.cosine), -l->light.cosine, 0}, HUGE_VAL};
-    nebel_transfer out;
-    assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
-    nebel_release_snapshot(snapshot);
+    const nebel_transfer out = fog_along(lighting, &ray);
+    nebel_release_lighting(lighting);
     return out.in_scattering[0];
 }
 
@@ -253,11 +235,10 @@ static void test_endless_depth_in_even_light(void **unused)
         const light l = {.albedo = spaces[i].albedo, .cosine = spaces[i].cosine};
         nebel_volume_desc volume = volume_of(&l, .3);
         volume.shape = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE, .point = {3, 20, 4}, .normal = {0, 1, 0}};
-        nebel_snapshot *snapshot = commit_under(&even, &volume, &by_default);
+        nebel_lighting *lighting = commit_under(&even, &volume, &by_default);
         const nebel_ray ray = {{0, 21, 0}, {sqrt(1 - l.cosine * l.cosine), -l.cosine, 0}, HUGE_VAL};
-        nebel_transfer out;
-        assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
-        nebel_release_snapshot(snapshot);
+        const nebel_transfer out = fog_along(lighting, &ray);
+        nebel_release_lighting(lighting);
         assert_true(fabs(out.in_scattering[0] - spaces[i].reflected) < .02);
     }
 }
@@ -273,7 +254,7 @@ static void test_height_fog_reflects_as_a_layer(void **unused)
         nebel_volume_desc volume = volume_of(&l->light, l->depth / 50);
         volume.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .base = 7, .scale_height = 50};
         const nebel_diffusion_desc on_ground = {.has_ground = 1, .ground_height = 7};
-        nebel_snapshot *snapshot = commit(&l->light, &volume, &on_ground);
+        nebel_lighting *lighting = commit(&l->light, &volume, &on_ground);
         /* Fog below the ground would add to what rays see; they end there, as at a surface. */
         double nodes[COSINES], weights[COSINES], sum = 0;
         find_rule(nodes, weights);
@@ -283,10 +264,10 @@ static void test_height_fog_reflects_as_a_layer(void **unused)
             const nebel_ray ray = {{0, 2000, 0}, {sine * cos(angle), -cosine, sine * sin(angle)}, 1993 / cosine};
             nebel_transfer out;
             const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT};
-            assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
+            fog_trace(lighting, desc, 1, &ray, &out);
             sum += weights[k / TURNS] * cosine * 2 * pi / TURNS * out.in_scattering[0] / l->light.cosine;
         }
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
         assert_true(fabs(sum - l->reflected) < MOST_OFF);
     }
 }
@@ -298,9 +279,9 @@ static void test_endless_depth(void **unused)
         const light l = {.albedo = spaces[i].albedo, .cosine = spaces[i].cosine};
         nebel_volume_desc volume = volume_of(&l, .3);
         volume.shape = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE, .point = {3, 20, 4}, .normal = {0, 1, 0}};
-        nebel_snapshot *snapshot = commit(&l, &volume, &by_default);
-        const double off = flux_at(snapshot, &l, 21, 0) - spaces[i].reflected;
-        nebel_release_snapshot(snapshot);
+        nebel_lighting *lighting = commit(&l, &volume, &by_default);
+        const double off = flux_at(lighting, &l, 21, 0) - spaces[i].reflected;
+        nebel_release_lighting(lighting);
         assert_true(fabs(off) < MOST_OFF);
     }
 }
@@ -315,9 +296,9 @@ static void test_ground_reflects(void **unused)
     for (int k = 0; k < 3; k++) {
         const double albedo = k / 2.;
         const nebel_diffusion_desc on_ground = {.has_ground = 1, .ground_albedo = {albedo, albedo, albedo}};
-        nebel_snapshot *snapshot = commit(&l, &volume, &on_ground);
-        back[k] = flux_at(snapshot, &l, 2, 0);
-        nebel_release_snapshot(snapshot);
+        nebel_lighting *lighting = commit(&l, &volume, &on_ground);
+        back[k] = flux_at(lighting, &l, 2, 0);
+        nebel_release_lighting(lighting);
     }
     assert_true(back[0] + .05 < back[1] && back[1] + .05 < back[2]);
     assert_true(back[2] < 1);
@@ -342,36 +323,29 @@ static void set_rays(nebel_ray rays[RAYS])
         rays[i] = (nebel_ray){{9, 2 + .02 * i, -4}, {-8, .03 * i - 2, 7 + .01 * i}, i % 5 ? HUGE_VAL : .2 * i};
 }
 
-static void trace_some(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t count, nebel_transfer *to)
+static void trace_some(const nebel_lighting *lighting, const nebel_trace_desc *desc, size_t count, nebel_transfer *to)
 {
     nebel_ray rays[RAYS];
     set_rays(rays);
-    assert_int_equal(nebel_trace(snapshot, desc, count, rays, sizeof *rays, to, sizeof *to), NEBEL_OK);
+    fog_trace(lighting, *desc, count, rays, to);
 }
 
-static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_transfer transfers[RAYS])
+static void trace(const nebel_lighting *lighting, const nebel_trace_desc *desc, nebel_transfer transfers[RAYS])
 {
-    trace_some(snapshot, desc, RAYS, transfers);
+    trace_some(lighting, desc, RAYS, transfers);
 }
 
 static void test_white_fog_under_a_white_sky_is_white(void **unused)
 {
     (void)unused;
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
     nebel_transfer transfers[RAYS];
     const nebel_volume_desc volume = ball(&white, 3);
-    const nebel_fog_desc desc = {.ambient = {1, 1, 1}};
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_diffusion(fog, &by_default), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    trace(snapshot, &(nebel_trace_desc){0}, transfers);
+    nebel_lighting *lighting = commit_under(&(nebel_environment){.radiance = {1, 1, 1}}, &volume, &by_default);
+    trace(lighting, &(nebel_trace_desc){0}, transfers);
     for (int i = 0; i < RAYS; i++)
         for (int c = 0; c < 3; c++)
             assert_true(fabs(transfers[i].transmittance[c] + transfers[i].in_scattering[c] - 1) < 1e-9);
-    nebel_release_snapshot(snapshot);
-    nebel_destroy_fog(fog);
+    nebel_release_lighting(lighting);
 }
 
 /* The same where the lattice is solved: nothing says beforehand that a gradient is even. White ground sends back what a sky
@@ -385,13 +359,13 @@ static void test_white_fog_over_white_ground_is_white(void **unused)
     const nebel_volume_desc level = layer_of(&white, 5), body = ball(&white, 3);
     const nebel_volume_desc *volumes[] = {&level, &body};
     for (int k = 0; k < 2; k++) {
-        nebel_snapshot *snapshot = commit_under(&sky, volumes[k], &on_ground);
+        nebel_lighting *lighting = commit_under(&sky, volumes[k], &on_ground);
         nebel_transfer transfers[RAYS];
-        trace(snapshot, &(nebel_trace_desc){0}, transfers);
+        trace(lighting, &(nebel_trace_desc){0}, transfers);
         for (int i = 0; i < RAYS; i++)
             for (int c = 0; c < 3; c++)
                 assert_true(fabs(2 * transfers[i].transmittance[c] + transfers[i].in_scattering[c] - 2) < 1e-6);
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
 }
 
@@ -399,7 +373,7 @@ static void test_transmittance_stays_and_light_is_added(void **unused)
 {
     (void)unused;
     const nebel_volume_desc volume = ball(&white, 3);
-    nebel_snapshot *once = commit(&white, &volume, NULL), *all = commit(&white, &volume, &by_default);
+    nebel_lighting *once = commit(&white, &volume, NULL), *all = commit(&white, &volume, &by_default);
     nebel_transfer transfers[2][RAYS];
     double more = 0;
     trace(once, &(nebel_trace_desc){0}, transfers[0]);
@@ -411,32 +385,31 @@ static void test_transmittance_stays_and_light_is_added(void **unused)
             more = fmax(more, transfers[1][i].in_scattering[c] - transfers[0][i].in_scattering[c]);
         }
     assert_true(more > .03);
-    nebel_release_snapshot(once);
-    nebel_release_snapshot(all);
+    nebel_release_lighting(once);
+    nebel_release_lighting(all);
 }
 
-static void assert_same_bits(const nebel_snapshot *snapshot)
+static void assert_same_bits(const nebel_lighting *lighting)
 {
     nebel_transfer first[RAYS], other[RAYS];
     nebel_ray rays[RAYS];
     nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
     const size_t count = nb_test_count(RAYS) > 34 ? nb_test_count(RAYS) : 34;
     set_rays(rays);
-    trace_some(snapshot, &desc, count, first);
+    trace_some(lighting, &desc, count, first);
     for (int isa = 0; isa < NEBEL_ISA_COUNT; isa++) {
         if (!nebel_isa_available((nebel_isa)isa)) continue;
         desc.isa = (nebel_isa)isa;
-        trace_some(snapshot, &desc, count, other);
+        trace_some(lighting, &desc, count, other);
         assert_memory_equal(first, other, count * sizeof *first);
         for (size_t i = 0; i < count; i += 7) {
             if (!nb_test_tries(i / 7, count / 7 + 1)) continue;
             const size_t n = count - i < 7 ? count - i : 7;
-            assert_int_equal(nebel_trace(snapshot, &desc, n, &rays[i], sizeof *rays, &other[i], sizeof *other),
-                             NEBEL_OK);
+            fog_trace(lighting, desc, n, &rays[i], &other[i]);
         }
         assert_memory_equal(first, other, count * sizeof *first);
     }
-    trace_some(snapshot, &(nebel_trace_desc){0}, count, other);
+    trace_some(lighting, &(nebel_trace_desc){0}, count, other);
     for (size_t i = 0; i < count; i++) assert_true(fog_difference(&first[i], &other[i]) < 1e-3);
 }
 
@@ -446,34 +419,27 @@ static void test_same_bits_for_every_isa_and_split(void **unused)
     nebel_volume_desc volume = ball(&white, 3);
     volume.extinction[1] = 2;
     volume.albedo[2] = .9;
-    nebel_snapshot *snapshot = commit(&white, &volume, &by_default);
-    assert_same_bits(snapshot);
-    nebel_release_snapshot(snapshot);
+    nebel_lighting *lighting = commit(&white, &volume, &by_default);
+    assert_same_bits(lighting);
+    nebel_release_lighting(lighting);
 }
 
 /* ---- own light ------------------------------------------------------------------------------- */
 
 /* A ball of fog that scatters all light, in the dark, with a lamp or a fire in its middle. */
-static nebel_snapshot *commit_glowing(double g, const nebel_light *lamp, const nebel_volume_desc *fire)
+static nebel_lighting *commit_glowing(double g, const nebel_light *lamp, const nebel_volume_desc *fire)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1},
-                                .extinction = {5, 5, 5},
-                                .albedo = {1, 1, 1},
-                                .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = g}};
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = 0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
-    if (fire != NULL) assert_int_equal(nebel_add_volume(fog, fire, NULL), NEBEL_OK);
-    if (lamp != NULL) assert_int_equal(nebel_set_lamps(fog, 1, lamp), NEBEL_OK);
-    assert_int_equal(nebel_set_diffusion(fog, &by_default), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    nebel_volume_desc volumes[2] = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1},
+                                     .extinction = {5, 5, 5},
+                                     .albedo = {1, 1, 1},
+                                     .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = g}}};
+    const nebel_lighting_desc lights = {.lights = lamp, .light_count = lamp != NULL, .diffusion = &by_default};
+    if (fire != NULL) volumes[1] = *fire;
+    return fog_light(&lights, volumes, fire != NULL ? 2 : 1);
 }
 
 /* What goes out along z, W/sr: radiance over the ball's area. Straight light of a lamp is no fog's. */
-static void find_intensity(const nebel_snapshot *snapshot, double intensity[3])
+static void find_intensity(const nebel_lighting *lighting, double intensity[3])
 {
     enum { SIDE = 40, SMALL_SIDE = 20 };
     const int side = nb_test_count(SIDE) > SMALL_SIDE ? (int)nb_test_count(SIDE) : SMALL_SIDE;
@@ -481,8 +447,7 @@ static void find_intensity(const nebel_snapshot *snapshot, double intensity[3])
     for (int i = 0; i < side * side; i++) {
         const double x = 2. * (i % side + .5) / side - 1, y = 2. * ((int)(i / side) + .5) / side - 1;
         const nebel_ray ray = {{x, y, 3}, {0, 0, -1}, 6};
-        nebel_transfer seen;
-        assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &seen, sizeof seen), NEBEL_OK);
+        const nebel_transfer seen = fog_along(lighting, &ray);
         for (int c = 0; c < 3; c++) intensity[c] += seen.in_scattering[c] * 4 / (side * side);
     }
 }
@@ -497,31 +462,31 @@ static void test_white_fog_keeps_own_light(void **unused)
     for (int k = 0; k < 4; k++) {
         if (!nb_test_tries((size_t)(k % 2 + k / 2) % 2, 2)) continue;
         const double g = k % 2 ? .85 : 0, volume = 4 * 3.14159265358979323846 / 3 * .027;
-        nebel_snapshot *snapshot = commit_glowing(g, k < 2 ? &green : NULL, k < 2 ? NULL : &fire);
+        nebel_lighting *lighting = commit_glowing(g, k < 2 ? &green : NULL, k < 2 ? NULL : &fire);
         const double straight = k < 2 ? exp(-5) : 0;
         double intensity[3];
-        find_intensity(snapshot, intensity);
+        find_intensity(lighting, intensity);
         for (int c = 0; c < 3; c++) {
             const double all = k < 2 ? green.intensity[c] * (1 - straight) : fire.emission[c] * volume;
             assert_true(fabs(intensity[c] - all) <= .06 * all);
         }
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
 }
 
 static void test_own_light_of_several_colours_adds(void **unused)
 {
     (void)unused;
-    nebel_snapshot *both = commit_glowing(.85, &green, &fire);
-    nebel_snapshot *one = commit_glowing(.85, &green, NULL), *other = commit_glowing(.85, NULL, &fire);
+    nebel_lighting *both = commit_glowing(.85, &green, &fire);
+    nebel_lighting *one = commit_glowing(.85, &green, NULL), *other = commit_glowing(.85, NULL, &fire);
     double sum[3], first[3], second[3];
     find_intensity(both, sum);
     find_intensity(one, first);
     find_intensity(other, second);
     for (int c = 0; c < 3; c++) assert_true(fabs(sum[c] - first[c] - second[c]) < .03 * sum[c]);
     assert_same_bits(both);
-    nebel_snapshot *const made[] = {both, one, other};
-    for (int k = 0; k < 3; k++) nebel_release_snapshot(made[k]);
+    nebel_lighting *const made[] = {both, one, other};
+    for (int k = 0; k < 3; k++) nebel_release_lighting(made[k]);
 }
 
 /* Fog between the eye and the lattice dims what comes from there: a wall of soot. */
@@ -532,14 +497,14 @@ static void test_fog_before_the_lattice_dims(void **unused)
                                            .extinction = {2, 2, 2}};
     for (int k = 0; k < 2; k++) {
         if (!nb_test_tries((size_t)k, 2)) continue;
-        nebel_snapshot *clear = commit_glowing(k ? .85 : 0, &green, NULL),
+        nebel_lighting *clear = commit_glowing(k ? .85 : 0, &green, NULL),
                        *dimmed = commit_glowing(k ? .85 : 0, &green, &soot);
         double before[3], behind[3];
         find_intensity(clear, before);
         find_intensity(dimmed, behind);
         assert_true(fabs(behind[1] / before[1] / exp(-1) - 1) < 1e-3);
-        nebel_release_snapshot(clear);
-        nebel_release_snapshot(dimmed);
+        nebel_release_lighting(clear);
+        nebel_release_lighting(dimmed);
     }
 }
 
@@ -550,9 +515,9 @@ static void test_cells_do_not_matter_much(void **unused)
     const nebel_volume_desc volume = ball(&white, 3);
     nebel_transfer transfers[2][RAYS];
     for (int k = 0; k < 2; k++) {
-        nebel_snapshot *snapshot = commit(&white, &volume, &(nebel_diffusion_desc){.max_cells = k ? 65536 : 8000});
-        trace(snapshot, &(nebel_trace_desc){0}, transfers[k]);
-        nebel_release_snapshot(snapshot);
+        nebel_lighting *lighting = commit(&white, &volume, &(nebel_diffusion_desc){.max_cells = k ? 65536 : 8000});
+        trace(lighting, &(nebel_trace_desc){0}, transfers[k]);
+        nebel_release_lighting(lighting);
     }
     for (int i = 0; i < RAYS; i++) assert_true(fog_difference(&transfers[0][i], &transfers[1][i]) < .01);
 }
@@ -561,24 +526,20 @@ static void test_cells_do_not_matter_much(void **unused)
 static void test_bodies_in_height_fog(void **unused)
 {
     (void)unused;
-    nebel_volume_desc haze = volume_of(&white, .02);
-    haze.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 20};
-    nebel_fog *fog = start(&white, &haze, &(nebel_diffusion_desc){.has_ground = 1});
-    nebel_snapshot *alone = NULL, *both = NULL;
+    const nebel_diffusion_desc on_ground = {.has_ground = 1};
+    const nebel_lighting_desc lights = lights_of(&white, &on_ground);
+    nebel_volume_desc volumes[] = {volume_of(&white, .02), ball(&white, 1)};
+    volumes[0].density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 20};
+    nebel_lighting *alone = fog_light(&lights, volumes, 1), *both = fog_light(&lights, volumes, 2);
     nebel_transfer transfers[2][2];
-    const nebel_volume_desc body = ball(&white, 1);
-    assert_int_equal(nebel_commit_fog(fog, &alone), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &body, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &both), NEBEL_OK);
     /* One ray through the body, one far from it. */
     const nebel_ray rays[] = {{{1, 2, 40}, {0, 0, -1}, 60}, {{500, 2, 40}, {0, 0, -1}, 60}};
-    assert_int_equal(nebel_trace(alone, NULL, 2, rays, sizeof *rays, transfers[0], sizeof *transfers[0]), NEBEL_OK);
-    assert_int_equal(nebel_trace(both, NULL, 2, rays, sizeof *rays, transfers[1], sizeof *transfers[1]), NEBEL_OK);
+    fog_trace(alone, (nebel_trace_desc){0}, 2, rays, transfers[0]);
+    fog_trace(both, (nebel_trace_desc){0}, 2, rays, transfers[1]);
     assert_true(transfers[1][0].in_scattering[0] > transfers[0][0].in_scattering[0] + .01);
     assert_true(fabs(transfers[1][1].in_scattering[0] / transfers[0][1].in_scattering[0] - 1) < .05);
-    nebel_release_snapshot(alone);
-    nebel_release_snapshot(both);
-    nebel_destroy_fog(fog);
+    nebel_release_lighting(alone);
+    nebel_release_lighting(both);
 }
 
 /* ---- bad input ------------------------------------------------------------------------------- */
@@ -587,35 +548,35 @@ static void test_bad_descriptions(void **unused)
 {
     (void)unused;
     const nebel_volume_desc volume = ball(&white, 1);
-    nebel_fog *fog = start(&white, &volume, NULL);
+    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &volume, 1);
+    nebel_lighting *lighting = NULL;
     static const nebel_diffusion_desc bad[] = {{.max_cells = 1},
                                                {.max_cells = NEBEL_MAX_DIFFUSION_CELLS + 1},
                                                {.has_ground = 1, .ground_height = HUGE_VAL},
                                                {.has_ground = 1, .ground_height = -2e15},
                                                {.has_ground = 1, .ground_albedo = {0, 1.5, 0}},
                                                {.has_ground = 1, .ground_albedo = {0, 0, -.1}}};
-    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-        assert_int_equal(nebel_set_diffusion(fog, &bad[i]), NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_set_diffusion(NULL, NULL), NEBEL_ERROR_ARGUMENT);
-    nebel_destroy_fog(fog);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        const nebel_lighting_desc lights = lights_of(&white, &bad[i]);
+        assert_int_equal(nebel_create_lighting(snapshot, &lights, &lighting), NEBEL_ERROR_VALUE);
+        assert_null(lighting);
+    }
+    nebel_release_snapshot(snapshot);
 }
 
 static void assert_refused(const nebel_volume_desc *volume, double max_opacity, const char *word)
 {
     fog_messages said = {0};
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    const nebel_fog_desc desc = {.log = fog_messages_log(&said),
-                                 .sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}},
-                                 .max_opacity = max_opacity};
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_diffusion(fog, &by_default), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_ERROR_UNSUPPORTED);
-    assert_null(snapshot);
+    const nebel_fog_desc desc = {.log = fog_messages_log(&said), .max_opacity = max_opacity};
+    const nebel_lighting_desc lights = {.sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}},
+                                        .diffusion = &by_default};
+    nebel_snapshot *snapshot = fog_commit(&desc, volume, 1);
+    nebel_lighting *lighting = NULL;
+    assert_int_equal(nebel_create_lighting(snapshot, &lights, &lighting), NEBEL_ERROR_UNSUPPORTED);
+    assert_null(lighting);
     assert_int_equal(said.count, 1);
     assert_non_null(strstr(said.text, word));
-    nebel_destroy_fog(fog);
+    nebel_release_snapshot(snapshot);
 }
 
 static void test_what_diffusion_cannot_do_is_refused(void **unused)
@@ -636,11 +597,11 @@ static void test_fog_without_light(void **unused)
     (void)unused;
     nebel_volume_desc volumes[] = {volume_of(&white, 1), ball(&white, 0), ball(&white, 1e6), ball(&white, 1e-9)};
     for (size_t i = 0; i < sizeof volumes / sizeof *volumes; i++) {
-        nebel_snapshot *snapshot = commit(&white, &volumes[i], &by_default);
+        nebel_lighting *lighting = commit(&white, &volumes[i], &by_default);
         nebel_transfer all[RAYS];
-        trace(snapshot, &(nebel_trace_desc){0}, all);
+        trace(lighting, &(nebel_trace_desc){0}, all);
         for (int k = 0; k < RAYS; k++) assert_true(all[k].in_scattering[0] >= 0 && all[k].in_scattering[0] < 2);
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
 }
 
@@ -651,25 +612,24 @@ static void test_random_fog(void **unused)
     static random_fog fog;
     size_t lit = 0;
     for (uint64_t seed = 0; seed < random_count; seed++) {
-        nebel_fog *made = NULL;
-        nebel_snapshot *snapshot = NULL;
+        nebel_lighting *lighting = NULL;
         uint64_t numbers = seed;
         random_fog_make(&fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), seed);
         random_fog_light(&fog, &numbers);
-        nebel_fog_desc desc = {.sun = {.direction = {.3, (double)(seed % 7) / 3 - 1, -.2}, .irradiance = {3, 2, 1}}};
-        assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
-        for (size_t i = 0; i < fog.count; i++)
-            assert_int_equal(nebel_add_volume(made, &fog.volumes[i], NULL), NEBEL_OK);
         const nebel_diffusion_desc few = {.max_cells = 1000, .has_ground = seed % 3 == 0, .ground_albedo = {.5, .5, 1}};
-        assert_int_equal(nebel_set_diffusion(made, &few), NEBEL_OK);
         const nebel_light lamp = {.position = {.1, .2, .3}, .intensity = {3, 2, 1}, .radius = (double)(seed % 3)};
-        if (seed % 2 == 0) assert_int_equal(nebel_set_lamps(made, 1, &lamp), NEBEL_OK);
-        const nebel_result result = nebel_commit_fog(made, &snapshot);
+        const nebel_lighting_desc lights = {
+            .sun = {.direction = {.3, (double)(seed % 7) / 3 - 1, -.2}, .irradiance = {3, 2, 1}},
+            .lights = &lamp,
+            .light_count = seed % 2 == 0,
+            .diffusion = &few};
+        nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, fog.volumes, fog.count);
+        const nebel_result result = nebel_create_lighting(snapshot, &lights, &lighting);
         assert_true(result == NEBEL_OK || result == NEBEL_ERROR_UNSUPPORTED);
         for (uint64_t i = 0; i < 20 && result == NEBEL_OK; i++) {
             nebel_transfer out;
             const nebel_ray ray = random_fog_ray(&fog, i);
-            const nebel_trace_desc in_float = {.precision = NEBEL_PRECISION_FLOAT};
+            const nebel_trace_desc in_float = {.lighting = lighting, .precision = NEBEL_PRECISION_FLOAT};
             const nebel_result traced = nebel_trace(snapshot, &in_float, 1, &ray, sizeof ray, &out, sizeof out);
             if (traced == NEBEL_ERROR_UNBOUNDED) continue;
             assert_int_equal(traced, NEBEL_OK);
@@ -677,7 +637,7 @@ static void test_random_fog(void **unused)
             lit += out.in_scattering[0] > 0;
         }
         nebel_release_snapshot(snapshot);
-        nebel_destroy_fog(made);
+        nebel_release_lighting(lighting);
     }
     assert_true(lit > random_count);
 }
@@ -692,17 +652,16 @@ static void test_far_away(void **unused)
     const nebel_volume_desc *volumes[] = {&haze, &far};
     for (int k = 0; k < 2; k++) {
         const nebel_diffusion_desc few = {.max_cells = 1000, .has_ground = !k};
-        nebel_snapshot *snapshot = commit(&white, volumes[k], &few);
+        nebel_lighting *lighting = commit(&white, volumes[k], &few);
         for (int i = 0; i < 60; i++) {
             const double at = NEBEL_MAX_LENGTH * (i % 2 ? 1 : .9999);
             const nebel_ray ray = {{i % 3 ? at : 0, i % 5 ? 2e13 : -at, i % 4 ? -at : 3},
                                    {i % 7 - 3, i % 11 ? .01 : -1, i % 13 - 6.5},
                                    HUGE_VAL};
-            nebel_transfer out;
-            assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
+            const nebel_transfer out = fog_along(lighting, &ray);
             assert_true(out.in_scattering[0] >= 0 && isfinite(out.in_scattering[0]));
         }
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
 }
 
@@ -718,17 +677,16 @@ static void test_lamps_far_away(void **unused)
     volumes[1].density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 2};
     for (size_t i = 0; i < 3 * sizeof volumes / sizeof *volumes; i++) {
         const nebel_diffusion_desc few = {.max_cells = 1000, .has_ground = i < 3};
-        nebel_fog *fog = start(&white, &volumes[i / 3], &few);
-        nebel_snapshot *snapshot = NULL;
+        nebel_lighting_desc lights = lights_of(&white, &few);
         nebel_transfer transfers[RAYS];
-        assert_int_equal(nebel_set_lamps(fog, i % 3 + 1, far), NEBEL_OK);
-        assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-        trace(snapshot, &(nebel_trace_desc){0}, transfers);
+        lights.lights = far;
+        lights.light_count = i % 3 + 1;
+        nebel_lighting *lighting = fog_light(&lights, &volumes[i / 3], 1);
+        trace(lighting, &(nebel_trace_desc){0}, transfers);
         for (int k = 0; k < RAYS; k++)
             for (int c = 0; c < 3; c++)
                 assert_true(transfers[k].in_scattering[c] >= 0 && isfinite(transfers[k].in_scattering[c]));
-        nebel_release_snapshot(snapshot);
-        nebel_destroy_fog(fog);
+        nebel_release_lighting(lighting);
     }
 }
 
@@ -738,27 +696,26 @@ static void test_memory_runs_out(void **unused)
     fog_memory memory = {0};
     nebel_result result = NEBEL_ERROR_MEMORY;
     const nebel_volume_desc volume = ball(&white, 1);
-    nebel_fog *fog = NULL;
-    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory),
-                                 .sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}}};
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, 1, &green), NEBEL_OK);
-    assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.max_cells = 512}), NEBEL_OK);
+    const nebel_diffusion_desc few = {.max_cells = 512};
+    const nebel_lighting_desc lights = {.sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}},
+                                        .lights = &green,
+                                        .light_count = 1,
+                                        .diffusion = &few};
+    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.allocator = fog_memory_allocator(&memory)}, &volume, 1);
     const size_t live = memory.live;
     size_t tries = 0;
     while (result == NEBEL_ERROR_MEMORY) {
-        nebel_snapshot *snapshot = NULL;
+        nebel_lighting *lighting = NULL;
         memory.fail_first = ++tries;
         memory.fail_count = 1;
-        result = nebel_commit_fog(fog, &snapshot);
-        assert_true(result == NEBEL_ERROR_MEMORY ? snapshot == NULL && memory.live == live : result == NEBEL_OK);
-        nebel_release_snapshot(snapshot);
+        result = nebel_create_lighting(snapshot, &lights, &lighting);
+        assert_true(result == NEBEL_ERROR_MEMORY ? lighting == NULL && memory.live == live : result == NEBEL_OK);
+        nebel_release_lighting(lighting);
     }
     assert_int_equal(memory.live, live);
     assert_true(tries > 20);
     memory.fail_first = 0;
-    nebel_destroy_fog(fog);
+    nebel_release_snapshot(snapshot);
 }
 
 /* The first argument: another number of random fogs. */

@@ -373,13 +373,9 @@ static int is_own(const trial *t)
     return t->lamp_count > 0 || t->emission > 0;
 }
 
-static nebel_snapshot *commit(const trial *t, int is_diffuse)
+static nebel_lighting *commit(const trial *t, int is_diffuse)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
     const double sunlight = has_sun(t), albedo = 1 - t->darkness;
-    const nebel_fog_desc desc = {
-        .sun = {.direction = {t->sun[0], t->sun[1], t->sun[2]}, .irradiance = {sunlight, sunlight, sunlight}}};
     nebel_volume_desc volume = {.shape = t->shape,
                                 .density = t->density,
                                 .extinction = {t->extinction, t->extinction, t->extinction},
@@ -388,18 +384,17 @@ static nebel_snapshot *commit(const trial *t, int is_diffuse)
     const nebel_diffusion_desc diffusion = {.has_ground = t->shape.type == NEBEL_SHAPE_WORLD,
                                             .ground_height = t->density.base};
     if (t->density.type == NEBEL_DENSITY_GRID) volume.density.grid = make_cloud(t->coverage);
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    assert_int_equal(nebel_set_environment(fog, &skies[t->sky]), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
     const nebel_volume_desc fire = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {.2, -.2, .1}, .radius = .3},
                                     .emission = {t->emission, t->emission, t->emission}};
-    if (t->emission > 0) assert_int_equal(nebel_add_volume(fog, &fire, NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, t->lamp_count, t->lamps), NEBEL_OK);
-    assert_int_equal(nebel_set_diffusion(fog, is_diffuse ? &diffusion : NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    const nebel_lighting_desc lights = {
+        .sun = {.direction = {t->sun[0], t->sun[1], t->sun[2]}, .irradiance = {sunlight, sunlight, sunlight}},
+        .environment = skies[t->sky],
+        .lights = t->lamps,
+        .light_count = t->lamp_count,
+        .diffusion = is_diffuse ? &diffusion : NULL};
+    nebel_lighting *lighting = fog_light(&lights, (nebel_volume_desc[]){volume, fire}, t->emission > 0 ? 2 : 1);
     nebel_release_grid(volume.density.grid);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return lighting;
 }
 
 /* Black ground, as far as anybody sees. */
@@ -433,7 +428,7 @@ static void take(const trial *t, nebel_method method, int is_diffuse, shot *out)
     scene.camera = test_camera(0, 10, 50, 0, 0, 0);
     scene.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     scene.camera.view_height = 2.4;
-    nebel_snapshot *fog = commit(t, is_diffuse);
+    nebel_lighting *fog = commit(t, is_diffuse);
     assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){.thread_count = 2}, &renderer),
                      NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, method, NULL), NEBEL_OK);
@@ -442,7 +437,7 @@ static void take(const trial *t, nebel_method method, int is_diffuse, shot *out)
     const nebel_frame planes = {.color = out->color, .standard_error = out->error};
     assert_int_equal(nebel_render_frame(renderer, &frame, &planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* ---- judgement ------------------------------------------------------------------------------- */

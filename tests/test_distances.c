@@ -96,25 +96,24 @@ static void test_random_fog_is_that_of_the_ray_between(void **unused)
     static random_fog fog;
     for (uint64_t seed = 0; seed < 300; seed++) {
         random_fog_make(&fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), 9000 + 2 * seed);
-        nebel_fog_desc desc = {0};
-        memcpy(desc.ambient, fog.ambient, sizeof desc.ambient);
-        nebel_snapshot *const plain = fog_commit(&desc, fog.volumes, fog.count);
+        const nebel_lighting_desc lights = random_fog_lights(&fog);
+        nebel_lighting *const plain = fog_light(&lights, fog.volumes, fog.count);
         for (size_t i = 0; i < fog.count; i++) fog.volumes[i].cutoff = 12;
-        nebel_snapshot *const cut = fog_commit(&desc, fog.volumes, fog.count);
+        nebel_lighting *const cut = fog_light(&lights, fog.volumes, fog.count);
         for (uint64_t r = 0; r < 20; r++) {
             nebel_transfer transfer[2];
             nebel_ray ray = random_fog_ray(&fog, r);
             const nebel_trace_desc how = {.precision = (nebel_precision)(r % 2), .tolerance = 1e-5};
-            assert_int_equal(nebel_trace(cut, &how, 1, &ray, sizeof ray, &transfer[0], sizeof *transfer), NEBEL_OK);
+            fog_trace(cut, how, 1, &ray, &transfer[0]);
             ray.t_max = fmin(ray.t_max, 12);
-            assert_int_equal(nebel_trace(plain, &how, 1, &ray, sizeof ray, &transfer[1], sizeof *transfer), NEBEL_OK);
+            fog_trace(plain, how, 1, &ray, &transfer[1]);
             for (int c = 0; c < 3; c++) {
                 assert_true(transfer[0].transmittance[c] == transfer[1].transmittance[c]);
                 assert_true(transfer[0].in_scattering[c] == transfer[1].in_scattering[c]);
             }
         }
-        nebel_release_snapshot(plain);
-        nebel_release_snapshot(cut);
+        nebel_release_lighting(plain);
+        nebel_release_lighting(cut);
     }
 }
 

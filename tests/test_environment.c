@@ -5,7 +5,6 @@
 #include "fog_help.h"
 
 #include <nebel/classic.h>
-#include <nebel/light.h>
 
 #include <math.h>
 #include <stdlib.h>
@@ -30,27 +29,19 @@ static const nebel_environment dusk = {
     .type = NEBEL_ENVIRONMENT_GRADIENT, .zenith = {0.1, 0.3, 1}, .horizon = {2, 1, 0.5}, .ground = {0.05, 0.04, 0}};
 
 /* Fog that nothing is seen through, of albedo 1. */
-static nebel_snapshot *commit(const nebel_environment *environment, const nebel_phase *phase)
+static nebel_lighting *commit(const nebel_environment *environment, const nebel_phase *phase)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
     const nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-99, -99, -99}, .max = {99, 99, 99}},
                                       .extinction = {9, 9, 9},
                                       .albedo = {1, 1, 1},
                                       .phase = *phase};
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_environment(fog, environment), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return fog_light(&(nebel_lighting_desc){.environment = *environment}, &volume, 1);
 }
 
-static void ask(const nebel_snapshot *snapshot, const double direction[3], double scattered[3])
+static void ask(const nebel_lighting *lighting, const double direction[3], double scattered[3])
 {
     const nebel_ray ray = {.direction = {direction[0], direction[1], direction[2]}, .t_max = 100};
-    nebel_transfer transfer;
-    assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+    const nebel_transfer transfer = fog_along(lighting, &ray);
     memcpy(scattered, transfer.in_scattering, sizeof transfer.in_scattering);
 }
 
@@ -126,14 +117,14 @@ enum { DIRECTIONS = sizeof directions / sizeof *directions };
 static void expect_scattered(const nebel_environment *environment, const nebel_phase *phase, int parts, int turns,
                              double tolerance)
 {
-    nebel_snapshot *snapshot = commit(environment, phase);
+    nebel_lighting *lighting = commit(environment, phase);
     const cosines at = make_cosines(phase, parts);
     for (int i = 0; i < DIRECTIONS; i++) {
         double wanted[3], scattered[3], unit[3];
         const double *d = directions[i], length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
         for (int k = 0; k < 3; k++) unit[k] = d[k] / length;
         mean_about(environment, unit, &at, turns, wanted);
-        ask(snapshot, d, scattered);
+        ask(lighting, d, scattered);
         for (int c = 0; c < 3; c++) {
             if (!(fabs(scattered[c] - wanted[c]) <= tolerance))
                 fail_msg("phase %d %g, direction %d, channel %d: is %.9g, must be %.9g", (int)phase->type, phase->g, i,
@@ -141,7 +132,7 @@ static void expect_scattered(const nebel_environment *environment, const nebel_p
         }
     }
     free(at.values);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 static void expect_reflected(const nebel_environment *environment, double tolerance)
@@ -216,7 +207,7 @@ static void sharp_fog_neither_rings_nor_loses_light(void **state)
     (void)state;
     mean_about(&environment, (const double[3]){0, 1, 0}, &sphere, 64, mean);
     for (int i = BLUNT - 1; i < PHASES; i++) {
-        nebel_snapshot *snapshot = commit(&environment, &phases[i]);
+        nebel_lighting *lighting = commit(&environment, &phases[i]);
         double sum = 0, least = HUGE_VAL, most = 0;
         enum { COUNT = 120 };
         for (int y = 0; y < COUNT; y++)
@@ -224,7 +215,7 @@ static void sharp_fog_neither_rings_nor_loses_light(void **state)
                 const double down = PI * (y + 0.5) / COUNT, across = PI * (x + 0.5) / COUNT, level = sin(down);
                 const double direction[3] = {level * sin(across), cos(down), -level * cos(across)};
                 double scattered[3];
-                ask(snapshot, direction, scattered);
+                ask(lighting, direction, scattered);
                 sum += scattered[0] * level * (PI / COUNT) * (PI / COUNT) / (4 * PI);
                 least = fmin(least, scattered[0]);
                 most = fmax(most, scattered[0]);
@@ -232,7 +223,7 @@ static void sharp_fog_neither_rings_nor_loses_light(void **state)
         assert_true(fabs(sum - mean[0]) <= 2e-3 * mean[0]);
         assert_true(least >= 0);
         assert_true(most > 10 * mean[0]);
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
     free(sphere.values);
     nebel_release_environment_map(environment.map);
@@ -272,13 +263,13 @@ static void a_constant_one_is_the_ambient_radiance(void **state)
     const nebel_environment constant = {.radiance = {0.3, 0.4, 0.7}};
     (void)state;
     for (int i = 0; i < PHASES; i++) {
-        nebel_snapshot *snapshot = commit(&constant, &phases[i]);
+        nebel_lighting *lighting = commit(&constant, &phases[i]);
         double scattered[3], reflected[3];
-        ask(snapshot, directions[i % DIRECTIONS], scattered);
+        ask(lighting, directions[i % DIRECTIONS], scattered);
         nebel_evaluate_environment_diffuse(&constant, directions[i % DIRECTIONS], reflected);
         assert_memory_equal(scattered, constant.radiance, sizeof scattered);
         assert_memory_equal(reflected, constant.radiance, sizeof reflected);
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
 }
 
@@ -316,24 +307,17 @@ static void maps_lie_as_panoramas_do(void **state)
 
 /* ---- the contracts of queries ---------------------------------------------------------------- */
 
-static nebel_snapshot *commit_many(const nebel_environment *environment)
+static nebel_lighting *commit_many(const nebel_environment *environment)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    for (int i = 0; i < PHASES; i++) {
-        const nebel_volume_desc volume = {
-            .shape = {.type = NEBEL_SHAPE_SPHERE, .center = {i - 5.0, 0.3 * i, -6}, .radius = 2},
-            .density = {.type = i % 2 ? NEBEL_DENSITY_CONSTANT : NEBEL_DENSITY_RADIAL, .power = 1},
-            .extinction = {0.2, 0.3, 0.1},
-            .albedo = {0.9, 0.8, 1},
-            .phase = phases[i]};
-        assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
-    }
-    assert_int_equal(nebel_set_environment(fog, environment), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    nebel_volume_desc volumes[PHASES];
+    for (int i = 0; i < PHASES; i++)
+        volumes[i] =
+            (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {i - 5.0, 0.3 * i, -6}, .radius = 2},
+                                .density = {.type = i % 2 ? NEBEL_DENSITY_CONSTANT : NEBEL_DENSITY_RADIAL, .power = 1},
+                                .extinction = {0.2, 0.3, 0.1},
+                                .albedo = {0.9, 0.8, 1},
+                                .phase = phases[i]};
+    return fog_light(&(nebel_lighting_desc){.environment = *environment}, volumes, PHASES);
 }
 
 enum { RAYS = 500 };
@@ -349,34 +333,31 @@ static void throw_rays(nebel_ray rays[RAYS])
 /* The same bits for every instruction set and alone; float is near double; light leaves transmittance as it is. */
 static void expect_contracts(const nebel_environment *environment)
 {
-    nebel_snapshot *snapshot = commit_many(environment);
+    nebel_lighting *lighting = commit_many(environment);
     static nebel_ray rays[RAYS];
     static nebel_transfer exact[RAYS], first[RAYS], transfers[RAYS];
     throw_rays(rays);
     nebel_trace_desc desc = {.precision = NEBEL_PRECISION_DOUBLE};
-    assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, exact, sizeof *exact), NEBEL_OK);
+    fog_trace(lighting, desc, RAYS, rays, exact);
     desc = (nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
-    assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, first, sizeof *first), NEBEL_OK);
+    fog_trace(lighting, desc, RAYS, rays, first);
     for (int i = 0; i < RAYS; i++)
         for (int c = 0; c < 3; c++)
             assert_true(fabs(first[i].in_scattering[c] - exact[i].in_scattering[c]) <= first[i].error + 1e-7);
     for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
         if (!nebel_isa_available((nebel_isa)isa)) continue;
         desc.isa = (nebel_isa)isa;
-        assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers),
-                         NEBEL_OK);
+        fog_trace(lighting, desc, RAYS, rays, transfers);
         assert_memory_equal(transfers, first, sizeof first);
-        for (size_t i = 0; i < nb_test_count(RAYS); i++)
-            assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &transfers[i], 0), NEBEL_OK);
+        for (size_t i = 0; i < nb_test_count(RAYS); i++) fog_trace(lighting, desc, 1, &rays[i], &transfers[i]);
         assert_memory_equal(transfers, first, sizeof first);
         desc.transmittance_only = 1;
-        assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers),
-                         NEBEL_OK);
+        fog_trace(lighting, desc, RAYS, rays, transfers);
         for (int i = 0; i < RAYS; i++)
             assert_memory_equal(transfers[i].transmittance, first[i].transmittance, sizeof first[i].transmittance);
         desc.transmittance_only = 0;
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 static void contracts_hold(void **state)
@@ -391,23 +372,32 @@ static void contracts_hold(void **state)
 /* Boxes of one light have a short cut; this is not one light. */
 static void a_box_at_vertices_is_lit_by_direction(void **state)
 {
-    nebel_snapshot *snapshot = commit(&dusk, &phases[2]);
+    nebel_lighting *lighting = commit(&dusk, &phases[2]);
     (void)state;
     float positions[2][3] = {{0, 50, -10}, {0, -50, -10}}, colors[2][4];
     const nebel_vertices vertices = {.positions = positions[0], .position_stride = sizeof *positions};
     const nebel_vertex_output output = {.format = NEBEL_VERTEX_RGBA_FLOAT, .data = colors, .stride = sizeof *colors};
-    assert_int_equal(nebel_compute_vertex_fog(snapshot, NULL, 2, &vertices, &output, 1), NEBEL_OK);
+    const nebel_vertex_desc desc = {.lighting = lighting};
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, &desc, 2, &vertices, &output, 1), NEBEL_OK);
     assert_true(colors[0][2] > 1.2F * colors[1][2]);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 /* ---- what is none ---------------------------------------------------------------------------- */
 
+static void expect_refused(nebel_snapshot *snapshot, const nebel_environment *environment, nebel_result result)
+{
+    nebel_lighting *lighting = NULL;
+    const nebel_lighting_desc lights = {.environment = *environment};
+    assert_int_equal(nebel_create_lighting(snapshot, &lights, &lighting), result);
+    assert_null(lighting);
+}
+
 static void what_is_no_environment_is_refused(void **state)
 {
-    nebel_fog *fog = NULL;
+    nebel_snapshot *empty = fog_commit(&(nebel_fog_desc){0}, NULL, 0);
     (void)state;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
     nebel_environment_map *map = make_map(8, bright);
     const nebel_environment wrong[] = {
         {.radiance = {-1, 0, 0}},
@@ -420,19 +410,15 @@ static void what_is_no_environment_is_refused(void **state)
         {.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = -1},
         {.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = 1e9 * 2},
     };
-    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
-        assert_int_equal(nebel_set_environment(fog, &wrong[i]), NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_set_environment(fog, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_set_environment(fog, &(nebel_environment){.type = NEBEL_ENVIRONMENT_MAP}),
-                     NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_set_environment(fog, &(nebel_environment){.type = NEBEL_ENVIRONMENT_COUNT}),
-                     NEBEL_ERROR_ARGUMENT);
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) expect_refused(empty, &wrong[i], NEBEL_ERROR_VALUE);
+    expect_refused(empty, &(nebel_environment){.type = NEBEL_ENVIRONMENT_MAP}, NEBEL_ERROR_ARGUMENT);
+    expect_refused(empty, &(nebel_environment){.type = NEBEL_ENVIRONMENT_COUNT}, NEBEL_ERROR_ARGUMENT);
     double radiance[3] = {1, 1, 1}; /* where there is none there is no light */
     nebel_evaluate_environment(&(nebel_environment){.type = NEBEL_ENVIRONMENT_MAP}, (const double[3]){0, 1, 0},
                                radiance);
     for (int c = 0; c < 3; c++) assert_true(radiance[c] == 0);
     nebel_release_environment_map(map);
-    nebel_destroy_fog(fog);
+    nebel_release_snapshot(empty);
 }
 
 static void what_is_no_map_is_refused(void **state)
@@ -468,11 +454,12 @@ static void what_is_no_map_is_refused(void **state)
 /* As many phase functions as there may be, and one more. */
 static void phase_functions_have_a_limit(void **state)
 {
+    const nebel_lighting_desc lights = {.environment = dusk}, even = {.environment = {.radiance = {1, 1, 1}}};
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
+    nebel_lighting *lighting = NULL;
     (void)state;
     assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_set_environment(fog, &dusk), NEBEL_OK);
     for (int i = 0; i <= NEBEL_MAX_ENVIRONMENT_PHASES; i++) {
         const nebel_phase phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.01 * i};
         const nebel_volume_desc volume = {.extinction = {1, 1, 1}, .albedo = {1, 1, 1}, .phase = phase};
@@ -480,11 +467,13 @@ static void phase_functions_have_a_limit(void **state)
         assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
         if (i + 1 < NEBEL_MAX_ENVIRONMENT_PHASES) continue;
         const nebel_result wanted = i < NEBEL_MAX_ENVIRONMENT_PHASES ? NEBEL_OK : NEBEL_ERROR_LIMIT;
-        assert_int_equal(nebel_commit_fog(fog, &snapshot), wanted);
         nebel_release_snapshot(snapshot);
+        assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+        assert_int_equal(nebel_create_lighting(snapshot, &lights, &lighting), wanted);
+        assert_true((lighting == NULL) == (wanted != NEBEL_OK));
+        nebel_release_lighting(lighting);
     }
-    assert_int_equal(nebel_set_ambient(fog, (const double[3]){1, 1, 1}), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_release_lighting(light_fog(snapshot, &even));
     nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
 }
@@ -499,18 +488,20 @@ static void memory_may_be_out(void **state)
         fog_memory memory = {.fail_first = fail, .fail_count = 1};
         const nebel_allocator allocator = {fog_memory_allocate, fog_memory_release, &memory};
         const nebel_environment_map_desc desc = {.allocator = allocator, .width = 8, .height = 4, .pixels = pixels};
-        nebel_environment environment = {.type = NEBEL_ENVIRONMENT_MAP};
+        nebel_lighting_desc lights = {.environment = {.type = NEBEL_ENVIRONMENT_MAP}};
         nebel_fog *fog = NULL;
         nebel_snapshot *snapshot = NULL;
+        nebel_lighting *lighting = NULL;
         const nebel_volume_desc volume = {.extinction = {1, 1, 1}, .albedo = {1, 1, 1}, .phase = phases[2]};
-        nebel_result result = nebel_create_environment_map(&desc, &environment.map);
+        nebel_result result = nebel_create_environment_map(&desc, &lights.environment.map);
         if (result == NEBEL_OK) result = nebel_create_fog(&(nebel_fog_desc){.allocator = allocator}, &fog);
-        if (result == NEBEL_OK) result = nebel_set_environment(fog, &environment);
         if (result == NEBEL_OK) result = nebel_add_volume(fog, &volume, NULL);
         if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
+        if (result == NEBEL_OK) result = nebel_create_lighting(snapshot, &lights, &lighting);
         nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
         nebel_destroy_fog(fog);
-        nebel_release_environment_map(environment.map);
+        nebel_release_environment_map(lights.environment.map);
         assert_int_equal(memory.live, 0);
         if (result == NEBEL_OK) break;
         assert_int_equal(result, NEBEL_ERROR_MEMORY);

@@ -53,10 +53,11 @@ static uint64_t seed_of(size_t i)
     return i / RAYS_PER_FOG / RANDOM_FOG_KIND_COUNT;
 }
 
-static nebel_snapshot *commit(const random_fog *fog)
+static nebel_lighting *commit(const random_fog *fog)
 {
     const nebel_fog_desc desc = random_fog_desc(fog);
-    return fog_commit(&desc, fog->volumes, fog->count);
+    const nebel_lighting_desc lights = random_fog_lights(fog);
+    return fog_commit_lit(&desc, fog->volumes, fog->count, &lights);
 }
 
 static double largest_radiance(const random_fog *fog)
@@ -123,9 +124,11 @@ static void try_fog(size_t from, size_t to)
     nebel_transfer transfers[MODES][RAYS_PER_FOG];
     make_fog(&fog, from);
     for (size_t i = from; i < to; i++) rays[i - from] = random_fog_ray(&fog, i % RAYS_PER_FOG);
-    nebel_snapshot *const snapshot = commit(&fog);
+    nebel_lighting *const lighting = commit(&fog);
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
     for (int m = 0; m < MODES; m++) {
-        const nebel_trace_desc desc = {.precision = modes[m].precision, .tolerance = modes[m].tolerance};
+        const nebel_trace_desc desc = {
+            .lighting = lighting, .precision = modes[m].precision, .tolerance = modes[m].tolerance};
         const nebel_result result =
             nebel_trace(snapshot, &desc, to - from, rays, sizeof *rays, transfers[m], sizeof *transfers[m]);
         if (result != NEBEL_OK) print_message("case %zu, %s: %s\n", from, modes[m].name, nebel_result_text(result));
@@ -142,7 +145,7 @@ static void try_fog(size_t from, size_t to)
         worst_uncertainty = fmax(worst_uncertainty, is.uncertainty);
         for (int m = 0; m < MODES; m++) judge(&modes[m], i, &fog, &transfers[m][i - from], &is);
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 /* Everything that is needed to see a case again. */
@@ -151,14 +154,15 @@ static void print_case(const char *why, const mode *m, size_t i)
     static random_fog fog;
     make_fog(&fog, i);
     const nebel_ray ray = random_fog_ray(&fog, i % RAYS_PER_FOG);
-    nebel_snapshot *const snapshot = commit(&fog);
+    nebel_lighting *const lighting = commit(&fog);
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
     nebel_transfer transfer;
     double T[3], S[3], uncertainty;
-    const nebel_trace_desc desc = {.precision = m->precision, .tolerance = m->tolerance};
+    const nebel_trace_desc desc = {.lighting = lighting, .precision = m->precision, .tolerance = m->tolerance};
     nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer);
     oracle_trace(fog.volumes, fog.count, fog.ambient, &ray, T, S, &uncertainty);
     oracle_limit(fog.max_opacity, T, S, &uncertainty);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
     printf("\n%s, %s: case %zu (kind %d, seed %zu, ray %zu)\n", m->name, why, i, (int)kind_of(i), (size_t)seed_of(i),
            i % RAYS_PER_FOG);
     random_fog_print(stdout, &fog, &ray);

@@ -203,12 +203,12 @@ static nebel_ray make_ray(scene *s)
 
 /* ---- what must hold -------------------------------------------------------------------------- */
 
-static nebel_snapshot *commit(const scene *s, size_t *refused)
+static nebel_lighting *commit(const scene *s, size_t *refused)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    const nebel_fog_desc desc = {.ambient = {s->ambient[0], s->ambient[1], s->ambient[2]}};
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    const nebel_lighting_desc lights = {.environment = {.radiance = {s->ambient[0], s->ambient[1], s->ambient[2]}}};
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
     for (size_t i = 0; i < s->count; i++) {
         const nebel_result result = nebel_add_volume(fog, &s->volumes[i], NULL);
         assert_true(result == NEBEL_OK || result == NEBEL_ERROR_VALUE);
@@ -216,7 +216,9 @@ static nebel_snapshot *commit(const scene *s, size_t *refused)
     }
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     nebel_destroy_fog(fog);
-    return snapshot;
+    nebel_lighting *lighting = light_fog(snapshot, &lights);
+    nebel_release_snapshot(snapshot);
+    return lighting;
 }
 
 static int is_light(const nebel_transfer *transfer)
@@ -252,13 +254,15 @@ typedef struct tally {
 } tally;
 
 /* One ray; on OK the light in *light. */
-static int try_ray(const scene *s, uint64_t seed, const nebel_snapshot *snapshot, nebel_precision precision,
+static int try_ray(const scene *s, uint64_t seed, const nebel_lighting *lighting, nebel_precision precision,
                    const nebel_ray *ray, nebel_transfer *transfer, tally *sum)
 {
     static const char *const names[] = {"double", "float"};
     size_t failed = 99;
     const double tolerances[] = {0, 1e-5, 10};
-    const nebel_trace_desc desc = {.precision = precision, .tolerance = tolerances[seed % 3], .failed_ray = &failed};
+    const nebel_trace_desc desc = {
+        .lighting = lighting, .precision = precision, .tolerance = tolerances[seed % 3], .failed_ray = &failed};
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
     const nebel_result result = nebel_trace(snapshot, &desc, 1, ray, sizeof *ray, transfer, sizeof *transfer);
     if (result == NEBEL_ERROR_UNBOUNDED) {
         sum->unbounded++;
@@ -278,19 +282,19 @@ static void try_scene(uint64_t seed, tally *sum)
 {
     static scene s;
     make_scene(&s, seed);
-    nebel_snapshot *const snapshot = commit(&s, &sum->refused);
+    nebel_lighting *const lighting = commit(&s, &sum->refused);
     for (int r = 0; r < RAYS; r++) {
         const nebel_ray ray = make_ray(&s);
         nebel_transfer exact, transfer;
-        const int good = try_ray(&s, seed, snapshot, NEBEL_PRECISION_DOUBLE, &ray, &exact, sum);
-        if (!try_ray(&s, seed, snapshot, NEBEL_PRECISION_FLOAT, &ray, &transfer, sum) || !good) continue;
+        const int good = try_ray(&s, seed, lighting, NEBEL_PRECISION_DOUBLE, &ray, &exact, sum);
+        if (!try_ray(&s, seed, lighting, NEBEL_PRECISION_FLOAT, &ray, &transfer, sum) || !good) continue;
         if (!compares_precisions) continue;
         if (fog_difference(&exact, &transfer) <= exact.error + transfer.error) continue;
         sum->wrong++;
         say(seed, "double and float disagree", &ray, &exact);
         say(seed, "beyond their errors", &ray, &transfer);
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 static void test_extreme_but_legal_fog_gives_numbers_within_their_ranges(void **unused)
@@ -311,7 +315,8 @@ static void test_distances_to_a_transmittance_lie_on_the_ray(void **unused)
     size_t refused = 0, found = 0;
     for (uint64_t seed = 0; seed < scene_count; seed++) {
         make_scene(&s, seed);
-        nebel_snapshot *const snapshot = commit(&s, &refused);
+        nebel_lighting *const lighting = commit(&s, &refused);
+        const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
         for (int r = 0; r < RAYS; r++) {
             const nebel_ray ray = make_ray(&s);
             const double wanted = one_in(&s, 3) ? 1e-300 : one_in(&s, 2) ? nextafter(1, 0) : .5;
@@ -323,7 +328,7 @@ static void test_distances_to_a_transmittance_lie_on_the_ray(void **unused)
             assert_true(good);
             found += distance < HUGE_VAL;
         }
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
     assert_true(found > scene_count);
 }
@@ -335,7 +340,8 @@ static void test_segments_give_transmittances(void **unused)
     size_t refused = 0;
     for (uint64_t seed = 0; seed < scene_count; seed++) {
         make_scene(&s, seed);
-        nebel_snapshot *const snapshot = commit(&s, &refused);
+        nebel_lighting *const lighting = commit(&s, &refused);
+        const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
         float from[RAYS][3], to[RAYS][3], out[RAYS];
         for (int r = 0; r < RAYS; r++)
             for (int k = 0; k < 3; k++) {
@@ -347,7 +353,7 @@ static void test_segments_give_transmittances(void **unused)
             nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 1, RAYS, &segments, out, 0);
         assert_true(result == NEBEL_OK);
         for (int r = 0; r < RAYS; r++) assert_true(out[r] >= 0 && out[r] <= 1);
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
 }
 

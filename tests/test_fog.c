@@ -50,7 +50,7 @@ typedef struct fingerprint {
     nebel_transfer transfers[PROBES];
 } fingerprint;
 
-static fingerprint look_at(const nebel_snapshot *snapshot)
+static fingerprint look_at(const nebel_snapshot *snapshot, const nebel_lighting *lighting)
 {
     static const nebel_ray rays[PROBES] = {{{-9, .3, .2}, {1, 0, 0}, 20},
                                            {{0, 9, .1}, {.1, -1, 0}, 30},
@@ -60,8 +60,8 @@ static fingerprint look_at(const nebel_snapshot *snapshot)
     fingerprint print;
     memset(&print, 0, sizeof print);
     print.count = nebel_get_volume_count(snapshot);
-    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){0}, PROBES, rays, sizeof rays[0], print.transfers,
-                                 sizeof print.transfers[0]),
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){.lighting = lighting}, PROBES, rays, sizeof rays[0],
+                                 print.transfers, sizeof print.transfers[0]),
                      NEBEL_OK);
     return print;
 }
@@ -70,7 +70,7 @@ static fingerprint look_at_fog(nebel_fog *fog)
 {
     nebel_snapshot *snapshot = NULL;
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    const fingerprint print = look_at(snapshot);
+    const fingerprint print = look_at(snapshot, NULL);
     nebel_release_snapshot(snapshot);
     return print;
 }
@@ -99,8 +99,7 @@ typedef struct bench {
 
 static nebel_fog *make_fog(bench *b)
 {
-    const nebel_fog_desc desc = {
-        .allocator = fog_memory_allocator(&b->memory), .log = fog_messages_log(&b->messages), .ambient = {.1, .2, .3}};
+    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&b->memory), .log = fog_messages_log(&b->messages)};
     nebel_fog *fog = NULL;
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     return fog;
@@ -154,8 +153,7 @@ static size_t fail_each_in_fog(act *perform, act *undo, const nebel_volume_desc 
 
 static nebel_result create(bench *b)
 {
-    const nebel_fog_desc desc = {
-        .allocator = fog_memory_allocator(&b->memory), .log = fog_messages_log(&b->messages), .ambient = {0}};
+    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&b->memory), .log = fog_messages_log(&b->messages)};
     nebel_fog *fog = (nebel_fog *)&desc;
     const nebel_result result = nebel_create_fog(&desc, &fog);
     if (result != NEBEL_OK) assert_null(fog);
@@ -300,10 +298,10 @@ static size_t fail_each_in_query(act *query, size_t crowd, size_t ray_count)
 {
     bench b = {.ray_count = ray_count};
     open_crowd(&b, crowd);
-    const fingerprint before = look_at(b.snapshot);
+    const fingerprint before = look_at(b.snapshot, NULL);
     const size_t count = fail_each(&b, query, 1);
     assert_int_equal(fail_each(&b, query, 1000), count);
-    const fingerprint after = look_at(b.snapshot);
+    const fingerprint after = look_at(b.snapshot, NULL);
     assert_same(&before, &after);
     nebel_release_snapshot(b.snapshot);
     assert_int_equal(b.memory.live, 0);
@@ -418,39 +416,40 @@ static void test_a_snapshot_outlives_changes_and_the_fog(void **unused)
     nebel_volume_id ids[KINDS];
     for (int i = 0; i < KINDS; i++) ids[i] = must_add(fog, &kinds[i]);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    const fingerprint before = look_at(snapshot);
+    const fingerprint before = look_at(snapshot, NULL);
     for (int i = 0; i < KINDS; i += 2) assert_int_equal(nebel_remove_volume(fog, ids[i]), NEBEL_OK);
     assert_int_equal(nebel_update_volume(fog, ids[1], &kinds[2]), NEBEL_OK);
-    assert_int_equal(nebel_set_ambient(fog, (const double[3]){9, 9, 9}), NEBEL_OK);
-    const fingerprint changed = look_at(snapshot);
+    assert_int_equal(nebel_set_max_opacity(fog, .5), NEBEL_OK);
+    const fingerprint changed = look_at(snapshot, NULL);
     nebel_destroy_fog(fog);
-    const fingerprint orphan = look_at(snapshot);
+    const fingerprint orphan = look_at(snapshot, NULL);
     assert_same(&before, &changed);
     assert_same(&before, &orphan);
 
     assert_ptr_equal(nebel_retain_snapshot(snapshot), snapshot);
     nebel_release_snapshot(snapshot);
-    const fingerprint retained = look_at(snapshot);
+    const fingerprint retained = look_at(snapshot, NULL);
     assert_same(&before, &retained);
     assert_true(memory.live > 0);
     nebel_release_snapshot(snapshot);
     assert_int_equal(memory.live, 0);
 }
 
-static void test_ambient_light_reaches_later_snapshots_only(void **unused)
+static void test_ambient_light_is_in_its_lighting_only(void **unused)
 {
     (void)unused;
-    nebel_fog *const fog = plain_fog();
     const nebel_volume_desc lit = {.extinction = {.1, .1, .1}, .albedo = {.5, .6, .7}};
-    must_add(fog, &lit);
-    const fingerprint dark = look_at_fog(fog);
+    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &lit, 1);
     const double ambient[3] = {1, 2, 4};
-    assert_int_equal(nebel_set_ambient(fog, ambient), NEBEL_OK);
-    assert_int_equal(nebel_set_ambient(fog, (const double[3]){1, -1, 1}), NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_set_ambient(fog, (const double[3]){1, (double)NAN, 1}), NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_set_ambient(fog, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_set_ambient(NULL, ambient), NEBEL_ERROR_ARGUMENT);
-    const fingerprint bright = look_at_fog(fog);
+    nebel_lighting_desc lights = {.environment = {.radiance = {1, 2, 4}}};
+    nebel_lighting *lighting = light_fog(snapshot, &lights), *none = NULL;
+    const double wrong[] = {-1, (double)NAN};
+    for (int i = 0; i < 2; i++) {
+        lights.environment.radiance[1] = wrong[i];
+        assert_int_equal(nebel_create_lighting(snapshot, &lights, &none), NEBEL_ERROR_VALUE);
+        assert_null(none);
+    }
+    const fingerprint bright = look_at(snapshot, lighting), dark = look_at(snapshot, NULL);
     for (int i = 0; i < PROBES; i++)
         for (int c = 0; c < 3; c++) {
             const double T = bright.transfers[i].transmittance[c];
@@ -458,7 +457,8 @@ static void test_ambient_light_reaches_later_snapshots_only(void **unused)
             assert_true(dark.transfers[i].in_scattering[c] == 0);
             assert_true(fabs(bright.transfers[i].in_scattering[c] - lit.albedo[c] * ambient[c] * (1 - T)) < 1e-14);
         }
-    nebel_destroy_fog(fog);
+    nebel_release_lighting(lighting);
+    nebel_release_snapshot(snapshot);
 }
 
 /* A product that wraps around must not become a little memory. */
@@ -566,7 +566,7 @@ int main(void)
         cmocka_unit_test(test_a_changed_volume_keeps_its_id),
         cmocka_unit_test(test_volumes_give_the_same_bits_in_any_order_and_after_any_history),
         cmocka_unit_test(test_a_snapshot_outlives_changes_and_the_fog),
-        cmocka_unit_test(test_ambient_light_reaches_later_snapshots_only),
+        cmocka_unit_test(test_ambient_light_is_in_its_lighting_only),
         cmocka_unit_test(test_counts_beyond_all_memory_are_refused),
         cmocka_unit_test(test_empty_descriptions_are_valid),
         cmocka_unit_test(test_the_version_is_that_of_the_header),

@@ -35,7 +35,6 @@ enum { RAYS = 3000 };
 static void trace(const nebel_scene *scene, nebel_transfer *transfers)
 {
     static nebel_ray rays[RAYS];
-    nebel_snapshot *fog = NULL;
     uint32_t seed = 5;
     for (int i = 0; i < RAYS; i++) {
         double numbers[6];
@@ -43,11 +42,7 @@ static void trace(const nebel_scene *scene, nebel_transfer *transfers)
         rays[i] =
             (nebel_ray){{16 * numbers[0], 16 * numbers[1], 16 * numbers[2]}, {numbers[3], numbers[4], numbers[5]}, 30};
     }
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-12}, RAYS, rays, sizeof *rays, transfers,
-                                 sizeof *transfers),
-                     NEBEL_OK);
-    nebel_release_snapshot(fog);
+    scene_trace(scene, 0, (nebel_trace_desc){.tolerance = 1e-12}, RAYS, rays, transfers);
 }
 
 static void assert_same_fog(const char *members, const char *model, const char *fog)

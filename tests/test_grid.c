@@ -4,12 +4,7 @@
 #include "fog_help.h"
 #include "near.h"
 
-#include <nebel/places.h>
 #include <nebel/shader.h>
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 /* ---- truth: every face that the ray crosses, sorted; between them polynomials ---------------- */
 
@@ -220,11 +215,11 @@ static nebel_ray random_ray(uint64_t *state)
     return ray;
 }
 
-static nebel_transfer trace(const nebel_snapshot *fog, nebel_precision digits, double tolerance, const nebel_ray *ray)
+static nebel_transfer trace(const nebel_lighting *fog, nebel_precision digits, double tolerance, const nebel_ray *ray)
 {
     nebel_transfer transfer;
     const nebel_trace_desc desc = {.precision = digits, .tolerance = tolerance};
-    assert_int_equal(nebel_trace(fog, &desc, 1, ray, sizeof *ray, &transfer, sizeof transfer), NEBEL_OK);
+    fog_trace(fog, desc, 1, ray, &transfer);
     return transfer;
 }
 
@@ -244,7 +239,7 @@ static void depth_is_that_of_T39(void **state)
                            .density = {.type = NEBEL_DENSITY_GRID},
                            .extinction = {.1, .1, .1}};
     v.density.grid = make_grid(size, NEBEL_VOXEL_FLOAT, NEBEL_GRID_FILTER_LINEAR, voxels);
-    nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &v, 1);
+    nebel_lighting *fog = fog_light(NULL, &v, 1);
     nebel_release_grid(v.density.grid);
     const nebel_ray ray = {.origin = {0, .4, 2.7}, .direction = {3, 2.2, -2.4}, .t_max = 4.427188724235731};
     const nebel_transfer exact = trace(fog, NEBEL_PRECISION_DOUBLE, 0, &ray);
@@ -252,7 +247,7 @@ static void depth_is_that_of_T39(void **state)
     assert_true(exact.error < 1e-12);
     const nebel_transfer fast = trace(fog, NEBEL_PRECISION_FLOAT, 0, &ray);
     assert_near(-log(fast.transmittance[0]), 1.805295396947395, 3e-6);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void check_depth(uint64_t seed, nebel_grid_filter filter)
@@ -261,7 +256,7 @@ static void check_depth(uint64_t seed, nebel_grid_filter filter)
     block b;
     fill_block(&state, &b, filter);
     const nebel_volume_desc v = volume_of(&b, .4, 1);
-    nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &v, 1);
+    nebel_lighting *fog = fog_light(NULL, &v, 1);
     nebel_release_grid(b.grid);
     for (int i = 0; i < 40; i++) {
         const nebel_ray ray = random_ray(&state);
@@ -277,7 +272,7 @@ static void check_depth(uint64_t seed, nebel_grid_filter filter)
                          transfer.error);
         }
     }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void depth_is_the_sum_over_cells(void **state)
@@ -302,7 +297,7 @@ static void check_light(uint64_t seed, nebel_grid_filter filter, double toleranc
     const double extinction[2] = {dice(&state, .1, 3), dice(&state, .1, 3)}, source[2] = {.2, 1};
     const nebel_volume_desc v[2] = {volume_of(&a, extinction[0], source[0]), volume_of(&b, extinction[1], source[1])};
     const nebel_volume_desc turned[2] = {v[1], v[0]};
-    nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, v, 2), *other = fog_commit(&(nebel_fog_desc){0}, turned, 2);
+    nebel_lighting *fog = fog_light(NULL, v, 2), *other = fog_light(NULL, turned, 2);
     nebel_release_grid(a.grid);
     nebel_release_grid(b.grid);
     const block *const blocks[2] = {&a, &b};
@@ -322,8 +317,8 @@ static void check_light(uint64_t seed, nebel_grid_filter filter, double toleranc
             assert_memory_equal(&transfer, &same, sizeof transfer);
         }
     }
-    nebel_release_snapshot(fog);
-    nebel_release_snapshot(other);
+    nebel_release_lighting(fog);
+    nebel_release_lighting(other);
 }
 
 static void errors_admit_the_truth(void **state)
@@ -365,7 +360,7 @@ static long double sunlight_of(const block *b, const long double to_sun[3], cons
 }
 
 /* One block alone, in some seeds with a sun level with its faces. */
-static nebel_snapshot *lone_fog(uint64_t *state, block *b, nebel_grid_filter filter, double sun[3])
+static nebel_lighting *lone_fog(uint64_t *state, block *b, nebel_grid_filter filter, double sun[3])
 {
     fill_block(state, b, filter);
     const int level = dice_below(state, 5);
@@ -376,12 +371,12 @@ static nebel_snapshot *lone_fog(uint64_t *state, block *b, nebel_grid_filter fil
     }
     for (int i = 0; i < 3; i++) sun[i] /= sqrt(square);
     nebel_volume_desc v = volume_of(b, lone_extinction, 0);
-    nebel_fog_desc desc = {.sun = {.direction = {sun[0], sun[1], sun[2]}}};
+    nebel_lighting_desc desc = {.sun = {.direction = {sun[0], sun[1], sun[2]}}};
     for (int c = 0; c < 3; c++) {
         v.albedo[c] = lone_glow;
         desc.sun.irradiance[c] = 4 * acos(-1);
     }
-    nebel_snapshot *fog = fog_commit(&desc, &v, 1);
+    nebel_lighting *fog = fog_light(&desc, &v, 1);
     nebel_release_grid(b->grid);
     return fog;
 }
@@ -391,7 +386,7 @@ static void check_sunlight(uint64_t seed, nebel_grid_filter filter, double toler
     static block b;
     uint64_t state = 977 * seed + 5;
     double sun[3];
-    nebel_snapshot *fog = lone_fog(&state, &b, filter, sun);
+    nebel_lighting *fog = lone_fog(&state, &b, filter, sun);
     const long double to_sun[3] = {(long double)sun[0], (long double)sun[1], (long double)sun[2]};
     for (int i = 0; i < 4; i++) {
         const nebel_ray ray = random_ray(&state);
@@ -407,7 +402,7 @@ static void check_sunlight(uint64_t seed, nebel_grid_filter filter, double toler
                 fail_msg("seed %d ray %d precision %d: off by %g, said %g", (int)seed, i, p, off, transfer.error);
         }
     }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void errors_of_sunlight_admit_the_truth(void **state)
@@ -429,29 +424,29 @@ static void shadows_of_surfaces_part_the_sunlight(void **test)
     for (uint64_t seed = 0; seed < 40; seed++) {
         uint64_t state = seed;
         double sun[3];
-        nebel_snapshot *fog = lone_fog(&state, &b, (nebel_grid_filter)(seed % 2), sun);
+        nebel_lighting *fog = lone_fog(&state, &b, (nebel_grid_filter)(seed % 2), sun);
         const nebel_ray ray = random_ray(&state);
         const nebel_ray_visibility seen[2] = {{lit, boundaries}, {dark, boundaries}};
         nebel_transfer part[2];
         const nebel_transfer all = trace(fog, NEBEL_PRECISION_FLOAT, 1e-4, &ray);
         for (int i = 0; i < 2; i++) {
-            const nebel_trace_desc desc = {NEBEL_PRECISION_FLOAT, .tolerance = 1e-4, .sun_visibility = &seen[i]};
-            assert_int_equal(nebel_trace(fog, &desc, 1, &ray, sizeof ray, &part[i], sizeof part[i]), NEBEL_OK);
+            nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .tolerance = 1e-4, .sun_visibility = &seen[i]};
+            fog_trace(fog, desc, 1, &ray, &part[i]);
         }
         const double sum = part[0].in_scattering[0] + part[1].in_scattering[0];
         assert_true(fabs(sum - all.in_scattering[0]) <= part[0].error + part[1].error + all.error);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
     }
 }
 
-static void trace_at(const nebel_snapshot *fog, nebel_isa isa, size_t n, const nebel_ray *rays, nebel_transfer *to)
+static void trace_at(const nebel_lighting *fog, nebel_isa isa, size_t n, const nebel_ray *rays, nebel_transfer *to)
 {
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = isa, .tolerance = 1e-5};
-    assert_int_equal(nebel_trace(fog, &desc, n, rays, sizeof *rays, to, sizeof *to), NEBEL_OK);
+    fog_trace(fog, desc, n, rays, to);
 }
 
 /* Turned boxes, mirrored ones, fog of other kinds, and the sun. */
-static nebel_snapshot *mixed_fog(uint64_t *state, double albedo)
+static nebel_lighting *mixed_fog(uint64_t *state, double albedo)
 {
     static block b[2];
     nebel_volume_desc v[3] = {
@@ -467,8 +462,8 @@ static nebel_snapshot *mixed_fog(uint64_t *state, double albedo)
             v[1].source[c] = 0;
             v[1].albedo[c] = albedo;
         }
-    const nebel_fog_desc desc = {.ambient = {.1, .2, .3}, .sun = {{.3, .8, .5}, {3, 2, 1}}};
-    nebel_snapshot *fog = fog_commit(&desc, v, 3);
+    const nebel_lighting_desc desc = {.environment = {.radiance = {.1, .2, .3}}, .sun = {{.3, .8, .5}, {3, 2, 1}}};
+    nebel_lighting *fog = fog_light(&desc, v, 3);
     for (int i = 0; i < 2; i++) nebel_release_grid(b[i].grid);
     return fog;
 }
@@ -481,7 +476,7 @@ static void bits_do_not_depend_on_company(void **test)
         static block lone;
         double sun[3];
         uint64_t state = seed;
-        nebel_snapshot *fog = seed < 12 ? mixed_fog(&state, seed % 3 == 2 ? .5 : 0)
+        nebel_lighting *fog = seed < 12 ? mixed_fog(&state, seed % 3 == 2 ? .5 : 0)
                                         : lone_fog(&state, &lone, (nebel_grid_filter)(seed % 2), sun);
         nebel_ray rays[RAYS];
         nebel_transfer alone[RAYS], all[RAYS];
@@ -492,7 +487,7 @@ static void bits_do_not_depend_on_company(void **test)
             trace_at(fog, (nebel_isa)isa, RAYS, rays, all);
             for (int i = 0; i < RAYS; i++) assert_memory_equal(&all[i], &alone[i], offsetof(nebel_transfer, error));
         }
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
     }
 }
 
@@ -502,7 +497,7 @@ static void float_is_near_double(void **test)
     (void)test;
     for (uint64_t seed = 100; seed < 140; seed++) {
         uint64_t state = seed;
-        nebel_snapshot *fog = mixed_fog(&state, 0);
+        nebel_lighting *fog = mixed_fog(&state, 0);
         for (int i = 0; i < 20; i++) {
             const nebel_ray ray = random_ray(&state);
             const nebel_transfer fine = trace(fog, NEBEL_PRECISION_DOUBLE, 1e-9, &ray);
@@ -511,7 +506,7 @@ static void float_is_near_double(void **test)
             assert_true(fast.error <= 1.1e-4);
             assert_true(fog_difference(&fine, &fast) <= fine.error + fast.error);
         }
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
     }
 }
 
@@ -529,8 +524,8 @@ static void equal_voxels_are_constant_density(void **test)
     nebel_volume_desc even = v;
     even.density = (nebel_density){0};
     for (int c = 0; c < 3; c++) even.extinction[c] /= 2;
-    const nebel_fog_desc desc = {.ambient = {.1, .2, .3}, .sun = {{.3, .8, .5}, {3, 2, 1}}};
-    nebel_snapshot *fog = fog_commit(&desc, &v, 1), *plain = fog_commit(&desc, &even, 1);
+    const nebel_lighting_desc desc = {.environment = {.radiance = {.1, .2, .3}}, .sun = {{.3, .8, .5}, {3, 2, 1}}};
+    nebel_lighting *fog = fog_light(&desc, &v, 1), *plain = fog_light(&desc, &even, 1);
     nebel_release_grid(v.density.grid);
     uint64_t state = 7;
     for (int i = 0; i < 50; i++) {
@@ -540,8 +535,8 @@ static void equal_voxels_are_constant_density(void **test)
         assert_true(fog_difference(&a, &b) <= a.error + b.error);
         assert_near(a.transmittance[0], b.transmittance[0], 1e-14);
     }
-    nebel_release_snapshot(fog);
-    nebel_release_snapshot(plain);
+    nebel_release_lighting(fog);
+    nebel_release_lighting(plain);
 }
 
 /* All types of voxels, with scale and offset, are the same density. */
@@ -559,7 +554,7 @@ static void types_agree(void **test)
     }
     const void *const voxels[] = {floats, bytes, words};
     const double scales[] = {2. / 255, 2, 2};
-    nebel_snapshot *fog[3];
+    nebel_lighting *fog[3];
     for (int i = 0; i < 3; i++) {
         const nebel_grid_desc desc = {
             .size = {3, 4, 5}, .type = (nebel_voxel_type)i, .voxels = voxels[i], .scale = scales[i], .offset = .25};
@@ -567,7 +562,7 @@ static void types_agree(void **test)
                                .density = {.type = NEBEL_DENSITY_GRID},
                                .extinction = {1, .5, .25}};
         assert_int_equal(nebel_create_grid(&desc, &v.density.grid), NEBEL_OK);
-        fog[i] = fog_commit(&(nebel_fog_desc){0}, &v, 1);
+        fog[i] = fog_light(NULL, &v, 1);
         nebel_release_grid(v.density.grid);
     }
     for (int i = 0; i < 30; i++) {
@@ -580,7 +575,7 @@ static void types_agree(void **test)
                 assert_near(a.transmittance[0], b.transmittance[0], isa > 0 ? 1e-6 : 1e-14);
             }
     }
-    for (int i = 0; i < 3; i++) nebel_release_snapshot(fog[i]);
+    for (int i = 0; i < 3; i++) nebel_release_lighting(fog[i]);
 }
 
 /* Visibility ends where the depth does. */
@@ -591,12 +586,13 @@ static void distances_are_found(void **test)
     block b;
     fill_block(&state, &b, NEBEL_GRID_FILTER_LINEAR);
     const nebel_volume_desc v = volume_of(&b, 1, 0);
-    nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &v, 1);
+    nebel_lighting *fog = fog_light(NULL, &v, 1);
     nebel_release_grid(b.grid);
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(fog);
     for (int i = 0; i < 50; i++) {
         nebel_ray ray = random_ray(&state);
         double distance;
-        assert_int_equal(nebel_invert_transmittance(fog, .7, 0, 1, &ray, sizeof ray, &distance), NEBEL_OK);
+        assert_int_equal(nebel_invert_transmittance(snapshot, .7, 0, 1, &ray, sizeof ray, &distance), NEBEL_OK);
         if (isfinite(distance)) {
             assert_true(distance <= ray.t_max);
             ray.t_max = distance;
@@ -605,7 +601,7 @@ static void distances_are_found(void **test)
             assert_true(trace(fog, NEBEL_PRECISION_DOUBLE, 0, &ray).transmittance[0] >= .7);
         }
     }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* Extinction at places is that of the truth, and no more than the bound of a ray that starts there. */
@@ -702,30 +698,30 @@ static void volumes_need_a_box_and_a_grid(void **test)
     assert_non_null(strstr(messages.text, "needs a box"));
     nebel_snapshot *snapshot = NULL;
     size_t words;
-    const nebel_sun sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}};
+    const nebel_light lamp = {.intensity = {1, 1, 1}};
+    nebel_lighting_desc sky = {.sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}}, .lights = &lamp};
     v.shape = (nebel_shape){.type = NEBEL_SHAPE_BOX, .max = {1, 1, 1}};
     v.albedo[0] = 1;
-    assert_int_equal(nebel_set_sun(fog, &sun), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &v, NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    assert_int_equal(nebel_pack_fog(snapshot, (double[3]){0, 0, 0}, NULL, 0, &words), NEBEL_OK);
-    nebel_release_snapshot(snapshot);
-    assert_int_equal(nebel_set_lamps(fog, 1, &(nebel_light){.intensity = {1, 1, 1}}), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    assert_int_equal(nebel_pack_fog(snapshot, (double[3]){0, 0, 0}, NULL, 0, &words), NEBEL_OK);
+    for (; sky.light_count < 2; sky.light_count++) {
+        nebel_lighting *lit = light_fog(snapshot, &sky);
+        assert_int_equal(nebel_pack_fog(lit, (double[3]){0, 0, 0}, NULL, 0, &words), NEBEL_OK);
+        nebel_release_lighting(lit);
+    }
     nebel_destroy_fog(fog);
     nebel_release_snapshot(snapshot);
     nebel_release_grid(grid);
 }
 
-/* A grid lives as long as anybody needs it, and the lattice that the sun needs; whatever fails gives back what it took.
- */
+/* A grid lives as long as anybody needs it, and the sun's lattice; whatever fails gives back what it took. */
 static nebel_result live_and_die(const nebel_allocator *allocator, double albedo)
 {
     const float voxels[8] = {1, 2};
     nebel_grid *grid = NULL;
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
+    nebel_lighting *lit[2] = {NULL, NULL};
     nebel_volume_id id;
     const nebel_grid_desc desc = {.allocator = *allocator, .size = {2, 2, 2}, .voxels = voxels};
     nebel_result result = nebel_create_grid(&desc, &grid);
@@ -734,22 +730,26 @@ static nebel_result live_and_die(const nebel_allocator *allocator, double albedo
                            .density = {.type = NEBEL_DENSITY_GRID, .grid = grid},
                            .extinction = {1, 1, 1},
                            .albedo = {albedo, albedo, albedo}};
-    const nebel_fog_desc sky = {.allocator = *allocator, .sun = {{.2, 1, .3}, {1, 1, 1}}};
-    result = nebel_create_fog(&sky, &fog);
+    nebel_lighting_desc sky = {.sun = {{.2, 1, .3}, {1, 1, 1}}};
+    result = nebel_create_fog(&(nebel_fog_desc){.allocator = *allocator}, &fog);
     if (result == NEBEL_OK) result = nebel_add_volume(fog, &v, &id);
     if (result == NEBEL_OK) result = nebel_update_volume(fog, id, &v);
     for (int i = 0; i < 2 && result == NEBEL_OK; i++) {
         nebel_release_snapshot(snapshot);
         result = nebel_commit_fog(fog, &snapshot);
+        sky.previous = lit[0];
+        if (result == NEBEL_OK) result = nebel_create_lighting(snapshot, &sky, &lit[i]);
     }
+    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lit[0]);
     if (result == NEBEL_OK) result = nebel_remove_volume(fog, id);
     nebel_release_grid(grid);
     nebel_destroy_fog(fog);
     if (result == NEBEL_OK) {
         const nebel_ray ray = {.origin = {-1, .5, .5}, .direction = {1, 0, 0}, .t_max = 9};
-        assert_near(trace(snapshot, NEBEL_PRECISION_DOUBLE, 2e-3, &ray).transmittance[0], exp(-.375), 1e-15);
+        assert_near(trace(lit[1], NEBEL_PRECISION_DOUBLE, 2e-3, &ray).transmittance[0], exp(-.375), 1e-15);
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lit[1]);
     return result;
 }
 

@@ -65,20 +65,20 @@ static cloud random_cloud(uint64_t *state)
     return c;
 }
 
-static nebel_snapshot *fog_of(const cloud *c)
+static nebel_lighting *fog_of(const cloud *c)
 {
     nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX},
                            .density = {.type = NEBEL_DENSITY_GRID, .grid = c->grid}};
-    nebel_fog_desc desc = {.max_opacity = 1};
-    memcpy(desc.sun.direction, c->sun, sizeof c->sun);
+    nebel_lighting_desc lights = {.sun = {{0}, {0}}};
+    memcpy(lights.sun.direction, c->sun, sizeof c->sun);
     for (int i = 0; i < 3; i++) {
         v.shape.min[i] = c->low[i];
         v.shape.max[i] = c->high[i];
         v.extinction[i] = c->extinction;
         v.albedo[i] = 1;
-        desc.sun.irradiance[i] = 4 * acos(-1); /* opaque fog that is lit from all around has a radiance of 1 */
+        lights.sun.irradiance[i] = 4 * acos(-1); /* opaque fog that is lit from all around has a radiance of 1 */
     }
-    return fog_commit(&desc, &v, 1);
+    return fog_light(&lights, &v, 1);
 }
 
 /* To a place inside the box; some of them are hardly off a face all along. */
@@ -149,12 +149,12 @@ static void check_rays(uint64_t seed, double tolerance)
 {
     uint64_t state = seed;
     const cloud c = random_cloud(&state);
-    nebel_snapshot *fog = fog_of(&c);
+    nebel_lighting *fog = fog_of(&c);
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .tolerance = tolerance};
     for (int i = 0; i < RAYS; i++) {
         const nebel_ray ray = random_ray(&state, &c);
         nebel_transfer transfer;
-        assert_int_equal(nebel_trace(fog, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+        fog_trace(fog, desc, 1, &ray, &transfer);
         if (transfer.transmittance[0] == 1) continue;
         const double off = fabs(transfer.in_scattering[0] - brute_light(&c, &ray, PARTS));
         if (off <= transfer.error) continue;
@@ -163,7 +163,7 @@ static void check_rays(uint64_t seed, double tolerance)
         if (!(still <= transfer.error + doubt))
             fail_msg("seed %d ray %d: off by %g, said %g", (int)seed, i, still, transfer.error);
     }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_release_grid(c.grid);
 }
 
@@ -183,11 +183,12 @@ static void check_transmittance(uint64_t seed)
     float boundaries[2 * COUNT];
     uint64_t state = seed;
     const cloud c = random_cloud(&state);
-    nebel_snapshot *fog = fog_of(&c);
+    nebel_lighting *fog = fog_of(&c);
     nebel_ray_planes rays = {.offset_stride = sizeof(float), .direction_stride = sizeof(float)};
     nebel_transfer_planes dark = {.transmittance_stride = sizeof(float)}, lit = dark;
     const nebel_ray_visibility pieces = {first, boundaries};
-    const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .sun_visibility = &pieces};
+    const nebel_trace_desc desc = {
+        .lighting = fog, .precision = NEBEL_PRECISION_FLOAT, .sun_visibility = seed % 2 ? NULL : &pieces};
     lit.in_scattering_stride = sizeof(float);
     for (int n = 0; n < COUNT; n++) {
         const nebel_ray ray = random_ray(&state, &c);
@@ -206,10 +207,11 @@ static void check_transmittance(uint64_t seed)
         lit.in_scattering[i] = light[i];
     }
     first[COUNT] = 2 * COUNT;
-    assert_int_equal(nebel_trace_planes(fog, NULL, COUNT, &rays, &dark), NEBEL_OK);
-    assert_int_equal(nebel_trace_planes(fog, seed % 2 ? NULL : &desc, COUNT, &rays, &lit), NEBEL_OK);
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(fog);
+    assert_int_equal(nebel_trace_planes(snapshot, NULL, COUNT, &rays, &dark), NEBEL_OK);
+    assert_int_equal(nebel_trace_planes(snapshot, &desc, COUNT, &rays, &lit), NEBEL_OK);
     assert_memory_equal(alone, with_light, sizeof alone);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_release_grid(c.grid);
 }
 

@@ -255,8 +255,8 @@ static void odd_coordinates_are_survived(void **state)
     static const float odd[] = {NAN, INFINITY, 1e6f, 1e20f, 3e38f};
     static test_card card;
     const nebel_volume_desc volume = {.extinction = {.1, .1, .1}, .albedo = {1, 1, 1}};
-    const nebel_fog_desc desc = {.sun = {.direction = {.3, .9, .2}, .irradiance = {3, 3, 3}}};
-    nebel_snapshot *fog = fog_commit(&desc, &volume, 1);
+    const nebel_lighting_desc lights = {.sun = {.direction = {.3, .9, .2}, .irradiance = {3, 3, 3}}};
+    nebel_lighting *fog = fog_commit_lit(&(nebel_fog_desc){0}, &volume, 1, &lights);
     test_picture picture = test_picture_make(8, 8);
     (void)state;
     for (size_t i = 0; i < sizeof odd / sizeof *odd; i++)
@@ -268,7 +268,7 @@ static void odd_coordinates_are_survived(void **state)
             for (int p = 0; p < 3 * 8 * 8; p++) assert_true(isfinite(picture.planes.in_scattering[p]));
         }
     test_picture_free(&picture);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 int main(void)

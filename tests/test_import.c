@@ -14,12 +14,8 @@ static void assert_grey(const double *got, double wanted)
 
 static nebel_transfer light_along(const nebel_scene *scene, const nebel_ray *ray)
 {
-    nebel_snapshot *fog = NULL;
     nebel_transfer transfer;
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, ray, sizeof *ray, &transfer, sizeof transfer),
-                     NEBEL_OK);
-    nebel_release_snapshot(fog);
+    scene_trace(scene, 0, (nebel_trace_desc){0}, 1, ray, &transfer);
     return transfer;
 }
 

@@ -7,41 +7,29 @@
 
 #include <math.h>
 
-static nebel_snapshot *commit(const nebel_fog_desc *desc, const nebel_volume_desc *volumes, size_t n,
-                              const nebel_light *lamps, size_t lamp_count)
-{
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(desc, &fog), NEBEL_OK);
-    for (size_t i = 0; i < n; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, lamp_count, lamps), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
-}
-
-static nebel_transfer ask(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_ray ray)
+static nebel_transfer ask(const nebel_lighting *lighting, nebel_trace_desc desc, nebel_ray ray)
 {
     nebel_transfer transfer;
-    assert_int_equal(nebel_trace(snapshot, desc, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+    fog_trace(lighting, desc, 1, &ray, &transfer);
     return transfer;
 }
 
 /* ---- even fog -------------------------------------------------------------------------------- */
 
-static nebel_snapshot *make_airlight(double extinction, const nebel_light *lamp)
+static nebel_lighting *make_airlight(double extinction, const nebel_light *lamp)
 {
     const nebel_volume_desc volume = {.extinction = {extinction, extinction, extinction}, .albedo = {1, 1, 1}};
-    return commit(&(nebel_fog_desc){0}, &volume, 1, lamp, 1);
+    const nebel_lighting_desc lights = {.lights = lamp, .light_count = 1};
+    return fog_light(&lights, &volume, 1);
 }
 
 /* Both precisions, and the error that they tell. */
-static void expect_light(const nebel_snapshot *snapshot, nebel_ray ray, double wanted)
+static void expect_light(const nebel_lighting *lighting, nebel_ray ray, double wanted)
 {
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         const double tolerance = precision == NEBEL_PRECISION_DOUBLE ? 1e-9 : 1e-6;
         const nebel_trace_desc desc = {.precision = (nebel_precision)precision, .tolerance = tolerance};
-        const nebel_transfer transfer = ask(snapshot, &desc, ray);
+        const nebel_transfer transfer = ask(lighting, desc, ray);
         for (int c = 0; c < 3; c++) {
             const double off = fabs(transfer.in_scattering[c] - wanted), rounding = 1e-6 * wanted;
             assert_true(off <= tolerance + rounding);
@@ -62,9 +50,9 @@ static void airlight_is_that_of_T17(void **state)
         const double angle = cases[i].angle * 3.14159265358979323846 / 180;
         const nebel_light lamp = {.position = {cases[i].distance * cos(angle), 0, cases[i].distance * sin(angle)},
                                   .intensity = {100, 100, 100}};
-        nebel_snapshot *snapshot = make_airlight(cases[i].extinction, &lamp);
-        expect_light(snapshot, (nebel_ray){{0, 0, 0}, {1, 0, 0}, cases[i].length}, cases[i].light);
-        nebel_release_snapshot(snapshot);
+        nebel_lighting *lighting = make_airlight(cases[i].extinction, &lamp);
+        expect_light(lighting, (nebel_ray){{0, 0, 0}, {1, 0, 0}, cases[i].length}, cases[i].light);
+        nebel_release_lighting(lighting);
     }
 }
 
@@ -78,20 +66,20 @@ static void spots_are_those_of_T19(void **state)
                         .outer_angle = 30};
     const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, HUGE_VAL};
     (void)state;
-    nebel_snapshot *snapshot = make_airlight(0.02, &lamp);
-    expect_light(snapshot, ray, 0.02458581030636606);
-    expect_light(snapshot, (nebel_ray){{0, 0, 0}, {1, 0, 0}, 7.1132}, 0);
-    nebel_release_snapshot(snapshot);
+    nebel_lighting *lighting = make_airlight(0.02, &lamp);
+    expect_light(lighting, ray, 0.02458581030636606);
+    expect_light(lighting, (nebel_ray){{0, 0, 0}, {1, 0, 0}, 7.1132}, 0);
+    nebel_release_lighting(lighting);
     lamp.inner_angle = lamp.outer_angle = 180; /* a point */
-    snapshot = make_airlight(0.02, &lamp);
+    lighting = make_airlight(0.02, &lamp);
     const nebel_trace_desc fine = {.tolerance = 1e-9};
-    const nebel_transfer spot = ask(snapshot, &fine, ray);
-    nebel_release_snapshot(snapshot);
+    const nebel_transfer spot = ask(lighting, fine, ray);
+    nebel_release_lighting(lighting);
     lamp.type = NEBEL_LIGHT_POINT;
-    snapshot = make_airlight(0.02, &lamp);
-    const nebel_transfer point = ask(snapshot, &fine, ray);
+    lighting = make_airlight(0.02, &lamp);
+    const nebel_transfer point = ask(lighting, fine, ray);
     assert_true(fog_difference(&spot, &point) < 2e-9);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 /* ---- brute force ----------------------------------------------------------------------------- */
@@ -137,7 +125,7 @@ static double glow_at(const nebel_volume_desc *balls, size_t count, const nebel_
 
 enum { STEPS = 40000 };
 
-static double brute_force(const nebel_snapshot *snapshot, const nebel_volume_desc *balls, size_t count,
+static double brute_force(const nebel_lighting *lighting, const nebel_volume_desc *balls, size_t count,
                           const nebel_light *lamp, const nebel_ray *ray)
 {
     static nebel_ray rays[2 * STEPS];
@@ -153,9 +141,7 @@ static double brute_force(const nebel_snapshot *snapshot, const nebel_volume_des
         rays[2 * i].t_max = t;
         rays[2 * i + 1] = (nebel_ray){{place[0], place[1], place[2]}, {towards[0], towards[1], towards[2]}, reach};
     }
-    const nebel_trace_desc desc = {.transmittance_only = 1};
-    assert_int_equal(nebel_trace(snapshot, &desc, 2 * (size_t)STEPS, rays, sizeof *rays, transfers, sizeof *transfers),
-                     NEBEL_OK);
+    fog_trace(lighting, (nebel_trace_desc){.transmittance_only = 1}, 2 * (size_t)STEPS, rays, transfers);
     double sum = 0;
     for (int i = 0; i < STEPS; i++)
         sum += glow[i] * h * transfers[2 * i].transmittance[0] * transfers[2 * i + 1].transmittance[0];
@@ -189,15 +175,16 @@ static void light_is_that_of_brute_force(void **state)
     (void)state;
     double worst = 0;
     for (size_t l = 0; l < sizeof lamps / sizeof lamps[0]; l++) {
-        nebel_snapshot *snapshot = commit(&(nebel_fog_desc){0}, balls, 2, &lamps[l], 1);
+        const nebel_lighting_desc lights = {.lights = &lamps[l], .light_count = 1};
+        nebel_lighting *lighting = fog_light(&lights, balls, 2);
         for (size_t r = 0; r < nb_test_count(RAY_KINDS); r++) {
             const nebel_ray *const ray = &rays[(l + r) % RAY_KINDS];
-            const nebel_transfer transfer = ask(snapshot, &(nebel_trace_desc){.tolerance = 1e-6}, *ray);
-            const double sum = brute_force(snapshot, balls, 2, &lamps[l], ray);
+            const nebel_transfer transfer = ask(lighting, (nebel_trace_desc){.tolerance = 1e-6}, *ray);
+            const double sum = brute_force(lighting, balls, 2, &lamps[l], ray);
             worst = fmax(worst, fabs(transfer.in_scattering[0] - sum) / sum);
             assert_true(transfer.error <= 1.1e-6);
         }
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
     print_message("off by at most %.1e\n", worst);
     assert_true(worst < 3e-4); /* steps that an edge falls into */
@@ -215,7 +202,7 @@ enum { SEEDS = 3 };
 enum { RAYS = 16, LAMPS = 3 };
 
 static random_fog fog;
-static nebel_fog_desc sky;
+static nebel_lighting_desc sky;
 static nebel_light lamps[LAMPS];
 
 /* Random fog under a sun and lamps within and beside it. */
@@ -236,26 +223,28 @@ static void make_lit(random_fog_kind kind, uint64_t seed)
             lamp->intensity[c] = dice(&numbers, 0, 20);
         }
     }
-    sky = (nebel_fog_desc){.sun = {.direction = {dice(&numbers, -1, 1), dice(&numbers, 0.2, 1), 0.3}}};
+    sky = (nebel_lighting_desc){.sun = {.direction = {dice(&numbers, -1, 1), dice(&numbers, 0.2, 1), 0.3}}};
     if (seed % 2 == 0) sky.sun.irradiance[0] = sky.sun.irradiance[1] = sky.sun.irradiance[2] = 4;
-    memcpy(sky.ambient, fog.ambient, sizeof sky.ambient);
+    memcpy(sky.environment.radiance, fog.ambient, sizeof fog.ambient);
+    sky.lights = lamps;
+    sky.light_count = LAMPS;
 }
 
-static nebel_snapshot *commit_lit(void)
+static nebel_lighting *commit_lit(void)
 {
-    return commit(&sky, fog.volumes, fog.count, lamps, LAMPS);
+    return fog_light(&sky, fog.volumes, fog.count);
 }
 
-static void trace_some(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t count,
+static void trace_some(const nebel_lighting *lighting, const nebel_trace_desc *desc, size_t count,
                        const nebel_ray rays[RAYS], nebel_transfer transfers[RAYS])
 {
-    assert_int_equal(nebel_trace(snapshot, desc, count, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
+    fog_trace(lighting, *desc, count, rays, transfers);
 }
 
-static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, const nebel_ray rays[RAYS],
+static void trace(const nebel_lighting *lighting, const nebel_trace_desc *desc, const nebel_ray rays[RAYS],
                   nebel_transfer transfers[RAYS])
 {
-    trace_some(snapshot, desc, RAYS, rays, transfers);
+    trace_some(lighting, desc, RAYS, rays, transfers);
 }
 
 static void draw_rays(nebel_ray rays[RAYS])
@@ -274,11 +263,11 @@ static void errors_are_told(void **state)
             nebel_ray rays[RAYS];
             nebel_transfer fine[RAYS], transfer[RAYS];
             make_lit((random_fog_kind)kind, seed);
-            nebel_snapshot *snapshot = commit_lit();
+            nebel_lighting *lighting = commit_lit();
             draw_rays(rays);
-            trace_some(snapshot, &(nebel_trace_desc){.tolerance = 2e-5}, count, rays, fine);
+            trace_some(lighting, &(nebel_trace_desc){.tolerance = 2e-5}, count, rays, fine);
             for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-                trace_some(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, count, rays,
+                trace_some(lighting, &(nebel_trace_desc){.precision = (nebel_precision)precision}, count, rays,
                            transfer);
                 for (size_t i = 0; i < count; i++) {
                     const double off = fog_difference(&transfer[i], &fine[i]);
@@ -286,7 +275,7 @@ static void errors_are_told(void **state)
                     slack = fmax(slack, transfer[i].error);
                 }
             }
-            nebel_release_snapshot(snapshot);
+            nebel_release_lighting(lighting);
         }
         print_message("kind %d: off by at most %.3f of the error told; at most %.1e told\n", kind, worst, slack);
         assert_true(worst <= 1);
@@ -304,7 +293,7 @@ static void light_is_the_same_in_any_set_and_split(void **state)
         nebel_ray rays[RAYS];
         nebel_transfer all[RAYS], expected[RAYS], other[RAYS];
         make_lit((random_fog_kind)kind, 4);
-        nebel_snapshot *snapshot = commit_lit();
+        nebel_lighting *lighting = commit_lit();
         draw_rays(rays);
         for (uint32_t i = 0; i < RAYS; i++) {
             const uint32_t count = (uint32_t)dice(&numbers, 0, 8);
@@ -315,24 +304,24 @@ static void light_is_the_same_in_any_set_and_split(void **state)
         const nebel_ray_visibility none = {(const uint32_t[RAYS + 1]){0}, NULL}, some = {first, boundaries};
         const nebel_ray_visibility pieces[LAMPS] = {some, none, some};
         nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
-        trace(snapshot, &desc, rays, all);
+        trace(lighting, &desc, rays, all);
         desc.light_visibility = pieces;
-        trace(snapshot, &desc, rays, expected);
+        trace(lighting, &desc, rays, expected);
         for (int i = 0; i < RAYS; i++)
             assert_memory_equal(all[i].transmittance, expected[i].transmittance, sizeof all[i].transmittance);
         for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
             if (!nebel_isa_available(desc.isa)) continue;
             desc.light_visibility = pieces;
-            trace(snapshot, &desc, rays, other);
+            trace(lighting, &desc, rays, other);
             assert_memory_equal(expected, other, sizeof expected);
             for (size_t i = 0; i < nb_test_count(RAYS); i++) {
                 const nebel_ray_visibility one[LAMPS] = {{first + i, boundaries}, none, {first + i, boundaries}};
                 desc.light_visibility = one;
-                assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
+                fog_trace(lighting, desc, 1, &rays[i], &other[i]);
             }
             assert_memory_equal(expected, other, sizeof expected);
         }
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
 }
 
@@ -344,18 +333,18 @@ static void pieces_add_up(void **state)
     const nebel_ray_visibility pieces[] = {{odd_first, odd}, {even_first, even}};
     const nebel_light lamp = {.position = {10, 1, 2}, .intensity = {100, 50, 20}};
     const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 60};
-    nebel_snapshot *snapshot = make_airlight(0.03, &lamp);
+    nebel_lighting *lighting = make_airlight(0.03, &lamp);
     (void)state;
     nebel_transfer transfer[3];
     for (int i = 0; i < 3; i++)
         transfer[i] =
-            ask(snapshot, &(nebel_trace_desc){.tolerance = 1e-8, .light_visibility = i < 2 ? &pieces[i] : NULL}, ray);
+            ask(lighting, (nebel_trace_desc){.tolerance = 1e-8, .light_visibility = i < 2 ? &pieces[i] : NULL}, ray);
     for (int c = 0; c < 3; c++) {
         const double both = transfer[0].in_scattering[c] + transfer[1].in_scattering[c];
         assert_true(transfer[1].in_scattering[c] > 0.05 * transfer[2].in_scattering[c]);
         assert_true(fabs(both - transfer[2].in_scattering[c]) < 3e-8);
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 /* ---- hard cases ------------------------------------------------------------------------------ */
@@ -372,21 +361,21 @@ static void hard_rays_are_answered(void **state)
                               {{far + 1e-4, 5, 0}, {0, 1, 0}, 1e-6},
                               {{0, 5, 0}, {0, 1, 0}, HUGE_VAL},
                               {{far - 20, 5, 0}, {0, 1, 0}, HUGE_VAL}};
-    nebel_snapshot *snapshot = make_airlight(0.02, &lamp), *near;
+    nebel_lighting *lighting = make_airlight(0.02, &lamp), *near;
     (void)state;
     for (size_t i = 0; i < sizeof rays / sizeof rays[0]; i++)
         for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
             const nebel_transfer transfer =
-                ask(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, rays[i]);
+                ask(lighting, (nebel_trace_desc){.precision = (nebel_precision)precision}, rays[i]);
             for (int c = 0; c < 3; c++) assert_true(transfer.in_scattering[c] >= 0 && transfer.in_scattering[c] < 1e4);
             assert_true(transfer.error >= 0 && transfer.error < 0.01);
         }
-    const nebel_transfer away = ask(snapshot, NULL, rays[6]);
+    const nebel_transfer away = ask(lighting, (nebel_trace_desc){0}, rays[6]);
     near = make_airlight(0.02, &(nebel_light){.position = {0, 5, 0}, .intensity = {100, 100, 100}});
-    const nebel_transfer here = ask(near, NULL, (nebel_ray){{-20, 5, 0}, {0, 1, 0}, HUGE_VAL});
+    const nebel_transfer here = ask(near, (nebel_trace_desc){0}, (nebel_ray){{-20, 5, 0}, {0, 1, 0}, HUGE_VAL});
     assert_true(fog_difference(&away, &here) < 1e-9);
-    nebel_release_snapshot(snapshot);
-    nebel_release_snapshot(near);
+    nebel_release_lighting(lighting);
+    nebel_release_lighting(near);
 }
 
 static void lamps_are_checked(void **state)
@@ -407,21 +396,23 @@ static void lamps_are_checked(void **state)
     wrong[9].outer_angle = 0;
     wrong[10].inner_angle = 41;
     wrong[11].outer_angle = 181;
-    nebel_fog *made = NULL;
     (void)state;
     fog_messages messages = {0};
-    const nebel_fog_desc desc = {.log = fog_messages_log(&messages)};
-    assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
+    nebel_snapshot *empty = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, NULL, 0);
+    nebel_lighting *made = NULL;
     for (int i = 0; i < 12; i++) {
         const nebel_light both[] = {right, wrong[i]};
-        assert_int_equal(nebel_set_lamps(made, 2, both), NEBEL_ERROR_VALUE);
+        const nebel_lighting_desc desc = {.lights = both, .light_count = 2};
+        assert_int_equal(nebel_create_lighting(empty, &desc, &made), NEBEL_ERROR_VALUE);
         assert_non_null(strstr(messages.text, "lamp 1: "));
+        assert_null(made);
     }
-    assert_int_equal(nebel_set_lamps(made, 1, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_set_lamps(NULL, 1, &right), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_set_lamps(made, 1, &right), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(made, 0, NULL), NEBEL_OK);
-    nebel_destroy_fog(made);
+    const nebel_lighting_desc none = {.light_count = 1}, one = {.lights = &right, .light_count = 1};
+    assert_int_equal(nebel_create_lighting(empty, &none, &made), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_lighting(NULL, &one, &made), NEBEL_ERROR_ARGUMENT);
+    nebel_release_lighting(light_fog(empty, &one));
+    nebel_release_lighting(light_fog(empty, &(nebel_lighting_desc){.lights = &right}));
+    nebel_release_snapshot(empty);
 }
 
 static void lost_memory_is_survived(void **state)
@@ -433,14 +424,13 @@ static void lost_memory_is_survived(void **state)
     const nebel_ray ray = {{0, 0.2, -1}, {0, 0, 1}, HUGE_VAL};
     fog_memory memory = {0};
     const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory)};
+    const nebel_lighting_desc lights = {.lights = &lamp, .light_count = 1};
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;
+    nebel_lighting *lighting = NULL;
     (void)state;
     assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
     assert_int_equal(nebel_add_volume(made, &volume, NULL), NEBEL_OK);
-    memory.fail_first = memory.fail_count = 1;
-    assert_int_equal(nebel_set_lamps(made, 1, &lamp), NEBEL_ERROR_MEMORY);
-    assert_int_equal(nebel_set_lamps(made, 1, &lamp), NEBEL_OK);
     nebel_result result = NEBEL_ERROR_MEMORY;
     for (size_t k = 1; result == NEBEL_ERROR_MEMORY; k++) {
         memory.fail_first = k;
@@ -448,18 +438,26 @@ static void lost_memory_is_survived(void **state)
         result = nebel_commit_fog(made, &snapshot);
     }
     assert_int_equal(result, NEBEL_OK);
+    result = NEBEL_ERROR_MEMORY;
+    for (size_t k = 1; result == NEBEL_ERROR_MEMORY; k++) {
+        memory.fail_first = k;
+        memory.fail_count = 1;
+        result = nebel_create_lighting(snapshot, &lights, &lighting);
+    }
+    assert_int_equal(result, NEBEL_OK);
     memory.fail_first = memory.fail_count = 1;
     nebel_transfer transfer;
-    const nebel_trace_desc asked = {.light_visibility = &pieces};
+    const nebel_trace_desc asked = {.lighting = lighting, .light_visibility = &pieces};
     assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &transfer, 0), NEBEL_ERROR_MEMORY);
     assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &transfer, 0), NEBEL_OK);
     nebel_destroy_fog(made);
     nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
     assert_int_equal(memory.live, 0);
 }
 
 /* What a renderer asks that casts shadows into fog. */
-static void a_snapshot_tells_of_its_lamps(void **state)
+static void a_lighting_tells_of_its_lamps(void **state)
 {
     const nebel_volume_desc volumes[] = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {1, 2, 3}, .radius = 2},
                                           .extinction = {1, 1, 1},
@@ -467,21 +465,22 @@ static void a_snapshot_tells_of_its_lamps(void **state)
                                          {.extinction = {1, 1, 1}, .source = {1, 1, 1}}};
     const nebel_light given[] = {{.position = {7, 8, 9}, .intensity = {1, 1, 1}, .radius = 0.5},
                                  {.position = {-1, 0, 1}, .intensity = {1, 1, 1}}};
-    double min[3], max[3], position[3], radius;
+    const nebel_lighting_desc desc = {.lights = given, .light_count = 2};
+    const nebel_light *told = NULL;
+    nebel_bounds lit;
     (void)state;
-    nebel_snapshot *snapshot = commit(&(nebel_fog_desc){0}, volumes, 2, given, 2);
-    assert_int_equal(nebel_snapshot_lamplit_fog(snapshot, min, max), 1);
-    for (int c = 0; c < 3; c++) assert_true(fabs(min[c] - (c - 1)) < 1e-6 && fabs(max[c] - (c + 3)) < 1e-6);
-    assert_int_equal(nebel_snapshot_lamp_count(snapshot), 2);
+    nebel_lighting *lighting = fog_light(&desc, volumes, 2);
+    assert_int_equal(nebel_get_lit_bounds(lighting, NEBEL_LIGHT_GROUP_LOCAL, &lit), 1);
+    for (int c = 0; c < 3; c++) assert_true(fabs(lit.min[c] - (c - 1)) < 1e-6 && fabs(lit.max[c] - (c + 3)) < 1e-6);
+    assert_int_equal(nebel_get_lighting_lights(lighting, &told), 2);
     for (size_t i = 0; i < 2; i++) {
-        nebel_snapshot_lamp(snapshot, i, position, &radius);
-        assert_memory_equal(position, given[i].position, sizeof position);
-        assert_true(radius == given[i].radius);
+        assert_memory_equal(told[i].position, given[i].position, sizeof given[i].position);
+        assert_true(told[i].radius == given[i].radius);
     }
-    nebel_release_snapshot(snapshot);
-    snapshot = commit(&(nebel_fog_desc){0}, &volumes[1], 1, given, 2);
-    assert_int_equal(nebel_snapshot_lamplit_fog(snapshot, min, max), 0);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
+    lighting = fog_light(&desc, &volumes[1], 1);
+    assert_int_equal(nebel_get_lit_bounds(lighting, NEBEL_LIGHT_GROUP_LOCAL, &lit), 0);
+    nebel_release_lighting(lighting);
 }
 
 int main(void)
@@ -496,7 +495,7 @@ int main(void)
         cmocka_unit_test(hard_rays_are_answered),
         cmocka_unit_test(lamps_are_checked),
         cmocka_unit_test(lost_memory_is_survived),
-        cmocka_unit_test(a_snapshot_tells_of_its_lamps),
+        cmocka_unit_test(a_lighting_tells_of_its_lamps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -27,13 +27,13 @@ static void render(const nebel_light *lamp, int has_lid, double extinction, test
     camera.up[1] = 0;
     camera.up[2] = -1;
     camera.view_height = SIZE / 8.0;
-    nebel_snapshot *fog = test_world_fog(extinction, 0);
+    nebel_lighting *fog = test_world_fog(extinction, 0);
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     const nebel_frame_desc desc = {.camera = camera, .width = SIZE, .height = SIZE, .samples = 1};
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture->planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* Of the pixel: metres from the middle, to the right and down. */
@@ -113,18 +113,6 @@ static void odd_lamps_are_answered(void **state)
 
 static const float wall_positions[] = {-50, -50, -3, 50, -50, -3, 50, 50, -3, -50, 50, -3};
 
-static nebel_snapshot *lit_fog(const nebel_volume_desc *volume, const nebel_light *lamp)
-{
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, 1, lamp), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
-}
-
 /* Level at a wall 3 m behind the lamp, through fog about it; the floor is seen from its edge. */
 static void render_wall(const nebel_light *lamp, int has_floor, nebel_method method, test_picture *picture)
 {
@@ -136,7 +124,8 @@ static void render_wall(const nebel_light *lamp, int has_floor, nebel_method met
     const nebel_volume_desc box = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-4, -4, -2.9}, .max = {4, 4, 3}},
                                    .extinction = {.1, .1, .1},
                                    .albedo = {1, 1, 1}};
-    nebel_snapshot *fog = lit_fog(&box, lamp);
+    const nebel_lighting_desc lights = {.lights = lamp, .light_count = 1};
+    nebel_lighting *fog = fog_commit_lit(&(nebel_fog_desc){0}, &box, 1, &lights);
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, method, NULL), NEBEL_OK);
@@ -146,7 +135,7 @@ static void render_wall(const nebel_light *lamp, int has_floor, nebel_method met
     desc.camera.view_height = 3.9;
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture->planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* On a floor, in it, and deeper in it by less than 1 mm, a lamp lights what is above as if there were no floor; but for

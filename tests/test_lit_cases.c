@@ -4,16 +4,11 @@
 #include "fog_help.h"
 #include "lit_cases.h"
 
-static nebel_snapshot *commit_case(const lit_case *c)
+static nebel_lighting *commit_case(const lit_case *c)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.sun = c->sun}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &c->volume, NULL), NEBEL_OK);
-    if (c->lamp.intensity[0] > 0) assert_int_equal(nebel_set_lamps(fog, 1, &c->lamp), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    const size_t lamp_count = c->lamp.intensity[0] > 0 ? 1 : 0;
+    const nebel_lighting_desc lights = {.sun = c->sun, .lights = &c->lamp, .light_count = lamp_count};
+    return fog_light(&lights, &c->volume, 1);
 }
 
 static void light_of_small_places_is_within_the_error(void **state)
@@ -22,11 +17,11 @@ static void light_of_small_places_is_within_the_error(void **state)
     int wrong = 0;
     for (size_t i = 0; i < LIT_CASES; i++) {
         const lit_case *c = &lit_cases[i];
-        nebel_snapshot *snapshot = commit_case(c);
+        nebel_lighting *lighting = commit_case(c);
         for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
             nebel_transfer transfer;
             const nebel_trace_desc desc = {.precision = (nebel_precision)precision, .tolerance = c->tolerance};
-            assert_int_equal(nebel_trace(snapshot, &desc, 1, &c->ray, 0, &transfer, 0), NEBEL_OK);
+            fog_trace(lighting, desc, 1, &c->ray, &transfer);
             const double off = fabs(transfer.in_scattering[0] - c->right), digits = 5e-6 * c->right;
             if (off <= transfer.error + digits) continue;
             print_message("%s, %s: %g for %g, error %g\n", c->name,
@@ -34,7 +29,7 @@ static void light_of_small_places_is_within_the_error(void **state)
                           transfer.error);
             wrong++;
         }
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
     assert_int_equal(wrong, 0);
 }
@@ -98,15 +93,14 @@ static const nebel_volume_desc company[] = {
      .extinction = {0.0005980100383277415, 0.0005980100383277415, 0.0005980100383277415},
      .albedo = {0.5119207657032396, 0.9508476350068125, 0.795565786496648}}};
 
-static void compare_with_alone(const nebel_snapshot *snapshot, const nebel_ray rays[2])
+static void compare_with_alone(const nebel_lighting *lighting, const nebel_ray rays[2])
 {
     for (int isa = NEBEL_ISA_DEFAULT; isa < NEBEL_ISA_COUNT; isa++) {
         if (!nebel_isa_available((nebel_isa)isa)) continue;
         const nebel_trace_desc asked = {.precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa};
         nebel_transfer both[2], alone[2];
-        assert_int_equal(nebel_trace(snapshot, &asked, 2, rays, sizeof *rays, both, sizeof *both), NEBEL_OK);
-        for (int i = 0; i < 2; i++)
-            assert_int_equal(nebel_trace(snapshot, &asked, 1, &rays[i], 0, &alone[i], 0), NEBEL_OK);
+        fog_trace(lighting, asked, 2, rays, both);
+        for (int i = 0; i < 2; i++) fog_trace(lighting, asked, 1, &rays[i], &alone[i]);
         assert_memory_equal(both, alone, sizeof both);
     }
 }
@@ -114,17 +108,17 @@ static void compare_with_alone(const nebel_snapshot *snapshot, const nebel_ray r
 static void an_error_is_the_same_in_any_company(void **state)
 {
     (void)state;
-    const nebel_fog_desc desc = {.sun = {{0.5703836956029522, 0.7341352143446351, 0.28227282113884566},
-                                         {3.798747974940091, 5.701761832261121, 3.004591232939652}}};
+    const nebel_lighting_desc lights = {.sun = {{0.5703836956029522, 0.7341352143446351, 0.28227282113884566},
+                                                {3.798747974940091, 5.701761832261121, 3.004591232939652}}};
     const nebel_ray rays[] = {{{-7027.572529043353, 13281.28243056264, 3670.531089885469},
                                {-1388.2683006868756, -24713.766115851984, -17996.825625834386},
                                10000000.0},
                               {{-12370.996091612718, -1214.2372285642632, -2837.3831879135823},
                                {12987.905803801903, 9356.483849675022, 8053.4140760037235},
                                10000000.0}};
-    nebel_snapshot *snapshot = fog_commit(&desc, company, sizeof company / sizeof company[0]);
-    compare_with_alone(snapshot, rays);
-    nebel_release_snapshot(snapshot);
+    nebel_lighting *lighting = fog_light(&lights, company, sizeof company / sizeof company[0]);
+    compare_with_alone(lighting, rays);
+    nebel_release_lighting(lighting);
 }
 
 /* One ray of two is in the voxels. */
@@ -144,12 +138,12 @@ static void an_error_is_the_same_beside_voxels(void **state)
          .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = 0.378},
          .extinction = {1.75, 1.32, 1.97},
          .albedo = {0.88, 0.88, 0.88}}};
-    const nebel_fog_desc desc = {.sun = {{0.5718, 0.799, 0.186}, {1.466, 1.466, 1.466}}};
+    const nebel_lighting_desc lights = {.sun = {{0.5718, 0.799, 0.186}, {1.466, 1.466, 1.466}}};
     const nebel_ray rays[] = {{{-0.7321759, -0.6259578, -0.9529993}, {0.17222105, 0.9078012, -0.38240934}, 1.0403034},
                               {{0.0097677520, -0.2111334, -0.4915024}, {0.15538425, 0.4294096, -0.8896421}, 2.0793005}};
-    nebel_snapshot *snapshot = fog_commit(&desc, fog, 2);
-    compare_with_alone(snapshot, rays);
-    nebel_release_snapshot(snapshot);
+    nebel_lighting *lighting = fog_light(&lights, fog, 2);
+    compare_with_alone(lighting, rays);
+    nebel_release_lighting(lighting);
     nebel_release_grid(grid);
 }
 

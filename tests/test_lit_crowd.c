@@ -4,7 +4,7 @@
 
 #include "fog_help.h"
 
-#include <nebel/places.h>
+#include <nebel/nebel.h>
 
 #include <math.h>
 
@@ -22,7 +22,7 @@ static double dot(const double a[3], const double b[3])
 typedef struct crowd {
     nebel_volume_desc bodies[BODIES];
     size_t count;
-    nebel_fog_desc desc;
+    nebel_sun sun;
     nebel_light lamp;
     int has_lamp;
 } crowd;
@@ -105,27 +105,15 @@ static void make_crowd(crowd *made, size_t count, int mixed, int light, uint64_t
         made->lamp = spot;
     }
     if (light == 0) {
-        made->desc.sun = (nebel_sun){.irradiance = {3, 2, 1}};
-        memcpy(made->desc.sun.direction, sun_direction, sizeof sun_direction);
+        made->sun = (nebel_sun){.irradiance = {3, 2, 1}};
+        memcpy(made->sun.direction, sun_direction, sizeof sun_direction);
     }
 }
 
-static nebel_snapshot *commit(const nebel_fog_desc *desc, size_t count, const nebel_volume_desc *bodies, int has_lamp,
-                              const nebel_light *lamp)
+static nebel_lighting *commit_crowd(const crowd *of)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(desc, &fog), NEBEL_OK);
-    for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(fog, &bodies[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, (size_t)has_lamp, lamp), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
-}
-
-static nebel_snapshot *commit_crowd(const crowd *of)
-{
-    return commit(&of->desc, of->count, of->bodies, of->has_lamp, &of->lamp);
+    const nebel_lighting_desc lights = {.sun = of->sun, .lights = &of->lamp, .light_count = (size_t)of->has_lamp};
+    return fog_light(&lights, of->bodies, of->count);
 }
 
 static void make_rays(nebel_ray rays[RAYS], uint64_t seed)
@@ -217,7 +205,7 @@ static forced light_by_force(const crowd *of, const nebel_snapshot *snapshot, co
         const int shines = dark == NULL || t < (double)dark[0] || t >= (double)dark[1];
         for (int c = 0; c < 3; c++) {
             const double glow = (all[c] - some[c]) * phase_value(0, 0) + some[c] * forward;
-            const double source = of->has_lamp ? of->lamp.intensity[c] : of->desc.sun.irradiance[c];
+            const double source = of->has_lamp ? of->lamp.intensity[c] : of->sun.irradiance[c];
             const double light = glow * shines * source * from.fluence * step;
             sum.light[c] += light * seen.transmittance[c] * lit.transmittance[c];
             sum.off[c] += 0.5 * fabs(light - before[c]) * seen.transmittance[c] * lit.transmittance[c];
@@ -228,7 +216,7 @@ static forced light_by_force(const crowd *of, const nebel_snapshot *snapshot, co
 }
 
 /* The bodies whose phase function is turned are lit, the others are not. */
-static nebel_snapshot *commit_turned(const crowd *of)
+static nebel_lighting *commit_turned(const crowd *of)
 {
     crowd only = *of;
     for (size_t i = 0; i < only.count; i++)
@@ -239,26 +227,20 @@ static nebel_snapshot *commit_turned(const crowd *of)
 
 /* ---- tests ----------------------------------------------------------------------------------- */
 
-static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, const nebel_ray *rays,
-                  nebel_transfer *transfers)
-{
-    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
-}
-
 /* Alone and in any company. */
-static void expect_the_same_bits(const nebel_snapshot *snapshot, const nebel_trace_desc *asked, const nebel_ray *rays,
+static void expect_the_same_bits(const nebel_lighting *lighting, const nebel_trace_desc *asked, const nebel_ray *rays,
                                  const nebel_transfer *expected)
 {
     nebel_transfer other[RAYS];
     nebel_trace_desc desc = *asked;
     for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
         if (!nebel_isa_available(desc.isa)) continue;
-        trace(snapshot, &desc, rays, other);
+        fog_trace(lighting, desc, RAYS, rays, other);
         assert_memory_equal(expected, other, sizeof other);
     }
     if (asked->sun_visibility != NULL || asked->light_visibility != NULL) return;
     for (int i = 0; i < RAYS; i++) {
-        assert_int_equal(nebel_trace(snapshot, asked, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
+        fog_trace(lighting, *asked, 1, &rays[i], &other[i]);
         assert_memory_equal(&expected[i], &other[i], sizeof other[i]);
     }
 }
@@ -277,16 +259,17 @@ static void expect_brute_force(size_t count, int mixed, int light, int in_shadow
     const nebel_ray_visibility pieces = {first, boundaries};
     make_crowd(&of, count, mixed, light, 17 * count + (uint64_t)light);
     make_rays(rays, 5 * count + 3);
-    nebel_snapshot *snapshot = commit_crowd(&of), *turned = commit_turned(&of);
+    nebel_lighting *lighting = commit_crowd(&of), *turned = commit_turned(&of);
     for (int i = 0; i < forced_rays; i++)
-        force[i] = light_by_force(&of, snapshot, turned, &rays[i], in_shadow ? boundaries : NULL);
+        force[i] = light_by_force(&of, nebel_get_lighting_snapshot(lighting), nebel_get_lighting_snapshot(turned),
+                                  &rays[i], in_shadow ? boundaries : NULL);
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         for (int fine = 0; fine < 2; fine++) {
             nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = fine ? 2e-5 : 0};
             if (in_shadow && light == 0) asked.sun_visibility = &pieces;
             if (in_shadow && light > 0) asked.light_visibility = &pieces;
-            trace(snapshot, &asked, rays, transfers);
-            if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_bits(snapshot, &asked, rays, transfers);
+            fog_trace(lighting, asked, RAYS, rays, transfers);
+            if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_bits(lighting, &asked, rays, transfers);
             for (int i = 0; i < forced_rays; i++) {
                 assert_true(transfers[i].error < (fine ? 2e-5 : 1e-3));
                 for (int c = 0; c < 3; c++) {
@@ -297,8 +280,8 @@ static void expect_brute_force(size_t count, int mixed, int light, int in_shadow
             }
         }
     }
-    nebel_release_snapshot(turned);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(turned);
+    nebel_release_lighting(lighting);
 }
 
 static void sunlight_is_what_brute_force_finds(void **state)
@@ -323,7 +306,7 @@ static void expect_light_through_slits(int boxes, double slit)
     const double extinction = 0.3, width = 22.0 / boxes;
     static crowd of;
     double right = 0;
-    of = (crowd){.count = (size_t)boxes + 1, .desc = {.sun = {{0, 1, 0}, {3, 3, 3}}}};
+    of = (crowd){.count = (size_t)boxes + 1, .sun = {{0, 1, 0}, {3, 3, 3}}};
     of.bodies[boxes] =
         (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .min = {-10, -1, -50}, .max = {10, 0, 50}},
                             .extinction = {extinction, extinction, extinction},
@@ -337,16 +320,16 @@ static void expect_light_through_slits(int boxes, double slit)
     }
     right *= 3 * exp(-extinction * 0.5) * phase_value(0, 0);
     const nebel_ray ray = {{-12, -0.5, 0}, {1, 0, 0}, HUGE_VAL};
-    nebel_snapshot *snapshot = commit_crowd(&of);
+    nebel_lighting *lighting = commit_crowd(&of);
     for (int way = 0; way < 3; way++) {
         const nebel_trace_desc asked = {.precision = way == 2 ? NEBEL_PRECISION_FLOAT : NEBEL_PRECISION_DOUBLE,
                                         .tolerance = way == 1 ? 1e-5 : 0};
         nebel_transfer transfer;
-        assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &transfer, 0), NEBEL_OK);
+        fog_trace(lighting, asked, 1, &ray, &transfer);
         assert_true(transfer.error < (way == 1 ? 1e-5 : 1e-3));
         assert_true(fabs(transfer.in_scattering[0] - right) <= transfer.error);
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 static void light_falls_through_slits(void **state)
@@ -364,9 +347,10 @@ static void bodies_far_away_change_nothing(void **state)
 {
     (void)state;
     static const nebel_light lamp = {.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
+    const nebel_lighting_desc lights = {.lights = &lamp, .light_count = 1};
     enum { MANY = 70 };
     nebel_volume_desc bodies[MANY];
-    nebel_snapshot *fog[2];
+    nebel_lighting *fog[2];
     nebel_transfer transfers[2][FORCED];
     nebel_ray rays[RAYS];
     for (int i = 0; i < MANY; i++)
@@ -375,13 +359,11 @@ static void bodies_far_away_change_nothing(void **state)
     for (int i = 0; i < 6; i++) bodies[i / 3].albedo[i % 3] = 0.5, bodies[i / 3].extinction[i % 3] = 0.1;
     bodies[0].shape.radius = 5;
     bodies[1].phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.5};
-    for (int k = 0; k < 2; k++) fog[k] = commit(&(nebel_fog_desc){0}, k == 0 ? 2 : MANY, bodies, 1, &lamp);
+    for (int k = 0; k < 2; k++) fog[k] = fog_light(&lights, bodies, k == 0 ? 2 : MANY);
     make_rays(rays, 11);
     for (int precision = 0; precision < 2; precision++) {
         const nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = 1e-3};
-        for (int k = 0; k < 2; k++)
-            assert_int_equal(nebel_trace(fog[k], &asked, FORCED, rays, sizeof *rays, transfers[k], sizeof **transfers),
-                             NEBEL_OK);
+        for (int k = 0; k < 2; k++) fog_trace(fog[k], asked, FORCED, rays, transfers[k]);
         for (int i = 0; i < FORCED; i++) {
             const double few = transfers[0][i].error, many = transfers[1][i].error;
             assert_true(transfers[1][i].in_scattering[0] > 1e-3);
@@ -389,7 +371,7 @@ static void bodies_far_away_change_nothing(void **state)
             assert_true(many >= few && many <= 1.1 * few);
         }
     }
-    for (int k = 0; k < 2; k++) nebel_release_snapshot(fog[k]);
+    for (int k = 0; k < 2; k++) nebel_release_lighting(fog[k]);
 }
 
 int main(void)

@@ -35,10 +35,12 @@ static size_t undecided;
 
 /* ---- the same bits --------------------------------------------------------------------------- */
 
-static void ask(const nebel_snapshot *snapshot, way_to_ask way, nebel_isa isa, size_t n, const nebel_ray *rays,
+static void ask(const nebel_lighting *lighting, way_to_ask way, nebel_isa isa, size_t n, const nebel_ray *rays,
                 nebel_transfer *transfers)
 {
-    const nebel_trace_desc desc = {.precision = way == ASK_FLOAT ? NEBEL_PRECISION_FLOAT : NEBEL_PRECISION_DOUBLE,
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
+    const nebel_trace_desc desc = {.lighting = lighting,
+                                   .precision = way == ASK_FLOAT ? NEBEL_PRECISION_FLOAT : NEBEL_PRECISION_DOUBLE,
                                    .isa = isa,
                                    .tolerance = way == ASK_FINE ? 1e-5 : 0};
     assert_int_equal(nebel_trace(snapshot, &desc, n, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
@@ -53,30 +55,30 @@ static void compare_bits(tally *t, const char *how, const nebel_transfer *a, con
                   b->in_scattering[0], b->error, a->transmittance[0], a->in_scattering[0], a->error);
 }
 
-static void compare_orders(const nebel_snapshot *snapshot, int n, const nebel_ray *rays,
+static void compare_orders(const nebel_lighting *lighting, int n, const nebel_ray *rays,
                            const nebel_transfer *transfers, tally *t)
 {
     const size_t count = (size_t)n, some = count / 3;
     nebel_ray shuffled[RAYS];
     nebel_transfer again[RAYS];
     for (int i = 0; i < n; i++) shuffled[i * 7 % n] = rays[i];
-    ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, count, shuffled, again);
+    ask(lighting, ASK_FLOAT, NEBEL_ISA_DEFAULT, count, shuffled, again);
     for (int i = 0; i < n; i++) compare_bits(t, "shuffled", &transfers[i], &again[i * 7 % n]);
-    for (int i = 0; i < n; i++) ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, 1, &rays[i], &again[i]);
+    for (int i = 0; i < n; i++) ask(lighting, ASK_FLOAT, NEBEL_ISA_DEFAULT, 1, &rays[i], &again[i]);
     for (int i = 0; i < n; i++) compare_bits(t, "alone", &transfers[i], &again[i]);
-    ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, some, rays, again);
-    ask(snapshot, ASK_FLOAT, NEBEL_ISA_DEFAULT, count - some, rays + some, again + some);
+    ask(lighting, ASK_FLOAT, NEBEL_ISA_DEFAULT, some, rays, again);
+    ask(lighting, ASK_FLOAT, NEBEL_ISA_DEFAULT, count - some, rays + some, again + some);
     for (int i = 0; i < n; i++) compare_bits(t, "split", &transfers[i], &again[i]);
 }
 
-static void compare_all_bits(const nebel_snapshot *snapshot, int n, const nebel_ray *rays,
+static void compare_all_bits(const nebel_lighting *lighting, int n, const nebel_ray *rays,
                              const nebel_transfer *transfers, tally *t)
 {
     nebel_transfer again[RAYS];
-    compare_orders(snapshot, n, rays, transfers, t);
+    compare_orders(lighting, n, rays, transfers, t);
     for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
         if (!nebel_isa_available((nebel_isa)isa)) continue;
-        ask(snapshot, ASK_FLOAT, (nebel_isa)isa, (size_t)n, rays, again);
+        ask(lighting, ASK_FLOAT, (nebel_isa)isa, (size_t)n, rays, again);
         for (int i = 0; i < n; i++) compare_bits(t, nebel_isa_name((nebel_isa)isa), &transfers[i], &again[i]);
     }
 }
@@ -175,12 +177,12 @@ static void try_fog(lit_kind kind, lit_source source, uint64_t seed)
     const int n = lit_ray_count(kind);
     lit_draw_fog(&draw, kind, source, seed);
     lit_draw_rays(seed, rays);
-    nebel_snapshot *snapshot = lit_draw_commit(&draw);
-    assert_non_null(snapshot);
+    nebel_lighting *lighting = lit_draw_commit(&draw);
+    assert_non_null(lighting);
     lit_fog_prepare(&draw.scene, &fog);
     for (int way = 0; way < ASK_COUNT; way++)
-        ask(snapshot, (way_to_ask)way, NEBEL_ISA_DEFAULT, (size_t)n, rays, transfers[way]);
-    compare_all_bits(snapshot, n, rays, transfers[ASK_FLOAT], &bits[kind][source]);
+        ask(lighting, (way_to_ask)way, NEBEL_ISA_DEFAULT, (size_t)n, rays, transfers[way]);
+    compare_all_bits(lighting, n, rays, transfers[ASK_FLOAT], &bits[kind][source]);
     for (int i = 0; i < n; i++) {
         lit_truth is;
         if (find_truth(&fog, &rays[i], transfers, i, &is))
@@ -188,7 +190,7 @@ static void try_fog(lit_kind kind, lit_source source, uint64_t seed)
         else
             undecided++;
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
     lit_draw_free(&draw);
 }
 

@@ -66,7 +66,7 @@ static int is_grained(const lit_fog *lit, const nebel_ray *ray)
     return densest_fog(lit, ray) * 2 * farthest * ldexp(1, -24) > 1. / 255;
 }
 
-static void judge(const lit_fog *lit, lit_kind kind, lit_source source, uint64_t seed, const nebel_snapshot *snapshot,
+static void judge(const lit_fog *lit, lit_kind kind, lit_source source, uint64_t seed, const nebel_lighting *lighting,
                   int i, const lit_truth *is)
 {
     static const double origin[3];
@@ -83,7 +83,7 @@ static void judge(const lit_fog *lit, lit_kind kind, lit_source source, uint64_t
     if (t->rays < 1 << 14) t->off[t->rays] = off;
     t->rays++;
     if (off > 1. / 255 && (is_grained(lit, &rays[VECTOR * i]) ||
-                           off < 2 * conditioning(snapshot, &precise, &rays[VECTOR * i], origin, scale))) {
+                           off < 2 * conditioning(lighting, &precise, &rays[VECTOR * i], origin, scale))) {
         t->ill++;
         return;
     }
@@ -105,20 +105,20 @@ static void try_scene(tracer *t, lit_kind kind, lit_source source, uint64_t seed
     const int n = lit_ray_count(kind);
     lit_draw_fog(&draw, kind, source, seed);
     lit_draw_rays(seed, drawn);
-    nebel_snapshot *snapshot = lit_draw_commit(&draw);
-    assert_non_null(snapshot);
+    nebel_lighting *lighting = lit_draw_commit(&draw);
+    assert_non_null(lighting);
     lit_fog_prepare(&draw.scene, &lit);
     for (int i = 0; i < VECTOR * n; i++) set_ray(i, &drawn[i / VECTOR], origin);
-    pack_and_upload(t, snapshot, origin);
-    if (draw.grid != NULL) upload_voxels(t, snapshot);
+    pack_and_upload(t, lighting, origin);
+    if (draw.grid != NULL) upload_voxels(t, lighting);
     if (!nb_gl_evaluate(&t->gl, t->program, (size_t)(VECTOR * n), (const float *)items, (float *)answers))
         fail_msg("%s", t->gl.fault);
     for (int i = 0; i < n; i++) {
         lit_truth is;
         if (lit_oracle_trace(&lit, &rays[VECTOR * i], LIT_QUICK, &is))
-            judge(&lit, kind, source, seed, snapshot, i, &is);
+            judge(&lit, kind, source, seed, lighting, i, &is);
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
     lit_draw_free(&draw);
 }
 
@@ -129,10 +129,10 @@ static uint32_t features_of(lit_kind first, lit_kind last, lit_source source)
     for (int kind = (int)first; kind <= (int)last; kind++)
         for (uint64_t seed = 0; seed < seed_count; seed++) {
             lit_draw_fog(&draw, (lit_kind)kind, source, first_seed + seed);
-            nebel_snapshot *snapshot = lit_draw_commit(&draw);
-            assert_non_null(snapshot);
-            features |= (uint32_t)nebel_pack_features(snapshot);
-            nebel_release_snapshot(snapshot);
+            nebel_lighting *lighting = lit_draw_commit(&draw);
+            assert_non_null(lighting);
+            features |= (uint32_t)nebel_pack_features(lighting);
+            nebel_release_lighting(lighting);
             lit_draw_free(&draw);
         }
     return features;

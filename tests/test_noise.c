@@ -2,7 +2,7 @@
 #include "fog_help.h"
 #include "near.h"
 
-#include <nebel/places.h>
+#include <nebel/nebel.h>
 
 enum { NOISE_SIDE = 24 };
 

@@ -8,7 +8,6 @@
 #include <nebel/light.h>
 #include <nebel/particles.h>
 #include <nebel/photograph.h>
-#include <nebel/places.h>
 #include <nebel/render.h>
 #include <nebel/shader.h>
 
@@ -40,6 +39,7 @@ static const nebel_triangles good_triangles = {
     .positions = floats, .vertex_count = 3, .indices = indices, .triangle_count = 1};
 static const nebel_cloud_layer good_cloud_layer = {.coverage = .5};
 static const nebel_diffusion_desc good_diffusion_desc = {.max_cells = 512};
+static const nebel_lighting_desc good_lighting_desc = {.light_count = 0};
 static const nebel_environment good_environment = {.type = NEBEL_ENVIRONMENT_CONSTANT};
 static const float sky[24] = {1};
 static const nebel_environment_map_desc good_environment_map_desc = {.width = 4, .height = 2, .pixels = sky};
@@ -55,7 +55,6 @@ static const nebel_fog_desc good_fog_desc = {.max_opacity = 0};
 static const nebel_volume_desc good_volume_desc = {
     .shape = {.type = NEBEL_SHAPE_BOX, .max = {1, 1, 1}}, .extinction = {.1, .1, .1}, .source = {1, 1, 1}};
 static const nebel_sun good_sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}};
-static const nebel_light good_light = {.intensity = {1, 1, 1}};
 static const nebel_trace_desc good_trace_desc = {.tolerance = 0};
 static const nebel_ray good_ray = {{0, 1, 0}, {0, 1, 0}, 1};
 static const nebel_ray_planes good_ray_planes = {.direction = {0, 1, 0}};
@@ -97,8 +96,8 @@ static struct {
     nebel_droplet_properties droplet_properties;
     size_t count;
     nebel_volume_id volume_id;
-    nebel_sunlit_fog sunlit_fog;
-    nebel_split_fog split_fog;
+    nebel_bounds bounds;
+    const nebel_light *lights;
     nebel_transfer transfer;
     nebel_particle particle;
     nebel_medium_properties medium_properties;
@@ -157,6 +156,7 @@ typedef struct objects {
     nebel_fog *fog;
     nebel_volume_id id;
     nebel_snapshot *snapshot;
+    nebel_lighting *lighting;
     nebel_environment_map *environment_map;
     nebel_grid *grid;
     nebel_textured_planet *textured_planet;
@@ -193,6 +193,7 @@ static int make_things(void **state)
     assert_int_equal(nebel_create_fog(&good_fog_desc, &made.fog), NEBEL_OK);
     assert_int_equal(nebel_add_volume(made.fog, &good_volume_desc, &made.id), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(made.fog, &made.snapshot), NEBEL_OK);
+    assert_int_equal(nebel_create_lighting(made.snapshot, &good_lighting_desc, &made.lighting), NEBEL_OK);
     assert_int_equal(nebel_create_environment_map(&good_environment_map_desc, &made.environment_map), NEBEL_OK);
     assert_int_equal(nebel_create_noise_grid(&good_noise_desc, &made.grid), NEBEL_OK);
     assert_int_equal(nebel_create_textured_planet(&good_textured_planet_desc, &made.textured_planet), NEBEL_OK);
@@ -208,7 +209,7 @@ static int make_things(void **state)
     assert_int_equal(nebel_parse_scene(text, sizeof text - 1, "test_null.json", &good_scene_desc, &made.scene),
                      NEBEL_OK);
     made.contents = nebel_get_scene_data(made.scene);
-    assert_int_equal(nebel_create_cpu_renderer(made.contents, made.snapshot, &good_cpu_renderer_desc, &made.renderer),
+    assert_int_equal(nebel_create_cpu_renderer(made.contents, made.lighting, &good_cpu_renderer_desc, &made.renderer),
                      NEBEL_OK);
     good_scene_noise.desc = good_noise_desc;
     return 0;
@@ -227,6 +228,7 @@ static int free_things(void **state)
     nebel_destroy_textured_planet(made.textured_planet);
     nebel_release_grid(made.grid);
     nebel_release_environment_map(made.environment_map);
+    nebel_release_lighting(made.lighting);
     nebel_release_snapshot(made.snapshot);
     nebel_destroy_fog(made.fog);
     nebel_destroy_cells(made.cells);
@@ -238,6 +240,7 @@ static void free_fresh(void)
 {
     nebel_destroy_cells(fresh.cells);
     nebel_destroy_fog(fresh.fog);
+    nebel_release_lighting(fresh.lighting);
     nebel_release_snapshot(fresh.snapshot);
     nebel_release_environment_map(fresh.environment_map);
     nebel_release_grid(fresh.grid);

@@ -1,4 +1,5 @@
 /* The same as test_null.c of the functions that call OpenGL, in a context. */
+#include "fog_help.h"
 #include "pass_help.h"
 
 #include <nebel/gl.h>
@@ -35,7 +36,7 @@ static const nebel_scene_data nothing;
 
 static struct {
     nb_gl context;
-    nebel_snapshot *snapshot;
+    nebel_lighting *lighting;
     const nebel_scene_data *contents;
     nebel_gl *gl;
     nebel_gl_classic *gl_classic;
@@ -50,16 +51,13 @@ static struct {
 
 static int make_things(void **state)
 {
-    nebel_fog *fog;
     (void)state;
     pass_open(&made.context, NB_GL_330);
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &made.snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
+    made.lighting = fog_light(NULL, NULL, 0);
     made.contents = &nothing;
     assert_int_equal(nebel_create_gl(&good_gl_desc, &made.gl), NEBEL_OK);
     assert_int_equal(nebel_create_gl_classic(&good_gl_classic_desc, &made.gl_classic), NEBEL_OK);
-    assert_int_equal(nebel_create_gl_renderer(&nothing, made.snapshot, &good_gl_renderer_desc, &made.gl_renderer),
+    assert_int_equal(nebel_create_gl_renderer(&nothing, made.lighting, &good_gl_renderer_desc, &made.gl_renderer),
                      NEBEL_OK);
     return 0;
 }
@@ -70,7 +68,7 @@ static int free_things(void **state)
     nebel_destroy_gl_renderer(made.gl_renderer);
     nebel_destroy_gl_classic(made.gl_classic);
     nebel_destroy_gl(made.gl);
-    nebel_release_snapshot(made.snapshot);
+    nebel_release_lighting(made.lighting);
     pass_close(&made.context);
     return 0;
 }

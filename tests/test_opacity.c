@@ -10,19 +10,18 @@ enum { RAYS = 40 };
 
 static random_fog fog;
 
-static nebel_snapshot *commit(double max_opacity)
+static nebel_lighting *commit(double max_opacity)
 {
-    nebel_fog_desc desc = {.max_opacity = max_opacity};
-    memcpy(desc.ambient, fog.ambient, sizeof desc.ambient);
-    return fog_commit(&desc, fog.volumes, fog.count);
+    const nebel_lighting_desc lights = random_fog_lights(&fog);
+    return fog_commit_lit(&(nebel_fog_desc){.max_opacity = max_opacity}, fog.volumes, fog.count, &lights);
 }
 
-static void trace(const nebel_snapshot *snapshot, nebel_precision precision, nebel_transfer transfers[RAYS])
+static void trace(const nebel_lighting *lighting, nebel_precision precision, nebel_transfer transfers[RAYS])
 {
     nebel_ray rays[RAYS];
     for (uint64_t i = 0; i < RAYS; i++) rays[i] = random_fog_ray(&fog, i);
     const nebel_trace_desc desc = {.precision = precision, .tolerance = 1e-4};
-    assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
+    fog_trace(lighting, desc, RAYS, rays, transfers);
 }
 
 /* As nebel.h says it. */
@@ -44,7 +43,7 @@ static void test_light_is_limited_as_a_last_step(void **unused)
     for (uint64_t seed = 0; seed < 200; seed++) {
         random_fog_make(&fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), seed);
         const double most = .02 + .98 * (double)(seed % 17) / 17;
-        nebel_snapshot *const plain = commit(0), *const limited = commit(most);
+        nebel_lighting *const plain = commit(0), *const limited = commit(most);
         for (int p = 0; p < 2; p++) {
             nebel_transfer transfers[2][RAYS];
             trace(plain, (nebel_precision)p, transfers[0]);
@@ -60,8 +59,8 @@ static void test_light_is_limited_as_a_last_step(void **unused)
                 }
             }
         }
-        nebel_release_snapshot(plain);
-        nebel_release_snapshot(limited);
+        nebel_release_lighting(plain);
+        nebel_release_lighting(limited);
     }
     assert_true(limited_rays > 500);
 }
@@ -73,7 +72,7 @@ static void test_planes_give_the_same_bits(void **unused)
     const float offset[3] = {0, 0, 0}, direction[3] = {1, .25f, -.5f};
     for (uint64_t seed = 0; seed < 60; seed++) {
         random_fog_make(&fog, (random_fog_kind)(seed % 3), seed);
-        nebel_snapshot *const limited = commit(.01 + .015 * (double)seed);
+        nebel_lighting *const limited = commit(.01 + .015 * (double)seed);
         const nebel_ray ray = {{0, 0, 0}, {1, .25, -.5}, 60};
         const nebel_ray_planes rays = {.offset = {&offset[0], &offset[1], &offset[2]},
                                        .direction_float = {&direction[0], &direction[1], &direction[2]},
@@ -83,13 +82,15 @@ static void test_planes_give_the_same_bits(void **unused)
                                                  .in_scattering = {&S[0], &S[1], &S[2]}};
         nebel_transfer transfer;
         const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT};
-        assert_int_equal(nebel_trace(limited, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
-        assert_int_equal(nebel_trace_planes(limited, NULL, 1, &rays, &transfers), NEBEL_OK);
+        fog_trace(limited, desc, 1, &ray, &transfer);
+        const nebel_trace_desc lit = {.lighting = limited};
+        const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(limited);
+        assert_int_equal(nebel_trace_planes(snapshot, &lit, 1, &rays, &transfers), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
             assert_true((double)T[c] == transfer.transmittance[c]);
             assert_true((double)S[c] == transfer.in_scattering[c]);
         }
-        nebel_release_snapshot(limited);
+        nebel_release_lighting(limited);
     }
 }
 
@@ -155,6 +156,11 @@ static void test_the_limit_can_be_changed(void **unused)
         const double opacity = i < 2 ? limits[i] : 1 - exp(-4);
         assert_true(fabs(transfer.transmittance[0] - (1 - opacity)) < 1e-14);
         assert_true(fabs(transfer.in_scattering[0] - opacity) < 1e-14);
+        assert_true(nebel_get_max_opacity(snapshot) == (i < 2 ? limits[i] : 1));
+        assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){.ignore_max_opacity = 1}, 1, &ray, 0, &transfer, 0),
+                         NEBEL_OK);
+        assert_true(fabs(transfer.transmittance[0] - exp(-4)) < 1e-14);
+        assert_true(fabs(transfer.in_scattering[0] - (1 - exp(-4))) < 1e-14);
         nebel_release_snapshot(snapshot);
     }
     const double wrong[] = {-.1, 1.1, (double)NAN};

@@ -98,7 +98,7 @@ static void draw(nebel_gl *gl, float texels[4 * PASS_PIXELS])
 }
 
 /* Sets the fog, which must take so many uploads and draw what a nebel_gl draws that knows nothing yet. */
-static void check(nebel_gl *gl, nebel_snapshot *fog, const nebel_view *view, int of_words, int of_tiles)
+static void check(nebel_gl *gl, nebel_lighting *fog, const nebel_view *view, int of_words, int of_tiles)
 {
     static float got[4 * PASS_PIXELS], wanted[4 * PASS_PIXELS];
     nebel_gl *fresh = NULL;
@@ -123,11 +123,11 @@ static int moves(const nebel_view *from, const nebel_view *to)
     return memcmp(a.eye, b.eye, sizeof a.eye) != 0;
 }
 
-/* In the end another snapshot of the same fog, which counts as another. */
+/* In the end another lighting of the same fog, which counts as another. */
 static void check_fog(nebel_gl *gl, int more, int of_tiles)
 {
     const nebel_view first = pass_view(PERSPECTIVE, usual, 0, 0);
-    nebel_snapshot *fog = pass_fog(more);
+    nebel_lighting *fog = pass_fog(more);
     check(gl, fog, &first, 1, of_tiles);
     check(gl, fog, &first, 0, 0);
     nebel_view view = first;
@@ -140,10 +140,10 @@ static void check_fog(nebel_gl *gl, int more, int of_tiles)
     check(gl, fog, &view, moves(&first, &view), of_tiles);
     view.eye_from_world[12] += .5;
     check(gl, fog, &view, 1, of_tiles);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     fog = pass_fog(more);
     check(gl, fog, &view, 1, of_tiles);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_passes_hand_over_what_is_new(void **state)
@@ -163,7 +163,7 @@ static void test_passes_hand_over_what_is_new(void **state)
 }
 
 /* A box before the eye. */
-static nebel_snapshot *fog_of_voxels(nebel_grid *grid, double extinction)
+static nebel_lighting *fog_of_voxels(nebel_grid *grid, double extinction)
 {
     const double *const e = pass_eye;
     nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX,
@@ -172,7 +172,7 @@ static nebel_snapshot *fog_of_voxels(nebel_grid *grid, double extinction)
                            .density = {.type = NEBEL_DENSITY_GRID, .grid = grid},
                            .source = {1, .8, .6}};
     for (int i = 0; i < 3; i++) v.extinction[i] = extinction;
-    return fog_commit(&(nebel_fog_desc){0}, &v, 1);
+    return fog_light(NULL, &v, 1);
 }
 
 /* 10 voxels along each axis, the last of which is `last`. */
@@ -196,7 +196,7 @@ static void test_voxels_stay(void **state)
     nebel_gl *gl = NULL;
     nebel_view view = pass_view(PERSPECTIVE, usual, 0, 0);
     nebel_grid *const grids[] = {grid_ending_in(1), grid_ending_in(1), grid_ending_in(2)};
-    nebel_snapshot *const fogs[] = {fog_of_voxels(grids[0], .3), fog_of_voxels(grids[1], .4), pass_fog(-1),
+    nebel_lighting *const fogs[] = {fog_of_voxels(grids[0], .3), fog_of_voxels(grids[1], .4), pass_fog(-1),
                                     fog_of_voxels(grids[0], .5), fog_of_voxels(grids[2], .5)};
     const int uploads[] = {1, 0, 0, 0, 1};
     pass_open(&context, NB_GL_330);
@@ -209,7 +209,7 @@ static void test_voxels_stay(void **state)
         assert_int_equal(voxels, 0);
     }
     nebel_destroy_gl(gl);
-    for (int i = 0; i < 5; i++) nebel_release_snapshot(fogs[i]);
+    for (int i = 0; i < 5; i++) nebel_release_lighting(fogs[i]);
     for (int i = 0; i < 3; i++) nebel_release_grid(grids[i]);
     pass_close(&context);
 }
@@ -221,7 +221,7 @@ static void test_errors_are_not_kept(void **state)
     nb_gl context;
     nebel_gl *gl = NULL;
     nebel_view view = pass_view(PERSPECTIVE, usual, .3, -.1);
-    nebel_snapshot *const fog = pass_fog(60);
+    nebel_lighting *const fog = pass_fog(60);
     pass_open(&context, NB_GL_330);
     assert_int_equal(nebel_create_gl(&(nebel_gl_desc){0}, &gl), NEBEL_OK);
     check(gl, fog, &view, 1, 1);
@@ -231,7 +231,7 @@ static void test_errors_are_not_kept(void **state)
     view.height = PASS_HEIGHT;
     check(gl, fog, &view, 0, 0);
     nebel_destroy_gl(gl);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     pass_close(&context);
 }
 
@@ -243,7 +243,7 @@ static void test_samples_share_the_fog(void **state)
     (void)state;
     nb_gl context;
     nebel_gl_renderer *renderer = NULL;
-    nebel_snapshot *const fog = pass_fog(60);
+    nebel_lighting *const fog = pass_fog(60);
     const nebel_scene_data scene = {.ambient = {1, 1, 1}};
     nebel_gl_frame_desc frame = {
         .camera = {.look_at = {4e4, 12, -7e4 - 9}, .up = {0, 1, 0}, .vertical_fov = 60}, .width = 64, .height = 48};
@@ -255,7 +255,7 @@ static void test_samples_share_the_fog(void **state)
     expect_uploads(1, 1);
     stop_counting();
     nebel_destroy_gl_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     pass_close(&context);
 }
 
@@ -285,11 +285,11 @@ static void test_sun_and_eye_share_voxels(void **state)
     assert_int_equal(nebel_create_gl_renderer(&scene, NULL, &(nebel_gl_renderer_desc){0}, &renderer), NEBEL_OK);
     start_counting();
     for (int i = 0; i < 3; i++) {
-        nebel_snapshot *const fog = fog_of_voxels(grids[i % 2], .3);
-        assert_int_equal(nebel_set_gl_renderer_fog(renderer, fog), NEBEL_OK);
+        nebel_lighting *const fog = fog_of_voxels(grids[i % 2], .3);
+        assert_int_equal(nebel_set_gl_renderer_lighting(renderer, fog), NEBEL_OK);
         assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
         assert_int_equal(voxels, i + 1);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
     }
     stop_counting();
     nebel_destroy_gl_renderer(renderer);

@@ -15,7 +15,7 @@ typedef struct stage {
     nb_gl context;
     int desktop;
     nebel_gl *gl;
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
     unsigned depth, targets[2];
     int objects;
 } stage;
@@ -54,7 +54,7 @@ static void close_stage(stage *s)
     pass_delete_texture(s->depth);
     assert_int_equal(pass_count_objects(), s->objects);
     pass_close(&s->context);
-    nebel_release_snapshot(s->fog);
+    nebel_release_lighting(s->fog);
 }
 
 /* Between two snapshots of all state. `forgiven`: errors that are reported meanwhile. */

@@ -11,7 +11,7 @@
 
 enum { WIDTH = 12, HEIGHT = 8, SAMPLES = 4 };
 
-static nebel_snapshot *make_fog(void)
+static nebel_lighting *make_fog(void)
 {
     static crowd c;
     c = (crowd){.count = 0};
@@ -46,7 +46,7 @@ static void test_several_samples(void **state)
     view.width = WIDTH;
     view.height = HEIGHT;
     pass_open(&context, NB_GL_330);
-    nebel_snapshot *const fog = make_fog();
+    nebel_lighting *const fog = make_fog();
     const unsigned depth = make_depth(), target = pass_color_texture(WIDTH, HEIGHT, 4, NULL),
                    second = pass_color_texture(WIDTH, HEIGHT, 4, NULL), framebuffer = pass_framebuffer(target, second);
     const nebel_gl_desc desc = {.log = fog_messages_log(&messages)};
@@ -62,7 +62,7 @@ static void test_several_samples(void **state)
     pass_delete_texture(target);
     pass_delete_texture(second);
     pass_delete_texture(depth);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     pass_close(&context);
 }
 
@@ -73,7 +73,7 @@ static void check_frames(const nebel_scene_data *scene, const nebel_particle *pa
 {
     nb_gl context;
     nebel_gl_renderer *renderer = NULL;
-    nebel_snapshot *const fog = make_fog();
+    nebel_lighting *const fog = make_fog();
     const nebel_gl_renderer_desc desc = {.log = fog_messages_log(&messages)};
     const nebel_gl_frame_desc frame = {
         .camera = test_camera(pass_eye[0], pass_eye[1], pass_eye[2], pass_eye[0], pass_eye[1], pass_eye[2] - 6),
@@ -91,7 +91,7 @@ static void check_frames(const nebel_scene_data *scene, const nebel_particle *pa
         assert_int_equal(messages.count, 0);
     }
     nebel_destroy_gl_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     pass_close(&context);
 }
 

@@ -14,7 +14,7 @@ typedef struct split {
 } split;
 
 /* Returns how many messages there were. The picture may be smaller. */
-static size_t draw(nebel_snapshot *fog, const pass_picture *picture, nb_gl_language language, split *out)
+static size_t draw(nebel_lighting *fog, const pass_picture *picture, nb_gl_language language, split *out)
 {
     fog_messages messages = {.count = 0};
     nb_gl context;
@@ -47,7 +47,7 @@ static void check(const crowd *c, const char *what, nb_gl_language language, int
     static split got;
     static pass_picture picture;
     const int width = WIDTH / share, height = HEIGHT / share;
-    nebel_snapshot *const fog = crowd_commit(c);
+    nebel_lighting *const fog = crowd_commit(c);
     pass_difference light = {0}, transmittance = {0};
     picture = (pass_picture){.view = pass_view(0, (range){-1, 0}, 0, 0), .clip = {-1, 0}};
     picture.view.width = (uint32_t)width;
@@ -67,7 +67,7 @@ static void check(const crowd *c, const char *what, nb_gl_language language, int
     assert_true(light.largest <= 3. / 255 && transmittance.largest <= 3. / 255);
     assert_true(light.beyond_step * 1000 <= light.fogged && transmittance.beyond_step * 1000 <= transmittance.fogged);
     assert_int_equal(messages, 0);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_balls_with_a_hole(void **state)

@@ -19,7 +19,7 @@
 typedef struct stage {
     nb_gl context;
     nebel_gl *gl;
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
     pass_picture picture;
     unsigned depth, color, target, second, framebuffer;
     int objects;
@@ -56,7 +56,7 @@ static void close_stage(stage *s)
 {
     nebel_destroy_gl(s->gl);
     assert_int_equal(pass_count_objects(), s->objects);
-    nebel_release_snapshot(s->fog);
+    nebel_release_lighting(s->fog);
     pass_close(&s->context);
 }
 
@@ -134,7 +134,7 @@ static void test_another_context_is_refused(void **state)
     nebel_destroy_gl(s.gl);
     pass_close(&other);
     nb_gl_close(&s.context);
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 static void test_a_lost_context_is_survived(void **state)
@@ -148,7 +148,7 @@ static void test_a_lost_context_is_survived(void **state)
     expect_message(nebel_gl_set_fog(s.gl, s.fog, &s.picture.view), NEBEL_ERROR_UNSUPPORTED, "create another");
     nebel_destroy_gl(s.gl);
     epoxy_glIsVertexArray = true_is;
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
     pass_close(&s.context);
 }
 
@@ -194,7 +194,7 @@ static void test_shaders_that_the_driver_refuses(void **state)
 }
 
 /* One box of `size` voxels along each axis, no two alike. */
-static nebel_snapshot *fog_of_voxels(size_t size)
+static nebel_lighting *fog_of_voxels(size_t size)
 {
     const size_t count = size * size * size;
     nebel_grid *grid = NULL;
@@ -209,30 +209,24 @@ static nebel_snapshot *fog_of_voxels(size_t size)
         .extinction = {.1, .1, .1},
         .source = {1, 1, 1},
     };
-    nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, &v, 1);
+    nebel_lighting *const fog = fog_light(NULL, &v, 1);
     nebel_release_grid(grid);
     free(voxels);
     return fog;
 }
 
 /* One that scatters a small map sharply. */
-static nebel_snapshot *fog_under_a_map(void)
+static nebel_lighting *fog_under_a_map(void)
 {
     static const float pixels[3 * 4 * 2] = {1, 2, 3, 4, 5, 6};
     const nebel_environment_map_desc desc = {.width = 4, .height = 2, .pixels = pixels};
     const nebel_volume_desc v = {
         .extinction = {.1, .1, .1}, .albedo = {1, 1, 1}, .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .8}};
-    nebel_environment sky = {.type = NEBEL_ENVIRONMENT_MAP};
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_environment_map(&desc, &sky.map), NEBEL_OK);
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &v, NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_environment(fog, &sky), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    nebel_release_environment_map(sky.map);
-    return snapshot;
+    nebel_lighting_desc lights = {.environment = {.type = NEBEL_ENVIRONMENT_MAP}};
+    assert_int_equal(nebel_create_environment_map(&desc, &lights.environment.map), NEBEL_OK);
+    nebel_lighting *const fog = fog_light(&lights, &v, 1);
+    nebel_release_environment_map(lights.environment.map);
+    return fog;
 }
 
 static void test_more_volumes_than_a_texture_holds(void **state)
@@ -242,23 +236,23 @@ static void test_more_volumes_than_a_texture_holds(void **state)
     open_stage(&s, NB_GL_330);
     const nebel_gl_desc desc = desc_of(NULL);
     nebel_gl *narrow = NULL;
-    nebel_snapshot *const many = pass_fog(1000);
+    nebel_lighting *const many = pass_fog(1000);
     true_get_integer = epoxy_glGetIntegerv;
     epoxy_glGetIntegerv = narrow_textures;
     assert_int_equal(nebel_create_gl(&desc, &narrow), NEBEL_OK);
     epoxy_glGetIntegerv = true_get_integer;
     expect_message(nebel_gl_set_fog(narrow, many, &s.picture.view), NEBEL_ERROR_LIMIT, "has 3 (GL_MAX_TEXTURE_SIZE)");
     assert_int_equal(nebel_gl_set_fog(narrow, s.fog, &s.picture.view), NEBEL_OK);
-    nebel_snapshot *const fine = fog_of_voxels(32);
+    nebel_lighting *const fine = fog_of_voxels(32);
     expect_message(nebel_gl_set_fog(narrow, fine, &s.picture.view), NEBEL_ERROR_LIMIT, "use fewer voxels");
     assert_int_equal(nebel_gl_set_fog(narrow, s.fog, &s.picture.view), NEBEL_OK);
-    nebel_release_snapshot(fine);
-    nebel_snapshot *const lit = fog_under_a_map();
+    nebel_release_lighting(fine);
+    nebel_lighting *const lit = fog_under_a_map();
     expect_message(nebel_gl_set_fog(narrow, lit, &s.picture.view), NEBEL_ERROR_LIMIT, "fewer phase functions");
     assert_int_equal(nebel_gl_set_fog(narrow, s.fog, &s.picture.view), NEBEL_OK);
-    nebel_release_snapshot(lit);
+    nebel_release_lighting(lit);
     nebel_destroy_gl(narrow);
-    nebel_release_snapshot(many);
+    nebel_release_lighting(many);
     close_stage(&s);
 }
 
@@ -272,7 +266,7 @@ static void test_a_driver_without_memory(void **state)
     (void)state;
     static stage s;
     open_stage(&s, NB_GL_330);
-    nebel_snapshot *const many = pass_fog(1000);
+    nebel_lighting *const many = pass_fog(1000);
     (void)glGetError();
     const PFNGLGETERRORPROC true_error = epoxy_glGetError;
     epoxy_glGetError = out_of_memory;
@@ -282,23 +276,23 @@ static void test_a_driver_without_memory(void **state)
     expect_message(draw(&s), NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog first");
     assert_int_equal(nebel_gl_set_fog(s.gl, many, &s.picture.view), NEBEL_OK);
     assert_int_equal(draw(&s), NEBEL_OK);
-    nebel_snapshot *const voxels = fog_of_voxels(12);
+    nebel_lighting *const voxels = fog_of_voxels(12);
     epoxy_glGetError = out_of_memory;
     const nebel_result refused = nebel_gl_set_fog(s.gl, voxels, &s.picture.view);
     epoxy_glGetError = true_error;
     expect_message(refused, NEBEL_ERROR_MEMORY, "no memory for the texture of voxels");
     assert_int_equal(nebel_gl_set_fog(s.gl, voxels, &s.picture.view), NEBEL_OK);
     assert_int_equal(draw(&s), NEBEL_OK);
-    nebel_snapshot *const lit = fog_under_a_map();
+    nebel_lighting *const lit = fog_under_a_map();
     epoxy_glGetError = out_of_memory;
     const nebel_result dark = nebel_gl_set_fog(s.gl, lit, &s.picture.view);
     epoxy_glGetError = true_error;
     expect_message(dark, NEBEL_ERROR_MEMORY, "no memory for the texture of the environment");
     assert_int_equal(nebel_gl_set_fog(s.gl, lit, &s.picture.view), NEBEL_OK);
     assert_int_equal(draw(&s), NEBEL_OK);
-    nebel_release_snapshot(lit);
-    nebel_release_snapshot(voxels);
-    nebel_release_snapshot(many);
+    nebel_release_lighting(lit);
+    nebel_release_lighting(voxels);
+    nebel_release_lighting(many);
     close_stage(&s);
 }
 
@@ -310,7 +304,7 @@ static void test_memory_that_runs_out(void **state)
     (void)state;
     static stage s;
     open_stage(&s, NB_GL_330);
-    nebel_snapshot *const many = pass_fog(60), *const voxels = fog_of_voxels(12), *const lit = fog_under_a_map();
+    nebel_lighting *const many = pass_fog(60), *const voxels = fog_of_voxels(12), *const lit = fog_under_a_map();
     const nebel_gl_pass pass = pass_of(&s);
     nebel_result result = NEBEL_ERROR_MEMORY;
     size_t fails = 0;
@@ -331,9 +325,9 @@ static void test_memory_that_runs_out(void **state)
         assert_int_equal(pass_count_objects(), objects);
     }
     assert_true(fails >= 6);
-    nebel_release_snapshot(many);
-    nebel_release_snapshot(lit);
-    nebel_release_snapshot(voxels);
+    nebel_release_lighting(many);
+    nebel_release_lighting(lit);
+    nebel_release_lighting(voxels);
     close_stage(&s);
 }
 

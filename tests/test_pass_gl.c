@@ -14,7 +14,7 @@ typedef struct split {
     float in_scattering[4 * PASS_PIXELS], transmittance[4 * PASS_PIXELS];
 } split;
 
-static void draw_split(nebel_gl *gl, nebel_snapshot *fog, const pass_picture *picture, split *out)
+static void draw_split(nebel_gl *gl, nebel_lighting *fog, const pass_picture *picture, split *out)
 {
     const int width = (int)picture->view.width, height = (int)picture->view.height;
     const int window = picture->depth.encoding == NEBEL_DEPTH_ENCODING_WINDOW;
@@ -37,7 +37,7 @@ static void draw_split(nebel_gl *gl, nebel_snapshot *fog, const pass_picture *pi
     pass_expect_no_errors();
 }
 
-static void compare_split(const nebel_snapshot *fog, const pass_picture *picture, const split *got, const char *name)
+static void compare_split(const nebel_lighting *fog, const pass_picture *picture, const split *got, const char *name)
 {
     pass_difference difference = {0, 0, 0};
     for (int y = 0; y < (int)picture->view.height; y++) {
@@ -57,7 +57,7 @@ static void compare_split(const nebel_snapshot *fog, const pass_picture *picture
     assert_true(difference.largest <= 3. / 255);
 }
 
-static void check_picture(nebel_gl *gl, nebel_snapshot *fog, pass_picture *picture, const char *name)
+static void check_picture(nebel_gl *gl, nebel_lighting *fog, pass_picture *picture, const char *name)
 {
     static split got;
     pass_fill(picture);
@@ -102,7 +102,7 @@ static const nb_gl_language languages[] = {NB_GL_330, NB_GL_300ES};
 static void check_projections(nb_gl_language language)
 {
     stage s = open_stage(language);
-    nebel_snapshot *const fog = pass_fog(0);
+    nebel_lighting *const fog = pass_fog(0);
     for (int kind = 0; kind < PROJECTIONS; kind++) {
         pass_picture picture = {.view = pass_view(kind, usual, .3, -.1), .clip = usual};
         check_picture(s.gl, fog, &picture, projections[kind].name);
@@ -110,7 +110,7 @@ static void check_projections(nb_gl_language language)
             (pass_picture){.view = pass_view(kind, reversed, .3, -.1), .clip = reversed, .depth = {.zero_to_one = 1}};
         check_picture(s.gl, fog, &picture, projections[kind].name);
     }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     close_stage(&s);
 }
 
@@ -131,7 +131,7 @@ static void test_every_kind_of_depth_agrees_with_trace(void **state)
     };
     for (int i = 0; i < 2; i++) {
         stage s = open_stage(languages[i]);
-        nebel_snapshot *const fog = pass_fog(0);
+        nebel_lighting *const fog = pass_fog(0);
         for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
             const range clip = kinds[k].zero_to_one ? zero_to_one : usual;
             pass_picture picture = {.view = pass_view(PERSPECTIVE, clip, .3, -.1), .clip = clip, .depth = kinds[k]};
@@ -139,7 +139,7 @@ static void test_every_kind_of_depth_agrees_with_trace(void **state)
             snprintf(name, sizeof name, "depth convention %zu", k);
             check_picture(s.gl, fog, &picture, name);
         }
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
         close_stage(&s);
     }
 }
@@ -163,14 +163,14 @@ static void test_cube_faces_agree_with_trace(void **state)
 {
     (void)state;
     stage s = open_stage(NB_GL_330);
-    nebel_snapshot *const fog = pass_fog(0);
+    nebel_lighting *const fog = pass_fog(0);
     for (int face = 0; face < 6; face++) {
         pass_picture picture = {.view = cube_face(face, .2), .clip = usual};
         char name[32];
         snprintf(name, sizeof name, "cube face %d", face);
         check_picture(s.gl, fog, &picture, name);
     }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     close_stage(&s);
 }
 
@@ -211,7 +211,7 @@ static void agree(agreement *a, const split *first, size_t i, const split *secon
     if (!(off <= a->largest)) a->largest = off;
 }
 
-static agreement compare_tiles(nebel_gl *gl, nebel_snapshot *fog)
+static agreement compare_tiles(nebel_gl *gl, nebel_lighting *fog)
 {
     enum { TILE = 16 };
     static split whole, part;
@@ -242,12 +242,12 @@ static void test_a_pixel_is_the_same_in_a_tile(void **state)
     (void)state;
     for (int i = 0; i < 2; i++) {
         stage s = open_stage(languages[i]);
-        nebel_snapshot *const flat = pass_fog(-1), *const round = pass_fog(0);
+        nebel_lighting *const flat = pass_fog(-1), *const round = pass_fog(0);
         assert_int_equal(compare_tiles(s.gl, flat).beyond, 0);
         const agreement a = compare_tiles(s.gl, round);
         assert_true(a.beyond <= a.count / 500 && a.largest < 1. / 255);
-        nebel_release_snapshot(flat);
-        nebel_release_snapshot(round);
+        nebel_release_lighting(flat);
+        nebel_release_lighting(round);
         close_stage(&s);
     }
 }
@@ -277,7 +277,7 @@ static void test_turning_the_camera_changes_no_fog(void **state)
     (void)state;
     static split first, turned;
     stage s = open_stage(NB_GL_330);
-    nebel_snapshot *const fog = pass_fog(-1);
+    nebel_lighting *const fog = pass_fog(-1);
     double largest = 0;
     for (int i = 0; i < 40; i++) {
         const double angle = i * .7, away = 2 + 2.3 * i;
@@ -294,7 +294,7 @@ static void test_turning_the_camera_changes_no_fog(void **state)
     }
     print_message("turning changes fog by at most %.1e\n", largest);
     assert_true(largest < 5e-6);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     close_stage(&s);
 }
 
@@ -307,7 +307,7 @@ static void test_many_volumes_agree_with_trace(void **state)
     for (int i = 0; i < 2; i++) {
         stage s = open_stage(languages[i]);
         for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
-            nebel_snapshot *const fog = pass_fog(counts[k]);
+            nebel_lighting *const fog = pass_fog(counts[k]);
             pass_picture picture = {
                 .view = pass_view(PERSPECTIVE, reversed, .1, 0), .clip = reversed, .depth = {.zero_to_one = 1}};
             nebel_gl_fog_resources stored_fog;
@@ -318,7 +318,7 @@ static void test_many_volumes_agree_with_trace(void **state)
             assert_true((stored_fog.block != 0) == (stored_fog.texel_count <= NEBEL_BLOCK_TEXELS));
             assert_true((stored_fog.texture != 0) == (stored_fog.texel_count > NEBEL_BLOCK_TEXELS));
             assert_true((stored_fog.tiles != 0) == (counts[k] >= 0));
-            nebel_release_snapshot(fog);
+            nebel_release_lighting(fog);
         }
         close_stage(&s);
     }
@@ -331,7 +331,7 @@ static void test_block_and_texture_give_the_same(void **state)
     stage s = open_stage(NB_GL_330);
     nebel_gl *other = NULL;
     nebel_gl_fog_resources stored_fog;
-    nebel_snapshot *const fog = pass_fog(0);
+    nebel_lighting *const fog = pass_fog(0);
     pass_picture picture = {.view = pass_view(PERSPECTIVE, usual, 2, 0), .clip = usual};
     pass_fill(&picture);
     assert_int_equal(nebel_create_gl(&(nebel_gl_desc){.storage = NEBEL_GL_STORAGE_TEXTURE}, &other), NEBEL_OK);
@@ -341,7 +341,7 @@ static void test_block_and_texture_give_the_same(void **state)
     assert_true(stored_fog.block == 0 && stored_fog.texture != 0);
     assert_memory_equal(&block, &texture, sizeof block);
     nebel_destroy_gl(other);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     close_stage(&s);
 }
 
@@ -387,7 +387,7 @@ static void fill_sheet(const pass_picture *picture)
 }
 
 /* Draws over a sheet that holds the colours already where the output blends, else zeros. */
-static void draw_sheet(nebel_gl *gl, nebel_snapshot *fog, const pass_picture *picture, nebel_gl_output output)
+static void draw_sheet(nebel_gl *gl, nebel_lighting *fog, const pass_picture *picture, nebel_gl_output output)
 {
     static const float zeros[4 * SHEET];
     const int blends = output != NEBEL_GL_OUTPUT_COMPOSE;
@@ -439,7 +439,7 @@ static void test_every_output_puts_the_same_fog_over_its_pixels(void **state)
     const nebel_gl_output outputs[] = {NEBEL_GL_OUTPUT_COMPOSE, NEBEL_GL_OUTPUT_BLEND, NEBEL_GL_OUTPUT_BLEND_GRAY};
     for (int i = 0; i < 2; i++) {
         stage s = open_stage(languages[i]);
-        nebel_snapshot *const fog = pass_fog(0);
+        nebel_lighting *const fog = pass_fog(0);
         pass_picture picture = {.view = pass_view(PERSPECTIVE, usual, .3, -.1), .clip = usual};
         pass_fill(&picture);
         draw_split(s.gl, fog, &picture, &fog_of_pixels);
@@ -448,7 +448,7 @@ static void test_every_output_puts_the_same_fog_over_its_pixels(void **state)
             draw_sheet(s.gl, fog, &picture, outputs[k]);
             check_sheet(&fog_of_pixels, outputs[k]);
         }
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
         close_stage(&s);
     }
 }

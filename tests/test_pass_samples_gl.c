@@ -128,7 +128,7 @@ static int is_silhouette(int i)
     return 0;
 }
 
-static void expect(const nebel_snapshot *fog, int i, double composed[4], double scattered[3], double through[3])
+static void expect(const nebel_lighting *fog, int i, double composed[4], double scattered[3], double through[3])
 {
     memset(composed, 0, 4 * sizeof *composed);
     memset(scattered, 0, 3 * sizeof *scattered);
@@ -150,7 +150,7 @@ static void expect(const nebel_snapshot *fog, int i, double composed[4], double 
 typedef struct stage {
     nb_gl context;
     nebel_gl *gl;
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
     unsigned depth, color, samples;
     nebel_view view;
 } stage;
@@ -174,7 +174,7 @@ static stage open_stage(void)
 static void close_stage(stage *s)
 {
     nebel_destroy_gl(s->gl);
-    nebel_release_snapshot(s->fog);
+    nebel_release_lighting(s->fog);
     pass_delete_texture(s->depth);
     pass_delete_texture(s->color);
     pass_delete_framebuffer(s->samples);
@@ -275,7 +275,7 @@ static void blend(stage *s, nebel_gl_output output, float *texels)
     pass_expect_no_errors();
 }
 
-static void expect_blended(const nebel_snapshot *fog, int i, int grey, double wanted[3])
+static void expect_blended(const nebel_lighting *fog, int i, int grey, double wanted[3])
 {
     memset(wanted, 0, 3 * sizeof *wanted);
     for (int s = 0; s < SAMPLES; s++) {

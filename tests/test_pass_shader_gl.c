@@ -117,7 +117,7 @@ static void check(int es, int volumes)
     nebel_gl *gl = NULL;
     nebel_gl_fog_resources stored_fog;
     pass_open(&context, es ? NB_GL_300ES : NB_GL_330);
-    nebel_snapshot *const fog = pass_fog(volumes);
+    nebel_lighting *const fog = pass_fog(volumes);
     pass_picture picture = {.view = pass_view(PERSPECTIVE, usual, .3, -.1), .clip = usual};
     pass_fill(&picture);
     const unsigned depth = pass_depth_texture(PASS_WIDTH, PASS_HEIGHT, picture.stored);
@@ -137,7 +137,7 @@ static void check(int es, int volumes)
     }
     assert_true(theirs[0][0] > 0);
     nebel_destroy_gl(gl);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     pass_close(&context);
 }
 

@@ -28,7 +28,7 @@ static GLuint attach_depth_and_stencil(void)
 }
 
 /* All functions, in the state as it is, between two snapshots of it. */
-static void use_all(nebel_gl *gl, nebel_snapshot *fog, const pass_picture *picture, unsigned depth, unsigned color,
+static void use_all(nebel_gl *gl, nebel_lighting *fog, const pass_picture *picture, unsigned depth, unsigned color,
                     const unsigned targets[2], nebel_gl_output output, int desktop)
 {
     static odd_snapshot before, after;
@@ -50,7 +50,7 @@ static void use_all(nebel_gl *gl, nebel_snapshot *fog, const pass_picture *pictu
 }
 
 /* What a pass draws in a state. */
-static void draw_in(nebel_gl *gl, nebel_snapshot *fog, int desktop, int odd_state, nebel_gl_output output, outcome *out)
+static void draw_in(nebel_gl *gl, nebel_lighting *fog, int desktop, int odd_state, nebel_gl_output output, outcome *out)
 {
     static float color_texels[4 * PASS_PIXELS];
     odd o;
@@ -77,13 +77,13 @@ static void draw_alone(nb_gl_language language, int volumes, int odd_state, nebe
 {
     nb_gl context;
     nebel_gl *gl = NULL;
-    nebel_snapshot *const fog = pass_fog(volumes);
+    nebel_lighting *const fog = pass_fog(volumes);
     pass_open(&context, language);
     assert_int_equal(nebel_create_gl(&(nebel_gl_desc){0}, &gl), NEBEL_OK);
     draw_in(gl, fog, language == NB_GL_330, odd_state, output, out);
     nebel_destroy_gl(gl);
     pass_close(&context);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* The same pixels in a new context and in the oddest one, and no state changed. */
@@ -133,7 +133,7 @@ static void test_each_odd_thing_alone(void **state)
     static outcome plain, strange;
     nb_gl context;
     nebel_gl *gl = NULL;
-    nebel_snapshot *const fog = pass_fog(60);
+    nebel_lighting *const fog = pass_fog(60);
     pass_picture picture = {.view = pass_view(PERSPECTIVE, (range){-1, 0}, .3, -.1), .clip = {-1, 0}};
     pass_fill(&picture);
     pass_open(&context, NB_GL_330);
@@ -155,7 +155,7 @@ static void test_each_odd_thing_alone(void **state)
     pass_delete_texture(depth);
     nebel_destroy_gl(gl);
     pass_close(&context);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* ---- what odd state does not hold ------------------------------------------------------------ */
@@ -164,7 +164,7 @@ static void test_each_odd_thing_alone(void **state)
 typedef struct stage {
     nb_gl context;
     nebel_gl *gl;
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
     nebel_gl_pass pass;
     unsigned target, framebuffer;
 } stage;
@@ -186,7 +186,7 @@ static void open_stage(stage *s)
 static void close_stage(stage *s)
 {
     nebel_destroy_gl(s->gl);
-    nebel_release_snapshot(s->fog);
+    nebel_release_lighting(s->fog);
     pass_delete_framebuffer(s->framebuffer);
     pass_close(&s->context);
 }

@@ -47,7 +47,7 @@ static double cover(const surface *s, int c, double behind)
     }
 }
 
-static nebel_transfer trace_between(const nebel_snapshot *fog, const line *way, double from, double to)
+static nebel_transfer trace_between(const nebel_lighting *fog, const line *way, double from, double to)
 {
     nebel_ray ray = {.t_max = to - from};
     nebel_transfer transfer;
@@ -55,13 +55,12 @@ static nebel_transfer trace_between(const nebel_snapshot *fog, const line *way, 
         ray.direction[i] = (double)way->direction[i];
         ray.origin[i] = (double)way->origin[i] + from * ray.direction[i];
     }
-    const nebel_trace_desc exact = {.tolerance = 1e-6};
-    assert_int_equal(nebel_trace(fog, &exact, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+    fog_trace(fog, (nebel_trace_desc){.tolerance = 1e-6}, 1, &ray, &transfer);
     return transfer;
 }
 
 /* surfaces[0] is nearest; what is not before `end` is hidden. */
-static void carry_light(const nebel_snapshot *fog, const line *way, const surface *surfaces, double end,
+static void carry_light(const nebel_lighting *fog, const line *way, const surface *surfaces, double end,
                         double light[3])
 {
     double far = end;
@@ -194,7 +193,7 @@ static surface random_surface(uint64_t *state, int mode, path how, double distan
 static pass_picture picture;
 static float background[4 * PASS_PIXELS], drawn[4 * PASS_PIXELS];
 
-static void compare(const nebel_snapshot *fog, const surface *surfaces, pass_difference *difference)
+static void compare(const nebel_lighting *fog, const surface *surfaces, pass_difference *difference)
 {
     for (int i = 0; i < PASS_PIXELS; i += 11) {
         const line way = line_of(&picture.view, i % PASS_WIDTH + .5, i / PASS_WIDTH + .5);
@@ -237,7 +236,7 @@ static void try_path(nb_gl_language language, path how)
     pass_difference difference = {0};
     uint64_t state = 17;
     pass_open(&context, language);
-    nebel_snapshot *const fog = pass_fog(0);
+    nebel_lighting *const fog = pass_fog(0);
     picture = (pass_picture){.view = pass_view(PERSPECTIVE, usual, .3, -.1), .clip = usual};
     picture.depth.encoding = NEBEL_DEPTH_ENCODING_RADIAL;
     pass_fill(&picture);
@@ -257,7 +256,7 @@ static void try_path(nb_gl_language language, path how)
     assert_true(difference.largest <= 1. / 255);
     glDeleteProgram(program);
     nebel_destroy_gl(gl);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     pass_close(&context);
 }
 

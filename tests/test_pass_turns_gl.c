@@ -14,7 +14,7 @@ enum { MOST = 1000, GAUSSIAN = 0, PARTS = 1, EVEN = 2, HOLED = 3 };
 
 /* Balls of every colour around one place, Gaussian ones; of PARTS half are unions, of EVEN all have a constant density; of
  * HOLED, too, and the last excludes the others. */
-static nebel_snapshot *make_crowd(int count, int kind)
+static nebel_lighting *make_crowd(int count, int kind)
 {
     static nebel_volume_desc volumes[MOST];
     static nebel_shape pieces[MOST][2];
@@ -40,7 +40,7 @@ static nebel_snapshot *make_crowd(int count, int kind)
         volumes[count - 1].operation = NEBEL_OPERATION_EXCLUDE;
         volumes[count - 1].shape.radius = 1;
     }
-    return fog_commit(&(nebel_fog_desc){0}, volumes, (size_t)count);
+    return fog_light(NULL, volumes, (size_t)count);
 }
 
 typedef struct split {
@@ -86,7 +86,7 @@ static void bind(unsigned program, const char *name, int unit, unsigned texture)
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
 }
 
-static void draw(nebel_snapshot *snapshot, const pass_picture *picture, split *out)
+static void draw(nebel_lighting *lighting, const pass_picture *picture, split *out)
 {
     nb_gl context;
     nebel_gl *gl = NULL;
@@ -99,7 +99,7 @@ static void draw(nebel_snapshot *snapshot, const pass_picture *picture, split *o
     const unsigned targets[] = {pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL),
                                 pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL)};
     const unsigned framebuffer = pass_framebuffer(targets[0], targets[1]);
-    assert_int_equal(nebel_gl_set_fog(gl, snapshot, &picture->view), NEBEL_OK);
+    assert_int_equal(nebel_gl_set_fog(gl, lighting, &picture->view), NEBEL_OK);
     assert_int_equal(nebel_gl_get_fog_resources(gl, &fog), NEBEL_OK);
     assert_int_equal(nebel_compute_view_rays(&picture->view, NULL, &rays), NEBEL_OK);
     const unsigned program = make_program(&fog);
@@ -127,7 +127,7 @@ static void draw(nebel_snapshot *snapshot, const pass_picture *picture, split *o
 static void check(int count, int kind, double most)
 {
     static split got;
-    nebel_snapshot *const fog = make_crowd(count, kind);
+    nebel_lighting *const fog = make_crowd(count, kind);
     pass_picture picture = {.view = pass_view(PERSPECTIVE, (range){-1, 0}, 0, 0), .clip = {-1, 0}};
     double light = 0, transmittance = 0;
     pass_fill(&picture);
@@ -142,7 +142,7 @@ static void check(int count, int kind, double most)
     print_message("%d volumes: transmittance %.1e off, light %.1e\n", count, transmittance, light);
     assert_true(transmittance < 1e-4);
     assert_true(light < most);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_crowds_are_as_promised(void **state)

@@ -63,7 +63,7 @@ static void make_floor(floor_mesh *f, uint32_t count)
 }
 
 /* Two colours of light; grey, so that red's transmittance is all. */
-static nebel_snapshot *commit_mist(void)
+static nebel_lighting *commit_mist(void)
 {
     const nebel_volume_desc volumes[] = {
         {.shape = {.type = NEBEL_SHAPE_WORLD},
@@ -75,7 +75,7 @@ static nebel_snapshot *commit_mist(void)
          .extinction = {.2, .2, .2},
          .source = {.9, .4, .2}},
     };
-    return fog_commit(&(nebel_fog_desc){0}, volumes, 2);
+    return fog_light(NULL, volumes, 2);
 }
 
 /* ---- pictures -------------------------------------------------------------------------------- */
@@ -96,14 +96,14 @@ static void draw(nebel_gl_renderer *renderer, const nebel_camera *camera, nebel_
     assert_int_equal(nebel_gl_read_planes(renderer, &wanted), NEBEL_OK);
 }
 
-static nebel_gl_renderer *create(const floor_mesh *floor, nebel_snapshot *fog)
+static nebel_gl_renderer *create(const floor_mesh *floor, nebel_lighting *fog)
 {
     nebel_gl_renderer *renderer = NULL;
     assert_int_equal(nebel_create_gl_renderer(&floor->scene, fog, &(nebel_gl_renderer_desc){0}, &renderer), NEBEL_OK);
     return renderer;
 }
 
-static void draw_alone(const floor_mesh *floor, nebel_snapshot *fog, const nebel_camera *camera, nebel_gl_method method,
+static void draw_alone(const floor_mesh *floor, nebel_lighting *fog, const nebel_camera *camera, nebel_gl_method method,
                        planes *p)
 {
     nebel_gl_renderer *const renderer = create(floor, fog);
@@ -171,14 +171,15 @@ static void check_triangle(nb_gl_language language)
     int seen = 0;
     nb_gl context;
     nebel_view view;
-    nebel_snapshot *const fog = commit_mist();
+    nebel_lighting *const fog = commit_mist();
     const nebel_camera camera = camera_at(1, 1.5, 5);
     make_triangle(&f);
     nebel_vertices points = {.positions = f.positions};
     memcpy(points.origin, middle, sizeof points.origin);
     memcpy(points.eye, camera.position, sizeof points.eye);
     const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, corners, 0};
-    assert_int_equal(nebel_compute_vertex_fog(fog, NULL, 3, &points, &output, 1), NEBEL_OK);
+    const nebel_snapshot *const snapshot = nebel_get_lighting_snapshot(fog);
+    assert_int_equal(nebel_compute_vertex_fog(snapshot, NULL, 3, &points, &output, 1), NEBEL_OK);
     assert_int_equal(nebel_view_from_camera(&camera, WIDTH, HEIGHT, NULL, &view), NEBEL_OK);
     pass_open(&context, language);
     draw_alone(&f, fog, &camera, NEBEL_GL_METHOD_VERTEX, &p);
@@ -195,7 +196,7 @@ static void check_triangle(nb_gl_language language)
     assert_true(seen > PIXELS / 4 && seen < PIXELS);
     assert_true(largest <= 1e-5);
     pass_close(&context);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_fog_is_that_of_the_corners_interpolated(void **state)
@@ -215,7 +216,7 @@ static void test_fine_triangles_are_nearly_exact(void **state)
     static planes exact, p;
     double last = 1;
     nb_gl context;
-    nebel_snapshot *const fog = commit_mist();
+    nebel_lighting *const fog = commit_mist();
     const nebel_camera camera = camera_at(1, 1.5, 5);
     pass_open(&context, NB_GL_330);
     for (uint32_t count = 6; count <= FINEST; count *= 4) {
@@ -229,7 +230,7 @@ static void test_fine_triangles_are_nearly_exact(void **state)
     }
     assert_true(last < 1. / 255);
     pass_close(&context);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_additive_fog_hides_nothing(void **state)
@@ -238,7 +239,7 @@ static void test_additive_fog_hides_nothing(void **state)
     static floor_mesh f;
     static planes vertex, additive;
     nb_gl context;
-    nebel_snapshot *const fog = commit_mist();
+    nebel_lighting *const fog = commit_mist();
     const nebel_camera camera = camera_at(1, 1.5, 5);
     make_floor(&f, 12);
     pass_open(&context, NB_GL_330);
@@ -255,7 +256,7 @@ static void test_additive_fog_hides_nothing(void **state)
         }
     }
     pass_close(&context);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* ---- the renderer ---------------------------------------------------------------------------- */
@@ -267,17 +268,16 @@ static void test_frames_do_not_depend_on_the_last(void **state)
     static floor_mesh f;
     static planes again, fresh;
     nb_gl context;
-    nebel_snapshot *const mist = commit_mist(), *const nothing =
-                                                    fog_commit(&(nebel_fog_desc){.log = {NULL, NULL}}, NULL, 0);
+    nebel_lighting *const mist = commit_mist(), *const nothing = fog_light(NULL, NULL, 0);
     const nebel_camera cameras[2] = {camera_at(1, 1.5, 5), camera_at(-3, .5, 2)};
     make_floor(&f, 12);
     pass_open(&context, NB_GL_330);
     const int objects = pass_count_objects();
     nebel_gl_renderer *const renderer = create(&f, NULL);
     for (int turn = 0; turn < 8; turn++) {
-        nebel_snapshot *const fog = turn == 7 ? NULL : turn == 3 ? nothing : mist;
+        nebel_lighting *const fog = turn == 7 ? NULL : turn == 3 ? nothing : mist;
         const nebel_gl_method method = turn % 3 == 2 ? NEBEL_GL_METHOD_EXACT : NEBEL_GL_METHOD_VERTEX;
-        assert_int_equal(nebel_set_gl_renderer_fog(renderer, fog), NEBEL_OK);
+        assert_int_equal(nebel_set_gl_renderer_lighting(renderer, fog), NEBEL_OK);
         draw(renderer, &cameras[turn % 2], method, &again);
         draw_alone(&f, fog, &cameras[turn % 2], method, &fresh);
         assert_memory_equal(&again, &fresh, sizeof again);
@@ -285,8 +285,8 @@ static void test_frames_do_not_depend_on_the_last(void **state)
     nebel_destroy_gl_renderer(renderer);
     assert_int_equal(pass_count_objects(), objects);
     pass_close(&context);
-    nebel_release_snapshot(mist);
-    nebel_release_snapshot(nothing);
+    nebel_release_lighting(mist);
+    nebel_release_lighting(nothing);
 }
 
 /* ---- cells ----------------------------------------------------------------------------------- */
@@ -360,7 +360,7 @@ static void test_cells_are_drawn_like_volumes(void **state)
     static floor_mesh f;
     static planes by_volumes, by_cells;
     const nebel_volume_desc volumes[] = {nebel_volume_from_cell(&rooms[0]), nebel_volume_from_cell(&rooms[1])};
-    nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, volumes, 2);
+    nebel_lighting *const fog = fog_light(NULL, volumes, 2);
     nebel_cells *const cells = create_rooms();
     nb_gl context;
     nebel_gl_frame_desc desc = {.camera = camera_at(1, 1.5, 5),
@@ -388,7 +388,7 @@ static void test_cells_are_drawn_like_volumes(void **state)
         pass_close(&context);
     }
     nebel_destroy_cells(cells);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* ---- factors --------------------------------------------------------------------------------- */
@@ -475,7 +475,7 @@ static void test_factors(void **state)
     static floor_mesh f;
     static planes p;
     nb_gl context;
-    nebel_snapshot *const fog = commit_mist(); /* is not drawn */
+    nebel_lighting *const fog = commit_mist(); /* is not drawn */
     const nebel_camera camera = camera_at(1, 1.5, 5);
     const nebel_factor_desc bad = {.density = -1};
     make_triangle(&f);
@@ -502,7 +502,7 @@ static void test_factors(void **state)
         assert_int_equal(pass_count_objects(), objects);
         pass_close(&context);
     }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* Start = end: all fog at vertices, a step at pixels. */

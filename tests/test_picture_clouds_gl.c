@@ -87,7 +87,7 @@ static void compare(const char *name, double most, const picture_pair *pair)
     assert_true(shown <= most && left <= most);
 }
 
-static void check_samples(const char *name, const world *w, nebel_snapshot *fog, const nebel_camera *camera,
+static void check_samples(const char *name, const world *w, nebel_lighting *fog, const nebel_camera *camera,
                           uint32_t samples)
 {
     picture_pair pair = picture_make(96 * scale, 54 * scale);
@@ -101,7 +101,7 @@ static void check_samples(const char *name, const world *w, nebel_snapshot *fog,
     picture_free(&pair);
 }
 
-static void check(const char *name, const world *w, nebel_snapshot *fog, const nebel_camera *camera)
+static void check(const char *name, const world *w, nebel_lighting *fog, const nebel_camera *camera)
 {
     check_samples(name, w, fog, camera, 1);
 }
@@ -174,11 +174,11 @@ static void walls_stand_amid_clouds(void **state)
 static void check_in_fog(const char *name, world *w, const nebel_camera *camera, uint32_t samples)
 {
     nb_gl context;
-    nebel_snapshot *const fog = planet_fog(w->scene.sun_direction);
+    nebel_lighting *const fog = planet_fog(w->scene.sun_direction);
     pass_open(&context, NB_GL_330);
     check_samples(name, w, fog, camera, samples);
     pass_close(&context);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     free_world(w);
 }
 
@@ -226,7 +226,7 @@ static void sheets_lie_over_mist(void **state)
     world w;
     make_world_under(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .base = 1500, .coverage = .5}, 0, &w);
     memcpy(w.scene.sun_direction, (const double[3]){.78, .046, -.624}, sizeof w.scene.sun_direction);
-    nebel_snapshot *const mist = planet_mist(w.planet.atmosphere_desc.radius, w.scene.sun_direction);
+    nebel_lighting *const mist = planet_mist(w.planet.atmosphere_desc.radius, w.scene.sun_direction);
     memset(w.scene.ambient, 0, sizeof w.scene.ambient);
     for (int c = 0; c < 3; c++) w.scene.sun_irradiance[c] = 20;
     nebel_camera camera = planet_camera(3e5, -.41);
@@ -239,7 +239,7 @@ static void sheets_lie_over_mist(void **state)
     compare("a sheet over mist", 1e-3, &pair);
     pass_close(&context);
     picture_free(&pair);
-    nebel_release_snapshot(mist);
+    nebel_release_lighting(mist);
     free_world(&w);
 }
 
@@ -325,7 +325,7 @@ static void frames_stop_amid_clouds(void **state)
     memory m = {0};
     stopper s = {0};
     make_world(.5, 0, &w);
-    nebel_snapshot *const fog = planet_fog(w.scene.sun_direction);
+    nebel_lighting *const fog = planet_fog(w.scene.sun_direction);
     pass_open(&context, NB_GL_330);
     const nebel_gl_renderer_desc desc = {.allocator = {allocate, release, &m}};
     assert_int_equal(nebel_create_gl_renderer(&w.scene, fog, &desc, &renderer), NEBEL_OK);
@@ -358,7 +358,7 @@ static void frames_stop_amid_clouds(void **state)
     nebel_destroy_gl_renderer(renderer);
     pass_close(&context);
     assert_int_equal(m.in_use, 0);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     free_world(&w);
 }
 
@@ -404,7 +404,7 @@ static void memory_that_runs_out_is_told(void **state)
     size_t failed = 0;
     make_world(.5, 0, &w);
     w.scene.mesh_count = 1; /* whose light has a table */
-    nebel_snapshot *const fog = planet_fog(w.scene.sun_direction);
+    nebel_lighting *const fog = planet_fog(w.scene.sun_direction);
     pass_open(&context, NB_GL_330);
     const nebel_gl_renderer_desc desc = {.allocator = {allocate, release, &m}};
     assert_int_equal(nebel_create_gl_renderer(&w.scene, fog, &desc, &renderer), NEBEL_OK);
@@ -426,7 +426,7 @@ static void memory_that_runs_out_is_told(void **state)
     nebel_destroy_gl_renderer(renderer);
     pass_close(&context);
     assert_int_equal(m.in_use, 0);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     free_world(&w);
 }
 

@@ -1,5 +1,6 @@
 /* In OpenGL fog on planets has the light of its own place, as on the CPU: mist around the planet, balls of fog behind the
  * terminator, before it, in the shadow of a moon, and with light of their own. With an argument in pictures so many times wider. */
+#include "fog_help.h"
 #include "pass_help.h"
 #include "picture_help.h"
 #include "planet_help.h"
@@ -32,7 +33,7 @@ static void compare(const char *name, const picture_pair *pair)
     assert_true(shown <= 1e-3 && fog <= 1e-3 && left <= 1. / 255);
 }
 
-static picture_pair check(const char *name, const nebel_scene_data *scene, nebel_snapshot *fog,
+static picture_pair check(const char *name, const nebel_scene_data *scene, nebel_lighting *fog,
                           const nebel_camera *camera)
 {
     picture_pair pair = picture_make(64 * scale, 36 * scale);
@@ -55,7 +56,6 @@ static void mist_seas_are_the_same(void **state)
     for (int k = 0; k < 9; k++) {
         char name[64];
         nebel_scene *scene = NULL;
-        nebel_snapshot *fog = NULL;
         nebel_sun sun = {.irradiance = {20, 20, 20}};
         memcpy(sun.direction, suns[k / 3], sizeof sun.direction);
         assert_true(nb_vector_make_unit(sun.direction));
@@ -63,7 +63,7 @@ static void mist_seas_are_the_same(void **state)
             nebel_load_scene(NEBEL_SOURCE "/examples/scenes/mist-sea.json", &(nebel_scene_desc){0}, &scene), NEBEL_OK);
         assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
         assert_int_equal(nebel_set_scene_sun(scene, &sun), NEBEL_OK);
-        assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+        nebel_lighting *const fog = picture_commit_scene(scene, 1);
         nebel_scene_data data = *nebel_get_scene_data(scene);
         memcpy(data.sun_direction, sun.direction, sizeof sun.direction);
         data.mesh_count = 0;
@@ -72,7 +72,7 @@ static void mist_seas_are_the_same(void **state)
         picture_pair pair = check(name, &data, fog, &camera);
         assert_true(picture_largest_light(&pair) > .01);
         picture_free(&pair);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
         nebel_destroy_scene(scene);
     }
     pass_close(&context);
@@ -102,13 +102,12 @@ static nebel_camera turned_camera(const worlds *s, double angle)
 enum { GLOW = 1, LAMP = 2, DIFFUSE = 4 };
 
 /* Lit as the scene's origin is, as programs do it. */
-static nebel_snapshot *make_ball(const worlds *s, double angle, const nebel_environment *sky, int own)
+static nebel_lighting *make_ball(const worlds *s, double angle, const nebel_environment *sky, int own)
 {
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
     static const double origin[1][3] = {{0, 0, 0}};
+    static const nebel_diffusion_desc diffusion = {.max_cells = 4096};
     nebel_irradiance light;
-    nebel_fog_desc desc = {.sun = s->sun};
+    nebel_lighting_desc lights = {.sun = s->sun, .environment = *sky};
     nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 80, -70}, .radius = 20},
                               .extinction = {.02, .03, .04},
                               .albedo = {.9, .8, .7},
@@ -119,16 +118,10 @@ static nebel_snapshot *make_ball(const worlds *s, double angle, const nebel_envi
     for (int c = 0; c < 3 && (own & GLOW) != 0; c++) ball.emission[c] = .002 * (c + 1);
     assert_int_equal(nebel_compute_atmosphere_irradiance(s->atmospheres[0], &s->sun, 1, origin, 0, &light, 0),
                      NEBEL_OK);
-    memcpy(desc.sun.irradiance, light.sun, sizeof light.sun);
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    assert_int_equal(nebel_set_environment(fog, sky), NEBEL_OK);
-    if ((own & LAMP) != 0) assert_int_equal(nebel_set_lamps(fog, 1, &lamp), NEBEL_OK);
-    if ((own & DIFFUSE) != 0)
-        assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.max_cells = 4096}), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &ball, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    memcpy(lights.sun.irradiance, light.sun, sizeof light.sun);
+    if ((own & LAMP) != 0) lights.lights = &lamp, lights.light_count = 1;
+    if ((own & DIFFUSE) != 0) lights.diffusion = &diffusion;
+    return fog_light(&lights, &ball, 1);
 }
 
 /* On the CPU, in the middle of the picture, where the ball is. */
@@ -149,13 +142,13 @@ static void check_ball(const ball_case *b, const worlds *s, const nebel_environm
     const double angle = b->degrees * acos(-1) / 180;
     nebel_camera camera = turned_camera(s, angle);
     if (b->is_panorama) camera.projection = NEBEL_PROJECTION_PANORAMA;
-    nebel_snapshot *const fog = make_ball(s, angle, sky, b->own);
+    nebel_lighting *const fog = make_ball(s, angle, sky, b->own);
     picture_pair pair = check(b->name, &s->scene, fog, &camera);
     const double light = ball_light(&pair, 0);
     print_message("  the ball: %g %g %g\n", light, ball_light(&pair, 1), ball_light(&pair, 2));
     assert_true(b->is_panorama || (light >= b->least && light <= b->most));
     picture_free(&pair);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* At noon the ball has a radiance of .05; the origin's sun would make it as bright wherever it is. */
@@ -205,11 +198,11 @@ static void moons_shade_balls(void **state)
         bodies[1].center[1] += 4e8;
         worlds_make(2, bodies, to_sun, .53, &s);
         nebel_camera camera = turned_camera(&s, angle);
-        nebel_snapshot *const fog = make_ball(&s, angle, &none, 0);
+        nebel_lighting *const fog = make_ball(&s, angle, &none, 0);
         picture_pair pair = check(ball.name, &s.scene, fog, &camera);
         lit[k] = ball_light(&pair, 0);
         picture_free(&pair);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
         worlds_free(&s);
     }
     pass_close(&context);
@@ -254,8 +247,6 @@ static void fences_shade_mist(void **state)
                                     .density = {.type = NEBEL_DENSITY_HEIGHT, .base = 2, .scale_height = 22}};
     const nebel_mesh fence = make_fence(corners, indices);
     nebel_camera camera = planet_camera(4, .054);
-    nebel_snapshot *snapshot;
-    nebel_fog *fog;
     nb_gl context;
     worlds s;
     pass_open(&context, NB_GL_330);
@@ -263,13 +254,11 @@ static void fences_shade_mist(void **state)
     s.scene.mesh_count = 1;
     s.scene.meshes = &fence;
     camera.vertical_fov = 6;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.sun = s.sun}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &mist, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    picture_pair pair = check("beside a fence", &s.scene, snapshot, &camera);
+    const nebel_lighting_desc lights = {.sun = s.sun};
+    nebel_lighting *const fog = fog_light(&lights, &mist, 1);
+    picture_pair pair = check("beside a fence", &s.scene, fog, &camera);
     picture_free(&pair);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(fog);
     worlds_free(&s);
     pass_close(&context);
 }
@@ -296,12 +285,12 @@ static void diffusion_is_warned_of_once(void **state)
         nebel_gl_renderer *renderer = NULL;
         const nebel_gl_renderer_desc desc = {.log = {count_warnings, &warnings}};
         const nebel_gl_frame_desc frame = {.camera = turned_camera(&s, .5), .width = 8, .height = 8, .samples = 1};
-        nebel_snapshot *const fog = make_ball(&s, .5, &none, is_diffuse ? DIFFUSE : 0);
+        nebel_lighting *const fog = make_ball(&s, .5, &none, is_diffuse ? DIFFUSE : 0);
         assert_int_equal(nebel_create_gl_renderer(&s.scene, fog, &desc, &renderer), NEBEL_OK);
         for (int i = 0; i < 2; i++) assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
         assert_int_equal(warnings, is_diffuse);
         nebel_destroy_gl_renderer(renderer);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
     }
     worlds_free(&s);
     pass_close(&context);

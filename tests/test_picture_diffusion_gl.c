@@ -12,7 +12,7 @@ enum { WIDTH = 32, HEIGHT = 22, MOST_VOLUMES = 2 };
 static const nebel_scene_data black = {.background = {0, 0, 0}};
 
 /* Both renderers' pictures of the fog, in parts of the brightest light of the CPU's. */
-static picture_difference compare(nebel_snapshot *fog, const nebel_camera *camera, nb_gl_language language,
+static picture_difference compare(nebel_lighting *fog, const nebel_camera *camera, nb_gl_language language,
                                   const char *name)
 {
     nb_gl context;
@@ -143,26 +143,21 @@ static const nebel_light lamps[] = {{.position = {.5, .3, .4}, .intensity = {4, 
 static const nebel_environment overcast = {
     .type = NEBEL_ENVIRONMENT_GRADIENT, .zenith = {.9, 1, 1.2}, .horizon = {.5, .4, .3}, .ground = {.1, .1, 0}};
 
-static nebel_snapshot *commit(const trial *t)
+static nebel_lighting *commit(const trial *t)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    const nebel_fog_desc desc = {.ambient = {.1, .1, .12},
-                                 .sun = {.direction = {1, .6, .5}, .irradiance = {3, 2.8, 2.5}}};
-    nebel_diffusion_desc diffusion = t->diffusion;
-    assert_int_equal(
-        nebel_create_fog(t->is_overcast || t->is_night ? &(nebel_fog_desc){.max_opacity = 0} : &desc, &fog), NEBEL_OK);
-    if (t->is_overcast) assert_int_equal(nebel_set_environment(fog, &overcast), NEBEL_OK);
-    if (t->is_night) assert_int_equal(nebel_set_lamps(fog, sizeof lamps / sizeof *lamps, lamps), NEBEL_OK);
-    for (size_t i = 0; i < t->count; i++) {
-        nebel_volume_desc volume = t->volumes[i];
-        volume.shape.center[0] += t->far;
-        assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+    nebel_volume_desc volumes[MOST_VOLUMES];
+    nebel_lighting_desc lights = {.diffusion = &t->diffusion};
+    if (t->is_overcast) lights.environment = overcast;
+    if (t->is_night) lights.lights = lamps, lights.light_count = sizeof lamps / sizeof *lamps;
+    if (!t->is_overcast && !t->is_night) {
+        lights.environment = (nebel_environment){.radiance = {.1, .1, .12}};
+        lights.sun = (nebel_sun){.direction = {1, .6, .5}, .irradiance = {3, 2.8, 2.5}};
     }
-    assert_int_equal(nebel_set_diffusion(fog, &diffusion), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    for (size_t i = 0; i < t->count; i++) {
+        volumes[i] = t->volumes[i];
+        volumes[i].shape.center[0] += t->far;
+    }
+    return fog_light(&lights, volumes, t->count);
 }
 
 static void test_fog_is_white_as_on_the_cpu(void **state)
@@ -172,29 +167,22 @@ static void test_fog_is_white_as_on_the_cpu(void **state)
         const trial *t = &trials[i];
         nebel_camera camera = test_camera(t->far + 2, 1.5, 5, t->far, 0, 0);
         camera.projection = t->projection;
-        nebel_snapshot *const fog = commit(t);
+        nebel_lighting *const fog = commit(t);
         const picture_difference d = compare(fog, &camera, i % 2 == 0 ? NB_GL_330 : NB_GL_300ES, t->name);
         expect_same(&d);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
     }
 }
 
 /* ---- random fog ------------------------------------------------------------------------------ */
 
-static nebel_snapshot *commit_random(const random_fog *random)
+static nebel_lighting *commit_random(const random_fog *random)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    nebel_fog_desc desc = random_fog_desc(random);
-    desc.max_opacity = 0;
-    desc.sun = (nebel_sun){.direction = {.3, .8, -.4}, .irradiance = {3, 2, 1}};
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    for (size_t i = 0; i < random->count; i++)
-        assert_int_equal(nebel_add_volume(fog, &random->volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.max_cells = 512}), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    static const nebel_diffusion_desc diffusion = {.max_cells = 512};
+    nebel_lighting_desc lights = random_fog_lights(random);
+    lights.sun = (nebel_sun){.direction = {.3, .8, -.4}, .irradiance = {3, 2, 1}};
+    lights.diffusion = &diffusion;
+    return fog_light(&lights, random->volumes, random->count);
 }
 
 static void test_random_fog(void **state)
@@ -211,7 +199,7 @@ static void test_random_fog(void **state)
         char name[32];
         random_fog_make(&random, kind, seed);
         random_fog_light(&random, &numbers);
-        nebel_snapshot *const fog = commit_random(&random);
+        nebel_lighting *const fog = commit_random(&random);
         nebel_camera camera =
             test_camera(dice(&numbers, -20, 20), dice(&numbers, -4, 8), dice(&numbers, -20, 20), 0, 0, 0);
         for (int k = 0; k < 3; k++) {
@@ -223,7 +211,7 @@ static void test_random_fog(void **state)
         all.fogged += d.fogged;
         all.beyond_step += d.beyond_step;
         all.largest = fmax(all.largest, d.largest);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
     }
     assert_true(all.fogged > 3 * (size_t)WIDTH * HEIGHT);
     expect_same(&all);

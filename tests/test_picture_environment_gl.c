@@ -50,17 +50,11 @@ static nebel_environment sky_of(uint64_t seed, nebel_environment_map *map)
     return sky;
 }
 
-static nebel_snapshot *commit(const nebel_fog_desc *desc, const nebel_environment *sky, size_t count,
+static nebel_lighting *commit(const nebel_fog_desc *desc, const nebel_environment *sky, size_t count,
                               const nebel_volume_desc *volumes)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(desc, &fog), NEBEL_OK);
-    for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_environment(fog, sky), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    const nebel_lighting_desc lights = {.environment = *sky};
+    return fog_commit_lit(desc, volumes, count, &lights);
 }
 
 /* ---- comparison ------------------------------------------------------------------------------ */
@@ -119,7 +113,7 @@ static void surfaces_reflect_the_sky(void **state)
         nb_gl context;
         picture_pair pair = picture_make(WIDTH, HEIGHT);
         test_stage_set(&s, (const double[3]){0, 0, 0}, (const double[3]){3, 2, 5});
-        nebel_release_snapshot(s.fog);
+        nebel_release_lighting(s.fog);
         s.ball.scene.has_sun = 0;
         s.ball.scene.environment = sky_of((uint64_t)i, i % 2 != 0 ? map : NULL);
         s.ball.scene.shows_ambient = i != 1;
@@ -134,7 +128,7 @@ static void surfaces_reflect_the_sky(void **state)
         assert_true(d.largest < .1 / 255);
         assert_true(d.color < 1e-3);
         picture_free(&pair);
-        nebel_release_snapshot(s.fog);
+        nebel_release_lighting(s.fog);
     }
     nebel_release_environment_map(map);
 }
@@ -183,7 +177,7 @@ static void changes_are_seen(void **state)
     }
     nebel_destroy_gl_renderer(renderer);
     pass_close(&context);
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
     nebel_release_environment_map(map);
 }
 
@@ -202,7 +196,7 @@ static picture_difference check_random(int number, nebel_environment_map *map)
     random_fog_light(&fog, &numbers);
     const double far = number % 3 == 0 ? .4 : 1;
     test_stage_set(&s, fog.shift, (const double[3]){12 * far, 3 * far, 14 * far});
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
     s.ball.scene.environment = sky_of((uint64_t)number, number % 2 != 0 ? map : NULL);
     s.ball.scene.shows_ambient = 1;
     s.ball.scene.has_sun = 0;
@@ -217,7 +211,7 @@ static picture_difference check_random(int number, nebel_environment_map *map)
     pass_close(&context);
     const picture_difference d = check("random", number, &pair, 1. / 255);
     picture_free(&pair);
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
     return d;
 }
 

@@ -26,7 +26,7 @@ typedef struct stage {
     uint8_t texels[4 * TEXELS * TEXELS];
     nebel_texture texture;
     nebel_particle particles[PARTICLES];
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
     nebel_gl_renderer *renderer;
     int objects;
     odd_snapshot before;
@@ -85,7 +85,7 @@ static void start_with_renderer(stage *s, nb_gl_language language)
 static void end(stage *s)
 {
     expect_nothing_left(s);
-    nebel_release_snapshot(s->fog);
+    nebel_release_lighting(s->fog);
     pass_close(&s->context);
 }
 
@@ -207,12 +207,12 @@ static void test_views_that_are_too_narrow(void **state)
     assert_int_equal(draw_narrow(&s, NEBEL_PROJECTION_ORTHOGRAPHIC, 1e-3), NEBEL_OK);
     assert_int_equal(draw_narrow(&s, NEBEL_PROJECTION_PERSPECTIVE, 1.2e-3), NEBEL_OK);
     const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1}, .extinction = {2, 2, 2}};
-    nebel_snapshot *const fog = test_fog(1, &ball);
-    assert_int_equal(nebel_set_gl_renderer_fog(s.renderer, fog), NEBEL_OK);
+    nebel_lighting *const fog = test_fog(1, &ball);
+    assert_int_equal(nebel_set_gl_renderer_lighting(s.renderer, fog), NEBEL_OK);
     expect_message(draw_narrow(&s, NEBEL_PROJECTION_PERSPECTIVE, 1.4e-2), NEBEL_ERROR_LIMIT,
                    "make vertical_fov at least 0.0154");
     assert_int_equal(draw_narrow(&s, NEBEL_PROJECTION_PERSPECTIVE, 1.6e-2), NEBEL_OK);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     end(&s);
 }
 
@@ -231,30 +231,31 @@ static void test_a_lost_context_is_survived(void **state)
                    "no frame was drawn");
     nebel_destroy_gl_renderer(s.renderer);
     epoxy_glIsVertexArray = true_is;
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
     pass_close(&s.context);
 }
 
 /* ---- what is not drawn ----------------------------------------------------------------------- */
 
-static nebel_snapshot *commit_sunlit_box(double x, double y)
+static nebel_lighting *commit_sunlit_box(double x, double y)
 {
     const nebel_volume_desc box = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {x, y, -1}, .max = {x + 1, y + 1, 1}},
                                    .extinction = {1, 1, 1},
                                    .albedo = {1, 1, 1}};
-    return fog_commit(&(nebel_fog_desc){.sun = {{0, 1, 0}, {3, 3, 3}}}, &box, 1);
+    const nebel_lighting_desc lights = {.sun = {{0, 1, 0}, {3, 3, 3}}};
+    return fog_light(&lights, &box, 1);
 }
 
 /* Draws twice: what is said is said once. word NULL: nothing is. */
 static void expect_said(stage *s, double x, double y, const char *word)
 {
-    nebel_snapshot *const fog = commit_sunlit_box(x, y);
+    nebel_lighting *const fog = commit_sunlit_box(x, y);
     messages.count = 0;
-    assert_int_equal(nebel_set_gl_renderer_fog(s->renderer, fog), NEBEL_OK);
+    assert_int_equal(nebel_set_gl_renderer_lighting(s->renderer, fog), NEBEL_OK);
     for (int i = 0; i < 2; i++) assert_int_equal(draw(s, 32, 1), NEBEL_OK);
     assert_int_equal(messages.count, word != NULL);
     if (word != NULL && strstr(messages.text, word) == NULL) fail_msg("it says: %s", messages.text);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* Fog under particles, beside them and above; a lamp. */

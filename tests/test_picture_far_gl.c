@@ -21,7 +21,7 @@ static fog_messages messages;
 static nebel_gl_renderer *opengl;
 
 /* About `size` wide where it is not a sheet of 2 m; of optical depth `depth` across. */
-static nebel_snapshot *commit_shape(int shape, double size, double depth)
+static nebel_lighting *commit_shape(int shape, double size, double depth)
 {
     const double wide = shape == 5 ? 1e3 * size : size, half = .4 * wide;
     const double across = shape < 2 ? 2 : shape == 4 ? .1 * size : wide, extinction = depth / across;
@@ -76,11 +76,11 @@ static int is_right(int shape, double size, double depth, const nebel_camera *ca
         .camera = *camera, .width = SIDE, .height = SIDE, .samples = 1, .tolerance = 1e-4};
     const nebel_gl_planes planes = {.transmittance = pair->gl.transmittance, .in_scattering = pair->gl.in_scattering};
     tally *const t = &tallies[camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC][shape];
-    nebel_snapshot *const fog = commit_shape(shape, size, depth);
+    nebel_lighting *const fog = commit_shape(shape, size, depth);
     nebel_renderer *cpu = NULL;
     double worst = 0;
     messages.count = 0;
-    assert_int_equal(nebel_set_gl_renderer_fog(opengl, fog), NEBEL_OK);
+    assert_int_equal(nebel_set_gl_renderer_lighting(opengl, fog), NEBEL_OK);
     const nebel_result result = nebel_gl_render_frame(opengl, &frame);
     if (result == NEBEL_OK) {
         assert_int_equal(nebel_gl_read_planes(opengl, &planes), NEBEL_OK);
@@ -97,7 +97,7 @@ static int is_right(int shape, double size, double depth, const nebel_camera *ca
     t->right += result == NEBEL_OK && worst <= 1. / 255;
     t->worst = fmax(t->worst, worst);
     t->wrong += !(worst <= 1. / 255);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     return worst <= 1. / 255;
 }
 
@@ -154,13 +154,8 @@ static void test_parallel_views_of_surfaces_from_afar(void **state)
     nb_gl context;
     picture_pair pair = picture_make(64, 64), from_afar = picture_make(64, 64);
     test_ball_make(&ball, (double[3]){0, 0, 0});
-    nebel_fog *made = NULL;
-    nebel_snapshot *fog = NULL;
-    const nebel_sun sun = {.direction = {.36, .8, .48}, .irradiance = {3, 2.9, 2.7}};
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.sun = sun}, &made), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(made, &volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(made, &fog), NEBEL_OK);
-    nebel_destroy_fog(made);
+    const nebel_lighting_desc lights = {.sun = {.direction = {.36, .8, .48}, .irradiance = {3, 2.9, 2.7}}};
+    nebel_lighting *const fog = fog_light(&lights, &volume, 1);
     pass_open(&context, NB_GL_330);
     for (int k = 0; k < 3; k++) camera.position[k] = near * (k == 0 ? .6 : k == 1 ? .64 : .48);
     picture_render(&ball.scene, fog, &camera, 1, &pair);
@@ -179,7 +174,7 @@ static void test_parallel_views_of_surfaces_from_afar(void **state)
     assert_true(difference.fogged > 1000 && difference.beyond_step <= difference.fogged / 200);
     picture_free(&pair);
     picture_free(&from_afar);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     pass_close(&context);
 }
 

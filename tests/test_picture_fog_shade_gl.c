@@ -65,16 +65,13 @@ static void free_world(world *w)
 }
 
 /* In the light of the origin under these clouds, as programs make it. */
-static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume)
+static nebel_lighting *make_fog(const world *w, const nebel_volume_desc *volume)
 {
     static const double origin[1][3] = {{0, 0, 0}};
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
     nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace;
     nebel_cloud_lighting_desc above = {.clouds = w->clouds, .sun = {.irradiance = {5, 4, 3}}};
-    nebel_fog_desc desc = {.sun = {.direction = {0, 1, 0}}};
-    nebel_environment environment = w->scene.environment;
+    nebel_lighting_desc lights = {.environment = w->scene.environment};
     nebel_irradiance light;
     float sun, sky;
     memcpy(above.sun.direction, w->scene.sun_direction, sizeof above.sun.direction);
@@ -84,16 +81,11 @@ static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume)
     assert_int_equal(nebel_compute_cloud_sky_transmittance(workspace, 200, 1, origin, 0, &sky), NEBEL_OK);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_lighting(view);
-    desc.sun = above.sun;
+    lights.sun = above.sun;
     assert_int_equal(nebel_compute_atmosphere_irradiance(w->atmosphere, &above.sun, 1, origin, 0, &light, 0), NEBEL_OK);
-    for (int c = 0; c < 3; c++) desc.sun.irradiance[c] = (double)sun * light.sun[c];
-    environment.intensity = (double)sky;
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    assert_int_equal(nebel_set_environment(fog, &environment), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    for (int c = 0; c < 3; c++) lights.sun.irradiance[c] = (double)sun * light.sun[c];
+    lights.environment.intensity = (double)sky;
+    return fog_light(&lights, volume, 1);
 }
 
 /* Of pixels the share whose in-scattering is apart by more than 1/255 of the brightest. */
@@ -104,7 +96,7 @@ static double light_apart(const picture_pair *pair)
 }
 
 /* How much of the light of fog changes where clouds are not there: less than that of another picture cannot be told. */
-static double by_clouds(world *w, nebel_snapshot *fog, const nebel_camera *camera, const picture_pair *pair)
+static double by_clouds(world *w, nebel_lighting *fog, const nebel_camera *camera, const picture_pair *pair)
 {
     nebel_renderer *renderer;
     picture_pair clear = picture_make(pair->width, pair->height);
@@ -124,7 +116,7 @@ static double by_clouds(world *w, nebel_snapshot *fog, const nebel_camera *camer
 static void check(const char *name, world *w, const nebel_volume_desc *volume, const nebel_camera *camera)
 {
     picture_pair pair = picture_make(64 * scale, 36 * scale);
-    nebel_snapshot *const fog = make_fog(w, volume);
+    nebel_lighting *const fog = make_fog(w, volume);
     const int objects = pass_count_objects();
     pair.tolerance = NEBEL_DEFAULT_TOLERANCE;
     picture_render(&w->scene, fog, camera, 1, &pair);
@@ -135,7 +127,7 @@ static void check(const char *name, world *w, const nebel_volume_desc *volume, c
                   name, 1e3 * shown, 1e3 * light, clouds);
     assert_true(shown <= 1e-3 && light <= 1e-3 && clouds > .05);
     picture_free(&pair);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static nebel_volume_desc make_mist(double extinction, double size, double top)

@@ -68,21 +68,20 @@ static void expect_sameness(const picture_difference *d)
 static void render_demo(const nebel_scene *scene, const nebel_camera *camera, picture_pair *pair)
 {
     const nebel_scene_data *const data = nebel_get_scene_data(scene);
-    nebel_snapshot *fog = NULL;
     nebel_particle *made = NULL;
     nb_gl context;
     picture_particles particles = {.count = data->particle_count};
     assert_int_equal(nebel_generate_scene_particles(scene, &made), NEBEL_OK);
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(nebel_commit_scene_volumes_at(scene, 0, &particles.others), NEBEL_OK);
+    nebel_lighting *const fog = picture_commit_scene(scene, 1);
+    particles.others = picture_commit_scene(scene, 0);
     particles.list = made;
     pass_open(&context, NB_GL_330);
     const int objects = pass_count_objects();
     picture_render_particles(data, fog, &particles, camera, 1, pair);
     assert_int_equal(pass_count_objects(), objects);
     pass_close(&context);
-    nebel_release_snapshot(fog);
-    nebel_release_snapshot(particles.others);
+    nebel_release_lighting(fog);
+    nebel_release_lighting(particles.others);
     nebel_free_scene_particles(scene, made);
 }
 
@@ -191,22 +190,15 @@ static nebel_scene_data scene_around(const double middle[3], nebel_mesh meshes[4
 }
 
 /* With lamps it scatters light; sun NULL: there is none. */
-static nebel_snapshot *commit(random_fog *random, const nebel_sun *sun, size_t lamp_count, const nebel_light *lamps)
+static nebel_lighting *commit(random_fog *random, const nebel_sun *sun, size_t lamp_count, const nebel_light *lamps)
 {
     uint64_t numbers = random->seed;
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    nebel_fog_desc desc = random_fog_desc(random);
-    desc.max_opacity = 0;
-    if (sun != NULL) desc.sun = *sun;
+    nebel_lighting_desc lights = random_fog_lights(random);
+    if (sun != NULL) lights.sun = *sun;
+    lights.lights = lamps;
+    lights.light_count = lamp_count;
     if (lamp_count > 0) random_fog_light(random, &numbers);
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    for (size_t i = 0; i < random->count; i++)
-        assert_int_equal(nebel_add_volume(fog, &random->volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, lamp_count, lamps), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return fog_light(&lights, random->volumes, random->count);
 }
 
 /* Every fourth scene has lamps: a ball beside the boxes and a spot between them. Mesa's software ends the
@@ -249,7 +241,7 @@ static picture_difference check_random(random_fog *random, const nebel_sun *sun,
     nb_gl context;
     nebel_light lamps[2];
     const size_t lamp_count = sun != NULL ? 0 : place_lamps(random, number, lamps);
-    nebel_snapshot *const fog = commit(random, sun, lamp_count, lamps);
+    nebel_lighting *const fog = commit(random, sun, lamp_count, lamps);
     nebel_scene_data scene = scene_around(random->shift, meshes, positions);
     scene.light_count = lamp_count;
     scene.lights = lamps;
@@ -266,7 +258,7 @@ static picture_difference check_random(random_fog *random, const nebel_sun *sun,
     snprintf(name, sizeof name, "%s-%d", kind, number);
     const picture_difference d = check(name, &pair);
     picture_free(&pair);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     return d;
 }
 
@@ -370,7 +362,7 @@ static void test_borders_of_shadows_in_dense_fog(void **state)
         scene.sun_direction[k] = sun.direction[k];
         scene.sun_irradiance[k] = sun.irradiance[k];
     }
-    nebel_snapshot *const fog = commit(&dense, &sun, 0, NULL);
+    nebel_lighting *const fog = commit(&dense, &sun, 0, NULL);
     picture_pair pair = picture_make(DEMO_WIDTH, DEMO_HEIGHT);
     pass_open(&context, NB_GL_330);
     picture_render(&scene, fog, &camera, 1, &pair);
@@ -380,7 +372,7 @@ static void test_borders_of_shadows_in_dense_fog(void **state)
     assert_true((double)d.beyond_step <= 1e-3 * (double)d.fogged);
     assert_true(d.largest <= 5. / 255); /* of a ray that lies in a border itself, within a texel */
     picture_free(&pair);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 int main(void)

@@ -47,7 +47,7 @@ static double mean_light(const nebel_frame *frame, size_t count)
     return sum / (3 * (double)count);
 }
 
-static void expect_same_light(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera,
+static void expect_same_light(const nebel_scene_data *scene, nebel_lighting *fog, const nebel_camera *camera,
                               nb_gl_language language, double most)
 {
     nb_gl context;
@@ -79,7 +79,7 @@ static void test_surfaces_are_lit_as_on_the_cpu(void **state)
         s.ball.scene.lights = lamps;
         if (i == 3) s.camera.projection = NEBEL_PROJECTION_PANORAMA;
         expect_same_light(&s.ball.scene, i == 2 ? NULL : s.fog, &s.camera, i % 2 == 0 ? NB_GL_330 : NB_GL_300ES, .005);
-        nebel_release_snapshot(s.fog);
+        nebel_release_lighting(s.fog);
     }
 }
 
@@ -95,7 +95,7 @@ static void test_lamps_may_lie_in_surfaces(void **state)
         s.ball.scene.light_count = 1;
         s.ball.scene.lights = &lamp;
         expect_same_light(&s.ball.scene, NULL, &s.camera, NB_GL_330, .005);
-        nebel_release_snapshot(s.fog);
+        nebel_release_lighting(s.fog);
     }
 }
 
@@ -120,7 +120,7 @@ static void test_many_lamps_cast_shadows(void **state)
     s.ball.scene.light_count = MANY;
     s.ball.scene.lights = lamps;
     expect_same_light(&s.ball.scene, NULL, &s.camera, NB_GL_330, .002);
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 static void render(nebel_gl_renderer *renderer, const test_stage *s, float *color)
@@ -164,7 +164,7 @@ static void test_lamps_may_change_from_frame_to_frame(void **state)
     assert_memory_equal(changed, first, sizeof first);
     nebel_destroy_gl_renderer(renderer);
     pass_close(&context);
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 /* More lamps than the context has layers for, or than are drawn at all. */
@@ -192,7 +192,7 @@ static void test_lamps_have_a_limit(void **state)
     render(renderer, &s, color);
     nebel_destroy_gl_renderer(renderer);
     pass_close(&context);
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 /* ---- fog ------------------------------------------------------------------------------------- */
@@ -213,18 +213,13 @@ static void strew_lamps(const random_fog *fog, uint64_t *numbers, nebel_light la
     lamps[0].inner_angle = dice(numbers, 0, 1) * lamps[0].outer_angle;
 }
 
-static nebel_snapshot *commit_lit(const nebel_fog_desc *desc, const random_fog *random, const nebel_light *lamps)
+static nebel_lighting *commit_lit(const random_fog *random, const nebel_light *lamps)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(desc, &fog), NEBEL_OK);
-    for (size_t i = 0; i < random->count; i++)
-        assert_int_equal(nebel_add_volume(fog, &random->volumes[i], NULL), NEBEL_OK);
-    const size_t lamp_count = random->kind == RANDOM_FOG_EXCLUDE ? 1 : FOG_LAMPS;
-    assert_int_equal(nebel_set_lamps(fog, lamp_count, lamps), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    const nebel_fog_desc desc = random_fog_desc(random);
+    nebel_lighting_desc lights = random_fog_lights(random);
+    lights.lights = lamps;
+    lights.light_count = random->kind == RANDOM_FOG_EXCLUDE ? 1 : FOG_LAMPS;
+    return fog_commit_lit(&desc, random->volumes, random->count, &lights);
 }
 
 static picture_difference check_random(random_fog_kind kind, uint64_t seed)
@@ -236,8 +231,7 @@ static picture_difference check_random(random_fog_kind kind, uint64_t seed)
     random_fog_make(&random, kind, seed);
     random_fog_light(&random, &numbers);
     strew_lamps(&random, &numbers, lamps);
-    const nebel_fog_desc desc = random_fog_desc(&random);
-    nebel_snapshot *const fog = commit_lit(&desc, &random, lamps);
+    nebel_lighting *const fog = commit_lit(&random, lamps);
     nebel_camera camera = test_camera(dice(&numbers, -20, 20), dice(&numbers, -4, 8), dice(&numbers, -20, 20), 0, 0, 0);
     for (int k = 0; k < 3; k++) {
         camera.position[k] += random.shift[k];
@@ -257,7 +251,7 @@ static picture_difference check_random(random_fog_kind kind, uint64_t seed)
     print_message("kind %d, seed %d: %zu pixels with fog, %zu beyond 1/255, worst %.2g/255 at %u, %u\n", (int)kind,
                   (int)seed, d.fogged, d.beyond_step, 255 * d.largest, (unsigned)d.x, (unsigned)d.y);
     picture_free(&pair);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     return d;
 }
 

@@ -1,6 +1,7 @@
 /* Textured planets in OpenGL are those of the CPU: the scenes of them, eyes at all heights and of all kinds, fog and models
  * between the shells. With an argument in pictures so many times wider. */
 #include "odd_state.h"
+#include "fog_help.h"
 #include "pass_help.h"
 #include "picture_help.h"
 
@@ -29,7 +30,7 @@ static void compare(const char *name, const picture_pair *pair)
     assert_true(shown <= 1e-3 && depth <= 5e-3);
 }
 
-static void render(const nebel_scene_data *data, nebel_snapshot *fog, const nebel_camera *camera, picture_pair *pair)
+static void render(const nebel_scene_data *data, nebel_lighting *fog, const nebel_camera *camera, picture_pair *pair)
 {
     const int objects = pass_count_objects();
     picture_render(data, fog, camera, 1, pair);
@@ -42,15 +43,14 @@ static void check_scene(const char *name, double time)
 {
     char path[512];
     nebel_scene *scene = NULL;
-    nebel_snapshot *fog = NULL;
     picture_particles particles = {.count = 0};
     nebel_particle *list = NULL;
     snprintf(path, sizeof path, NEBEL_SOURCE "/examples/scenes/%s", name);
     assert_int_equal(nebel_load_scene(path, &(nebel_scene_desc){0}, &scene), NEBEL_OK);
     assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     const nebel_scene_data *const data = nebel_get_scene_data(scene);
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(nebel_commit_scene_volumes_at(scene, 0, &particles.others), NEBEL_OK);
+    nebel_lighting *const fog = picture_commit_scene(scene, 1);
+    particles.others = picture_commit_scene(scene, 0);
     particles.count = data->particle_count;
     assert_int_equal(nebel_generate_scene_particles(scene, &list), NEBEL_OK);
     particles.list = list;
@@ -60,8 +60,8 @@ static void check_scene(const char *name, double time)
     compare(name, &pair);
     picture_free(&pair);
     nebel_free_scene_particles(scene, list);
-    nebel_release_snapshot(particles.others);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(particles.others);
+    nebel_release_lighting(fog);
     nebel_destroy_scene(scene);
 }
 
@@ -136,20 +136,14 @@ static void make_world(double radius, world *w)
                                   .meshes = &w->mesh};
 }
 
-static nebel_snapshot *make_fog(void)
+static nebel_lighting *make_fog(void)
 {
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
     const nebel_volume_desc volumes[] = {
         {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {1, 1, 2.2}, .radius = 1},
          .extinction = {.5, .7, 1},
          .source = {1, .5, .2}},
         {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 5}, .extinction = {.05, .04, .03}, .source = {.2, .3, .4}}};
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    for (int i = 0; i < 2; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return fog_light(NULL, volumes, 2);
 }
 
 static nebel_camera camera_from(double x, double y, double z, nebel_projection projection, double size)
@@ -183,7 +177,7 @@ static void eyes_everywhere_see_the_same(void **state)
                  {"in parallel from within", camera_from(.2, .9, 1.5, NEBEL_PROJECTION_ORTHOGRAPHIC, 7), 0, 0}};
     world w;
     make_world(2, &w);
-    nebel_snapshot *const fog = make_fog();
+    nebel_lighting *const fog = make_fog();
     for (int i = 0; i < 2; i++) {
         nb_gl context;
         pass_open(&context, contexts[i].language);
@@ -197,7 +191,7 @@ static void eyes_everywhere_see_the_same(void **state)
         }
         pass_close(&context);
     }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_destroy_textured_planet(w.layers);
 }
 
@@ -231,20 +225,16 @@ static void particles_lie_between_shells(void **state)
     (void)state;
     static const double centers[3][3] = {{-1.2, .2, 4}, {.4, 2.35, .9}, {2.5, .3, -3}};
     nebel_particle list[3];
-    nebel_fog *fog;
-    nebel_snapshot *all;
+    nebel_volume_desc volumes[3];
     nb_gl context;
     world w;
     make_world(2, &w);
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
     for (int i = 0; i < 3; i++) {
         list[i] = (nebel_particle){.radius = .5, .extinction = {1, 2, 3}, .emission = {.9, .6, .3}};
         memcpy(list[i].center, centers[i], sizeof centers[i]);
-        const nebel_volume_desc volume = nebel_volume_from_particle(&list[i]);
-        assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+        volumes[i] = nebel_volume_from_particle(&list[i]);
     }
-    assert_int_equal(nebel_commit_fog(fog, &all), NEBEL_OK);
-    nebel_destroy_fog(fog);
+    nebel_lighting *const all = fog_light(NULL, volumes, 3);
     pass_open(&context, NB_GL_330);
     const nebel_camera camera = camera_from(1, 3, 8, NEBEL_PROJECTION_PERSPECTIVE, 45);
     picture_pair pair = picture_make(96 * scale, 64 * scale);
@@ -252,7 +242,7 @@ static void particles_lie_between_shells(void **state)
     compare("particles", &pair);
     picture_free(&pair);
     pass_close(&context);
-    nebel_release_snapshot(all);
+    nebel_release_lighting(all);
     nebel_destroy_textured_planet(w.layers);
 }
 

@@ -26,7 +26,7 @@ static picture_pair make_pair(uint32_t width, uint32_t height)
     return picture_make(scale * width, scale * height);
 }
 
-static void render(const nebel_scene_data *data, nebel_snapshot *fog, const nebel_camera *camera, picture_pair *pair)
+static void render(const nebel_scene_data *data, nebel_lighting *fog, const nebel_camera *camera, picture_pair *pair)
 {
     const int objects = pass_count_objects();
     picture_render(data, fog, camera, 1, pair);
@@ -50,17 +50,16 @@ static nebel_scene *load(const char *name)
 static void check_scene(const char *name, int around)
 {
     nebel_scene *const scene = load(name);
-    nebel_snapshot *fog = NULL;
     if (scene == NULL) return;
     const nebel_scene_data *const data = nebel_get_scene_data(scene);
     nebel_camera camera = data->camera;
     if (around) camera.projection = NEBEL_PROJECTION_PANORAMA;
     picture_pair pair = around ? make_pair(96, 48) : make_pair(96, 54);
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    nebel_lighting *const fog = picture_commit_scene(scene, 1);
     render(data, fog, &camera, &pair);
     compare(around ? "all around" : name, &pair);
     picture_free(&pair);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_destroy_scene(scene);
 }
 
@@ -135,7 +134,7 @@ static void fog_lies_in_air(void **state)
     world w;
     make_world("earth", 15, &w);
     pass_open(&context, NB_GL_330);
-    nebel_snapshot *const fog = planet_fog(w.scene.sun_direction);
+    nebel_lighting *const fog = planet_fog(w.scene.sun_direction);
     const nebel_mesh mesh = {.origin = {300, 0, -2500},
                              .positions = wall[0],
                              .indices = wall_indices,
@@ -155,7 +154,7 @@ static void fog_lies_in_air(void **state)
     compare("a wall in fog in air", &pair);
     picture_free(&pair);
     pass_close(&context);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_destroy_atmosphere(w.atmosphere);
 }
 
@@ -165,19 +164,18 @@ static void mist_bends_with_the_ground(void **state)
     (void)state;
     nb_gl context;
     nebel_scene *scene = NULL;
-    nebel_snapshot *fog = NULL;
     pass_open(&context, NB_GL_330);
     assert_int_equal(nebel_load_scene(NEBEL_SOURCE "/examples/scenes/mist-sea.json", &(nebel_scene_desc){0}, &scene),
                      NEBEL_OK);
     assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    nebel_lighting *const fog = picture_commit_scene(scene, 1);
     nebel_scene_data data = *nebel_get_scene_data(scene);
     data.mesh_count = 0;
     picture_pair pair = make_pair(64, 36);
     render(&data, fog, &data.camera, &pair);
     compare("mist without its hills", &pair);
     picture_free(&pair);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_destroy_scene(scene);
     pass_close(&context);
 }

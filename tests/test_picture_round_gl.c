@@ -54,7 +54,7 @@ static void test_all_around_is_as_on_the_cpu(void **state)
         assert_true(d.largest < .2 / 255);
         assert_true(d.color < .02);
         picture_free(&pair);
-        nebel_release_snapshot(s.fog);
+        nebel_release_lighting(s.fog);
     }
 }
 
@@ -82,7 +82,7 @@ static void test_triangles_around_the_eye(void **state)
                        .base_color = {.5f, .6f, .7f},
                        .texture = -1};
     const nebel_scene_data scene = {.ambient = {1, 1, 1}, .mesh_count = 1, .meshes = &mesh};
-    nebel_snapshot *const fog = test_fog(1, &mist);
+    nebel_lighting *const fog = test_fog(1, &mist);
     for (int i = 0; i < 6; i++) {
         nb_gl context;
         picture_pair pair = picture_make(WIDTH, HEIGHT);
@@ -96,7 +96,7 @@ static void test_triangles_around_the_eye(void **state)
         assert_true(d.largest < 3. / 255);
         picture_free(&pair);
     }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* So many volumes that there are lists for tiles, before which particles are, of grey and of colour. */
@@ -134,7 +134,7 @@ static void test_particles_among_many_volumes(void **state)
     }
     for (int i = 0; i < 2; i++) {
         nb_gl context;
-        nebel_snapshot *const all = test_fog(MANY + PARTICLES, volumes), *const others = test_fog(MANY, volumes);
+        nebel_lighting *const all = test_fog(MANY + PARTICLES, volumes), *const others = test_fog(MANY, volumes);
         const picture_particles drawn = {.list = particles, .count = PARTICLES, .others = others};
         picture_pair pair = picture_make(WIDTH, HEIGHT);
         pass_open(&context, languages[i]);
@@ -146,10 +146,10 @@ static void test_particles_among_many_volumes(void **state)
         assert_true(d.largest < 3. / 255);
         assert_true(d.color < .02);
         picture_free(&pair);
-        nebel_release_snapshot(all);
-        nebel_release_snapshot(others);
+        nebel_release_lighting(all);
+        nebel_release_lighting(others);
     }
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 /* Frames of one renderer, flat ones and panoramas in turn, are those of new ones; nothing is left behind. */
@@ -178,7 +178,7 @@ static void test_kinds_of_frames_take_turns(void **state)
     nebel_destroy_gl_renderer(renderer);
     assert_int_equal(pass_count_objects(), objects);
     pass_close(&context);
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 /* ---- methods --------------------------------------------------------------------------------- */
@@ -258,7 +258,7 @@ static void test_methods_are_those_of_the_cpu(void **state)
         picture_free(&pair);
     }
     nebel_destroy_cells(cells);
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 int main(void)

@@ -62,7 +62,7 @@ static void test_light_is_that_of_the_cpu(void **state)
         assert_true(d.largest < .1 / 255);
         assert_true(d.color < .02);
         picture_free(&pair);
-        nebel_release_snapshot(s.fog);
+        nebel_release_lighting(s.fog);
     }
 }
 
@@ -151,7 +151,7 @@ static void check_particles(const test_stage *s, nb_gl_language language, int gr
     const nebel_scene_data scene = s->ball.scene; /* the first fog lets no light of the sun through */
     make_particles(particles, volumes, grey);
     camera.projection = projection;
-    nebel_snapshot *const all = test_fog(11, volumes), *const others = test_fog(2, volumes);
+    nebel_lighting *const all = test_fog(11, volumes), *const others = test_fog(2, volumes);
     const picture_particles drawn = {.list = particles, .count = 9, .others = others};
     pass_open(&context, language);
     picture_render_particles(&scene, all, &drawn, &camera, 1, &pair);
@@ -162,8 +162,8 @@ static void check_particles(const test_stage *s, nb_gl_language language, int gr
     assert_true((double)d.beyond_step <= 1e-3 * (double)d.fogged);
     assert_true(d.largest < 3. / 255);
     picture_free(&pair);
-    nebel_release_snapshot(all);
-    nebel_release_snapshot(others);
+    nebel_release_lighting(all);
+    nebel_release_lighting(others);
 }
 
 static void test_particles_are_fog(void **state)
@@ -177,7 +177,7 @@ static void test_particles_are_fog(void **state)
                             i == grey ? NEBEL_PROJECTION_PERSPECTIVE : NEBEL_PROJECTION_ORTHOGRAPHIC);
         }
     }
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 /* How far the colours are apart where the sun shines through particles onto the floor. */
@@ -190,15 +190,15 @@ static double compare_sunlight(const test_stage *s, nb_gl_language language, int
     nb_gl context;
     picture_pair pair = picture_make(WIDTH, HEIGHT);
     make_particles(particles, volumes, grey);
-    nebel_snapshot *const all = test_fog(11, volumes), *const others = test_fog(2, volumes);
+    nebel_lighting *const all = test_fog(11, volumes), *const others = test_fog(2, volumes);
     const picture_particles drawn = {.list = particles, .count = 9, .others = others, .leave_sun = leave_sun};
     pass_open(&context, language);
     picture_render_particles(&s->ball.scene, all, &drawn, &s->camera, 1, &pair);
     pass_close(&context);
     const double color = picture_compare(&pair, 1).color;
     picture_free(&pair);
-    nebel_release_snapshot(all);
-    nebel_release_snapshot(others);
+    nebel_release_lighting(all);
+    nebel_release_lighting(others);
     return color;
 }
 
@@ -213,7 +213,7 @@ static void test_particles_dim_the_sun(void **state)
         print_message("dimmed %.2g, not dimmed %.2g\n", dimmed, bright);
         assert_true(dimmed < .01 && dimmed < .2 * bright);
     }
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 /* Many samples of both come close to the same mean; one sample does not. */
@@ -240,7 +240,7 @@ static void test_samples_smooth_edges(void **state)
         assert_true(color[0] < .01 && color[0] < .25 * color[1]);
         picture_free(&pair);
     }
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 /* Both look through the same points of a pixel: outlines agree, but for points that rounding puts on the other side. */
@@ -260,7 +260,7 @@ static void test_outlines_agree_sample_by_sample(void **state)
         assert_true(difference.beyond_step <= 4);
         picture_free(&pair);
     }
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 /* Light, and depth in metres. Large, because there Mesa 22 cuts off what goes through one viewport where others have a
@@ -308,7 +308,7 @@ static void draw_in_odd_state(nb_gl_language language, nebel_gl_method method, i
     odd_expect_same(&before, &after);
     if (odd_state >= 0) odd_delete(&o);
     pass_close(&context);
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 static void test_state_neither_changes_nor_matters(void **state)
@@ -364,7 +364,7 @@ static void test_particles_of_other_colors_take_turns(void **state)
         nebel_destroy_gl_renderer(renderer);
         pass_close(&context);
     }
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 static int stop(size_t done, size_t total, void *user)
@@ -432,7 +432,7 @@ static void test_what_is_refused(void **state)
     nebel_destroy_gl_renderer(NULL);
     assert_int_equal(pass_count_objects(), objects);
     pass_close(&context);
-    nebel_release_snapshot(s.fog);
+    nebel_release_lighting(s.fog);
 }
 
 int main(void)

@@ -33,7 +33,7 @@ static picture_light compare(const char *name, const picture_pair *pair)
     return d;
 }
 
-static picture_light render(const char *name, const nebel_scene_data *scene, nebel_snapshot *fog,
+static picture_light render(const char *name, const nebel_scene_data *scene, nebel_lighting *fog,
                             const nebel_camera *camera, nb_gl_language language)
 {
     nb_gl context;
@@ -161,8 +161,8 @@ static void try_size(double size)
          .extinction = {e, e, e},
          .source = {.2, .4, .6}},
     };
-    const nebel_sun sun = {.direction = {.3, .8, .5}, .irradiance = {3, 3, 3}};
-    nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){.sun = sun}, volumes, 2);
+    const nebel_lighting_desc lights = {.sun = {.direction = {.3, .8, .5}, .irradiance = {3, 3, 3}}};
+    nebel_lighting *const fog = fog_light(&lights, volumes, 2);
     const nebel_mesh card = card_of(positions, NULL);
     const nebel_scene_data scene = {.mesh_count = 1,
                                     .meshes = &card,
@@ -182,7 +182,7 @@ static void try_size(double size)
     assert_true(d.fogged > 200);
     assert_int_equal(d.beyond_step, 0);
     picture_free(&pair);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_small_scenes(void **state)

@@ -139,7 +139,7 @@ static int is_drawn(const nebel_camera *camera, const float *depth, int x, int y
 
 typedef struct place {
     double along, order; /* distances: along the axis, and that by which they are drawn */
-    nebel_snapshot *alone;
+    nebel_lighting *alone;
 } place;
 
 static place places[PARTICLES];
@@ -158,7 +158,7 @@ static void place_particles(const nebel_camera *camera, const nebel_particle *pa
     for (int i = 0; i < PARTICLES; i++) {
         const nebel_volume_desc volume = nebel_volume_from_particle(&particles[i]);
         double square = 0;
-        places[i].alone = fog_commit(&(nebel_fog_desc){0}, &volume, 1);
+        places[i].alone = fog_light(NULL, &volume, 1);
         places[i].along = 0;
         for (int k = 0; k < 3; k++) {
             const double way = particles[i].center[k] - camera->position[k];
@@ -181,8 +181,7 @@ static int render_pixel(const nebel_camera *camera, const float *depth, int x, i
     make_ray(camera, x + .5, y + .5, &ray);
     for (int i = 0; i < PARTICLES; i++) {
         nebel_transfer l;
-        const nebel_trace_desc exact = {.tolerance = 1e-6};
-        assert_int_equal(nebel_trace(places[i].alone, &exact, 1, &ray, sizeof ray, &l, sizeof l), NEBEL_OK);
+        fog_trace(places[i].alone, (nebel_trace_desc){.tolerance = 1e-6}, 1, &ray, &l);
         if (l.transmittance[0] == 1 && l.transmittance[1] == 1 && l.transmittance[2] == 1) continue;
         if (!is_drawn(camera, depth, x, y, places[i].along, taps)) {
             hidden++;
@@ -222,7 +221,7 @@ static void check(nb_gl_language language, nebel_projection projection, int grey
         beyond += off > 2e-3;
         worst = fmax(worst, off);
     }
-    for (int i = 0; i < PARTICLES; i++) nebel_release_snapshot(places[i].alone);
+    for (int i = 0; i < PARTICLES; i++) nebel_release_lighting(places[i].alone);
     print_message("%zu pixels with particles, in %zu some are hidden; %zu more than 2e-3 off, worst %.1e\n", fogged,
                   hidden, beyond, worst);
     assert_true(fogged > PIXELS / 8 && hidden > PIXELS / 40);

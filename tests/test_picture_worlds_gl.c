@@ -28,7 +28,7 @@ static double largest_color(const picture_pair *pair)
     return most;
 }
 
-static void check(const char *name, const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera)
+static void check(const char *name, const nebel_scene_data *scene, nebel_lighting *fog, const nebel_camera *camera)
 {
     picture_pair pair = picture_make(96 * scale, 54 * scale);
     if (scene->planets[0].clouds != NULL) pair.tolerance = NEBEL_DEFAULT_TOLERANCE; /* as OpenGL takes */
@@ -65,13 +65,13 @@ static void fog_and_panoramas_are_the_same(void **state)
     worlds s;
     worlds_make(3, worlds_near, sun, .53, &s);
     pass_open(&context, NB_GL_300ES);
-    nebel_snapshot *const fog = planet_fog(s.scene.sun_direction);
+    nebel_lighting *const fog = planet_fog(s.scene.sun_direction);
     nebel_camera camera = planet_camera(120, .35);
     check("in fog", &s.scene, fog, &camera);
     camera.projection = NEBEL_PROJECTION_PANORAMA;
     check("all around", &s.scene, NULL, &camera);
     pass_close(&context);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     worlds_free(&s);
 }
 

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "unit.h"
+#include "fog_help.h"
 
 /* Wider than a piece of a row. */
 enum { WIDTH = 301, HEIGHT = 5, PIXELS = WIDTH * HEIGHT, MOST = 16 * PIXELS };
@@ -18,7 +18,7 @@ static uint32_t roll(void)
     return (uint32_t)(state_of_dice >> 32);
 }
 
-static double dice(double low, double high)
+static double roll_within(double low, double high)
 {
     return low + (high - low) * roll() * 0x1p-32;
 }
@@ -89,8 +89,8 @@ static double read_sample(const unsigned char *from, sample kind)
 static void fill(nebel_pixel_type type)
 {
     for (size_t i = 0; i < PIXELS * kinds[type].channels; i++) {
-        const uint16_t number = (uint16_t)(kinds[type].sample == HALF ? dice(0, 0x5000) : dice(0, 65536));
-        const float real = (float)exp(dice(-20, 5));
+        const uint16_t number = (uint16_t)(kinds[type].sample == HALF ? roll_within(0, 0x5000) : roll_within(0, 65536));
+        const float real = (float)exp(roll_within(-20, 5));
         if (kinds[type].sample == FLOAT)
             memcpy(color + 4 * i, &real, 4);
         else if (kinds[type].sample == BYTE)
@@ -102,7 +102,7 @@ static void fill(nebel_pixel_type type)
 
 static nebel_pixels make_picture(nebel_pixel_type type, nebel_pixel_depth depth_type, int srgb)
 {
-    for (int i = 0; i < PIXELS; i++) depth[i] = i % 19 == 0 ? HUGE_VALF : (float)dice(0, 90);
+    for (int i = 0; i < PIXELS; i++) depth[i] = i % 19 == 0 ? HUGE_VALF : (float)roll_within(0, 90);
     fill(type);
     return (nebel_pixels){.corner = {-.8f, .5f, -1},
                           .step_x = {.005f, .0001f, 0},
@@ -256,33 +256,26 @@ static void test_depths_that_are_none_keep_every_number(void **state)
 static void test_lit_boxes_show_their_light(void **state)
 {
     (void)state;
-    nebel_fog *fog = NULL;
-    nebel_snapshot *now = NULL;
     nebel_pixels p = make_picture(NEBEL_PIXEL_RGBA8, NEBEL_PIXEL_DEPTH_RADIAL, 0);
     p.transmittance = NULL;
     const nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-50, -50, -80}, .max = {50, 50, -2}},
                                       .extinction = {.05, .05, .05},
                                       .albedo = {.9, .9, .9}};
-    const nebel_sun sun = {.direction = {0, 1, 0}, .irradiance = {20, 20, 20}};
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_set_sun(fog, &sun), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &now), NEBEL_OK);
-    assert_int_equal(nebel_apply_fog_to_pixels(now, NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
+    const nebel_lighting_desc lights = {.sun = {.direction = {0, 1, 0}, .irradiance = {20, 20, 20}}};
+    nebel_lighting *lighting = fog_light(&lights, &volume, 1);
+    p.lighting = lighting;
+    assert_int_equal(nebel_apply_fog_to_pixels(nebel_get_lighting_snapshot(lighting), NEBEL_ISA_DEFAULT, &p), NEBEL_OK);
     for (int i = 0; i < PIXELS; i++) {
         nebel_ray ray = {.t_max = (double)depth[i]};
-        nebel_transfer transfer;
         for (int c = 0; c < 3; c++)
             ray.direction[c] = (double)p.corner[c] + i % WIDTH * (double)p.step_x[c] + i / WIDTH * (double)p.step_y[c];
-        assert_int_equal(nebel_trace(now, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
-                         NEBEL_OK);
+        const nebel_transfer transfer = fog_along(lighting, &ray);
         for (int c = 0; c < 3; c++) {
             const double wanted = transfer.transmittance[c] * color[4 * i + c] + 255 * transfer.in_scattering[c];
             assert_true(fabs(out[4 * i + c] - fmin(wanted, 255)) < .5 + 255 * NEBEL_DEFAULT_TOLERANCE);
         }
     }
-    nebel_release_snapshot(now);
-    nebel_destroy_fog(fog);
+    nebel_release_lighting(lighting);
 }
 
 static void test_wrong_kinds_are_refused(void **state)

@@ -4,8 +4,6 @@
 #include "fog_help.h"
 #include "random_fog.h"
 
-#include <nebel/places.h>
-
 #include <math.h>
 
 enum { SEEDS = 8, RAYS = 12, PLACES = 8, MOST_PIECES = 4000 };
@@ -69,8 +67,9 @@ static int are_alike(const nebel_medium_properties *a, const nebel_medium_proper
 }
 
 /* 1 where a short ray could tell: the fog is the same all along it. */
-static int compare_with_ray(const nebel_snapshot *snapshot, nebel_sample_point place, const double d[3])
+static int compare_with_ray(const nebel_lighting *lighting, nebel_sample_point place, const double d[3])
 {
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
     place.distance = -1;
     const nebel_medium_properties here = matter_at(snapshot, place);
     const double densest = most_of(here.extinction), far = fabs(place.position[0]) + fabs(place.position[2]);
@@ -86,7 +85,7 @@ static int compare_with_ray(const nebel_snapshot *snapshot, nebel_sample_point p
     const nebel_ray ray = {{place.position[0], place.position[1], place.position[2]}, {d[0], d[1], d[2]}, h};
     nebel_transfer transfer;
     const nebel_trace_desc exact = {.tolerance = 1e-9, .ignore_distances = 1};
-    assert_int_equal(nebel_trace(snapshot, &exact, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+    fog_trace(lighting, exact, 1, &ray, &transfer);
     for (int c = 0; c < 3; c++) {
         const double depth = h * here.extinction[c];
         const double shone = h * (here.emission[c] + here.scattering[c] * fog.ambient[c]) * (1 - depth / 2);
@@ -104,15 +103,18 @@ static void places_have_what_short_rays_meet(void **state)
         int compared = 0;
         for (uint64_t seed = 0; seed < SEEDS; seed++) {
             nebel_snapshot *snapshot = make_fog((random_fog_kind)kind, seed);
+            const nebel_lighting_desc lights = random_fog_lights(&fog);
+            nebel_lighting *lighting = light_fog(snapshot, &lights);
             for (uint64_t i = 0; i < RAYS; i++) {
                 const nebel_ray ray = random_fog_ray(&fog, i);
                 double d[3];
                 unit_direction(&ray, d);
                 const double reach = ray.t_max < 100 ? ray.t_max : 100;
                 for (int k = 0; k < PLACES; k++)
-                    compared += compare_with_ray(snapshot, place_on(&ray, dice(&numbers, 0, reach)), d);
+                    compared += compare_with_ray(lighting, place_on(&ray, dice(&numbers, 0, reach)), d);
             }
             nebel_release_snapshot(snapshot);
+            nebel_release_lighting(lighting);
         }
         assert_true(compared > SEEDS * RAYS / 4);
     }

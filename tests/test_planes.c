@@ -27,10 +27,11 @@ typedef struct light_numbers {
 
 static const float untouched = -7;
 
-static nebel_snapshot *commit(const random_fog *fog)
+static nebel_lighting *commit(const random_fog *fog)
 {
     const nebel_fog_desc desc = random_fog_desc(fog);
-    return fog_commit(&desc, fog->volumes, fog->count);
+    const nebel_lighting_desc lights = random_fog_lights(fog);
+    return fog_commit_lit(&desc, fog->volumes, fog->count, &lights);
 }
 
 /* A direction that stays one as floats. */
@@ -127,7 +128,7 @@ static void assert_gaps_are_untouched(const float *plane, size_t stride, size_t 
         if (i % stride != 0 || i / stride >= n) assert_true(is(plane[i], (double)untouched));
 }
 
-static void compare(const random_fog *fog, const nebel_snapshot *snapshot, sharing shared, uint64_t variant)
+static void compare(const random_fog *fog, const nebel_lighting *lighting, sharing shared, uint64_t variant)
 {
     static ray_numbers numbers;
     static light_numbers found;
@@ -136,7 +137,9 @@ static void compare(const random_fog *fog, const nebel_snapshot *snapshot, shari
     nebel_ray rays[RAYS];
     nebel_transfer expected[RAYS];
     make_rays(fog, shared, fine, stride, &numbers, rays);
-    nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT,
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
+    nebel_trace_desc desc = {.lighting = lighting,
+                             .precision = NEBEL_PRECISION_FLOAT,
                              .isa = NEBEL_ISA_SCALAR,
                              .tolerance = 1e-4,
                              .transmittance_only = !wants_light};
@@ -170,9 +173,9 @@ static void test_planes_give_the_bits_of_structures(void **state)
         const uint64_t rounds = kind == RANDOM_FOG_SINGLE ? 4000 : 120;
         for (uint64_t seed = 0; seed < rounds; seed++) {
             random_fog_make(&fog, (random_fog_kind)kind, seed);
-            nebel_snapshot *snapshot = commit(&fog);
-            for (int shared = 0; shared < SHARE_COUNT; shared++) compare(&fog, snapshot, (sharing)shared, variant += 5);
-            nebel_release_snapshot(snapshot);
+            nebel_lighting *lighting = commit(&fog);
+            for (int shared = 0; shared < SHARE_COUNT; shared++) compare(&fog, lighting, (sharing)shared, variant += 5);
+            nebel_release_lighting(lighting);
         }
     }
 }
@@ -273,17 +276,19 @@ static void test_a_ray_that_is_none_is_found(void **state)
 }
 
 /* Whatever the march would do with it. */
-static void compare_masked(const random_fog *fog, const nebel_snapshot *snapshot, sharing shared, int wants_error)
+static void compare_masked(const random_fog *fog, const nebel_lighting *lighting, sharing shared, int wants_error)
 {
     static ray_numbers numbers;
     static light_numbers masked, plain;
     nebel_ray rays[RAYS];
     const size_t first = (size_t)(fog->seed % 5);
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
+    const nebel_trace_desc desc = {.lighting = lighting};
     make_rays(fog, shared, 0, 1, &numbers, rays);
     for (size_t i = first; i < RAYS; i += 5) numbers.t_max[i] = 0;
     const nebel_ray_planes from = planes_of(&numbers, shared, 0, 1);
     const nebel_transfer_planes to = lights_of(&plain, 1, wants_error, 1);
-    assert_int_equal(nebel_trace_planes(snapshot, NULL, RAYS, &from, &to), NEBEL_OK);
+    assert_int_equal(nebel_trace_planes(snapshot, &desc, RAYS, &from, &to), NEBEL_OK);
     for (size_t i = first; i < RAYS; i += 5) {
         numbers.offset[i] = NAN;
         numbers.way[i] = i % 2 ? HUGE_VALF : 0;
@@ -291,7 +296,7 @@ static void compare_masked(const random_fog *fog, const nebel_snapshot *snapshot
         assert_true(is(plain.transmittance[i], 1) && is(plain.in_scattering[i], 0));
     }
     const nebel_transfer_planes to_masked = lights_of(&masked, 1, wants_error, 1);
-    assert_int_equal(nebel_trace_planes(snapshot, NULL, RAYS, &from, &to_masked), NEBEL_OK);
+    assert_int_equal(nebel_trace_planes(snapshot, &desc, RAYS, &from, &to_masked), NEBEL_OK);
     assert_memory_equal(&masked, &plain, sizeof plain);
 }
 
@@ -301,10 +306,10 @@ static void test_a_ray_of_no_length_may_be_anything(void **state)
     static random_fog fog;
     for (uint64_t seed = 0; seed < 300; seed++) {
         random_fog_make(&fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), seed);
-        nebel_snapshot *snapshot = commit(&fog);
+        nebel_lighting *lighting = commit(&fog);
         for (int shared = 0; shared < SHARE_END; shared++)
-            compare_masked(&fog, snapshot, (sharing)shared, seed % 2 != 0);
-        nebel_release_snapshot(snapshot);
+            compare_masked(&fog, lighting, (sharing)shared, seed % 2 != 0);
+        nebel_release_lighting(lighting);
     }
 }
 

@@ -23,17 +23,19 @@ typedef struct answers {
 static void ask(const random_fog *fog, const nebel_ray rays[RAYS], answers *got)
 {
     memset(got, 0, sizeof *got);
-    const nebel_fog_desc desc = {.ambient = {1, 1, 1}};
-    nebel_snapshot *snapshot = fog_commit(&desc, fog->volumes, fog->count);
+    const nebel_lighting_desc lights = {.environment = {.radiance = {1, 1, 1}}};
+    nebel_lighting *lighting = fog_light(&lights, fog->volumes, fog->count);
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
     for (int k = 0; k < 2; k++) {
-        const nebel_trace_desc how = {.precision = k == 0 ? NEBEL_PRECISION_DOUBLE : NEBEL_PRECISION_FLOAT};
+        const nebel_trace_desc how = {.lighting = lighting,
+                                      .precision = k == 0 ? NEBEL_PRECISION_DOUBLE : NEBEL_PRECISION_FLOAT};
         nebel_trace(snapshot, &how, RAYS, rays, sizeof *rays, got->transfers[k], sizeof *got->transfers[k]);
     }
     nebel_invert_transmittance(snapshot, 0.5, 0, RAYS, rays, sizeof *rays, got->distances);
     const double eye[] = {1 / 3.0, 2 / 7.0, 3 / 11.0};
     size_t count = 0;
-    assert_int_equal(nebel_pack_fog(snapshot, eye, got->words, WORDS, &count), NEBEL_OK);
-    nebel_release_snapshot(snapshot);
+    assert_int_equal(nebel_pack_fog(lighting, eye, got->words, WORDS, &count), NEBEL_OK);
+    nebel_release_lighting(lighting);
     const nebel_nebula_desc nebula = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1 / 3.0},
                                       .density = {.type = NEBEL_DENSITY_RADIAL, .power = 2},
                                       .count = PARTICLES,

@@ -61,12 +61,11 @@ static void trace_all(const nebel_volume_desc *volumes, size_t n, nebel_precisio
 {
     nebel_ray rays[RAYS];
     for (uint64_t i = 0; i < RAYS; i++) rays[i] = random_fog_ray(&fog, i);
-    nebel_fog_desc desc = {0};
-    memcpy(desc.ambient, fog.ambient, sizeof desc.ambient);
-    nebel_snapshot *const snapshot = fog_commit(&desc, volumes, n);
+    const nebel_lighting_desc lights = random_fog_lights(&fog);
+    nebel_lighting *const lighting = fog_light(&lights, volumes, n);
     const nebel_trace_desc how = {.precision = precision, .tolerance = 1e-5};
-    assert_int_equal(nebel_trace(snapshot, &how, RAYS, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
-    nebel_release_snapshot(snapshot);
+    fog_trace(lighting, how, RAYS, rays, transfers);
+    nebel_release_lighting(lighting);
 }
 
 static void assert_same_light(const nebel_volume_desc *a, size_t a_count, const nebel_volume_desc *b, size_t b_count)

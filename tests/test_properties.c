@@ -12,25 +12,25 @@ enum { RAYS = 37 }; /* no multiple of any number of lanes */
 
 static const nebel_precision precisions[] = {NEBEL_PRECISION_DOUBLE, NEBEL_PRECISION_FLOAT};
 
-static nebel_snapshot *commit(const double ambient[3], const nebel_volume_desc *volumes, size_t n)
+static nebel_lighting *commit(const double ambient[3], const nebel_volume_desc *volumes, size_t n)
 {
-    const nebel_fog_desc desc = {.ambient = {ambient[0], ambient[1], ambient[2]}};
-    return fog_commit(&desc, volumes, n);
+    const nebel_lighting_desc lights = {.environment = {.radiance = {ambient[0], ambient[1], ambient[2]}}};
+    return fog_light(&lights, volumes, n);
 }
 
-static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
+static void trace(const nebel_lighting *lighting, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
                   nebel_transfer *transfers)
 {
     memset(transfers, 0, n * sizeof *transfers);
-    assert_int_equal(nebel_trace(snapshot, desc, n, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
+    fog_trace(lighting, *desc, n, rays, transfers);
 }
 
 static void trace_as(const nebel_trace_desc *desc, const random_fog *fog, const nebel_volume_desc *volumes, size_t n,
                      const nebel_ray rays[RAYS], nebel_transfer transfers[RAYS])
 {
-    nebel_snapshot *const snapshot = commit(fog->ambient, volumes, n);
-    trace(snapshot, desc, RAYS, rays, transfers);
-    nebel_release_snapshot(snapshot);
+    nebel_lighting *const lighting = commit(fog->ambient, volumes, n);
+    trace(lighting, desc, RAYS, rays, transfers);
+    nebel_release_lighting(lighting);
 }
 
 static void trace_volumes(const random_fog *fog, const nebel_volume_desc *volumes, size_t n, nebel_precision precision,
@@ -108,17 +108,17 @@ static void test_instruction_sets_and_grouping_change_no_bit(void **unused)
         nebel_ray rays[RAYS];
         nebel_transfer transfers[RAYS], again[RAYS];
         make(&fog, (random_fog_kind)(trial % RANDOM_FOG_KIND_COUNT), 2000 + (uint64_t)trial, rays);
-        nebel_snapshot *const snapshot = commit(fog.ambient, fog.volumes, fog.count);
+        nebel_lighting *const lighting = commit(fog.ambient, fog.volumes, fog.count);
         for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
             if (!nebel_isa_available((nebel_isa)isa)) continue;
             const nebel_trace_desc desc = {
                 .precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa, .tolerance = 1e-5};
-            trace(snapshot, &desc, RAYS, rays, isa == NEBEL_ISA_SCALAR ? transfers : again);
+            trace(lighting, &desc, RAYS, rays, isa == NEBEL_ISA_SCALAR ? transfers : again);
             if (isa != NEBEL_ISA_SCALAR) assert_same_bits(nebel_isa_name((nebel_isa)isa), &fog, rays, transfers, again);
-            for (int i = 0; i < RAYS; i++) trace(snapshot, &desc, 1, &rays[i], &again[i]);
+            for (int i = 0; i < RAYS; i++) trace(lighting, &desc, 1, &rays[i], &again[i]);
             assert_same_bits("one by one", &fog, rays, transfers, again);
         }
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
 }
 
@@ -300,12 +300,12 @@ static void test_cutting_a_ray_in_two_changes_no_more_than_the_stated_errors(voi
             far[i].t_max = rays[i].t_max - at;
             for (int k = 0; k < 3; k++) far[i].origin[k] += at * d[k] / length;
         }
-        nebel_snapshot *const snapshot = commit(fog.ambient, fog.volumes, fog.count);
+        nebel_lighting *const lighting = commit(fog.ambient, fog.volumes, fog.count);
         const nebel_trace_desc desc = {.tolerance = 1e-5, .ignore_distances = 1};
-        trace(snapshot, &desc, RAYS, rays, whole);
-        trace(snapshot, &desc, RAYS, near, first);
-        trace(snapshot, &desc, RAYS, far, second);
-        nebel_release_snapshot(snapshot);
+        trace(lighting, &desc, RAYS, rays, whole);
+        trace(lighting, &desc, RAYS, near, first);
+        trace(lighting, &desc, RAYS, far, second);
+        nebel_release_lighting(lighting);
         for (int i = 0; i < RAYS; i++) {
             nebel_transfer joined = {.error = first[i].error + 3 * second[i].error};
             for (int c = 0; c < 3; c++) {

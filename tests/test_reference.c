@@ -14,7 +14,7 @@ static uint32_t effort = 1;
 typedef struct run {
     nebel_scene_data scene;
     nebel_camera camera;
-    nebel_fog_desc sky;
+    nebel_lighting_desc sky;
     size_t volume_count;
     nebel_volume_desc volumes[4];
     uint32_t side, samples, bounces, seed;
@@ -34,7 +34,7 @@ static shot taken;
 static const shot *take(const run *r)
 {
     nebel_renderer *renderer = NULL;
-    nebel_snapshot *fog = fog_commit(&r->sky, r->volumes, r->volume_count);
+    nebel_lighting *fog = fog_commit_lit(&(nebel_fog_desc){0}, r->volumes, r->volume_count, &r->sky);
     const nebel_cpu_renderer_desc desc = {.thread_count = r->threads};
     assert_int_equal(nebel_create_cpu_renderer(&r->scene, fog, &desc, &renderer), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_PATH, NULL), NEBEL_OK);
@@ -50,7 +50,7 @@ static const shot *take(const run *r)
                                 .standard_error = taken.error};
     taken.result = nebel_render_frame(renderer, &frame, &planes);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     return &taken;
 }
 
@@ -96,7 +96,7 @@ static run start_furnace(void)
     run r = start_run(8, 64);
     set_rgb(r.scene.background, 1);
     set_rgb(r.scene.ambient, 1);
-    set_rgb(r.sky.ambient, 1);
+    set_rgb(r.sky.environment.radiance, 1);
     r.volume_count = 1;
     r.volumes[0] = (nebel_volume_desc){.extinction = {.5, .5, .5}, .albedo = {1, 1, 1}};
     return r;

@@ -82,7 +82,7 @@ static nebel_camera camera_of(const nebel_ray *ray)
     return camera;
 }
 
-static nebel_result render(const globe *g, nebel_snapshot *fog, const nebel_frame_desc *desc, const nebel_frame *planes)
+static nebel_result render(const globe *g, nebel_lighting *fog, const nebel_frame_desc *desc, const nebel_frame *planes)
 {
     nebel_renderer *renderer = NULL;
     assert_int_equal(
@@ -94,7 +94,7 @@ static nebel_result render(const globe *g, nebel_snapshot *fog, const nebel_fram
 }
 
 /* All paths along one ray. */
-static estimate look(const globe *g, nebel_snapshot *fog, const nebel_ray *ray, uint32_t samples, uint32_t bounces)
+static estimate look(const globe *g, nebel_lighting *fog, const nebel_ray *ray, uint32_t samples, uint32_t bounces)
 {
     static float color[3 * PIXELS], error[3 * PIXELS], transmittance[3 * PIXELS];
     const nebel_frame planes = {.color = color, .transmittance = transmittance, .standard_error = error};
@@ -135,7 +135,7 @@ static const nebel_atmosphere_desc white_air = {
     .ground_albedo = {1, 1, 1}};
 
 /* Light that nothing absorbs is the same everywhere: along the ground, down on it, past it and from within clouds and fog. */
-static void furnace(const nebel_cloud_layer *layer, nebel_snapshot *fog, uint32_t samples)
+static void furnace(const nebel_cloud_layer *layer, nebel_lighting *fog, uint32_t samples)
 {
     static const double views[][2] = {{2, 5}, {500, 40}, {3e4, -10}, {4e5, -90}, {4e5, -19.5}};
     globe g;
@@ -163,9 +163,9 @@ static void white_clouds_and_fog_are_white(void **state)
     const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 400, 0}, .radius = 300},
                                     .extinction = {.001, .004, .002},
                                     .albedo = {1, 1, 1}};
-    nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, &ball, 1);
+    nebel_lighting *fog = fog_commit_lit(&(nebel_fog_desc){0}, &ball, 1, NULL);
     furnace(&stratus, fog, 4);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* ---- layers ---------------------------------------------------------------------------------- */

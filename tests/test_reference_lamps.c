@@ -214,7 +214,7 @@ static float look_below(float half)
     const nebel_scene_data scene = {.mesh_count = 1, .meshes = &lid, .light_count = 1, .lights = &lamp};
     nebel_volume_desc box = white_fog(.5);
     box.shape = (nebel_shape){.type = NEBEL_SHAPE_BOX, .min = {-1, -1, -1}, .max = {1, 0, 1}};
-    nebel_snapshot *fog = test_fog(1, &box);
+    nebel_lighting *fog = test_fog(1, &box);
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_PATH, NULL), NEBEL_OK);
@@ -225,7 +225,7 @@ static float look_below(float half)
     const nebel_frame planes = {.color = color, .in_scattering = layer, .transmittance = through};
     assert_int_equal(nebel_render_frame(renderer, &desc, &planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     assert_true(fabsf(layer[0] - color[0]) <= 1e-6f * color[0]); /* before black: all there is is fog's */
     return color[0];
 }

@@ -45,11 +45,13 @@ static void compare(const char *name, const char *path)
     static picture exact, paths[2];
     nebel_scene *scene = NULL;
     nebel_snapshot *fog = NULL;
+    nebel_lighting *lighting = NULL;
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_load_scene(path, &(nebel_scene_desc){.log = {0}}, &scene), NEBEL_OK);
     assert_int_equal(nebel_load_scene_models(scene), NEBEL_OK);
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(nebel_create_cpu_renderer(nebel_get_scene_data(scene), fog,
+    assert_int_equal(nebel_create_scene_lighting(scene, fog, 0, NULL, &lighting), NEBEL_OK);
+    assert_int_equal(nebel_create_cpu_renderer(nebel_get_scene_data(scene), lighting,
                                                &(nebel_cpu_renderer_desc){.thread_count = 0}, &renderer),
                      NEBEL_OK);
     take(renderer, scene, NEBEL_METHOD_EXACT, 0, &exact);
@@ -60,6 +62,7 @@ static void compare(const char *name, const char *path)
     print_message("%-12s off by %.2f of 255, known to %.2f\n", name, 255 * copysign(sqrt(fabs(square)), square),
                   255 * sqrt(4 * deviation));
     nebel_destroy_renderer(renderer);
+    nebel_release_lighting(lighting);
     nebel_release_snapshot(fog);
     nebel_destroy_scene(scene);
     assert_true(square <= 1 / (255. * 255) + 4 * deviation);

@@ -280,28 +280,17 @@ static trial environment(void)
 
 /* ---- pictures -------------------------------------------------------------------------------- */
 
-static nebel_snapshot *commit(const nebel_fog_desc *sky, const trial *t)
-{
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(sky, &fog), NEBEL_OK);
-    for (size_t i = 0; i < t->volume_count; i++)
-        assert_int_equal(nebel_add_volume(fog, &t->volumes[i], NULL), NEBEL_OK);
-    if (t->scene.environment.type != NEBEL_ENVIRONMENT_CONSTANT)
-        assert_int_equal(nebel_set_environment(fog, &t->scene.environment), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, t->scene.light_count, t->lamps), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
-}
-
 static void take(const trial *t, nebel_method method, uint32_t seed, float *color, float *error)
 {
-    nebel_fog_desc sky = {
-        .sun.direction = {t->scene.sun_direction[0], t->scene.sun_direction[1], t->scene.sun_direction[2]}};
-    memcpy(sky.sun.irradiance, t->scene.sun_irradiance, sizeof sky.sun.irradiance);
-    memcpy(sky.ambient, t->scene.ambient, sizeof sky.ambient);
-    nebel_snapshot *fog = commit(&sky, t);
+    nebel_lighting_desc lights = {
+        .sun.direction = {t->scene.sun_direction[0], t->scene.sun_direction[1], t->scene.sun_direction[2]},
+        .environment = t->scene.environment,
+        .lights = t->lamps,
+        .light_count = t->scene.light_count};
+    memcpy(lights.sun.irradiance, t->scene.sun_irradiance, sizeof lights.sun.irradiance);
+    if (lights.environment.type == NEBEL_ENVIRONMENT_CONSTANT)
+        memcpy(lights.environment.radiance, t->scene.ambient, sizeof t->scene.ambient);
+    nebel_lighting *fog = fog_commit_lit(&(nebel_fog_desc){0}, t->volumes, t->volume_count, &lights);
     nebel_scene_data scene = t->scene;
     scene.meshes = t->meshes;
     scene.lights = t->lamps;
@@ -314,7 +303,7 @@ static void take(const trial *t, nebel_method method, uint32_t seed, float *colo
     assert_int_equal(nebel_render_frame(renderer, &frame, &(nebel_frame){.color = color, .standard_error = error}),
                      NEBEL_OK);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* The mean of the reference's pictures, and its standard error. */

@@ -28,7 +28,7 @@ static void test_wall_in_constant_fog(void **state)
     const nebel_scene_data scene = {.mesh_count = 1, .meshes = &wall, .ambient = {.4, .5, .6}};
     nebel_camera camera = test_camera(3, 10, -2, 3, 0, -2);
     const double extinction = .05, source = .7;
-    nebel_snapshot *fog = test_world_fog(extinction, source);
+    nebel_lighting *fog = test_world_fog(extinction, source);
     test_picture picture = test_picture_make(37, 21);
     test_render(&scene, fog, &plain, &camera, 1, &picture);
     const double edge = tan(25 * test_pi / 180) / 21;
@@ -44,7 +44,7 @@ static void test_wall_in_constant_fog(void **state)
         }
     }
     test_picture_free(&picture);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_sun_through_fog_onto_ground(void **state)
@@ -57,7 +57,7 @@ static void test_sun_through_fog_onto_ground(void **state)
     const nebel_volume_desc layer = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-100, -1, -100}, .max = {100, 5, 100}},
                                      .extinction = {.1, .2, .3},
                                      .source = {.6, .5, .4}};
-    nebel_snapshot *fog = test_fog(1, &layer);
+    nebel_lighting *fog = test_fog(1, &layer);
     nebel_camera camera = test_camera(0, 10, 0, 0, 0, 0);
     camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     camera.view_height = 1;
@@ -72,7 +72,7 @@ static void test_sun_through_fog_onto_ground(void **state)
     assert_pixel(test_color(&picture, 2, 2), surface, transmittance, layer.source, 3e-6);
     assert_pixel(test_color(&picture, 0, 4), surface, transmittance, layer.source, 3e-6);
     test_picture_free(&picture);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_fog_that_begins_beyond_the_ground_still_dims_the_sun(void **state)
@@ -85,7 +85,7 @@ static void test_fog_that_begins_beyond_the_ground_still_dims_the_sun(void **sta
                                      .extinction = {.1, .2, .3},
                                      .source = {.6, .5, .4},
                                      .start = 20};
-    nebel_snapshot *fog = test_fog(1, &layer);
+    nebel_lighting *fog = test_fog(1, &layer);
     const nebel_camera camera = test_camera(0, 10, .1, 0, 0, 0);
     test_picture picture = test_picture_make(5, 5);
     test_render(&scene, fog, &plain, &camera, 1, &picture);
@@ -95,7 +95,7 @@ static void test_fog_that_begins_beyond_the_ground_still_dims_the_sun(void **sta
         surface[c] = base[c] / test_pi * scene.sun_irradiance[c] * exp(-layer.extinction[c] * 5 / .8) * .8;
     assert_pixel(test_color(&picture, 2, 2), surface, all, layer.source, 3e-6);
     test_picture_free(&picture);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_shadow_leaves_the_ambient_light(void **state)
@@ -226,7 +226,7 @@ static void test_same_segment_same_light_for_every_camera(void **state)
     (void)state;
     static test_ball ball;
     test_ball_make(&ball, (const double[3]){0, 0, 0});
-    nebel_snapshot *fog = test_world_fog(.1, .5);
+    nebel_lighting *fog = test_world_fog(.1, .5);
     test_picture pictures[3];
     for (int p = 0; p < 3; p++) pictures[p] = test_picture_make(1, 1);
     uint32_t seed = 7;
@@ -246,7 +246,7 @@ static void test_same_segment_same_light_for_every_camera(void **state)
         }
     }
     for (int p = 0; p < 3; p++) test_picture_free(&pictures[p]);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* Where a pixel of each projection looks, against the light of a ray cast by itself. */
@@ -254,7 +254,7 @@ static void test_pixels_look_where_they_should(void **state)
 {
     (void)state;
     const double extinction = .1;
-    nebel_snapshot *fog = test_fog(
+    nebel_lighting *fog = test_fog(
         1, &(nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_ELLIPSOID, .center = {4, 3, -9}, .radii = {6, 3, 5}},
                                 .extinction = {extinction, extinction, extinction},
                                 .source = {1, 1, 1}});
@@ -275,14 +275,12 @@ static void test_pixels_look_where_they_should(void **state)
                  {cos(latitude) * sin(longitude), sin(latitude), -cos(latitude) * cos(longitude)},
                  HUGE_VAL}};
             nebel_transfer transfer;
-            assert_int_equal(
-                nebel_trace(fog, &(nebel_trace_desc){0}, 1, &rays[p], sizeof *rays, &transfer, sizeof transfer),
-                NEBEL_OK);
+            fog_trace(fog, (nebel_trace_desc){0}, 1, &rays[p], &transfer);
             assert_true(fabs((double)picture.planes.color[3 * i] - transfer.in_scattering[0]) < 2e-4);
         }
     }
     test_picture_free(&picture);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_camera_inside_a_closed_mesh(void **state)
@@ -320,7 +318,7 @@ static void test_thread_count_changes_no_byte(void **state)
     (void)state;
     static test_ball ball;
     test_ball_make(&ball, (const double[3]){0, 0, 0});
-    nebel_snapshot *fog = test_world_fog(.1, .5);
+    nebel_lighting *fog = test_world_fog(.1, .5);
     const nebel_camera camera = test_camera(2, 2, 5, 0, 0, 0);
     test_picture one = test_picture_make(150, 93), more = test_picture_make(150, 93);
     for (int p = 0; p < 3; p++) {
@@ -334,7 +332,7 @@ static void test_thread_count_changes_no_byte(void **state)
     }
     test_picture_free(&one);
     test_picture_free(&more);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_fog_in_any_instruction_set_changes_no_byte(void **state)
@@ -342,7 +340,7 @@ static void test_fog_in_any_instruction_set_changes_no_byte(void **state)
     (void)state;
     static test_ball ball;
     test_ball_make(&ball, (const double[3]){0, 0, 0});
-    nebel_snapshot *fog = test_world_fog(.1, .5);
+    nebel_lighting *fog = test_world_fog(.1, .5);
     const nebel_frame_desc frame = {.camera = test_camera(2, 2, 5, 0, 0, 0), .width = 64, .height = 48, .samples = 2};
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_create_cpu_renderer(&ball.scene, fog, &plain, &renderer), NEBEL_OK);
@@ -358,7 +356,7 @@ static void test_fog_in_any_instruction_set_changes_no_byte(void **state)
     test_picture_free(&scalar);
     test_picture_free(&other);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_earlier_frames_change_no_byte(void **state)
@@ -388,22 +386,22 @@ static void test_fog_of_a_frame_takes_the_place_of_that_before(void **state)
     (void)state;
     static test_ball ball;
     test_ball_make(&ball, (const double[3]){0, 0, 0});
-    nebel_snapshot *fogs[3] = {test_world_fog(.1, .5), NULL, test_world_fog(.3, .2)};
+    nebel_lighting *fogs[3] = {test_world_fog(.1, .5), NULL, test_world_fog(.3, .2)};
     const nebel_camera camera = test_camera(2, 2, 5, 0, 0, 0);
     const nebel_frame_desc frame = {.camera = camera, .width = 40, .height = 30, .samples = 1};
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_create_cpu_renderer(&ball.scene, fogs[2], &plain, &renderer), NEBEL_OK);
     test_picture fresh = test_picture_make(40, 30), later = test_picture_make(40, 30);
     for (int i = 0; i < 3; i++) {
-        assert_int_equal(nebel_set_renderer_fog(renderer, fogs[i]), NEBEL_OK);
-        assert_int_equal(nebel_set_renderer_fog(renderer, fogs[i]), NEBEL_OK);
+        assert_int_equal(nebel_set_renderer_lighting(renderer, fogs[i]), NEBEL_OK);
+        assert_int_equal(nebel_set_renderer_lighting(renderer, fogs[i]), NEBEL_OK);
         assert_int_equal(nebel_render_frame(renderer, &frame, &later.planes), NEBEL_OK);
         test_render(&ball.scene, fogs[i], &plain, &camera, 1, &fresh);
         assert_same_bytes(&fresh, &later);
     }
-    assert_int_equal(nebel_set_renderer_fog(NULL, fogs[0]), NEBEL_ERROR_ARGUMENT);
-    nebel_release_snapshot(fogs[0]);
-    nebel_release_snapshot(fogs[2]);
+    assert_int_equal(nebel_set_renderer_lighting(NULL, fogs[0]), NEBEL_ERROR_ARGUMENT);
+    nebel_release_lighting(fogs[0]);
+    nebel_release_lighting(fogs[2]);
     nebel_destroy_renderer(renderer);
     test_picture_free(&fresh);
     test_picture_free(&later);
@@ -429,13 +427,13 @@ static void test_far_from_the_origin_is_as_good(void **state)
     for (int i = 0; i < 2; i++) {
         const double *m = centers[i];
         test_ball_make(&ball, m);
-        nebel_snapshot *fog = test_fog(
+        nebel_lighting *fog = test_fog(
             1, &(nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {m[0], m[1], m[2]}, .radius = 3},
                                     .extinction = {.3, .3, .3},
                                     .source = {.7, .7, .7}});
         const nebel_camera camera = test_camera(m[0] + 2, m[1] + 2, m[2] + 5, m[0], m[1], m[2]);
         test_render(&ball.scene, fog, &plain, &camera, 1, &pictures[i]);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
     }
     assert_int_equal(count_different(&pictures[0], &pictures[1], 2e-5f), 0);
     for (int i = 0; i < 2; i++) test_picture_free(&pictures[i]);
@@ -506,7 +504,7 @@ static void test_background_behind_endless_fog(void **state)
 {
     (void)state;
     const nebel_scene_data scene = {.background = {.5, .6, .7}};
-    nebel_snapshot *fog = test_world_fog(1e-6, .25);
+    nebel_lighting *fog = test_world_fog(1e-6, .25);
     const nebel_camera camera = test_camera(0, 2, 5, 0, 0, 0);
     test_picture picture = test_picture_make(3, 3);
     test_render(&scene, fog, &plain, &camera, 2, &picture);
@@ -516,7 +514,7 @@ static void test_background_behind_endless_fog(void **state)
         assert_float_equal(picture.planes.transmittance[3 * i], 0, 0);
     }
     test_picture_free(&picture);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* ---- samples --------------------------------------------------------------------------------- */
@@ -609,9 +607,9 @@ static void render_wall(double half_width, test_picture *picture)
     camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     camera.up[1] = 0;
     camera.up[2] = -1;
-    nebel_snapshot *fog = test_fog(1, &mist);
+    nebel_lighting *fog = test_fog(1, &mist);
     test_render(&scene, fog, &plain, &camera, 1, picture);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* Triangles of 1e6 m lie in their fog, and in the shadow of what stands on them, as those of 10 m do. */
@@ -641,7 +639,7 @@ static void test_means_of_planes_add_up(void **state)
     ball.scene.ambient[0] = 1;
     ball.scene.background[0] =
         .8; /* ball and background are equally bright, so that T * surface is known in the mean */
-    nebel_snapshot *fog = test_world_fog(.1, .5);
+    nebel_lighting *fog = test_world_fog(.1, .5);
     const nebel_camera camera = test_camera(2, 2, 5, 0, 0, 0);
     test_picture picture = test_picture_make(50, 40);
     test_render(&ball.scene, fog, &plain, &camera, 3, &picture);
@@ -651,7 +649,7 @@ static void test_means_of_planes_add_up(void **state)
         assert_true(picture.planes.error[i] >= 0 && picture.planes.error[i] < 1e-4f);
     }
     test_picture_free(&picture);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 int main(void)

@@ -97,7 +97,7 @@ static void test_exponential_pixels_are_exact(void **state)
     const nebel_volume_desc volumes[] = {nebel_volume_from_cell(&rooms[0]), nebel_volume_from_cell(&rooms[1])};
     const nebel_cells_desc desc = {.cells = rooms, .cell_count = 3, .model = NEBEL_CELL_EXPONENTIAL, .ungrouped = 1};
     nebel_cells *cells = NULL;
-    nebel_snapshot *fog = test_fog(2, volumes);
+    nebel_lighting *fog = test_fog(2, volumes);
     test_picture classic = test_picture_make(40, 30), exact = test_picture_make(40, 30);
     int fogged = 0;
     assert_int_equal(nebel_create_cells(&desc, &cells), NEBEL_OK);
@@ -110,7 +110,7 @@ static void test_exponential_pixels_are_exact(void **state)
         fogged += classic.planes.transmittance[3 * i] < .9f;
     }
     assert_true(fogged > 300);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_destroy_cells(cells);
     test_picture_free(&classic);
     test_picture_free(&exact);
@@ -244,7 +244,7 @@ static void test_cells_come_and_go(void **state)
     const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
     const nebel_camera camera = test_camera_down();
-    nebel_snapshot *fog = test_world_fog(.2, 1);
+    nebel_lighting *fog = test_world_fog(.2, 1);
     nebel_cells *cells = create_rooms(NEBEL_SPAN_RAY);
     test_picture before = test_picture_make(16, 16), after = test_picture_make(16, 16);
     nebel_renderer *renderer = NULL;
@@ -261,7 +261,7 @@ static void test_cells_come_and_go(void **state)
     assert_int_equal(nebel_set_renderer_cells(NULL, cells, NEBEL_CELLS_PER_VERTEX), NEBEL_ERROR_ARGUMENT);
     nebel_destroy_renderer(renderer);
     nebel_destroy_cells(cells);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&before);
     test_picture_free(&after);
 }

@@ -9,7 +9,7 @@ static const nebel_volume_desc bank = {.shape = {.type = NEBEL_SHAPE_BOX, .min =
                                        .extinction = {.1, .2, .3},
                                        .source = {1, .5, .25}};
 
-static nebel_result render_by(const nebel_scene_data *scene, nebel_snapshot *fog, nebel_method method,
+static nebel_result render_by(const nebel_scene_data *scene, nebel_lighting *fog, nebel_method method,
                               const nebel_method_desc *numbers, int threads, const nebel_camera *camera,
                               test_picture *picture)
 {
@@ -24,7 +24,7 @@ static nebel_result render_by(const nebel_scene_data *scene, nebel_snapshot *fog
     return result;
 }
 
-static nebel_result render(const nebel_scene_data *scene, nebel_snapshot *fog, nebel_method method,
+static nebel_result render(const nebel_scene_data *scene, nebel_lighting *fog, nebel_method method,
                            const nebel_factor_desc *factor, int threads, const nebel_camera *camera,
                            test_picture *picture)
 {
@@ -32,7 +32,7 @@ static nebel_result render(const nebel_scene_data *scene, nebel_snapshot *fog, n
 }
 
 /* The exact fog of the way to a corner. */
-static nebel_transfer trace_corner(const nebel_snapshot *fog, const nebel_camera *camera, size_t v)
+static nebel_transfer trace_corner(const nebel_lighting *fog, const nebel_camera *camera, size_t v)
 {
     nebel_ray ray = {.t_max = 0};
     nebel_transfer transfer;
@@ -43,8 +43,7 @@ static nebel_transfer trace_corner(const nebel_snapshot *fog, const nebel_camera
         square += ray.direction[i] * ray.direction[i];
     }
     ray.t_max = sqrt(square);
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
-                     NEBEL_OK);
+    fog_trace(fog, (nebel_trace_desc){0}, 1, &ray, &transfer);
     return transfer;
 }
 
@@ -56,7 +55,7 @@ static void test_vertices_are_exact_and_linear_between(void **state)
     const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, .3}};
     const nebel_camera camera = test_camera_down();
-    nebel_snapshot *fog = test_fog(1, &bank);
+    nebel_lighting *fog = test_fog(1, &bank);
     test_picture picture = test_picture_make(40, 30);
     double hidden[4], red[4], farthest = 0;
     for (size_t v = 0; v < 4; v++) {
@@ -80,7 +79,7 @@ static void test_vertices_are_exact_and_linear_between(void **state)
                 assert_near((double)test_color(&picture, x, y)[0], .5 * through + added, 1e-5);
             }
     }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&picture);
 }
 
@@ -91,7 +90,7 @@ static void test_fine_meshes_come_near_to_exact(void **state)
     static test_ball ball;
     test_ball_make(&ball, (const double[3]){0, 1, 0});
     const nebel_camera camera = test_camera(0, 3, 5, 0, 0, 0);
-    nebel_snapshot *fog = test_world_fog(.1, 1);
+    nebel_lighting *fog = test_world_fog(.1, 1);
     test_picture exact = test_picture_make(70, 50), vertex = test_picture_make(70, 50);
     ball.scene.mesh_count = 1; /* without the floor, of large triangles */
     assert_int_equal(render(&ball.scene, fog, NEBEL_METHOD_EXACT, NULL, 2, &camera, &exact), NEBEL_OK);
@@ -103,7 +102,7 @@ static void test_fine_meshes_come_near_to_exact(void **state)
         met++;
     }
     assert_true(met > 100);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&exact);
     test_picture_free(&vertex);
 }
@@ -118,12 +117,12 @@ static void test_orthographic_rays_begin_beside_the_camera(void **state)
     nebel_camera camera = test_camera_down();
     camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     camera.view_height = 4;
-    nebel_snapshot *fog = test_fog(1, &layer);
+    nebel_lighting *fog = test_fog(1, &layer);
     test_picture picture = test_picture_make(16, 16);
     assert_int_equal(render(&scene, fog, NEBEL_METHOD_VERTEX, NULL, 1, &camera, &picture), NEBEL_OK);
     for (uint32_t y = 0; y < 16; y++)
         for (uint32_t x = 0; x < 16; x++) assert_near((double)test_transmittance(&picture, x, y)[1], exp(-.6), 1e-6);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&picture);
 }
 
@@ -134,13 +133,13 @@ static void test_opaque_fog_has_no_negative_light(void **state)
     const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
     const nebel_camera camera = test_camera_down();
-    nebel_snapshot *fog = test_world_fog(1e3, 0);
+    nebel_lighting *fog = test_world_fog(1e3, 0);
     test_picture picture = test_picture_make(80, 60);
     assert_int_equal(render(&scene, fog, NEBEL_METHOD_VERTEX, NULL, 1, &camera, &picture), NEBEL_OK);
     for (size_t i = 0; i < 3 * 80 * 60; i++)
         assert_true(picture.planes.color[i] >= 0 && picture.planes.transmittance[i] >= 0 &&
                     picture.planes.transmittance[i] <= 1);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&picture);
 }
 
@@ -152,7 +151,7 @@ static void test_added_fog_hides_nothing(void **state)
     const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, 7}};
     const nebel_camera camera = test_camera_down();
-    nebel_snapshot *fog = test_fog(1, &bank);
+    nebel_lighting *fog = test_fog(1, &bank);
     test_picture blended = test_picture_make(40, 30), added = test_picture_make(40, 30);
     assert_int_equal(render(&scene, fog, NEBEL_METHOD_VERTEX, NULL, 2, &camera, &blended), NEBEL_OK);
     assert_int_equal(render(&scene, fog, NEBEL_METHOD_ADDITIVE, NULL, 2, &camera, &added), NEBEL_OK);
@@ -167,7 +166,7 @@ static void test_added_fog_hides_nothing(void **state)
         fogged += met && light > .1;
     }
     assert_true(fogged > 50);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&blended);
     test_picture_free(&added);
 }
@@ -205,7 +204,7 @@ static void test_factors(void **state)
     const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, .3}};
     const nebel_camera camera = test_camera_down();
-    nebel_snapshot *fog = test_world_fog(.2, 1); /* is not drawn */
+    nebel_lighting *fog = test_world_fog(.2, 1); /* is not drawn */
     test_picture picture = test_picture_make(40, 30);
     for (int method = NEBEL_METHOD_LINEAR; method <= NEBEL_METHOD_EXP2; method++)
         for (int way = 0; way < 4; way++) {
@@ -234,7 +233,7 @@ static void test_factors(void **state)
                                 1e-5);
                 }
         }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&picture);
 }
 
@@ -292,7 +291,7 @@ static void test_streams_of_hardware(void **state)
     const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
     const nebel_camera camera = test_camera_down();
-    nebel_snapshot *fog = test_fog(1, &bank);
+    nebel_lighting *fog = test_fog(1, &bank);
     test_picture picture = test_picture_make(40, 30);
     float table[NEBEL_CURVE_ENTRIES];
     for (int i = 0; i < NEBEL_CURVE_ENTRIES; i++) table[i] = i < 128 ? 0 : 1;
@@ -314,7 +313,7 @@ static void test_streams_of_hardware(void **state)
         assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_ALPHA, &numbers, 2, &camera, &picture), NEBEL_OK);
         assert_true(find_difference(&camera, &picture, bytes, rounded) < 1e-5);
     }
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&picture);
 }
 
@@ -327,7 +326,7 @@ static void test_two_passes_are_fog_at_vertices(void **state)
     const nebel_camera camera = test_camera_down();
     nebel_volume_desc grey = bank;
     for (int c = 0; c < 3; c++) grey.extinction[c] = .1;
-    nebel_snapshot *fog = test_fog(1, &grey);
+    nebel_lighting *fog = test_fog(1, &grey);
     test_picture one = test_picture_make(40, 30), two = test_picture_make(40, 30);
     assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_VERTEX, NULL, 2, &camera, &one), NEBEL_OK);
     assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_TWO_PASS, NULL, 2, &camera, &two), NEBEL_OK);
@@ -341,7 +340,7 @@ static void test_two_passes_are_fog_at_vertices(void **state)
     }
     assert_int_equal(render_by(&scene, NULL, NEBEL_METHOD_TWO_PASS, NULL, 2, &camera, &two), NEBEL_OK);
     for (int i = 0; i < 3 * 40 * 30; i++) assert_near((double)two.planes.transmittance[i], 1, 0);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&one);
     test_picture_free(&two);
 }
@@ -353,7 +352,7 @@ static void test_own_coordinates(void **state)
     const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
     const nebel_camera camera = test_camera_down();
-    nebel_snapshot *fog = test_fog(1, &bank);
+    nebel_lighting *fog = test_fog(1, &bank);
     test_picture picture = test_picture_make(40, 30);
     double coordinates[4], corners[4], fresh[3], largest = 0;
     nebel_factor_desc factor = {.coordinate = NEBEL_COORDINATE_USER, .density = .03, .color = {.9, .6, .3}};
@@ -379,7 +378,7 @@ static void test_own_coordinates(void **state)
     /* Without fog c is 0. */
     assert_int_equal(render(&scene, NULL, NEBEL_METHOD_EXP, &factor, 2, &camera, &picture), NEBEL_OK);
     assert_near((double)test_transmittance(&picture, 20, 15)[0], 1, 0);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&picture);
 }
 
@@ -390,7 +389,7 @@ static void test_devices(void **state)
     const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
     const nebel_camera camera = test_camera_down();
-    nebel_snapshot *fog = test_fog(1, &bank);
+    nebel_lighting *fog = test_fog(1, &bank);
     test_picture picture = test_picture_make(40, 30);
     nebel_d3d9_fog d3d9 = {
         .fog_color = 0x12ff3300, .fog_vertex_mode = NEBEL_D3DFOG_LINEAR, .fog_start = 6, .fog_end = 15};
@@ -416,7 +415,7 @@ static void test_devices(void **state)
     d3d9.fog_table_mode = d3d9.fog_vertex_mode = NEBEL_D3DFOG_NONE;
     assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_D3D9, &numbers, 2, &camera, &picture), NEBEL_OK);
     assert_true(find_difference(&camera, &picture, by_alpha, orange) < 1e-5);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&picture);
 }
 
@@ -461,7 +460,7 @@ static void test_methods_come_and_go(void **state)
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
     const nebel_camera camera = test_camera_down();
     nebel_renderer *renderer = NULL;
-    nebel_snapshot *fog = test_fog(1, &bank);
+    nebel_lighting *fog = test_fog(1, &bank);
     test_picture before = test_picture_make(16, 16), after = test_picture_make(16, 16);
     const nebel_frame_desc frame = {.camera = camera, .width = 16, .height = 16, .samples = 1};
     assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
@@ -484,15 +483,15 @@ static void test_methods_come_and_go(void **state)
     assert_int_equal(nebel_set_renderer_method(NULL, NEBEL_METHOD_EXACT, NULL), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_render_frame(renderer, &frame, &after.planes), NEBEL_OK);
     assert_memory_not_equal(before.planes.color, after.planes.color, 16 * 16 * 3 * sizeof(float));
-    assert_int_equal(nebel_set_renderer_fog(renderer, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_lighting(renderer, NULL), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &after.planes), NEBEL_OK);
     assert_near((double)test_transmittance(&after, 8, 8)[0], 1, 0);
-    assert_int_equal(nebel_set_renderer_fog(renderer, fog), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_lighting(renderer, fog), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_EXACT, NULL), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &after.planes), NEBEL_OK);
     assert_memory_equal(before.planes.color, after.planes.color, 16 * 16 * 3 * sizeof(float));
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&before);
     test_picture_free(&after);
 }

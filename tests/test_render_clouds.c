@@ -173,21 +173,15 @@ typedef struct ball {
 
 static const double shine[3] = {2, 1.5, 1};
 
-static nebel_snapshot *make_ball(const ball *b)
+static nebel_lighting *make_ball(const ball *b)
 {
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
     nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = b->radius}};
     for (int c = 0; c < 3; c++) {
         volume.shape.center[c] = b->center[c];
         volume.extinction[c] = b->extinction;
         volume.source[c] = shine[c];
     }
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return fog_commit_lit(&(nebel_fog_desc){0}, &volume, 1, NULL);
 }
 
 /* Where a ray of length 1 is in the ball: the root of a quadratic. */
@@ -332,7 +326,7 @@ static void fog_lies_among_clouds(void **state)
             assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
             clear = render(&w, &camera, 2, 1, 0);
         }
-        nebel_snapshot *const fog = make_ball(&cases[v].ball);
+        nebel_lighting *const fog = make_ball(&cases[v].ball);
         test_picture picture = render_in(&w, fog, &camera, 2, 1, 0);
         compare_ball(&w, &cases[v].ball, workspace, &picture, &clear, &camera, &is);
         print_message("a ball %s clouds: %d pixels with both, off by %.2g at most, %.2g beyond what is told\n",
@@ -340,7 +334,7 @@ static void fog_lies_among_clouds(void **state)
         assert_true(is.both > (int)nb_test_count(20) && is.most < 6e-3 &&
                     is.beyond < 1e-4); /* the tolerance, 2e-3, times light up to 2, and that of haze */
         test_picture_free(&picture);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
         if (v + 1 < count && cases[v].cloud == cases[v + 1].cloud) continue;
         test_picture_free(&clear);
         nebel_destroy_cloud_workspace(workspace);
@@ -350,7 +344,7 @@ static void fog_lies_among_clouds(void **state)
 }
 
 /* Where the light is in the mean that a ball adds, in pixels. */
-static void find_center(const world *w, nebel_snapshot *fog, uint32_t samples, double center[2])
+static void find_center(const world *w, nebel_lighting *fog, uint32_t samples, double center[2])
 {
     const nebel_camera camera = planet_camera(2, .4);
     test_picture picture = render_in(w, fog, &camera, 2, samples, 0), clear = render(w, &camera, 2, samples, 0);
@@ -374,13 +368,13 @@ static void samples_leave_fog_before_clouds_where_it_is(void **state)
     double one[2], several[2];
     world w;
     make_world(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .coverage = 1}, &w);
-    nebel_snapshot *const fog = make_ball(&(ball){{0, 200, -600}, 150, 6e-3});
+    nebel_lighting *const fog = make_ball(&(ball){{0, 200, -600}, 150, 6e-3});
     find_center(&w, fog, 1, one);
     find_center(&w, fog, 4, several);
     print_message("a ball before closed clouds: at %.3f %.3f, of 4 samples at %.3f %.3f\n", one[0], one[1], several[0],
                   several[1]);
     for (int c = 0; c < 2; c++) assert_true(fabs(several[c] - one[c]) < .05);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     free_world(&w);
 }
 
@@ -451,7 +445,7 @@ static void sheets_over_mist_have_no_dots(void **state)
     world w;
     make_world(&(nebel_cloud_layer){.type = NEBEL_CLOUD_STRATUS, .base = 1500, .coverage = .5}, &w);
     memcpy(w.scene.sun_direction, (const double[3]){.927, .046, -.371}, sizeof w.scene.sun_direction);
-    nebel_snapshot *const mist = planet_mist(w.planet.atmosphere_desc.radius, w.scene.sun_direction);
+    nebel_lighting *const mist = planet_mist(w.planet.atmosphere_desc.radius, w.scene.sun_direction);
     nebel_camera camera = planet_camera(3e5, -.55);
     camera.vertical_fov = 10;
     test_picture picture = render_in(&w, mist, &camera, 2, 1, 0);
@@ -461,7 +455,7 @@ static void sheets_over_mist_have_no_dots(void **state)
                   dot / spread);
     assert_true(dot < .25 * spread);
     test_picture_free(&picture);
-    nebel_release_snapshot(mist);
+    nebel_release_lighting(mist);
     free_world(&w);
 }
 

@@ -52,22 +52,15 @@ static nebel_irradiance light_at(const world *w, const double place[3])
 }
 
 /* `sun`: its irradiance there. */
-static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume, const double sun[3],
+static nebel_lighting *make_fog(const world *w, const nebel_volume_desc *volume, const double sun[3],
                                 const nebel_environment *sky)
 {
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
-    nebel_fog_desc desc = {.sun = w->sun};
-    memcpy(desc.sun.irradiance, sun, sizeof desc.sun.irradiance);
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    assert_int_equal(nebel_set_environment(fog, sky), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    nebel_lighting_desc lights = {.sun = w->sun, .environment = *sky};
+    memcpy(lights.sun.irradiance, sun, sizeof lights.sun.irradiance);
+    return fog_commit_lit(&(nebel_fog_desc){0}, volume, 1, &lights);
 }
 
-static test_picture render(const world *w, nebel_snapshot *fog, const nebel_camera *camera, nebel_isa isa, int threads)
+static test_picture render(const world *w, nebel_lighting *fog, const nebel_camera *camera, nebel_isa isa, int threads)
 {
     nebel_renderer *renderer;
     const test_picture picture = test_picture_make(WIDTH, HEIGHT);
@@ -109,9 +102,9 @@ static test_picture see_ball(world *w, double angle, const double light[3])
     turn_direction(angle, camera.up);
     turn(w->planet.atmosphere_desc.radius, angle, ball.shape.center);
     memcpy(w->scene.ambient, sky.radiance, sizeof w->scene.ambient);
-    nebel_snapshot *fog = make_fog(w, &ball, light, &sky);
+    nebel_lighting *fog = make_fog(w, &ball, light, &sky);
     const test_picture picture = render(w, fog, &camera, NEBEL_ISA_DEFAULT, 2);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     return picture;
 }
 
@@ -159,9 +152,9 @@ static void light_ball(world *w, double height, double brightest[3])
         nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, height, -70}, .radius = 20},
                                   .extinction = {.03, .03, .03}};
         for (int c = 0; c < 3; c++) ball.albedo[c] = k;
-        nebel_snapshot *fog = make_fog(w, &ball, light.sun, &none);
+        nebel_lighting *fog = make_fog(w, &ball, light.sun, &none);
         pictures[k] = render(w, fog, &camera, NEBEL_ISA_DEFAULT, 2);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
     }
     for (int c = 0; c < 3; c++) brightest[c] = 0;
     for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
@@ -218,9 +211,9 @@ static void a_ball_in_eclipse_is_black(void **state)
         turn(w.planet.atmosphere_desc.radius, angle, camera.look_at);
         turn_direction(angle, camera.up);
         w.scene.planet_count = k == 0 ? 1 : 2;
-        nebel_snapshot *fog = make_fog(&w, &ball, white, &none);
+        nebel_lighting *fog = make_fog(&w, &ball, white, &none);
         pictures[k] = render(&w, fog, &camera, NEBEL_ISA_DEFAULT, 2);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
     }
     double lit = 0;
     for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
@@ -254,8 +247,8 @@ typedef struct steps {
 
 /* Many short pieces, each of air, of fog in sunlight and of fog in the sky's light for itself. How much brighter the sky is than at the
  * origin is for test_render_planet to try. */
-static steps step_along(const world *w, const nb_irradiance_table *daylight, const nebel_snapshot *by_sun,
-                        const nebel_snapshot *by_sky, nebel_ray ray)
+static steps step_along(const world *w, const nb_irradiance_table *daylight, const nebel_lighting *by_sun,
+                        const nebel_lighting *by_sky, nebel_ray ray)
 {
     enum { STEPS = 4000 };
     static const double origin[3] = {0, 0, 0};
@@ -280,8 +273,8 @@ static steps step_along(const world *w, const nb_irradiance_table *daylight, con
         double sun_left[3], brighter[3];
         nb_irradiance_at(daylight, NB_IRRADIANCE_OF_FOG, middle, sun_left, brighter);
         assert_int_equal(nebel_trace_atmosphere(w->atmosphere, &w->sun, 1, &ray, 0, &air, 0), NEBEL_OK);
-        assert_int_equal(nebel_trace(by_sun, NULL, 1, &ray, 0, &sun, 0), NEBEL_OK);
-        assert_int_equal(nebel_trace(by_sky, NULL, 1, &ray, 0, &sky, 0), NEBEL_OK);
+        fog_trace(by_sun, (nebel_trace_desc){0}, 1, &ray, &sun);
+        fog_trace(by_sky, (nebel_trace_desc){0}, 1, &ray, &sky);
         for (int c = 0; c < 3; c++) {
             const double of_air = .5 * (1 + sky.transmittance[c]) * air.in_scattering[c];
             const double above = w->sun.irradiance[c], seen = .5 * (1 + air.transmittance[c]) * left[c];
@@ -322,9 +315,9 @@ static void mist_is_lit_by_place(void **state)
         const nebel_environment dark = {.type = NEBEL_ENVIRONMENT_CONSTANT};
         const nebel_irradiance home = light_at(&w, origin);
         const nebel_volume_desc mist = mist_of(&w);
-        nebel_snapshot *fog = make_fog(&w, &mist, home.sun, &w.scene.environment);
-        nebel_snapshot *by_sun = make_fog(&w, &mist, w.sun.irradiance, &dark);
-        nebel_snapshot *by_sky = make_fog(&w, &mist, none, &w.scene.environment);
+        nebel_lighting *fog = make_fog(&w, &mist, home.sun, &w.scene.environment);
+        nebel_lighting *by_sun = make_fog(&w, &mist, w.sun.irradiance, &dark);
+        nebel_lighting *by_sky = make_fog(&w, &mist, none, &w.scene.environment);
         const nebel_camera camera = planet_camera(views[v].height, views[v].pitch);
         test_picture picture = render(&w, fog, &camera, NEBEL_ISA_DEFAULT, 2);
         double worst = 0, apart = 0;
@@ -344,9 +337,9 @@ static void mist_is_lit_by_place(void **state)
                       worst, apart);
         assert_true(apart > 3 * worst);
         test_picture_free(&picture);
-        nebel_release_snapshot(fog);
-        nebel_release_snapshot(by_sun);
-        nebel_release_snapshot(by_sky);
+        nebel_release_lighting(fog);
+        nebel_release_lighting(by_sun);
+        nebel_release_lighting(by_sky);
         nebel_release_environment_map(map);
     }
 }
@@ -359,7 +352,7 @@ static void every_thread_and_processor_gives_the_same(void **state)
     make_world(to_sun, &w);
     nebel_environment_map *map = planet_even_sky(&w.scene);
     const nebel_volume_desc mist = mist_of(&w);
-    nebel_snapshot *fog = make_fog(&w, &mist, irradiance, &w.scene.environment);
+    nebel_lighting *fog = make_fog(&w, &mist, irradiance, &w.scene.environment);
     const nebel_camera camera = planet_camera(1e5, -.2);
     test_picture one = render(&w, fog, &camera, NEBEL_ISA_SCALAR, 1);
     for (int isa = NEBEL_ISA_DEFAULT; isa <= (int)NEBEL_ISA_NEON; isa++) {
@@ -370,7 +363,7 @@ static void every_thread_and_processor_gives_the_same(void **state)
         test_picture_free(&other);
     }
     test_picture_free(&one);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_release_environment_map(map);
 }
 

@@ -203,7 +203,7 @@ static void test_light_without_end_is_an_error(void **state)
 {
     (void)state;
     const nebel_scene_data scene = {0};
-    nebel_snapshot *fog = test_fog(1, &(nebel_volume_desc){.emission = {1, 1, 1}});
+    nebel_lighting *fog = test_fog(1, &(nebel_volume_desc){.emission = {1, 1, 1}});
     test_log log = {0};
     nebel_renderer *renderer = NULL;
     const nebel_cpu_renderer_desc desc = {.thread_count = 2, .log = {write_log, &log}};
@@ -212,7 +212,7 @@ static void test_light_without_end_is_an_error(void **state)
     assert_int_equal(nebel_render_frame(renderer, &frame, &(nebel_frame){0}), NEBEL_ERROR_UNBOUNDED);
     assert_int_equal(log.messages, 1);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* ---- progress -------------------------------------------------------------------------------- */

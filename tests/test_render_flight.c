@@ -27,7 +27,7 @@ static void make_world(const double ground[3], const double to_sun[3], world *w)
     memcpy(w->scene.sun_direction, to_sun, sizeof w->scene.sun_direction);
 }
 
-static nebel_renderer *create_renderer(const world *w, nebel_snapshot *fog)
+static nebel_renderer *create_renderer(const world *w, nebel_lighting *fog)
 {
     nebel_renderer *renderer;
     assert_int_equal(
@@ -150,24 +150,18 @@ static void a_flight_has_no_seam(void **state)
 }
 
 /* A lit bank of mist a metre high, at a place of the scene. */
-static nebel_snapshot *make_mist(const world *w, const double place[3])
+static nebel_lighting *make_mist(const world *w, const double place[3])
 {
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
     const nebel_volume_desc mist = {
         .shape = {.type = NEBEL_SHAPE_SPHERE, .center = {place[0], place[1] + 1, place[2] - 6}, .radius = 1},
         .extinction = {1, 1, 1},
         .albedo = {.9, .8, .7}};
-    nebel_fog_desc desc = {.sun = w->sun};
+    nebel_lighting_desc lights = {.sun = w->sun};
     nebel_irradiance light;
     const double middle[1][3] = {{place[0], place[1] + 1, place[2] - 6}};
     assert_int_equal(nebel_compute_atmosphere_irradiance(w->atmosphere, &w->sun, 1, middle, 0, &light, 0), NEBEL_OK);
-    memcpy(desc.sun.irradiance, light.sun, sizeof light.sun);
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &mist, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    memcpy(lights.sun.irradiance, light.sun, sizeof light.sun);
+    return fog_commit_lit(&(nebel_fog_desc){0}, &mist, 1, &lights);
 }
 
 /* Where numbers are 2^22 times as large as the mist, pictures are those at the origin while the camera moves by millimetres. Numbers
@@ -187,7 +181,7 @@ static void mist_stands_still_on_a_planet(void **state)
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 2; k++) {
             nebel_camera camera = planet_camera(1.5, -.05);
-            nebel_snapshot *fog = make_mist(&worlds[k], places[k]);
+            nebel_lighting *fog = make_mist(&worlds[k], places[k]);
             nebel_renderer *renderer = create_renderer(&worlds[k], fog);
             camera.position[0] += i * 0x1p-9;
             camera.look_at[0] += i * 0x1p-9;
@@ -197,7 +191,7 @@ static void mist_stands_still_on_a_planet(void **state)
             }
             render(renderer, &camera, &pictures[k]);
             nebel_destroy_renderer(renderer);
-            nebel_release_snapshot(fog);
+            nebel_release_lighting(fog);
         }
         for (uint32_t p = 0; p < WIDE * HIGH * 3; p++) {
             const double left = (double)pictures[0].planes.transmittance[p];

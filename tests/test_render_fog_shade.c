@@ -110,30 +110,23 @@ static double sky_at(const world *w, const double place[3])
     return (double)part;
 }
 
-static nebel_snapshot *make_limited_fog(const world *w, const nebel_volume_desc *volume, double sun, double sky,
+static nebel_lighting *make_limited_fog(const world *w, const nebel_volume_desc *volume, double sun, double sky,
                                         double max_opacity)
 {
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
-    nebel_fog_desc desc = {.sun = {.direction = {0, 1, 0}}, .max_opacity = max_opacity};
-    nebel_environment environment = w->scene.environment;
-    memcpy(desc.sun.direction, w->scene.sun_direction, sizeof desc.sun.direction);
-    for (int c = 0; c < 3; c++) desc.sun.irradiance[c] = sun * irradiance[c];
-    environment.intensity = sky;
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    if (sky > 0) assert_int_equal(nebel_set_environment(fog, &environment), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    nebel_lighting_desc lights = {.sun = {.direction = {0, 1, 0}}};
+    memcpy(lights.sun.direction, w->scene.sun_direction, sizeof lights.sun.direction);
+    for (int c = 0; c < 3; c++) lights.sun.irradiance[c] = sun * irradiance[c];
+    if (sky > 0) lights.environment = w->scene.environment;
+    lights.environment.intensity = sky;
+    return fog_commit_lit(&(nebel_fog_desc){.max_opacity = max_opacity}, volume, 1, &lights);
 }
 
-static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume, double sun, double sky)
+static nebel_lighting *make_fog(const world *w, const nebel_volume_desc *volume, double sun, double sky)
 {
     return make_limited_fog(w, volume, sun, sky, 0);
 }
 
-static test_picture render(const world *w, nebel_snapshot *fog, const nebel_camera *camera, int threads)
+static test_picture render(const world *w, nebel_lighting *fog, const nebel_camera *camera, int threads)
 {
     nebel_renderer *renderer;
     const test_picture picture = test_picture_make(WIDTH, HEIGHT);
@@ -147,7 +140,7 @@ static test_picture render(const world *w, nebel_snapshot *fog, const nebel_came
 }
 
 /* All fog in the light that it was made with, which is the origin's. */
-static test_picture render_evenly(const world *w, nebel_snapshot *fog, const nebel_camera *camera)
+static test_picture render_evenly(const world *w, nebel_lighting *fog, const nebel_camera *camera)
 {
     world clear = *w;
     clear.planet.clouds = NULL;
@@ -164,7 +157,7 @@ static double to_ground(const world *w, const nebel_ray *ray)
 }
 
 /* The light of fog along a ray of unit length that ends on the ground, in many short pieces. */
-static void step_along(const world *w, const nebel_snapshot *by_sun, const nebel_snapshot *by_sky, nebel_ray ray,
+static void step_along(const world *w, const nebel_lighting *by_sun, const nebel_lighting *by_sky, nebel_ray ray,
                        double end, double light[3])
 {
     enum { STEPS = 600 };
@@ -182,8 +175,8 @@ static void step_along(const world *w, const nebel_snapshot *by_sun, const nebel
             middle[c] = whole.origin[c] + .5 * (from + to) * whole.direction[c];
         }
         ray.t_max = to - from;
-        assert_int_equal(nebel_trace(by_sun, NULL, 1, &ray, 0, &sun, 0), NEBEL_OK);
-        assert_int_equal(nebel_trace(by_sky, NULL, 1, &ray, 0, &sky, 0), NEBEL_OK);
+        fog_trace(by_sun, (nebel_trace_desc){0}, 1, &ray, &sun);
+        fog_trace(by_sky, (nebel_trace_desc){0}, 1, &ray, &sky);
         if (!(sun.transmittance[0] < 1)) continue;
         const double of_sun = sun_at(w, middle), of_sky = sky_at(w, middle);
         for (int c = 0; c < 3; c++) {
@@ -201,8 +194,8 @@ typedef struct off {
 static off compare(const world *w, const nebel_volume_desc *mist, const nebel_camera *camera, double pitch)
 {
     static const double origin[3] = {0, 0, 0};
-    nebel_snapshot *const fog = make_fog(w, mist, sun_at(w, origin), sky_at(w, origin));
-    nebel_snapshot *const by_sun = make_fog(w, mist, 1, 0), *const by_sky = make_fog(w, mist, 0, 1);
+    nebel_lighting *const fog = make_fog(w, mist, sun_at(w, origin), sky_at(w, origin));
+    nebel_lighting *const by_sun = make_fog(w, mist, 1, 0), *const by_sky = make_fog(w, mist, 0, 1);
     test_picture picture = render(w, fog, camera, 2), even = render_evenly(w, fog, camera);
     off is = {.beyond = -1};
     for (uint32_t i = 5; i < WIDTH * HEIGHT; i += 7) {
@@ -225,9 +218,9 @@ static off compare(const world *w, const nebel_volume_desc *mist, const nebel_ca
     is.mean /= is.count;
     test_picture_free(&picture);
     test_picture_free(&even);
-    nebel_release_snapshot(fog);
-    nebel_release_snapshot(by_sun);
-    nebel_release_snapshot(by_sky);
+    nebel_release_lighting(fog);
+    nebel_release_lighting(by_sun);
+    nebel_release_lighting(by_sky);
     return is;
 }
 
@@ -320,7 +313,7 @@ static void limited_opacity_keeps_the_shade(void **state)
         .shape = {.type = NEBEL_SHAPE_BOX, .min = {-9000, -5, -9000}, .max = {9000, 400, 9000}},
         .extinction = {1e-3, 2e-3, 4e-3},
         .albedo = {.97, .97, .97}};
-    nebel_snapshot *const fog = make_fog(&w, &mist, 1, 1), *const limited = make_limited_fog(&w, &mist, 1, 1, limit);
+    nebel_lighting *const fog = make_fog(&w, &mist, 1, 1), *const limited = make_limited_fog(&w, &mist, 1, 1, limit);
     const nebel_camera camera = planet_camera(300, -.1);
     test_picture all = render(&w, fog, &camera, 2), most = render(&w, limited, &camera, 2);
     double worst = 0;
@@ -337,8 +330,8 @@ static void limited_opacity_keeps_the_shade(void **state)
     assert_true(beyond > 100 && worst < 1e-3);
     test_picture_free(&all);
     test_picture_free(&most);
-    nebel_release_snapshot(fog);
-    nebel_release_snapshot(limited);
+    nebel_release_lighting(fog);
+    nebel_release_lighting(limited);
     free_world(&w);
 }
 
@@ -352,14 +345,14 @@ static void threads_change_nothing(void **state)
         .shape = {.type = NEBEL_SHAPE_BOX, .min = {-6000, -5, -6000}, .max = {6000, 60, 6000}},
         .extinction = {2e-3, 2e-3, 2e-3},
         .albedo = {.97, .97, .97}};
-    nebel_snapshot *const fog = make_fog(&w, &mist, 1, 1);
+    nebel_lighting *const fog = make_fog(&w, &mist, 1, 1);
     const nebel_camera camera = planet_camera(500, -.3);
     test_picture one = render(&w, fog, &camera, 1), three = render(&w, fog, &camera, 3);
     assert_memory_equal(one.planes.color, three.planes.color, (size_t)WIDTH * HEIGHT * 3 * sizeof(float));
     assert_memory_equal(one.planes.error, three.planes.error, (size_t)WIDTH * HEIGHT * sizeof(float));
     test_picture_free(&one);
     test_picture_free(&three);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     free_world(&w);
 }
 
@@ -374,7 +367,7 @@ static void clear_places_stay_as_they_are(void **state)
     const nebel_volume_desc bank = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-600, 0, -2100}, .max = {600, 60, -900}},
                                     .extinction = {2e-3, 2e-3, 2e-3},
                                     .albedo = {.97, .97, .97}};
-    nebel_snapshot *const fog = make_fog(&w, &bank, 1, 1);
+    nebel_lighting *const fog = make_fog(&w, &bank, 1, 1);
     const nebel_camera camera = planet_camera(500, -.3);
     test_picture with = render(&w, fog, &camera, 2);
     w.planet.clouds = NULL;
@@ -382,7 +375,7 @@ static void clear_places_stay_as_they_are(void **state)
     assert_memory_equal(with.planes.color, without.planes.color, (size_t)WIDTH * HEIGHT * 3 * sizeof(float));
     test_picture_free(&with);
     test_picture_free(&without);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     free_world(&w);
 }
 
@@ -421,9 +414,9 @@ static test_picture see_top(world *w, const double top[3], int is_ball, double s
     }
     move_planet(top, w);
     w->scene.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_CONSTANT, .radiance = {.1, .15, .2}};
-    nebel_snapshot *const snapshot = make_fog(w, &fog, sun, 1);
+    nebel_lighting *const snapshot = make_fog(w, &fog, sun, 1);
     const test_picture picture = render(w, snapshot, &camera, 2);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(snapshot);
     return picture;
 }
 

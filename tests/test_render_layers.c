@@ -46,7 +46,7 @@ static void make_world(world *w)
                                   .planets = &w->planet};
 }
 
-static nebel_snapshot *make_fog(void)
+static nebel_lighting *make_fog(void)
 {
     const nebel_volume_desc volumes[] = {
         {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {1, 1, 2.2}, .radius = 1},
@@ -56,7 +56,7 @@ static nebel_snapshot *make_fog(void)
     return test_fog(2, volumes);
 }
 
-static void render(const world *w, nebel_snapshot *fog, int threads, double time, uint32_t samples, float *color,
+static void render(const world *w, nebel_lighting *fog, int threads, double time, uint32_t samples, float *color,
                    float *depth)
 {
     nebel_renderer *renderer = NULL;
@@ -91,17 +91,17 @@ static nebel_ray ray_of(const nebel_camera *camera, uint32_t x, uint32_t y, doub
     return ray;
 }
 
-static nebel_transfer fog_up_to(const nebel_snapshot *fog, const nebel_ray *ray, double t)
+static nebel_transfer fog_up_to(const nebel_lighting *fog, const nebel_ray *ray, double t)
 {
     nebel_transfer transfer = {.transmittance = {1, 1, 1}};
     nebel_ray piece = *ray;
     piece.t_max = t;
-    if (fog != NULL) assert_int_equal(nebel_trace(fog, NULL, 1, &piece, 0, &transfer, 0), NEBEL_OK);
+    if (fog != NULL) fog_trace(fog, (nebel_trace_desc){0}, 1, &piece, &transfer);
     return transfer;
 }
 
 /* From behind to the front: each piece of fog takes away from what is behind it and adds its own. */
-static void compose(const world *w, const nebel_snapshot *fog, const nebel_ray *ray, const nebel_shell_hits *hits,
+static void compose(const world *w, const nebel_lighting *fog, const nebel_ray *ray, const nebel_shell_hits *hits,
                     double color[3])
 {
     double far = HUGE_VAL;
@@ -122,7 +122,7 @@ static void compose(const world *w, const nebel_snapshot *fog, const nebel_ray *
     }
 }
 
-static void check_picture(const world *w, nebel_snapshot *fog, double time)
+static void check_picture(const world *w, nebel_lighting *fog, double time)
 {
     static float color[3 * PIXELS], depth[PIXELS];
     int grounds = 0;
@@ -157,9 +157,9 @@ static void pictures_are_what_rays_say(void **state)
     make_world(&w);
     check_picture(&w, NULL, 0);
     check_picture(&w, NULL, 33);
-    nebel_snapshot *fog = make_fog();
+    nebel_lighting *fog = make_fog();
     check_picture(&w, fog, 33);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_destroy_textured_planet(w.layers);
 }
 
@@ -196,11 +196,11 @@ static void bytes_do_not_hang_on_threads(void **state)
     static float one[3 * PIXELS], three[3 * PIXELS];
     world w;
     make_world(&w);
-    nebel_snapshot *fog = make_fog();
+    nebel_lighting *fog = make_fog();
     render(&w, fog, 1, 7, 4, one, NULL);
     render(&w, fog, 3, 7, 4, three, NULL);
     assert_memory_equal(one, three, sizeof one);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_destroy_textured_planet(w.layers);
 }
 

@@ -80,13 +80,13 @@ static void compare_windows(nebel_renderer *renderer, const nebel_camera *camera
 }
 
 /* A barrel in a ball of sunlit fog, and fog of a color. */
-static nebel_snapshot *make_fog(void)
+static nebel_lighting *make_fog(void)
 {
     const nebel_volume_desc volumes[] = {
         {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 2.5}, .extinction = {.4, .4, .4}, .albedo = {.9, .9, .9}},
         {.extinction = {.02, .03, .05}, .source = {.2, .3, .4}}};
-    const nebel_fog_desc desc = {.sun = {.direction = {cos(.3), 0, -sin(.3)}, .irradiance = {3, 3, 3}}};
-    return fog_commit(&desc, volumes, 2);
+    const nebel_lighting_desc lights = {.sun = {.direction = {cos(.3), 0, -sin(.3)}, .irradiance = {3, 3, 3}}};
+    return fog_commit_lit(&(nebel_fog_desc){0}, volumes, 2, &lights);
 }
 
 static void test_windows_have_the_pixels_of_the_whole(void **state)
@@ -97,7 +97,7 @@ static void test_windows_have_the_pixels_of_the_whole(void **state)
     (void)state;
     test_barrel barrel;
     test_barrel_make(&barrel);
-    nebel_snapshot *fog = make_fog();
+    nebel_lighting *fog = make_fog();
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_create_cpu_renderer(&barrel.scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     for (size_t m = 0; m < sizeof methods / sizeof *methods; m++) {
@@ -109,7 +109,7 @@ static void test_windows_have_the_pixels_of_the_whole(void **state)
         }
     }
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_windows_that_cut_regions_are_refused(void **state)
@@ -128,7 +128,7 @@ static void test_windows_that_cut_regions_are_refused(void **state)
                                        {UINT32_MAX - 63, 0, 64, 64}};
     (void)state;
     const nebel_scene_data scene = {0};
-    nebel_snapshot *fog = make_fog();
+    nebel_lighting *fog = make_fog();
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     const nebel_camera camera = test_camera(0, 0, 6, 0, 0, 0);
@@ -137,7 +137,7 @@ static void test_windows_that_cut_regions_are_refused(void **state)
         assert_int_equal(render(renderer, &camera, 1, &bad[i], &whole), NEBEL_ERROR_VALUE);
     free_planes(&whole);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* ---- samples --------------------------------------------------------------------------------- */
@@ -177,7 +177,7 @@ static void test_samples_are_the_same_alone(void **state)
     (void)state;
     test_barrel barrel;
     test_barrel_make(&barrel);
-    nebel_snapshot *fog = make_fog();
+    nebel_lighting *fog = make_fog();
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_create_cpu_renderer(&barrel.scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     const nebel_camera camera = test_camera(.5, 1, 6, 0, 0, 0);
@@ -192,7 +192,7 @@ static void test_samples_are_the_same_alone(void **state)
     }
     free_planes(&whole);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 int main(void)

@@ -58,7 +58,7 @@ static nebel_sun sun_of(const world *w)
     return sun;
 }
 
-static test_picture render(const world *w, nebel_snapshot *fog, const nebel_camera *camera, nebel_isa isa, int threads,
+static test_picture render(const world *w, nebel_lighting *fog, const nebel_camera *camera, nebel_isa isa, int threads,
                            uint32_t samples)
 {
     nebel_renderer *renderer;
@@ -346,7 +346,7 @@ static void fog_has_the_sky_from_all_sides(void **state)
 }
 
 /* Many short pieces, each of air and of fog for itself: what is left is of their length. */
-static void step_along(const world *w, const nebel_snapshot *fog, nebel_ray ray, double end, double light[3])
+static void step_along(const world *w, const nebel_lighting *fog, nebel_ray ray, double end, double light[3])
 {
     enum { STEPS = 3000 };
     const nebel_sun sun = sun_of(w);
@@ -363,7 +363,7 @@ static void step_along(const world *w, const nebel_snapshot *fog, nebel_ray ray,
         ray.t_max = next - at;
         for (int c = 0; c < 3; c++) ray.origin[c] = whole.origin[c] + at * unit[c];
         assert_int_equal(nebel_trace_atmosphere(w->atmosphere, &sun, 1, &ray, 0, &air, 0), NEBEL_OK);
-        assert_int_equal(nebel_trace(fog, NULL, 1, &ray, 0, &of_fog, 0), NEBEL_OK);
+        fog_trace(fog, (nebel_trace_desc){0}, 1, &ray, &of_fog);
         for (int c = 0; c < 3; c++) {
             light[c] += left[c] * (0.5 * (1 + of_fog.transmittance[c]) * air.in_scattering[c] +
                                    0.5 * (1 + air.transmittance[c]) * of_fog.in_scattering[c]);
@@ -379,7 +379,7 @@ static void air_and_fog_share_a_ray(void **state)
     const double to_sun[3] = {.6, .3, -.74161984870956629}, pitch = .05;
     world w;
     make_world("earth", to_sun, &w);
-    nebel_snapshot *snapshot = planet_fog(to_sun);
+    nebel_lighting *snapshot = planet_fog(to_sun);
     const nebel_camera camera = planet_camera(50, pitch);
     test_picture picture = render(&w, snapshot, &camera, NEBEL_ISA_DEFAULT, 2, 1);
     double worst = 0, apart = 0;
@@ -393,7 +393,7 @@ static void air_and_fog_share_a_ray(void **state)
         ending.t_max = fmin(way, 1.5e6);
         step_along(&w, snapshot, ray, ending.t_max, light);
         assert_int_equal(nebel_trace_atmosphere(w.atmosphere, &sun, 1, &ray, 0, &air, 0), NEBEL_OK);
-        assert_int_equal(nebel_trace(snapshot, NULL, 1, &ending, 0, &alone, 0), NEBEL_OK);
+        fog_trace(snapshot, (nebel_trace_desc){0}, 1, &ending, &alone);
         for (int c = 0; c < 3; c++) {
             const double got = (double)picture.planes.in_scattering[3 * i + (uint32_t)c];
             const double left = (double)picture.planes.transmittance[3 * i + (uint32_t)c];
@@ -407,23 +407,17 @@ static void air_and_fog_share_a_ray(void **state)
     print_message("air and fog: off by %.1e; fog before all air would be off by %.1e\n", worst, apart);
     assert_true(worst < 6e-3 && apart > 5 * worst);
     test_picture_free(&picture);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(snapshot);
 }
 
 /* A ball that glows at night. */
-static nebel_snapshot *glowing_ball(void)
+static nebel_lighting *glowing_ball(void)
 {
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
     const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 3, -30}, .radius = 12},
                                     .density = {.type = NEBEL_DENSITY_GAUSSIAN, .center = {0, 3, -30}, .sigma = 5},
                                     .extinction = {.02, .02, .02},
                                     .source = {.05, .05, .05}};
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = 0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &ball, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return fog_commit_lit(&(nebel_fog_desc){0}, &ball, 1, NULL);
 }
 
 /* Fog and air along a ray are composed to a tolerance; in the dark it is so much less that no ring shows where one more piece is
@@ -433,7 +427,7 @@ static void fog_in_the_dark_is_as_exact(void **state)
     (void)state;
     static const double night[3] = {.29, -.19, -.94};
     const nebel_camera camera = planet_camera(3, -.1);
-    nebel_snapshot *snapshot = glowing_ball();
+    nebel_lighting *snapshot = glowing_ball();
     nebel_renderer *renderer;
     test_picture exact = test_picture_make(WIDTH, HEIGHT);
     world w;
@@ -457,22 +451,16 @@ static void fog_in_the_dark_is_as_exact(void **state)
     assert_true(lit > 300 && worst <= 4e-3);
     test_picture_free(&usual);
     test_picture_free(&exact);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(snapshot);
 }
 
 /* A ball of black fog 5 m over the ground, in the sun and beside a lamp. */
-static nebel_snapshot *black_ball(const double shift[3])
+static nebel_lighting *black_ball(const double shift[3])
 {
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
     const nebel_volume_desc ball = {
         .shape = {.type = NEBEL_SHAPE_SPHERE, .center = {shift[0] + 1.5, shift[1] + 5, shift[2] - 12}, .radius = 3},
         .extinction = {2, 2, 2}};
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = 0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &ball, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return fog_commit_lit(&(nebel_fog_desc){0}, &ball, 1, NULL);
 }
 
 /* The ball, its shadows and a planet, all of them `shift` off, before a camera that goes with them. */
@@ -494,9 +482,9 @@ static test_picture render_shadow(const double shift[3], const nebel_mesh *mesh)
     w.scene.lights = &lamp;
     w.scene.mesh_count = mesh != NULL;
     w.scene.meshes = mesh;
-    nebel_snapshot *fog = black_ball(shift);
+    nebel_lighting *fog = black_ball(shift);
     const test_picture picture = render(&w, fog, &camera, NEBEL_ISA_DEFAULT, 1, 1);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_destroy_atmosphere(w.atmosphere);
     return picture;
 }
@@ -680,14 +668,10 @@ static void every_thread_and_processor_gives_the_same(void **state)
     w.scene.mesh_count = 1;
     w.scene.meshes = &wall;
     w.planet.sun_angular_diameter = 3;
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
     const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 20, -90}, .radius = 40},
                                     .extinction = {.01, .02, .03},
                                     .source = {.5, .4, .3}};
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = 0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &ball, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_lighting *snapshot = fog_commit_lit(&(nebel_fog_desc){0}, &ball, 1, NULL);
     const nebel_camera camera = planet_camera(10, .1);
     test_picture one = render(&w, snapshot, &camera, NEBEL_ISA_DEFAULT, 1, 1);
     for (int isa = NEBEL_ISA_DEFAULT; isa <= (int)NEBEL_ISA_NEON; isa++) {
@@ -699,8 +683,7 @@ static void every_thread_and_processor_gives_the_same(void **state)
         test_picture_free(&other);
     }
     test_picture_free(&one);
-    nebel_release_snapshot(snapshot);
-    nebel_destroy_fog(fog);
+    nebel_release_lighting(snapshot);
 }
 
 /* Below the ground, in the centre, far away, and what planets are not drawn with. */

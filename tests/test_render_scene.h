@@ -65,14 +65,14 @@ static inline nebel_camera test_camera(double x, double y, double z, double to_x
         .position = {x, y, z}, .look_at = {to_x, to_y, to_z}, .up = {0, 1, 0}, .vertical_fov = 50, .view_height = 10};
 }
 
-/* A snapshot of some volumes. */
-static inline nebel_snapshot *test_fog(size_t count, const nebel_volume_desc *volumes)
+/* Some volumes, without lights. */
+static inline nebel_lighting *test_fog(size_t count, const nebel_volume_desc *volumes)
 {
-    return fog_commit(&(nebel_fog_desc){0}, volumes, count);
+    return fog_commit_lit(&(nebel_fog_desc){0}, volumes, count, NULL);
 }
 
 /* Fog everywhere. */
-static inline nebel_snapshot *test_world_fog(double extinction, double source)
+static inline nebel_lighting *test_world_fog(double extinction, double source)
 {
     const nebel_volume_desc volume = {.extinction = {extinction, 2 * extinction, .5 * extinction},
                                       .source = {source, .5 * source, 2 * source}};
@@ -80,7 +80,7 @@ static inline nebel_snapshot *test_world_fog(double extinction, double source)
 }
 
 /* Renders with a renderer of its own. */
-static inline void test_render(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_cpu_renderer_desc *desc,
+static inline void test_render(const nebel_scene_data *scene, nebel_lighting *fog, const nebel_cpu_renderer_desc *desc,
                                const nebel_camera *camera, uint32_t samples, test_picture *picture)
 {
     nebel_renderer *renderer = NULL;
@@ -342,7 +342,7 @@ typedef struct test_stage {
     test_ball ball;
     uint8_t texels[4 * TEST_TEXELS * TEST_TEXELS];
     nebel_texture texture;
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
     nebel_camera camera;
 } test_stage;
 

@@ -319,17 +319,16 @@ static void test_the_fog_of_the_scene_answers_rays(void **state)
                                     "\"extinction\": 0.1, \"albedo\": 1}, "
                                     "{\"operation\": \"exclude\", \"name\": \"hole\", \"shape\": {\"type\": "
                                     "\"sphere\", \"center\": [0, 0, -5], \"radius\": 1}}]}");
-    nebel_snapshot *fog = NULL;
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    nebel_destroy_scene(scene);
-    assert_int_equal(nebel_get_volume_count(fog), 2);
     const nebel_ray ray = {.direction = {0, 0, -1}, .t_max = 10};
     nebel_transfer transfer;
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
-                     NEBEL_OK);
+    nebel_lighting *fog = scene_light(scene, 0);
+    nebel_destroy_scene(scene);
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(fog);
+    assert_int_equal(nebel_get_volume_count(snapshot), 2);
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){.lighting = fog}, 1, &ray, 0, &transfer, 0), NEBEL_OK);
     assert_true(fabs(transfer.transmittance[0] - exp(-.8)) < 1e-12);
     assert_true(fabs(transfer.in_scattering[0] - .5 * (1 - exp(-.8))) < 1e-12);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 static void test_the_fog_of_the_scene_hides_no_more_than_it_may(void **state)
@@ -337,17 +336,13 @@ static void test_the_fog_of_the_scene_hides_no_more_than_it_may(void **state)
     (void)state;
     nebel_scene *scene = parse_good("{\"nebel\": 1, \"max_opacity\": 0.4, \"fog\": [{\"shape\": {\"type\": \"world\"}, "
                                     "\"extinction\": 0.1, \"source\": 0.5}]}");
-    nebel_snapshot *fog = NULL;
     assert_number(nebel_get_scene_data(scene)->max_opacity, .4);
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    nebel_destroy_scene(scene);
     const nebel_ray ray = {.direction = {0, 0, -1}, .t_max = 10};
     nebel_transfer transfer;
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
-                     NEBEL_OK);
+    scene_trace(scene, 0, (nebel_trace_desc){0}, 1, &ray, &transfer);
+    nebel_destroy_scene(scene);
     assert_true(fabs(transfer.transmittance[0] - .6) < 1e-12);
     assert_true(fabs(transfer.in_scattering[0] - .5 * .4) < 1e-12);
-    nebel_release_snapshot(fog);
 }
 
 static void test_the_order_of_sections_does_not_matter(void **state)

@@ -243,9 +243,8 @@ static void new_maps_are_not_saved(void **state)
 static void render(const char *text, float *color)
 {
     nebel_scene *scene = load_good(text);
-    nebel_snapshot *fog = NULL;
+    nebel_lighting *fog = scene_light(scene, 0);
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
     assert_int_equal(nebel_create_cpu_renderer(nebel_get_scene_data(scene), fog,
                                                &(nebel_cpu_renderer_desc){.thread_count = 1}, &renderer),
                      NEBEL_OK);
@@ -253,7 +252,7 @@ static void render(const char *text, float *color)
         .camera = nebel_get_scene_camera(scene, 0), .width = WIDTH, .height = HEIGHT, .samples = 1};
     assert_int_equal(nebel_render_frame(renderer, &desc, &(nebel_frame){.color = color}), NEBEL_OK);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_destroy_scene(scene);
 }
 

@@ -80,12 +80,16 @@ static void test_every_failing_allocation_is_survived(void **state)
         journal kept;
         nebel_scene *scene;
         nebel_snapshot *fog = NULL;
+        nebel_lighting *lighting = NULL;
         const nebel_scene_desc desc = metered_desc(&m, &kept);
         m.fail_at = k;
         result = nebel_parse_scene(rich, strlen(rich), "t.json", &desc, &scene);
         if (result == NEBEL_OK) result = nebel_commit_scene_fog(scene, &fog);
-        if (result != NEBEL_OK) assert_int_equal(result, NEBEL_ERROR_MEMORY);
         if (result != NEBEL_OK) assert_null(fog);
+        if (result == NEBEL_OK) result = nebel_create_scene_lighting(scene, fog, 0, NULL, &lighting);
+        if (result != NEBEL_OK) assert_int_equal(result, NEBEL_ERROR_MEMORY);
+        if (result != NEBEL_OK) assert_null(lighting);
+        nebel_release_lighting(lighting);
         nebel_release_snapshot(fog);
         nebel_destroy_scene(scene);
         assert_int_equal(m.live, 0);

@@ -145,12 +145,8 @@ static void test_what_would_vanish_keeps_the_nearer_key(void **state)
 static nebel_transfer trace(const nebel_scene *scene, double frame)
 {
     const nebel_ray ray = {{-9, .25, .5}, {1, .1, -.05}, 30};
-    nebel_snapshot *fog = NULL;
     nebel_transfer transfer;
-    assert_int_equal(nebel_commit_scene_fog_at(scene, frame, &fog), NEBEL_OK);
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &transfer, sizeof transfer),
-                     NEBEL_OK);
-    nebel_release_snapshot(fog);
+    scene_trace(scene, frame, (nebel_trace_desc){0}, 1, &ray, &transfer);
     return transfer;
 }
 
@@ -284,9 +280,7 @@ static void test_everything_that_moves_can_be_had(void **state)
                 shapes[s][0], densities[d][0], shapes[s][1], densities[d][1]);
             nebel_scene *scene = parse_good(text);
             for (int i = -2; i < 60; i++) {
-                nebel_snapshot *fog = NULL;
-                assert_int_equal(nebel_commit_scene_fog_at(scene, i * .15, &fog), NEBEL_OK);
-                nebel_release_snapshot(fog);
+                nebel_release_lighting(scene_light(scene, i * .15));
             }
             nebel_destroy_scene(scene);
         }

@@ -97,12 +97,9 @@ static const char lit_fog[] =
 /* What a ray through the ball sees. */
 static nebel_transfer light_of(const nebel_scene *scene)
 {
-    nebel_snapshot *fog = NULL;
     nebel_transfer transfer;
     const nebel_ray ray = {{0, 10, 9}, {0, 0, -1}, 20};
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
-    nebel_release_snapshot(fog);
+    scene_trace(scene, 0, (nebel_trace_desc){0}, 1, &ray, &transfer);
     return transfer;
 }
 

@@ -122,19 +122,14 @@ enum { RAYS = 2000 };
 
 static void trace_at(const nebel_scene *scene, double frame, nebel_transfer *transfers)
 {
-    nebel_snapshot *fog = NULL;
     nebel_ray rays[RAYS];
     uint32_t seed = 7;
-    assert_int_equal(nebel_commit_scene_fog_at(scene, frame, &fog), NEBEL_OK);
     for (int i = 0; i < RAYS; i++) {
         rays[i] = (nebel_ray){.t_max = i % 3 == 0 ? HUGE_VAL : 40 * random_number(&seed)};
         for (int k = 0; k < 3; k++) rays[i].origin[k] = 24 * random_number(&seed) - 12;
         for (int k = 0; k < 3; k++) rays[i].direction[k] = random_number(&seed) - .5;
     }
-    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-13}, RAYS, rays, sizeof *rays, transfers,
-                                 sizeof *transfers),
-                     NEBEL_OK);
-    nebel_release_snapshot(fog);
+    scene_trace(scene, frame, (nebel_trace_desc){.tolerance = 1e-13}, RAYS, rays, transfers);
 }
 
 static void trace(const nebel_scene *scene, nebel_transfer *transfers)

@@ -62,7 +62,6 @@ static void test_it_lights_fog(void **state)
         parse_good(SCENE(TWO, ", \"fog\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 1}, "
                               "\"extinction\": 1, \"albedo\": 1}]"));
     for (int i = 0; i < 3; i++) {
-        nebel_snapshot *moved, *standing;
         const nebel_sun sun = nebel_get_scene_sun(scene, 10 + 10 * i);
         char text[400];
         (void)snprintf(text, sizeof text,
@@ -72,16 +71,12 @@ static void test_it_lights_fog(void **state)
                        sun.direction[0], sun.direction[1], sun.irradiance[0], sun.irradiance[2]);
         nebel_scene *other = parse_good(text);
         assert_int_equal(nebel_set_scene_frame(scene, 10 + 10 * i), NEBEL_OK);
-        assert_int_equal(nebel_commit_scene_fog(scene, &moved), NEBEL_OK);
-        assert_int_equal(nebel_commit_scene_fog(other, &standing), NEBEL_OK);
         const nebel_ray ray = {{.3, 0, 5}, {0, .05, -1}, (double)INFINITY};
         nebel_transfer a, b;
-        assert_int_equal(nebel_trace(moved, &(nebel_trace_desc){0}, 1, &ray, 0, &a, 0), NEBEL_OK);
-        assert_int_equal(nebel_trace(standing, &(nebel_trace_desc){0}, 1, &ray, 0, &b, 0), NEBEL_OK);
+        scene_trace(scene, 0, (nebel_trace_desc){0}, 1, &ray, &a);
+        scene_trace(other, 0, (nebel_trace_desc){0}, 1, &ray, &b);
         assert_true(b.in_scattering[2] > 0);
         for (int c = 0; c < 3; c++) assert_near(a.in_scattering[c], b.in_scattering[c], 1e-9);
-        nebel_release_snapshot(moved);
-        nebel_release_snapshot(standing);
         nebel_destroy_scene(other);
     }
     nebel_destroy_scene(scene);
@@ -96,14 +91,14 @@ static void test_it_lights_the_air_of_a_planet(void **state)
                                   "3, 6]}" TOY "}");
     const double up[3] = {0, 1, 0};
     double noon[3], dusk[3], wanted[3];
-    nebel_snapshot *before;
+    nebel_lighting *before;
     assert_int_equal(nebel_set_scene_frame(scene, 10), NEBEL_OK);
     assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
     assert_int_equal(nebel_load_scene_planets(low), NEBEL_OK);
     const nebel_scene_data *data = nebel_get_scene_data(scene);
     const double left = data->planets[0].sun_left[2];
     nebel_evaluate_environment(&data->environment, up, noon);
-    assert_int_equal(nebel_commit_scene_fog(scene, &before), NEBEL_OK);
+    before = scene_light(scene, 0);
     assert_int_equal(nebel_set_scene_frame(scene, 30), NEBEL_OK);
     nebel_evaluate_environment(&data->environment, up, dusk);
     nebel_evaluate_environment(&nebel_get_scene_data(low)->environment, up, wanted);
@@ -113,7 +108,7 @@ static void test_it_lights_the_air_of_a_planet(void **state)
         assert_near(dusk[c], wanted[c], 1e-12);
     }
     assert_true(fabs(dusk[1] - noon[1]) > .1 * noon[1]);
-    nebel_release_snapshot(before);
+    nebel_release_lighting(before);
     nebel_destroy_scene(low);
     nebel_destroy_scene(scene);
 }

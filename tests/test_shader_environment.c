@@ -2,7 +2,6 @@
 #include "fog_help.h"
 
 #include "shader/texel_layout.h"
-#include <nebel/light.h>
 #include <nebel/shader.h>
 
 static const nebel_environment dusk = {
@@ -21,32 +20,27 @@ static nebel_environment_map *make_map(void)
 }
 
 /* Volumes of these means of the cosine, the last of which has no albedo. */
-static nebel_snapshot *commit(const nebel_environment *sky, size_t count, const double *g, nebel_log log)
+static nebel_lighting *commit(const nebel_environment *sky, size_t count, const double *g, nebel_log log)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.log = log}, &fog), NEBEL_OK);
+    nebel_volume_desc volumes[8];
     for (size_t i = 0; i < count; i++) {
         const double albedo = i + 1 < count ? 0.5 : 0;
-        const nebel_volume_desc volume = {.extinction = {1, 2, 3},
-                                          .albedo = {albedo, albedo, albedo},
-                                          .emission = {7, 8, 9},
-                                          .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = g[i]}};
-        assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+        volumes[i] = (nebel_volume_desc){.extinction = {1, 2, 3},
+                                         .albedo = {albedo, albedo, albedo},
+                                         .emission = {7, 8, 9},
+                                         .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = g[i]}};
     }
-    assert_int_equal(nebel_set_environment(fog, sky), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    const nebel_lighting_desc lights = {.environment = *sky};
+    return fog_commit_lit(&(nebel_fog_desc){.log = log}, volumes, count, &lights);
 }
 
-static nebel_texel_f32 *pack(const nebel_snapshot *snapshot, int surfaces, size_t *count)
+static nebel_texel_f32 *pack(const nebel_lighting *lighting, int surfaces, size_t *count)
 {
-    assert_int_equal(nebel_pack_environment(snapshot, surfaces, NULL, 0, count), NEBEL_OK);
+    assert_int_equal(nebel_pack_environment(lighting, surfaces, NULL, 0, count), NEBEL_OK);
     nebel_texel_f32 *words = malloc((*count + 1) * sizeof *words);
     assert_non_null(words);
     memset(words, 0xff, (*count + 1) * sizeof *words); /* NaN wherever nothing is written */
-    assert_int_equal(nebel_pack_environment(snapshot, surfaces, words, *count, count), NEBEL_OK);
+    assert_int_equal(nebel_pack_environment(lighting, surfaces, words, *count, count), NEBEL_OK);
     for (size_t i = 0; i < *count; i++)
         for (int c = 0; c < 4; c++)
             if (!isfinite(words[i].v[c])) fail_msg("word %zu, component %d is %g", i, c, (double)words[i].v[c]);
@@ -60,7 +54,7 @@ static void media_name_their_filters(void **state)
     (void)state;
     static const double g[] = {0.5, 0.3, 0.5, 0.3};
     size_t count, fog_count;
-    nebel_snapshot *fog = commit(&dusk, 4, g, (nebel_log){0});
+    nebel_lighting *fog = commit(&dusk, 4, g, (nebel_log){0});
     nebel_texel_f32 *words = pack(fog, 0, &count), packed[64];
     assert_int_equal(count, NB_ENVIRONMENT_TEXELS + 2 * (1 + NB_FILTER_PIECES));
     assert_int_equal(nebel_pack_fog(fog, (const double[3]){1, 2, 3}, packed, 64, &fog_count), NEBEL_OK);
@@ -81,7 +75,7 @@ static void media_name_their_filters(void **state)
     assert_true(nebel_pack_features(fog) & NEBEL_FEATURE_ENVIRONMENT);
     assert_true(nebel_pack_features(fog) & NEBEL_FEATURE_MIXED);
     free(words);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 /* Filters are where they are whatever else is packed; pixels are what they were. */
@@ -92,7 +86,7 @@ static void maps_bring_what_surfaces_want(void **state)
     size_t alone, count;
     nebel_environment_map *map = make_map();
     const nebel_environment sky = {.type = NEBEL_ENVIRONMENT_MAP, .map = map, .rotation = 90, .intensity = 3};
-    nebel_snapshot *fog = commit(&sky, 2, g, (nebel_log){0});
+    nebel_lighting *fog = commit(&sky, 2, g, (nebel_log){0});
     nebel_texel_f32 *filter = pack(fog, 0, &alone), *all = pack(fog, 1, &count);
     assert_true(count > alone + PIXELS);
     assert_memory_equal(filter + NB_ENVIRONMENT_TEXELS, all + NB_ENVIRONMENT_TEXELS,
@@ -106,7 +100,7 @@ static void maps_bring_what_surfaces_want(void **state)
     assert_int_equal((size_t)(picture - all) + 1 + PIXELS, count);
     free(filter);
     free(all);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_release_environment_map(map);
 }
 
@@ -121,7 +115,7 @@ static void what_is_the_same(void **state)
     sky.ground[2] = 1;
     const nebel_environment maps[] = {{.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = 1},
                                       {.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = 1, .rotation = 3}};
-    nebel_snapshot *const fogs[] = {
+    nebel_lighting *const fogs[] = {
         commit(&dusk, 2, g, (nebel_log){0}),    commit(&dusk, 2, g, (nebel_log){0}),
         commit(&dusk, 3, g, (nebel_log){0}),    commit(&sky, 2, g, (nebel_log){0}),
         commit(&maps[0], 2, g, (nebel_log){0}), commit(&maps[1], 2, g, (nebel_log){0}),
@@ -138,7 +132,7 @@ static void what_is_the_same(void **state)
     assert_true((int)words[0].v[0] == NB_ENVIRONMENT_CONSTANT && words[1].v[2] == 0.2F);
     assert_false(nebel_pack_features(fogs[FOGS - 1]) & NEBEL_FEATURE_ENVIRONMENT);
     free(words);
-    for (int i = 0; i < FOGS; i++) nebel_release_snapshot(fogs[i]);
+    for (int i = 0; i < FOGS; i++) nebel_release_lighting(fogs[i]);
     nebel_release_environment_map(map);
 }
 
@@ -149,14 +143,14 @@ static void bad_input_is_refused(void **state)
     fog_messages messages = {0};
     nebel_texel_f32 word = {{77, 0, 0, 0}};
     size_t count = 0;
-    nebel_snapshot *fog = commit(&dusk, 2, g, fog_messages_log(&messages));
+    nebel_lighting *fog = commit(&dusk, 2, g, fog_messages_log(&messages));
     assert_int_equal(nebel_pack_environment(NULL, 0, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_pack_environment(fog, 0, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_pack_environment(fog, 0, NULL, 1, &count), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_pack_environment(fog, 0, &word, 1, &count), NEBEL_ERROR_LIMIT);
     assert_non_null(strstr(messages.text, "room for 1"));
     assert_true(word.v[0] == 77);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
 }
 
 int main(void)

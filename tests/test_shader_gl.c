@@ -22,7 +22,7 @@
 
 /* ---- random scenes --------------------------------------------------------------------------- */
 
-static nebel_snapshot *commit_random_fog(random_fog_kind kind, uint64_t seed)
+static nebel_lighting *commit_random_fog(random_fog_kind kind, uint64_t seed)
 {
     random_fog_make(&fog, kind, seed);
     return commit_fog();
@@ -104,17 +104,17 @@ static void test_rays_to_a_light_know_no_distances(void **unused)
  * theirs. */
 static void try_hostile(tracer *t, random_fog_kind kind, uint64_t seed)
 {
-    nebel_snapshot *snapshot = commit_random_fog(kind, seed);
+    nebel_lighting *lighting = commit_random_fog(kind, seed);
     char name[64];
     snprintf(name, sizeof name, "hostile %s %d", kinds[kind], (int)seed);
     for (int i = 0; i < RAYS; i++) {
         const nebel_ray ray = random_fog_ray(&fog, (uint64_t)i);
         set_ray(i, &ray, fog.shift);
     }
-    pack_and_upload(t, snapshot, fog.shift);
+    pack_and_upload(t, lighting, fog.shift);
     evaluate(t);
-    compare(snapshot, &precise, fog.shift, largest_source(&fog), 1, name);
-    nebel_release_snapshot(snapshot);
+    compare(lighting, &precise, fog.shift, largest_source(&fog), 1, name);
+    nebel_release_lighting(lighting);
 }
 
 static void try_language(nb_gl_language language, word_store store, const char *defines, int seeds)
@@ -163,22 +163,23 @@ static void trace_sunlit_fog(random_fog_kind kind, uint64_t seed)
     random_fog_make(&fog, kind, seed);
     uint64_t state = seed + 100;
     random_fog_light(&fog, &state);
-    nebel_fog_desc desc = random_fog_desc(&fog);
-    desc.sun = (nebel_sun){{dice(&state, -1, 1), dice(&state, .2, 1), .3}, {3, 2.5, 2}};
-    nebel_snapshot *snapshot = fog_commit(&desc, fog.volumes, fog.count);
+    const nebel_fog_desc desc = random_fog_desc(&fog);
+    nebel_lighting_desc lights = random_fog_lights(&fog);
+    lights.sun = (nebel_sun){{dice(&state, -1, 1), dice(&state, .2, 1), .3}, {3, 2.5, 2}};
+    nebel_lighting *lighting = fog_commit_lit(&desc, fog.volumes, fog.count, &lights);
     double eye[3];
     char name[64];
     for (int k = 0; k < 3; k++) eye[k] = fog.shift[k] + dice(&state, -20, 20) * (seed % 3 == 0 ? .2 : 1);
     snprintf(name, sizeof name, "sunlit %s %d", kinds[kind], (int)seed);
     camera_rays(eye, fog.shift, seed);
     snprintf(features, sizeof features, "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES %u\n",
-             (unsigned)nebel_pack_features(snapshot));
+             (unsigned)nebel_pack_features(lighting));
     open_tracer(&t, seed % 2 == 0 ? NB_GL_330 : NB_GL_300ES, TEXTURE, features, trace_body);
-    pack_and_upload(&t, snapshot, eye);
+    pack_and_upload(&t, lighting, eye);
     evaluate(&t);
-    compare(snapshot, &(nebel_trace_desc){.tolerance = 1e-4}, eye, largest_source(&fog), 0, name);
+    compare(lighting, &(nebel_trace_desc){.tolerance = 1e-4}, eye, largest_source(&fog), 0, name);
     nb_gl_close(&t.gl);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 static int all_kinds; /* an argument asks for them */
@@ -236,17 +237,17 @@ static void try_volumes(const char *defines, const nebel_volume_desc *volumes, s
                         const char *name)
 {
     static const double middle[3] = {0, 0, 0};
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, count);
+    nebel_lighting *lighting = fog_light(NULL, volumes, count);
     char all[128];
     snprintf(all, sizeof all, "%s#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES %u\n", defines,
-             (unsigned)nebel_pack_features(snapshot));
+             (unsigned)nebel_pack_features(lighting));
     tracer t;
     open_tracer(&t, NB_GL_330, TEXTURE, all, trace_body);
     camera_rays(eye, middle, count);
-    pack_and_upload(&t, snapshot, eye);
+    pack_and_upload(&t, lighting, eye);
     evaluate(&t);
-    compare(snapshot, &precise, eye, 2, 0, name);
-    nebel_release_snapshot(snapshot);
+    compare(lighting, &precise, eye, 2, 0, name);
+    nebel_release_lighting(lighting);
     nb_gl_close(&t.gl);
 }
 
@@ -297,7 +298,7 @@ static void test_silhouettes_from_afar(void **state)
     for (int decade = 1; decade <= 5; decade++) {
         const double distance = pow(10, decade), eye[3] = {1e7, -1e7, 1e7};
         const nebel_volume_desc ball = ball_of(eye[0], eye[1], eye[2] - distance, 1);
-        nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &ball, 1);
+        nebel_lighting *lighting = fog_light(NULL, &ball, 1);
         uint64_t dices = 1;
         double worst = 0, edge = 0;
         for (int i = 0; i < RAYS; i++) {
@@ -307,11 +308,10 @@ static void test_silhouettes_from_afar(void **state)
                              .t_max = HUGE_VAL};
             set_ray(i, &ray, eye);
         }
-        pack_and_upload(&t, snapshot, eye);
+        pack_and_upload(&t, lighting, eye);
         evaluate(&t);
         const nebel_trace_desc desc = {.tolerance = 1e-5};
-        assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, transfers, sizeof *transfers),
-                         NEBEL_OK);
+        fog_trace(lighting, desc, RAYS, rays, transfers);
         for (int i = 0; i < RAYS; i++) {
             const double off = worst_of(&answers[i], &transfers[i], 1);
             double *w = transfers[i].transmittance[0] > .99 ? &edge : &worst;
@@ -319,7 +319,7 @@ static void test_silhouettes_from_afar(void **state)
         }
         print_message("ball of 1 m at %g m: worst %.1e within, %.1e at the edge\n", distance, worst, edge);
         assert_true(worst < 1e-7 + 2e-7 * distance);
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
     nb_gl_close(&t.gl);
 }
@@ -334,16 +334,17 @@ static void test_eyes_and_orders(void **state)
     static answer first[RAYS];
     tracer t;
     open_tracer(&t, NB_GL_330, TEXTURE, UNLIT, trace_body);
-    nebel_snapshot *snapshot = commit_random_fog(RANDOM_FOG_PROFILES, 3);
+    nebel_lighting *lighting = commit_random_fog(RANDOM_FOG_PROFILES, 3);
     const double eye[3] = {8, 3, -11};
     camera_rays(eye, fog.shift, 3);
-    pack_and_upload(&t, snapshot, eye);
+    pack_and_upload(&t, lighting, eye);
     evaluate(&t);
     memcpy(first, answers, sizeof first);
 
     const nebel_fog_desc desc = random_fog_desc(&fog);
+    const nebel_lighting_desc lights = random_fog_lights(&fog);
     for (size_t i = 0; i < fog.count; i++) reversed[i] = fog.volumes[fog.count - 1 - i];
-    nebel_snapshot *other = fog_commit(&desc, reversed, fog.count);
+    nebel_lighting *other = fog_commit_lit(&desc, reversed, fog.count, &lights);
     pack_and_upload(&t, other, eye);
     evaluate(&t);
     assert_memory_equal(first, answers, sizeof first);
@@ -352,7 +353,7 @@ static void test_eyes_and_orders(void **state)
     double worst = 0;
     for (int i = 0; i < RAYS; i++)
         for (int k = 0; k < 3; k++) items[i].origin[k] = (float)(eye[k] - beside[k]);
-    pack_and_upload(&t, snapshot, beside);
+    pack_and_upload(&t, lighting, beside);
     evaluate(&t);
     for (int i = 0; i < RAYS; i++)
         for (int c = 0; c < 3; c++) {
@@ -361,8 +362,8 @@ static void test_eyes_and_orders(void **state)
         }
     print_message("packed for another eye: worst difference %.1e\n", worst);
     assert_true(worst < 2e-5);
-    nebel_release_snapshot(snapshot);
-    nebel_release_snapshot(other);
+    nebel_release_lighting(lighting);
+    nebel_release_lighting(other);
     nb_gl_close(&t.gl);
 }
 
@@ -379,35 +380,34 @@ static void test_lists(void **state)
     size_t kept = 0;
     tracer t;
     open_tracer(&t, NB_GL_330, TEXTURE, UNGROUPED, trace_body);
-    nebel_snapshot *snapshot = commit_random_fog(RANDOM_FOG_PROFILES, 3);
+    nebel_lighting *lighting = commit_random_fog(RANDOM_FOG_PROFILES, 3);
     for (size_t i = 0; i < fog.count; i++)
         fog.volumes[i].extinction[0] = .01 * (double)(i + 1); /* their canonical order */
     for (size_t i = 0; i < fog.count; i += 2) half[kept++] = fog.volumes[i];
-    nebel_release_snapshot(snapshot);
-    nebel_fog_desc desc = {0};
-    memcpy(desc.ambient, fog.ambient, sizeof desc.ambient);
-    snapshot = fog_commit(&desc, fog.volumes, fog.count);
-    nebel_snapshot *halved = fog_commit(&desc, half, kept);
+    nebel_release_lighting(lighting);
+    const nebel_lighting_desc lights = random_fog_lights(&fog);
+    lighting = fog_light(&lights, fog.volumes, fog.count);
+    nebel_lighting *halved = fog_light(&lights, half, kept);
     camera_rays(eye, fog.shift, 3);
-    pack_and_upload(&t, snapshot, eye);
+    pack_and_upload(&t, lighting, eye);
     evaluate(&t);
     memcpy(all, answers, sizeof all);
     nb_gl_close(&t.gl);
 
     open_tracer(&t, NB_GL_330, TEXTURE, UNGROUPED "#define NEBEL_TILE_ENTRY(i) (i)\n", list_body);
     for (int i = 0; i < RAYS; i++) items[i].unused = (float)fog.count;
-    pack_and_upload(&t, snapshot, eye);
+    pack_and_upload(&t, lighting, eye);
     evaluate(&t);
     assert_memory_equal(all, answers, sizeof all);
     nb_gl_close(&t.gl);
 
     open_tracer(&t, NB_GL_300ES, TEXTURE, UNGROUPED "#define NEBEL_TILE_ENTRY(i) (2 * (i))\n", list_body);
     for (int i = 0; i < RAYS; i++) items[i].unused = (float)kept;
-    pack_and_upload(&t, snapshot, eye);
+    pack_and_upload(&t, lighting, eye);
     evaluate(&t);
     compare(halved, &precise, eye, largest_source(&fog), 0, "every second volume");
-    nebel_release_snapshot(snapshot);
-    nebel_release_snapshot(halved);
+    nebel_release_lighting(lighting);
+    nebel_release_lighting(halved);
     nb_gl_close(&t.gl);
 }
 
@@ -416,19 +416,19 @@ static void test_features(void **state)
 {
     (void)state;
     for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
-        nebel_snapshot *snapshot = commit_random_fog((random_fog_kind)kind, 1);
+        nebel_lighting *lighting = commit_random_fog((random_fog_kind)kind, 1);
         const double eye[3] = {fog.shift[0] + 8, fog.shift[1] + 3, fog.shift[2] - 11};
         char defines[96], name[64];
         snprintf(defines, sizeof defines, "%s#define NEBEL_FEATURES %u\n",
-                 kind % 2 ? "" : "#define NEBEL_FEATURES_LITERAL\n", (unsigned)nebel_pack_features(snapshot));
-        snprintf(name, sizeof name, "%s with features %u", kinds[kind], (unsigned)nebel_pack_features(snapshot));
+                 kind % 2 ? "" : "#define NEBEL_FEATURES_LITERAL\n", (unsigned)nebel_pack_features(lighting));
+        snprintf(name, sizeof name, "%s with features %u", kinds[kind], (unsigned)nebel_pack_features(lighting));
         tracer t;
         open_tracer(&t, NB_GL_330, TEXTURE, defines, trace_body);
         camera_rays(eye, fog.shift, 3);
-        pack_and_upload(&t, snapshot, eye);
+        pack_and_upload(&t, lighting, eye);
         evaluate(&t);
-        compare(snapshot, &precise, eye, largest_source(&fog), 0, name);
-        nebel_release_snapshot(snapshot);
+        compare(lighting, &precise, eye, largest_source(&fog), 0, name);
+        nebel_release_lighting(lighting);
         nb_gl_close(&t.gl);
     }
 }
@@ -444,14 +444,14 @@ static void test_transmittance_alone(void **state)
     tracer t;
     open_tracer(&t, NB_GL_330, TEXTURE, UNLIT, transmit_body);
     for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
-        nebel_snapshot *snapshot = commit_random_fog((random_fog_kind)kind, 2);
+        nebel_lighting *lighting = commit_random_fog((random_fog_kind)kind, 2);
         camera_rays(fog.shift, fog.shift, 3);
-        pack_and_upload(&t, snapshot, fog.shift);
+        pack_and_upload(&t, lighting, fog.shift);
         evaluate(&t);
         for (int i = 0; i < RAYS; i++)
             for (int c = 0; c < 3; c++)
                 assert_true(fabs((double)(answers[i].transmittance[c] - answers[i].in_scattering[c])) <= 1e-6);
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
     nb_gl_close(&t.gl);
 }
@@ -461,7 +461,7 @@ static void test_rays_that_are_none(void **state)
     (void)state;
     const nebel_volume_desc world = {
         .shape = {.type = NEBEL_SHAPE_WORLD}, .extinction = {.1, .1, .1}, .source = {1, 1, 1}};
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &world, 1);
+    nebel_lighting *lighting = fog_light(NULL, &world, 1);
     const double eye[3] = {0, 0, 0};
     const item none[] = {{.direction = {0, 0, 0}, .t_max = 5},   {.direction = {1, 0, 0}, .t_max = 0},
                          {.direction = {1, 0, 0}, .t_max = -1},  {.direction = {1, 0, 0}, .t_max = NAN},
@@ -470,14 +470,14 @@ static void test_rays_that_are_none(void **state)
     tracer t;
     open_tracer(&t, NB_GL_330, TEXTURE, UNLIT, trace_body);
     for (int i = 0; i < RAYS; i++) items[i] = i < NONE ? none[i] : (item){.direction = {1, 0, 0}, .t_max = HUGE_VALF};
-    pack_and_upload(&t, snapshot, eye);
+    pack_and_upload(&t, lighting, eye);
     evaluate(&t);
     for (int i = 0; i < RAYS; i++)
         for (int c = 0; c < 3; c++) {
             assert_float_equal(answers[i].transmittance[c], i < NONE ? 1 : 0, 1e-30f);
             assert_float_equal(answers[i].in_scattering[c], i < NONE ? 0 : 1, 1e-6f);
         }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
     nb_gl_close(&t.gl);
 }
 
@@ -489,19 +489,19 @@ static void test_light_without_end(void **state)
                                           .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 3},
                                           .extinction = {0, 0, .1},
                                           .source = {0, 0, 1}}};
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, 2);
+    nebel_lighting *lighting = fog_light(NULL, volumes, 2);
     const double eye[3] = {0, 0, 0};
     tracer t;
     open_tracer(&t, NB_GL_330, TEXTURE, UNLIT, trace_body);
     for (int i = 0; i < RAYS; i++) items[i] = (item){.direction = {0, 1, 0}, .t_max = 1e18f};
-    pack_and_upload(&t, snapshot, eye);
+    pack_and_upload(&t, lighting, eye);
     evaluate(&t);
     for (int i = 0; i < RAYS; i++) {
         assert_float_equal(answers[i].in_scattering[0], 65504, 0);
         assert_float_equal(answers[i].in_scattering[1], 65504, 0);
         assert_float_equal(answers[i].in_scattering[2], 1 - expf(-.3f), 1e-4f);
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
     nb_gl_close(&t.gl);
 }
 

@@ -32,18 +32,18 @@ static int tries_all; /* an argument asks for more scenes */
 static const nebel_sun low_sun = {{.8, .42, .4}, {3, 2.5, 2}};
 
 /* Against light in double, which is found without lattices; features as packed, to the preprocessor as well in one language. */
-static void trace_packed(const nebel_snapshot *snapshot, const double eye[3], double scale, const char *name,
+static void trace_packed(const nebel_lighting *lighting, const double eye[3], double scale, const char *name,
                          nb_gl_language language)
 {
     char defines[128];
     tracer t;
     snprintf(defines, sizeof defines, "%s#define NEBEL_VOXELS\n#define NEBEL_FEATURES %u\n",
-             language == NB_GL_330 ? "#define NEBEL_FEATURES_LITERAL\n" : "", (unsigned)nebel_pack_features(snapshot));
+             language == NB_GL_330 ? "#define NEBEL_FEATURES_LITERAL\n" : "", (unsigned)nebel_pack_features(lighting));
     open_tracer(&t, language, TEXTURE, defines, trace_body);
-    pack_and_upload(&t, snapshot, eye);
-    upload_voxels(&t, snapshot);
+    pack_and_upload(&t, lighting, eye);
+    upload_voxels(&t, lighting);
     evaluate(&t);
-    compare(snapshot, &(nebel_trace_desc){.tolerance = 1e-4}, eye, scale, 0, name);
+    compare(lighting, &(nebel_trace_desc){.tolerance = 1e-4}, eye, scale, 0, name);
     nb_gl_close(&t.gl);
 }
 
@@ -81,12 +81,13 @@ static void test_sunlit_puff(void **unused)
     for (int i = tries_all ? 0 : 1; i < (tries_all ? 4 : 3); i++) {
         nebel_grid *grid = make_puff(i < 2 ? NEBEL_GRID_FILTER_LINEAR : NEBEL_GRID_FILTER_NEAREST);
         const nebel_volume_desc cloud = cloud_of(grid, i == 0 ? .4 : 2);
-        nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.sun = low_sun, .ambient = {.1, .12, .15}}, &cloud, 1);
+        const nebel_lighting_desc lights = {.sun = low_sun, .environment = {.radiance = {.1, .12, .15}}};
+        nebel_lighting *lighting = fog_light(&lights, &cloud, 1);
         const double *eye = i == 1 ? amid : before;
         camera_rays(eye, origin, (uint64_t)i);
-        trace_packed(snapshot, eye, 1, i < 2 ? "sunlit puff" : "sunlit puff of nearest voxels",
+        trace_packed(lighting, eye, 1, i < 2 ? "sunlit puff" : "sunlit puff of nearest voxels",
                      i % 2 == 0 ? NB_GL_330 : NB_GL_300ES);
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
         nebel_release_grid(grid);
     }
 }
@@ -108,11 +109,12 @@ static void test_sunlit_noise_among_others(void **unused)
                                     .source = {.1, .2, .3}}};
     volumes[0].phase = (nebel_phase){.type = NEBEL_PHASE_DROPLETS, .diameter = 12};
     for (int i = tries_all ? 0 : 1; i < 2; i++) {
-        nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.sun = low_sun}, volumes, i == 0 ? 2 : 3);
+        const nebel_lighting_desc lights = {.sun = low_sun};
+        nebel_lighting *lighting = fog_light(&lights, volumes, i == 0 ? 2 : 3);
         const double *eye = i == 1 ? amid : before;
         camera_rays(eye, origin, (uint64_t)i);
-        trace_packed(snapshot, eye, 1, "sunlit noise among others", i == 0 ? NB_GL_330 : NB_GL_300ES);
-        nebel_release_snapshot(snapshot);
+        trace_packed(lighting, eye, 1, "sunlit noise among others", i == 0 ? NB_GL_330 : NB_GL_300ES);
+        nebel_release_lighting(lighting);
     }
     nebel_release_grid(grid);
 }
@@ -135,15 +137,16 @@ static void test_sunlit_random_grids(void **unused)
         uint64_t state = seed + 100;
         random_grids_make(&fog, (random_fog_kind)(seed % 6 + (seed % 6 >= RANDOM_FOG_MANY)), seed, grids);
         random_fog_light(&fog, &state);
-        nebel_fog_desc desc = random_fog_desc(&fog);
-        desc.sun = (nebel_sun){{dice(&state, -1, 1), dice(&state, .2, 1), .3}, {3, 2.5, 2}};
-        nebel_snapshot *snapshot = fog_commit(&desc, fog.volumes, fog.count);
+        const nebel_fog_desc desc = random_fog_desc(&fog);
+        nebel_lighting_desc lights = random_fog_lights(&fog);
+        lights.sun = (nebel_sun){{dice(&state, -1, 1), dice(&state, .2, 1), .3}, {3, 2.5, 2}};
+        nebel_lighting *lighting = fog_commit_lit(&desc, fog.volumes, fog.count, &lights);
         double eye[3];
         for (int k = 0; k < 3; k++) eye[k] = fog.shift[k] + dice(&state, -20, 20) * (seed % 3 == 0 ? .2 : 1);
         camera_rays(eye, fog.shift, seed);
         if (tries_all) thin_rays(eye);
-        trace_packed(snapshot, eye, largest_source(&fog), "sunlit random grids", NB_GL_330);
-        nebel_release_snapshot(snapshot);
+        trace_packed(lighting, eye, largest_source(&fog), "sunlit random grids", NB_GL_330);
+        nebel_release_lighting(lighting);
         random_grids_release(grids);
     }
 }
@@ -184,7 +187,8 @@ static void try_dense(tracer *t, int kind, double extinction, nebel_grid_filter 
     nebel_grid *grid = make_coarse(kind, filter);
     nebel_volume_desc cloud = cloud_of(grid, extinction);
     cloud.phase = (nebel_phase){0};
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.sun = *sun}, &cloud, 1);
+    const nebel_lighting_desc lights = {.sun = *sun};
+    nebel_lighting *lighting = fog_light(&lights, &cloud, 1);
     camera_rays(before, origin, (uint64_t)kind);
     for (int i = 0; i < 64;
          i++) { /* level ones, so that what a lattice is off by at one height is not made up for at another */
@@ -192,11 +196,11 @@ static void try_dense(tracer *t, int kind, double extinction, nebel_grid_filter 
         set_ray(i, &level, before);
     }
     keep_rays(512, before);
-    pack_and_upload(t, snapshot, before);
-    upload_voxels(t, snapshot);
+    pack_and_upload(t, lighting, before);
+    upload_voxels(t, lighting);
     evaluate(t);
-    compare(snapshot, &(nebel_trace_desc){.tolerance = 1e-4}, before, 1, 0, name);
-    nebel_release_snapshot(snapshot);
+    compare(lighting, &(nebel_trace_desc){.tolerance = 1e-4}, before, 1, 0, name);
+    nebel_release_lighting(lighting);
     nebel_release_grid(grid);
 }
 
@@ -219,9 +223,8 @@ static void test_sunlit_dense_voxels(void **unused)
 /* ---- lamps ----------------------------------------------------------------------------------- */
 
 /* A ball in the puff and a spot beside it that shines through it. */
-static nebel_snapshot *commit_lamplit(const nebel_volume_desc *volumes, size_t count)
+static nebel_lighting *commit_lamplit(const nebel_volume_desc *volumes, size_t count)
 {
-    const nebel_fog_desc desc = {.ambient = {.1, .12, .15}};
     const nebel_light lamps[2] = {{.position = {1, -.5, .8}, .intensity = {9, 6, 3}, .radius = .1},
                                   {.type = NEBEL_LIGHT_SPOT,
                                    .position = {-9, 3, 2},
@@ -229,14 +232,8 @@ static nebel_snapshot *commit_lamplit(const nebel_volume_desc *volumes, size_t c
                                    .direction = {9, -2.5, -2},
                                    .inner_angle = 20,
                                    .outer_angle = 40}};
-    nebel_fog *made = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
-    for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(made, &volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(made, 2, lamps), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(made, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(made);
-    return snapshot;
+    const nebel_lighting_desc lights = {.environment = {.radiance = {.1, .12, .15}}, .lights = lamps, .light_count = 2};
+    return fog_light(&lights, volumes, count);
 }
 
 static void test_lamplit_puff(void **unused)
@@ -246,13 +243,13 @@ static void test_lamplit_puff(void **unused)
         nebel_grid *grid = make_puff(i % 2 == 0 ? NEBEL_GRID_FILTER_LINEAR : NEBEL_GRID_FILTER_NEAREST);
         const nebel_volume_desc volumes[] = {cloud_of(grid, i < 2 ? 2 : .4),
                                              {.extinction = {.02, .02, .03}, .albedo = {.9, .9, .9}}};
-        nebel_snapshot *snapshot = commit_lamplit(volumes, i == 0 ? 1 : 2);
+        nebel_lighting *lighting = commit_lamplit(volumes, i == 0 ? 1 : 2);
         const double *eye = i == 0 ? amid : before;
         camera_rays(eye, origin, (uint64_t)i);
         keep_rays(tries_all ? RAYS : 192, eye);
-        trace_packed(snapshot, eye, 1, i % 2 == 0 ? "lamplit puff" : "lamplit puff of nearest voxels",
+        trace_packed(lighting, eye, 1, i % 2 == 0 ? "lamplit puff" : "lamplit puff of nearest voxels",
                      i % 2 == 0 ? NB_GL_300ES : NB_GL_330);
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
         nebel_release_grid(grid);
     }
 }

@@ -19,7 +19,7 @@ static const double eye[3] = {0, 0, 0};
 static int all_features = 0;
 
 /* Haze in a box and a denser ball of another colour in it. */
-static nebel_snapshot *commit_sunlit(void)
+static nebel_lighting *commit_sunlit(void)
 {
     const nebel_volume_desc volumes[] = {
         {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-8, -4, -8}, .max = {8, 4, 8}},
@@ -29,25 +29,17 @@ static nebel_snapshot *commit_sunlit(void)
          .extinction = {.5, .3, .2},
          .albedo = {.9, .6, .3}},
     };
-    const nebel_fog_desc desc = {0};
-    const nebel_sun sun = {.direction = {.48, .6, .64}, .irradiance = {5, 4, 3}};
-    nebel_fog *made = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
-    for (int i = 0; i < 2; i++) assert_int_equal(nebel_add_volume(made, &volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_sun(made, &sun), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(made, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(made);
-    return snapshot;
+    const nebel_lighting_desc lights = {.sun = {.direction = {.48, .6, .64}, .irradiance = {5, 4, 3}}};
+    return fog_light(&lights, volumes, 2);
 }
 
 /* In-scattering of the ray as if it ended at t. */
-static nebel_transfer light_up_to(const nebel_snapshot *snapshot, nebel_ray ray, double t)
+static nebel_transfer light_up_to(const nebel_lighting *lighting, nebel_ray ray, double t)
 {
     const nebel_trace_desc desc = {.tolerance = 1e-5};
     nebel_transfer transfer;
     ray.t_max = fmax(t, 0);
-    assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &transfer, sizeof transfer), NEBEL_OK);
+    fog_trace(lighting, desc, 1, &ray, &transfer);
     return transfer;
 }
 
@@ -59,13 +51,13 @@ static double border_of(const nebel_ray *ray)
 }
 
 /* The eye is in light. A step counts as its middle does, so that half a step beside the border may be lit or not. */
-static void check_ray(const nebel_snapshot *snapshot, int i)
+static void check_ray(const nebel_lighting *lighting, int i)
 {
     const nebel_ray *const ray = &rays[i];
     const double border = border_of(ray), doubt = border < ray->t_max ? .26 : 0;
-    const nebel_transfer least = light_up_to(snapshot, *ray, border - doubt);
-    const nebel_transfer most = light_up_to(snapshot, *ray, fmin(border + doubt, ray->t_max));
-    const nebel_transfer all = light_up_to(snapshot, *ray, ray->t_max);
+    const nebel_transfer least = light_up_to(lighting, *ray, border - doubt);
+    const nebel_transfer most = light_up_to(lighting, *ray, fmin(border + doubt, ray->t_max));
+    const nebel_transfer all = light_up_to(lighting, *ray, ray->t_max);
     for (int c = 0; c < 3; c++) {
         const double got = (double)answers[i].in_scattering[c];
         assert_true(got > least.in_scattering[c] - 5e-4 && got < most.in_scattering[c] + 5e-4);
@@ -79,10 +71,10 @@ static void test_the_host_of_the_page(void **unused)
     tracer t;
     uint64_t state = 3;
     int crossing = 0;
-    nebel_snapshot *const snapshot = commit_sunlit();
+    nebel_lighting *const lighting = commit_sunlit();
     char defines[sizeof host_text + 64] = "";
     if (!all_features)
-        (void)snprintf(defines, 64, "#define NEBEL_FEATURES %u\n", (unsigned)nebel_pack_features(snapshot));
+        (void)snprintf(defines, 64, "#define NEBEL_FEATURES %u\n", (unsigned)nebel_pack_features(lighting));
     strcat(defines, host_text);
     open_tracer(&t, NB_GL_330, BLOCK, defines, trace_body);
     for (int i = 0; i < RAYS; i++) {
@@ -90,14 +82,14 @@ static void test_the_host_of_the_page(void **unused)
         for (int axis = 0; axis < 3; axis++) ray.direction[axis] = dice(&state, -1, 1);
         set_ray(i, &ray, eye);
     }
-    pack_and_upload(&t, snapshot, eye);
+    pack_and_upload(&t, lighting, eye);
     evaluate(&t);
     for (int i = 0; i < ASKED; i++) {
-        check_ray(snapshot, i);
+        check_ray(lighting, i);
         crossing += border_of(&rays[i]) < rays[i].t_max;
     }
     assert_true(crossing > ASKED / 8);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
     nb_gl_close(&t.gl);
 }
 

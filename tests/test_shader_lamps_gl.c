@@ -41,19 +41,13 @@ static void strew_rays(const setting *s)
     }
 }
 
-static nebel_snapshot *commit_haze(const nebel_phase *phase, const setting *s)
+static nebel_lighting *commit_haze(const nebel_phase *phase, const setting *s)
 {
     const nebel_volume_desc volume = {.extinction = {.05, .06, .08}, .albedo = {.95, .95, .9}, .phase = *phase};
     nebel_light lamp = {.intensity = {10, 8, 6}, .radius = s->radius};
-    nebel_fog *made = NULL;
-    nebel_snapshot *snapshot = NULL;
     memcpy(lamp.position, s->place, sizeof lamp.position);
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &made), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(made, &volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(made, 1, &lamp), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(made, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(made);
-    return snapshot;
+    const nebel_lighting_desc lights = {.lights = &lamp, .light_count = 1};
+    return fog_light(&lights, &volume, 1);
 }
 
 /* As a share of the ray's own light, or of a hundredth of what is bright where that is more. */
@@ -71,13 +65,13 @@ static double lamplight_off(const answer *got, const nebel_transfer *wanted, dou
 static void try_setting(tracer *t, int phase, const setting *s)
 {
     const nebel_trace_desc truth = {.tolerance = 1e-6};
-    nebel_snapshot *const snapshot = commit_haze(&phases[phase], s);
+    nebel_lighting *const lighting = commit_haze(&phases[phase], s);
     const size_t count = (size_t)asked;
     double brightest = 0;
     strew_rays(s);
-    pack_and_upload(t, snapshot, eye);
+    pack_and_upload(t, lighting, eye);
     evaluate(t);
-    assert_int_equal(nebel_trace(snapshot, &truth, count, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
+    fog_trace(lighting, truth, count, rays, transfers);
     for (size_t i = 0; i < count; i++) brightest = fmax(brightest, transfers[i].in_scattering[0]);
     for (size_t i = 0; i < count; i++) differences[i] = lamplight_off(&answers[i], &transfers[i], fmin(brightest, 1));
     qsort(differences, count, sizeof *differences, ascending);
@@ -86,18 +80,18 @@ static void try_setting(tracer *t, int phase, const setting *s)
     assert_true(brightest > .05);
     assert_true(differences[count * 95 / 100] <= 4e-4);
     assert_true(differences[count - 1] <= 2e-3);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 /* All settings want the same program. */
 static void open_hazes(tracer *t, nb_gl_language language)
 {
-    nebel_snapshot *const snapshot = commit_haze(&phases[1], &settings[0]);
+    nebel_lighting *const lighting = commit_haze(&phases[1], &settings[0]);
     char defines[96];
     snprintf(defines, sizeof defines, "#define NEBEL_MAX_RADIANCE 1e9\n#define NEBEL_FEATURES %u\n",
-             (unsigned)nebel_pack_features(snapshot));
+             (unsigned)nebel_pack_features(lighting));
     open_tracer(t, language, BLOCK, defines, trace_body);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 static void try_all(nb_gl_language language)

@@ -18,18 +18,21 @@ static nebel_grid *add_voxels(nebel_fog *made)
     return grid;
 }
 
-static nebel_snapshot *commit_case(const lit_case *c, int beside_voxels)
+static nebel_lighting *commit_case(const lit_case *c, int beside_voxels)
 {
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.sun = c->sun}, &made), NEBEL_OK);
+    const nebel_lighting_desc lights = {
+        .sun = c->sun, .lights = &c->lamp, .light_count = c->lamp.intensity[0] > 0 ? 1 : 0};
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &made), NEBEL_OK);
     assert_int_equal(nebel_add_volume(made, &c->volume, NULL), NEBEL_OK);
     nebel_grid *const grid = beside_voxels ? add_voxels(made) : NULL;
-    if (c->lamp.intensity[0] > 0) assert_int_equal(nebel_set_lamps(made, 1, &c->lamp), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(made, &snapshot), NEBEL_OK);
     nebel_release_grid(grid);
     nebel_destroy_fog(made);
-    return snapshot;
+    nebel_lighting *const lighting = light_fog(snapshot, &lights);
+    nebel_release_snapshot(snapshot);
+    return lighting;
 }
 
 /* One program of what all of them need. */
@@ -39,9 +42,9 @@ static void open_cases(tracer *t, int is_lamplit, int beside_voxels)
     uint32_t features = 0;
     for (size_t i = 0; i < LIT_CASES; i++) {
         if ((lit_cases[i].lamp.intensity[0] > 0) != is_lamplit) continue;
-        nebel_snapshot *snapshot = commit_case(&lit_cases[i], beside_voxels);
-        features |= nebel_pack_features(snapshot);
-        nebel_release_snapshot(snapshot);
+        nebel_lighting *lighting = commit_case(&lit_cases[i], beside_voxels);
+        features |= nebel_pack_features(lighting);
+        nebel_release_lighting(lighting);
     }
     snprintf(defines, sizeof defines, "#define NEBEL_FEATURES_LITERAL\n%s#define NEBEL_FEATURES %u\n",
              beside_voxels ? "#define NEBEL_VOXELS\n" : "", (unsigned)features);
@@ -50,13 +53,13 @@ static void open_cases(tracer *t, int is_lamplit, int beside_voxels)
 
 static double trace_case(tracer *t, const lit_case *c, int beside_voxels)
 {
-    nebel_snapshot *snapshot = commit_case(c, beside_voxels);
+    nebel_lighting *lighting = commit_case(c, beside_voxels);
     memset(items, 0, sizeof items);
     set_ray(0, &c->ray, c->ray.origin);
-    pack_and_upload(t, snapshot, c->ray.origin);
-    if (beside_voxels) upload_voxels(t, snapshot);
+    pack_and_upload(t, lighting, c->ray.origin);
+    if (beside_voxels) upload_voxels(t, lighting);
     evaluate(t);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
     return (double)answers[0].in_scattering[0];
 }
 
@@ -111,9 +114,9 @@ static void grazing_lamplight_is_found_beside_voxels(void **state)
                                  .albedo = LIT_GRAY(1)},
                       .lamp = {.position = {far, .4, 0}, .intensity = LIT_GRAY(far * far * 100)},
                       .ray = {{0, 5, 0}, {0, -1, 0}, HUGE_VAL}};
-        nebel_snapshot *snapshot = commit_case(&c, 1);
-        assert_int_equal(nebel_trace(snapshot, &precise, 1, &c.ray, 0, transfers, 0), NEBEL_OK);
-        nebel_release_snapshot(snapshot);
+        nebel_lighting *lighting = commit_case(&c, 1);
+        fog_trace(lighting, precise, 1, &c.ray, transfers);
+        nebel_release_lighting(lighting);
         c.right = transfers[0].in_scattering[0];
         const double light = trace_case(&t, &c, 1), off = fabs(light - c.right);
         print_message("%g: %g for %g +- %g, off %g\n", far, light, c.right, transfers[0].error, off / c.right);

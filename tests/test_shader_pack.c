@@ -13,13 +13,13 @@
 
 static random_fog fog;
 
-static nebel_texel_f32 *pack(const nebel_snapshot *snapshot, const double eye[3], size_t *count)
+static nebel_texel_f32 *pack(const nebel_lighting *lighting, const double eye[3], size_t *count)
 {
-    assert_int_equal(nebel_pack_fog(snapshot, eye, NULL, 0, count), NEBEL_OK);
+    assert_int_equal(nebel_pack_fog(lighting, eye, NULL, 0, count), NEBEL_OK);
     nebel_texel_f32 *words = malloc(*count * sizeof *words);
     assert_non_null(words);
     memset(words, 0xff, *count * sizeof *words); /* NaN wherever nothing is written */
-    assert_int_equal(nebel_pack_fog(snapshot, eye, words, *count, count), NEBEL_OK);
+    assert_int_equal(nebel_pack_fog(lighting, eye, words, *count, count), NEBEL_OK);
     return words;
 }
 
@@ -36,14 +36,14 @@ static void test_words_are_numbers(void **state)
     for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++)
         for (uint64_t seed = 0; seed < 20; seed++) {
             random_fog_make(&fog, (random_fog_kind)kind, seed);
-            nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, fog.volumes, fog.count);
+            nebel_lighting *lighting = fog_light(NULL, fog.volumes, fog.count);
             const double eye[3] = {fog.shift[0] + 3, fog.shift[1], fog.shift[2] - 7};
             size_t count;
-            nebel_texel_f32 *words = pack(snapshot, eye, &count);
+            nebel_texel_f32 *words = pack(lighting, eye, &count);
             assert_numbers(words, count);
-            assert_int_equal((size_t)words[0].v[0], nebel_get_volume_count(snapshot));
+            assert_int_equal((size_t)words[0].v[0], nebel_get_volume_count(nebel_get_lighting_snapshot(lighting)));
             free(words);
-            nebel_release_snapshot(snapshot);
+            nebel_release_lighting(lighting);
         }
 }
 
@@ -70,12 +70,12 @@ static void test_extremes(void **state)
          .extinction = {1, 1, 1}},
     };
     const double eye[3] = {1e15, -1e15, 1e15};
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, sizeof volumes / sizeof *volumes);
+    nebel_lighting *lighting = fog_light(NULL, volumes, sizeof volumes / sizeof *volumes);
     size_t count;
-    nebel_texel_f32 *words = pack(snapshot, eye, &count);
+    nebel_texel_f32 *words = pack(lighting, eye, &count);
     assert_numbers(words, count);
     free(words);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 /* A block of 16 KiB holds a hundred boxes; what stands where is what layout.h says. */
@@ -86,10 +86,10 @@ static void test_layout(void **state)
                                    .extinction = {.1, .2, .3},
                                    .source = {.5, .5, .5},
                                    .emission = {0, 0, 1}};
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &box, 1);
+    nebel_lighting *lighting = fog_light(NULL, &box, 1);
     const double eye[3] = {1e7, -1e7, 2};
     size_t count;
-    nebel_texel_f32 *words = pack(snapshot, eye, &count);
+    nebel_texel_f32 *words = pack(lighting, eye, &count);
     assert_int_equal(count, NB_HEADER_TEXELS + NB_MEDIUM_TEXELS);
     assert_true((NEBEL_BLOCK_TEXELS - NB_HEADER_TEXELS) / NB_MEDIUM_TEXELS >= 100);
     const float *m = words[NB_HEADER_TEXELS].v, *leaf = words[NB_HEADER_TEXELS + NB_MEDIUM_LEAF].v;
@@ -98,7 +98,7 @@ static void test_layout(void **state)
     const float place[] = {NB_TYPE_BOX, 0, 0, 1, 1 - 1e7f, 2 + 1e7f, 1, 0, 4 - 1e7f, 5 + 1e7f, 4, 1e18f};
     for (int i = 0; i < 12; i++) assert_float_equal(leaf[i], place[i], 0);
     free(words);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 /* A block whose x, y and z become y, z and x: faces are packed in the world's axes. */
@@ -115,9 +115,9 @@ static void test_faces_of_a_turned_body(void **state)
                                               .plane_count = 6,
                                               .transform = {.rotation = {.5, .5, .5, .5}, .scale = {1, 1, 1}}},
                                     .extinction = {1, 1, 1}};
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &body, 1);
+    nebel_lighting *lighting = fog_light(NULL, &body, 1);
     size_t count;
-    nebel_texel_f32 *words = pack(snapshot, (const double[3]){0, 0, 0}, &count);
+    nebel_texel_f32 *words = pack(lighting, (const double[3]){0, 0, 0}, &count);
     const float *leaf = words[NB_HEADER_TEXELS + NB_MEDIUM_LEAF].v;
     unsigned found = 0;
     assert_int_equal((int)leaf[1], 6);
@@ -132,7 +132,7 @@ static void test_faces_of_a_turned_body(void **state)
     }
     assert_int_equal(found, 63);
     free(words);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 static void test_order_and_repetition(void **state)
@@ -141,8 +141,8 @@ static void test_order_and_repetition(void **state)
     random_fog_make(&fog, RANDOM_FOG_MANY, 1);
     static nebel_volume_desc reversed[RANDOM_FOG_VOLUMES];
     for (size_t i = 0; i < fog.count; i++) reversed[i] = fog.volumes[fog.count - 1 - i];
-    nebel_snapshot *one = fog_commit(&(nebel_fog_desc){0}, fog.volumes, fog.count);
-    nebel_snapshot *two = fog_commit(&(nebel_fog_desc){0}, reversed, fog.count);
+    nebel_lighting *one = fog_light(NULL, fog.volumes, fog.count);
+    nebel_lighting *two = fog_light(NULL, reversed, fog.count);
     const double eye[3] = {1, 2, 3};
     size_t n, m;
     nebel_texel_f32 *a = pack(one, eye, &n), *b = pack(two, eye, &m);
@@ -150,8 +150,8 @@ static void test_order_and_repetition(void **state)
     assert_memory_equal(a, b, n * sizeof *a);
     free(a);
     free(b);
-    nebel_release_snapshot(one);
-    nebel_release_snapshot(two);
+    nebel_release_lighting(one);
+    nebel_release_lighting(two);
 }
 
 static void test_bad_input(void **state)
@@ -161,25 +161,25 @@ static void test_bad_input(void **state)
     fog_messages messages = {0};
     const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages)};
     random_fog_make(&fog, RANDOM_FOG_PARTS, 1);
-    nebel_snapshot *snapshot = fog_commit(&desc, fog.volumes, fog.count);
+    nebel_lighting *lighting = fog_commit_lit(&desc, fog.volumes, fog.count, NULL);
     const double eye[3] = {0, 0, 0}, nowhere[3] = {0, (double)NAN, 0}, far[3] = {2e15, 0, 0};
     static nebel_texel_f32 words[4096];
     size_t count = 0;
     const size_t calls = memory.calls;
     assert_int_equal(nebel_pack_fog(NULL, eye, words, 4096, &count), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_pack_fog(snapshot, NULL, words, 4096, &count), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_pack_fog(snapshot, eye, words, 4096, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_pack_fog(snapshot, eye, NULL, 1, &count), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_pack_fog(snapshot, nowhere, words, 4096, &count), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_pack_fog(snapshot, far, words, 4096, &count), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_pack_fog(snapshot, eye, NULL, 0, &count), NEBEL_OK);
+    assert_int_equal(nebel_pack_fog(lighting, NULL, words, 4096, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_pack_fog(lighting, eye, words, 4096, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_pack_fog(lighting, eye, NULL, 1, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_pack_fog(lighting, nowhere, words, 4096, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_pack_fog(lighting, far, words, 4096, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_pack_fog(lighting, eye, NULL, 0, &count), NEBEL_OK);
     words[count - 1].v[0] = 77;
-    assert_int_equal(nebel_pack_fog(snapshot, eye, words, count - 1, &count), NEBEL_ERROR_LIMIT);
+    assert_int_equal(nebel_pack_fog(lighting, eye, words, count - 1, &count), NEBEL_ERROR_LIMIT);
     assert_non_null(strstr(messages.text, "room for"));
     assert_float_equal(words[count - 1].v[0], 77, 0);
-    assert_int_equal(nebel_pack_fog(snapshot, eye, words, count, &count), NEBEL_OK);
+    assert_int_equal(nebel_pack_fog(lighting, eye, words, count, &count), NEBEL_OK);
     assert_int_equal(memory.calls, calls); /* packing takes no memory */
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 /* ---- voxels ---------------------------------------------------------------------------------- */
@@ -194,14 +194,14 @@ static nebel_grid *grid_of(const uint8_t *voxels, size_t x, size_t y, size_t z, 
 }
 
 /* A box for each grid, one behind the other. */
-static nebel_snapshot *boxes_of(nebel_grid *const *grids, size_t count, nebel_log log)
+static nebel_lighting *boxes_of(nebel_grid *const *grids, size_t count, nebel_log log)
 {
     nebel_volume_desc v[8];
     for (size_t i = 0; i < count; i++)
         v[i] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .max = {1 + (double)i, 1, 1}},
                                    .density = {.type = NEBEL_DENSITY_GRID, .grid = grids[i]},
                                    .extinction = {1, 1, 1}};
-    return fog_commit(&(nebel_fog_desc){.log = log}, v, count);
+    return fog_commit_lit(&(nebel_fog_desc){.log = log}, v, count, NULL);
 }
 
 static float float_of(uint32_t bits)
@@ -217,12 +217,12 @@ static void test_texels(void **state)
     (void)state;
     const uint8_t voxels[9] = {0, 255, 51, 0, 0, 0, 0, 51, 51};
     nebel_grid *grid = grid_of(voxels, 9, 1, 1, NEBEL_GRID_FILTER_LINEAR);
-    nebel_snapshot *snapshot = boxes_of(&grid, 1, (nebel_log){0});
+    nebel_lighting *lighting = boxes_of(&grid, 1, (nebel_log){0});
     nebel_texel_u32 texels[3 + 512];
     size_t count = 0;
-    assert_int_equal(nebel_pack_voxels(snapshot, NULL, 0, &count), NEBEL_OK);
+    assert_int_equal(nebel_pack_voxels(lighting, NULL, 0, &count), NEBEL_OK);
     assert_int_equal(count, 3 + 512);
-    assert_int_equal(nebel_pack_voxels(snapshot, texels, count, &count), NEBEL_OK);
+    assert_int_equal(nebel_pack_voxels(lighting, texels, count, &count), NEBEL_OK);
     assert_memory_equal(texels[0].v, ((uint32_t[]){2, 1, 1, 1}), sizeof texels[0].v);
     assert_float_equal(float_of(texels[1].v[0]), 1, 0);
     assert_float_equal(float_of(texels[1].v[1]) * 65535, 2, 1e-6);
@@ -234,7 +234,7 @@ static void test_texels(void **state)
         assert_int_equal(texels[4].v[i], 65535u << 16);
         assert_int_equal(texels[5].v[i], 65535u | 13107u << 16);
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
     nebel_release_grid(grid);
 }
 
@@ -245,10 +245,10 @@ static void test_shared_and_same_voxels(void **state)
     nebel_grid *one = grid_of(voxels, 2, 2, 2, NEBEL_GRID_FILTER_NEAREST),
                *twin = grid_of(voxels, 2, 2, 2, NEBEL_GRID_FILTER_NEAREST);
     nebel_grid *other = grid_of(even, 2, 2, 2, NEBEL_GRID_FILTER_NEAREST);
-    nebel_snapshot *const alone = boxes_of(&one, 1, (nebel_log){0}), *const again = boxes_of(&twin, 1, (nebel_log){0});
-    nebel_snapshot *const shared = boxes_of((nebel_grid *[]){one, one, one}, 3, (nebel_log){0});
-    nebel_snapshot *const both = boxes_of((nebel_grid *[]){one, other}, 2, (nebel_log){0});
-    nebel_snapshot *const none = fog_commit(&(nebel_fog_desc){0}, NULL, 0);
+    nebel_lighting *const alone = boxes_of(&one, 1, (nebel_log){0}), *const again = boxes_of(&twin, 1, (nebel_log){0});
+    nebel_lighting *const shared = boxes_of((nebel_grid *[]){one, one, one}, 3, (nebel_log){0});
+    nebel_lighting *const both = boxes_of((nebel_grid *[]){one, other}, 2, (nebel_log){0});
+    nebel_lighting *const none = fog_light(NULL, NULL, 0);
     size_t count = 0;
     assert_int_equal(nebel_pack_voxels(shared, NULL, 0, &count), NEBEL_OK);
     assert_int_equal(count, 2 + 512);
@@ -260,11 +260,11 @@ static void test_shared_and_same_voxels(void **state)
                 nebel_is_same_voxels(none, none));
     assert_false(nebel_is_same_voxels(alone, both) || nebel_is_same_voxels(both, alone) ||
                  nebel_is_same_voxels(none, alone));
-    nebel_release_snapshot(alone);
-    nebel_release_snapshot(again);
-    nebel_release_snapshot(shared);
-    nebel_release_snapshot(both);
-    nebel_release_snapshot(none);
+    nebel_release_lighting(alone);
+    nebel_release_lighting(again);
+    nebel_release_lighting(shared);
+    nebel_release_lighting(both);
+    nebel_release_lighting(none);
     nebel_release_grid(one);
     nebel_release_grid(twin);
     nebel_release_grid(other);
@@ -284,8 +284,8 @@ static void test_voxels_that_cannot_be_packed(void **state)
     for (size_t i = 0; i < voxels; i++) many[i] = (uint8_t)i;
     nebel_grid *small = grid_of(many, 2, 2, 2, NEBEL_GRID_FILTER_LINEAR),
                *large = grid_of(many, SIDE, SIDE, LAYERS, NEBEL_GRID_FILTER_LINEAR);
-    nebel_snapshot *const fog_of_small = boxes_of(&small, 1, fog_messages_log(&messages));
-    nebel_snapshot *const fog_of_large = boxes_of(&large, 1, fog_messages_log(&messages));
+    nebel_lighting *const fog_of_small = boxes_of(&small, 1, fog_messages_log(&messages));
+    nebel_lighting *const fog_of_large = boxes_of(&large, 1, fog_messages_log(&messages));
     assert_int_equal(nebel_pack_voxels(NULL, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_pack_voxels(fog_of_small, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_pack_voxels(fog_of_small, NULL, 1, &count), NEBEL_ERROR_ARGUMENT);
@@ -295,8 +295,8 @@ static void test_voxels_that_cannot_be_packed(void **state)
     assert_int_equal(nebel_pack_voxels(fog_of_large, NULL, 0, &count), NEBEL_ERROR_LIMIT);
     assert_non_null(strstr(messages.text, "too large for shaders"));
     assert_int_equal(nebel_pack_fog(fog_of_large, eye, NULL, 0, &count), NEBEL_ERROR_LIMIT);
-    nebel_release_snapshot(fog_of_small);
-    nebel_release_snapshot(fog_of_large);
+    nebel_release_lighting(fog_of_small);
+    nebel_release_lighting(fog_of_large);
     nebel_release_grid(small);
     nebel_release_grid(large);
     free(many);
@@ -308,12 +308,12 @@ static void test_features(void **state)
     const nebel_volume_desc box = {.shape = {.type = NEBEL_SHAPE_BOX, .max = {1, 1, 1}}, .extinction = {1, 1, 1}};
     const nebel_volume_desc others[] = {
         box, {.shape = {.type = NEBEL_SHAPE_WORLD}, .extinction = {1, 1, 1}, .source = {1, 1, 1}}};
-    nebel_snapshot *one = fog_commit(&(nebel_fog_desc){0}, &box, 1), *two = fog_commit(&(nebel_fog_desc){0}, others, 2);
+    nebel_lighting *one = fog_light(NULL, &box, 1), *two = fog_light(NULL, others, 2);
     assert_int_equal(nebel_pack_features(one), NB_HAS_BOX);
     assert_int_equal(nebel_pack_features(two), NB_HAS_BOX | NB_HAS_SEVERAL | NB_HAS_MIXED);
     assert_int_equal(nebel_pack_features(NULL), NB_HAS_ALL);
-    nebel_release_snapshot(one);
-    nebel_release_snapshot(two);
+    nebel_release_lighting(one);
+    nebel_release_lighting(two);
 }
 
 /* No #version, nothing that another compiler would take for its own. */

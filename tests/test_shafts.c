@@ -352,16 +352,10 @@ static void ends_among_leaves_are_those_of_visibility(void **state)
 
 enum { LAMPS = 4 };
 
-static nebel_snapshot *lamplit_fog(const nebel_volume_desc *volume, size_t count, const nebel_light *lamps)
+static nebel_lighting *lamplit_fog(const nebel_volume_desc *volume, size_t count, const nebel_light *lamps)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, count, lamps), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    const nebel_lighting_desc lights = {.lights = lamps, .light_count = count};
+    return fog_commit_lit(&(nebel_fog_desc){0}, volume, 1, &lights);
 }
 
 /* Lamps among the triangles; the larger ones have some of them within their radius, wholly or in part. */
@@ -388,7 +382,7 @@ static void ends_of_lamplight_are_those_of_visibility(void **state)
         positions[5][1] = NAN;
         set_holed(&h, seed, positions);
         const nebel_volume_desc volume = {.extinction = {1, 1, 1}, .albedo = {1, 1, 1}};
-        nebel_snapshot *fog = lamplit_fog(&volume, LAMPS, lamps);
+        nebel_lighting *fog = lamplit_fog(&volume, LAMPS, lamps);
         nebel_camera camera = trial_camera(seed);
         if (seed == 4) memcpy(camera.look_at, lamps[1].position, sizeof camera.look_at);
         nb_geometry geometry = place_triangles(&h.scene, &camera, &run.view);
@@ -411,7 +405,7 @@ static void ends_of_lamplight_are_those_of_visibility(void **state)
         }
         nb_shadow_tree_free(&run.tree, &geometry.allocator);
         nb_geometry_free(&geometry);
-        nebel_release_snapshot(fog);
+        nebel_release_lighting(fog);
     }
     const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
     nb_light_shafts_free(&shafts, &allocator);
@@ -451,11 +445,11 @@ static void the_shadow_of_a_box_is_cut_out(void **state)
     const nebel_volume_desc layer = {.shape = {.type = NEBEL_SHAPE_CONVEX, .planes = planes, .plane_count = 2},
                                      .extinction = {s, s, s},
                                      .albedo = {albedo, albedo, albedo}};
-    const nebel_fog_desc desc = {.sun = {.direction = {0.6, 0.8, 0}, .irradiance = {1, 1, 1}}};
+    const nebel_lighting_desc lights = {.sun = {.direction = {0.6, 0.8, 0}, .irradiance = {1, 1, 1}}};
     const nebel_mesh mesh = box_mesh();
     const nebel_scene_data scene = {.mesh_count = 1, .meshes = &mesh};
     nebel_camera camera = test_camera(-20, 5, 0, 0, 5, 0);
-    nebel_snapshot *fog = fog_commit(&desc, &layer, 1);
+    nebel_lighting *fog = fog_commit_lit(&(nebel_fog_desc){0}, &layer, 1, &lights);
     test_picture picture = test_picture_make(SIDE, SIDE);
     nebel_renderer *renderer = NULL;
     int dark = 0;
@@ -477,7 +471,7 @@ static void the_shadow_of_a_box_is_cut_out(void **state)
         }
     assert_true(dark > 200);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     test_picture_free(&picture);
 }
 
@@ -508,7 +502,7 @@ typedef struct pillars {
     nebel_texture texture;
     nebel_mesh meshes[PILLARS + 1];
     nebel_scene_data scene;
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
     nebel_camera camera;
     double sun[3];
 } pillars;
@@ -522,8 +516,9 @@ static void set_pillars(pillars *p)
                                       .albedo = {1, 1, 1}};
     *p = (pillars){.camera = test_camera(6, 3, 24, 0, 4, 0), .sun = {-0.8, 0.35, -0.3}};
     nb_vector_make_unit(p->sun);
-    const nebel_fog_desc desc = {.sun = {.direction = {p->sun[0], p->sun[1], p->sun[2]}, .irradiance = {20, 10, 5}}};
-    p->fog = fog_commit(&desc, &volume, 1);
+    const nebel_lighting_desc lights = {
+        .sun = {.direction = {p->sun[0], p->sun[1], p->sun[2]}, .irradiance = {20, 10, 5}}};
+    p->fog = fog_commit_lit(&(nebel_fog_desc){0}, &volume, 1, &lights);
     for (int i = 0; i < PILLARS; i++) {
         p->meshes[i] = box_mesh();
         p->meshes[i].origin[0] = 5 * i - 12;
@@ -581,7 +576,7 @@ static void shafts_are_those_of_small_steps(void **state)
     print_message("off by at most %.5f, %.6f in the root mean square\n", worst, sqrt(square / SIDE / SIDE));
     assert_true(worst < 0.002);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(p.fog);
+    nebel_release_lighting(p.fog);
     test_picture_free(&picture);
 }
 
@@ -590,7 +585,7 @@ static void set_lamplit_pillars(pillars *p, nebel_light lamps[2])
 {
     const nebel_volume_desc volume = {.extinction = {.05, .05, .05}, .albedo = {1, 1, 1}};
     set_pillars(p);
-    nebel_release_snapshot(p->fog);
+    nebel_release_lighting(p->fog);
     lamps[0] = (nebel_light){.position = {0.5, 5.2, 1}, .intensity = {50, 100, 150}, .radius = 0.3};
     lamps[1] = (nebel_light){.type = NEBEL_LIGHT_SPOT,
                              .position = {-7, 8, 6},
@@ -686,7 +681,7 @@ static void lamp_shafts_are_those_of_small_steps(void **state)
     assert_true(worst < 0.002);
     assert_true(shaded > SIDE);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(p.fog);
+    nebel_release_lighting(p.fog);
     test_picture_free(&picture);
     test_picture_free(&bare);
 }
@@ -707,7 +702,7 @@ static void threads_give_the_same_shafts(void **state)
         test_render(&p.scene, p.fog, &(nebel_cpu_renderer_desc){.thread_count = 1}, &p.camera, 2, &one);
         test_render(&p.scene, p.fog, &(nebel_cpu_renderer_desc){.thread_count = 3}, &p.camera, 2, &three);
         assert_memory_equal(one.planes.color, three.planes.color, sizeof(float) * 3 * one.width * one.height);
-        nebel_release_snapshot(p.fog);
+        nebel_release_lighting(p.fog);
     }
     test_picture_free(&one);
     test_picture_free(&three);
@@ -747,10 +742,10 @@ static void lost_memory_is_told(void **state)
     (void)state;
     set_pillars(&p);
     assert_true(lose_memory(&p) >= 10); /* the tree's eight, shadows, and what boundaries are made in */
-    nebel_release_snapshot(p.fog);
+    nebel_release_lighting(p.fog);
     set_lamplit_pillars(&p, lamps);
     assert_true(lose_memory(&p) >= 12); /* and the lamps' pieces, and their numbers */
-    nebel_release_snapshot(p.fog);
+    nebel_release_lighting(p.fog);
 }
 
 int main(void)

@@ -97,10 +97,10 @@ static nebel_shape shape_of(const skin *s, uint64_t *state)
 }
 
 /* Lamps shine on the surface about as brightly as the sun; for an eye within one is near it. */
-static void set_lamps(const skin *s, uint64_t *state, nebel_fog *made)
+static void place_lamps(const skin *s, uint64_t *state, nebel_light lamps[2])
 {
-    nebel_light lamps[2] = {{.type = NEBEL_LIGHT_POINT},
-                            {.type = NEBEL_LIGHT_SPOT, .inner_angle = 20, .outer_angle = 60}};
+    lamps[0] = (nebel_light){.type = NEBEL_LIGHT_POINT};
+    lamps[1] = (nebel_light){.type = NEBEL_LIGHT_SPOT, .inner_angle = 20, .outer_angle = 60};
     for (int i = 0; i < 2; i++) {
         double away = s->radius * dice(state, 1.3, 6);
         turn_any(state, away, lamps[i].position);
@@ -112,10 +112,9 @@ static void set_lamps(const skin *s, uint64_t *state, nebel_fog *made)
         }
         lamps[i].radius = fmax(1e-3, .02 * away);
     }
-    assert_int_equal(nebel_set_lamps(made, 2, lamps), NEBEL_OK);
 }
 
-static nebel_snapshot *commit_skin(const skin *s, uint64_t seed)
+static nebel_lighting *commit_skin(const skin *s, uint64_t seed)
 {
     const double extinction = s->depth / s->radius;
     uint64_t state = seed;
@@ -124,18 +123,16 @@ static nebel_snapshot *commit_skin(const skin *s, uint64_t seed)
                                 .albedo = {.9, .9, .8},
                                 .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .4}};
     nebel_sun sun = {.irradiance = {3, 3, 2}};
-    nebel_fog *made = NULL;
-    nebel_snapshot *snapshot = NULL;
+    nebel_light lamps[2];
+    nebel_lighting_desc lights = {.lights = lamps};
     turn_any(&state, 1, sun.direction);
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &made), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(made, &volume, NULL), NEBEL_OK);
-    if (s->by_lamps)
-        set_lamps(s, &state, made);
-    else
-        assert_int_equal(nebel_set_sun(made, &sun), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(made, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(made);
-    return snapshot;
+    if (s->by_lamps) {
+        place_lamps(s, &state, lamps);
+        lights.light_count = 2;
+    } else {
+        lights.sun = sun;
+    }
+    return fog_light(&lights, &volume, 1);
 }
 
 static void strew_rays(const skin *s, uint64_t seed)
@@ -156,15 +153,15 @@ static void strew_rays(const skin *s, uint64_t seed)
 static double worst[TYPES][2][EYE_PLACES];
 static size_t tried[TYPES][2][EYE_PLACES], wrong, ill;
 
-static void judge(const skin *s, const nebel_snapshot *snapshot, uint64_t seed)
+static void judge(const skin *s, const nebel_lighting *lighting, uint64_t seed)
 {
     const nebel_trace_desc truth = {.tolerance = 1e-4};
-    assert_int_equal(nebel_trace(snapshot, &truth, EACH, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
+    fog_trace(lighting, truth, EACH, rays, transfers);
     for (int i = 0; i < EACH; i++) {
         const double *is = transfers[i].in_scattering, scale = fmax(1, fmax(is[0], fmax(is[1], is[2])));
         const double off = worst_of(&answers[i], &transfers[i], scale);
         if (transfers[i].error > 1e-3 * scale) continue; /* the reference does not know either */
-        if (off > 1. / 255 && off < 2 * conditioning(snapshot, &truth, &rays[i], s->eye, scale)) {
+        if (off > 1. / 255 && off < 2 * conditioning(lighting, &truth, &rays[i], s->eye, scale)) {
             ill++;
             continue;
         }
@@ -184,9 +181,9 @@ static unsigned features_of_all(int by_lamps)
     unsigned features = 0;
     for (int kind = 0; kind < TYPES; kind++) {
         const skin like = {.by_lamps = by_lamps, .radius = 1, .depth = 1e3, .kind = kind, .is_turned = 1};
-        nebel_snapshot *snapshot = commit_skin(&like, 1);
-        features |= (unsigned)nebel_pack_features(snapshot);
-        nebel_release_snapshot(snapshot);
+        nebel_lighting *lighting = commit_skin(&like, 1);
+        features |= (unsigned)nebel_pack_features(lighting);
+        nebel_release_lighting(lighting);
     }
     return features;
 }
@@ -201,12 +198,12 @@ static void try_light(int by_lamps, int seeds)
     for (int i = 0; i < seeds; i++) {
         const uint64_t seed = (uint64_t)i + 1;
         const skin s = draw_skin(seed, by_lamps, i / EYE_PLACES % TYPES, (eye_place)(i % EYE_PLACES));
-        nebel_snapshot *snapshot = commit_skin(&s, seed);
+        nebel_lighting *lighting = commit_skin(&s, seed);
         strew_rays(&s, seed);
-        pack_and_upload(&t, snapshot, s.eye);
+        pack_and_upload(&t, lighting, s.eye);
         evaluate(&t);
-        judge(&s, snapshot, seed);
-        nebel_release_snapshot(snapshot);
+        judge(&s, lighting, seed);
+        nebel_release_lighting(lighting);
     }
     nb_gl_close(&t.gl);
 }

@@ -152,7 +152,7 @@ static void make_boxes(nebel_mesh meshes[BOXES], float positions[BOXES][8][3])
 static const nebel_factor_desc factor = {
     .mode = NEBEL_FACTOR_LINEAR, .stage = NEBEL_STAGE_PIXEL, .start = 4, .end = 20, .color = {.5, .6, .7}};
 
-static void render_cpu(const nebel_scene_data *data, nebel_snapshot *fog, const smoke *s, const nebel_camera *camera,
+static void render_cpu(const nebel_scene_data *data, nebel_lighting *fog, const smoke *s, const nebel_camera *camera,
                        picture_pair *pair)
 {
     nebel_renderer *renderer = NULL;
@@ -167,12 +167,12 @@ static void render_cpu(const nebel_scene_data *data, nebel_snapshot *fog, const 
     nebel_destroy_renderer(renderer);
 }
 
-static void render_gl(const nebel_scene *scene, const nebel_scene_data *data, nebel_snapshot *fog, const smoke *s,
+static void render_gl(const nebel_scene *scene, const nebel_scene_data *data, nebel_lighting *fog, const smoke *s,
                       const nebel_camera *camera, picture_pair *pair)
 {
     nebel_gl_renderer *renderer = NULL;
     nebel_particle *particles = NULL;
-    nebel_snapshot *others = NULL;
+    nebel_lighting *others = NULL;
     const nebel_gl_frame_desc frame = {.camera = *camera,
                                        .width = WIDTH,
                                        .height = HEIGHT,
@@ -185,14 +185,14 @@ static void render_gl(const nebel_scene *scene, const nebel_scene_data *data, ne
     assert_int_equal(nebel_create_gl_renderer(data, fog, &(nebel_gl_renderer_desc){0}, &renderer), NEBEL_OK);
     if (s->particles) {
         assert_int_equal(nebel_generate_scene_particles(scene, &particles), NEBEL_OK);
-        assert_int_equal(nebel_commit_scene_volumes_at(scene, 0, &others), NEBEL_OK);
+        others = picture_commit_scene(scene, 0);
         assert_int_equal(nebel_set_gl_renderer_particles(renderer, particles, data->particle_count), NEBEL_OK);
-        assert_int_equal(nebel_set_gl_renderer_fog(renderer, others), NEBEL_OK);
+        assert_int_equal(nebel_set_gl_renderer_lighting(renderer, others), NEBEL_OK);
     }
     assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
     assert_int_equal(nebel_gl_read_planes(renderer, &planes), NEBEL_OK);
     nebel_destroy_gl_renderer(renderer);
-    nebel_release_snapshot(others);
+    nebel_release_lighting(others);
     nebel_free_scene_particles(scene, particles);
 }
 
@@ -208,12 +208,11 @@ static void compare(const smoke *s)
 {
     nebel_mesh meshes[BOXES];
     float positions[BOXES][8][3];
-    nebel_snapshot *fog = NULL;
     nebel_scene *const scene = parse(s->text);
     picture_pair pair = picture_make(WIDTH, HEIGHT);
     if (s->tolerance > 0) pair.tolerance = s->tolerance;
     assert_int_equal(nebel_load_scene_planets(scene), NEBEL_OK);
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    nebel_lighting *const fog = picture_commit_scene(scene, 1);
     nebel_scene_data data = *nebel_get_scene_data(scene);
     nebel_camera camera = data.camera;
     camera.projection = s->projection;
@@ -229,7 +228,7 @@ static void compare(const smoke *s)
     assert_true(d.beyond_step <= 2);
     assert_true(shown <= .008);
     picture_free(&pair);
-    nebel_release_snapshot(fog);
+    nebel_release_lighting(fog);
     nebel_destroy_scene(scene);
 }
 

@@ -22,7 +22,7 @@ static const layer layers[] = {{0.1, 1, 0.5, 0.006875010222976228, 0.00685215068
                                {5, 1, 0.5, 0.02652581573433815, 0.0005325759739789651}};
 
 /* Fog between y = 0 and 10, even or denser below, of that optical depth. */
-static nebel_snapshot *make_layer(const layer *l, int is_even)
+static nebel_lighting *make_layer(const layer *l, int is_even)
 {
     const nebel_plane planes[] = {{{0, -1, 0}, 0}, {{0, 1, 0}, 10}};
     const double scale = 3, thick = is_even ? 10 : scale * (1 - exp(-10 / scale)), s = l->depth / thick;
@@ -31,8 +31,9 @@ static nebel_snapshot *make_layer(const layer *l, int is_even)
         .density = {.type = is_even ? NEBEL_DENSITY_CONSTANT : NEBEL_DENSITY_HEIGHT, .scale_height = scale},
         .extinction = {s, s, s},
         .albedo = {1, 1, 1}};
-    const nebel_fog_desc desc = {.sun = {.direction = {sqrt(1 - l->sun * l->sun), l->sun, 0}, .irradiance = {1, 1, 1}}};
-    return fog_commit(&desc, &volume, 1);
+    const nebel_lighting_desc desc = {
+        .sun = {.direction = {sqrt(1 - l->sun * l->sun), l->sun, 0}, .irradiance = {1, 1, 1}}};
+    return fog_light(&desc, &volume, 1);
 }
 
 /* From above the light that comes back, from below what comes through. */
@@ -41,7 +42,7 @@ static void layers_are_those_of_T16(void **state)
     (void)state;
     for (size_t i = 0; i < 2 * sizeof layers / sizeof layers[0]; i++) {
         const layer *l = &layers[i / 2];
-        nebel_snapshot *snapshot = make_layer(l, i % 2 == 0);
+        nebel_lighting *lighting = make_layer(l, i % 2 == 0);
         const double across = sqrt(1 - l->view * l->view);
         const nebel_ray rays[] = {{{0, 20, 0}, {0, -l->view, across}, HUGE_VAL},
                                   {{0, -5, 0}, {0, l->view, across}, HUGE_VAL}};
@@ -49,15 +50,14 @@ static void layers_are_those_of_T16(void **state)
             nebel_transfer transfers[2];
             const nebel_trace_desc desc = {.precision = (nebel_precision)precision,
                                            .tolerance = precision == NEBEL_PRECISION_DOUBLE ? 1e-9 : 1e-5};
-            assert_int_equal(nebel_trace(snapshot, &desc, 2, rays, sizeof *rays, transfers, sizeof *transfers),
-                             NEBEL_OK);
+            fog_trace(lighting, desc, 2, rays, transfers);
             const double may = precision == NEBEL_PRECISION_DOUBLE ? 1e-10 : 1e-6;
             assert_true(fabs(transfers[0].in_scattering[0] - l->reflected) < may);
             assert_true(fabs(transfers[1].in_scattering[1] - l->transmitted) < may);
             assert_true(transfers[0].error >= fabs(transfers[0].in_scattering[0] - l->reflected));
             assert_true(transfers[1].error >= fabs(transfers[1].in_scattering[0] - l->transmitted));
         }
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
 }
 
@@ -73,7 +73,7 @@ enum { SEEDS = 6 };
 enum { RAYS = 24 };
 
 static random_fog fog;
-static nebel_fog_desc sky;
+static nebel_lighting_desc sky;
 
 /* Random fog under a sun. */
 static void make_sunlit(random_fog_kind kind, uint64_t seed)
@@ -81,21 +81,21 @@ static void make_sunlit(random_fog_kind kind, uint64_t seed)
     uint64_t numbers = seed * 977 + (uint64_t)kind;
     random_fog_make(&fog, kind, seed);
     random_fog_light(&fog, &numbers);
-    sky = (nebel_fog_desc){
+    sky = (nebel_lighting_desc){
         .sun = {.direction = {dice(&numbers, -1, 1), dice(&numbers, 0.2, 1), 0.3}, .irradiance = {5, 4, 3}}};
-    memcpy(sky.ambient, fog.ambient, sizeof sky.ambient);
+    memcpy(sky.environment.radiance, fog.ambient, sizeof fog.ambient);
 }
 
-static void trace_some(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t count, nebel_ray rays[RAYS],
+static void trace_some(const nebel_lighting *lighting, const nebel_trace_desc *desc, size_t count, nebel_ray rays[RAYS],
                        nebel_transfer transfers[RAYS])
 {
-    assert_int_equal(nebel_trace(snapshot, desc, count, rays, sizeof *rays, transfers, sizeof *transfers), NEBEL_OK);
+    fog_trace(lighting, *desc, count, rays, transfers);
 }
 
-static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_ray rays[RAYS],
+static void trace(const nebel_lighting *lighting, const nebel_trace_desc *desc, nebel_ray rays[RAYS],
                   nebel_transfer transfers[RAYS])
 {
-    trace_some(snapshot, desc, RAYS, rays, transfers);
+    trace_some(lighting, desc, RAYS, rays, transfers);
 }
 
 static void draw_rays(nebel_ray rays[RAYS])
@@ -119,7 +119,7 @@ static double brightest(void)
     double most = 1;
     for (size_t i = 0; i < fog.count; i++)
         for (int c = 0; c < 3; c++)
-            most = fmax(most, fmax(fog.volumes[i].source[c], fog.volumes[i].albedo[c] * sky.ambient[c]));
+            most = fmax(most, fmax(fog.volumes[i].source[c], fog.volumes[i].albedo[c] * sky.environment.radiance[c]));
     return most;
 }
 
@@ -134,11 +134,11 @@ static void errors_are_told(void **state)
             nebel_ray rays[RAYS];
             nebel_transfer fine[RAYS], transfer[RAYS];
             make_sunlit((random_fog_kind)kind, seed);
-            nebel_snapshot *snapshot = fog_commit(&sky, fog.volumes, fog.count);
+            nebel_lighting *lighting = fog_light(&sky, fog.volumes, fog.count);
             draw_rays(rays);
-            trace_some(snapshot, &(nebel_trace_desc){.tolerance = 2e-6}, count, rays, fine);
+            trace_some(lighting, &(nebel_trace_desc){.tolerance = 2e-6}, count, rays, fine);
             for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-                trace_some(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, count, rays,
+                trace_some(lighting, &(nebel_trace_desc){.precision = (nebel_precision)precision}, count, rays,
                            transfer);
                 for (size_t i = 0; i < count; i++) {
                     const double off = apart(&transfer[i], &fine[i]);
@@ -148,7 +148,7 @@ static void errors_are_told(void **state)
                         assert_true(transfer[i].error <= 0.002 * brightest() + 1e-8);
                 }
             }
-            nebel_release_snapshot(snapshot);
+            nebel_release_lighting(lighting);
         }
         print_message("kind %d: off by at most %.3f of the error told; at most %.1e told\n", kind, worst, slack);
         assert_true(worst <= 1);
@@ -162,40 +162,39 @@ static void light_is_the_same_in_any_order_and_set(void **state)
         nebel_ray rays[RAYS];
         nebel_transfer first[RAYS], other[RAYS];
         make_sunlit((random_fog_kind)kind, 3);
-        nebel_snapshot *snapshot = fog_commit(&sky, fog.volumes, fog.count);
+        nebel_lighting *lighting = fog_light(&sky, fog.volumes, fog.count);
         draw_rays(rays);
         for (size_t i = 0; i < fog.count / 2; i++) {
             const nebel_volume_desc swapped = fog.volumes[i];
             fog.volumes[i] = fog.volumes[fog.count - 1 - i];
             fog.volumes[fog.count - 1 - i] = swapped;
         }
-        nebel_snapshot *turned = fog_commit(&sky, fog.volumes, fog.count);
-        trace(snapshot, &(nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR}, rays, first);
+        nebel_lighting *turned = fog_light(&sky, fog.volumes, fog.count);
+        trace(lighting, &(nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR}, rays, first);
         for (int isa = NEBEL_ISA_DEFAULT; isa < NEBEL_ISA_COUNT; isa++) {
             if (!nebel_isa_available((nebel_isa)isa)) continue;
             const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa};
             trace(turned, &desc, rays, other);
             assert_memory_equal(first, other, sizeof first);
-            for (size_t i = 0; i < nb_test_count(RAYS); i++)
-                assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
+            for (size_t i = 0; i < nb_test_count(RAYS); i++) fog_trace(lighting, desc, 1, &rays[i], &other[i]);
             assert_memory_equal(first, other, sizeof first);
         }
-        nebel_release_snapshot(snapshot);
-        nebel_release_snapshot(turned);
+        nebel_release_lighting(lighting);
+        nebel_release_lighting(turned);
     }
 }
 
 /* ---- lit pieces ------------------------------------------------------------------------------ */
 
 /* A box of even fog under a sun at right angles to the ray: the depth to the sun is the same all along. */
-static nebel_snapshot *make_slab(void)
+static nebel_lighting *make_slab(void)
 {
     const nebel_plane planes[] = {{{0, -1, 0}, 0}, {{0, 1, 0}, 10}};
     const nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_CONVEX, .planes = planes, .plane_count = 2},
                                       .extinction = {0.1, 0.2, 0.3},
                                       .albedo = {1, 0.5, 1}};
-    const nebel_fog_desc desc = {.sun = {.direction = {0, 1, 0}, .irradiance = {1, 2, 3}}};
-    return fog_commit(&desc, &volume, 1);
+    const nebel_lighting_desc desc = {.sun = {.direction = {0, 1, 0}, .irradiance = {1, 2, 3}}};
+    return fog_light(&desc, &volume, 1);
 }
 
 /* What the ray (0, 4, 0) + t (1, 0, 0) gathers from a to b in the slab: albedo irradiance / 4 pi, e^-6s for the way to
@@ -219,7 +218,7 @@ static void pieces_are_those_of_the_closed_form(void **state)
     } lit[] = {{2, {0, 2, 3, 20}}, {0, {0}}, {1, {5, 20}}, {1, {0, 4}}, {1, {0, 20}}, {1, {0, 7}}};
     enum { CASES = sizeof lit / sizeof lit[0] };
     const nebel_ray_visibility pieces = {first, boundaries};
-    nebel_snapshot *snapshot = make_slab();
+    nebel_lighting *lighting = make_slab();
     nebel_ray rays[CASES];
     (void)state;
     for (int i = 0; i < CASES; i++) rays[i] = (nebel_ray){{0, 4, 0}, {1, 0, 0}, 20};
@@ -227,8 +226,7 @@ static void pieces_are_those_of_the_closed_form(void **state)
         nebel_transfer transfers[CASES];
         const nebel_trace_desc desc = {
             .precision = (nebel_precision)precision, .tolerance = 1e-7, .sun_visibility = &pieces};
-        assert_int_equal(nebel_trace(snapshot, &desc, CASES, rays, sizeof *rays, transfers, sizeof *transfers),
-                         NEBEL_OK);
+        fog_trace(lighting, desc, CASES, rays, transfers);
         for (int i = 0; i < CASES; i++)
             for (int c = 0; c < 3; c++) {
                 double sum = 0;
@@ -243,10 +241,9 @@ static void pieces_are_those_of_the_closed_form(void **state)
     for (int i = 1; i < MANY; i += 2) sum += slab_light(0, (double)comb[i], (double)comb[i + 1]);
     const nebel_ray_visibility thin = {(const uint32_t[]){0, MANY}, comb};
     nebel_transfer transfer;
-    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){.sun_visibility = &thin}, 1, rays, 0, &transfer, 0),
-                     NEBEL_OK);
+    fog_trace(lighting, (nebel_trace_desc){.sun_visibility = &thin}, 1, rays, &transfer);
     assert_true(fabs(transfer.in_scattering[0] - sum) < 1e-6);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 static void pieces_that_are_none_are_refused(void **state)
@@ -256,17 +253,18 @@ static void pieces_that_are_none_are_refused(void **state)
     const nebel_ray_visibility wrong[] = {{first, descends}, {first, below},  {first, none},
                                           {back, ascends},   {NULL, ascends}, {first, NULL}};
     const nebel_ray rays[2] = {{{0, 4, 0}, {1, 0, 0}, 20}, {{0, 4, 0}, {1, 0, 0}, 20}};
-    nebel_snapshot *snapshot = make_slab();
+    nebel_lighting *lighting = make_slab();
     (void)state;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         nebel_transfer transfers[2];
         size_t failed = 9;
-        const nebel_trace_desc desc = {.sun_visibility = &wrong[i], .failed_ray = &failed};
+        const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
+        const nebel_trace_desc desc = {.lighting = lighting, .sun_visibility = &wrong[i], .failed_ray = &failed};
         assert_int_equal(nebel_trace(snapshot, &desc, 2, rays, sizeof *rays, transfers, sizeof *transfers),
                          NEBEL_ERROR_ARGUMENT);
         assert_int_equal(failed, i < 4 ? 1 : i == 4 ? 9 : 0);
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 /* Random pieces of random fog: every set, split and way of asking gives the same bits, transmittance those without. */
@@ -280,7 +278,7 @@ static void pieces_are_the_same_in_any_set_and_split(void **state)
         nebel_ray rays[RAYS];
         nebel_transfer all[RAYS], expected[RAYS], other[RAYS];
         make_sunlit((random_fog_kind)kind, 4);
-        nebel_snapshot *snapshot = fog_commit(&sky, fog.volumes, fog.count);
+        nebel_lighting *lighting = fog_light(&sky, fog.volumes, fog.count);
         draw_rays(rays);
         for (uint32_t i = 0; i < RAYS; i++) {
             const uint32_t count = (uint32_t)dice(&numbers, 0, 8);
@@ -290,31 +288,31 @@ static void pieces_are_the_same_in_any_set_and_split(void **state)
         }
         const nebel_ray_visibility pieces = {first, boundaries};
         nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
-        trace(snapshot, &desc, rays, all);
+        trace(lighting, &desc, rays, all);
         desc.sun_visibility = &pieces;
-        trace(snapshot, &desc, rays, expected);
+        trace(lighting, &desc, rays, expected);
         for (int i = 0; i < RAYS; i++)
             assert_memory_equal(all[i].transmittance, expected[i].transmittance, sizeof all[i].transmittance);
         for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
             if (!nebel_isa_available(desc.isa)) continue;
             desc.sun_visibility = &pieces;
-            trace(snapshot, &desc, rays, other);
+            trace(lighting, &desc, rays, other);
             assert_memory_equal(expected, other, sizeof expected);
             for (size_t i = 0; i < nb_test_count(RAYS); i++) {
                 const nebel_ray_visibility one = {first + i, boundaries};
                 desc.sun_visibility = &one;
-                assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
+                fog_trace(lighting, desc, 1, &rays[i], &other[i]);
             }
             assert_memory_equal(expected, other, sizeof expected);
         }
         nebel_transfer fine[RAYS], reference[RAYS];
-        trace(snapshot, &(nebel_trace_desc){.tolerance = 2e-6, .sun_visibility = &pieces}, rays, fine);
-        trace(snapshot, &(nebel_trace_desc){.sun_visibility = &pieces}, rays, reference);
+        trace(lighting, &(nebel_trace_desc){.tolerance = 2e-6, .sun_visibility = &pieces}, rays, fine);
+        trace(lighting, &(nebel_trace_desc){.sun_visibility = &pieces}, rays, reference);
         for (int i = 0; i < RAYS; i++) {
             assert_true(apart(&reference[i], &fine[i]) <= reference[i].error + fine[i].error);
             assert_true(apart(&expected[i], &fine[i]) <= expected[i].error + fine[i].error);
         }
-        nebel_release_snapshot(snapshot);
+        nebel_release_lighting(lighting);
     }
 }
 
@@ -372,14 +370,14 @@ static size_t make_bodies(uint64_t *numbers, int kind, nebel_volume_desc volumes
     return count;
 }
 
-static void expect_the_same_in_any_set(const nebel_snapshot *snapshot, const nebel_trace_desc *asked, size_t count,
+static void expect_the_same_in_any_set(const nebel_lighting *lighting, const nebel_trace_desc *asked, size_t count,
                                        nebel_ray rays[RAYS], const nebel_transfer expected[RAYS])
 {
     nebel_transfer other[RAYS];
     nebel_trace_desc desc = *asked;
     for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
         if (!nebel_isa_available(desc.isa)) continue;
-        trace_some(snapshot, &desc, count, rays, other);
+        trace_some(lighting, &desc, count, rays, other);
         assert_memory_equal(expected, other, count * sizeof *other);
     }
 }
@@ -399,10 +397,10 @@ static void closed_forms_are_what_marches_find(void **state)
         nebel_transfer closed[RAYS], marched[RAYS];
         const int kind = (int)(seed % 4);
         const size_t count = make_bodies(&numbers, kind, volumes);
-        const nebel_fog_desc desc = {
+        const nebel_lighting_desc desc = {
             .sun = {.direction = {dice(&numbers, -1, 1), dice(&numbers, 0.1, 1), dice(&numbers, -1, 1)},
                     .irradiance = {5, 4, 3}}};
-        nebel_snapshot *simple = fog_commit(&desc, volumes, count), *other = fog_commit(&desc, volumes, count + 1);
+        nebel_lighting *simple = fog_light(&desc, volumes, count), *other = fog_light(&desc, volumes, count + 1);
         for (int i = 0; i < RAYS; i++) {
             rays[i].t_max = i % 3 ? HUGE_VAL : dice(&numbers, 1, 20);
             for (int c = 0; c < 3; c++) {
@@ -423,8 +421,8 @@ static void closed_forms_are_what_marches_find(void **state)
                 assert_true(off < (precision == NEBEL_PRECISION_DOUBLE ? 1e-6 : 2e-5));
             }
         }
-        nebel_release_snapshot(simple);
-        nebel_release_snapshot(other);
+        nebel_release_lighting(simple);
+        nebel_release_lighting(other);
     }
 }
 
@@ -525,8 +523,7 @@ static void strew_rays(nebel_ray *rays, int count, uint64_t *numbers)
 }
 
 /* `most`: what the light may be off by at a tolerance of 1e-5. */
-static void expect_brute_force(const nebel_fog_desc *desc, const nebel_light *lamp, size_t count, double thick,
-                               double most)
+static void expect_brute_force(nebel_sun sun, const nebel_light *lamp, size_t count, double thick, double most)
 {
     static nebel_volume_desc balls[MOST_BALLS];
     uint64_t numbers = 31 + count;
@@ -534,8 +531,7 @@ static void expect_brute_force(const nebel_fog_desc *desc, const nebel_light *la
     nebel_transfer transfers[RAYS];
     forced fine[BALL_RAYS];
     double off[BALL_RAYS];
-    nebel_fog *made = NULL;
-    nebel_snapshot *snapshot = NULL;
+    const nebel_lighting_desc lights = {.sun = sun, .lights = lamp, .light_count = lamp != NULL};
     const int forced_rays = (int)nb_test_count(BALL_RAYS);
     const size_t ray_count = count > 20 ? nb_test_count(RAYS) : RAYS;
     strew_balls(balls, count, thick, &numbers);
@@ -546,34 +542,30 @@ static void expect_brute_force(const nebel_fog_desc *desc, const nebel_light *la
         off[i] = fabs(fine[i].light - halved) + fine[i].jumps;
         assert_true(fine[i].light > 50 * most && off[i] < most / 2);
     }
-    assert_int_equal(nebel_create_fog(desc, &made), NEBEL_OK);
-    for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(made, &balls[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(made, lamp != NULL, lamp), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(made, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(made);
+    nebel_lighting *lighting = fog_light(&lights, balls, count);
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         const nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = 1e-5};
-        trace_some(snapshot, &asked, ray_count, rays, transfers);
+        trace_some(lighting, &asked, ray_count, rays, transfers);
         if (precision == NEBEL_PRECISION_FLOAT)
-            expect_the_same_in_any_set(snapshot, &asked, ray_count, rays, transfers);
+            expect_the_same_in_any_set(lighting, &asked, ray_count, rays, transfers);
         for (int i = 0; i < forced_rays; i++) {
             const double wrong = fabs(transfers[i].in_scattering[i % 3] - fine[i].light);
             assert_true(wrong <= transfers[i].error + off[i]);
             assert_true(wrong < most);
         }
     }
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 /* Balls over each other, each in the shadow of the others: few that are asked one by one, and many that a tree finds. */
 static void many_balls_are_what_brute_force_finds(void **state)
 {
-    nebel_fog_desc sunny = {.sun = {.irradiance = {1, 1, 1}}};
+    nebel_sun sunny = {.irradiance = {1, 1, 1}};
     (void)state;
-    memcpy(sunny.sun.direction, sun_of_balls, sizeof sun_of_balls);
-    expect_brute_force(&sunny, NULL, 20, 1, 3e-5);
-    expect_brute_force(&sunny, NULL, 40, 1, 3e-5);
-    expect_brute_force(&sunny, NULL, MOST_BALLS, 1, 3e-5);
+    memcpy(sunny.direction, sun_of_balls, sizeof sun_of_balls);
+    expect_brute_force(sunny, NULL, 20, 1, 3e-5);
+    expect_brute_force(sunny, NULL, 40, 1, 3e-5);
+    expect_brute_force(sunny, NULL, MOST_BALLS, 1, 3e-5);
 }
 
 /* So bright and so thick that rounding of transmittance is more light than the tolerance: steps that were halved for it
@@ -583,8 +575,8 @@ static void many_balls_around_lamps_are_what_brute_force_finds(void **state)
     const nebel_light dim = {.position = {3, 4, -2}, .intensity = {40, 40, 40}, .radius = 0.2};
     const nebel_light bright = {.position = {-4, 3, 3}, .intensity = {2000, 2000, 2000}, .radius = 0.2};
     (void)state;
-    expect_brute_force(&(nebel_fog_desc){0}, &dim, 20, 1, 1e-4);
-    expect_brute_force(&(nebel_fog_desc){0}, &bright, 40, 3, 4e-4);
+    expect_brute_force((nebel_sun){.irradiance = {0, 0, 0}}, &dim, 20, 1, 1e-4);
+    expect_brute_force((nebel_sun){.irradiance = {0, 0, 0}}, &bright, 40, 3, 4e-4);
 }
 
 /* ---- rules ----------------------------------------------------------------------------------- */
@@ -598,18 +590,19 @@ static void suns_are_checked(void **state)
                                {.direction = {0, 1, 0}, .irradiance = {nan, 1, 1}},
                                {.direction = {0, 1, 0}, .irradiance = {1e10, 1, 1}}};
     const nebel_sun right = {.direction = {0, 1e30, 0}, .irradiance = {1e9, 0, 0}};
+    nebel_snapshot *empty = fog_commit(&(nebel_fog_desc){0}, NULL, 0);
+    nebel_lighting *lighting = NULL;
     nebel_fog *made = NULL;
     (void)state;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        const nebel_fog_desc desc = {.sun = wrong[i]};
-        assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_ERROR_VALUE);
-        assert_null(made);
+        const nebel_lighting_desc desc = {.sun = wrong[i]};
+        assert_int_equal(nebel_create_lighting(empty, &desc, &lighting), NEBEL_ERROR_VALUE);
+        assert_null(lighting);
     }
+    assert_int_equal(nebel_create_lighting(empty, &(nebel_lighting_desc){.sun = right}, &lighting), NEBEL_OK);
+    nebel_release_lighting(lighting);
+    nebel_release_snapshot(empty);
     assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &made), NEBEL_OK);
-    assert_int_equal(nebel_set_sun(made, &wrong[0]), NEBEL_ERROR_VALUE);
-    assert_int_equal(nebel_set_sun(made, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_set_sun(NULL, &right), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_set_sun(made, &right), NEBEL_OK);
     const nebel_volume_desc peaked = {.albedo = {1, 1, 1}, .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 1}};
     assert_int_equal(nebel_add_volume(made, &peaked, NULL), NEBEL_ERROR_VALUE);
     nebel_destroy_fog(made);
@@ -618,51 +611,49 @@ static void suns_are_checked(void **state)
 /* A box around what is lit: not around fog with a source, and without end where lit fog has none. */
 static void sunlit_fog_is_bounded(void **state)
 {
-    const nebel_fog_desc desc = {.sun = {.direction = {0, 5, 0}, .irradiance = {5, 5, 5}}};
+    const nebel_lighting_desc desc = {.sun = {.direction = {0, 5, 0}, .irradiance = {5, 5, 5}}};
     nebel_volume_desc volumes[] = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {1, 2, 3}, .radius = 2},
                                     .extinction = {1, 1, 1},
                                     .albedo = {1, 0, 0}},
                                    {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {50, 2, 3}, .radius = 2},
                                     .extinction = {1, 1, 1},
                                     .source = {1, 1, 1}}};
-    nebel_sunlit_fog lit;
+    nebel_bounds lit;
     (void)state;
-    nebel_snapshot *snapshot = fog_commit(&desc, volumes, 2);
-    assert_int_equal(nebel_snapshot_sunlit_fog(snapshot, &lit), 1);
+    nebel_lighting *lighting = fog_light(&desc, volumes, 2);
+    assert_int_equal(nebel_get_lit_bounds(lighting, NEBEL_LIGHT_GROUP_SUN, &lit), 1);
     for (int c = 0; c < 3; c++) {
-        assert_true(lit.direction[c] == (c == 1));
+        assert_true(nebel_get_lighting_sun(lighting).direction[c] == (c == 1));
         assert_true(fabs(lit.min[c] - (c - 1)) < 1e-6 && fabs(lit.max[c] - (c + 3)) < 1e-6);
     }
-    nebel_release_snapshot(snapshot);
-    snapshot = fog_commit(&desc, &volumes[1], 1);
-    assert_int_equal(nebel_snapshot_sunlit_fog(snapshot, &lit), 0);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
+    lighting = fog_light(&desc, &volumes[1], 1);
+    assert_int_equal(nebel_get_lit_bounds(lighting, NEBEL_LIGHT_GROUP_SUN, &lit), 0);
+    nebel_release_lighting(lighting);
     volumes[1] = (nebel_volume_desc){.extinction = {1, 1, 1}, .albedo = {1, 1, 1}};
-    snapshot = fog_commit(&desc, volumes, 2);
-    assert_int_equal(nebel_snapshot_sunlit_fog(snapshot, &lit), 1);
+    lighting = fog_light(&desc, volumes, 2);
+    assert_int_equal(nebel_get_lit_bounds(lighting, NEBEL_LIGHT_GROUP_SUN, &lit), 1);
     for (int c = 0; c < 3; c++) assert_true(lit.min[c] == -HUGE_VAL && lit.max[c] == HUGE_VAL);
-    nebel_release_snapshot(snapshot);
+    nebel_release_lighting(lighting);
 }
 
 /* An endless world of fog lets no sun in; fog without end above, less and less of it, does. */
 static void endless_fog_is_answered(void **state)
 {
-    const nebel_fog_desc desc = {.sun = {.direction = {0.2, 1, 0.1}, .irradiance = {5, 5, 5}}};
+    const nebel_lighting_desc desc = {.sun = {.direction = {0.2, 1, 0.1}, .irradiance = {5, 5, 5}}};
     nebel_volume_desc volume = {.extinction = {0.01, 0.02, 0.03}, .albedo = {1, 1, 1}};
     const nebel_ray rays[] = {{{0, 2, 0}, {0.3, -0.1, 1}, HUGE_VAL}, {{0, 2, 0}, {0.3, 0.2, 1}, HUGE_VAL}};
     nebel_transfer transfers[2];
     (void)state;
-    nebel_snapshot *world = fog_commit(&desc, &volume, 1);
-    assert_int_equal(nebel_trace(world, &(nebel_trace_desc){0}, 2, rays, sizeof *rays, transfers, sizeof *transfers),
-                     0);
+    nebel_lighting *world = fog_light(&desc, &volume, 1);
+    fog_trace(world, (nebel_trace_desc){0}, 2, rays, transfers);
     for (int c = 0; c < 3; c++) assert_true(transfers[0].in_scattering[c] <= transfers[0].error);
-    nebel_release_snapshot(world);
+    nebel_release_lighting(world);
     volume.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 20};
-    nebel_snapshot *height = fog_commit(&desc, &volume, 1);
-    assert_int_equal(nebel_trace(height, &(nebel_trace_desc){0}, 2, rays, sizeof *rays, transfers, sizeof *transfers),
-                     0);
+    nebel_lighting *height = fog_light(&desc, &volume, 1);
+    fog_trace(height, (nebel_trace_desc){0}, 2, rays, transfers);
     for (int c = 0; c < 3; c++) assert_true(transfers[1].in_scattering[c] > 0.05 && transfers[1].error < 0.0021);
-    nebel_release_snapshot(height);
+    nebel_release_lighting(height);
 }
 
 /* More volumes than the stack has room for, and than are asked without a tree. */
@@ -673,13 +664,13 @@ static void expect_no_loss(const nebel_volume_desc volumes[CROWD])
     const nebel_ray ray = {{0, 0.2, -1}, {0, 0, 1}, HUGE_VAL};
     fog_memory memory = {0};
     fog_messages messages = {0};
-    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory),
-                                 .log = fog_messages_log(&messages),
-                                 .sun = {.direction = {0.3, 1, 0.2}, .irradiance = {1, 1, 1}}};
+    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages)};
+    const nebel_lighting_desc lights = {.sun = {.direction = {0.3, 1, 0.2}, .irradiance = {1, 1, 1}}};
     nebel_snapshot *snapshot = fog_commit(&desc, volumes, CROWD);
+    nebel_lighting *lighting = light_fog(snapshot, &lights);
     const size_t live = memory.live;
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-        const nebel_trace_desc asked = {.precision = (nebel_precision)precision};
+        const nebel_trace_desc asked = {.lighting = lighting, .precision = (nebel_precision)precision};
         nebel_transfer transfer;
         nebel_result result = NEBEL_ERROR_MEMORY;
         size_t failed = 0;
@@ -695,6 +686,7 @@ static void expect_no_loss(const nebel_volume_desc volumes[CROWD])
         assert_true(transfer.in_scattering[0] > 0);
         memory.fail_first = 0;
     }
+    nebel_release_lighting(lighting);
     nebel_release_snapshot(snapshot);
     assert_int_equal(memory.live, 0);
 }

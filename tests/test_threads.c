@@ -1,5 +1,5 @@
-/* One snapshot, four threads: the same bits as from one, and the last owner frees it. By hand under -fsanitize=thread.
- */
+/* One lighting and its snapshot, four threads: the same bits as from one, and the last owner frees it. By hand under
+ * -fsanitize=thread. */
 #include "random_fog.h"
 
 #include <math.h>
@@ -18,20 +18,21 @@ typedef struct answers {
 } answers;
 
 typedef struct question {
-    nebel_snapshot *snapshot; /* the thread owns one share of it */
+    nebel_lighting *lighting; /* the thread owns one share of it */
     nebel_ray rays[RAYS];
     float to[RAYS][3];
     answers *results;
 } question;
 
-static void ask(const nebel_snapshot *snapshot, const question *q, answers *a)
+static void ask(const nebel_lighting *lighting, const question *q, answers *a)
 {
+    const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
     const float from[3] = {0, 0, 0};
     const nebel_segments segments = {.from = from, .to = &q->to[0][0], .to_stride = sizeof q->to[0]};
-    const nebel_trace_desc in_float = {.precision = NEBEL_PRECISION_FLOAT};
+    const nebel_trace_desc in_double = {.lighting = lighting};
+    const nebel_trace_desc in_float = {.lighting = lighting, .precision = NEBEL_PRECISION_FLOAT};
     const nebel_result results[] = {
-        nebel_trace(snapshot, &(nebel_trace_desc){0}, RAYS, q->rays, sizeof(nebel_ray), a->exact,
-                    sizeof(nebel_transfer)),
+        nebel_trace(snapshot, &in_double, RAYS, q->rays, sizeof(nebel_ray), a->exact, sizeof(nebel_transfer)),
         nebel_trace(snapshot, &in_float, RAYS, q->rays, sizeof(nebel_ray), a->transfers, sizeof(nebel_transfer)),
         nebel_invert_transmittance(snapshot, .5, 1, RAYS, q->rays, sizeof(nebel_ray), a->distances),
         nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 2, RAYS, &segments, a->transmittances, 0)};
@@ -43,11 +44,13 @@ static void *work(void *user)
 {
     question *const q = user;
     for (int round = 0; round < ROUNDS; round++) {
-        nebel_snapshot *const again = nebel_retain_snapshot(q->snapshot);
+        nebel_lighting *const again = nebel_retain_lighting(q->lighting);
+        nebel_snapshot *const snapshot = nebel_retain_snapshot(nebel_get_lighting_snapshot(again));
         ask(again, q, q->results);
-        nebel_release_snapshot(again);
+        nebel_release_lighting(again);
+        nebel_release_snapshot(snapshot);
     }
-    nebel_release_snapshot(q->snapshot);
+    nebel_release_lighting(q->lighting);
     return NULL;
 }
 
@@ -71,7 +74,7 @@ static void release(void *memory, void *user)
 
 static question make_question(const random_fog *fog)
 {
-    question q = {.snapshot = NULL};
+    question q = {.lighting = NULL};
     for (int i = 0; i < RAYS; i++) {
         q.rays[i] = random_fog_ray(fog, (uint64_t)i);
         for (int k = 0; k < 3; k++) q.to[i][k] = (float)(20 * sin(1 + i * (k + 1.3)));
@@ -86,25 +89,26 @@ static void query_with_threads(random_fog *fog, uint64_t seed)
     pthread_t threads[THREADS];
     random_fog_make(fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), 300 + seed);
     const question q = make_question(fog);
-    const nebel_fog_desc desc = {.allocator = {allocate, release, NULL}, .ambient = {.1, .2, .3}};
-    nebel_snapshot *const snapshot = fog_commit(&desc, fog->volumes, fog->count);
+    const nebel_fog_desc desc = {.allocator = {allocate, release, NULL}};
+    const nebel_lighting_desc lights = {.environment = {.radiance = {.1, .2, .3}}};
+    nebel_lighting *const lighting = fog_commit_lit(&desc, fog->volumes, fog->count, &lights);
     memset(&alone, 0, sizeof alone);
-    ask(snapshot, &q, &alone);
+    ask(lighting, &q, &alone);
     assert_int_equal(alone.failures, 0);
     for (int i = 0; i < THREADS; i++) {
         memset(&results[i], 0, sizeof results[i]);
         questions[i] = q;
-        questions[i].snapshot = nebel_retain_snapshot(snapshot);
+        questions[i].lighting = nebel_retain_lighting(lighting);
         questions[i].results = &results[i];
     }
     for (int i = 0; i < THREADS; i++) assert_int_equal(pthread_create(&threads[i], NULL, work, &questions[i]), 0);
-    nebel_release_snapshot(snapshot); /* some thread is the last owner */
+    nebel_release_lighting(lighting); /* some thread is the last owner */
     for (int i = 0; i < THREADS; i++) assert_int_equal(pthread_join(threads[i], NULL), 0);
     for (int i = 0; i < THREADS; i++) assert_memory_equal(&alone, &results[i], sizeof alone);
     assert_int_equal(atomic_load(&live), 0);
 }
 
-static void test_threads_get_the_same_bits_from_one_snapshot(void **unused)
+static void test_threads_get_the_same_bits_from_one_lighting(void **unused)
 {
     (void)unused;
     static random_fog fog;
@@ -145,7 +149,7 @@ static void test_threads_edit_fogs_of_their_own(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_threads_get_the_same_bits_from_one_snapshot),
+        cmocka_unit_test(test_threads_get_the_same_bits_from_one_lighting),
         cmocka_unit_test(test_threads_edit_fogs_of_their_own),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

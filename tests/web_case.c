@@ -32,8 +32,11 @@ static void print_features(const char *path)
 {
     nebel_scene *scene = load(path);
     nebel_snapshot *snapshot = NULL;
+    nebel_lighting *lighting = NULL;
     require(nebel_commit_scene_fog(scene, &snapshot));
-    printf("%u %s\n", (unsigned)nebel_pack_features(snapshot), path);
+    require(nebel_create_scene_lighting(scene, snapshot, 0, NULL, &lighting));
+    printf("%u %s\n", (unsigned)nebel_pack_features(lighting), path);
+    nebel_release_lighting(lighting);
     nebel_release_snapshot(snapshot);
     nebel_destroy_scene(scene);
 }
@@ -55,39 +58,39 @@ static void print_words(const char *name, const nebel_texel_f32 *words, size_t c
 }
 
 /* Packs words into `words`, or counts them where it is NULL. */
-typedef nebel_result (*pack_fn)(const nebel_snapshot *snapshot, const double eye[3], nebel_texel_f32 *words,
+typedef nebel_result (*pack_fn)(const nebel_lighting *lighting, const double eye[3], nebel_texel_f32 *words,
                                 size_t capacity, size_t *count);
 
-static void print_packed(const char *name, pack_fn pack, const nebel_snapshot *snapshot, const double eye[3])
+static void print_packed(const char *name, pack_fn pack, const nebel_lighting *lighting, const double eye[3])
 {
     size_t count = 0;
-    require(pack(snapshot, eye, NULL, 0, &count));
+    require(pack(lighting, eye, NULL, 0, &count));
     nebel_texel_f32 *words = allocate(count, sizeof *words);
-    require(pack(snapshot, eye, words, count, &count));
+    require(pack(lighting, eye, words, count, &count));
     print_words(name, words, count);
     free(words);
 }
 
-static nebel_result pack_nodes(const nebel_snapshot *snapshot, const double eye[3], nebel_texel_f32 *words,
+static nebel_result pack_nodes(const nebel_lighting *lighting, const double eye[3], nebel_texel_f32 *words,
                                size_t capacity, size_t *count)
 {
     (void)eye;
-    return nebel_pack_diffusion(snapshot, words, capacity, count);
+    return nebel_pack_diffusion(lighting, words, capacity, count);
 }
 
-static nebel_result pack_environment(const nebel_snapshot *snapshot, const double eye[3], nebel_texel_f32 *words,
+static nebel_result pack_environment(const nebel_lighting *lighting, const double eye[3], nebel_texel_f32 *words,
                                      size_t capacity, size_t *count)
 {
     (void)eye;
-    return nebel_pack_environment(snapshot, 0, words, capacity, count);
+    return nebel_pack_environment(lighting, 0, words, capacity, count);
 }
 
-static void print_voxels(const nebel_snapshot *snapshot)
+static void print_voxels(const nebel_lighting *lighting)
 {
     size_t count = 0;
-    require(nebel_pack_voxels(snapshot, NULL, 0, &count));
+    require(nebel_pack_voxels(lighting, NULL, 0, &count));
     nebel_texel_u32 *texels = allocate(count, sizeof *texels);
-    require(nebel_pack_voxels(snapshot, texels, count, &count));
+    require(nebel_pack_voxels(lighting, texels, count, &count));
     printf("\"voxels\": [");
     for (size_t i = 0; i < 4 * count; i++) printf("%s%u", i > 0 ? "," : "", (unsigned)texels[i / 4].v[i % 4]);
     printf("],\n");
@@ -183,17 +186,20 @@ static void print_picture(const char *path, unsigned width, unsigned height)
 {
     nebel_scene *scene = load(path);
     nebel_snapshot *snapshot = NULL;
+    nebel_lighting *lighting = NULL;
     require(nebel_commit_scene_fog(scene, &snapshot));
+    require(nebel_create_scene_lighting(scene, snapshot, 0, NULL, &lighting));
     const frame f = frame_of(&nebel_get_scene_data(scene)->camera, width, height);
-    printf("{\"features\": %u, \"width\": %u, \"height\": %u,\n", (unsigned)nebel_pack_features(snapshot), width,
+    printf("{\"features\": %u, \"width\": %u, \"height\": %u,\n", (unsigned)nebel_pack_features(lighting), width,
            height);
-    print_packed("fog", nebel_pack_fog, snapshot, f.position);
-    print_voxels(snapshot);
-    print_packed("nodes", pack_nodes, snapshot, f.position);
-    print_packed("environment", pack_environment, snapshot, f.position);
+    print_packed("fog", nebel_pack_fog, lighting, f.position);
+    print_voxels(lighting);
+    print_packed("nodes", pack_nodes, lighting, f.position);
+    print_packed("environment", pack_environment, lighting, f.position);
     print_rays(&f);
     print_pixels(&f);
     printf("}\n");
+    nebel_release_lighting(lighting);
     nebel_release_snapshot(snapshot);
     nebel_destroy_scene(scene);
 }

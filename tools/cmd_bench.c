@@ -27,8 +27,8 @@ static const nb_option options[] = {
     {"device", 'd', "NAME", "cpu (default), or gl: OpenGL on a graphics\nprocessor or in Mesa's software"},
     {"group", 'g', "NAME",
      "only one group; on the cpu: process, segments,\nvertices, frame, sunlight, pass, particles,\noverlap, "
-     "photographs, planet; on gl: pass,\n"
-     "particles, planet"},
+     "lighting, photographs, planet; on gl:\n"
+     "pass, particles, planet"},
     {"json", 'j', "FILE", "also write the figures to FILE, as JSON"},
     {"quick", 'q', NULL, "small and short: whether everything runs; the\nfigures mean little"},
 };

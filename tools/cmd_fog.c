@@ -209,6 +209,7 @@ static int load_scene(crew *all)
             wanted->scene);
     all->shared.scene = all->loaded.scene;
     all->shared.scene_fog = all->loaded.fog;
+    all->shared.scene_lighting = all->loaded.lighting;
     return NB_DONE;
 }
 

@@ -220,7 +220,7 @@ static nebel_result trace_samples(nb_render_state *all, double time, uint32_t fi
         .error = all->samples[NB_LAYER_ERROR],
         .standard_error = all->samples[NB_LAYER_STANDARD_ERROR],
     };
-    const nebel_result result = nebel_set_renderer_fog(all->renderer, all->loaded.fog);
+    const nebel_result result = nebel_set_renderer_lighting(all->renderer, all->loaded.lighting);
     return result == NEBEL_OK ? nebel_render_frame(all->renderer, &desc, &frame) : result;
 }
 
@@ -559,7 +559,8 @@ static int open_renderer(nb_render_state *all)
 {
     nebel_cpu_renderer_desc desc = all->wanted->renderer;
     desc.log = nb_report_log(&all->listener);
-    const nebel_result result = nebel_create_cpu_renderer(surfaces_of(all), all->loaded.fog, &desc, &all->renderer);
+    const nebel_result result =
+        nebel_create_cpu_renderer(surfaces_of(all), all->loaded.lighting, &desc, &all->renderer);
     return result == NEBEL_OK ? choose_method(all) : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 

@@ -162,10 +162,11 @@ static int report_ray(const nb_trace_work *shared, size_t ray, nb_report_listene
 }
 
 /* The results, or NULL after a message. */
-static nebel_transfer *trace_all(const nebel_snapshot *fog, const nb_ray_list *rays, const nb_trace_options *wanted,
+static nebel_transfer *trace_all(const nb_load_result *loaded, const nb_ray_list *rays, const nb_trace_options *wanted,
                                  nb_report_listener *listener)
 {
-    nb_trace_work shared = {.fog = fog, .desc = wanted->trace, .rays = rays};
+    nb_trace_work shared = {.fog = loaded->fog, .desc = wanted->trace, .rays = rays};
+    shared.desc.lighting = loaded->lighting;
     shared.transfers =
         rays->count < SIZE_MAX / sizeof(nebel_transfer) ? malloc((rays->count + 1) * sizeof(nebel_transfer)) : NULL;
     if (shared.transfers == NULL) {
@@ -314,7 +315,7 @@ static int trace_scene(const char *path, nb_trace_options *wanted, nb_ray_list *
     status = read_rays(rays);
     if (status == NB_DONE) {
         wanted->threads = useful_threads(rays->count, wanted->threads);
-        nebel_transfer *const transfers = trace_all(loaded.fog, rays, wanted, &listener);
+        nebel_transfer *const transfers = trace_all(&loaded, rays, wanted, &listener);
         status = transfers != NULL ? write_lights(transfers, rays->count, wanted) : NB_FAILED;
         free(transfers);
     }

@@ -26,6 +26,7 @@ typedef struct work {
     nb_fog_records records;
     float *transmittance; /* three a pixel; NULL: not needed */
     nebel_snapshot *own_fog;
+    nebel_lighting *own_lighting;
     nebel_pixels pixels;
     nb_fog_tale *tale;
 } work;
@@ -192,6 +193,10 @@ static int choose_fog(work *w)
         result = nebel_commit_scene_fog_anew(w->shared->scene, w->frame, seed, &w->own_fog);
     } else if (wanted->frame_of_name && nebel_get_scene_data(w->shared->scene)->animated_volume_count > 0)
         result = nebel_commit_scene_fog_at(w->shared->scene, w->frame, &w->own_fog);
+    if (result == NEBEL_OK && w->own_fog != NULL)
+        result = nebel_create_scene_lighting(w->shared->scene, w->own_fog, w->frame, w->shared->scene_lighting,
+                                             &w->own_lighting);
+    w->pixels.lighting = w->own_fog != NULL ? w->own_lighting : w->shared->scene_lighting;
     return judge(w, wanted->scene, result);
 }
 
@@ -361,6 +366,7 @@ int nb_fog_work(const nb_fog_shared *shared, const nb_fog_files *files, nb_repor
     const int status = run(&w);
     nebel_free_photograph(&w.host, &w.photograph);
     nebel_free_depth(&w.host, &w.depth);
+    nebel_release_lighting(w.own_lighting);
     nebel_release_snapshot(w.own_fog);
     free(w.transmittance);
     return status;

@@ -9,12 +9,13 @@
 /* What all pictures share. */
 typedef struct nb_fog_shared {
     const nb_fog_call *wanted;
-    const nebel_scene *scene;        /* NULL: fog of one density, made for each picture */
-    const nebel_snapshot *scene_fog; /* of pictures that have no fog of their own */
-    const nb_fingerprint *start;     /* of the records; NULL: there are none */
-    int row_threads;                 /* for the rows of a picture */
-    void (*hold)(int is_held);       /* called around writing files */
-    void (*answer)(void *user);      /* called now and then */
+    const nebel_scene *scene;             /* NULL: fog of one density, made for each picture */
+    const nebel_snapshot *scene_fog;      /* of pictures that have no fog of their own */
+    const nebel_lighting *scene_lighting; /* of that fog */
+    const nb_fingerprint *start;          /* of the records; NULL: there are none */
+    int row_threads;                      /* for the rows of a picture */
+    void (*hold)(int is_held);            /* called around writing files */
+    void (*answer)(void *user);           /* called now and then */
     void *user;
 } nb_fog_shared;
 

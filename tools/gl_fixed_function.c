@@ -111,15 +111,17 @@ static void store_colors(float (*colors)[4], size_t count)
 static nebel_result fog_mesh(const nb_fixed_work *w, const nebel_mesh *mesh, nebel_vertex_output *stream)
 {
     const nebel_vertex_format format = format_of(nebel_gl_get_classic_method(w->classic));
-    const nebel_vertex_desc *const look = w->desc->vertex;
+    nebel_vertex_desc look = w->desc->vertex != NULL ? *w->desc->vertex : (nebel_vertex_desc){.channel = 0};
     const size_t size = format == NEBEL_VERTEX_RGBA_FLOAT ? 4 * sizeof(float) : sizeof(float);
     nebel_vertices vertices = {.positions = mesh->positions};
     memcpy(vertices.origin, mesh->origin, sizeof vertices.origin);
     memcpy(vertices.eye, w->desc->camera.position, sizeof vertices.eye);
     *stream = (nebel_vertex_output){format, malloc(((size_t)mesh->vertex_count + 1) * size), size};
     if (stream->data == NULL) return NEBEL_ERROR_MEMORY;
-    if (format == NEBEL_VERTEX_ALPHA) fill_colors(stream->data, mesh->vertex_count, look->color);
-    const nebel_result result = nebel_compute_vertex_fog(w->fixed->fog, look, mesh->vertex_count, &vertices, stream, 1);
+    if (format == NEBEL_VERTEX_ALPHA) fill_colors(stream->data, mesh->vertex_count, look.color);
+    look.lighting = w->fixed->fog;
+    const nebel_result result = nebel_compute_vertex_fog(nebel_get_lighting_snapshot(w->fixed->fog), &look,
+                                                         mesh->vertex_count, &vertices, stream, 1);
     if (result == NEBEL_OK && format == NEBEL_VERTEX_RGBA_FLOAT) store_colors(stream->data, mesh->vertex_count);
     return result;
 }

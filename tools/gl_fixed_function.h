@@ -8,7 +8,7 @@
 typedef struct nb_gl_fixed_function {
     nebel_gl_renderer *renderer;
     const nebel_scene_data *scene; /* whose meshes the renderer has */
-    nebel_snapshot *fog;
+    const nebel_lighting *fog;     /* with its snapshot */
     nebel_log log;
 } nb_gl_fixed_function;
 

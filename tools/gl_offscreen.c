@@ -60,12 +60,17 @@ int nb_gl_painter_open(nb_gl_offscreen *painter, const char *name, const nb_load
 /* Particles are drawn in another way than other fog. */
 static nebel_result set_fog(const nb_gl_offscreen *painter, double frame)
 {
+    const nb_load_result *loaded = painter->loaded;
     nebel_snapshot *volumes = NULL;
-    if (nebel_get_scene_data(painter->loaded->scene)->particle_count == 0) {
-        return nebel_set_gl_renderer_fog(painter->renderer, painter->loaded->fog);
+    nebel_lighting *lighting = NULL;
+    if (nebel_get_scene_data(loaded->scene)->particle_count == 0) {
+        return nebel_set_gl_renderer_lighting(painter->renderer, loaded->lighting);
     }
-    nebel_result result = nebel_commit_scene_volumes_at(painter->loaded->scene, frame, &volumes);
-    if (result == NEBEL_OK) result = nebel_set_gl_renderer_fog(painter->renderer, volumes);
+    nebel_result result = nebel_commit_scene_volumes_at(loaded->scene, frame, &volumes);
+    if (result == NEBEL_OK)
+        result = nebel_create_scene_lighting(loaded->scene, volumes, frame, loaded->lighting, &lighting);
+    if (result == NEBEL_OK) result = nebel_set_gl_renderer_lighting(painter->renderer, lighting);
+    nebel_release_lighting(lighting);
     nebel_release_snapshot(volumes);
     return result;
 }
@@ -73,7 +78,7 @@ static nebel_result set_fog(const nb_gl_offscreen *painter, double frame)
 /* Cells are all fog there is. */
 static nebel_result clear_fog(const nb_gl_offscreen *painter)
 {
-    const nebel_result result = nebel_set_gl_renderer_fog(painter->renderer, NULL);
+    const nebel_result result = nebel_set_gl_renderer_lighting(painter->renderer, NULL);
     return result == NEBEL_OK ? nebel_set_gl_renderer_particles(painter->renderer, NULL, 0) : result;
 }
 
@@ -83,7 +88,7 @@ nebel_result nb_gl_painter_draw(nb_gl_offscreen *painter, double frame, const ne
     const int by_cells = desc->method == NEBEL_GL_METHOD_CELLS || desc->method == NEBEL_GL_METHOD_CELLS_PIXEL;
     nebel_result result = by_cells ? clear_fog(painter) : set_fog(painter, frame);
     if (result == NEBEL_OK && painter->is_fixed) {
-        const nb_gl_fixed_function by = {painter->renderer, painter->scene, painter->loaded->fog, painter->log};
+        const nb_gl_fixed_function by = {painter->renderer, painter->scene, painter->loaded->lighting, painter->log};
         return nb_gl_fixed_draw(&by, desc, planes);
     }
     if (result == NEBEL_OK) result = nebel_gl_render_frame(painter->renderer, desc);

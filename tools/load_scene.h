@@ -10,9 +10,10 @@
 typedef struct nb_load_result {
     nebel_scene *scene;
     nebel_snapshot *fog;
+    nebel_lighting *lighting; /* of the fog */
 } nb_load_result;
 
-/* Reads the scene file, with models where wanted, and makes its air and a snapshot of its fog at a frame. Returns NB_DONE; or
+/* Reads the scene file, with models where wanted, and makes its air and a snapshot of its fog at a frame, with its lights. Returns NB_DONE; or
  * NB_FAILED, said on standard error. `listener` must outlive the result. */
 int nb_load_scene(const char *path, int with_models, double frame, nb_report_listener *listener,
                   nb_load_result *result);
@@ -21,7 +22,7 @@ int nb_load_scene(const char *path, int with_models, double frame, nb_report_lis
 int nb_load_file(const char *path, int with_models, nb_report_listener *listener, nb_load_result *result);
 int nb_load_fog(const char *path, double frame, nb_report_listener *listener, nb_load_result *result);
 
-/* Lights the scene as at another frame, and puts the fog of that in place of the snapshot, where sun or fog move at all. Returns a result; the log has said
+/* Lights the scene as at another frame, and puts the fog of that in place of what was, where sun or fog move at all. Returns a result; the log has said
  * why. */
 nebel_result nb_load_move_fog(nb_load_result *result, double frame);
 

@@ -20,13 +20,20 @@
 #ifndef NEBEL_CLASSIC_H
 #define NEBEL_CLASSIC_H
 
-#include <nebel/nebel.h>
+#include <nebel/light.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 /* ---- fog factors ----------------------------------------------------------------------------- */
+
+/* f = (end - c) / (end - start), exp(-density c) or exp(-(density c)^2), clamped to [0, 1] last; colour = f surface +
+ * (1 - f) fog. c is the distance or fog coordinate [m]. end == start gives a step: 1 below start, 0 from it on.
+ * Source: OpenGL 2.1, section 3.10. Any thread. */
+double nebel_fog_factor_linear(double c, double start, double end);
+double nebel_fog_factor_exp(double c, double density);
+double nebel_fog_factor_exp2(double c, double density);
 
 typedef enum nebel_factor_mode {
     NEBEL_FACTOR_EXP = 0, /* exp(-density c) */
@@ -213,8 +220,9 @@ typedef struct nebel_vertex_output {
     size_t stride; /* bytes, at least the size of the format: 16 for RGBA_FLOAT, else 4; 0: that size */
 } nebel_vertex_output;
 
-/* NULL or {0}: the exact light of the fog. */
+/* NULL or {0}: the exact light of fog without lights. */
 typedef struct nebel_vertex_desc {
+    const nebel_lighting *lighting; /* of the snapshot; NULL: its fog gives source and emission alone */
     nebel_isa isa;
     int channel;            /* whose transmittance is f: 0 red, 1 green, 2 blue */
     nebel_curve_type curve; /* of the way's optical depth: k is the extinction of the volumes */

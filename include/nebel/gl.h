@@ -3,7 +3,7 @@
  *     nebel_gl *gl = NULL;
  *     nebel_create_gl(&(nebel_gl_desc){0}, &gl);          // in the host's context
  *
- *     nebel_gl_set_fog(gl, snapshot, &view);              // each frame: the fog as this eye sees it
+ *     nebel_gl_set_fog(gl, lighting, &view);              // each frame: the fog as this eye sees it
  *     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target);     // the host's own, with one colour texture
  *     nebel_gl_draw_fog(gl, &(nebel_gl_pass){.depth_texture = depth, .color_texture = color});
  *
@@ -74,14 +74,14 @@ nebel_result nebel_create_gl(const nebel_gl_desc *desc, nebel_gl **gl);
 void nebel_destroy_gl(nebel_gl *gl);
 
 /* Hands over the fog as one eye sees it: packed relative to the eye of `view`, with lists of volumes per screen tile
- * where there are more than a few. It holds until the next call, and the snapshot is retained until then. Snapshot
- * NULL: no fog. O(volumes + tiles), plus what the driver takes for the upload; nothing is packed again where snapshot
+ * where there are more than a few. It holds until the next call, and the lighting is retained until then, whose
+ * snapshot has the fog. NULL: no fog. O(volumes + tiles), plus what the driver takes for the upload; nothing is packed again where lighting
  * and eye are those of the last call, to the last bit, and nothing at all is done where the view is, too. Errors:
  * ARGUMENT (also a view that nebel_compute_view_rays refuses, with a width or height of 0 among them), MEMORY, LIMIT (more
  * volumes, larger grids or more phase functions of an environment than the largest texture holds), UNSUPPORTED (the
  * context is another one, or lost). On an error there is no fog.
  */
-nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebel_view *view);
+nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_lighting *lighting, const nebel_view *view);
 
 typedef enum nebel_gl_output {
     NEBEL_GL_OUTPUT_COMPOSE = 0, /* transmittance * color + in-scattering; alpha of the colour texture */
@@ -313,18 +313,18 @@ typedef struct nebel_gl_renderer_desc {
 /* Copies meshes and textures of `scene` to the graphics processor; they are not read again. Light, lamps, background and
  * ambient are read anew for each frame, so `scene` must outlive the renderer. The maps around a lamp are drawn when it
  * is new or has moved. Where lamps are more than there is room for, GL_MAX_ARRAY_TEXTURE_LAYERS or 1,365, those that are
- * brightest at the eye cast shadows. The snapshot is retained; fog NULL: none.
+ * brightest at the eye cast shadows. The lighting, whose snapshot has the fog, is retained; NULL: no fog.
  * On an error *renderer is NULL. O(vertices + triangles + texels). Errors: ARGUMENT and VALUE as nebel_create_cpu_renderer,
  * MEMORY, LIMIT (a texture larger than GL_MAX_TEXTURE_SIZE), UNSUPPORTED (no current context, or one that is too old or
  * cannot draw into textures of floats). */
-nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snapshot *fog,
+nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_lighting *lighting,
                                       const nebel_gl_renderer_desc *desc, nebel_gl_renderer **renderer);
 
 /* NULL is fine. As nebel_destroy_gl where the context is lost. */
 void nebel_destroy_gl_renderer(nebel_gl_renderer *renderer);
 
-/* The fog of the frames from now on. The snapshot is retained; NULL: none. Errors: ARGUMENT. */
-nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *renderer, nebel_snapshot *fog);
+/* The fog of the frames from now on, and its light. The lighting is retained; NULL: no fog. Errors: ARGUMENT. */
+nebel_result nebel_set_gl_renderer_lighting(nebel_gl_renderer *renderer, nebel_lighting *lighting);
 
 /* The particles of the frames from now on, beside the fog and not among it: commit that with
  * nebel_commit_scene_volumes_at. They are copied; count 0: none. Each is drawn as a ball whose transmittance and light

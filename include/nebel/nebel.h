@@ -349,7 +349,8 @@ typedef struct nebel_volume_desc {
     nebel_density density;
     double extinction[3]; /* 1/m, 0 to 1e9, where the density is 1 */
     double source[3];     /* radiance of opaque fog, 0 to 1e9: alone it gives source * (1 - transmittance) */
-    double albedo[3];     /* 0..1: lit by the fog's ambient light and its sun; not together with source */
+    double
+        albedo[3]; /* 0..1: of what light it meets it scatters so much, see nebel/light.h; not together with source */
     nebel_phase phase;  /* where light is scattered to; makes no difference to light that is the same from everywhere */
     double emission[3]; /* radiance per metre, 0 to 1e9, where the density is 1 */
     double start, cutoff; /* m along a ray from where it starts, >= 0: the volume acts between them alone, whatever its
@@ -430,39 +431,12 @@ const nebel_fog_preset *nebel_lookup_fog_preset(const char *name);
 
 typedef struct nebel_fog nebel_fog;
 typedef struct nebel_snapshot nebel_snapshot;
-typedef uint64_t nebel_volume_id; /* 0 is never one */
-
-/* Light from one direction, from 1e18 m away. What it brings to a place is what all fog on the way there lets
- * through; light that was scattered once is not scattered again. */
-typedef struct nebel_sun {
-    double direction[3];  /* towards the sun, any length but 0 where it shines */
-    double irradiance[3]; /* 0 to 1e9, on a surface that faces it; all zero: no sun */
-} nebel_sun;
-
-typedef enum nebel_light_type {
-    NEBEL_LIGHT_POINT = 0, /* shines alike in all directions */
-    NEBEL_LIGHT_SPOT       /* shines into a cone */
-} nebel_light_type;
-
-/* A ball that shines. Its light reaches a place through all fog on the straight way there, scattered once, as the
- * sun's. What it brings is the irradiance from all sides of a ball that is equally bright everywhere; phase functions
- * take it for light from the ball's centre, and fog dims it from the ball's surface on, with
- * radius 0 from its centre. */
-typedef struct nebel_light {
-    nebel_light_type type;
-    double position[3];  /* m */
-    double intensity[3]; /* W/sr, 0 to 1e9, seen from far away; of a spot along its axis */
-    double radius;       /* m, 1e-3 to 1e6; 0: 1e-3. Rays that pass nearer see no more than at its surface */
-    double direction[3]; /* spot: where it shines to, any length but 0 */
-    double inner_angle, outer_angle; /* spot: degrees from the axis, 0 <= inner <= outer, 0 < outer <= 180: full light
-                                        within the inner one, none beyond the outer one, smooth between */
-} nebel_light;
+typedef struct nebel_lighting nebel_lighting; /* see nebel/light.h */
+typedef uint64_t nebel_volume_id;             /* 0 is never one */
 
 typedef struct nebel_fog_desc {
     nebel_allocator allocator;
     nebel_log log;
-    double ambient[3];  /* radiance, the same from everywhere, 0 to 1e9; lights volumes with an albedo */
-    nebel_sun sun;      /* lights volumes with an albedo */
     double max_opacity; /* 0 to 1; 0: 1. See nebel_set_max_opacity */
 } nebel_fog_desc;
 
@@ -485,28 +459,14 @@ nebel_result nebel_update_volume(nebel_fog *fog, nebel_volume_id id, const nebel
 /* Removes a volume. Cost O(1). An id that is unknown or was removed is ARGUMENT. */
 nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id);
 
-/* Sets the ambient radiance, 0 to 1e9, the same from everywhere, in place of any environment before (nebel/light.h). Cost O(1).
- * Errors: ARGUMENT, VALUE. */
-nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3]);
-
-/* Sets the sun. Cost O(1). Errors: ARGUMENT, VALUE. */
-nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun);
-
-/* Sets the point and spot lights, `count` of them, in place of those before; they are copied. They light volumes with an
- * albedo. A query costs for each light what it costs for the sun, except for lights too weak or too far away to matter: their
- * light is left out, and counted in `error`. Cost O(count). Errors: ARGUMENT, VALUE, MEMORY; the lights are then as they
- * were. */
-nebel_result nebel_set_lamps(nebel_fog *fog, size_t count, const nebel_light *lamps);
-
 /* Sets the most that all fog together hides, 0 to 1; 0: no limit, as 1. Where transmittance T of a channel is less than
  * 1 - max_opacity it becomes that, and in-scattering is weakened by as much as opacity is: S max_opacity / (1 - T).
- * Every query answers so. A look, not physics: the fog of a ray is no longer that of its parts. Cost O(1). Errors:
- * ARGUMENT, VALUE. */
+ * Every query answers so. No physics: a ray's fog is no longer that of its parts. Cost O(1). Errors: ARGUMENT, VALUE. */
 nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity);
 
 /* Makes an immutable snapshot of the fog as it is. Cost O(n log n) in the number of volumes. The same volumes give the
  * same bits in every query, in whatever order they were added. Free it with nebel_release_snapshot. Errors: ARGUMENT,
- * MEMORY, UNSUPPORTED (see nebel/light.h), LIMIT (see nebel/light.h). */
+ * MEMORY. */
 nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot);
 
 /* One more owner of the snapshot; any thread. Returns its argument. */
@@ -519,46 +479,21 @@ void nebel_release_snapshot(nebel_snapshot *snapshot);
 /* How many volumes the snapshot holds. */
 size_t nebel_get_volume_count(const nebel_snapshot *snapshot);
 
-/* What a renderer that casts the shadows of its surfaces into fog wants to know: see nebel_ray_visibility. */
-typedef struct nebel_sunlit_fog {
-    double direction[3];   /* towards the sun, of length 1 */
-    double min[3], max[3]; /* m: no fog that the sun lights is outside of this box; infinite where it has no end */
-} nebel_sunlit_fog;
+/* The most that all fog together hides, > 0 to 1; 1: no limit, also of NULL. Any thread. */
+double nebel_get_max_opacity(const nebel_snapshot *snapshot);
 
-/* Returns 1, or 0 where the sun lights no fog of the snapshot; *fog is then untouched. Cost O(n). Any thread. */
-int nebel_snapshot_sunlit_fog(const nebel_snapshot *snapshot, nebel_sunlit_fog *fog);
+/* A box with its sides along the axes. */
+typedef struct nebel_bounds {
+    double min[3], max[3]; /* m; infinite where it has no end */
+} nebel_bounds;
 
-/* The same of point and spot lights: writes the corners [m] of a box outside of which no fog is lit by them, infinite where it has
- * no end, and returns 1; or returns 0 where they light no fog, with min and max untouched. Cost O(n). Any thread. */
-int nebel_snapshot_lamplit_fog(const nebel_snapshot *snapshot, double min[3], double max[3]);
+/* Without fog that is level and without end along x or z, which is made for places near the origin: NEBEL_DENSITY_ALTITUDE
+ * is for all of a planet. */
+#define NEBEL_BOUNDS_WITHOUT_LEVEL_FOG 1u
 
-/* The same of all fog that scatters, which any sky would light: the snapshot need not have one, nor a sun. */
-int nebel_snapshot_skylit_fog(const nebel_snapshot *snapshot, double min[3], double max[3]);
-
-/* The same but for level fog without end along x or z, which is made for places near the origin. */
-int nebel_snapshot_scattering_fog(const nebel_snapshot *snapshot, double min[3], double max[3]);
-
-/* The same fog lit by one light each, for renderers in which light changes from place to place: what the three add to a
- * ray comes to what a snapshot with `sun` adds, and each has its transmittance. */
-typedef struct nebel_split_fog {
-    nebel_snapshot *sun, *sky; /* lit by the sun alone, by ambient light alone */
-    nebel_snapshot *own;       /* with point and spot lights, emission and source; NULL where there is none of it */
-    double max_opacity;        /* 0 to 1, 1: no limit. The parts are not limited: the limit holds for their sum */
-} nebel_split_fog;
-
-/* Makes the three, for nebel_release_split_light. `sun` takes the place of the snapshot's. Cost of each as nebel_commit_fog.
- * On an error *split is all NULL. Any thread. Errors: ARGUMENT, MEMORY, those of nebel_set_sun and of nebel_commit_fog. */
-nebel_result nebel_split_light(const nebel_snapshot *snapshot, const nebel_sun *sun, nebel_split_fog *split);
-void nebel_release_split_light(nebel_split_fog *split);
-
-/* The same fog by all its lights, with another sun. As above. */
-nebel_result nebel_relight(const nebel_snapshot *snapshot, const nebel_sun *sun, nebel_snapshot **lit);
-
-/* How many point and spot lights the snapshot has. */
-size_t nebel_snapshot_lamp_count(const nebel_snapshot *snapshot);
-
-/* Where light `number`, less than their count, is, and its radius as it was given [m]. Any thread. */
-void nebel_snapshot_lamp(const nebel_snapshot *snapshot, size_t number, double position[3], double *radius);
+/* Writes bounds outside of which no fog scatters light, and returns 1; or returns 0 where none does, with *bounds as it
+ * was. `flags`: 0, or NEBEL_BOUNDS_WITHOUT_LEVEL_FOG. Cost O(n). Any thread. */
+int nebel_get_scattering_bounds(const nebel_snapshot *snapshot, uint32_t flags, nebel_bounds *bounds);
 
 /* ---- queries --------------------------------------------------------------------------------- */
 
@@ -598,6 +533,7 @@ typedef struct nebel_ray_visibility {
 } nebel_ray_visibility;
 
 typedef struct nebel_trace_desc {
+    const nebel_lighting *lighting; /* of the snapshot that is asked; NULL: its fog gives source and emission alone */
     nebel_precision precision;
     nebel_isa isa;      /* float only */
     double tolerance;   /* > 0: absolute on transmittance; relative to max(1, largest source radiance) on in-scattering.
@@ -606,12 +542,14 @@ typedef struct nebel_trace_desc {
     int transmittance_only; /* nonzero: in-scattering is not asked for and comes back 0; `error` is that of
                              transmittance. Much cheaper where fog of different light varies along the ray; same bits of
                              transmittance. */
-    int ignore_distances;   /* nonzero: volumes act wherever their shape is. For rays that do not begin at the eye, as
+    int ignore_max_opacity; /* nonzero: the limit of nebel_set_max_opacity does not hold. For renderers that put pieces of rays
+                               together and limit their sum: see nebel_get_max_opacity */
+    int ignore_distances; /* nonzero: volumes act wherever their shape is. For rays that do not begin at the eye, as
                              those to a light, since `start` and `cutoff` of a volume count from where a ray starts. */
     /* Of the rays of the call: where surfaces do not hide them from the sun. NULL: visible everywhere. Fog in shadow scatters
      * no sunlight; transmittance stays as it is, to the bit. Boundaries are taken as exact: `error` says nothing of them. */
     const nebel_ray_visibility *sun_visibility;
-    /* The same of the other lights, one for each light of the snapshot, in their order. */
+    /* The same of the other lights, one for each light of the lighting, in their order. */
     const nebel_ray_visibility *light_visibility;
 } nebel_trace_desc;
 
@@ -642,6 +580,67 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
 nebel_result nebel_invert_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
                                         const nebel_ray *rays, size_t ray_stride, double *distances);
 
+/* ---- fog at single places -------------------------------------------------------------------- */
+
+/* For renderers that sample: properties at a place, which volume scatters, and majorants along a ray. */
+
+/* A point in fog. */
+typedef struct nebel_sample_point {
+    double position[3]; /* m */
+    /* m from where its ray starts, >= 0, for `start` and `cutoff` of volumes; < 0: these do not count. */
+    double distance;
+} nebel_sample_point;
+
+/* What all fog together is at a place. Without `emission` a path of light ends or is scattered there. */
+typedef struct nebel_medium_properties {
+    double extinction[3]; /* 1/m */
+    double scattering[3]; /* 1/m: what of it is scattered, albedo times extinction of volumes that have one */
+    double emission[3];   /* radiance per metre: emission, and source times extinction of volumes that have one. The
+                             sun and the ambient light are not in it: they are the renderer's to bring there */
+} nebel_medium_properties;
+
+/* What fog is at each of n places: shapes, profiles and priorities counted. Strides in bytes. places and matter must
+ * not overlap. max_opacity does not count, which is no property of places. Cost for each place O(k + log N), k of N
+ * volumes near it. Any thread. Errors: ARGUMENT (NULL, a position that is a NaN or farther than NEBEL_MAX_LENGTH). */
+nebel_result nebel_sample_medium(const nebel_snapshot *snapshot, size_t n, const nebel_sample_point *places,
+                                 size_t place_stride, nebel_medium_properties *matter, size_t matter_stride);
+
+/* One of the volumes that scatter at a place. */
+typedef struct nebel_scatterer {
+    nebel_phase phase;
+    double scattering[3]; /* 1/m: this volume's part */
+    double probability;   /* of its choice, 0 to 1; 0: nothing scatters there, and the rest means nothing */
+} nebel_scatterer;
+
+/* Chooses a volume by a random number, 0 <= chance < 1, the more often the more it scatters of `channel` (0 red, 1 green,
+ * 2 blue; -1: of all together), so that the mean over all chances of phase value * scattering / probability is what all
+ * volumes scatter of that channel, or of each. Any thread. Errors: ARGUMENT, as nebel_sample_medium; a chance or a channel
+ * out of range. */
+nebel_result nebel_sample_scatterer(const nebel_snapshot *snapshot, const nebel_sample_point *place, int channel,
+                                    double chance, nebel_scatterer *scatterer);
+
+/* A piece of a ray on which fog is bounded. */
+typedef struct nebel_majorant_segment {
+    double end;           /* m along the ray: where the piece ends, behind where it begins; INFINITY is legal */
+    double extinction[3]; /* 1/m: no place of the piece has more. 0 where there is no fog */
+    double emission[3];   /* radiance per metre, with `source` as in nebel_medium_properties: the same */
+} nebel_majorant_segment;
+
+/* Cuts a ray, whose t_max is not read, into pieces for delta tracking (Woodcock et al. 1965): the piece that begins
+ * `from` metres along it, >= 0. The next begins where this one ends. The bound is the extinction itself in volumes of
+ * constant density between their ends; of round bodies it is that of a box around them; where density changes without
+ * end (height, linear, gaussian) pieces are so short that it is within a few times of the densest place, or that half an
+ * optical depth fits in. On an endless piece the fog either is bounded by 0 or goes on for ever, so that a path ends
+ * there. Ends of volumes are found to some 1e-12 of the distances; over so short a piece a bound may count a volume
+ * that is not there, never leave one out. Cost O(k + log N), k of N volumes on the rest of the ray. Any thread. Errors:
+ * ARGUMENT, as nebel_trace; `from` that is a NaN or below 0. */
+nebel_result nebel_next_majorant(const nebel_snapshot *snapshot, const nebel_ray *ray, int ignore_distances,
+                                 double from, nebel_majorant_segment *bound);
+
+/* 1 where every volume takes all channels alike, so that one path of light stands for all three; else 0. What volumes
+ * scatter and emit may have colour. Any thread. */
+int nebel_is_extinction_gray(const nebel_snapshot *snapshot);
+
 /* ---- planes of rays in, planes of light out: the hot path of a renderer ---------------------- */
 
 /* n rays in caller memory, a plane for each coordinate. Neighbours in a plane are a stride apart, in bytes, a multiple
@@ -661,6 +660,13 @@ typedef struct nebel_ray_planes {
     size_t t_max_stride;
 } nebel_ray_planes;
 
+/* A part of in-scattering, by where its light comes from: see nebel_light_group in nebel/light.h. */
+typedef struct nebel_transfer_group {
+    float *in_scattering[3]; /* RGB radiance, >= 0; with the stride of the whole */
+} nebel_transfer_group;
+
+#define NEBEL_TRANSFER_GROUPS 3 /* NEBEL_LIGHT_GROUP_COUNT */
+
 /* Light in caller memory: planes like those of the rays, whose elements beyond n stay as they are. Every plane may be
  * NULL: not wanted. What is not wanted is not computed as far as possible; the error in particular costs more than the
  * light of a box. */
@@ -669,6 +675,10 @@ typedef struct nebel_transfer_planes {
     size_t transmittance_stride;
     float *in_scattering[3]; /* RGB radiance, >= 0 */
     size_t in_scattering_stride;
+    /* The parts of in-scattering, which add up to it but for rounding; with diffusion the environment's is 0 where fog takes more
+     * from its light than is there, and the sum may be larger. Asking for them changes no bit of it; where fog gives light of
+     * its own and scatters an environment besides, it costs a second march. */
+    nebel_transfer_group group[NEBEL_TRANSFER_GROUPS];
     float *error; /* bound of the absolute error: of all six numbers where a plane of in_scattering is given, else of
                      transmittance */
     size_t error_stride;
@@ -729,6 +739,7 @@ size_t nebel_pixel_size(nebel_pixel_type type);
 
 /* A picture in caller memory, its depth, and the rays it was seen along. Rows `pitch` bytes apart, 0: without gaps. */
 typedef struct nebel_pixels {
+    const nebel_lighting *lighting;        /* of the snapshot; NULL: its fog gives source and emission alone */
     double eye[3];                         /* m, where all rays start */
     float corner[3], step_x[3], step_y[3]; /* the way from the eye to depth 1 through pixel (x, y), x and y counted from
                                               0: corner + x step_x + y step_y */
@@ -783,15 +794,6 @@ typedef struct nebel_blend {
  * PREMULTIPLIED alone. An unknown mode leaves the pixel as it is. Linear light. Source of the formulas:
  * src/formulas/blend.inc. Any thread. */
 nebel_blend nebel_blend_surface(nebel_blend_mode mode, const double color[3], double alpha, const nebel_transfer *fog);
-
-/* ---- standard fog factors -------------------------------------------------------------------- */
-
-/* f = (end - c) / (end - start), exp(-density c) or exp(-(density c)^2), clamped to [0, 1] last; colour = f surface +
- * (1 - f) fog. c is the distance or fog coordinate [m]. end == start gives a step: 1 below start, 0 from it on.
- * Source: OpenGL 2.1, section 3.10. Any thread. */
-double nebel_fog_factor_linear(double c, double start, double end);
-double nebel_fog_factor_exp(double c, double density);
-double nebel_fog_factor_exp2(double c, double density);
 
 #ifdef __cplusplus
 }

@@ -21,7 +21,7 @@
 #ifndef NEBEL_PLANET_H
 #define NEBEL_PLANET_H
 
-#include <nebel/nebel.h>
+#include <nebel/light.h>
 
 #ifdef __cplusplus
 extern "C" {

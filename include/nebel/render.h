@@ -30,14 +30,14 @@ typedef struct nebel_cpu_renderer_desc {
 } nebel_cpu_renderer_desc;
 
 /* Builds the acceleration structure over the meshes of `scene`, which must outlive the renderer, as must nothing else:
- * the snapshot is retained. fog NULL: none. Errors: ARGUMENT, VALUE, MEMORY, UNSUPPORTED. */
-nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_snapshot *fog,
+ * the lighting, whose snapshot has the fog, is retained. lighting NULL: no fog. Errors: ARGUMENT, VALUE, MEMORY, UNSUPPORTED. */
+nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_lighting *lighting,
                                        const nebel_cpu_renderer_desc *desc, nebel_renderer **renderer);
 void nebel_destroy_renderer(nebel_renderer *renderer);
 
-/* The fog of the frames from now on, for fog that moves. The snapshot is retained; NULL: none. Not while a frame is
- * rendered. Errors: ARGUMENT. */
-nebel_result nebel_set_renderer_fog(nebel_renderer *renderer, nebel_snapshot *fog);
+/* The fog of the frames from now on, and its light, for what moves. The lighting is retained; NULL: no fog. Not while a frame
+ * is rendered. Errors: ARGUMENT. */
+nebel_result nebel_set_renderer_lighting(nebel_renderer *renderer, nebel_lighting *lighting);
 
 /* Where the fog of cells is computed. */
 typedef enum nebel_cell_stage {

@@ -3,7 +3,9 @@
  *     nebel_scene *scene = NULL;
  *     if (nebel_load_scene("mist.json", &(nebel_scene_desc){0}, &scene) != NEBEL_OK) ...;   // the log said why
  *     nebel_snapshot *fog = NULL;
+ *     nebel_lighting *lighting = NULL;
  *     nebel_commit_scene_fog(scene, &fog);
+ *     nebel_create_scene_lighting(scene, fog, 0, NULL, &lighting);
  *
  * Reads and checks the JSON of docs/scene-file.md, loads models through Assimp, 16-bit PNG height maps, and reads and
  * writes PNG and OpenEXR pictures. Link with libnebel_scene and libnebel.
@@ -329,9 +331,9 @@ typedef enum nebel_volume_origin {
 /* index < contents->volume_count. */
 nebel_volume_origin nebel_get_volume_origin(const nebel_scene *scene, size_t index);
 
-/* Light that fog scatters more than once, of snapshots from now on: what the section "multiple_scattering" says, in place
+/* Light that fog scatters more than once, of lightings from now on: what the section "multiple_scattering" says, in place
  * of it. NULL: none; the description is copied. Not thread safe against readers of the same scene. Errors: ARGUMENT; LIMIT
- * where the scene may not take so much, which leaves it as it is; a commit has those of nebel_set_diffusion. */
+ * where the scene may not take so much, which leaves it as it is. */
 nebel_result nebel_set_scene_diffusion(nebel_scene *scene, const nebel_diffusion_desc *desc);
 
 /* Counts what the host itself is about to take for the scene, such as pictures, as nebel_scene_desc.memory does. `what`
@@ -353,6 +355,12 @@ nebel_result nebel_commit_scene_fog_anew(const nebel_scene *scene, double frame,
 
 /* The same without the particles, for renderers that draw those in another way. */
 nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot);
+
+/* The scene's lights at a frame for a snapshot of its fog: the sun and the sky as they are at the scene's origin, under its
+ * planet's air and clouds. `previous` as in nebel_lighting_desc. Any thread, as long as nothing changes the scene. On an error
+ * *made is NULL. Errors: ARGUMENT, VALUE, and those of nebel_create_lighting. */
+nebel_result nebel_create_scene_lighting(const nebel_scene *scene, nebel_snapshot *snapshot, double frame,
+                                         const nebel_lighting *previous, nebel_lighting **made);
 
 /* NULL is fine. */
 void nebel_destroy_scene(nebel_scene *scene);

@@ -1,8 +1,8 @@
 /* Fog in shaders: the fog function as text, and the fog packed into numbers that the text reads.
  *
  *     size_t count = 0;
- *     nebel_pack_fog(snapshot, camera_position, NULL, 0, &count);           // how many words?
- *     nebel_pack_fog(snapshot, camera_position, words, capacity, &count);   // each frame: 4 floats a word
+ *     nebel_pack_fog(lighting, camera_position, NULL, 0, &count);           // how many words? lighting: nebel/light.h
+ *     nebel_pack_fog(lighting, camera_position, words, capacity, &count);   // each frame: 4 floats a word
  *     // upload the words into a uniform block of 16 KiB or a float texture, put nebel_get_shader_source() behind
  *     // your #version line, and
  *
@@ -32,11 +32,11 @@
  *         The same for a ray that does not begin at the eye, as one to a light: `start` and `cutoff` of volumes do not
  *         count.
  *
- * Lamps (nebel_set_lamps) are packed with the fog that they light, and in-scattering has their light, attenuated by all
+ * Point and spot lights are packed with the fog that they light, and in-scattering has their light, attenuated by all
  * fog on its way. Where surfaces keep it away the host says, where it defines before the text
  *
  *     NEBEL_LIGHT_VISIBILITY(lamp, origin, direction, t, end)
- *         A vec2: what share of the light of lamp number `lamp`, in the order of nebel_set_lamps, reaches the ray from t
+ *         A vec2: what share of the light of number `lamp`, in the order of the lighting, reaches the ray from t
  *         on, and up to where on the ray that holds, more than t and at most `end` (which may be 1e18). Looked up in a
  *         shadow map, say; all but 0 and 1 is soft shadow.
  *
@@ -119,7 +119,7 @@
  * NEBEL_MAX_ITERATIONS as how many turns of loops a ray may take, for drivers that end loops: see docs/shaders.md. The GLSL
  * ES text makes highp the default precision.
  *
- * Ambient light by direction (nebel_set_environment) is among the in-scattering of fog that has an albedo. Surfaces and
+ * Ambient light by direction (nebel_environment) is among the in-scattering of fog that has an albedo. Surfaces and
  * what is behind everything ask for it themselves, of words that were packed for surfaces:
  *
  *     vec3 nebel_evaluate_environment(vec3 direction);
@@ -155,7 +155,7 @@
 #ifndef NEBEL_SHADER_H
 #define NEBEL_SHADER_H
 
-#include <nebel/nebel.h>
+#include <nebel/light.h>
 #include <nebel/planet.h>
 
 #ifdef __cplusplus
@@ -183,11 +183,11 @@ typedef struct nebel_texel_f32 {
     float v[4];
 } nebel_texel_f32;
 
-/* Packs a snapshot for an eye [m]. *count receives the number of words needed; they are written when `capacity` is at
- * least that. Same snapshot and eye, same words. O(volumes and their parts). Any thread. Errors: ARGUMENT; LIMIT when
+/* Packs the fog of a lighting, and its lights, for an eye [m]. *count receives the number of words needed; they are written when `capacity` is at
+ * least that. Same lighting and eye, same words. O(volumes and their parts). Any thread. Errors: ARGUMENT; LIMIT when
  * capacity is too small (not for words NULL and capacity 0, which only asks) or when more than 2^24 words would be
  * needed. */
-nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_texel_f32 *words,
+nebel_result nebel_pack_fog(const nebel_lighting *lighting, const double eye[3], nebel_texel_f32 *words,
                             size_t capacity, size_t *count);
 
 /* Four integers of a grid's voxels: a uvec4. */
@@ -195,45 +195,45 @@ typedef struct nebel_texel_u32 {
     uint32_t v[4];
 } nebel_texel_u32;
 
-/* Packs the voxels of a snapshot's grids. *count receives the number of texels needed, 0 where there is no grid; they
+/* Packs the voxels of a lighting's fog. *count receives the number of texels needed, 0 where there is no grid; they
  * are written when `capacity` is at least that. A cube of 8 x 8 x 8 voxels takes one texel where all are equal, else
  * 513: each voxel in 65,536 steps between the least and the most of its cube. Where the sun lights fog each grid has
  * besides how much of it lies before the sun, which takes up to 2^23 texels. They do not depend on the eye: pack again
  * when nebel_is_same_voxels denies. O(voxels). Any thread. Errors: ARGUMENT; MEMORY; LIMIT when capacity is too small (not for
  * texels NULL and capacity 0, which only asks) or when more than 2^24 texels (256 MiB) would be needed, for which
  * nebel_pack_fog answers LIMIT, too. */
-nebel_result nebel_pack_voxels(const nebel_snapshot *snapshot, nebel_texel_u32 *texels, size_t capacity, size_t *count);
+nebel_result nebel_pack_voxels(const nebel_lighting *lighting, nebel_texel_u32 *texels, size_t capacity, size_t *count);
 
 /* Whether nebel_pack_voxels makes the same of both: not where the sun moves, nor in sunlight where the largest extinction of a grid's
  * volume passes a power of two. O(volumes) where they share their grids. Any thread. */
-int nebel_is_same_voxels(const nebel_snapshot *a, const nebel_snapshot *b);
+int nebel_is_same_voxels(const nebel_lighting *a, const nebel_lighting *b);
 
 /* Packs the lattice of light that is scattered more than once. *count receives the number of words needed, 0 where
- * nebel_set_diffusion is off or no fog is lit; they are written when `capacity` is at least that: three a node, seven
+ * the lighting has no diffusion or lights no fog; they are written when `capacity` is at least that: three a node, seven
  * where fog has colour. They do not depend on the eye. O(nodes). Any thread. Errors: ARGUMENT; LIMIT when capacity is
  * too small (not for words NULL and capacity 0, which only asks) or when more than 2^24 words (256 MiB) would be needed,
  * for which nebel_pack_fog answers LIMIT, too. */
-nebel_result nebel_pack_diffusion(const nebel_snapshot *snapshot, nebel_texel_f32 *words, size_t capacity,
+nebel_result nebel_pack_diffusion(const nebel_lighting *lighting, nebel_texel_f32 *words, size_t capacity,
                                   size_t *count);
 
-/* Packs what a snapshot's environment (nebel/light.h) is to the fog that it lights, and where `surfaces` is not 0
+/* Packs what a lighting's environment (nebel/light.h) is to the fog that it lights, and where `surfaces` is not 0
  * what nebel_evaluate_environment and nebel_evaluate_environment_diffuse of the text want. *count receives the number of words
  * needed, 0 where no fog scatters light by direction and surfaces are not asked for; they are written when `capacity` is
  * at least that. A gradient takes 4, and 127 for each phase function; a map up to 524,289 (8 MiB) for each, the same once
  * for surfaces, and one for each of its pixels. They do not depend on the eye: pack again when nebel_is_same_environment
  * denies. O(words). Any thread. Errors: ARGUMENT; LIMIT when capacity is too small (not for words NULL and capacity 0,
  * which only asks) or when more than 2^24 words (256 MiB) would be needed, for which nebel_pack_fog answers LIMIT, too. */
-nebel_result nebel_pack_environment(const nebel_snapshot *snapshot, int surfaces, nebel_texel_f32 *words,
+nebel_result nebel_pack_environment(const nebel_lighting *lighting, int surfaces, nebel_texel_f32 *words,
                                     size_t capacity, size_t *count);
 
 /* Whether nebel_pack_environment makes the same of both. O(phase functions). Any thread. */
-int nebel_is_same_environment(const nebel_snapshot *a, const nebel_snapshot *b);
+int nebel_is_same_environment(const nebel_lighting *a, const nebel_lighting *b);
 
-/* What the fog has, as a mask for NEBEL_FEATURES: the text leaves out the shapes, profiles and walks that it does not
+/* What the fog and its lights have, as a mask for NEBEL_FEATURES: the text leaves out the shapes, profiles and walks that it does not
  * name, and a driver makes a smaller and faster program. Fog that has more than the shader was compiled for gives wrong
- * answers; masks of several snapshots may be joined with |. NULL gives everything. O(volumes and their parts). Any
+ * answers; masks of several lightings may be joined with |. NULL gives everything. O(volumes and their parts). Any
  * thread. */
-uint32_t nebel_pack_features(const nebel_snapshot *snapshot);
+uint32_t nebel_pack_features(const nebel_lighting *lighting);
 
 /* The feature of fog whose volumes are of different light: rays may have to be walked, from event to event. */
 #define NEBEL_FEATURE_MIXED 512u

@@ -8,6 +8,7 @@
 #include <nebel/nebel.h>
 
 #include <math.h>
+#include <string.h>
 
 /* How wide the shade of the origin is, m: as scenes are in which fog stands. */
 #define NB_FOG_SHADE_ORIGIN 200.
@@ -81,7 +82,10 @@ static inline nebel_result nb_cloud_shadow_extent_set(nebel_cloud_workspace *clo
     static const double origin[1][3] = {{0, 0, 0}};
     nb_value_range sun = {1, 0}, sky = {1, 0};
     *roof = (nb_cloud_shadow_extent){.owns_ambient = owns_ambient, .clear_sky = 1};
-    if (!nebel_snapshot_skylit_fog(snapshot, roof->min, roof->max)) return NEBEL_OK;
+    nebel_bounds fog;
+    if (!nebel_get_scattering_bounds(snapshot, 0, &fog)) return NEBEL_OK;
+    memcpy(roof->min, fog.min, sizeof roof->min);
+    memcpy(roof->max, fog.max, sizeof roof->max);
     nebel_result result = nb_cloud_shadow_extent_ask(clouds, NB_FOG_SHADE_ORIGIN, origin, &sun, &sky);
     if (owns_ambient) roof->clear_sky = 1 / fmaxf(sky.most, 1e-6f);
     roof->is_shaded = !nb_cloud_shadow_extent_is_small(roof);

@@ -34,7 +34,7 @@ typedef struct meaning {
     const char *unit, *least, *most;
 } meaning;
 
-static const meaning pure = {"", "", ""}, per_metre = {" per m", "", ""}, length = {" m", "", ""};
+static const meaning pure = {"", "", ""}, per_metre = {" per m", "", ""}, length_meaning = {" m", "", ""};
 
 static nebel_result check(const nb_atmosphere_subject *of, const char *what, double number, double least, double most,
                           const meaning *is)
@@ -87,8 +87,8 @@ nebel_result nb_atmosphere_check(const nebel_atmosphere_desc *desc)
     static const meaning at_least = {" m", " (a millionth of the radius)", ""};
     nb_atmosphere_subject of = {&desc->log, ""};
     nebel_result result =
-        check_all(&of, "ground_point", desc->ground_point, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH, &length);
-    if (result == NEBEL_OK) result = check(&of, "radius", desc->radius, 1, 1e12, &length);
+        check_all(&of, "ground_point", desc->ground_point, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH, &length_meaning);
+    if (result == NEBEL_OK) result = check(&of, "radius", desc->radius, 1, 1e12, &length_meaning);
     if (result == NEBEL_OK) result = check(&of, "thickness", desc->thickness, desc->radius / 1e6, 1e12, &at_least);
     if (result == NEBEL_OK) result = check_all(&of, "ground_albedo", desc->ground_albedo, 0, 1, &pure);
     if (result != NEBEL_OK) return result;

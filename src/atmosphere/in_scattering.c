@@ -25,10 +25,10 @@ void nb_gather_aim(nb_gather_job *job)
         job->rest[k] = rest_of(&job->airs->airs[k], job->scatter->orders, job->aspect.sun);
 }
 
-#define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_gather_##suffix,
-static nb_gather_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(KERNEL)};
+#define GATHER_KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_gather_##suffix,
+static nb_gather_fn *const gather_kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(GATHER_KERNEL)};
 
 nb_gather_fn *nb_gather_choose(nebel_isa isa)
 {
-    return kernels[nb_isa_select(isa)];
+    return gather_kernels[nb_isa_select(isa)];
 }

@@ -8,12 +8,12 @@
 /* What is told at least, as a part of the brightest light in the table: rays that are short and steep share few rows. */
 #define LEAST_OFF 2e-4
 
-#define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = &nb_sky_view_kernel_##suffix,
-static const nb_sky_view_kernel *const kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(KERNEL)};
+#define SKY_VIEW_KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = &nb_sky_view_kernel_##suffix,
+static const nb_sky_view_kernel *const sky_view_kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(SKY_VIEW_KERNEL)};
 
 const nb_sky_view_kernel *nb_sky_view_choose(nebel_isa isa)
 {
-    return kernels[nb_isa_select(isa)];
+    return sky_view_kernels[nb_isa_select(isa)];
 }
 
 static nb_sky_view_table table_of(const nebel_sky_view *view)

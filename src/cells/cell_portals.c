@@ -230,8 +230,8 @@ nebel_result nb_cells_derive_portals(nebel_cells *cells)
 
 /* ---- given ----------------------------------------------------------------------------------- */
 
-static nebel_result check_ends(const nebel_cells *cells, const nebel_log *log, size_t number,
-                               const nebel_portal *portal)
+static nebel_result check_portal_ends(const nebel_cells *cells, const nebel_log *log, size_t number,
+                                      const nebel_portal *portal)
 {
     for (int i = 0; i < 2; i++)
         if (portal->cells[i] >= cells->cell_count)
@@ -306,7 +306,7 @@ static nebel_result check_form(const nebel_cells *cells, const nebel_log *log, s
 nebel_result nb_cells_add_portal(nebel_cells *cells, const nebel_log *log, size_t number, const nebel_portal *portal)
 {
     double area[3];
-    nebel_result result = check_ends(cells, log, number, portal);
+    nebel_result result = check_portal_ends(cells, log, number, portal);
     if (result == NEBEL_OK) result = check_places(cells, log, number, portal);
     if (result == NEBEL_OK) result = check_form(cells, log, number, portal, area);
     if (result != NEBEL_OK) return result;

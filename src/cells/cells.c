@@ -96,7 +96,7 @@ static int add_faces(nebel_cells *cells, nb_fog_cell *cell, const nb_volume *vol
     return 1;
 }
 
-static nebel_result check_ends(const nebel_log *log, const nb_volume *volume)
+static nebel_result check_cell_ends(const nebel_log *log, const nb_volume *volume)
 {
     static const char *const ways[2][3] = {{"-x", "-y", "-z"}, {"+x", "+y", "+z"}};
     for (int i = 0; i < 3; i++)
@@ -120,7 +120,7 @@ static nebel_result set_cell(nebel_cells *cells, const nebel_log *log, const neb
     memcpy(cell->color, from->color, sizeof cell->color);
     memcpy(cell->low, volume.low, sizeof cell->low);
     memcpy(cell->high, volume.high, sizeof cell->high);
-    result = check_ends(log, &volume);
+    result = check_cell_ends(log, &volume);
     if (result == NEBEL_OK && !add_faces(cells, cell, &volume))
         result = nb_fail(log, NEBEL_ERROR_MEMORY, "out of memory");
     nb_volume_free(&cells->allocator, &volume);

@@ -1,5 +1,5 @@
 /* The standard fog factors in double, from the one formula text. */
-#include <nebel/nebel.h>
+#include <nebel/classic.h>
 
 #define NB_DOUBLE
 #include "formulas/prelude.h"

@@ -14,16 +14,16 @@
 
 #define NONE UINT32_MAX
 
-typedef struct edge {
+typedef struct mesh_edge {
     uint32_t ends[2];   /* points, ascending */
     uint32_t halves[2]; /* edges; NONE: it is whole */
     double square;      /* of its length; 0 also where floats have no place between its ends */
-} edge;
+} mesh_edge;
 
 /* A vertex in the middle of an edge. */
-typedef struct middle {
+typedef struct edge_middle {
     uint32_t vertex, next;
-} middle;
+} edge_middle;
 
 typedef struct nb_split_triangle {
     uint32_t corners[3]; /* vertices */
@@ -41,9 +41,9 @@ typedef struct mesh {
     float (*positions)[3];
     uint32_t *points; /* of each vertex: the first vertex at its place */
     uint32_t (*parents)[2];
-    edge *edges;
+    mesh_edge *edges;
     uint32_t *middle_of; /* of each edge: the first of the vertices in its middle; NONE: it is whole */
-    middle *middles;
+    edge_middle *middles;
     nb_split_triangle *triangles;
     uint32_t *indices;
     nb_fog_bound *bound;
@@ -73,8 +73,8 @@ static nebel_result add_edge(mesh *m, uint32_t a, uint32_t b, uint32_t *number)
     if (!GROW(m, edges, edge_count, edge_room) || !GROW(m, middle_of, edge_count, middle_of_room))
         return NEBEL_ERROR_MEMORY;
     m->middle_of[m->edge_count] = NONE;
-    edge *const e = &m->edges[m->edge_count];
-    *e = (edge){{a < b ? a : b, a < b ? b : a}, {NONE, NONE}, 0};
+    mesh_edge *const e = &m->edges[m->edge_count];
+    *e = (mesh_edge){{a < b ? a : b, a < b ? b : a}, {NONE, NONE}, 0};
     const float *const p = m->positions[e->ends[0]], *const q = m->positions[e->ends[1]];
     int is_between = 0;
     for (int i = 0; i < 3; i++) {
@@ -149,7 +149,7 @@ static nebel_result find_middle(mesh *m, uint32_t number, uint32_t a, uint32_t b
     }
     if (result != NEBEL_OK) return result;
     if (first != NONE) m->points[*vertex] = m->points[m->middles[first].vertex];
-    m->middles[m->middle_count] = (middle){*vertex, first};
+    m->middles[m->middle_count] = (edge_middle){*vertex, first};
     m->middle_of[number] = (uint32_t)m->middle_count++;
     return NEBEL_OK;
 }
@@ -157,7 +157,7 @@ static nebel_result find_middle(mesh *m, uint32_t number, uint32_t a, uint32_t b
 /* The half of an edge at a point. */
 static uint32_t half_at(const mesh *m, uint32_t number, uint32_t point)
 {
-    const edge *const e = &m->edges[number];
+    const mesh_edge *const e = &m->edges[number];
     return e->halves[e->ends[0] == point ? 0 : 1];
 }
 
@@ -299,7 +299,7 @@ static nebel_result join_edge(mesh *m, const table *seen, uint32_t a, uint32_t b
     const uint32_t low = a < b ? a : b, high = a < b ? b : a;
     size_t at = stir(low, high, 0) & seen->mask;
     while (seen->numbers[at] != NONE) {
-        const edge *const e = &m->edges[seen->numbers[at]];
+        const mesh_edge *const e = &m->edges[seen->numbers[at]];
         if (e->ends[0] == low && e->ends[1] == high) break;
         at = (at + 1) & seen->mask;
     }
@@ -380,7 +380,7 @@ static nebel_result take(mesh *m, const nebel_triangles *given)
 
 /* ---- the public face --------------------------------------------------------------------------- */
 
-static const char *fault_of(const nebel_tessellation_desc *desc, const nebel_triangles *given)
+static const char *tessellation_fault(const nebel_tessellation_desc *desc, const nebel_triangles *given)
 {
     if (!nb_allocator_is_valid(&desc->allocator)) return "the allocator needs both functions or neither";
     if (desc->channel < 0 || desc->channel > 2) return "channel is none of 0, 1, 2";
@@ -462,7 +462,7 @@ nebel_result nebel_tessellate(const nebel_snapshot *snapshot, const nebel_tessel
     *tessellation = NULL;
     if (snapshot == NULL || desc == NULL || triangles == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_log *const log = &snapshot->log;
-    const char *const fault = fault_of(desc, triangles);
+    const char *const fault = tessellation_fault(desc, triangles);
     if (fault != NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "tessellation: %s", fault);
     if (!are_values(desc, triangles))
         return nb_fail(log, NEBEL_ERROR_VALUE, "tessellation: bound, eye and origin must be finite, the bound >= 0");

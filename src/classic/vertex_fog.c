@@ -44,7 +44,8 @@ nebel_result nebel_resolve_vertex_desc(const nebel_vertex_desc *desc, nebel_vert
 /* What holds for all blocks of a call. */
 typedef struct call {
     const nebel_snapshot *snapshot;
-    nebel_isa level; /* chosen */
+    const nebel_lighting *lighting; /* of it */
+    nebel_isa level;                /* chosen */
     nebel_vertex_desc desc;
     nebel_vertices vertices;
     float start[3];   /* the eye from the origin of the positions */
@@ -110,7 +111,8 @@ static nebel_result trace_block(const call *c, nb_vertex_block *b)
         rays.direction_float[k] = b->direction[k];
         if (c->traces_light) transfers.in_scattering[k] = b->light[k];
     }
-    return nebel_trace_planes(c->snapshot, &(nebel_trace_desc){.isa = c->desc.isa}, b->count, &rays, &transfers);
+    return nebel_trace_planes(c->snapshot, &(nebel_trace_desc){.lighting = c->lighting, .isa = c->desc.isa}, b->count,
+                              &rays, &transfers);
 }
 
 /* ---- blocks ---------------------------------------------------------------------------------- */
@@ -216,7 +218,7 @@ static const char *fault_of_places(const nebel_vertices *v)
     return NULL;
 }
 
-static const char *fault_of(const call *c, size_t n, const nebel_vertex_output *outputs, size_t output_count)
+static const char *vertex_fog_fault(const call *c, size_t n, const nebel_vertex_output *outputs, size_t output_count)
 {
     const char *fault = fault_of_places(&c->vertices);
     if (fault == NULL) fault = nb_layout_fault(n, &c->vertices, outputs, output_count);
@@ -230,10 +232,10 @@ static const char *fault_of(const call *c, size_t n, const nebel_vertex_output *
 static void choose_way(call *c, int wants_light)
 {
     c->by_boxes = nb_boxes_list(c->snapshot, c->vertices.origin, c->desc.channel, 0, c->boxes) &&
-                  (!wants_light || nb_boxes_have_one_color(c->snapshot));
+                  (!wants_light || nb_boxes_have_one_color(c->lighting));
     c->traces_light = wants_light && !c->by_boxes;
     for (int k = 0; k < 3; k++) {
-        const double *const own = c->snapshot->medium_count > 0 ? c->snapshot->media[0].radiance : NULL;
+        const double *const own = c->snapshot->medium_count > 0 ? c->lighting->media[0].radiance : NULL;
         const double *const color = c->desc.color != NULL ? c->desc.color : own;
         c->color[k] = color != NULL ? (float)color[k] : 0;
         c->start[k] = (float)(c->vertices.eye[k] - c->vertices.origin[k]);
@@ -248,10 +250,12 @@ nebel_result nebel_compute_vertex_fog(const nebel_snapshot *snapshot, const nebe
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (vertices == NULL || (output_count > 0 && outputs == NULL))
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "vertices: vertices and outputs must not be NULL");
-    call c = {.snapshot = snapshot, .vertices = *vertices};
+    const nebel_lighting *lighting = nb_lighting_of(snapshot, desc != NULL ? desc->lighting : NULL);
+    if (lighting == NULL) return NEBEL_ERROR_ARGUMENT;
+    call c = {.snapshot = snapshot, .lighting = lighting, .vertices = *vertices};
     const nebel_result result = nebel_resolve_vertex_desc(desc != NULL ? desc : &none, &c.desc);
     if (result != NEBEL_OK) return nb_fail(&snapshot->log, result, "vertices: the description is not valid");
-    const char *fault = fault_of(&c, n, outputs, output_count);
+    const char *fault = vertex_fog_fault(&c, n, outputs, output_count);
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "vertices: %s", fault);
     c.level = nb_isa_select(c.desc.isa);
     if (c.level == NEBEL_ISA_COUNT)

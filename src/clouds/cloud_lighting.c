@@ -24,7 +24,7 @@ static nebel_result check(const nebel_cloud_lighting_desc *desc, nebel_sun *sun,
 }
 
 /* Where layers are at a time, and how low the sun is at most where light is asked for. */
-static void set_layers(nebel_cloud_lighting *view, double time)
+static void place_layers(nebel_cloud_lighting *view, double time)
 {
     const nebel_clouds *clouds = view->clouds;
     const double ground = clouds->atmosphere->airs.radius;
@@ -58,7 +58,7 @@ nebel_result nebel_create_cloud_lighting(const nebel_cloud_lighting_desc *desc, 
     made->kernel = kernel;
     made->sun = sun;
     made->tolerance = fmax(1e-6, desc->tolerance > 0 ? desc->tolerance : NEBEL_DEFAULT_TOLERANCE);
-    set_layers(made, desc->time);
+    place_layers(made, desc->time);
     result = nb_cloud_light_make(made);
     if (result == NEBEL_OK) {
         *view = made;

@@ -194,21 +194,21 @@ static void fill_billows(nb_cloud_noise *noise, float *table)
 
 nebel_result nb_cloud_noise_make(const nebel_allocator *allocator, nb_cloud_noise *noise)
 {
-    enum { POINTS = NB_CLOUD_LATTICE * NB_CLOUD_LATTICE * NB_CLOUD_LATTICE };
+    enum { LATTICE_POINTS = NB_CLOUD_LATTICE * NB_CLOUD_LATTICE * NB_CLOUD_LATTICE };
     size_t all = 0;
     for (int level = 0; level < NB_BILLOW_LEVELS; level++) {
         const size_t row = ((size_t)NB_BILLOW_SIZE >> level) + 2;
         noise->billow_starts[level] = (float)all;
         all += row * row * row;
     }
-    noise->turns = nb_allocate(allocator, POINTS, 1);
+    noise->turns = nb_allocate(allocator, LATTICE_POINTS, 1);
     noise->directions = nb_allocate(allocator, NB_CLOUD_DIRECTIONS, sizeof *noise->directions);
     uint16_t *tables = nb_allocate(allocator, all, sizeof *tables);
     float *table = nb_allocate(allocator, NB_BILLOW_SIZE * NB_BILLOW_SIZE * NB_BILLOW_SIZE, sizeof *table);
     const int is_whole = noise->turns != NULL && noise->directions != NULL && tables != NULL && table != NULL;
     noise->billows = tables;
     if (is_whole) {
-        for (uint32_t i = 0; i < POINTS; i++) noise->turns[i] = (uint8_t)(nb_mix_bits(i + 77) >> 13);
+        for (uint32_t i = 0; i < LATTICE_POINTS; i++) noise->turns[i] = (uint8_t)(nb_mix_bits(i + 77) >> 13);
         fill_directions(noise->directions);
         fill_billows(noise, table);
     }

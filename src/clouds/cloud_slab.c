@@ -41,10 +41,10 @@ static double root_of(int i, int count)
 /* The integral over the sphere of a color of the phase function held below a cap, by angles that are finer ahead. */
 static double capped(const nb_cloud_phase *phase, int color, double cap)
 {
-    enum { ANGLES = 512 };
+    enum { CAP_ANGLES = 512 };
     double sum = 0;
-    for (int i = 0; i < ANGLES; i++) {
-        const double part = (i + 0.5) / ANGLES, angle = PI * part * part, wide = 2 * PI * part / ANGLES;
+    for (int i = 0; i < CAP_ANGLES; i++) {
+        const double part = (i + 0.5) / CAP_ANGLES, angle = PI * part * part, wide = 2 * PI * part / CAP_ANGLES;
         float values[4];
         nb_cloud_phase_at(phase, cos(angle), values);
         sum += 2 * PI * sin(angle) * wide * fmin(cap, (double)values[color]);
@@ -243,7 +243,7 @@ static void set_solver(const nb_cloud_phase *phase, int orders, nb_slab_solver *
     for (int k = 0; k < SUNS; k++) solver->suns[k] = pow(root_of(k, SUNS), 2);
 }
 
-static void set_layers(int m, nb_slab_solver *solver)
+static void set_slab_layers(int m, nb_slab_solver *solver)
 {
     double depth = ldexp(FIRST_DEPTH, -HALVINGS);
     nb_slab_layer layer;
@@ -329,7 +329,7 @@ nb_slab *nb_slab_make(const nebel_allocator *allocator, const nb_cloud_phase *ph
         set_solver(phase, ORDERS, solver);
         for (int m = 0, first = 0; m < ORDERS; first += ORDERS - m, m++) {
             set_functions(m, solver);
-            set_layers(m, solver);
+            set_slab_layers(m, solver);
             set_source(solver, m, first, slab);
         }
     } else {

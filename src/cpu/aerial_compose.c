@@ -62,10 +62,15 @@ static float unlimited_between(const nb_aerial_node *a, const nb_aerial_node *b,
            b->shade.sky * sky_between(a, b, c);
 }
 
+static float most_opacity(const nb_air_frame *air)
+{
+    return (float)nebel_get_max_opacity(nebel_get_lighting_snapshot(air->daylit));
+}
+
 /* max_opacity limits all light up to a place, not that of pieces (see nebel_set_max_opacity). */
 static void limit_opacity(const nb_air_frame *air, const nb_aerial_node *before, nb_aerial_node *node)
 {
-    const float most = (float)air->fog.max_opacity;
+    const float most = most_opacity(air);
     for (int c = 0; c < 3; c++) {
         node->fog_sum[c] = before->fog_sum[c] + unlimited_between(before, node, c);
         node->limit[c] = most > 0 ? most / fmaxf(most, 1 - node->fog_left[c]) : node->fog_left[c] < 1 ? 0 : 1;
@@ -75,7 +80,7 @@ static void limit_opacity(const nb_air_frame *air, const nb_aerial_node *before,
 
 static int is_limited(const nb_air_frame *air)
 {
-    return nb_fog_irradiance_is(air) && air->fog.max_opacity < 1;
+    return nb_fog_irradiance_is(air) && most_opacity(air) < 1;
 }
 
 /* The node of a place behind the one before. */
@@ -196,8 +201,8 @@ static int is_by_shade(const nb_aerial_node *a, const nb_aerial_node *b, const f
 
 /* Fog is mostly near and air far: what begins at the eye is cut where air begins to count, other long pieces nearer to
  * their start. */
-static float cut(const nb_frame *frame, const nb_scratch *scratch, int lane, const nb_aerial_node *a,
-                 const nb_aerial_node *b, const float scales[3])
+static float cut_piece(const nb_frame *frame, const nb_scratch *scratch, int lane, const nb_aerial_node *a,
+                       const nb_aerial_node *b, const float scales[3])
 {
     const nb_ray_batch *const rays = &scratch->rays;
     if (is_by_shade(a, b, scales)) return nb_fog_shadow_cut(&scratch->air.fog_shade[lane], a->at, b->at);
@@ -261,7 +266,7 @@ static void keep_fresh(nb_cpu_planets_scratch *scratch)
 }
 
 /* Before which node a place is. */
-static int place_of(const nb_cpu_planets_scratch *scratch, int lane, float at)
+static int node_place(const nb_cpu_planets_scratch *scratch, int lane, float at)
 {
     int place = 0;
     while (scratch->nodes[scratch->order[lane][place]].at[lane] < at) place++;
@@ -276,7 +281,7 @@ static void put_in_order(const nb_air_frame *air, nb_cpu_planets_scratch *scratc
     scratch->count[lane] = 1;
     for (int k = 1; k < scratch->known[lane]; k++) {
         const float at = scratch->nodes[k].at[lane];
-        if (at < end) insert(scratch, lane, place_of(scratch, lane, at), k);
+        if (at < end) insert(scratch, lane, node_place(scratch, lane, at), k);
     }
     for (int i = 0; i < scratch->count[lane] && air->roof.is_shaded; i++) shade_piece(scratch, lane, i);
 }
@@ -324,7 +329,7 @@ static float first_cut(const nb_frame *frame, const nb_scratch *scratch, int lan
 }
 
 /* One more node for each lane that needs it; returns whether any did. */
-static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
+static int choose_nodes(const nb_frame *frame, nb_scratch *scratch, int is_first)
 {
     nb_cpu_planets_scratch *air = &scratch->air;
     int any = 0;
@@ -334,7 +339,7 @@ static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
         air->fresh.at[i] = 0;
         if (!scratch->inside[i] || air->known[i] == NB_AIR_NODES) continue;
         if (is_first && (first = first_cut(frame, scratch, i)) > 0) {
-            cut_at(&frame->air, air, i, place_of(air, i, first), first);
+            cut_at(&frame->air, air, i, node_place(air, i, first), first);
             any = 1;
             continue;
         }
@@ -342,7 +347,7 @@ static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
         nb_aerial_node a, b;
         const int worst = find_worst(&frame->air, air, i, scales, &a, &b, &all);
         if (all <= frame->air.tolerance) continue;
-        const float place = cut(frame, scratch, i, &a, &b, scales);
+        const float place = cut_piece(frame, scratch, i, &a, &b, scales);
         if (!(place > a.at && place < b.at)) continue;
         cut_at(&frame->air, air, i, worst, place);
         any = 1;
@@ -385,7 +390,7 @@ static void sum_up(const nb_air_frame *of, nb_scratch *scratch, int lane)
         before = here;
     }
     sum_light(of, air, lane, light);
-    if (is_limited(of)) all += limit_error(&before, (float)of->fog.max_opacity, samples->error[lane]);
+    if (is_limited(of)) all += limit_error(&before, most_opacity(of), samples->error[lane]);
     for (int c = 0; c < 3; c++) {
         if (is_limited(of)) samples->transmittance[c][lane] = before.fog_left[c];
         samples->transmittance[c][lane] *= air->nodes[0].air_left[c][lane];
@@ -444,7 +449,7 @@ nebel_result nb_aerial_add(const nb_frame *frame, const nebel_ray_planes *fog, c
     if (nb_fog_irradiance_is(&frame->air)) nb_fog_irradiance_light(frame, &scratch->rays, first);
     if (result == NEBEL_OK && frame->air.roof.is_shaded) result = nb_fog_shadow_find(frame, scratch);
     for (int i = 0; i < NB_BATCH; i++) put_in_order(&frame->air, &scratch->air, i);
-    for (int k = 1; result == NEBEL_OK && choose(frame, scratch, k == 1); k++) {
+    for (int k = 1; result == NEBEL_OK && choose_nodes(frame, scratch, k == 1); k++) {
         result = trace_node(frame, fog, trace, scratch, &scratch->air.fresh);
         keep_fresh(&scratch->air);
     }

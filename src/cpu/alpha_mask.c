@@ -25,15 +25,10 @@ NB_ALWAYS_INLINE nb_mask_cell cell_of(uint32_t corners, float threshold)
                            {(float)(corners >> 16 & 255) - threshold, (float)(corners >> 24) - threshold}}};
 }
 
-static int has_edge(const nb_mask_cell *cell)
+static int cell_has_edge(const nb_mask_cell *cell)
 {
     const int solid = (cell->at[0][0] >= 0) + (cell->at[0][1] >= 0) + (cell->at[1][0] >= 0) + (cell->at[1][1] >= 0);
     return solid % 4 != 0;
-}
-
-static uint32_t least(uint32_t a, uint32_t b)
-{
-    return a < b ? a : b;
 }
 
 /* Ways of lines: towards higher x and y, or lower x, or lower y, or both. */
@@ -56,7 +51,8 @@ static int sweep(const nb_alpha_mask *mask, int falls_x, int falls_y)
         for (uint32_t k = 0; k < width; k++) {
             const uint32_t x = falls_x ? k : width - 1 - k, beside = falls_x ? before(x, width) : after(x, width);
             const uint32_t across = ahead[beside] >> shift & 255;
-            const uint32_t found = 1 + least(across, least(row[beside] >> shift & 255, ahead[x] >> shift & 255));
+            const uint32_t found =
+                1 + nb_lesser(across, nb_lesser(row[beside] >> shift & 255, ahead[x] >> shift & 255));
             const uint32_t known = row[x] >> shift & 255;
             if (found >= known) continue;
             row[x] -= (known - found) << shift;
@@ -71,14 +67,14 @@ static void set_clearances(const nb_alpha_mask *mask)
     const size_t count = (size_t)mask->width * mask->height;
     for (size_t i = 0; i < count; i++) {
         const nb_mask_cell cell = cell_of(mask->corners[i], mask->threshold);
-        mask->clearances[i] = has_edge(&cell) ? 0 : UINT32_MAX;
+        mask->clearances[i] = cell_has_edge(&cell) ? 0 : UINT32_MAX;
     }
     for (int way = 0; way < 4; way++)
         while (sweep(mask, way & 1, way >> 1)) {
         }
 }
 
-static void set_corners(const nb_alpha_mask *mask, const nebel_texture *texture)
+static void set_mask_corners(const nb_alpha_mask *mask, const nebel_texture *texture)
 {
     const uint32_t width = mask->width, height = mask->height;
     for (uint32_t y = 0; y < height; y++)
@@ -101,7 +97,7 @@ nebel_result nb_alpha_mask_make(nb_alpha_mask *mask, const nebel_allocator *allo
     mask->corners = nb_allocate(allocator, count, sizeof *mask->corners);
     mask->clearances = nb_allocate(allocator, count, sizeof *mask->clearances);
     if (mask->corners == NULL || mask->clearances == NULL) return NEBEL_ERROR_MEMORY;
-    set_corners(mask, texture);
+    set_mask_corners(mask, texture);
     set_clearances(mask);
     return NEBEL_OK;
 }
@@ -139,7 +135,7 @@ int nb_alpha_mask_is_hole(const nb_alpha_mask *mask, float u, float v)
 /* ---- lines ----------------------------------------------------------------------------------- */
 
 /* Steps end so far beyond a cell: in another one, whatever rounding does. */
-static const double margin = 1e-6;
+static const double mask_margin = 1e-6;
 
 /* Of lines that are not walked the place is of no meaning, but within the mask. */
 NB_ALWAYS_INLINE void begin_axis(nb_alpha_mask_walk *walk, const nb_alpha_mask_lines *lines, int axis, double size,
@@ -152,7 +148,7 @@ NB_ALWAYS_INLINE void begin_axis(nb_alpha_mask_walk *walk, const nb_alpha_mask_l
         const double from = lines->from[axis][i], way = lines->to[axis][i] - from;
         const int is_short = (fabs(way) <= reach) & (fabs(from) < HUGE_VAL) & is_small;
         const double start = is_short ? from : 1, goes = is_short ? way : 0;
-        const double least_place = (goes < 0 ? start + goes : start) - 0.5 - margin;
+        const double least_place = (goes < 0 ? start + goes : start) - 0.5 - mask_margin;
         walk->start[axis][i] = start - 0.5 - size * floor(least_place / size);
         walk->way[axis][i] = goes;
         walk->inverse[axis][i] = 1 / (fabs(goes) > 1e-200 ? goes : 1e-200);
@@ -218,8 +214,8 @@ NB_ALWAYS_INLINE int enter_cells(const nb_alpha_mask_walk *walk, nb_mask_step *s
         const nb_mask_cell v = cell_of(corners[cell], threshold);
         const int32_t clearance = (int32_t)(clearances[cell] >> walk->shift[i] & 255);
         const double reach = clearance > 0 ? clearance : 1;
-        const double across = ((way_x < 0 ? 1 - reach - margin : reach + margin) - f) * walk->inverse[0][i];
-        const double down = ((way_y < 0 ? 1 - reach - margin : reach + margin) - g) * walk->inverse[1][i];
+        const double across = ((way_x < 0 ? 1 - reach - mask_margin : reach + mask_margin) - f) * walk->inverse[0][i];
+        const double down = ((way_y < 0 ? 1 - reach - mask_margin : reach + mask_margin) - g) * walk->inverse[1][i];
         const double shorter = across < down ? across : down, length = shorter < left ? shorter : left;
         const double origin = (double)v.at[0][0], right = (double)(v.at[0][1] - v.at[0][0]);
         const double below = (double)(v.at[1][0] - v.at[0][0]), twist = (double)(v.at[1][1] - v.at[1][0]) - right;

@@ -86,8 +86,9 @@ static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebe
         trace->sun_visibility = sunlit;
     }
     if (frame->has_lamp_shafts && result == NEBEL_OK) {
-        result = nb_light_shafts_find(&scratch->lamp_shafts, &renderer->allocator, &renderer->lamp_tree, renderer->fog,
-                                      &frame->lamplit_box, &scratch->rays, frame->view.advance, scratch->distance);
+        result =
+            nb_light_shafts_find(&scratch->lamp_shafts, &renderer->allocator, &renderer->lamp_tree, renderer->lighting,
+                                 &frame->lamplit_box, &scratch->rays, frame->view.advance, scratch->distance);
         trace->light_visibility = scratch->lamp_shafts.pieces;
     }
     return result;

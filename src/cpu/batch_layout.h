@@ -45,6 +45,11 @@ static inline float nb_clamp_coordinate(float x)
 #define NB_SIMD _Pragma("omp simd")
 #endif
 
+static inline uint32_t nb_lesser(uint32_t a, uint32_t b)
+{
+    return a < b ? a : b;
+}
+
 /* Column and row of lane `i` in its region. */
 static inline uint32_t nb_lane_x(uint32_t i)
 {

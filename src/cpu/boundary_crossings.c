@@ -1,6 +1,6 @@
 #include "boundary_crossings.h"
 
-enum { VISITS = NB_WALL_LEVELS * NB_WALL_FAN };
+enum { WALL_VISITS = NB_WALL_LEVELS * NB_WALL_FAN };
 
 typedef struct nb_crossing_visit {
     int level;
@@ -8,7 +8,7 @@ typedef struct nb_crossing_visit {
 } nb_crossing_visit;
 
 /* Children that the beam may meet, as bits. */
-NB_ALWAYS_INLINE uint32_t meet_children(const nb_wall_node *node, const nb_beam *beam)
+NB_ALWAYS_INLINE uint32_t meet_walls(const nb_wall_node *node, const nb_beam *beam)
 {
     const float *restrict first_x = beam->falls[0] ? node->high[0] : node->low[0];
     const float *restrict last_x = beam->falls[0] ? node->low[0] : node->high[0];
@@ -101,7 +101,7 @@ NB_ALWAYS_INLINE int alternate(const nb_boundary_crossings *passages, int is_dar
 NB_CLONES static int find_passages(const nb_shadow_boundaries *walls, const nb_beam *beam, const nb_shaft_rays *rays,
                                    int is_dark, nb_boundary_crossings *passages)
 {
-    nb_crossing_visit visits[VISITS];
+    nb_crossing_visit visits[WALL_VISITS];
     float scale[NB_PACKET];
     int count = 1;
     NB_SIMD
@@ -113,7 +113,7 @@ NB_CLONES static int find_passages(const nb_shadow_boundaries *walls, const nb_b
     visits[0] = (nb_crossing_visit){walls->level_count - 1, 0};
     while (count > 0) {
         const nb_crossing_visit visit = visits[--count];
-        uint32_t children = meet_children(&walls->levels[visit.level][visit.node], beam);
+        uint32_t children = meet_walls(&walls->levels[visit.level][visit.node], beam);
         for (; children != 0; children &= children - 1) {
             const uint32_t child = NB_WALL_FAN * visit.node + (uint32_t)__builtin_ctz(children);
             if (visit.level > 0)

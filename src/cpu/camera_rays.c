@@ -120,7 +120,7 @@ NB_CLONES static void set_units(nb_ray_batch *rays)
     }
 }
 
-NB_CLONES static void set_starts(const nb_view *view, nb_ray_batch *rays)
+NB_CLONES static void set_camera_starts(const nb_view *view, nb_ray_batch *rays)
 {
     const int orthographic = view->projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
     for (int c = 0; c < 3; c++) {
@@ -149,7 +149,7 @@ double nb_view_pixel(const nb_view *view, uint32_t height)
 void nb_view_finish_rays(const nb_view *view, nb_ray_batch *rays)
 {
     set_units(rays);
-    set_starts(view, rays);
+    set_camera_starts(view, rays);
 }
 
 void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float *x, const float *y, nb_ray_batch *rays)

@@ -39,7 +39,7 @@ static void ask(const nb_cloud_scratch *clouds, uint32_t lane, uint32_t count, c
     }
 }
 
-static nebel_result trace(const nb_frame *frame, nb_cpu_planets_asked *asked)
+static nebel_result trace_air(const nb_frame *frame, nb_cpu_planets_asked *asked)
 {
     const double *const direction[3] = {asked->direction[0], asked->direction[1], asked->direction[2]};
     nebel_transfer_planes transfers = {.error = NULL};
@@ -62,7 +62,7 @@ static nebel_result set_shade(const nb_frame *frame, const nebel_air_shadow *sha
                               nb_cpu_planets_asked *asked)
 {
     if (asked->count == 0) return NEBEL_OK;
-    const nebel_result result = trace(frame, asked);
+    const nebel_result result = trace_air(frame, asked);
     for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
         const uint32_t lane = asked->lanes[i];
         float light[3][NB_SHADED_PIECES];
@@ -96,7 +96,7 @@ enum { CELL = 9, CELLS = (NB_REGION - 1) / CELL };
 _Static_assert((int)CELL *(int)CELLS == (int)NB_REGION - 1, "the last cell ends where a batch does");
 
 /* Lanes of a cell's corners, x first. */
-static void set_corners(uint32_t cell, uint32_t lanes[4])
+static void set_cell_corners(uint32_t cell, uint32_t lanes[4])
 {
     for (uint32_t i = 0; i < 4; i++) lanes[i] = nb_lane_at(CELL * (cell + (i & 1)), (i >> 1) * (NB_BLOCK - 1));
 }
@@ -152,7 +152,7 @@ static void fill_pixel(const uint32_t corners[4], float u, float v, uint32_t lan
 static void fill_cell(uint32_t cell, int is_own[NB_BATCH], nb_cloud_scratch *clouds)
 {
     uint32_t corners[4];
-    set_corners(cell, corners);
+    set_cell_corners(cell, corners);
     if (!are_alike(clouds, corners)) return;
     for (uint32_t i = 0; i < NB_BLOCK * (CELL + 1); i++) {
         const uint32_t x = i % (CELL + 1), y = i / (CELL + 1), lane = nb_lane_at(CELL * cell + x, y);
@@ -189,10 +189,10 @@ nebel_result nb_cloud_air_shade(const nb_frame *frame, const nb_batch_place *pla
 /* ---- up to nodes ----------------------------------------------------------------------------- */
 
 /* What the air does up to the nodes of those that were asked; begins anew. */
-static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_cpu_planets_asked *asked)
+static nebel_result set_cloud_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_cpu_planets_asked *asked)
 {
     if (asked->count == 0) return NEBEL_OK;
-    const nebel_result result = trace(frame, asked);
+    const nebel_result result = trace_air(frame, asked);
     for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
         const uint32_t lane = asked->lanes[i], first = asked->first[i];
         const nebel_cloud_transfer *nodes = &clouds->nodes[lane];
@@ -216,8 +216,8 @@ nebel_result nb_cloud_air_find(const nb_frame *frame, const int is_asked[NB_BATC
     for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
         const nebel_cloud_transfer *nodes = &clouds->nodes[i];
         if (!is_asked[i]) continue;
-        if (!has_room(&asked, nodes->count)) result = set_air(frame, clouds, &asked);
+        if (!has_room(&asked, nodes->count)) result = set_cloud_air(frame, clouds, &asked);
         ask(clouds, i, nodes->count, nodes->t, &asked);
     }
-    return result == NEBEL_OK ? set_air(frame, clouds, &asked) : result;
+    return result == NEBEL_OK ? set_cloud_air(frame, clouds, &asked) : result;
 }

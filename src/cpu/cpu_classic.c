@@ -202,6 +202,7 @@ static nebel_result trace_vertices(const nb_frame *frame, const nebel_mesh *mesh
         renderer->method == NEBEL_METHOD_ALPHA)
         desc = renderer->look;
     desc.isa = renderer->fog_isa;
+    desc.lighting = renderer->lighting;
     const nebel_vertex_output output = {format, fog + first, sizeof *fog};
     nebel_result result = NEBEL_OK;
     if (renderer->fog != NULL)

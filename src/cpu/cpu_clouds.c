@@ -131,7 +131,7 @@ static void choose_ray(const nb_scratch *scratch, int lane, nb_cloud_scratch *cl
     clouds->reach[lane] = 0;
 }
 
-static uint32_t lane_of(int pixel)
+static uint32_t cloud_lane(int pixel)
 {
     return nb_lane_at((uint32_t)pixel % NB_REGION, (uint32_t)pixel / NB_REGION);
 }
@@ -142,7 +142,7 @@ static nebel_result trace_pixels(const nb_frame *frame, const int is_asked[NB_CL
     const nb_air_frame *const air = &frame->air;
     uint32_t count = 0, lanes[NB_BATCH];
     for (int i = 0; i < NB_CLOUD_SHARE; i++) {
-        const uint32_t lane = lane_of(i);
+        const uint32_t lane = cloud_lane(i);
         if (!is_asked[i]) continue;
         clouds->asked[count] = nb_cloud_air_ray(frame, clouds, lane);
         clouds->asked[count].t_max = (double)clouds->end[lane];
@@ -172,12 +172,12 @@ static nebel_result trace_block(const nb_frame *frame, nb_cloud_pixel_block *blo
 }
 
 /* As far as samples go. *any: whether there are clouds. */
-static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
+static nebel_result trace_clouds(const nb_frame *frame, nb_scratch *scratch, int *any)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
     nb_cloud_pixel_block block;
     for (int i = 0; i < NB_CLOUD_SHARE; i++) {
-        const uint32_t lane = lane_of(i);
+        const uint32_t lane = cloud_lane(i);
         if (scratch->inside[lane]) {
             choose_ray(scratch, (int)lane, clouds);
             clouds->end[lane] = end_of(frame, scratch, lane);
@@ -191,7 +191,7 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
     const nebel_result result = trace_block(frame, &block, clouds);
     *any = 0;
     for (int i = 0; i < NB_CLOUD_SHARE; i++) {
-        const uint32_t lane = lane_of(i);
+        const uint32_t lane = cloud_lane(i);
         if (block.is_wanted[i]) clouds->reach[lane] = clouds->end[lane];
         clouds->is_new[lane] = block.is_wanted[i] && clouds->nodes[lane].count > 0;
         *any |= clouds->is_new[lane];
@@ -221,7 +221,7 @@ static nebel_result mark(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *s
 }
 
 /* What is next. *any: whether anything is. */
-static nebel_result choose(const nb_frame *frame, nb_cloud_scratch *clouds, int *any)
+static nebel_result choose_samples(const nb_frame *frame, nb_cloud_scratch *clouds, int *any)
 {
     int is_longer[NB_BATCH] = {0};
     *any = 0;
@@ -247,7 +247,7 @@ static nebel_result find_fog(const nb_frame *frame, nb_aerial_fn haze, nb_scratc
     scratch->rays = scratch->clouds.rays;
     memset(scratch->clouds.marks, 0, sizeof scratch->clouds.marks);
     while (result == NEBEL_OK && any) {
-        result = choose(frame, &scratch->clouds, &any);
+        result = choose_samples(frame, &scratch->clouds, &any);
         if (result == NEBEL_OK && any) result = mark(frame, haze, scratch);
         if (result == NEBEL_OK && any) nb_aerial_keep(scratch);
     }
@@ -271,7 +271,7 @@ static void mix_lane(int has_fog, nb_cloud_scratch *clouds, int lane)
     clouds->doubt[lane] += nb_cloud_compose_missed(nodes, &haze);
 }
 
-static nebel_result mix(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *scratch)
+static nebel_result mix_haze(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *scratch)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
     for (int i = 0; i < NB_BATCH; i++)
@@ -312,8 +312,8 @@ static void lay_over(nb_scratch *scratch, int lane)
 nebel_result nb_cpu_clouds_add(const nb_frame *frame, nb_aerial_fn haze, nb_scratch *scratch)
 {
     int any;
-    nebel_result result = trace(frame, scratch, &any);
-    if (result == NEBEL_OK && any) result = mix(frame, haze, scratch);
+    nebel_result result = trace_clouds(frame, scratch, &any);
+    if (result == NEBEL_OK && any) result = mix_haze(frame, haze, scratch);
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++)
         if (scratch->clouds.nodes[i].count > 0) lay_over(scratch, i);
     return result;

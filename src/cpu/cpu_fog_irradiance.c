@@ -81,61 +81,62 @@ static void set_even_light(nb_air_frame *air, const nebel_planet *home, const do
     }
 }
 
+/* The renderer's lights, with another sun. */
+static nebel_result light_by_sun(const nebel_renderer *renderer, const nebel_sun *sun, nebel_lighting **made)
+{
+    const nebel_light *lights;
+    const size_t light_count = nebel_get_lighting_lights(renderer->lighting, &lights);
+    const nebel_lighting_desc desc = {.sun = *sun,
+                                      .environment = nebel_get_lighting_environment(renderer->lighting),
+                                      .light_count = light_count,
+                                      .lights = lights,
+                                      .diffusion = nebel_get_lighting_diffusion(renderer->lighting),
+                                      .previous = renderer->lighting};
+    return nebel_create_lighting(renderer->fog, &desc, made);
+}
+
 nebel_result nb_fog_irradiance_set(nb_frame *frame)
 {
     nb_air_frame *air = &frame->air;
     const nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
-    double min[3], max[3], middle[3] = {0, 0, 0};
+    double middle[3] = {0, 0, 0};
+    nebel_bounds bounds;
     if (!air->has_fog || !scene->has_sun) return NEBEL_OK;
-    const int is_far = nebel_snapshot_scattering_fog(renderer->fog, min, max) &&
-                       !nb_irradiance_is_near(&scene->planets[0], scene->sun_direction, min, max);
+    const int is_far = nebel_get_scattering_bounds(renderer->fog, NEBEL_BOUNDS_WITHOUT_LEVEL_FOG, &bounds) &&
+                       !nb_irradiance_is_near(&scene->planets[0], scene->sun_direction, bounds.min, bounds.max);
     nebel_result result = nb_fog_shadow_set(frame);
     if (result != NEBEL_OK || !(is_far || air->roof.is_shaded)) return result;
     nebel_sun sun = nb_surface_lighting_sun(scene);
-    if (is_far) find_middle(min, max, middle);
-    air->is_fog_even = !is_far || is_even(air, min, max);
+    if (is_far) find_middle(bounds.min, bounds.max, middle);
+    air->is_fog_even = !is_far || is_even(air, bounds.min, bounds.max);
     result = find_cloud_shade(frame, &air->cloud_shade);
     if (air->is_fog_even)
         set_even_light(air, &scene->planets[0], middle, &sun);
     else if (result == NEBEL_OK)
         result = nb_cpu_planets_set_irradiances(air, &scene->planets[0], &renderer->log);
     if (result == NEBEL_OK && !air->is_fog_even) light_at(air, air->position, air->sun_at_eye, air->sky_at_eye);
-    return result == NEBEL_OK ? nebel_split_light(renderer->fog, &sun, &air->fog) : result;
+    return result == NEBEL_OK ? light_by_sun(renderer, &sun, &air->daylit) : result;
 }
 
 /* ---- along rays ------------------------------------------------------------------------------ */
 
-/* Adds to the error of all. */
-static nebel_result trace_part(const nebel_snapshot *fog, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
-                               float *error, float *const light[3])
-{
-    float own[NB_BATCH];
-    const nebel_transfer_planes transfers = {.in_scattering = {light[0], light[1], light[2]},
-                                             .error = error != NULL ? own : NULL};
-    const nebel_result result = nebel_trace_planes(fog, trace, NB_BATCH, rays, &transfers);
-    for (int i = 0; i < NB_BATCH && error != NULL && result == NEBEL_OK; i++) error[i] += own[i];
-    return result;
-}
-
 nebel_result nb_fog_irradiance_trace(const nb_frame *frame, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
                                      const nebel_transfer_planes *transfers, nb_aerial_batch_nodes *node)
 {
-    const nebel_split_fog *fog = &frame->air.fog;
     if (!nb_fog_irradiance_is(&frame->air))
         return nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, rays, transfers);
-    nebel_trace_desc by_sky = *trace, by_sun = *trace;
-    nebel_transfer_planes with_sky = *transfers;
-    by_sky.sun_visibility = by_sky.light_visibility = by_sun.light_visibility = NULL;
-    for (int c = 0; c < 3; c++) with_sky.in_scattering[c] = node->fog_sky[c];
-    nebel_result result = nebel_trace_planes(fog->sky, &by_sky, NB_BATCH, rays, &with_sky);
-    if (result == NEBEL_OK)
-        result = trace_part(fog->sun, rays, &by_sun, transfers->error,
-                            (float *const[]){node->fog_sun[0], node->fog_sun[1], node->fog_sun[2]});
-    if (fog->own != NULL && result == NEBEL_OK)
-        return trace_part(fog->own, rays, trace, transfers->error, transfers->in_scattering);
-    for (int c = 0; c < 3; c++) memset(transfers->in_scattering[c], 0, NB_BATCH * sizeof(float));
-    return result;
+    nebel_trace_desc by_groups = *trace;
+    nebel_transfer_planes planes = *transfers;
+    by_groups.lighting = frame->air.daylit;
+    by_groups.ignore_max_opacity = 1;
+    for (int c = 0; c < 3; c++) {
+        planes.in_scattering[c] = NULL;
+        planes.group[NEBEL_LIGHT_GROUP_SUN].in_scattering[c] = node->fog_sun[c];
+        planes.group[NEBEL_LIGHT_GROUP_ENVIRONMENT].in_scattering[c] = node->fog_sky[c];
+        planes.group[NEBEL_LIGHT_GROUP_LOCAL].in_scattering[c] = transfers->in_scattering[c];
+    }
+    return nebel_trace_planes(frame->renderer->fog, &by_groups, NB_BATCH, rays, &planes);
 }
 
 void nb_fog_irradiance_light(const nb_frame *frame, const nb_ray_batch *rays, nb_aerial_batch_nodes *node)
@@ -155,7 +156,7 @@ void nb_fog_irradiance_light(const nb_frame *frame, const nb_ray_batch *rays, nb
 }
 
 /* Where a ray is nearest to the middle of a ball, and half of what the ball cuts out of it; 0: it does not meet it. */
-static double pass(const nb_planet *world, const double position[3], const double unit[3], double *half)
+static double pass_ball(const nb_planet *world, const double position[3], const double unit[3], double *half)
 {
     double to[3], square = world->top * world->top;
     for (int c = 0; c < 3; c++) to[c] = world->center[c] - position[c];
@@ -169,7 +170,8 @@ static double pass_first(const nb_air_frame *air, const nb_ray_batch *rays, int 
 {
     double unit[3], nearest = 0;
     for (int c = 0; c < 3; c++) unit[c] = rays->direction[c][lane] / (double)rays->length[lane];
-    for (int k = 0; k < air->count && !(nearest > 0); k++) nearest = pass(&air->worlds[k], air->position, unit, half);
+    for (int k = 0; k < air->count && !(nearest > 0); k++)
+        nearest = pass_ball(&air->worlds[k], air->position, unit, half);
     return nearest;
 }
 

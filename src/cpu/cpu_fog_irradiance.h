@@ -1,16 +1,16 @@
-/* Fog over which daylight changes: traced by its lights apart, each of which is then as bright as at its place. */
+/* Fog over which daylight changes: whose light is traced by groups, each of which is then as bright as at its place. */
 #ifndef NB_CPU_CPU_FOG_IRRADIANCE_H
 #define NB_CPU_CPU_FOG_IRRADIANCE_H
 
 #include "cpu_renderer.h"
 
-/* Splits the light of the frame's fog where it needs that, once air and clouds are set. Errors: MEMORY, and those of
- * nebel_split_light. */
+/* Lights the frame's fog by the sun above the air where it needs that, once air and clouds are set. Errors: those of
+ * nebel_create_lighting. */
 nebel_result nb_fog_irradiance_set(nb_frame *frame);
 
 static inline int nb_fog_irradiance_is(const nb_air_frame *air)
 {
-    return air->fog.sun != NULL;
+    return air->daylit != NULL;
 }
 
 /* nebel_trace_planes, of the frame's fog. Where it is daylit, in-scattering is that of its own light, and the others are in

@@ -47,7 +47,7 @@ typedef struct shadow_sum {
     nb_value_range range;
 } shadow_sum;
 
-static void add(shadow_sum *s, float length, float part, float within)
+static void add_shade(shadow_sum *s, float length, float part, float within)
 {
     s->length += length;
     s->integral += length * part;
@@ -71,14 +71,14 @@ nb_segment_shadow nb_fog_shadow_between(const nb_fog_shadow *shade, float a, flo
     for (uint32_t k = 0; k < p->count && p->t[k] < b; k++) {
         const float length = fminf(b, p->t[k + 1]) - fmaxf(a, p->t[k]);
         if (!(length > 0)) continue;
-        add(&sun, length, p->sun_transmittance[k], p->error[k]);
-        add(&sky, length, p->sky_transmittance[k], p->error[k]);
+        add_shade(&sun, length, p->sun_transmittance[k], p->error[k]);
+        add_shade(&sky, length, p->sky_transmittance[k], p->error[k]);
     }
     /* Fog over clouds. */
     const float over = fminf(b, shade->end) - fmaxf(a, p->t[p->count]);
     if (over > 0) {
-        add(&sun, over, 1, 0);
-        add(&sky, over, shade->clear_sky, 0);
+        add_shade(&sun, over, 1, 0);
+        add_shade(&sky, over, shade->clear_sky, 0);
     }
     between.sun = mean_of(&sun, &between.sun_doubt, &between.sun_within);
     between.sky = mean_of(&sky, &between.sky_doubt, &between.sky_within);

@@ -68,12 +68,12 @@ static nebel_result set_window(nb_frame *frame, const nebel_frame_desc *desc)
         NEBEL_WINDOW_STEP, NEBEL_WINDOW_STEP);
 }
 
-static nb_lit_box box_of(const nb_geometry *geometry, const double min[3], const double max[3])
+static nb_lit_box lit_box_of(const nb_geometry *geometry, const nebel_bounds *bounds)
 {
     nb_lit_box box;
     for (int c = 0; c < 3; c++) {
-        box.low[c] = (float)(min[c] - geometry->origin[c]);
-        box.high[c] = (float)(max[c] - geometry->origin[c]);
+        box.low[c] = (float)(bounds->min[c] - geometry->origin[c]);
+        box.high[c] = (float)(bounds->max[c] - geometry->origin[c]);
     }
     return box;
 }
@@ -84,19 +84,18 @@ static nebel_result set_shafts(nb_frame *frame)
     nebel_renderer *renderer = frame->renderer;
     const nb_geometry *geometry = &renderer->geometry;
     const int may = renderer->fog != NULL && renderer->method == NEBEL_METHOD_EXACT && geometry->scene != NULL;
-    nebel_sunlit_fog fog;
-    double min[3], max[3];
+    nebel_bounds by_sun, by_lights;
     nebel_result result = NEBEL_OK;
-    const nebel_snapshot *sunlit = nb_fog_irradiance_is(&frame->air) ? frame->air.fog.sun : renderer->fog;
-    frame->has_shafts = may && nebel_snapshot_sunlit_fog(sunlit, &fog);
-    frame->has_lamp_shafts = may && nebel_snapshot_lamplit_fog(renderer->fog, min, max);
+    const nebel_lighting *lighting = nb_fog_irradiance_is(&frame->air) ? frame->air.daylit : renderer->lighting;
+    frame->has_shafts = may && nebel_get_lit_bounds(lighting, NEBEL_LIGHT_GROUP_SUN, &by_sun);
+    frame->has_lamp_shafts = may && nebel_get_lit_bounds(lighting, NEBEL_LIGHT_GROUP_LOCAL, &by_lights);
     if (frame->has_shafts) {
-        frame->sunlit_box = box_of(geometry, fog.min, fog.max);
-        result = nb_sun_cells_set(&renderer->sun_cells, geometry, fog.direction);
+        frame->sunlit_box = lit_box_of(geometry, &by_sun);
+        result = nb_sun_cells_set(&renderer->sun_cells, geometry, nebel_get_lighting_sun(lighting).direction);
         frame->eye = nb_sun_shafts_eye(&renderer->sun_cells, geometry, &frame->view);
     }
     if (frame->has_lamp_shafts && result == NEBEL_OK) {
-        frame->lamplit_box = box_of(geometry, min, max);
+        frame->lamplit_box = lit_box_of(geometry, &by_lights);
         result = nb_shadow_tree_set_lights(&renderer->lamp_tree, geometry, renderer->threads);
     }
     if (result == NEBEL_OK) return NEBEL_OK;
@@ -104,7 +103,7 @@ static nebel_result set_shafts(nb_frame *frame)
 }
 
 /* What cannot be drawn with air is refused, not left out. */
-static nebel_result set_air(nb_frame *frame, const nebel_frame_desc *desc)
+static nebel_result set_frame_air(nb_frame *frame, const nebel_frame_desc *desc)
 {
     nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
@@ -150,13 +149,15 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
         const nb_raster_target picture = {desc->width, desc->height, nb_sample_range_of(frame->samples)};
         nb_raster_set(&frame->raster, geometry, &frame->view, &picture, renderer->threads);
     }
-    frame->trace =
-        (nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT, .isa = renderer->fog_isa, .tolerance = desc->tolerance};
+    frame->trace = (nebel_trace_desc){.lighting = renderer->lighting,
+                                      .precision = NEBEL_PRECISION_FLOAT,
+                                      .isa = renderer->fog_isa,
+                                      .tolerance = desc->tolerance};
     result = nb_classic_fog_set_vertices(frame);
     if (result != NEBEL_OK)
         return nb_fail(&renderer->log, result, "frame: fog at a vertex: %s", nebel_result_text(result));
     result = nb_path_batch_set(frame, desc);
-    if (result == NEBEL_OK) result = set_air(frame, desc);
+    if (result == NEBEL_OK) result = set_frame_air(frame, desc);
     if (result == NEBEL_OK) result = nb_cpu_clouds_set(frame, desc);
     if (result == NEBEL_OK) result = nb_fog_irradiance_set(frame);
     if (result == NEBEL_OK) result = set_shafts(frame);
@@ -202,7 +203,7 @@ static nebel_result render_samples(const nb_frame *frame, uint32_t left, uint32_
 }
 
 /* One thread at a time. */
-static void add_part(nb_frame_progress *state, nebel_result result)
+static void finish_part(nb_frame_progress *state, nebel_result result)
 {
     state->done++;
     if (result == NEBEL_OK && state->result == NEBEL_OK && state->desc->progress != NULL &&
@@ -221,7 +222,7 @@ static int count_part(nb_frame_progress *state, nebel_result result)
 {
     int stop;
 #pragma omp critical(nb_count_part)
-    add_part(state, result);
+    finish_part(state, result);
 #pragma omp atomic read
     stop = state->stop;
     return stop;

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-static double part_of(double place, int count, int *first)
+static double fraction_of(double place, int count, int *first)
 {
     *first = place < count - 2 ? (int)place : count - 2;
     return place - *first;
@@ -14,8 +14,8 @@ static void find_sun(const nb_irradiance_table *daylight, double height, double 
 {
     int h, s;
     const double v =
-        part_of(sqrt(height / daylight->thickness) * (NB_IRRADIANCE_HEIGHTS - 1), NB_IRRADIANCE_HEIGHTS, &h);
-    const double u = part_of(sqrt(cosine) * (NB_IRRADIANCE_SUNS - 1), NB_IRRADIANCE_SUNS, &s);
+        fraction_of(sqrt(height / daylight->thickness) * (NB_IRRADIANCE_HEIGHTS - 1), NB_IRRADIANCE_HEIGHTS, &h);
+    const double u = fraction_of(sqrt(cosine) * (NB_IRRADIANCE_SUNS - 1), NB_IRRADIANCE_SUNS, &s);
     for (int c = 0; c < 3; c++) {
         const double low = (1 - u) * (double)daylight->depth[h][s][c] + u * (double)daylight->depth[h][s + 1][c];
         const double high =
@@ -34,8 +34,8 @@ void nb_irradiance_at(const nb_irradiance_table *daylight, nb_irradiance_receive
     const double height = fmax(0, radius - daylight->radius);
     int s;
     const double part =
-        part_of(0.5 * (nb_irradiance_spread(cosine) / nb_irradiance_spread(1) + 1) * (NB_IRRADIANCE_SKIES - 1),
-                NB_IRRADIANCE_SKIES, &s);
+        fraction_of(0.5 * (nb_irradiance_spread(cosine) / nb_irradiance_spread(1) + 1) * (NB_IRRADIANCE_SKIES - 1),
+                    NB_IRRADIANCE_SKIES, &s);
     for (int c = 0; c < 3; c++)
         sky[c] = exp((1 - part) * (double)daylight->sky[of][s][c] + part * (double)daylight->sky[of][s + 1][c]);
     if (height <= daylight->thickness && cosine >= 0) {

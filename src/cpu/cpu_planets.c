@@ -62,7 +62,7 @@ void nb_cpu_planets_free(nb_air_frame *air)
         nebel_destroy_sky_view(air->worlds[i].view);
         nb_release(air->allocator, air->worlds[i].daylight);
     }
-    nebel_release_split_light(&air->fog);
+    nebel_release_lighting(air->daylit);
 }
 
 /* ---- along rays ------------------------------------------------------------------------------ */
@@ -81,7 +81,7 @@ static double uneclipsed(const nb_air_frame *air, int world, const double place[
 /* ---- the ground ------------------------------------------------------------------------------ */
 
 /* Surfaces on the ground touch it: they are seen where they lie this little behind it, which is more than rounding. */
-static float behind(float t)
+static float behind_ground(float t)
 {
     return 1e-5f * t + 1e-3f;
 }
@@ -125,7 +125,7 @@ void nb_cpu_planets_find_ground(const nb_air_frame *air, double advance, const n
         const int is_hit = hits->surface[i] != NB_NONE;
         const float t = (float)(advance * (double)rays->length[i]) + hits->t[i];
         /* From on the ground or below it all surfaces are seen before it. */
-        if (!inside[i] || (is_hit && (distance[i] == 0 || distance[i] + behind(t) >= t)))
+        if (!inside[i] || (is_hit && (distance[i] == 0 || distance[i] + behind_ground(t) >= t)))
             distance[i] = HUGE_VALF;
         else if (distance[i] < HUGE_VALF)
             hits->surface[i] = NB_NONE;
@@ -140,8 +140,8 @@ int nb_cpu_planets_sees_ground(const nb_cpu_planets_scratch *scratch)
 }
 
 /* The ground is not lifted: no surface hides fog and lamps from it there. */
-static void set_starts(const double position[3], const nb_ray_batch *rays, const nb_surface_batch *points,
-                       nb_cpu_planets_scratch *scratch)
+static void set_ground_starts(const double position[3], const nb_ray_batch *rays, const nb_surface_batch *points,
+                              nb_cpu_planets_scratch *scratch)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         const float distance = scratch->ground.distance[i];
@@ -184,7 +184,7 @@ void nb_cpu_planets_set_points(const nb_air_frame *air, double advance, const do
         hits->surface[i] = NB_GROUND;
         hits->t[i] = (float)((double)distance - advance * (double)rays->length[i]);
     }
-    set_starts(position, rays, points, scratch);
+    set_ground_starts(position, rays, points, scratch);
 }
 
 void nb_cpu_planets_light_at(const nb_air_frame *air, nb_irradiance_receiver of, const double place[3], double sun[3],

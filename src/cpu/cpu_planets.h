@@ -24,13 +24,14 @@ typedef struct nb_air_frame {
     int ends;                            /* rays may end before the ground */
     int has_fog;
     float tolerance;
-    double reach;        /* m, from the camera: no air is beyond */
-    int owns_ambient;    /* ambient light is the planet's sky */
-    double to_sun[3];    /* of length 1 */
-    double position[3];  /* of the camera */
-    nebel_split_fog fog; /* all NULL: daylight does not change over it, and the rest means nothing */
-    int is_fog_even;     /* daylight is the same all over it: that at the eye, below */
-    float cloud_shade;   /* part of the sun that clouds leave to fog */
+    double reach;       /* m, from the camera: no air is beyond */
+    int owns_ambient;   /* ambient light is the planet's sky */
+    double to_sun[3];   /* of length 1 */
+    double position[3]; /* of the camera */
+    nebel_lighting
+        *daylit; /* fog in the sun above the air; NULL: daylight does not change over it, and the rest means nothing */
+    int is_fog_even;   /* daylight is the same all over it: that at the eye, below */
+    float cloud_shade; /* part of the sun that clouds leave to fog */
     double sun_at_eye[3], sky_at_eye[3];
     nb_cloud_shadow_extent roof; /* of fog that clouds shade by its place; cloud_shade is then 1 */
 } nb_air_frame;

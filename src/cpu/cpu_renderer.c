@@ -70,7 +70,7 @@ static nebel_result set_up(nebel_renderer *renderer, nebel_isa isa)
     return result;
 }
 
-nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_snapshot *fog,
+nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_lighting *lighting,
                                        const nebel_cpu_renderer_desc *desc, nebel_renderer **renderer)
 {
     if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -84,7 +84,8 @@ nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_snap
     made->allocator = made->geometry.allocator = allocator;
     made->log = made->geometry.log = desc->log;
     made->scene = scene;
-    made->fog = fog != NULL ? nebel_retain_snapshot(fog) : NULL;
+    made->lighting = nebel_retain_lighting(lighting);
+    made->fog = nebel_get_lighting_snapshot(lighting);
     made->fog_isa = desc->isa;
     made->threads = count_threads(desc->thread_count);
     nb_srgb_table_set(&made->table);
@@ -101,12 +102,13 @@ nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_snap
     return NEBEL_OK;
 }
 
-nebel_result nebel_set_renderer_fog(nebel_renderer *renderer, nebel_snapshot *fog)
+nebel_result nebel_set_renderer_lighting(nebel_renderer *renderer, nebel_lighting *lighting)
 {
     if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (fog != NULL) nebel_retain_snapshot(fog);
-    nebel_release_snapshot(renderer->fog);
-    renderer->fog = fog;
+    (void)nebel_retain_lighting(lighting);
+    nebel_release_lighting(renderer->lighting);
+    renderer->lighting = lighting;
+    renderer->fog = nebel_get_lighting_snapshot(lighting);
     return NEBEL_OK;
 }
 
@@ -268,7 +270,7 @@ void nebel_destroy_renderer(nebel_renderer *renderer)
         nb_sun_shafts_free(&renderer->scratch[i].shafts, &allocator);
         nb_light_shafts_free(&renderer->scratch[i].lamp_shafts, &allocator);
     }
-    if (renderer->fog != NULL) nebel_release_snapshot(renderer->fog);
+    nebel_release_lighting(renderer->lighting);
     nb_release(&allocator, renderer->scratch_memory);
     nb_release(&allocator, renderer->vertex_fog);
     nb_release(&allocator, renderer);

@@ -103,7 +103,8 @@ struct nebel_renderer {
     nebel_allocator allocator;
     nebel_log log;
     const nebel_scene_data *scene;
-    nebel_snapshot *fog; /* NULL: none */
+    nebel_lighting *lighting; /* NULL: no fog */
+    nebel_snapshot *fog;      /* of the lighting; NULL: none */
     nebel_method method;
     const nebel_cells *cells; /* of the methods CELLS and CELLS_PIXEL */
     nebel_factor_desc factor; /* of the methods LINEAR, EXP, EXP2; resolved */

@@ -34,7 +34,7 @@ static nb_taps find_taps(float coordinate, uint32_t size)
     return (nb_taps){first, first + 1 < size ? first + 1 : 0, (float)(place - whole)};
 }
 
-static float mix(float a, float b, float weight)
+static float lerp(float a, float b, float weight)
 {
     return a + (b - a) * weight;
 }
@@ -46,10 +46,10 @@ static void sample_texture(const nebel_texture *texture, const nb_srgb_table *ta
     const uint8_t *bottom = texture->rgba + 4 * (size_t)y.second * texture->width;
     for (size_t c = 0; c < 3; c++) {
         const float above =
-            mix(table->linear[top[4 * (size_t)x.first + c]], table->linear[top[4 * (size_t)x.second + c]], x.weight);
-        const float below = mix(table->linear[bottom[4 * (size_t)x.first + c]],
-                                table->linear[bottom[4 * (size_t)x.second + c]], x.weight);
-        color[c] = mix(above, below, y.weight);
+            lerp(table->linear[top[4 * (size_t)x.first + c]], table->linear[top[4 * (size_t)x.second + c]], x.weight);
+        const float below = lerp(table->linear[bottom[4 * (size_t)x.first + c]],
+                                 table->linear[bottom[4 * (size_t)x.second + c]], x.weight);
+        color[c] = lerp(above, below, y.weight);
     }
 }
 

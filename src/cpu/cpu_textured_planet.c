@@ -80,7 +80,7 @@ static void show_ground(const nb_frame *frame, nb_scratch *scratch, int lane)
 }
 
 /* Of one shell of each ray. */
-static void add_shell(nb_shell_scratch *shells, uint32_t number)
+static void blend_shell(nb_shell_scratch *shells, uint32_t number)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         if (number >= shells->hits[i].count) continue;
@@ -130,7 +130,7 @@ nebel_result nb_cpu_textured_trace(const nb_frame *frame, const nebel_ray_planes
         nebel_result result = NEBEL_OK;
         if (fog != NULL) result = trace_shell(frame, fog, trace, shells, k);
         if (result != NEBEL_OK) return result;
-        add_shell(shells, k);
+        blend_shell(shells, k);
     }
     return NEBEL_OK;
 }

@@ -1,5 +1,7 @@
 #include "delta_tracking.h"
 
+#include "math/vector.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -41,11 +43,6 @@ double nb_tracking_reach(const nebel_ray *ray)
         if (ray->direction[i] != 0) reach = fmin(reach, (1 - 1e-12) * (far - ray->origin[i]) / ray->direction[i]);
     }
     return fmax(reach, 0);
-}
-
-static double largest(const double rgb[3])
-{
-    return fmax(rgb[0], fmax(rgb[1], rgb[2]));
 }
 
 static void start_walk(const nb_tracker *track, nb_media_part part, nb_media_walk *walk)
@@ -92,7 +89,7 @@ static nebel_result next_piece(const nb_tracker *track, nb_media_walk *walk, dou
     p->rate = walk->extinction[track->channel];
     p->boost = 1;
     p->end = fmin(walk->end, reach);
-    if (largest(walk->emission) > 0) {
+    if (nb_vector_largest(walk->emission) > 0) {
         if (p->rate == 0 && isinf(walk->end) && isinf(track->ray.t_max)) return NEBEL_ERROR_UNBOUNDED;
         p->rate = fmax(p->rate, STOPS_OF_EMISSION / (p->end - t));
     }
@@ -153,7 +150,7 @@ nebel_result nb_tracking_fly(const nb_tracker *track, nb_rng *chance, nb_free_fl
 }
 
 /* 0: the weight is gone. */
-static int survives(double *weight, nb_rng *chance)
+static int weight_survives(double *weight, nb_rng *chance)
 {
     if (*weight >= SMALL_WEIGHT) return 1;
     *weight = nb_rng_next(chance) * SMALL_WEIGHT < *weight ? SMALL_WEIGHT : 0;
@@ -180,7 +177,7 @@ nebel_result nb_tracking_transmittance(const nb_tracker *track, nb_rng *chance, 
             result = nb_tracking_look(track, t, NB_MEDIA_WITHOUT_AIR, &place, &matter);
             if (result != NEBEL_OK) return result;
             weight *= fmax(1 - matter.all.extinction[channel] / rate, 0);
-            if (!survives(&weight, chance)) return NEBEL_OK;
+            if (!weight_survives(&weight, chance)) return NEBEL_OK;
         }
         t = end;
     }

@@ -366,7 +366,7 @@ static nebel_result attach(nb_geometry *geometry, size_t number)
     return result_of(rtcGetDeviceError(geometry->device));
 }
 
-static nebel_result build(nb_geometry *geometry)
+static nebel_result build_scene(nb_geometry *geometry)
 {
     if (geometry->scene != NULL) rtcReleaseScene(geometry->scene);
     geometry->scene = rtcNewScene(geometry->device);
@@ -413,7 +413,7 @@ nebel_result nb_geometry_place(nb_geometry *geometry, const double camera[3])
         geometry->bounds_min[i] = (float)(low[i] - origin[i]);
         geometry->bounds_max[i] = (float)(high[i] - origin[i]);
     }
-    return build(geometry);
+    return build_scene(geometry);
 }
 
 void nb_geometry_free(nb_geometry *geometry)

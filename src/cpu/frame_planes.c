@@ -8,20 +8,15 @@ typedef struct nb_area {
     uint32_t left, top, columns, rows;
 } nb_area;
 
-static uint32_t least(uint32_t a, uint32_t b)
-{
-    return a < b ? a : b;
-}
-
 static nb_area area_of(const nb_frame *frame, const nb_batch_place *place)
 {
     const nebel_window *window = &frame->window;
     const uint32_t left = place->left - window->left, top = place->top + nb_lane_y(place->first) - window->top;
-    return (nb_area){left, top, least(NB_REGION, window->width - left), least(NB_BLOCK, window->height - top)};
+    return (nb_area){left, top, nb_lesser(NB_REGION, window->width - left), nb_lesser(NB_BLOCK, window->height - top)};
 }
 
 /* Lane of a pixel in its batch: the inverse of nb_lane_x and nb_lane_y. */
-static uint32_t lane_of(uint32_t x, uint32_t y)
+static uint32_t batch_lane(uint32_t x, uint32_t y)
 {
     return x / NB_BLOCK * NB_PACKET + y * NB_BLOCK + x % NB_BLOCK;
 }
@@ -30,7 +25,7 @@ static void set_vectors(float *plane, uint32_t width, const nb_area *area, const
 {
     for (uint32_t y = 0; y < area->rows; y++) {
         float *row = plane + 3 * ((size_t)(area->top + y) * width + area->left);
-        const uint32_t first = lane_of(0, y);
+        const uint32_t first = batch_lane(0, y);
         for (uint32_t x = 0; x < area->columns; x++) {
             const uint32_t i = first + x / NB_BLOCK * NB_PACKET + x % NB_BLOCK;
             row[3 * x] = v[0][i];
@@ -48,7 +43,7 @@ static void add_vectors(float *plane, uint32_t width, const nb_area *area, int i
     }
     for (uint32_t y = 0; y < area->rows; y++) {
         float *row = plane + 3 * ((size_t)(area->top + y) * width + area->left);
-        const uint32_t first = lane_of(0, y);
+        const uint32_t first = batch_lane(0, y);
         for (uint32_t x = 0; x < area->columns; x++) {
             const uint32_t i = first + x / NB_BLOCK * NB_PACKET + x % NB_BLOCK;
             row[3 * x] += v[0][i];
@@ -63,7 +58,7 @@ static void add_normals(float *plane, uint32_t width, const nb_area *area, int i
     for (uint32_t y = 0; y < area->rows; y++) {
         float *row = plane + 3 * ((size_t)(area->top + y) * width + area->left);
         for (uint32_t x = 0; x < area->columns; x++) {
-            const uint32_t i = lane_of(x, y);
+            const uint32_t i = batch_lane(x, y);
             const int hit = scratch->hits.surface[i] != NB_NONE;
             for (uint32_t c = 0; c < 3; c++) {
                 row[3 * x + c] = (is_first ? 0 : row[3 * x + c]) + (hit ? scratch->points.normal[c][i] : 0);
@@ -77,7 +72,7 @@ static void widen_errors(float *plane, uint32_t width, const nb_area *area, int 
     for (uint32_t y = 0; y < area->rows; y++) {
         float *row = plane + (size_t)(area->top + y) * width + area->left;
         for (uint32_t x = 0; x < area->columns; x++) {
-            const float e = error[lane_of(x, y)];
+            const float e = error[batch_lane(x, y)];
             row[x] = is_first || e > row[x] ? e : row[x];
         }
     }
@@ -89,7 +84,7 @@ static void add_depths(const nb_frame *frame, const nb_area *area, int is_first,
     for (uint32_t y = 0; y < area->rows; y++) {
         float *row = frame->planes->depth + (size_t)(area->top + y) * frame->window.width + area->left;
         for (uint32_t x = 0; x < area->columns; x++) {
-            const uint32_t i = lane_of(x, y);
+            const uint32_t i = batch_lane(x, y);
             const int hit = scratch->hits.surface[i] != NB_NONE;
             const float t = (float)(frame->view.advance * (double)scratch->rays.length[i]) + scratch->hits.t[i];
             row[x] = (is_first ? 0 : row[x]) + (hit ? t : 0);
@@ -128,7 +123,7 @@ static void divide_depths(const nb_frame *frame, const nb_area *area, const uint
     for (uint32_t y = 0; y < area->rows; y++) {
         float *row = frame->planes->depth + (size_t)(area->top + y) * frame->window.width + area->left;
         for (uint32_t x = 0; x < area->columns; x++) {
-            const uint32_t count = counts[lane_of(x, y)];
+            const uint32_t count = counts[batch_lane(x, y)];
             row[x] = count > 0 ? row[x] / (float)count : INFINITY;
         }
     }

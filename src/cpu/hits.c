@@ -5,7 +5,7 @@
 
 enum { ROW = NB_PACKET * sizeof(float) };
 
-static void fill(float *row, float value)
+static void fill_row(float *row, float value)
 {
     for (int i = 0; i < NB_PACKET; i++) row[i] = value;
 }
@@ -13,9 +13,9 @@ static void fill(float *row, float value)
 /* tnear, time, mask, flags and the identity of a ray are the same for all. */
 static void set_constants(struct RTCRay16 *ray)
 {
-    fill(ray->tnear, 0);
-    fill(ray->time, 0);
-    fill(ray->tfar, INFINITY);
+    fill_row(ray->tnear, 0);
+    fill_row(ray->time, 0);
+    fill_row(ray->tfar, INFINITY);
     memset(ray->mask, 0xff, sizeof ray->mask);
     memset(ray->id, 0, sizeof ray->id);
     memset(ray->flags, 0, sizeof ray->flags);
@@ -100,7 +100,7 @@ void nb_hits_refine(const nb_geometry *geometry, const nb_ray_batch *rays, nb_hi
     }
 }
 
-static void set_starts(struct RTCRay16 *ray, float (*start)[NB_BATCH], int first)
+static void set_ray_starts(struct RTCRay16 *ray, float (*start)[NB_BATCH], int first)
 {
     memcpy(ray->org_x, start[0] + first, ROW);
     memcpy(ray->org_y, start[1] + first, ROW);
@@ -123,13 +123,13 @@ void nb_hits_shadow(RTCScene scene, float (*start)[NB_BATCH], const float direct
 {
     struct RTCRay16 *ray = &packets->rays[0].ray;
     set_constants(ray);
-    fill(ray->dir_x, direction[0]);
-    fill(ray->dir_y, direction[1]);
-    fill(ray->dir_z, direction[2]);
+    fill_row(ray->dir_x, direction[0]);
+    fill_row(ray->dir_y, direction[1]);
+    fill_row(ray->dir_z, direction[2]);
     for (int first = 0; first < NB_BATCH; first += NB_PACKET) {
         if (!any(active + first)) continue;
-        set_starts(ray, start, first);
-        fill(ray->tfar, INFINITY);
+        set_ray_starts(ray, start, first);
+        fill_row(ray->tfar, INFINITY);
         find_shadows(scene, ray, active + first);
     }
 }
@@ -141,7 +141,7 @@ void nb_hits_between(RTCScene scene, float (*start)[NB_BATCH], float (*direction
     set_constants(ray);
     for (int first = 0; first < NB_BATCH; first += NB_PACKET) {
         if (!any(active + first)) continue;
-        set_starts(ray, start, first);
+        set_ray_starts(ray, start, first);
         memcpy(ray->dir_x, direction[0] + first, ROW);
         memcpy(ray->dir_y, direction[1] + first, ROW);
         memcpy(ray->dir_z, direction[2] + first, ROW);

@@ -5,15 +5,10 @@
 
 #define PI 3.14159265358979323846
 
-static double largest(const double rgb[3])
-{
-    return fmax(rgb[0], fmax(rgb[1], rgb[2]));
-}
-
 /* ---- places ---------------------------------------------------------------------------------- */
 
 /* The part of its light that a spot sends off its axis. */
-static double cone_of(const nebel_light *lamp, const double direction[3])
+static double spot_falloff(const nebel_light *lamp, const double direction[3])
 {
     if (lamp->type != NEBEL_LIGHT_SPOT) return 1;
     const double outer = cos(lamp->outer_angle * (PI / 180)), inner = cos(lamp->inner_angle * (PI / 180));
@@ -35,7 +30,7 @@ nb_sampled_light nb_light_sight_from(const nebel_light *lamp, const double place
     const double nearest = fmax(distance, radius), part = radius / nearest;
     sight.reach = fmax(distance - lamp->radius, 0);
     sight.shadowed = fmax(distance - radius, 0);
-    sight.beam = cone_of(lamp, sight.direction) / (nearest * nearest);
+    sight.beam = spot_falloff(lamp, sight.direction) / (nearest * nearest);
     sight.fluence = sight.beam * 2 / (1 + sqrt(1 - part * part));
     return sight;
 }
@@ -71,13 +66,13 @@ double nb_passing_density(const nb_light_pass *p, double t)
 
 double nb_light_weight_at(const nebel_light *lamp, const nebel_ray *ray)
 {
-    return largest(lamp->intensity) * nb_light_sight_from(lamp, ray->origin).fluence;
+    return nb_vector_largest(lamp->intensity) * nb_light_sight_from(lamp, ray->origin).fluence;
 }
 
 double nb_light_weight_along(const nebel_light *lamp, const nebel_ray *ray)
 {
     const nb_light_pass passing = nb_passing_of(lamp, ray);
-    return largest(lamp->intensity) * passing.angle / passing.aside;
+    return nb_vector_largest(lamp->intensity) * passing.angle / passing.aside;
 }
 
 double nb_lights_sum(const nebel_scene_data *scene, nb_light_weigh *weigh, const nebel_ray *ray)

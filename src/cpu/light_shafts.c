@@ -41,13 +41,13 @@ NB_ALWAYS_INLINE double inverse_length(double x, double y, double z)
     return 1 / sqrt(square > 1e-60 ? square : 1e-60);
 }
 
-NB_ALWAYS_INLINE float least_of(double x, double y)
+NB_ALWAYS_INLINE float least_below_zero(double x, double y)
 {
     const double least = x < y ? x : y;
     return (float)(least < 0 ? least : 0);
 }
 
-NB_ALWAYS_INLINE float most_of(double x, double y)
+NB_ALWAYS_INLINE float most_above_zero(double x, double y)
 {
     const double most = x > y ? x : y;
     return (float)(most > 0 ? most : 0);
@@ -72,12 +72,12 @@ NB_CLONES static void set_flats(const nb_shaft_rays *rays, nb_flats *flats)
         const double qx = x + to * dx, qy = y + to * dy, qz = z + to * dz;
         const double p = inverse_length(px, py, pz), q = inverse_length(qx, qy, qz);
         const int some = rays->from[i] < rays->to[i];
-        flats->low[0][i] = some ? least_of(px, qx) : HUGE_VALF;
-        flats->low[1][i] = some ? least_of(py, qy) : HUGE_VALF;
-        flats->low[2][i] = some ? least_of(pz, qz) : HUGE_VALF;
-        flats->high[0][i] = some ? most_of(px, qx) : -HUGE_VALF;
-        flats->high[1][i] = some ? most_of(py, qy) : -HUGE_VALF;
-        flats->high[2][i] = some ? most_of(pz, qz) : -HUGE_VALF;
+        flats->low[0][i] = some ? least_below_zero(px, qx) : HUGE_VALF;
+        flats->low[1][i] = some ? least_below_zero(py, qy) : HUGE_VALF;
+        flats->low[2][i] = some ? least_below_zero(pz, qz) : HUGE_VALF;
+        flats->high[0][i] = some ? most_above_zero(px, qx) : -HUGE_VALF;
+        flats->high[1][i] = some ? most_above_zero(py, qy) : -HUGE_VALF;
+        flats->high[2][i] = some ? most_above_zero(pz, qz) : -HUGE_VALF;
         flats->across[0][i] = (float)nx;
         flats->across[1][i] = (float)ny;
         flats->across[2][i] = (float)nz;
@@ -102,7 +102,7 @@ typedef struct nb_light_box {
     float slack; /* what rounding may do to its distance from a plane */
 } nb_light_box;
 
-NB_ALWAYS_INLINE nb_light_box box_of(const nb_shadow_node *node, int child, const nb_light_place *lamp)
+NB_ALWAYS_INLINE nb_light_box node_box_of(const nb_shadow_node *node, int child, const nb_light_place *lamp)
 {
     nb_light_box box = {.slack = 0};
     for (int c = 0; c < 3; c++) {
@@ -136,7 +136,7 @@ NB_ALWAYS_INLINE float reach_along(const nb_light_box *box, const float (*normal
 }
 
 /* Whether the box may meet any of the flat triangles: no plane of a few likely ones has them on different sides. */
-NB_ALWAYS_INLINE int meets(const nb_light_box *box, const nb_flats *flats)
+NB_ALWAYS_INLINE int meets_flats(const nb_light_box *box, const nb_flats *flats)
 {
     const float(*across)[NB_PACKET] = flats->across, (*near)[NB_PACKET] = flats->near, (*far)[NB_PACKET] = flats->far,
           (*beyond)[NB_PACKET] = flats->beyond;
@@ -217,8 +217,9 @@ static void cut_hole(const nb_hole *hole, const nb_shaft_rays *rays, int i, nb_s
     found->leave[i] = fminf((float)enter, found->leave[i]);
 }
 
-NB_ALWAYS_INLINE int add(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_masked_occluder *sheet,
-                         const nb_masked_triangle_light *lamp, const nb_shaft_interval *found, nb_shaft_rays *rays)
+NB_ALWAYS_INLINE int add_interval(nb_sun_shafts *shafts, const nebel_allocator *allocator,
+                                  const nb_masked_occluder *sheet, const nb_masked_triangle_light *lamp,
+                                  const nb_shaft_interval *found, nb_shaft_rays *rays)
 {
     int fresh[NB_PACKET];
     if (sheet != NULL) return nb_masked_triangle_cast(sheet, lamp, shafts, allocator, found, rays);
@@ -276,9 +277,10 @@ NB_ALWAYS_INLINE int cast(nb_sun_shafts *shafts, const nebel_allocator *allocato
     if (!may_meet((const float(*)[3])corner, slack, flats) || !see(caster, lamp, &seen)) return 1;
     const nb_masked_triangle_light view = {lamp->place, seen.hole.normal, sqrt(seen.hole.distance2)};
     nb_cross_prism(&seen.pyramid, rays, &found);
-    if (seen.hole.distance2 >= seen.hole.radius2) return add(shafts, allocator, sheet, &view, &found, rays);
+    if (seen.hole.distance2 >= seen.hole.radius2) return add_interval(shafts, allocator, sheet, &view, &found, rays);
     for (int i = 0; i < NB_PACKET; i++) cut_hole(&seen.hole, rays, i, &found, &rest);
-    return add(shafts, allocator, sheet, &view, &found, rays) && add(shafts, allocator, sheet, &view, &rest, rays);
+    return add_interval(shafts, allocator, sheet, &view, &found, rays) &&
+           add_interval(shafts, allocator, sheet, &view, &rest, rays);
 }
 
 typedef struct nb_light_visit {
@@ -286,21 +288,21 @@ typedef struct nb_light_visit {
     size_t number; /* of the node; at level -1 of the leaf */
 } nb_light_visit;
 
-enum { VISITS = NB_SHADOW_LEVELS * NB_SHADOW_FAN };
+enum { LIGHT_VISITS = NB_SHADOW_LEVELS * NB_SHADOW_FAN };
 
 /* Returns 0 when memory is out. */
 NB_CLONES static int walk_to_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
                                   const nb_light_place *lamp, const nb_flats *flats, nb_shaft_rays *rays)
 {
-    nb_light_visit visits[VISITS];
+    nb_light_visit visits[LIGHT_VISITS];
     int count = 1;
     visits[0] = (nb_light_visit){tree->level_count - 1, 0};
     while (count > 0) {
         const nb_light_visit visit = visits[--count];
         const size_t first = visit.number * NB_SHADOW_FAN;
         for (size_t k = 0; k < NB_SHADOW_FAN && visit.level >= 0; k++) {
-            const nb_light_box box = box_of(&tree->levels[visit.level][visit.number], (int)k, lamp);
-            if (meets(&box, flats)) visits[count++] = (nb_light_visit){visit.level - 1, first + k};
+            const nb_light_box box = node_box_of(&tree->levels[visit.level][visit.number], (int)k, lamp);
+            if (meets_flats(&box, flats)) visits[count++] = (nb_light_visit){visit.level - 1, first + k};
         }
         for (size_t k = first; k < first + NB_SHADOW_FAN && k < tree->count && visit.level < 0; k++)
             if (!cast(shafts, allocator, tree, k, lamp, flats, rays)) return 0;
@@ -310,8 +312,8 @@ NB_CLONES static int walk_to_lamp(nb_sun_shafts *shafts, const nebel_allocator *
 
 /* ---- lamps ----------------------------------------------------------------------------------- */
 
-static int find_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                       const nb_light_place *lamp, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
+static int find_light_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                             const nb_light_place *lamp, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
 {
     nb_flats flats;
     for (int i = 0; i < NB_PACKET; i++) {
@@ -337,7 +339,7 @@ static int find_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, co
             packet.from[i] = from[p + i];
             packet.to[i] = to[p + i];
         }
-        if (!find_packet(shafts, allocator, tree, lamp, rays, p, &packet) ||
+        if (!find_light_packet(shafts, allocator, tree, lamp, rays, p, &packet) ||
             !nb_sun_shafts_finish(shafts, allocator, &packet, rays->length + p, advance, numbers + p))
             return 0;
     }
@@ -345,7 +347,7 @@ static int find_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, co
     return 1;
 }
 
-static int make_room(nb_light_shafts *shafts, const nebel_allocator *allocator, size_t lamps)
+static int reserve_pieces(nb_light_shafts *shafts, const nebel_allocator *allocator, size_t lamps)
 {
     void *numbers = shafts->numbers, *pieces = shafts->pieces;
     const int grown =
@@ -356,26 +358,25 @@ static int make_room(nb_light_shafts *shafts, const nebel_allocator *allocator, 
     return grown;
 }
 
-static nb_light_place place_lamp(const nebel_snapshot *fog, size_t number, const double origin[3])
+static nb_light_place place_light(const nebel_light *light, const double origin[3])
 {
-    nb_light_place lamp;
-    nebel_snapshot_lamp(fog, number, lamp.place, &lamp.radius);
-    for (int c = 0; c < 3; c++) lamp.place[c] -= origin[c];
-    lamp.radius = nb_light_radius(lamp.radius);
+    nb_light_place lamp = {.radius = nb_light_radius(light->radius)};
+    for (int c = 0; c < 3; c++) lamp.place[c] = light->position[c] - origin[c];
     return lamp;
 }
 
 nebel_result nb_light_shafts_find(nb_light_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                                  const nebel_snapshot *fog, const nb_lit_box *box, const nb_ray_batch *rays,
+                                  const nebel_lighting *lighting, const nb_lit_box *box, const nb_ray_batch *rays,
                                   double advance, const float *distance)
 {
-    const size_t count = nebel_snapshot_lamp_count(fog);
+    const nebel_light *lights;
+    const size_t count = nebel_get_lighting_lights(lighting, &lights);
     float from[NB_BATCH], to[NB_BATCH];
-    if (!make_room(shafts, allocator, count)) return NEBEL_ERROR_MEMORY;
+    if (!reserve_pieces(shafts, allocator, count)) return NEBEL_ERROR_MEMORY;
     nb_sun_shafts_clip(box, rays, advance, distance, from, to);
     shafts->shafts.boundary_count = 0;
     for (size_t i = 0; i < count; i++) {
-        const nb_light_place lamp = place_lamp(fog, i, tree->origin);
+        const nb_light_place lamp = place_light(&lights[i], tree->origin);
         uint32_t *numbers = shafts->numbers + i * (NB_BATCH + 1);
         if (!find_lamp(&shafts->shafts, allocator, tree, &lamp, from, to, rays, advance, numbers))
             return NEBEL_ERROR_MEMORY;

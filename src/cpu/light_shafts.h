@@ -19,7 +19,7 @@ typedef struct nb_light_shafts {
 /* As nb_sun_shafts_find, for all lamps of the fog. What is nearer to a lamp than its radius casts no shadow. Errors:
  * MEMORY. */
 nebel_result nb_light_shafts_find(nb_light_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                                  const nebel_snapshot *fog, const nb_lit_box *box, const nb_ray_batch *rays,
+                                  const nebel_lighting *lighting, const nb_lit_box *box, const nb_ray_batch *rays,
                                   double advance, const float *distance);
 
 void nb_light_shafts_free(nb_light_shafts *shafts, const nebel_allocator *allocator);

@@ -47,8 +47,8 @@ NB_CLONES static int look_up_ends(const nb_masked_occluder *sheet, const nb_mask
 }
 
 /* As nb_extend and nb_replace, of one lane. */
-static int add(nb_sun_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, float enter, float leave,
-               nb_shaft_rays *rays)
+static int add_lane_interval(nb_sun_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, float enter,
+                             float leave, nb_shaft_rays *rays)
 {
     const float gap = nb_closeness * fabsf(fminf(leave, rays->leave[lane]));
     if (!(enter < leave)) return 1;
@@ -65,7 +65,7 @@ static int add(nb_sun_shafts *shafts, const nebel_allocator *allocator, uint32_t
 
 /* The place on the ray that is seen at s of the way over the sheet: of all ways to divide a line in perspective the one
  * in which cross ratios stay. */
-static float place_at(double s, float enter, float leave, double near, double far)
+static float place_on_ray(double s, float enter, float leave, double near, double far)
 {
     const double part = s * near / (s * near + (1 - s) * far);
     return s >= 1 ? leave : (float)((double)enter + part * ((double)leave - (double)enter));
@@ -84,9 +84,9 @@ int nb_masked_triangle_cast(const nb_masked_occluder *sheet, const nb_masked_tri
             const nb_solid *solid = &walk.found[i];
             const uint32_t k = solid->line;
             const float enter = found->enter[k], leave = found->leave[k];
-            const float begin = place_at(solid->enter, enter, leave, lines.near[k], lines.far[k]);
-            const float end = place_at(solid->leave, enter, leave, lines.near[k], lines.far[k]);
-            if (!add(shafts, allocator, k, begin, end, rays)) return 0;
+            const float begin = place_on_ray(solid->enter, enter, leave, lines.near[k], lines.far[k]);
+            const float end = place_on_ray(solid->leave, enter, leave, lines.near[k], lines.far[k]);
+            if (!add_lane_interval(shafts, allocator, k, begin, end, rays)) return 0;
         }
     } while (nb_alpha_mask_next(&walk));
     return 1;

@@ -121,7 +121,7 @@ double nb_media_air_transmittance(const nb_media *media, const nebel_ray *ray, i
 
 /* ---- scattering ------------------------------------------------------------------------------ */
 
-static double part_of(const double scattering[3], int channel)
+static double scattering_part(const double scattering[3], int channel)
 {
     return channel >= 0 ? scattering[channel] : scattering[0] + scattering[1] + scattering[2];
 }
@@ -142,7 +142,7 @@ static void choose_of_planet(const nb_planet_matter *planet, double all, int cha
     for (uint32_t k = 0; k < desc->component_count; k++) {
         double scattering[3];
         for (int c = 0; c < 3; c++) scattering[c] = planet->density[k] * desc->components[k].scattering[c];
-        const double part = part_of(scattering, channel);
+        const double part = scattering_part(scattering, channel);
         if (!(part > 0)) continue;
         /* The last one is kept where rounding leaves some of the chance. */
         *scatterer =
@@ -153,14 +153,14 @@ static void choose_of_planet(const nb_planet_matter *planet, double all, int cha
     if (!(planet->clouds > 0)) return;
     const double clouds[3] = {planet->clouds, planet->clouds, planet->clouds};
     *scatterer = (nb_scatterer){.turns = &medium->drops[planet->layer][channel >= 0 ? channel : 0],
-                                .probability = part_of(clouds, channel) / all};
+                                .probability = scattering_part(clouds, channel) / all};
     memcpy(scatterer->scattering, clouds, sizeof clouds);
 }
 
 nebel_result nb_media_choose(const nb_media *media, const nebel_sample_point *place, const nb_matter *matter,
                              int channel, double chance, nb_scatterer *scatterer)
 {
-    const double all = part_of(matter->all.scattering, channel), fog = part_of(matter->fog, channel);
+    const double all = scattering_part(matter->all.scattering, channel), fog = scattering_part(matter->fog, channel);
     memset(scatterer, 0, sizeof *scatterer);
     if (!(all > 0)) return NEBEL_OK;
     double left = chance * all;

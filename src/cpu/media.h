@@ -6,7 +6,7 @@
 
 #include "base/base.h"
 
-#include <nebel/places.h>
+#include <nebel/nebel.h>
 
 typedef struct nb_media {
     const nebel_snapshot *fog;       /* NULL: none */

@@ -91,7 +91,7 @@ static nb_path_vertex find_surface(const nb_path_scene *world, const nebel_ray *
 /* ---- grounds --------------------------------------------------------------------------------- */
 
 /* Surfaces on the ground touch it: they are seen where they lie this little behind it, which is more than rounding. */
-static double behind(double t)
+static double past_ground(double t)
 {
     return 1e-5 * t + 1e-3;
 }
@@ -101,7 +101,7 @@ void nb_meeting_end_at_ground(const nb_path_scene *world, nebel_ray *ray, nb_pat
     const nb_ground_hit hit = nb_media_find_ground(&world->media, ray);
     const int meets_surface = meeting->t < HUGE_VAL;
     /* From on the ground or below it all surfaces are seen before it. */
-    if (hit.world == NULL || (meets_surface && (hit.t == 0 || hit.t + behind(meeting->t) >= meeting->t))) return;
+    if (hit.world == NULL || (meets_surface && (hit.t == 0 || hit.t + past_ground(meeting->t) >= meeting->t))) return;
     *meeting = (nb_path_vertex){.t = hit.t, .is_ground = 1};
     ray->t_max = hit.t;
     for (int c = 0; c < 3; c++) {

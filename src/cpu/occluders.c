@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-static void turn(const double axes[3][3], const float *position, float corner[3])
+static void turn_corner(const double axes[3][3], const float *position, float corner[3])
 {
     const double p[3] = {(double)position[0], (double)position[1], (double)position[2]};
     for (int i = 0; i < 3; i++) corner[i] = (float)nb_vector_dot(axes[i], p);
@@ -49,7 +49,7 @@ static nb_masked_occluder make_sheet(const nb_batch_surface *surface, const uint
     return sheet;
 }
 
-static void fill(const nb_geometry *geometry, const double axes[3][3], int is_for_sun, nb_occluders *casters)
+static void fill_occluders(const nb_geometry *geometry, const double axes[3][3], int is_for_sun, nb_occluders *casters)
 {
     uint32_t sheet_count = 0;
     for (size_t s = 0; s < geometry->surface_count; s++) {
@@ -57,7 +57,8 @@ static void fill(const nb_geometry *geometry, const double axes[3][3], int is_fo
         for (size_t t = 0; t < surface->mesh->triangle_count; t++) {
             const uint32_t *index = surface->mesh->indices + 3 * t;
             nb_occluder *triangle = &casters->triangles[casters->count];
-            for (int k = 0; k < 3; k++) turn(axes, surface->positions + 3 * (size_t)index[k], triangle->corner[k]);
+            for (int k = 0; k < 3; k++)
+                turn_corner(axes, surface->positions + 3 * (size_t)index[k], triangle->corner[k]);
             const double area = nb_caster_area(triangle);
             const float depth = triangle->corner[0][2] + triangle->corner[1][2] + triangle->corner[2][2];
             if ((area == 0 && is_for_sun) || !isfinite(area) || !isfinite(depth)) continue;
@@ -86,7 +87,7 @@ nebel_result nb_occluders_list(const nb_geometry *geometry, const double axes[3]
         casters->sheets = nb_allocate(allocator, holed, sizeof *casters->sheets);
         if (casters->numbers == NULL || casters->sheets == NULL) return NEBEL_ERROR_MEMORY;
     }
-    fill(geometry, axes, is_for_sun, casters);
+    fill_occluders(geometry, axes, is_for_sun, casters);
     return NEBEL_OK;
 }
 

@@ -5,7 +5,7 @@ typedef struct nb_spread {
     float low, high, way_low, way_high; /* places where the beam begins; changes of them for each m */
 } nb_spread;
 
-NB_ALWAYS_INLINE float least_of(float *values)
+NB_ALWAYS_INLINE float least_of_lanes(float *values)
 {
     for (int half = NB_PACKET / 2; half > 0; half /= 2) {
         NB_SIMD
@@ -14,7 +14,7 @@ NB_ALWAYS_INLINE float least_of(float *values)
     return values[0];
 }
 
-NB_ALWAYS_INLINE float most_of(float *values)
+NB_ALWAYS_INLINE float most_of_lanes(float *values)
 {
     for (int half = NB_PACKET / 2; half > 0; half /= 2) {
         NB_SIMD
@@ -35,7 +35,7 @@ NB_ALWAYS_INLINE nb_spread spread_along(const nb_shaft_rays *rays, int axis, flo
         way_low[i] = counts ? way : INFINITY;
         way_high[i] = counts ? way : -INFINITY;
     }
-    nb_spread s = {least_of(low), most_of(high), least_of(way_low), most_of(way_high)};
+    nb_spread s = {least_of_lanes(low), most_of_lanes(high), least_of_lanes(way_low), most_of_lanes(way_high)};
     const float rounding = 0x1p-21f * (s.high > -s.low ? s.high : -s.low);
     s.low -= rounding;
     s.high += rounding;
@@ -61,9 +61,9 @@ NB_CLONES static void set_beam(nb_beam *beam, const nb_shaft_rays *rays)
         first[i] = counts ? rays->from[i] : INFINITY;
         last[i] = counts ? rays->to[i] : -INFINITY;
     }
-    const float from = least_of(first);
+    const float from = least_of_lanes(first);
     beam->from = from;
-    beam->length = most_of(last) - from;
+    beam->length = most_of_lanes(last) - from;
     for (int axis = 0; axis < 2; axis++) {
         const nb_spread s = spread_along(rays, axis, from);
         set_axis(beam, axis, &s);

@@ -1,7 +1,7 @@
 /* The reference renderer's part of a batch: a path for each pixel, and what their spread says of the error. */
 #include "cpu_renderer.h"
 
-#include <nebel/places.h>
+#include <nebel/nebel.h>
 
 #include <math.h>
 #include <string.h>

@@ -80,7 +80,7 @@ static void reflect_diffusely(const nb_path_vertex *at, nb_rng *chance, double d
 
 /* ---- light ----------------------------------------------------------------------------------- */
 
-static void add(path *p, const double light[3], double share)
+static void add_radiance(path *p, const double light[3], double share)
 {
     for (int c = 0; c < 3; c++) p->radiance[c] += p->throughput[c] * light[c] * share;
 }
@@ -98,7 +98,7 @@ static nebel_result add_arriving(path *p, const double origin[3], const double d
     double transmittance = 1;
     nebel_result result = NEBEL_OK;
     if (!nb_media_are_empty(&world->media)) result = nb_tracking_transmittance(&way, &p->chance, &transmittance);
-    if (result == NEBEL_OK) add(p, light, share * transmittance);
+    if (result == NEBEL_OK) add_radiance(p, light, share * transmittance);
     return result;
 }
 
@@ -230,14 +230,14 @@ static void add_ambient(path *p)
 {
     double ambient[3];
     nebel_evaluate_environment(&p->world->environment, p->ray.direction, ambient);
-    add(p, ambient, 1);
+    add_radiance(p, ambient, 1);
 }
 
 /* What is behind everything. */
 static void add_background(path *p)
 {
     if (p->is_first)
-        add(p, p->eye->background, 1);
+        add_radiance(p, p->eye->background, 1);
     else
         add_ambient(p);
 }
@@ -286,7 +286,7 @@ static void leave_sunward(path *p, const nb_turns *turns, const double place[3])
 }
 
 /* Sends the path on. */
-static void turn(path *p, const nb_scatterer *scatterer, const double place[3])
+static void scatter_path(path *p, const nb_scatterer *scatterer, const double place[3])
 {
     const nb_turns *turns = scatterer->turns;
     const double chance = nb_rng_next(&p->chance);
@@ -318,7 +318,7 @@ static nebel_result scatter(path *p, const lit_ray *lit, const nb_free_flight *f
     const double cosine = cosine_between(p->ray.direction, world->to_sun);
     result = add_sunlight(p, flight->place.position, nb_scatterer_value(&scatterer, cosine));
     if (result == NEBEL_OK) result = add_colliding_light(p, lit, flight, &scatterer);
-    turn(p, &scatterer, flight->place.position);
+    scatter_path(p, &scatterer, flight->place.position);
     return result;
 }
 
@@ -339,7 +339,7 @@ static nebel_result reflect(path *p, const nb_path_vertex *at)
 /* ---- paths ----------------------------------------------------------------------------------- */
 
 /* 0: the path ends, and others carry its light. What goes on just beside the sun is worth more than it carries. */
-static int survives(path *p)
+static int path_survives(path *p)
 {
     const double most = p->promise * fmax(p->throughput[0], fmax(p->throughput[1], p->throughput[2]));
     if (most >= SMALL_THROUGHPUT) return 1;
@@ -349,7 +349,7 @@ static int survives(path *p)
 }
 
 /* The first ray of a path of light from behind the media, which has no flight. */
-static nebel_result pass(path *p, const nb_tracker *track, nb_free_flight *flight)
+static nebel_result pass_media(path *p, const nb_tracker *track, nb_free_flight *flight)
 {
     memset(flight, 0, sizeof *flight);
     return nb_tracking_transmittance(track, &p->chance, &flight->weight);
@@ -359,7 +359,7 @@ static nebel_result fly(path *p, const nb_tracker *track, const lit_ray *lit, nb
 {
     nebel_result result = add_passing_light(p, lit);
     if (result == NEBEL_OK) result = nb_tracking_fly(track, &p->chance, flight);
-    if (result == NEBEL_OK) add(p, flight->shone, 1);
+    if (result == NEBEL_OK) add_radiance(p, flight->shone, 1);
     return result;
 }
 
@@ -370,7 +370,7 @@ static nebel_result go_on(path *p, const nb_path_vertex *at, nb_free_flight *fli
     const path_share share = p->is_first ? p->share : ALL;
     const nb_tracker track = {&world->media, p->ray, !p->is_first, p->channel, share == SCATTERED};
     const lit_ray lit = light_ray(world, &track);
-    nebel_result result = share == PASSED ? pass(p, &track, flight) : fly(p, &track, &lit, flight);
+    nebel_result result = share == PASSED ? pass_media(p, &track, flight) : fly(p, &track, &lit, flight);
     if (result != NEBEL_OK) return result;
     if (p->is_first) {
         memcpy(p->shone, p->radiance, sizeof p->shone);
@@ -400,7 +400,7 @@ static nebel_result follow(path *p, const nb_path_vertex *first)
         if (result != NEBEL_OK) return result;
         p->is_first = 0;
         if (!ended && p->bounces == world->bounces) add_ambient(p);
-        if (ended || p->bounces == world->bounces || !survives(p)) return NEBEL_OK;
+        if (ended || p->bounces == world->bounces || !path_survives(p)) return NEBEL_OK;
         at = nb_meeting_find(world, &p->ray, p->lone);
     }
 }
@@ -415,7 +415,7 @@ static nebel_result follow_all(path *p)
         p->promise = next->promise;
         p->bounces = next->bounces;
         memcpy(p->throughput, next->throughput, sizeof p->throughput);
-        if (p->bounces == p->world->bounces || !survives(p)) continue;
+        if (p->bounces == p->world->bounces || !path_survives(p)) continue;
         const nb_path_vertex at = nb_meeting_find(p->world, &p->ray, p->lone);
         result = follow(p, &at);
     }
@@ -423,7 +423,7 @@ static nebel_result follow_all(path *p)
 }
 
 /* Adds a path to the channels that it stands for. */
-static void gather(const path *p, int is_grey, nb_path_light *light)
+static void gather_path(const path *p, int is_grey, nb_path_light *light)
 {
     for (int k = p->channel; k < (is_grey ? 3 : p->channel + 1); k++) {
         light->color[k] += p->radiance[k];
@@ -456,7 +456,7 @@ nebel_result nb_path_trace(const nb_path_scene *world, const nb_path_eye *eye, c
             const nebel_result result = follow_all(&p);
             if (result != NEBEL_OK) return result;
             chance = p.chance;
-            gather(&p, world->is_grey, light);
+            gather_path(&p, world->is_grey, light);
         }
     }
     return NEBEL_OK;

@@ -87,7 +87,7 @@ static double most_density(const nebel_atmosphere_component *air, double low, do
 
 /* ---- shells ---------------------------------------------------------------------------------- */
 
-static void add_shell(nb_shells *shells, double radius, double top)
+static void add_medium_shell(nb_shells *shells, double radius, double top)
 {
     int i = shells->count;
     if (!(radius < top) || shells->count == NB_MEDIUM_SHELLS) return;
@@ -105,15 +105,15 @@ static void cut_air(nb_shells *shells, const nebel_atmosphere_component *air, do
         const double height = air->profile == NEBEL_COMPONENT_EXPONENTIAL
                                   ? (i + 1) * air->scale_height
                                   : air->center_height + air->half_width * (2. * i / (NB_SHELLS_PER_AIR - 1) - 1);
-        if (height > 0) add_shell(shells, ground + height, top);
+        if (height > 0) add_medium_shell(shells, ground + height, top);
     }
 }
 
 static void cut_clouds(const nb_planet_medium *medium, nb_shells *shells, double top)
 {
     for (uint32_t k = 0; k < medium->layer_count; k++) {
-        add_shell(shells, medium->world.radius + medium->layers[k].base, top);
-        add_shell(shells, medium->world.radius + medium->layers[k].top, top);
+        add_medium_shell(shells, medium->world.radius + medium->layers[k].base, top);
+        add_medium_shell(shells, medium->world.radius + medium->layers[k].top, top);
     }
 }
 
@@ -167,7 +167,7 @@ void nb_planet_medium_set(nb_planet_medium *medium, const nebel_planet *planet, 
     medium->world = nb_planet_of(planet);
     medium->time = time;
     set_clouds(medium, planet);
-    add_shell(&medium->shells, desc->radius, top);
+    add_medium_shell(&medium->shells, desc->radius, top);
     for (uint32_t k = 0; k < desc->component_count; k++) {
         cut_air(&medium->shells, &desc->components[k], desc->radius, top);
         set_turns(&medium->airs[k], &desc->components[k].phase);

@@ -82,7 +82,7 @@ static void prefetch_positions(const nb_geometry *geometry, const nb_pending *pe
     }
 }
 
-static void gather(const nb_geometry *geometry, nb_pending *pending)
+static void gather_triangles(const nb_geometry *geometry, nb_pending *pending)
 {
     nb_owner owner = nobody;
     for (uint32_t k = 0; k < pending->count; k++) {
@@ -195,8 +195,8 @@ static inline void fill_block(nb_functions f, const float *restrict xs, const fl
     }
 }
 
-NB_CLONES static void fill(const nb_pending *pending, int orthographic, const float *xs, const float *ys,
-                           nb_region_hits *seen)
+NB_CLONES static void fill_pixels(const nb_pending *pending, int orthographic, const float *xs, const float *ys,
+                                  nb_region_hits *seen)
 {
     for (uint32_t k = 0; k < pending->count; k++) {
         const nb_functions functions = functions_of(pending, k, orthographic);
@@ -233,10 +233,10 @@ static void flush(nb_raster_walk *walk)
 {
     const nb_projection *projection = &walk->raster->projection;
     prefetch_positions(walk->raster->geometry, &walk->pending);
-    gather(walk->raster->geometry, &walk->pending);
+    gather_triangles(walk->raster->geometry, &walk->pending);
     set_functions(projection, walk->left, walk->top, &walk->pending);
     for (uint32_t s = 0; s < walk->count; s++) {
-        fill(&walk->pending, projection->orthographic, walk->points[s].x, walk->points[s].y, &walk->seen[s]);
+        fill_pixels(&walk->pending, projection->orthographic, walk->points[s].x, walk->points[s].y, &walk->seen[s]);
     }
     walk->pending.count = 0;
 }
@@ -251,7 +251,7 @@ static inline int last_block(int pixel)
     return (pixel < NB_REGION ? pixel : NB_REGION - 1) / NB_BLOCK;
 }
 
-static void add_triangle(nb_raster_walk *walk, const int16_t *ends, uint32_t id)
+static void queue_triangle(nb_raster_walk *walk, const int16_t *ends, uint32_t id)
 {
     nb_pending *pending = &walk->pending;
     const uint32_t place = pending->count++;
@@ -293,7 +293,7 @@ static void visit_leaf(nb_raster_walk *walk, uint32_t number)
     if (count == 0) return;
     prefetch_indices(walk, number * NB_FAN);
     for (uint32_t i = 0; i < count; i++) {
-        add_triangle(walk, leaf->ends + 4 * (size_t)children[i], number * NB_FAN + children[i]);
+        queue_triangle(walk, leaf->ends + 4 * (size_t)children[i], number * NB_FAN + children[i]);
     }
     if (walk->pending.count > PENDING - NB_FAN) flush(walk);
 }
@@ -304,7 +304,7 @@ static void visit_leaves(nb_raster_walk *walk)
     walk->leaf_count = 0;
 }
 
-static void add_leaf(nb_raster_walk *walk, uint32_t number)
+static void queue_leaf(nb_raster_walk *walk, uint32_t number)
 {
     const nb_node *leaf = &walk->raster->geometry->levels[0][number];
     __builtin_prefetch(leaf);
@@ -316,7 +316,7 @@ static void add_leaf(nb_raster_walk *walk, uint32_t number)
 static void visit(nb_raster_walk *walk, int level, uint32_t number)
 {
     if (level == 0) {
-        add_leaf(walk, number);
+        queue_leaf(walk, number);
         return;
     }
     uint32_t children[NB_FAN];
@@ -330,7 +330,7 @@ static void set_least_ends(nb_raster_walk *walk)
     for (int i = 0; i < 4 * NB_FAN; i++) walk->least_ends[i] = (int16_t)ends[i % 4];
 }
 
-static void clear(int orthographic, nb_region_hits *seen)
+static void clear_hits(int orthographic, nb_region_hits *seen)
 {
     for (int i = 0; i < NB_PIXELS; i++) {
         seen->nearness[i] = orthographic ? -INFINITY : 0;
@@ -353,7 +353,7 @@ void nb_raster_region(const nb_raster *raster, uint32_t left, uint32_t top, uint
     walk.leaf_count = 0;
     walk.pending.count = 0;
     set_least_ends(&walk);
-    for (uint32_t s = 0; s < count; s++) clear(raster->projection.orthographic, &seen[s]);
+    for (uint32_t s = 0; s < count; s++) clear_hits(raster->projection.orthographic, &seen[s]);
     visit(&walk, geometry->level_count - 1, 0);
     visit_leaves(&walk);
     flush(&walk);

@@ -110,7 +110,7 @@ static void project_surface(const nb_projection *projection, const nb_raster_tar
 
 /* ---- rectangles ------------------------------------------------------------------------------ */
 
-static inline void enlarge(const int16_t *restrict by, int16_t *restrict ends)
+static inline void enlarge_bounds(const int16_t *restrict by, int16_t *restrict ends)
 {
     NB_SIMD
     for (int i = 0; i < 4; i++) ends[i] = by[i] > ends[i] ? by[i] : ends[i];
@@ -128,8 +128,8 @@ static inline void set_ends(const int16_t *restrict a, const int16_t *restrict b
     static const int16_t nothing[4] = {INT16_MIN, INT16_MIN, INT16_MIN, INT16_MIN};
     int16_t around[4];
     memcpy(around, a, sizeof around);
-    enlarge(b, around);
-    enlarge(c, around);
+    enlarge_bounds(b, around);
+    enlarge_bounds(c, around);
     const int is_behind = (a[0] == EVERYWHERE) & (b[0] == EVERYWHERE) & (c[0] == EVERYWHERE);
     const int shows = (around[0] + around[2] >= 0) & (around[1] + around[3] >= 0) & !is_behind;
     uint64_t chosen, other; /* four ends at once */
@@ -152,12 +152,12 @@ static void set_leaf(const nb_batch_surface *surface, uint32_t first, nb_node *l
 }
 
 /* Around `count` nodes of the level below. */
-static void set_node(const nb_node *below, size_t count, nb_node *node)
+static void set_screen_node(const nb_node *below, size_t count, nb_node *node)
 {
     for (size_t k = 0; k < NB_FAN; k++) {
         int16_t around[4];
         set_nothing(around);
-        for (size_t i = 0; i < NB_FAN && k < count; i++) enlarge(below[k].ends + 4 * i, around);
+        for (size_t i = 0; i < NB_FAN && k < count; i++) enlarge_bounds(below[k].ends + 4 * i, around);
         memcpy(node->ends + 4 * k, around, sizeof around);
     }
 }
@@ -168,7 +168,8 @@ static void set_level(nb_geometry *geometry, int level)
 #pragma omp for schedule(static)
     for (size_t i = 0; i < count; i++) {
         const size_t left = below - i * NB_FAN;
-        set_node(geometry->levels[level - 1] + i * NB_FAN, left < NB_FAN ? left : NB_FAN, &geometry->levels[level][i]);
+        set_screen_node(geometry->levels[level - 1] + i * NB_FAN, left < NB_FAN ? left : NB_FAN,
+                        &geometry->levels[level][i]);
     }
 }
 

@@ -86,7 +86,7 @@ static inline double depth_at(const nb_boundary_span *s, double u)
 }
 
 /* What of the edge is where offset + u rise >= 0. */
-static void cut(double offset, double rise, nb_boundary_span *s)
+static void clip_span(double offset, double rise, nb_boundary_span *s)
 {
     if (rise > 0)
         s->begin = fmax(s->begin, -offset / rise);
@@ -100,8 +100,8 @@ static void clip_to_cell(const nb_boundary_edge *e, const nb_sun_cell *cell, nb_
 {
     for (int i = 0; i < 2; i++) {
         const double a = (double)e->a[i], way = (double)e->b[i] - a;
-        cut(a - (double)cell->low[i], way, s);
-        cut((double)cell->high[i] - a, -way, s);
+        clip_span(a - (double)cell->low[i], way, s);
+        clip_span((double)cell->high[i] - a, -way, s);
     }
 }
 
@@ -128,7 +128,7 @@ static int span_of(const nb_occluder *t, const nb_boundary_edge *e, const nb_bou
         const double x = side * ((double)q[0] - (double)p[0]), y = side * ((double)q[1] - (double)p[1]);
         offset[k] = x * ((double)e->a[1] - (double)p[1]) - y * ((double)e->a[0] - (double)p[0]);
         rise[k] = x * ((double)e->b[1] - (double)e->a[1]) - y * ((double)e->b[0] - (double)e->a[0]);
-        cut(offset[k], rise[k], s);
+        clip_span(offset[k], rise[k], s);
     }
     if (!(s->end - s->begin > 1e-7)) return 0;
     for (int i = 0; i < 2; i++) {
@@ -139,7 +139,7 @@ static int span_of(const nb_occluder *t, const nb_boundary_edge *e, const nb_bou
     return 1;
 }
 
-static int has_edge(const nb_occluder *t, const nb_boundary_edge *e)
+static int triangle_has_edge(const nb_occluder *t, const nb_boundary_edge *e)
 {
     int ends = 0;
     for (int k = 0; k < 3; k++) ends += is_place(t->corner[k], e->a) || is_place(t->corner[k], e->b);
@@ -157,7 +157,7 @@ typedef struct nb_outline {
     size_t count;
 } nb_outline;
 
-static void place_at(const nb_outline *o, double u, float place[2])
+static void place_on_edge(const nb_outline *o, double u, float place[2])
 {
     for (int i = 0; i < 2; i++) {
         const double a = (double)o->edge.a[i], b = (double)o->edge.b[i];
@@ -175,8 +175,8 @@ static int add_wall(nb_outline *o, double begin, double end, double first, doubl
     walls->walls = grown;
     nb_shadow_boundary wall;
     const int k = o->edge.is_left ? 0 : 1;
-    place_at(o, begin, k == 0 ? wall.from : wall.to);
-    place_at(o, end, k == 0 ? wall.to : wall.from);
+    place_on_edge(o, begin, k == 0 ? wall.from : wall.to);
+    place_on_edge(o, end, k == 0 ? wall.to : wall.from);
     wall.top[k] = (float)depth_at(&o->whole, begin);
     wall.top[1 - k] = (float)depth_at(&o->whole, end);
     wall.bottom[k] = (float)first;
@@ -211,7 +211,7 @@ static const nb_boundary_span *nearest_at(const nb_outline *o, double begin, dou
 }
 
 /* A part of the edge on which no span begins or ends. What is least at both ends of a part is least all along it. */
-static int add_part(nb_outline *o, double begin, double end, int level)
+static int add_edge_part(nb_outline *o, double begin, double end, int level)
 {
     const nb_boundary_span *first = nearest_at(o, begin, end, begin), *last = nearest_at(o, begin, end, end);
     if (first == NULL) return add_above(o, begin, end, (double)bottomless, (double)bottomless);
@@ -219,7 +219,7 @@ static int add_part(nb_outline *o, double begin, double end, int level)
     const double middle = begin + (end - begin) * (gap[0] / (gap[0] + gap[1]));
     if (first == last || level == DEEPEST || !(gap[0] > 0 && gap[1] > 0) || !(middle > begin && middle < end))
         return add_above(o, begin, end, depth_at(first, begin), depth_at(last, end));
-    return add_part(o, begin, middle, level + 1) && add_part(o, middle, end, level + 1);
+    return add_edge_part(o, begin, middle, level + 1) && add_edge_part(o, middle, end, level + 1);
 }
 
 /* Where spans begin or end, in rising order. */
@@ -249,14 +249,14 @@ static int add_outline(nb_outline *o, const nb_occluders *casters, const uint32_
     o->count = 0;
     for (size_t i = 0; i < count; i++) {
         const nb_occluder *t = &casters->triangles[list[i]];
-        if (!has_edge(t, e)) o->count += (size_t)span_of(t, e, part, &o->spans[o->count]);
+        if (!triangle_has_edge(t, e)) o->count += (size_t)span_of(t, e, part, &o->spans[o->count]);
     }
     const double a = (double)e->a[2], way = (double)e->b[2] - a;
     o->whole = (nb_boundary_span){part->begin, part->end, {a + part->begin * way, a + part->end * way}};
     const size_t ends = list_splits(o, splits);
     o->walls->looks += count + ends * o->count;
     for (size_t i = 1; i < ends; i++)
-        if (splits[i] > splits[i - 1] && !add_part(o, splits[i - 1], splits[i], 0)) return 0;
+        if (splits[i] > splits[i - 1] && !add_edge_part(o, splits[i - 1], splits[i], 0)) return 0;
     return 1;
 }
 
@@ -312,7 +312,7 @@ static uint64_t spread_bits(uint64_t x)
     return x;
 }
 
-static uint64_t place_of(const nb_shadow_boundary *wall, const nb_sun_cell *bounds)
+static uint64_t wall_place(const nb_shadow_boundary *wall, const nb_sun_cell *bounds)
 {
     uint64_t place = 0;
     const float x = bounds->high[0] - bounds->low[0], y = bounds->high[1] - bounds->low[1];
@@ -337,7 +337,7 @@ static int sort_walls(nb_shadow_boundaries *walls, const nebel_allocator *alloca
     nb_placed *placed = nb_allocate(allocator, walls->count, sizeof *placed);
     if (placed == NULL) return 0;
     for (size_t i = 0; i < walls->count; i++)
-        placed[i] = (nb_placed){place_of(&walls->walls[i], bounds), walls->walls[i]};
+        placed[i] = (nb_placed){wall_place(&walls->walls[i], bounds), walls->walls[i]};
     qsort(placed, walls->count, sizeof *placed, compare_placed);
     for (size_t i = 0; i < walls->count; i++) walls->walls[i] = placed[i].wall;
     nb_release(allocator, placed);
@@ -437,13 +437,14 @@ static int is_near(const nb_wall_node *node, int k, const float place[3], float 
     return near;
 }
 
-static int meets(const nb_shadow_boundaries *walls, int level, size_t number, const float place[3], float margin)
+static int node_meets_place(const nb_shadow_boundaries *walls, int level, size_t number, const float place[3],
+                            float margin)
 {
     const nb_wall_node *node = &walls->levels[level][number];
     for (int k = 0; k < NB_WALL_FAN; k++) {
         const size_t child = NB_WALL_FAN * number + (size_t)k;
-        if (is_near(node, k, place, margin) &&
-            (level == 0 ? touches(&walls->walls[child], place, margin) : meets(walls, level - 1, child, place, margin)))
+        if (is_near(node, k, place, margin) && (level == 0 ? touches(&walls->walls[child], place, margin)
+                                                           : node_meets_place(walls, level - 1, child, place, margin)))
             return 1;
     }
     return 0;
@@ -451,5 +452,5 @@ static int meets(const nb_shadow_boundaries *walls, int level, size_t number, co
 
 int nb_shadow_boundaries_meet(const nb_shadow_boundaries *walls, const float place[3], float margin)
 {
-    return walls->level_count > 0 && meets(walls, walls->level_count - 1, 0, place, margin);
+    return walls->level_count > 0 && node_meets_place(walls, walls->level_count - 1, 0, place, margin);
 }

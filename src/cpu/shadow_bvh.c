@@ -78,7 +78,7 @@ static void sort_triangles(nb_making *making)
     }
 }
 
-static void enlarge(nb_shadow_node *node, int child, const float low[3], const float high[3])
+static void enlarge_child(nb_shadow_node *node, int child, const float low[3], const float high[3])
 {
     for (int i = 0; i < 3; i++) {
         node->low[i][child] = fminf(node->low[i][child], low[i]);
@@ -86,7 +86,7 @@ static void enlarge(nb_shadow_node *node, int child, const float low[3], const f
     }
 }
 
-static void clear(nb_shadow_node *node)
+static void clear_node(nb_shadow_node *node)
 {
     for (int k = 0; k < NB_SHADOW_FAN; k++) {
         for (int i = 0; i < 3; i++) {
@@ -109,21 +109,21 @@ static void finish(nb_shadow_node *node)
 static void set_leaves(nb_shadow_tree *tree, const nb_making *making, size_t number)
 {
     nb_shadow_node *node = &tree->levels[0][number];
-    clear(node);
+    clear_node(node);
     for (size_t k = 0; k < NB_SHADOW_FAN * NB_SHADOW_FAN; k++) {
         const size_t place = number * NB_SHADOW_FAN * NB_SHADOW_FAN + k;
         if (place >= making->casters.count) break;
         const nb_occluder *t = &making->casters.triangles[making->keys[place].number];
         tree->casters[place] = *t;
         if (tree->numbers != NULL) tree->numbers[place] = making->casters.numbers[making->keys[place].number];
-        for (int c = 0; c < 3; c++) enlarge(node, (int)(k / NB_SHADOW_FAN), t->corner[c], t->corner[c]);
+        for (int c = 0; c < 3; c++) enlarge_child(node, (int)(k / NB_SHADOW_FAN), t->corner[c], t->corner[c]);
     }
 }
 
-static void set_node(nb_shadow_tree *tree, int level, size_t number)
+static void set_shadow_node(nb_shadow_tree *tree, int level, size_t number)
 {
     nb_shadow_node *node = &tree->levels[level][number];
-    clear(node);
+    clear_node(node);
     for (size_t k = 0; k < NB_SHADOW_FAN; k++) {
         const size_t child = number * NB_SHADOW_FAN + k;
         if (child >= tree->node_counts[level - 1]) break;
@@ -131,7 +131,7 @@ static void set_node(nb_shadow_tree *tree, int level, size_t number)
         for (int i = 0; i < NB_SHADOW_FAN; i++) {
             const float low[3] = {below->low[0][i], below->low[1][i], below->low[2][i]};
             const float high[3] = {below->high[0][i], below->high[1][i], below->high[2][i]};
-            enlarge(node, (int)k, low, high);
+            enlarge_child(node, (int)k, low, high);
         }
     }
 }
@@ -141,7 +141,7 @@ static void fill_tree(nb_shadow_tree *tree, const nb_making *making, int threads
 #pragma omp parallel for schedule(static) num_threads(threads)
     for (size_t i = 0; i < tree->node_counts[0]; i++) set_leaves(tree, making, i);
     for (int level = 1; level < tree->level_count; level++)
-        for (size_t i = 0; i < tree->node_counts[level]; i++) set_node(tree, level, i);
+        for (size_t i = 0; i < tree->node_counts[level]; i++) set_shadow_node(tree, level, i);
     for (int level = 0; level < tree->level_count; level++)
         for (size_t i = 0; i < tree->node_counts[level]; i++) finish(&tree->levels[level][i]);
 }
@@ -181,7 +181,7 @@ static int allocate_tree(nb_shadow_tree *tree, const nebel_allocator *allocator,
     return 1;
 }
 
-static nebel_result build(nb_shadow_tree *tree, const nb_geometry *geometry, nb_making *making, int threads)
+static nebel_result build_shadow_tree(nb_shadow_tree *tree, const nb_geometry *geometry, nb_making *making, int threads)
 {
     static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     nb_occluders *casters = &making->casters;
@@ -201,7 +201,7 @@ nebel_result nb_shadow_tree_set_lights(nb_shadow_tree *tree, const nb_geometry *
     nb_making making = {.keys = NULL};
     if (tree->is_built && memcmp(tree->origin, geometry->origin, sizeof tree->origin) == 0) return NEBEL_OK;
     nb_shadow_tree_free(tree, &geometry->allocator);
-    const nebel_result result = build(tree, geometry, &making, threads);
+    const nebel_result result = build_shadow_tree(tree, geometry, &making, threads);
     nb_occluders_free(&making.casters, &geometry->allocator);
     nb_release(&geometry->allocator, making.keys);
     nb_release(&geometry->allocator, making.other_keys);

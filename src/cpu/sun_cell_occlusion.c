@@ -90,7 +90,7 @@ typedef struct nb_occlusion_layer {
     uint64_t edges; /* what is left of them */
 } nb_occlusion_layer;
 
-static void add_triangle(const nb_occluder *t, const double place[2], const double reach[2], nb_occlusion_layer *layer)
+static void add_occluder(const nb_occluder *t, const double place[2], const double reach[2], nb_occlusion_layer *layer)
 {
     int left = 0;
     for (int k = 0; k < 3; k++) {
@@ -133,7 +133,7 @@ float nb_covered_from(const nb_occluders *casters, const uint32_t *list, const n
             if (layer.passes != 0 && layer.edges == 0) return layer.farthest;
             layer = (nb_occlusion_layer){-INFINITY, 0, 0};
         }
-        add_triangle(&casters->triangles[list[order[i]]], place, reach, &layer);
+        add_occluder(&casters->triangles[list[order[i]]], place, reach, &layer);
         layer.farthest = nb_most(layer.farthest, next->farthest);
     }
     return layer.passes != 0 && layer.edges == 0 ? layer.farthest : INFINITY;

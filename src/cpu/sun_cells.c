@@ -116,8 +116,8 @@ static inline nb_sun_cell common(const nb_sun_cell *a, const nb_sun_cell *b)
 }
 
 /* A node of triangles, or of nodes of as many as there are for each. */
-static int add_leaf(nb_division *d, const nb_sun_cell *cell, const uint32_t *list, const nb_occlusion_depths *depths,
-                    size_t count, uint32_t *number)
+static int add_cell_leaf(nb_division *d, const nb_sun_cell *cell, const uint32_t *list,
+                         const nb_occlusion_depths *depths, size_t count, uint32_t *number)
 {
     size_t each = 1;
     while (each * NB_CELL_FAN < count) each *= NB_CELL_FAN;
@@ -129,7 +129,7 @@ static int add_leaf(nb_division *d, const nb_sun_cell *cell, const uint32_t *lis
         uint32_t child;
         for (size_t i = first; i < first + here; i++) below.nearest = nb_least(below.nearest, depths[i].nearest);
         const int made = each == 1 ? prism_of(d, list[first], &child)
-                                   : add_leaf(d, cell, list + first, depths + first, here, &child);
+                                   : add_cell_leaf(d, cell, list + first, depths + first, here, &child);
         if (!made) return 0;
         set_child(d, *number, (int)k, &bounds, below, each == 1 ? NB_IS_PRISM | child : child);
     }
@@ -156,7 +156,7 @@ static int finish_cell(nb_division *d, const nb_sun_cell_part *part, nb_occlusio
         list[kept++] = list[i];
     }
     const int added =
-        add_leaf(d, &part->cell, list, depths, kept, number) &&
+        add_cell_leaf(d, &part->cell, list, depths, kept, number) &&
         nb_shadow_boundaries_add(&d->cells->walls, d->allocator, &d->casters, list, kept, &part->cell, &d->all);
     nb_release(d->allocator, depths);
     return added;
@@ -281,7 +281,7 @@ static nb_sun_cell_part list_all(nb_division *d, size_t count)
     return all;
 }
 
-static nebel_result build(nb_division *d, const nb_geometry *geometry, const double axes[3][3])
+static nebel_result build_sun_cells(nb_division *d, const nb_geometry *geometry, const double axes[3][3])
 {
     if (nb_occluders_list(geometry, axes, 1, &d->casters) != NEBEL_OK) return NEBEL_ERROR_MEMORY;
     const size_t count = d->casters.count;
@@ -311,7 +311,7 @@ nebel_result nb_sun_cells_set(nb_sun_cells *cells, const nb_geometry *geometry, 
     double axes[3][3];
     nb_sun_cells_free(cells, &geometry->allocator);
     set_axes(sun, axes);
-    const nebel_result result = build(&division, geometry, (const double(*)[3])axes);
+    const nebel_result result = build_sun_cells(&division, geometry, (const double(*)[3])axes);
     nb_occluders_free(&division.casters, &geometry->allocator);
     nb_release(&geometry->allocator, division.prism_of);
     nb_release(&geometry->allocator, division.bounds);

@@ -37,7 +37,7 @@ void nb_sun_shafts_clip(const nb_lit_box *box, const nb_ray_batch *rays, double 
     clip(box, rays, advance, distance, from, to);
 }
 
-NB_CLONES static void turn(const nb_sun_cells *cells, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
+NB_CLONES static void turn_packet(const nb_sun_cells *cells, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
 {
     for (int a = 0; a < 3; a++) {
         const float x = cells->axes[a][0], y = cells->axes[a][1], z = cells->axes[a][2];
@@ -118,7 +118,7 @@ typedef struct nb_met {
     float begin[NB_CELL_FAN], end[NB_CELL_FAN]; /* m along the beam */
 } nb_met;
 
-NB_ALWAYS_INLINE void meet_children(const nb_cell_node *node, const nb_beam *beam, nb_met *met)
+NB_ALWAYS_INLINE void meet_cells(const nb_cell_node *node, const nb_beam *beam, nb_met *met)
 {
     const float *restrict first_x = beam->falls[0] ? node->high[0] : node->low[0];
     const float *restrict last_x = beam->falls[0] ? node->low[0] : node->high[0];
@@ -146,7 +146,7 @@ NB_ALWAYS_INLINE void meet_children(const nb_cell_node *node, const nb_beam *bea
     met->children = children;
 }
 
-enum { VISITS = (NB_CELL_LEVELS + NB_LEAF_LEVELS) * NB_CELL_FAN };
+enum { SUN_VISITS = (NB_CELL_LEVELS + NB_LEAF_LEVELS) * NB_CELL_FAN };
 
 typedef struct nb_shaft_visit {
     float begin, end; /* m along the rays */
@@ -177,7 +177,7 @@ NB_ALWAYS_INLINE int list_children(const nb_cell_node *nodes, uint32_t number, c
 {
     nb_met met;
     uint32_t order[NB_CELL_FAN];
-    meet_children(&nodes[number], beam, &met);
+    meet_cells(&nodes[number], beam, &met);
     const int count = sort_children(&met, order);
     for (int i = 0; i < count; i++) {
         const uint32_t k = order[i] % NB_CELL_FAN;
@@ -249,7 +249,7 @@ NB_ALWAYS_INLINE int is_recent(const nb_recent *recent, uint32_t child)
 NB_CLONES static int walk(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
                           const nb_beam *beam, nb_shaft_rays *rays)
 {
-    nb_shaft_visit visits[VISITS];
+    nb_shaft_visit visits[SUN_VISITS];
     nb_recent recent;
     memset(&recent, 0, sizeof recent); /* of no prism: that of a node */
     int count = list_children(cells->nodes, 0, beam, visits);
@@ -346,7 +346,7 @@ static int reserve_boundaries(nb_sun_shafts *shafts, const nebel_allocator *allo
     return grown;
 }
 
-static int make_room(nb_sun_shafts *shafts, const nebel_allocator *allocator)
+static int reserve_shadows(nb_sun_shafts *shafts, const nebel_allocator *allocator)
 {
     void *sorted = shafts->sorted;
     const int grown =
@@ -361,7 +361,7 @@ int nb_sun_shafts_finish(nb_sun_shafts *shafts, const nebel_allocator *allocator
     for (uint32_t i = 0; i < NB_PACKET; i++)
         if (!nb_sun_shafts_keep(shafts, allocator, i, rays)) return 0;
     size_t ends[NB_PACKET], begin = 0;
-    if (shafts->shadow_count > 0 && !make_room(shafts, allocator)) return 0;
+    if (shafts->shadow_count > 0 && !reserve_shadows(shafts, allocator)) return 0;
     if (shafts->shadow_count > 0) sort_by_lane(shafts, ends);
     for (uint32_t i = 0; i < NB_PACKET; i++) {
         first[i] = (uint32_t)shafts->boundary_count;
@@ -413,13 +413,13 @@ static int find_passages_from_eye(const nb_shadow_boundaries *walls, const nb_sh
     return nb_boundary_crossings_find(walls, &beam, &rays, is_dark, passages);
 }
 
-static int find_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
-                       const nb_ray_batch *rays, double advance, nb_eye_visibility eye, int first,
-                       nb_shaft_rays *packet)
+static int find_sun_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
+                           const nb_ray_batch *rays, double advance, nb_eye_visibility eye, int first,
+                           nb_shaft_rays *packet)
 {
     nb_boundary_crossings passages;
     float skipped[NB_PACKET];
-    turn(cells, rays, first, packet);
+    turn_packet(cells, rays, first, packet);
     for (int i = 0; i < NB_PACKET; i++) skipped[i] = (float)(advance * (double)rays->length[first + i]);
     const int by_walls = eye != NB_EYE_UNKNOWN && cells->walls.level_count > 0 &&
                          find_passages_from_eye(&cells->walls, packet, skipped, eye == NB_EYE_IN_SHADOW, &passages);
@@ -451,7 +451,7 @@ nebel_result nb_sun_shafts_find(nb_sun_shafts *shafts, const nebel_allocator *al
             packet.from[i] = from[p + i];
             packet.to[i] = to[p + i];
         }
-        if (!find_packet(shafts, allocator, cells, rays, advance, eye, p, &packet)) return NEBEL_ERROR_MEMORY;
+        if (!find_sun_packet(shafts, allocator, cells, rays, advance, eye, p, &packet)) return NEBEL_ERROR_MEMORY;
     }
     shafts->first[NB_BATCH] = (uint32_t)shafts->boundary_count;
     return NEBEL_OK;

@@ -11,7 +11,7 @@ typedef struct nb_spot_cone {
     float axis[3], edge, rise;
 } nb_spot_cone;
 
-static nb_spot_cone cone_of(const nebel_light *lamp)
+static nb_spot_cone spot_cone_of(const nebel_light *lamp)
 {
     if (lamp->type != NEBEL_LIGHT_SPOT) return (nb_spot_cone){{0, 0, 0}, -1, 1e30f}; /* everything is within */
     const double edge = cos(lamp->outer_angle * (PI / 180)), inner = cos(lamp->inner_angle * (PI / 180));
@@ -54,7 +54,7 @@ NB_CLONES static void set_ways(const nb_spot_cone *within, float radius, float c
 void nb_shadow_rays_set(const nebel_light *lamp, const nb_ray_starts *starts, const nb_hits *hits,
                         const nb_surface_batch *points, nb_shadow_rays *ways)
 {
-    const nb_spot_cone within = cone_of(lamp);
+    const nb_spot_cone within = spot_cone_of(lamp);
     float place[3];
     for (int c = 0; c < 3; c++) place[c] = (float)(lamp->position[c] - starts->origin[c]);
     set_ways(&within, (float)nb_light_radius(lamp->radius), (float)lamp->radius, place, starts, hits, points, ways);

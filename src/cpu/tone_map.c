@@ -8,7 +8,7 @@
 
 /* Brighter than this differs from white by less than the last bit of a channel; keeps infinities out of the quotients.
  */
-static const float brightest = 65504;
+static const float brightest_tone = 65504;
 
 /* f(x) = x (x + a) / (x^2 + b x + c), our own. Black stays 0, the limit is 1, and f rises everywhere, because b > a:
  * f' = ((b - a) x^2 + 2 c x + a c) / (x^2 + b x + c)^2. The constants follow from three wishes: middle grey 0.18 stays
@@ -59,7 +59,7 @@ NB_CLONES static void map(size_t count, const float *linear, float scale, float 
     for (size_t i = 0; i < count; i++) {
         const float x = linear[i] * scale;
         const float positive = x > 0 ? x : 0;
-        srgb[i] = encode(curve(positive < brightest ? positive : brightest));
+        srgb[i] = encode(curve(positive < brightest_tone ? positive : brightest_tone));
     }
 }
 

@@ -86,7 +86,7 @@ static void widen(const float *lanes, uint32_t columns, uint32_t rows, nb_rows m
     }
 }
 
-static float brightest(const nb_light_samples *samples, uint32_t lane)
+static float brightest_channel(const nb_light_samples *samples, uint32_t lane)
 {
     float most = 0;
     for (int c = 0; c < 3; c++) most = most > samples->color[c][lane] ? most : samples->color[c][lane];
@@ -105,7 +105,7 @@ static int is_smooth(uint32_t columns, uint32_t rows, nb_light_samples *samples)
     for (uint32_t y = 0; y < rows; y++)
         for (uint32_t x = 0; x < columns; x++) {
             const uint32_t i = nb_lane_at(x, y);
-            if (!(off[y][x] <= MOST_OFF * brightest(samples, i) && left[y][x] <= MOST_OFF)) return 0;
+            if (!(off[y][x] <= MOST_OFF * brightest_channel(samples, i) && left[y][x] <= MOST_OFF)) return 0;
             samples->error[i] += off[y][x];
         }
     return 1;

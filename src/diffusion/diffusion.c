@@ -17,8 +17,9 @@ enum { BATCH = 256 };
 
 /* ---- sunlight at the nodes ------------------------------------------------------------------- */
 
-static nebel_result trace_sun(const nb_diffusion *d, const nebel_snapshot *fog, size_t first, size_t count,
-                              float out[3][BATCH])
+/* `lighting` of the fog, or NULL. */
+static nebel_result trace_sun(const nb_diffusion *d, const nebel_snapshot *fog, const nebel_lighting *lighting,
+                              size_t first, size_t count, float out[3][BATCH])
 {
     const nb_diffusion_lattice *l = &d->lattice;
     float offset[3][BATCH];
@@ -35,17 +36,18 @@ static nebel_result trace_sun(const nb_diffusion *d, const nebel_snapshot *fog, 
         nb_diffusion_lattice_node(l, first + i, place);
         for (int a = 0; a < 3; a++) offset[a][i] = (float)(place[a] - rays.origin[a]);
     }
-    return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, count, &rays, &transfers);
+    const nebel_trace_desc desc = {.lighting = lighting, .ignore_distances = 1};
+    return nebel_trace_planes(fog, &desc, count, &rays, &transfers);
 }
 
-static nebel_result light_nodes(const nb_diffusion *d, const nebel_snapshot *fog, nb_node_sun *sun)
+static nebel_result light_nodes(const nb_diffusion *d, const nebel_lighting *lighting, nb_node_sun *sun)
 {
     const size_t count = nb_diffusion_lattice_nodes(&d->lattice);
     for (size_t first = 0; first < count; first += BATCH) {
         const size_t n = count - first < BATCH ? count - first : BATCH;
         float scaled[3][BATCH], whole[3][BATCH];
-        nebel_result result = trace_sun(d, d->scaled, first, n, scaled);
-        if (result == NEBEL_OK && d->has_peaks) result = trace_sun(d, fog, first, n, whole);
+        nebel_result result = trace_sun(d, d->scaled, NULL, first, n, scaled);
+        if (result == NEBEL_OK && d->has_peaks) result = trace_sun(d, lighting->snapshot, lighting, first, n, whole);
         if (result != NEBEL_OK) return result;
         for (size_t i = 0; i < n; i++) {
             for (int c = 0; c < 3; c++) {
@@ -151,10 +153,11 @@ static int has_colour(const nebel_snapshot *snapshot, const nebel_diffusion_desc
     return !snapshot->is_gray;
 }
 
-static int find_has_colour(const nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot)
+static int find_has_colour(const nb_diffusion *d, const nebel_lighting *lighting)
 {
-    if (has_colour(snapshot, &fog->diffusion) || (d->has_sky && nb_environment_has_colour(&fog->sky))) return 1;
-    return d->is_own && nb_find_own_light(snapshot).has_colour;
+    if (has_colour(lighting->snapshot, &lighting->diffusion_desc)) return 1;
+    if (d->has_sky && nb_environment_has_colour(&lighting->environment)) return 1;
+    return d->is_own && nb_find_own_light(lighting).has_colour;
 }
 
 static int has_peaks(const nebel_snapshot *snapshot)
@@ -171,15 +174,14 @@ typedef struct nb_diffusion_builder {
     nb_diffuse_light light[3], sky;
 } nb_diffusion_builder;
 
-static nebel_result fill_sun(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot,
-                             nb_diffusion_builder *made)
+static nebel_result fill_sun(nb_diffusion *d, const nebel_lighting *lighting, nb_diffusion_builder *made)
 {
     const size_t nodes = nb_diffusion_lattice_nodes(&d->lattice);
     const nb_diffuse_source source = {.sun = made->sun, .to_sun = d->to_sun};
-    const nebel_result result = light_nodes(d, snapshot, made->sun);
+    const nebel_result result = light_nodes(d, lighting, made->sun);
     for (int c = 0; c < d->channel_count && result == NEBEL_OK; c++) {
-        if (!nb_diffusion_solve(&fog->allocator, &d->lattice, made->cells, &source, fog->diffusion.ground_albedo[c], c,
-                                &made->light[c]))
+        if (!nb_diffusion_solve(&lighting->allocator, &d->lattice, made->cells, &source,
+                                lighting->diffusion_desc.ground_albedo[c], c, &made->light[c]))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
             const nb_medium_transport t = nb_diffusion_lattice_around(&d->lattice, made->cells, i);
@@ -191,15 +193,15 @@ static nebel_result fill_sun(nb_diffusion *d, const nebel_fog *fog, const nebel_
     return result;
 }
 
-static nebel_result fill_sky(nb_diffusion *d, const nebel_fog *fog, nb_diffusion_builder *made)
+static nebel_result fill_sky(nb_diffusion *d, const nebel_lighting *lighting, nb_diffusion_builder *made)
 {
     const size_t nodes = nb_diffusion_lattice_nodes(&d->lattice);
     nb_environment_moments moments[3];
-    nb_environment_find_moments(&fog->sky, d->skylight, moments);
+    nb_environment_find_moments(&lighting->environment, d->skylight, moments);
     for (int c = 0; c < d->channel_count; c++) {
         const nb_diffuse_source source = {.sky = moments[c]};
-        if (!nb_diffusion_solve(&fog->allocator, &d->lattice, made->cells, &source, fog->diffusion.ground_albedo[c], c,
-                                &made->sky))
+        if (!nb_diffusion_solve(&lighting->allocator, &d->lattice, made->cells, &source,
+                                lighting->diffusion_desc.ground_albedo[c], c, &made->sky))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
             const nb_medium_transport t = nb_diffusion_lattice_around(&d->lattice, made->cells, i);
@@ -224,17 +226,16 @@ static void forget_exact_light(const nb_diffusion *d)
     }
 }
 
-static nebel_result solve_own(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot,
-                              const nb_local_light *own, const nb_light_beams *beams, nb_local_node *straight,
-                              nb_diffusion_builder *made)
+static nebel_result solve_own(nb_diffusion *d, const nebel_lighting *lighting, const nb_local_light *own,
+                              const nb_light_beams *beams, nb_local_node *straight, nb_diffusion_builder *made)
 {
     const size_t nodes = nb_diffusion_lattice_nodes(&d->lattice);
     const nb_diffuse_source source = {.beams = beams};
     for (int c = 0; c < d->channel_count; c++) {
-        nb_cast_beams(&d->lattice, snapshot, made->cells, c, own, beams);
+        nb_cast_beams(&d->lattice, lighting, made->cells, c, own, beams);
         nb_light_nodes_by_cells(&d->lattice, made->cells, beams, c, straight);
-        if (!nb_diffusion_solve(&fog->allocator, &d->lattice, made->cells, &source, fog->diffusion.ground_albedo[c], c,
-                                &made->light[c]))
+        if (!nb_diffusion_solve(&lighting->allocator, &d->lattice, made->cells, &source,
+                                lighting->diffusion_desc.ground_albedo[c], c, &made->light[c]))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
             const nb_medium_transport t = nb_diffusion_lattice_around(&d->lattice, made->cells, i);
@@ -247,40 +248,38 @@ static nebel_result solve_own(nb_diffusion *d, const nebel_fog *fog, const nebel
     return NEBEL_OK;
 }
 
-static nebel_result fill_own(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot,
-                             nb_diffusion_builder *made)
+static nebel_result fill_own(nb_diffusion *d, const nebel_lighting *lighting, nb_diffusion_builder *made)
 {
-    const nebel_allocator *allocator = &fog->allocator;
-    const nb_local_light own = nb_find_own_light(snapshot);
+    const nebel_allocator *allocator = &lighting->allocator;
+    const nb_local_light own = nb_find_own_light(lighting);
     nb_local_node *straight = nb_allocate_zero(allocator, nb_diffusion_lattice_nodes(&d->lattice), sizeof *straight);
     nb_light_beams beams;
     const int all = nb_beams_open(allocator, &d->lattice, &beams) && straight != NULL;
     nebel_result result = all ? NEBEL_OK : NEBEL_ERROR_MEMORY;
     memcpy(d->irradiance, own.unit, sizeof d->irradiance);
-    if (all) result = nb_light_nodes_by_point_lights(d, snapshot, made->cells, &own, straight);
-    if (result == NEBEL_OK) result = solve_own(d, fog, snapshot, &own, &beams, straight, made);
-    if (result == NEBEL_OK) result = nb_diffusion_balance(snapshot, d, made->light);
+    if (all) result = nb_light_nodes_by_point_lights(d, lighting, made->cells, &own, straight);
+    if (result == NEBEL_OK) result = solve_own(d, lighting, &own, &beams, straight, made);
+    if (result == NEBEL_OK) result = nb_diffusion_balance(lighting, d, made->light);
     if (result == NEBEL_OK) forget_exact_light(d);
     nb_beams_close(allocator, &beams);
     nb_release(allocator, straight);
     return result;
 }
 
-static nebel_result fill(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot,
-                         nb_diffusion_builder *made)
+static nebel_result fill(nb_diffusion *d, const nebel_lighting *lighting, nb_diffusion_builder *made)
 {
     nebel_result result = NEBEL_OK;
-    nb_diffusion_lattice_mean(&d->lattice, snapshot, made->cells);
-    if (d->has_sun) result = fill_sun(d, fog, snapshot, made);
-    if (result == NEBEL_OK && d->has_sky) result = fill_sky(d, fog, made);
-    if (result == NEBEL_OK && d->is_own) result = fill_own(d, fog, snapshot, made);
-    if (result == NEBEL_OK && d->has_sun) result = nb_diffusion_balance(snapshot, d, made->light);
+    nb_diffusion_lattice_mean(&d->lattice, lighting->snapshot, made->cells);
+    if (d->has_sun) result = fill_sun(d, lighting, made);
+    if (result == NEBEL_OK && d->has_sky) result = fill_sky(d, lighting, made);
+    if (result == NEBEL_OK && d->is_own) result = fill_own(d, lighting, made);
+    if (result == NEBEL_OK && d->has_sun) result = nb_diffusion_balance(lighting, d, made->light);
     return result;
 }
 
-static nebel_result solve(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot)
+static nebel_result solve(nb_diffusion *d, const nebel_lighting *lighting)
 {
-    const nebel_allocator *allocator = &fog->allocator;
+    const nebel_allocator *allocator = &lighting->allocator;
     const size_t nodes = nb_diffusion_lattice_nodes(&d->lattice);
     nb_diffusion_builder made = {
         .cells = nb_allocate(allocator, nb_diffusion_lattice_cells(&d->lattice), sizeof *made.cells),
@@ -290,39 +289,37 @@ static nebel_result solve(nb_diffusion *d, const nebel_fog *fog, const nebel_sna
     for (int c = 0; c < 3; c++) made.light[c].nodes = light;
     made.sky.nodes = light;
     d->nodes = nb_allocate_zero(allocator, nodes, d->node_numbers * sizeof *d->nodes);
-    if (made.cells != NULL && made.sun != NULL && light != NULL && d->nodes != NULL)
-        result = fill(d, fog, snapshot, &made);
+    if (made.cells != NULL && made.sun != NULL && light != NULL && d->nodes != NULL) result = fill(d, lighting, &made);
     nb_release(allocator, made.cells);
     nb_release(allocator, made.sun);
     nb_release(allocator, light);
     return result;
 }
 
-nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snapshot, nebel_snapshot *scaled, int is_own,
-                               nb_diffusion **made)
+nebel_result nb_diffusion_make(const nebel_lighting *lighting, nebel_snapshot *scaled, int is_own, nb_diffusion **made)
 {
     nb_diffusion_lattice lattice;
     int lit;
     *made = NULL;
-    nebel_result result = nb_diffusion_lattice_place(fog, snapshot, scaled, is_own, &lattice, &lit);
+    nebel_result result = nb_diffusion_lattice_place(lighting, scaled, is_own, &lattice, &lit);
     if (result != NEBEL_OK || !lit) return result;
-    nb_diffusion *d = nb_allocate_zero(&fog->allocator, 1, sizeof *d);
+    nb_diffusion *d = nb_allocate_zero(&lighting->allocator, 1, sizeof *d);
     if (d == NULL) return NEBEL_ERROR_MEMORY;
     d->lattice = lattice;
     d->scaled = nebel_retain_snapshot(scaled);
-    d->has_peaks = has_peaks(snapshot);
-    d->has_sun = !is_own && snapshot->is_sunlit;
-    d->has_sky = !is_own && nb_environment_is_dimmed(fog, snapshot);
+    d->has_peaks = has_peaks(lighting->snapshot);
+    d->has_sun = !is_own && lighting->scatters_sun;
+    d->has_sky = !is_own && nb_environment_is_dimmed(lighting);
     d->is_own = is_own;
-    d->channel_count = find_has_colour(d, fog, snapshot) ? 3 : 1;
+    d->channel_count = find_has_colour(d, lighting) ? 3 : 1;
     d->node_numbers = nb_diffusion_second_number(d, nb_diffusion_has_second(d) ? d->channel_count : 0);
-    memcpy(d->to_sun, snapshot->to_sun, sizeof d->to_sun);
-    memcpy(d->irradiance, fog->sun.irradiance, sizeof d->irradiance); /* own light says otherwise */
-    result = solve(d, fog, snapshot);
+    memcpy(d->to_sun, lighting->to_sun, sizeof d->to_sun);
+    memcpy(d->irradiance, lighting->irradiance, sizeof d->irradiance); /* own light says otherwise */
+    result = solve(d, lighting);
     if (result == NEBEL_OK)
         *made = d;
     else
-        nb_diffusion_free(&fog->allocator, d);
+        nb_diffusion_free(&lighting->allocator, d);
     return result;
 }
 

@@ -8,8 +8,8 @@
 #ifndef NB_DIFFUSION_DIFFUSION_H
 #define NB_DIFFUSION_DIFFUSION_H
 
-#include "fog/fog.h"
 #include "fog/medium_sampling.h"
+#include "light/lighting.h"
 #include "trace/trace_kernel.h"
 
 /* What is beyond the end of a lattice. */
@@ -150,13 +150,13 @@ typedef struct nb_local_light {
     double unit[3]; /* the colour of all where they have one, else 1 */
 } nb_local_light;
 
-nb_local_light nb_find_own_light(const nebel_snapshot *snapshot);
+nb_local_light nb_find_own_light(const nebel_lighting *lighting);
 
 /* Of a lamp's intensity or of what is emitted, per unit. */
 double nb_local_amount(const nb_local_light *own, const double color[3], int channel);
 
 /* Follows own light on straight ways to the lattice's ends, in one channel. */
-void nb_cast_beams(const nb_diffusion_lattice *lattice, const nebel_snapshot *snapshot,
+void nb_cast_beams(const nb_diffusion_lattice *lattice, const nebel_lighting *lighting,
                    const nb_medium_transport *cells, int channel, const nb_local_light *own,
                    const nb_light_beams *beams);
 
@@ -167,7 +167,7 @@ typedef struct nb_local_node {
 } nb_local_node;
 
 /* Fills the nodes, which are all 0, with lamps' light. */
-nebel_result nb_light_nodes_by_point_lights(const nb_diffusion *diffusion, const nebel_snapshot *fog,
+nebel_result nb_light_nodes_by_point_lights(const nb_diffusion *diffusion, const nebel_lighting *lighting,
                                             const nb_medium_transport *cells, const nb_local_light *own,
                                             nb_local_node *nodes);
 
@@ -176,15 +176,15 @@ void nb_light_nodes_by_cells(const nb_diffusion_lattice *lattice, const nb_mediu
                              const nb_light_beams *beams, int channel, nb_local_node *nodes);
 
 /* Where the scattered light of lamps and of what fog emits matters, in fog without an end [m]. 0: nowhere. */
-int nb_find_reach(const nebel_snapshot *snapshot, const nebel_snapshot *scaled, double low[3], double high[3]);
+int nb_find_reach(const nebel_lighting *lighting, const nebel_snapshot *scaled, double low[3], double high[3]);
 
 int nb_medium_scatters(const nb_medium *medium);
 
 /* Whether the medium scatters the sun's light or ambient light. */
-int nb_medium_is_lit(const nb_medium *medium);
+int nb_medium_is_lit(const nb_medium *medium, const nb_medium_light *lit);
 
 /* Whether any fog or the ground takes something from ambient light, so that it is darker than undimmed. */
-int nb_environment_is_dimmed(const nebel_fog *fog, const nebel_snapshot *snapshot);
+int nb_environment_is_dimmed(const nebel_lighting *lighting);
 
 /* Of each channel; all 0 where it is dark. */
 void nb_environment_find_moments(const nebel_environment *sky, double mean[3], nb_environment_moments moments[3]);
@@ -194,9 +194,8 @@ int nb_environment_has_colour(const nebel_environment *sky);
 
 /* Where the lattice is, and its cells: of own light, or of the sun and the sky. *lit: 0 where there is nothing to be solved.
  * Errors: UNSUPPORTED. */
-nebel_result nb_diffusion_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot,
-                                        const nebel_snapshot *scaled, int is_own, nb_diffusion_lattice *lattice,
-                                        int *lit);
+nebel_result nb_diffusion_lattice_place(const nebel_lighting *lighting, const nebel_snapshot *scaled, int is_own,
+                                        nb_diffusion_lattice *lattice, int *lit);
 
 /* Whether it holds bodies in fog that goes on beside it. */
 int nb_diffusion_lattice_has_bodies(const nb_diffusion_lattice *lattice);
@@ -239,7 +238,8 @@ int nb_diffusion_solve(const nebel_allocator *allocator, const nb_diffusion_latt
 /* Sets the gains of a diffusion that is ready but for them. The radiance at an end of the lattice, which comes from what
  * is scattered towards it all along a ray, carries less out than diffusion says: that knows the energy better than where
  * near the end the light is. The gains make both alike. */
-nebel_result nb_diffusion_balance(const nebel_snapshot *fog, nb_diffusion *diffusion, const nb_diffuse_light light[3]);
+nebel_result nb_diffusion_balance(const nebel_lighting *lighting, nb_diffusion *diffusion,
+                                  const nb_diffuse_light light[3]);
 
 typedef struct nb_diffusion_gathered {
     double light[3], diffuse[3]; /* all, and what of it is diffuse */
@@ -248,20 +248,19 @@ typedef struct nb_diffusion_gathered {
 
 /* Light per unit of irradiance that rays gather from the sun's light scattered in scaled fog; of what fog is there is no
  * less, where `is_rest` is 1: what exact light of one scattering lacks. Rays of t_max 0 gather none. */
-nebel_result nb_diffusion_gather(const nebel_snapshot *fog, const nb_diffusion *diffusion, int is_rest, size_t count,
-                                 const nebel_ray *rays, nb_diffusion_gathered *gathered);
+nebel_result nb_diffusion_gather(const nebel_lighting *lighting, const nb_diffusion *diffusion, int is_rest,
+                                 size_t count, const nebel_ray *rays, nb_diffusion_gathered *gathered);
 
 /* How many rays are gathered at once, at most. */
 enum { NB_DIFFUSION_RAYS = 64 };
 
-/* Of the sun and the sky, or of own light. *made: NULL where that lights no fog that scatters. `snapshot` is complete but for
- * this. */
-nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snapshot, nebel_snapshot *scaled, int is_own,
-                               nb_diffusion **made);
+/* Of the sun and the sky, or of own light. *made: NULL where that lights no fog that scatters. The lighting is complete but
+ * for this. */
+nebel_result nb_diffusion_make(const nebel_lighting *lighting, nebel_snapshot *scaled, int is_own, nb_diffusion **made);
 
 void nb_diffusion_free(const nebel_allocator *allocator, nb_diffusion *diffusion);
 
 /* Adds to the in-scattering of a job that is done. */
-nebel_result nb_diffusion_add(const nb_trace_job *job);
+nebel_result nb_diffusion_add(const nebel_lighting *lighting, const nb_trace_job *job);
 
 #endif

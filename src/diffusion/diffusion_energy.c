@@ -30,7 +30,7 @@ typedef struct nb_flux_balance {
 } nb_flux_balance;
 
 typedef struct nb_energy_survey {
-    const nebel_snapshot *fog;
+    const nebel_lighting *lighting;
     const nb_diffusion *diffusion;
     double ground[3]; /* radiance of the ground, in the mean */
 } nb_energy_survey;
@@ -88,7 +88,7 @@ static nebel_result add_place(const nb_energy_survey *v, int axis, int side, con
         weights[k] = area * set_ray(axis, side, k, &rays[k]);
         for (int a = 0; a < 3; a++) rays[k].origin[a] = place[a];
     }
-    const nebel_result result = nb_diffusion_gather(v->fog, v->diffusion, 0, NB_DIFFUSION_RAYS, rays, gathered);
+    const nebel_result result = nb_diffusion_gather(v->lighting, v->diffusion, 0, NB_DIFFUSION_RAYS, rays, gathered);
     for (int k = 0; k < NB_DIFFUSION_RAYS; k++) {
         for (int c = 0; c < 3; c++) {
             sum->diffuse[c] += weights[k] * gathered[k].diffuse[c];
@@ -151,10 +151,11 @@ static void balance_channel(nb_diffusion *d, int c, const nb_diffuse_light *ligh
     }
 }
 
-nebel_result nb_diffusion_balance(const nebel_snapshot *fog, nb_diffusion *diffusion, const nb_diffuse_light light[3])
+nebel_result nb_diffusion_balance(const nebel_lighting *lighting, nb_diffusion *diffusion,
+                                  const nb_diffuse_light light[3])
 {
     nb_flux_balance ends[6];
-    nb_energy_survey v = {.fog = fog, .diffusion = diffusion};
+    nb_energy_survey v = {.lighting = lighting, .diffusion = diffusion};
     for (int c = 0; c < 3; c++) {
         v.ground[c] = light[c < diffusion->channel_count ? c : 0].ground;
         for (int i = 0; i < 6; i++) diffusion->gain[c][i / 2][i % 2] = 1;

@@ -13,19 +13,21 @@ int nb_medium_scatters(const nb_medium *medium)
     return scatters;
 }
 
-int nb_medium_is_lit(const nb_medium *medium)
+int nb_medium_is_lit(const nb_medium *medium, const nb_medium_light *lit)
 {
-    int is_lit = medium->is_sunlit;
-    for (int c = 0; c < 3; c++) is_lit |= medium->body.lit && medium->radiance[c] > 0 && medium->body.extinction[c] > 0;
+    int is_lit = lit->scatters_sun;
+    for (int c = 0; c < 3; c++) is_lit |= medium->body.lit && lit->radiance[c] > 0 && medium->body.extinction[c] > 0;
     return is_lit;
 }
 
-int nb_environment_is_dimmed(const nebel_fog *fog, const nebel_snapshot *snapshot)
+int nb_environment_is_dimmed(const nebel_lighting *lighting)
 {
+    const nebel_snapshot *snapshot = lighting->snapshot;
+    const nebel_diffusion_desc *desc = &lighting->diffusion_desc;
     double most[3];
-    int is_dimmed = fog->sky.type != NEBEL_ENVIRONMENT_CONSTANT, is_lit = 0;
-    nb_environment_most(&fog->sky, most);
-    for (int c = 0; c < 3; c++) is_dimmed |= fog->diffusion.has_ground && fog->diffusion.ground_albedo[c] < 1;
+    int is_dimmed = lighting->environment.type != NEBEL_ENVIRONMENT_CONSTANT, is_lit = 0;
+    nb_environment_most(&lighting->environment, most);
+    for (int c = 0; c < 3; c++) is_dimmed |= desc->has_ground && desc->ground_albedo[c] < 1;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         for (int c = 0; c < 3; c++) {

@@ -47,7 +47,7 @@ typedef struct walker {
 } walker;
 
 typedef struct nb_diffusion_block {
-    const nebel_snapshot *fog;
+    const nebel_lighting *lighting;
     const nb_diffusion *diffusion;
     int is_rest; /* see nb_diffusion_gather */
     double middle[3];
@@ -367,7 +367,9 @@ static int prepare(nb_diffusion_block *b)
     return goes_on;
 }
 
-static nebel_result ask(nb_diffusion_block *b, const nebel_snapshot *fog, float out[3][BLOCK])
+/* `lighting` of the fog, or NULL. */
+static nebel_result ask(const nb_diffusion_block *b, const nebel_snapshot *fog, const nebel_lighting *lighting,
+                        float out[3][BLOCK])
 {
     nebel_ray_planes rays = {.t_max = b->length};
     nebel_transfer_planes transfers = {.error = NULL};
@@ -377,14 +379,16 @@ static nebel_result ask(nb_diffusion_block *b, const nebel_snapshot *fog, float 
         rays.direction_double[a] = b->direction[a];
         if (a < b->diffusion->channel_count) transfers.transmittance[a] = out[a];
     }
-    return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, b->count, &rays, &transfers);
+    const nebel_trace_desc desc = {.lighting = lighting, .ignore_distances = 1};
+    return nebel_trace_planes(fog, &desc, b->count, &rays, &transfers);
 }
 
 static nebel_result go_through(nb_diffusion_block *b)
 {
     while (prepare(b)) {
-        nebel_result result = ask(b, b->diffusion->scaled, b->scaled);
-        if (result == NEBEL_OK && b->diffusion->has_peaks) result = ask(b, b->fog, b->whole);
+        nebel_result result = ask(b, b->diffusion->scaled, NULL, b->scaled);
+        if (result == NEBEL_OK && b->diffusion->has_peaks)
+            result = ask(b, b->lighting->snapshot, b->lighting, b->whole);
         if (result != NEBEL_OK) return result;
         for (size_t i = 0; i < b->count; i++) {
             if (!(b->walkers[i].t < b->walkers[i].end)) continue;
@@ -397,11 +401,11 @@ static nebel_result go_through(nb_diffusion_block *b)
     return NEBEL_OK;
 }
 
-nebel_result nb_diffusion_gather(const nebel_snapshot *fog, const nb_diffusion *diffusion, int is_rest, size_t count,
-                                 const nebel_ray *rays, nb_diffusion_gathered *gathered)
+nebel_result nb_diffusion_gather(const nebel_lighting *lighting, const nb_diffusion *diffusion, int is_rest,
+                                 size_t count, const nebel_ray *rays, nb_diffusion_gathered *gathered)
 {
     const nb_diffusion *d = diffusion;
-    nb_diffusion_block b = {.fog = fog, .diffusion = d, .is_rest = is_rest, .count = count};
+    nb_diffusion_block b = {.lighting = lighting, .diffusion = d, .is_rest = is_rest, .count = count};
     for (int a = 0; a < 3; a++) b.middle[a] = d->lattice.low[a] + (d->lattice.high[a] - d->lattice.low[a]) / 2;
     for (size_t i = 0; i < count; i++) start(&b, i, &rays[i]);
     const nebel_result result = go_through(&b);
@@ -423,17 +427,27 @@ static nebel_ray ray_of(const nb_trace_job *job, size_t i)
     return *(const nebel_ray *)nb_stride_from(job->rays, job->ray_stride, i);
 }
 
-static void add(const nb_trace_job *job, size_t i, int c, double light)
+static void add_to_plane(float *plane, size_t stride, size_t i, double light)
+{
+    if (plane == NULL) return;
+    float *out = nb_stride_to(plane, stride, i);
+    *out = fmaxf(*out + (float)light, 0);
+}
+
+/* `light` of the sun or of lights, less what the environment lacks. */
+static void add(const nb_trace_job *job, const nb_diffusion *d, size_t i, int c, double light, double lack)
 {
     if (job->light_planes == NULL) {
         nebel_transfer *out = nb_stride_to(job->transfers, job->transfer_stride, i);
-        out->in_scattering[c] = fmax(out->in_scattering[c] + light, 0);
+        out->in_scattering[c] = fmax(out->in_scattering[c] + (light - lack), 0);
         return;
     }
     const nebel_transfer_planes *planes = job->light_planes;
-    if (planes->in_scattering[c] == NULL) return;
-    float *out = nb_stride_to(planes->in_scattering[c], planes->in_scattering_stride, i);
-    *out = fmaxf(*out + (float)light, 0);
+    const int group = d->is_own ? NEBEL_LIGHT_GROUP_LOCAL : NEBEL_LIGHT_GROUP_SUN;
+    const size_t stride = planes->in_scattering_stride;
+    add_to_plane(planes->in_scattering[c], stride, i, light - lack);
+    add_to_plane(planes->group[group].in_scattering[c], stride, i, light);
+    add_to_plane(planes->group[NEBEL_LIGHT_GROUP_ENVIRONMENT].in_scattering[c], stride, i, -lack);
 }
 
 static nebel_result add_all(const nb_trace_job *job, const nb_diffusion *d)
@@ -443,19 +457,18 @@ static nebel_result add_all(const nb_trace_job *job, const nb_diffusion *d)
         nebel_ray rays[NB_DIFFUSION_RAYS];
         nb_diffusion_gathered gathered[NB_DIFFUSION_RAYS];
         for (size_t i = 0; i < n; i++) rays[i] = ray_of(job, first + i);
-        const nebel_result result = nb_diffusion_gather(job->snapshot, d, 1, n, rays, gathered);
+        const nebel_result result = nb_diffusion_gather(job->lighting, d, 1, n, rays, gathered);
         if (result != NEBEL_OK) return result;
         for (size_t i = 0; i < n; i++)
             for (int c = 0; c < 3; c++)
-                add(job, first + i, c,
-                    gathered[i].light[c] * d->irradiance[c] - gathered[i].dimmed[c] * d->skylight[c]);
+                add(job, d, first + i, c, gathered[i].light[c] * d->irradiance[c],
+                    gathered[i].dimmed[c] * d->skylight[c]);
     }
     return NEBEL_OK;
 }
 
-nebel_result nb_diffusion_add(const nb_trace_job *job)
+nebel_result nb_diffusion_add(const nebel_lighting *lighting, const nb_trace_job *job)
 {
-    const nebel_snapshot *s = job->snapshot;
-    const nebel_result result = s->diffusion != NULL ? add_all(job, s->diffusion) : NEBEL_OK;
-    return result == NEBEL_OK && s->own_diffusion != NULL ? add_all(job, s->own_diffusion) : result;
+    const nebel_result result = lighting->diffusion != NULL ? add_all(job, lighting->diffusion) : NEBEL_OK;
+    return result == NEBEL_OK && lighting->local_diffusion != NULL ? add_all(job, lighting->local_diffusion) : result;
 }

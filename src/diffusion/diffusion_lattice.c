@@ -75,14 +75,15 @@ static int takes_part_in_own(const nb_medium *medium, int goes_on)
 }
 
 /* The span of all fog that ends and is lit, or scatters or gives own light, and whether there is any that does not. NULL, or what goes on and changes. */
-static const nb_medium *gather(const nebel_snapshot *snapshot, int is_own, int axis, nb_diffusion_span *all)
+static const nb_medium *gather(const nebel_lighting *lighting, int is_own, int axis, nb_diffusion_span *all)
 {
+    const nebel_snapshot *snapshot = lighting->snapshot;
     *all = (nb_diffusion_span){HUGE_VAL, -HUGE_VAL, {0, 0}};
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_medium *medium = &snapshot->media[i];
         const nb_diffusion_span s = span_of(medium, axis);
         const int goes_on = s.is_endless[0] || s.is_endless[1];
-        if (!(is_own ? takes_part_in_own(medium, goes_on) : nb_medium_is_lit(medium))) continue;
+        if (!(is_own ? takes_part_in_own(medium, goes_on) : nb_medium_is_lit(medium, &lighting->media[i]))) continue;
         if (goes_on && axis != 1 && !is_level(medium, axis)) return medium;
         for (int side = 0; side < 2; side++) all->is_endless[side] |= axis != 1 ? goes_on : s.is_endless[side];
         if (!s.is_endless[0]) all->low = fmin(all->low, s.low);
@@ -141,11 +142,11 @@ static void set_height(const nebel_snapshot *scaled, const nb_diffusion_span *s,
 }
 
 /* In fog without an end a lattice of own light holds lamps and bodies that emit, with what lies around them, and ends there. */
-static void hold_own_light(const nebel_snapshot *snapshot, const nebel_snapshot *scaled, nb_diffusion_lattice *l)
+static void hold_own_light(const nebel_lighting *lighting, const nebel_snapshot *scaled, nb_diffusion_lattice *l)
 {
     double low[3], high[3];
     const int is_everywhere = !(l->low[1] < l->high[1]);
-    if (!nb_find_reach(snapshot, scaled, low, high)) return;
+    if (!nb_find_reach(lighting, scaled, low, high)) return;
     for (int a = 0; a < 3; a += 2) {
         const int is_one = l->high[a] - l->low[a] == 1;
         if (l->ends[a][0] != NB_END_LEVEL) continue;
@@ -212,17 +213,16 @@ int nb_diffusion_lattice_has_bodies(const nb_diffusion_lattice *l)
     return (l->ends[0][0] == NB_END_LEVEL && l->size[0] > 1) || (l->ends[2][0] == NB_END_LEVEL && l->size[2] > 1);
 }
 
-nebel_result nb_diffusion_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot,
-                                        const nebel_snapshot *scaled, int is_own, nb_diffusion_lattice *lattice,
-                                        int *lit)
+nebel_result nb_diffusion_lattice_place(const nebel_lighting *lighting, const nebel_snapshot *scaled, int is_own,
+                                        nb_diffusion_lattice *lattice, int *lit)
 {
     nb_diffusion_span spans[3];
     memset(lattice, 0, sizeof *lattice);
     *lit = 0;
     for (int a = 0; a < 3; a++) {
-        const nb_medium *uneven = gather(snapshot, is_own, a, &spans[a]);
+        const nb_medium *uneven = gather(lighting, is_own, a, &spans[a]);
         if (uneven != NULL)
-            return nb_fail(&fog->log, NEBEL_ERROR_UNSUPPORTED,
+            return nb_fail(&lighting->log, NEBEL_ERROR_UNSUPPORTED,
                            "fog[%zu]: is endless along %c, but not the same all along, which diffusion (multiple "
                            "scattering) needs; let it end, or leave out diffusion",
                            uneven->slot, "xyz"[a]);
@@ -232,13 +232,13 @@ nebel_result nb_diffusion_lattice_place(const nebel_fog *fog, const nebel_snapsh
         lattice->high[a] = spans[a].high;
         if (spans[a].is_endless[0]) set_level_axis(lattice, a, &spans[a]);
     }
-    set_height(scaled, &spans[1], &fog->diffusion, lattice);
+    set_height(scaled, &spans[1], &lighting->diffusion_desc, lattice);
     if (is_own &&
         (spans[0].is_endless[0] || spans[2].is_endless[0] || spans[1].is_endless[0] || spans[1].is_endless[1]))
-        hold_own_light(snapshot, scaled, lattice);
+        hold_own_light(lighting, scaled, lattice);
     for (int a = 0; a < 3; a++)
         if (!(lattice->low[a] < lattice->high[a])) return NEBEL_OK;
-    set_cells(snapshot, fog->diffusion.max_cells, is_own, lattice);
+    set_cells(lighting->snapshot, lighting->diffusion_desc.max_cells, is_own, lattice);
     *lit = 1;
     return NEBEL_OK;
 }

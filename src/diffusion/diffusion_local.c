@@ -34,9 +34,9 @@ enum { MOST_WAYS = 8192, LEAST_WAYS = 512, WAYS_OF_ALL = 65536, LEAST_WAYS_OF_CE
 
 /* ---- what there is --------------------------------------------------------------------------- */
 
-static int has_lamps(const nebel_snapshot *snapshot)
+static int has_lamps(const nebel_lighting *lighting)
 {
-    return snapshot->is_lamplit && snapshot->lamp_count > 0;
+    return lighting->scatters_lights && lighting->light_count > 0;
 }
 
 static double most_of(const double color[3])
@@ -56,12 +56,13 @@ static void add_color(nb_local_light *own, const double color[3])
     own->has = 1;
 }
 
-nb_local_light nb_find_own_light(const nebel_snapshot *snapshot)
+nb_local_light nb_find_own_light(const nebel_lighting *lighting)
 {
+    const nebel_snapshot *snapshot = lighting->snapshot;
     nb_local_light own = {.has = 0};
     int scatters = 0;
-    for (size_t i = 0; has_lamps(snapshot) && i < snapshot->lamp_count; i++)
-        add_color(&own, snapshot->lamps[i].intensity);
+    for (size_t i = 0; has_lamps(lighting) && i < lighting->light_count; i++)
+        add_color(&own, lighting->lights[i].intensity);
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         const double glow[3] = {nb_volume_glow(body, 0), nb_volume_glow(body, 1), nb_volume_glow(body, 2)};
@@ -131,14 +132,15 @@ static void widen(const nebel_snapshot *scaled, const double from_low[3], const 
     }
 }
 
-int nb_find_reach(const nebel_snapshot *snapshot, const nebel_snapshot *scaled, double low[3], double high[3])
+int nb_find_reach(const nebel_lighting *lighting, const nebel_snapshot *scaled, double low[3], double high[3])
 {
+    const nebel_snapshot *snapshot = lighting->snapshot;
     for (int a = 0; a < 3; a++) {
         low[a] = HUGE_VAL;
         high[a] = -HUGE_VAL;
     }
-    for (size_t i = 0; has_lamps(snapshot) && i < snapshot->lamp_count; i++) {
-        const nb_light *lamp = &snapshot->lamps[i];
+    for (size_t i = 0; has_lamps(lighting) && i < lighting->light_count; i++) {
+        const nb_light *lamp = &lighting->lights[i];
         if (most_of(lamp->intensity) > 0) widen(scaled, lamp->place, lamp->place, low, high);
     }
     for (size_t i = 0; i < snapshot->medium_count; i++) {
@@ -365,7 +367,7 @@ static void cast_emission(const caster *k, const nb_local_light *own)
     }
 }
 
-void nb_cast_beams(const nb_diffusion_lattice *lattice, const nebel_snapshot *snapshot,
+void nb_cast_beams(const nb_diffusion_lattice *lattice, const nebel_lighting *lighting,
                    const nb_medium_transport *cells, int channel, const nb_local_light *own,
                    const nb_light_beams *beams)
 {
@@ -376,10 +378,10 @@ void nb_cast_beams(const nb_diffusion_lattice *lattice, const nebel_snapshot *sn
     memset(beams->whole, 0, 4 * count * sizeof *beams->whole);
     for (int a = 0; a < 3; a++)
         memset(beams->through[a], 0, nb_diffusion_lattice_faces(lattice, a) * sizeof *beams->through[a]);
-    const double share = snapshot->lamp_count > 0 ? WAYS_OF_ALL / (double)snapshot->lamp_count : 0;
+    const double share = lighting->light_count > 0 ? WAYS_OF_ALL / (double)lighting->light_count : 0;
     const int ways = (int)fmin(fmax(share, LEAST_WAYS), MOST_WAYS);
-    for (size_t i = 0; has_lamps(snapshot) && i < snapshot->lamp_count; i++)
-        cast_lamp(&k, &snapshot->lamps[i], nb_local_amount(own, snapshot->lamps[i].intensity, channel), ways);
+    for (size_t i = 0; has_lamps(lighting) && i < lighting->light_count; i++)
+        cast_lamp(&k, &lighting->lights[i], nb_local_amount(own, lighting->lights[i].intensity, channel), ways);
     k.is_emitted = 1;
     cast_emission(&k, own);
 }
@@ -410,7 +412,9 @@ static void look(const nb_diffusion_lattice *l, const nb_light *lamp, size_t fir
     }
 }
 
-static nebel_result ask(const nb_diffusion_lattice *l, const nebel_snapshot *fog, nb_light_view *v, float out[3][BATCH])
+/* `lighting` of the fog, or NULL. */
+static nebel_result ask(const nb_diffusion_lattice *l, const nebel_snapshot *fog, const nebel_lighting *lighting,
+                        nb_light_view *v, float out[3][BATCH])
 {
     nebel_ray_planes rays = {.t_max = v->length};
     nebel_transfer_planes transfers = {.error = NULL};
@@ -420,7 +424,8 @@ static nebel_result ask(const nb_diffusion_lattice *l, const nebel_snapshot *fog
         rays.direction_double[a] = v->direction[a];
         transfers.transmittance[a] = out[a];
     }
-    return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, v->count, &rays, &transfers);
+    const nebel_trace_desc desc = {.lighting = lighting, .ignore_distances = 1};
+    return nebel_trace_planes(fog, &desc, v->count, &rays, &transfers);
 }
 
 static double turned_cosine(const nb_medium_transport *t, int channel)
@@ -452,7 +457,7 @@ static void add_lamp(const nb_light_view *v, size_t i, const nb_light *lamp, con
     }
 }
 
-nebel_result nb_light_nodes_by_point_lights(const nb_diffusion *diffusion, const nebel_snapshot *fog,
+nebel_result nb_light_nodes_by_point_lights(const nb_diffusion *diffusion, const nebel_lighting *lighting,
                                             const nb_medium_transport *cells, const nb_local_light *own,
                                             nb_local_node *nodes)
 {
@@ -461,11 +466,11 @@ nebel_result nb_light_nodes_by_point_lights(const nb_diffusion *diffusion, const
     const double cell = nb_exp(nb_log(l->spacing[0] * l->spacing[1] * l->spacing[2]) / 3);
     for (size_t first = 0; first < count; first += BATCH) {
         nb_light_view v = {.count = count - first < BATCH ? count - first : BATCH};
-        for (size_t k = 0; has_lamps(fog) && k < fog->lamp_count; k++) {
-            const nb_light *lamp = &fog->lamps[k];
+        for (size_t k = 0; has_lamps(lighting) && k < lighting->light_count; k++) {
+            const nb_light *lamp = &lighting->lights[k];
             look(l, lamp, first, &v);
-            nebel_result result = ask(l, diffusion->scaled, &v, v.scaled);
-            if (result == NEBEL_OK) result = ask(l, fog, &v, v.whole);
+            nebel_result result = ask(l, diffusion->scaled, NULL, &v, v.scaled);
+            if (result == NEBEL_OK) result = ask(l, lighting->snapshot, lighting, &v, v.whole);
             if (result != NEBEL_OK) return result;
             for (size_t i = 0; i < v.count; i++) {
                 const nb_medium_transport around = nb_diffusion_lattice_around(l, cells, first + i);

@@ -10,7 +10,7 @@
 
 enum { FIRST_READ = 1 << 16 };
 
-static nebel_result fail(const nebel_log *log, const char *where, const char *what, const char *path, int error)
+static nebel_result fail_read(const nebel_log *log, const char *where, const char *what, const char *path, int error)
 {
     return nb_fail(log, NEBEL_ERROR_FILE, "%s%scannot read the %s \"%s\": %s", where != NULL ? where : "",
                    where != NULL ? ": " : "", what, path, strerror(error));
@@ -52,11 +52,11 @@ static nebel_result look(const nebel_log *log, const char *where, const char *wh
 {
     struct stat status;
     const int file = open(path, LOOK | O_CLOEXEC | O_NOCTTY);
-    if (file < 0) return fail(log, where, what, path, errno);
+    if (file < 0) return fail_read(log, where, what, path, errno);
     const int error = fstat(file, &status) == 0 ? 0 : errno;
     close(file);
-    if (error != 0) return fail(log, where, what, path, error);
-    if (S_ISDIR(status.st_mode)) return fail(log, where, what, path, EISDIR);
+    if (error != 0) return fail_read(log, where, what, path, error);
+    if (S_ISDIR(status.st_mode)) return fail_read(log, where, what, path, EISDIR);
     return S_ISREG(status.st_mode) ? NEBEL_OK : refuse(log, where, what, path);
 }
 
@@ -68,7 +68,7 @@ nebel_result nb_file_open(const nebel_log *log, const char *where, const char *w
     if (result != NEBEL_OK) return result;
     /* It may be another one by now. */
     const int opened = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
-    if (opened < 0) return fail(log, where, what, path, errno);
+    if (opened < 0) return fail_read(log, where, what, path, errno);
     if (fstat(opened, &status) != 0 || !S_ISREG(status.st_mode)) {
         close(opened);
         return refuse(log, where, what, path);
@@ -85,7 +85,7 @@ FILE *nb_file_open_stream(const nebel_log *log, const char *where, const char *w
     const int error = errno;
     if (stream != NULL) return stream;
     close(file);
-    fail(log, where, what, path, error);
+    fail_read(log, where, what, path, error);
     return NULL;
 }
 
@@ -93,7 +93,7 @@ nebel_result nb_file_check(const nebel_log *log, const char *where, const char *
 {
     const nebel_result result = look(log, where, what, path);
     if (result != NEBEL_OK) return result;
-    return access(path, R_OK) == 0 ? NEBEL_OK : fail(log, where, what, path, errno);
+    return access(path, R_OK) == 0 ? NEBEL_OK : fail_read(log, where, what, path, errno);
 }
 
 /* ---- reading --------------------------------------------------------------------------------- */
@@ -137,7 +137,7 @@ nebel_result nb_file_read_open(const nebel_allocator *allocator, const nebel_log
     if (error == 0 || size > limit)
         return nb_fail(log, NEBEL_ERROR_LIMIT, "%s%sthe %s \"%s\" is larger than %zu bytes, the most that is read",
                        where != NULL ? where : "", where != NULL ? ": " : "", what, path, limit);
-    const nebel_result result = fail(log, where, what, path, error);
+    const nebel_result result = fail_read(log, where, what, path, error);
     return error == ENOMEM ? NEBEL_ERROR_MEMORY : result;
 }
 
@@ -155,7 +155,7 @@ nebel_result nb_file_read_stream(const nebel_allocator *allocator, const nebel_l
     *bytes = (nb_bytes){0};
     if (nb_file_descriptor(path) < 0) return nb_file_read(allocator, log, NULL, what, path, limit, bytes);
     const int file = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
-    if (file < 0) return fail(log, NULL, what, path, errno);
+    if (file < 0) return fail_read(log, NULL, what, path, errno);
     return read_and_close(allocator, log, NULL, what, path, file, limit, bytes);
 }
 

@@ -187,7 +187,7 @@ static int try_file(nb_arena *arena, const char *path, size_t size)
 
 /* ---- what went wrong ------------------------------------------------------------------------- */
 
-static nebel_result fail(nb_arena *arena, const nebel_log *log, const char *path, int error)
+static nebel_result fail_write(nb_arena *arena, const nebel_log *log, const char *path, int error)
 {
     if (error == 0) return NEBEL_OK;
     if (error == ENOMEM) return nb_fail(log, NEBEL_ERROR_MEMORY, "cannot write \"%s\": out of memory", path);
@@ -234,7 +234,7 @@ nebel_result nb_sink_open(const nebel_allocator *allocator, const nebel_log *log
     *made = (nb_sink){.allocator = *allocator, .log = *log, .arena = {.allocator = *allocator}, .file = -1};
     made->path = strcpy((char *)(made + 1), path);
     const int error = open_sink(made);
-    const nebel_result result = fail(&made->arena, log, path, error);
+    const nebel_result result = fail_write(&made->arena, log, path, error);
     if (result == NEBEL_OK)
         *sink = made;
     else
@@ -290,7 +290,7 @@ nebel_result nb_sink_finish(nb_sink *sink)
 {
     if (sink->error == 0)
         sink->error = sink->found.is_direct ? write_directly(sink->path, &sink->bytes) : rename_sink(sink);
-    return fail(&sink->arena, &sink->log, sink->path, sink->error);
+    return fail_write(&sink->arena, &sink->log, sink->path, sink->error);
 }
 
 bool nb_sink_has_failed(const nb_sink *sink)
@@ -324,7 +324,7 @@ nebel_result nb_file_write(const nebel_allocator *allocator, const nebel_log *lo
 nebel_result nb_file_try_room(const nebel_allocator *allocator, const nebel_log *log, const char *path, size_t size)
 {
     nb_arena arena = {.allocator = *allocator};
-    const nebel_result result = fail(&arena, log, path, try_file(&arena, path, size));
+    const nebel_result result = fail_write(&arena, log, path, try_file(&arena, path, size));
     nb_arena_release(&arena);
     return result;
 }

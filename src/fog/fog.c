@@ -1,11 +1,6 @@
 /* Fog that can be edited: slots for volumes, ids that never come back. */
 #include "fog.h"
 
-#include "medium/medium_check.h"
-
-#include <math.h>
-#include <string.h>
-
 /* An id is the slot in the low half and the slot's generation in the high half, so that a stale id is recognised. */
 static nebel_volume_id id_of(size_t slot, uint32_t generation)
 {
@@ -33,17 +28,13 @@ nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog)
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
     if (!nb_allocator_is_valid(&desc->allocator))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "allocator: needs allocate and release, or neither");
-    nebel_result result = nb_check_color(&desc->log, "ambient", desc->ambient, NEBEL_MAX_AMOUNT);
-    if (result == NEBEL_OK) result = nb_check_sun(&desc->log, &desc->sun);
-    if (result == NEBEL_OK) result = check_opacity(&desc->log, desc->max_opacity);
+    const nebel_result result = check_opacity(&desc->log, desc->max_opacity);
     if (result != NEBEL_OK) return result;
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
     nebel_fog *made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "fog: out of memory");
     made->allocator = allocator;
     made->log = desc->log;
-    memcpy(made->sky.radiance, desc->ambient, sizeof made->sky.radiance);
-    made->sun = desc->sun;
     made->max_opacity = desc->max_opacity;
     *fog = made;
     return NEBEL_OK;
@@ -53,12 +44,8 @@ void nebel_destroy_fog(nebel_fog *fog)
 {
     if (fog == NULL) return;
     const nebel_allocator allocator = fog->allocator;
-    for (size_t i = 0; i < fog->slot_count; i++) {
+    for (size_t i = 0; i < fog->slot_count; i++)
         if (fog->slots[i].used) nb_volume_free(&allocator, &fog->slots[i].volume);
-        nb_sun_lattice_release(fog->slots[i].lattice);
-    }
-    nebel_release_environment_map(fog->sky.map);
-    nb_release(&allocator, fog->lamps);
     nb_release(&allocator, fog->slots);
     nb_release(&allocator, fog);
 }
@@ -133,66 +120,11 @@ nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id)
     if (slot == NULL)
         return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "volume id %llu: no such volume", (unsigned long long)id);
     nb_volume_free(&fog->allocator, &slot->volume);
-    nb_sun_lattice_release(slot->lattice);
-    slot->lattice = NULL;
     slot->used = 0;
     if (++slot->generation == 0) return NEBEL_OK; /* this slot's ids are used up: it is never taken again */
     slot->next_free = fog->first_free;
     fog->first_free = (size_t)(slot - fog->slots) + 1;
     fog->free_count++;
-    return NEBEL_OK;
-}
-
-nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3])
-{
-    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (ambient == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "ambient: must not be NULL");
-    const nebel_result result = nb_check_color(&fog->log, "ambient", ambient, NEBEL_MAX_AMOUNT);
-    if (result != NEBEL_OK) return result;
-    return nebel_set_environment(fog, &(nebel_environment){.radiance = {ambient[0], ambient[1], ambient[2]}});
-}
-
-nebel_result nebel_set_environment(nebel_fog *fog, const nebel_environment *sky)
-{
-    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (sky == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "environment: must not be NULL");
-    const nebel_result result = nb_check_sky(&fog->log, sky);
-    if (result != NEBEL_OK) return result;
-    nebel_environment_map *before = fog->sky.map;
-    fog->sky = *sky;
-    fog->sky.map = sky->type == NEBEL_ENVIRONMENT_MAP ? nebel_retain_environment_map(sky->map) : NULL;
-    nebel_release_environment_map(before);
-    return NEBEL_OK;
-}
-
-nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun)
-{
-    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (sun == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "sun: must not be NULL");
-    const nebel_result result = nb_check_sun(&fog->log, sun);
-    if (result == NEBEL_OK) fog->sun = *sun;
-    return result;
-}
-
-static nb_light *resolve_lamps(const nebel_allocator *allocator, size_t count, const nebel_light *lamps)
-{
-    nb_light *made = nb_allocate(allocator, count, sizeof *made);
-    for (size_t i = 0; i < count && made != NULL; i++) made[i] = nb_light_resolve(&lamps[i]);
-    return made;
-}
-
-nebel_result nebel_set_lamps(nebel_fog *fog, size_t count, const nebel_light *lamps)
-{
-    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (count > 0 && lamps == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "lamps: must not be NULL");
-    const nebel_result result = nb_check_lights(&fog->log, count, lamps);
-    if (result != NEBEL_OK) return result;
-    nb_light *made = count > 0 ? resolve_lamps(&fog->allocator, count, lamps) : NULL;
-    if (count > 0 && made == NULL)
-        return nb_fail(&fog->log, NEBEL_ERROR_MEMORY, "lamps: out of memory for %zu of them", count);
-    nb_release(&fog->allocator, fog->lamps);
-    fog->lamps = made;
-    fog->lamp_count = count;
     return NEBEL_OK;
 }
 
@@ -202,32 +134,4 @@ nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity)
     const nebel_result result = check_opacity(&fog->log, max_opacity);
     if (result == NEBEL_OK) fog->max_opacity = max_opacity;
     return result;
-}
-
-static const char *fault_of_diffusion(const nebel_diffusion_desc *desc)
-{
-    if (desc->max_cells != 0 &&
-        (desc->max_cells < NEBEL_MIN_DIFFUSION_CELLS || desc->max_cells > NEBEL_MAX_DIFFUSION_CELLS))
-        return "max_cells: must be 0 or within " NB_TEXT(NEBEL_MIN_DIFFUSION_CELLS) " and " NB_TEXT(
-            NEBEL_MAX_DIFFUSION_CELLS);
-    if (!desc->has_ground) return NULL;
-    if (!(fabs(desc->ground_height) <= NEBEL_MAX_LENGTH)) return "ground_height: must be at most 1e15 m";
-    for (int c = 0; c < 3; c++)
-        if (!(desc->ground_albedo[c] >= 0 && desc->ground_albedo[c] <= 1))
-            return "ground_albedo: must be within 0 and 1";
-    return NULL;
-}
-
-nebel_result nebel_set_diffusion(nebel_fog *fog, const nebel_diffusion_desc *desc)
-{
-    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (desc == NULL) {
-        fog->diffusion = (nebel_diffusion_desc){0};
-        return NEBEL_OK;
-    }
-    const char *fault = fault_of_diffusion(desc);
-    if (fault != NULL) return nb_fail(&fog->log, NEBEL_ERROR_VALUE, "diffusion: %s", fault);
-    fog->diffusion = *desc;
-    if (desc->max_cells == 0) fog->diffusion.max_cells = NEBEL_DEFAULT_DIFFUSION_CELLS;
-    return NEBEL_OK;
 }

@@ -5,7 +5,7 @@
 #include "math/vector.h"
 #include "medium/density.h"
 
-#include <nebel/places.h>
+#include <nebel/nebel.h>
 
 #include <math.h>
 

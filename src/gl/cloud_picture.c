@@ -121,7 +121,7 @@ static double first_ray_at(const nb_cloud_picture *picture, uint32_t x, uint32_t
 
 /* ---- the view -------------------------------------------------------------------------------- */
 
-static int are_same(const nebel_cloud_lighting_desc *a, const nebel_cloud_lighting_desc *b)
+static int is_same_lighting(const nebel_cloud_lighting_desc *a, const nebel_cloud_lighting_desc *b)
 {
     return a->clouds == b->clouds && a->time == b->time && memcmp(&a->sun, &b->sun, sizeof a->sun) == 0;
 }
@@ -142,7 +142,7 @@ nebel_result nb_cloud_picture_set(nb_gl_clouds *clouds, const nebel_clouds *of, 
 {
     const nebel_cloud_lighting_desc desc = {
         .clouds = of, .sun = *sun, .time = time, .allocator = clouds->allocator, .log = *log};
-    if (are_same(&clouds->of, &desc)) return NEBEL_OK;
+    if (is_same_lighting(&clouds->of, &desc)) return NEBEL_OK;
     forget(clouds);
     const nebel_result result = nebel_create_cloud_lighting(&desc, &clouds->view);
     if (result == NEBEL_OK) clouds->of = desc;
@@ -517,7 +517,7 @@ nebel_result nb_cloud_picture_mix(nb_gl_clouds *clouds, const nb_cloud_picture *
 #define NEAR_GROUND 1e-6
 
 /* Before a surface within the clouds they are as between the nodes around it. */
-static void lay_over(const nb_cloud_pixel_node *nodes, uint32_t count, float end, float over[4])
+static void blend_nodes(const nb_cloud_pixel_node *nodes, uint32_t count, float end, float over[4])
 {
     static const float clear[4] = {0, 0, 0, 1};
     float t[NEBEL_MAX_CLOUD_NODES], part;
@@ -581,7 +581,7 @@ static nebel_result lay_anew(const job *j, nb_cloud_part *part, const nb_cloud_p
     anew.count = nodes.count;
     set_nodes(&nodes, list);
     if (nodes.count > 0) result = mix_pixel(j, part, &anew, ray->direction, list);
-    lay_over(list, nodes.count, (float)ray->t_max, over);
+    blend_nodes(list, nodes.count, (float)ray->t_max, over);
     return result;
 }
 
@@ -598,7 +598,7 @@ static nebel_result lay_pixel(const job *j, nb_cloud_part *part, uint32_t x, uin
     ray.t_max = lifted.t_max = (double)end->t;
     if ((has_other && (j->picture->has_fog ? end->is_on_ground : end->is_in_sky)) || !is_found(j, part, pixel, end->t))
         return lay_anew(j, part, pixel, end->is_in_sky ? &lifted : &ray, spread, over);
-    lay_over(nodes_of(part, pixel), pixel->count, end->t, over);
+    blend_nodes(nodes_of(part, pixel), pixel->count, end->t, over);
     return NEBEL_OK;
 }
 

@@ -5,15 +5,18 @@
 static nebel_result make_empty_fog(nebel_gl *gl)
 {
     nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
     const nebel_fog_desc desc = {.allocator = gl->allocator, .log = gl->log};
     nebel_result result = nebel_create_fog(&desc, &fog);
-    if (result == NEBEL_OK) result = nebel_commit_fog(fog, &gl->empty);
+    if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
+    if (result == NEBEL_OK) result = nebel_create_lighting(snapshot, NULL, &gl->empty);
+    nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
     return result;
 }
 
 /* A vertex array exists once it was bound. */
-static void make_objects(nebel_gl *gl)
+static void make_fog_objects(nebel_gl *gl)
 {
     GLint bound = 0;
     glGetIntegerv(GL_VERTEX_ARRAY_BINDING, &bound);
@@ -52,13 +55,13 @@ nebel_result nebel_create_gl(const nebel_gl_desc *desc, nebel_gl **gl)
         nb_release(&allocator, made);
         return result;
     }
-    make_objects(made);
+    make_fog_objects(made);
     *gl = made;
     return NEBEL_OK;
 }
 
 /* Names of 0 are skipped by OpenGL. */
-static void delete_objects(nebel_gl *gl)
+static void delete_fog_objects(nebel_gl *gl)
 {
     const GLuint textures[] = {gl->texture, gl->voxels, gl->nodes, gl->tiles};
     nb_programs_delete(&gl->programs);
@@ -75,12 +78,12 @@ void nebel_destroy_gl(nebel_gl *gl)
 {
     if (gl == NULL) return;
     const nebel_log silent = {0};
-    if (nb_context_check(&silent, gl->vertex_array) == NEBEL_OK) delete_objects(gl);
-    nebel_release_snapshot(gl->empty);
-    nebel_release_snapshot(gl->packed);
-    nebel_release_snapshot(gl->voxels_of);
-    nebel_release_snapshot(gl->nodes_of);
-    nebel_release_snapshot(gl->environment.of);
+    if (nb_context_check(&silent, gl->vertex_array) == NEBEL_OK) delete_fog_objects(gl);
+    nebel_release_lighting(gl->empty);
+    nebel_release_lighting(gl->packed);
+    nebel_release_lighting(gl->voxels_of);
+    nebel_release_lighting(gl->nodes_of);
+    nebel_release_lighting(gl->environment.of);
     nb_release(&gl->allocator, gl->programs.list);
     nb_release(&gl->allocator, gl->words);
     nb_release(&gl->allocator, gl->entries);

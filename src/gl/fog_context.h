@@ -13,7 +13,7 @@ struct nebel_gl {
     nebel_log log;
     nebel_gl_storage storage;
     nb_context context;
-    nebel_snapshot *empty; /* what is seen where there is no fog */
+    nebel_lighting *empty; /* what is seen where there is no fog */
 
     /* Names in OpenGL; 0: not made yet. The sampler fetches single texels, whatever the host's textures ask for. */
     unsigned vertex_array, sampler, block, texture, voxels, nodes, tiles, framebuffer;
@@ -28,9 +28,9 @@ struct nebel_gl {
     int may_tire;              /* rays may take more of them than this driver has */
     int is_crowded;            /* some will */
     int has_fog;               /* what follows is of the last nebel_gl_set_fog, and that went well */
-    nebel_snapshot *packed;    /* what words and tiles are made of, as `view` sees it; NULL: of nothing */
-    nebel_snapshot *voxels_of; /* what the texture of voxels is made of; NULL: of nothing */
-    nebel_snapshot *nodes_of;  /* the same of the lattice of multiple scattering */
+    nebel_lighting *packed;    /* what words and tiles are made of, as `view` sees it; NULL: of nothing */
+    nebel_lighting *voxels_of; /* what the texture of voxels is made of; NULL: of nothing */
+    nebel_lighting *nodes_of;  /* the same of the lattice of multiple scattering */
     nebel_view views[6];       /* one, or six of a panorama */
     int view_count;
     int face_first[6]; /* entry of the first tile of each */
@@ -41,8 +41,14 @@ struct nebel_gl {
     size_t entry_capacity;
 };
 
+/* How many volumes there are in the fog of a lighting, which may be NULL. */
+static inline size_t nb_gl_count_volumes(const nebel_lighting *lighting)
+{
+    return nebel_get_volume_count(nebel_get_lighting_snapshot(lighting));
+}
+
 /* nebel_gl_set_fog for a panorama of so many pixels. */
-nebel_result nb_gl_set_fog_around(nebel_gl *gl, nebel_snapshot *snapshot, const double eye[3], uint32_t width,
+nebel_result nb_gl_set_fog_around(nebel_gl *gl, nebel_lighting *lighting, const double eye[3], uint32_t width,
                                   uint32_t height);
 
 /* What keeps light away from fog, as the fog's text asks for it (NEBEL_LIGHT_VISIBILITY). `set` sets the uniforms of a program

@@ -42,12 +42,6 @@ const char nb_step_text[] =
     "    pass_word_3 = words.word[3];\n"
     "}\n";
 
-static const char triangle_text[] =
-    "void main()\n"
-    "{\n"
-    "    gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, float(gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0);\n"
-    "}\n";
-
 /* Pixels that are not done are left: 3 is NB_STAGE_DONE. What is written does not count. */
 static const char count_text[] = "precision highp float;\n"
                                  "uniform highp sampler2DArray pass_progress;\n"
@@ -92,7 +86,7 @@ static nebel_result build(const nb_context *context, const nebel_log *log, const
                           const char *text, int unit, unsigned *name)
 {
     if (*name != 0) return NEBEL_OK;
-    const nb_shader_parts vertex = {{nb_program_version(context), triangle_text}, 2};
+    const nb_shader_parts vertex = {{nb_program_version(context), nb_triangle_text}, 2};
     const nb_shader_parts fragment = {{nb_program_version(context), extension, output, text}, 4};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
     if (result != NEBEL_OK) return result;
@@ -119,7 +113,7 @@ static void delete_progress(nb_fog_passes *s)
     s->width = s->height = 0;
 }
 
-static int make_framebuffer(nb_fog_passes *s, int i)
+static int make_progress_framebuffer(nb_fog_passes *s, int i)
 {
     GLenum buffers[LAYERS];
     glGenFramebuffers(1, &s->framebuffers[i]);
@@ -132,7 +126,7 @@ static int make_framebuffer(nb_fog_passes *s, int i)
     return glCheckFramebufferStatus(GL_DRAW_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
 }
 
-static void make_texture(nb_fog_passes *s, int i)
+static void make_progress_texture(nb_fog_passes *s, int i)
 {
     glGenTextures(1, &s->progress[i]);
     glBindTexture(GL_TEXTURE_2D_ARRAY, s->progress[i]);
@@ -146,9 +140,9 @@ static void make_texture(nb_fog_passes *s, int i)
 static nebel_result make_progress(nb_fog_passes *s, const nebel_log *log)
 {
     int complete = 1;
-    for (int i = 0; i < 2; i++) make_texture(s, i);
+    for (int i = 0; i < 2; i++) make_progress_texture(s, i);
     nebel_result result = nb_context_check_memory(log, "the progress of rays; ask for fewer pixels");
-    for (int i = 0; i < 2 && result == NEBEL_OK; i++) complete = make_framebuffer(s, i) && complete;
+    for (int i = 0; i < 2 && result == NEBEL_OK; i++) complete = make_progress_framebuffer(s, i) && complete;
     if (result == NEBEL_OK && !complete) {
         result = nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
                          "OpenGL: the driver (%s) does not draw into layers of floats of 32 bits; update it, or take "

@@ -5,9 +5,9 @@
 #include "shaft_maps.h"
 #include "gl_state.h"
 
-typedef struct size {
+typedef struct pass_size {
     GLint width, height, samples;
-} size;
+} pass_size;
 
 /* The host's state is saved around this. */
 typedef struct nb_pass_task {
@@ -17,7 +17,7 @@ typedef struct nb_pass_task {
     const nb_program *program;
 } nb_pass_task;
 
-static nebel_result fail(const nebel_gl *gl, nebel_result result, const char *what)
+static nebel_result fail_pass(const nebel_gl *gl, nebel_result result, const char *what)
 {
     return nb_fail(&gl->log, result, "nebel_gl_draw_fog: %s", what);
 }
@@ -29,15 +29,16 @@ static int is_by_sample(const nebel_gl_pass *pass)
     return pass->samples > 1 && (pass->output == NEBEL_GL_OUTPUT_BLEND || pass->output == NEBEL_GL_OUTPUT_BLEND_GRAY);
 }
 
-static nebel_result check_samples(const nebel_gl *gl, const nebel_gl_pass *pass)
+static nebel_result check_pass_samples(const nebel_gl *gl, const nebel_gl_pass *pass)
 {
     if (pass->samples <= 1) return NEBEL_OK;
     if (gl->context.es) {
-        return fail(gl, NEBEL_ERROR_UNSUPPORTED,
-                    "OpenGL ES 3.0 has no multisampled textures; resolve color and depth first (glBlitFramebuffer), "
-                    "and set samples to 0");
+        return fail_pass(
+            gl, NEBEL_ERROR_UNSUPPORTED,
+            "OpenGL ES 3.0 has no multisampled textures; resolve color and depth first (glBlitFramebuffer), "
+            "and set samples to 0");
     }
-    if (pass->samples > NB_MAX_PASS_SAMPLES) return fail(gl, NEBEL_ERROR_LIMIT, "more than 32 samples");
+    if (pass->samples > NB_MAX_PASS_SAMPLES) return fail_pass(gl, NEBEL_ERROR_LIMIT, "more than 32 samples");
     return NEBEL_OK;
 }
 
@@ -58,22 +59,22 @@ static nebel_result check_target_samples(const nebel_gl *gl, const nebel_gl_pass
 static nebel_result check_output(const nebel_gl *gl, const nebel_gl_pass *pass)
 {
     if ((unsigned)pass->output >= NEBEL_GL_OUTPUT_COUNT)
-        return fail(gl, NEBEL_ERROR_ARGUMENT, "there is no such output");
+        return fail_pass(gl, NEBEL_ERROR_ARGUMENT, "there is no such output");
     if (pass->output == NEBEL_GL_OUTPUT_BLEND && !gl->context.dual_source) {
-        return fail(gl, NEBEL_ERROR_UNSUPPORTED,
-                    "this context cannot blend each color by its own transmittance (GL_EXT_blend_func_extended is "
-                    "missing); use "
-                    "NEBEL_GL_OUTPUT_COMPOSE, or NEBEL_GL_OUTPUT_BLEND_GRAY where fog takes all colors alike");
+        return fail_pass(gl, NEBEL_ERROR_UNSUPPORTED,
+                         "this context cannot blend each color by its own transmittance (GL_EXT_blend_func_extended is "
+                         "missing); use "
+                         "NEBEL_GL_OUTPUT_COMPOSE, or NEBEL_GL_OUTPUT_BLEND_GRAY where fog takes all colors alike");
     }
-    return check_samples(gl, pass);
+    return check_pass_samples(gl, pass);
 }
 
 /* With the texture bound to the active unit. OpenGL ES 3.0 does not tell sizes. */
-static nebel_result check_size(const nb_pass_task *t, GLenum target, const char *name)
+static nebel_result check_target_size(const nb_pass_task *t, GLenum target, const char *name)
 {
     const nebel_gl *const gl = t->gl;
     const nebel_gl_pass *const pass = t->pass;
-    size s = {0, 0, 0};
+    pass_size s = {0, 0, 0};
     if (!gl->context.tells_sizes) return NEBEL_OK;
     glGetTexLevelParameteriv(target, 0, GL_TEXTURE_WIDTH, &s.width);
     glGetTexLevelParameteriv(target, 0, GL_TEXTURE_HEIGHT, &s.height);
@@ -140,8 +141,8 @@ static nebel_result check_feedback(const nebel_gl *gl, const nebel_gl_pass *pass
     glGetFramebufferAttachmentParameteriv(GL_DRAW_FRAMEBUFFER, (GLenum)buffer, GL_FRAMEBUFFER_ATTACHMENT_OBJECT_NAME,
                                           &name);
     if ((unsigned)name != pass->color_texture) return NEBEL_OK;
-    return fail(gl, NEBEL_ERROR_ARGUMENT,
-                "the color texture is the target, too; draw into another texture, or use NEBEL_GL_OUTPUT_BLEND");
+    return fail_pass(gl, NEBEL_ERROR_ARGUMENT,
+                     "the color texture is the target, too; draw into another texture, or use NEBEL_GL_OUTPUT_BLEND");
 }
 
 static nebel_result check_framebuffer(const nebel_gl *gl, const nebel_gl_pass *pass)
@@ -194,14 +195,14 @@ static nebel_result bind_textures(const nb_pass_task *t)
     if (gl->fog.environment != 0) bind_texture(gl, NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, gl->fog.environment);
     if (gl->fog.tiles != 0) bind_texture(gl, NB_UNIT_TILES, GL_TEXTURE_2D, gl->fog.tiles);
     bind_host_texture(gl, NB_UNIT_DEPTH, target, t->pass->depth_texture);
-    const nebel_result result = check_size(t, target, "depth");
+    const nebel_result result = check_target_size(t, target, "depth");
     if (result != NEBEL_OK || t->pass->output != NEBEL_GL_OUTPUT_COMPOSE) return result;
     bind_host_texture(gl, NB_UNIT_COLOR, target, t->pass->color_texture);
-    return check_size(t, target, "color");
+    return check_target_size(t, target, "color");
 }
 
 /* A framebuffer of nothing, which older OpenGL finds complete only where no buffer is drawn to or read. */
-static void make_framebuffer(nebel_gl *gl)
+static void make_empty_framebuffer(nebel_gl *gl)
 {
     GLint reading = 0;
     glGetIntegerv(GL_READ_FRAMEBUFFER_BINDING, &reading);
@@ -217,7 +218,7 @@ static void read_places(nebel_gl *gl, const nebel_gl_pass *pass, GLfloat places[
 {
     const GLenum attachments[] = {GL_DEPTH_ATTACHMENT, GL_COLOR_ATTACHMENT0};
     int known = 0;
-    if (gl->framebuffer == 0) make_framebuffer(gl);
+    if (gl->framebuffer == 0) make_empty_framebuffer(gl);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, gl->framebuffer);
     for (int kind = 0; kind < 2 && !known; kind++) {
         glFramebufferTexture(GL_DRAW_FRAMEBUFFER, attachments[kind], pass->depth_texture, 0);
@@ -255,7 +256,7 @@ static int is_shaded(const nb_fog_pass_input *picture)
     return picture->cloud_shade != NULL && picture->cloud_shade->clear_sky > 0;
 }
 
-static void set_uniforms(const nb_pass_task *t, GLuint target_framebuffer)
+static void set_pass_uniforms(const nb_pass_task *t, GLuint target_framebuffer)
 {
     const nb_program *const p = t->program;
     glUniform4fv(p->rays, NEBEL_RAY_TEXELS, t->picture->rays.texels[0].v);
@@ -302,7 +303,7 @@ static nebel_result draw(const nb_pass_task *t, GLuint target_framebuffer)
     set_target(t, &(nb_pass_band){t->pass->x, t->pass->y, t->picture->width, t->picture->height});
     glUseProgram(t->program->name);
     glBindVertexArray(t->gl->vertex_array);
-    set_uniforms(t, target_framebuffer);
+    set_pass_uniforms(t, target_framebuffer);
     draw_triangles(t);
     return NEBEL_OK;
 }
@@ -325,7 +326,7 @@ void nb_gl_warn_of_turns(nebel_gl *gl, const char *why)
                   "evenly mixed, and that of lamps left out there. A graphics processor or the CPU renderer has no "
                   "such bound",
                   (const char *)glGetString(GL_RENDERER), why,
-                  (unsigned)(gl->fog.tiles != 0 ? gl->fog.max_tile_volumes : nebel_get_volume_count(gl->packed)));
+                  (unsigned)(gl->fog.tiles != 0 ? gl->fog.max_tile_volumes : nb_gl_count_volumes(gl->packed)));
 }
 
 /* Units that have textures of several layers while steps are drawn. */
@@ -355,7 +356,7 @@ static nebel_result draw_bands(const nb_pass_task *t, GLuint target_framebuffer)
         const nb_pass_band band = {t->pass->x, t->pass->y + y, t->picture->width,
                                    height - y < rows ? height - y : rows};
         glUseProgram(t->program->name);
-        set_uniforms(t, target_framebuffer);
+        set_pass_uniforms(t, target_framebuffer);
         if (nb_fog_passes_trace(&gl->steps, &gl->context, t->program->name, &band)) is_cut = 1;
         glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target_framebuffer);
         set_target(t, &band);
@@ -436,11 +437,11 @@ static const char *find_depth_fault(const nebel_view *view, const nebel_depth_de
 nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass)
 {
     if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (pass == NULL) return fail(gl, NEBEL_ERROR_ARGUMENT, "the pass is missing");
-    if (!gl->has_fog) return fail(gl, NEBEL_ERROR_ARGUMENT, "call nebel_gl_set_fog first");
+    if (pass == NULL) return fail_pass(gl, NEBEL_ERROR_ARGUMENT, "the pass is missing");
+    if (!gl->has_fog) return fail_pass(gl, NEBEL_ERROR_ARGUMENT, "call nebel_gl_set_fog first");
     nb_fog_pass_input picture = {.width = gl->views[0].width, .height = gl->views[0].height};
     if (nebel_compute_view_rays(&gl->views[0], &pass->depth, &picture.rays) != NEBEL_OK) {
-        return fail(gl, NEBEL_ERROR_ARGUMENT, find_depth_fault(&gl->views[0], &pass->depth));
+        return fail_pass(gl, NEBEL_ERROR_ARGUMENT, find_depth_fault(&gl->views[0], &pass->depth));
     }
     return nb_gl_draw_fog(gl, pass, &picture);
 }

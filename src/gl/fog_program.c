@@ -21,8 +21,14 @@ static const char vertex_text[] =
     "    gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, float(gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0);\n"
     "}\n";
 
+const char nb_triangle_text[] =
+    "void main()\n"
+    "{\n"
+    "    gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, float(gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0);\n"
+    "}\n";
+
 /* Behind the shader text. Texels are fetched by number, so that no filter and no coordinate of the host matters. */
-static const char fragment_text[] =
+static const char fog_fragment_text[] =
     "uniform ivec2 pass_corner;\n"
     "#if defined(NEBEL_TILES) && !defined(PASS_PANORAMA)\n"
     "uniform ivec2 pass_tiling;\n" /* the logarithm of the size, and how many in a row */
@@ -167,7 +173,7 @@ const char *nb_program_extension(const nb_context *context, nebel_gl_output outp
 }
 
 /* What comes before the shader text. */
-static void write_head(const nb_context *context, const nb_program_kind *kind, char *text, size_t size)
+static void write_fog_head(const nb_context *context, const nb_program_kind *kind, char *text, size_t size)
 {
     /* The first sample, and the one behind the last: which ones a fragment walks through is told before the text. */
     const char *const samples = "#define PASS_MULTISAMPLED\nuniform ivec2 pass_sample_range;\n";
@@ -206,7 +212,7 @@ static void flatten(char *text)
     }
 }
 
-static nebel_result refuse(const nebel_log *log, const char *what, char *words)
+static nebel_result refuse_program(const nebel_log *log, const char *what, char *words)
 {
     flatten(words);
     return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
@@ -227,8 +233,8 @@ static nebel_result compile(const nebel_log *log, unsigned kind, const nb_shader
     glGetShaderInfoLog(*shader, sizeof words, NULL, words);
     glDeleteShader(*shader);
     *shader = 0;
-    return refuse(log, kind == GL_VERTEX_SHADER ? "compile nebel's vertex shader" : "compile nebel's fragment shader",
-                  words);
+    return refuse_program(
+        log, kind == GL_VERTEX_SHADER ? "compile nebel's vertex shader" : "compile nebel's fragment shader", words);
 }
 
 static nebel_result link(const nebel_log *log, unsigned vertex, unsigned fragment, unsigned *name)
@@ -246,7 +252,7 @@ static nebel_result link(const nebel_log *log, unsigned vertex, unsigned fragmen
     glGetProgramInfoLog(*name, sizeof words, NULL, words);
     glDeleteProgram(*name);
     *name = 0;
-    return refuse(log, "link nebel's shaders", words);
+    return refuse_program(log, "link nebel's shaders", words);
 }
 
 nebel_result nb_program_build(const nebel_log *log, const nb_shader_parts *vertex, const nb_shader_parts *fragment,
@@ -262,7 +268,7 @@ nebel_result nb_program_build(const nebel_log *log, const nb_shader_parts *verte
     return result;
 }
 
-static void set_uniforms(nb_program *program)
+static void find_uniforms(nb_program *program)
 {
     const unsigned name = program->name, block = glGetUniformBlockIndex(name, "nebel_fog_block");
     if (block != GL_INVALID_INDEX) glUniformBlockBinding(name, block, 0);
@@ -286,11 +292,11 @@ static void set_uniforms(nb_program *program)
 /* The fog's text has its own. */
 static const char precision_text[] = "#ifdef GL_ES\nprecision highp float;\nprecision highp int;\n#endif\n";
 
-static nebel_result make(const nb_context *context, const nebel_log *log, const nb_program_kind *kind,
-                         nb_program *program)
+static nebel_result make_fog_program(const nb_context *context, const nebel_log *log, const nb_program_kind *kind,
+                                     nb_program *program)
 {
     char head[1024];
-    write_head(context, kind, head, sizeof head);
+    write_fog_head(context, kind, head, sizeof head);
     const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const nb_shader_parts vertex = {{nb_program_version(context), vertex_text}, 2};
     const char *const ray = kind->panorama ? nb_panorama_ray_text : "";
@@ -302,15 +308,15 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
                                        kind->air ? nb_air_planets_text : "", kind->daylit ? nb_air_places_text : "",
                                        kind->clouds ? nb_cloud_shade_text : "", kind->shaded ? nb_fog_shadow_text : "",
                                        kind->air ? nb_air_pieces_text : "", kind->air ? nb_air_aerial_text : "",
-                                       fragment_text, kind->step ? nb_step_text : whole_text},
+                                       fog_fragment_text, kind->step ? nb_step_text : whole_text},
                                       17};
     *program = (nb_program){.kind = *kind};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &program->name);
-    if (result == NEBEL_OK) set_uniforms(program);
+    if (result == NEBEL_OK) find_uniforms(program);
     return result;
 }
 
-static int is_same(const nb_program_kind *a, const nb_program_kind *b)
+static int is_same_program(const nb_program_kind *a, const nb_program_kind *b)
 {
     return a->in_texture == b->in_texture && a->tiled == b->tiled && a->multisampled == b->multisampled &&
            a->output == b->output && a->depth == b->depth && a->from_eye == b->from_eye && a->panorama == b->panorama &&
@@ -324,7 +330,7 @@ nebel_result nb_programs_find(nb_programs *programs, const nb_context *context, 
 {
     for (size_t i = 0; i < programs->count; i++) {
         *program = &programs->list[i];
-        if (is_same(&programs->list[i].kind, kind)) return NEBEL_OK;
+        if (is_same_program(&programs->list[i].kind, kind)) return NEBEL_OK;
     }
     void *list = programs->list;
     if (!nb_grow(allocator, &list, sizeof *programs->list, programs->count, &programs->capacity, programs->count + 1)) {
@@ -332,7 +338,7 @@ nebel_result nb_programs_find(nb_programs *programs, const nb_context *context, 
     }
     programs->list = list;
     nb_program *const made = &programs->list[programs->count];
-    const nebel_result result = make(context, log, kind, made);
+    const nebel_result result = make_fog_program(context, log, kind, made);
     if (result == NEBEL_OK) programs->count++;
     *program = made;
     return result;

@@ -29,6 +29,9 @@ const char *nb_program_limits(const nb_context *context, const char *shares, cha
 const char *nb_program_extension(const nb_context *context, nebel_gl_output output);
 const char *nb_program_output(nebel_gl_output output);
 
+/* A vertex shader without attributes: three vertices cover the viewport. */
+extern const char nb_triangle_text[];
+
 /* Compiles and links. UNSUPPORTED, with the driver's words, where it refuses; *name is 0 then. */
 nebel_result nb_program_build(const nebel_log *log, const nb_shader_parts *vertex, const nb_shader_parts *fragment,
                               unsigned *name);

@@ -17,7 +17,7 @@ static size_t whole_rows(size_t count)
 }
 
 /* Makes an array of at least `count` elements of what it was, without keeping its contents. 0 on failure. */
-static int make_room(nebel_gl *gl, void **array, size_t size, size_t count, size_t *capacity)
+static int reserve_array(nebel_gl *gl, void **array, size_t size, size_t count, size_t *capacity)
 {
     if (count <= *capacity) return 1;
     const size_t wanted = whole_rows(count + count / 2);
@@ -27,32 +27,33 @@ static int make_room(nebel_gl *gl, void **array, size_t size, size_t count, size
     return *array != NULL;
 }
 
-static nebel_result out_of_memory(const nebel_gl *gl)
+static nebel_result fail_fog_memory(const nebel_gl *gl)
 {
     return nb_fail(&gl->log, NEBEL_ERROR_MEMORY, "nebel_gl_set_fog: out of memory");
 }
 
-static nebel_result pack(nebel_gl *gl, const nebel_snapshot *snapshot)
+static nebel_result pack_fog(nebel_gl *gl, const nebel_lighting *lighting)
 {
     size_t count = 0;
-    nebel_result result = nebel_pack_fog(snapshot, gl->fog.eye, NULL, 0, &count);
+    nebel_result result = nebel_pack_fog(lighting, gl->fog.eye, NULL, 0, &count);
     if (result != NEBEL_OK) {
         return nb_fail(&gl->log, result, "nebel_gl_set_fog: the fog cannot be packed: %s", nebel_result_text(result));
     }
     void *words = gl->words;
-    const int room = make_room(gl, &words, sizeof *gl->words, count, &gl->word_capacity);
+    const int room = reserve_array(gl, &words, sizeof *gl->words, count, &gl->word_capacity);
     gl->words = words;
-    if (!room) return out_of_memory(gl);
+    if (!room) return fail_fog_memory(gl);
     gl->fog.texel_count = count;
-    return nebel_pack_fog(snapshot, gl->fog.eye, gl->words, gl->word_capacity, &count);
+    return nebel_pack_fog(lighting, gl->fog.eye, gl->words, gl->word_capacity, &count);
 }
 
 /* The lists of one view, behind `before` entries of others. */
-static nebel_result list_view(nebel_gl *gl, const nebel_snapshot *snapshot, int view, size_t before, size_t *count)
+static nebel_result list_view(nebel_gl *gl, const nebel_lighting *lighting, int view, size_t before, size_t *count)
 {
     uint32_t *const entries = before < gl->entry_capacity ? gl->entries + before : NULL;
     const size_t capacity = entries != NULL ? gl->entry_capacity - before : 0;
-    const nebel_result result = nebel_bin_volumes(snapshot, &gl->views[view], TILE_SIZE, entries, capacity, count);
+    const nebel_result result =
+        nebel_bin_volumes(nebel_get_lighting_snapshot(lighting), &gl->views[view], TILE_SIZE, entries, capacity, count);
     if (result == NEBEL_OK || *count > capacity) return NEBEL_OK;
     return nb_fail(&gl->log, result, "nebel_gl_set_fog: the volumes of the tiles cannot be listed: %s",
                    nebel_result_text(result));
@@ -73,13 +74,13 @@ static void shift_lists(nebel_gl *gl, int view, size_t before)
 }
 
 /* *count may be more than there is room for; then there are no lists. */
-static nebel_result list_views(nebel_gl *gl, const nebel_snapshot *snapshot, size_t *count)
+static nebel_result list_views(nebel_gl *gl, const nebel_lighting *lighting, size_t *count)
 {
     nebel_result result = NEBEL_OK;
     *count = 0;
     for (int i = 0; i < gl->view_count && result == NEBEL_OK; i++) {
         size_t entries = 0;
-        result = list_view(gl, snapshot, i, *count, &entries);
+        result = list_view(gl, lighting, i, *count, &entries);
         if (result == NEBEL_OK && *count + entries <= gl->entry_capacity) shift_lists(gl, i, *count);
         *count += entries;
     }
@@ -87,15 +88,15 @@ static nebel_result list_views(nebel_gl *gl, const nebel_snapshot *snapshot, siz
 }
 
 /* The lists of the last frame tell how much room this one's need; where it is more they are made once again. */
-static nebel_result list_tiles(nebel_gl *gl, const nebel_snapshot *snapshot, size_t *count)
+static nebel_result list_tiles(nebel_gl *gl, const nebel_lighting *lighting, size_t *count)
 {
     for (;;) {
-        const nebel_result result = list_views(gl, snapshot, count);
+        const nebel_result result = list_views(gl, lighting, count);
         if (result != NEBEL_OK || *count <= gl->entry_capacity) return result;
         void *entries = gl->entries;
-        const int room = make_room(gl, &entries, sizeof *gl->entries, *count, &gl->entry_capacity);
+        const int room = reserve_array(gl, &entries, sizeof *gl->entries, *count, &gl->entry_capacity);
         gl->entries = entries;
-        if (!room) return out_of_memory(gl);
+        if (!room) return fail_fog_memory(gl);
     }
 }
 
@@ -136,14 +137,14 @@ static int may_tire(const nebel_gl *gl)
 }
 
 /* How many cells of voxels a ray passes is not known. */
-static int find_crowd(const nebel_gl *gl, const nebel_snapshot *snapshot)
+static int find_crowd(const nebel_gl *gl, const nebel_lighting *lighting)
 {
     const uint32_t lit = NEBEL_FEATURE_SUN | NEBEL_FEATURE_LIGHTS | NEBEL_FEATURE_MIXED;
-    const double all = (double)nebel_get_volume_count(snapshot);
+    const double all = (double)nb_gl_count_volumes(lighting);
     const double listed = gl->fog.tiles != 0 ? (double)gl->fog.max_tile_volumes : all;
     if (gl->context.most_turns == 0 || gl->dims_alone) return 0;
     if ((gl->fog.features & NEBEL_FEATURE_GRID) != 0 && (gl->fog.features & lit) != 0) return 1;
-    const double lamps = (double)nebel_snapshot_lamp_count(snapshot);
+    const double lamps = (double)nebel_get_lighting_lights(lighting, NULL);
     return most_turns_of(gl, listed, all, lamps) > (double)gl->context.most_turns;
 }
 
@@ -219,78 +220,78 @@ static nebel_result upload_words(nebel_gl *gl)
     return result;
 }
 
-static nebel_result write_voxels(nebel_gl *gl, const nebel_snapshot *snapshot, size_t count)
+static nebel_result write_voxels(nebel_gl *gl, const nebel_lighting *lighting, size_t count)
 {
     const size_t room = whole_rows(count);
     nebel_texel_u32 *const texels = nb_allocate(&gl->allocator, room, sizeof *texels);
-    if (texels == NULL) return out_of_memory(gl);
-    nebel_result result = nebel_pack_voxels(snapshot, texels, count, &count);
+    if (texels == NULL) return fail_fog_memory(gl);
+    nebel_result result = nebel_pack_voxels(lighting, texels, count, &count);
     memset(texels + count, 0, (room - count) * sizeof *texels);
     if (result == NEBEL_OK) result = fill_texture(gl, &voxel_texels, texels, count, &gl->voxels, &gl->voxel_rows);
     nb_release(&gl->allocator, texels);
     return result;
 }
 
-/* A snapshot stays with the gl, so that no other can have its address. */
-static void keep(nebel_snapshot **kept, nebel_snapshot *snapshot)
+/* A lighting stays with the gl, so that no other can have its address. */
+static void keep(nebel_lighting **kept, nebel_lighting *lighting)
 {
-    if (snapshot != NULL) (void)nebel_retain_snapshot(snapshot);
-    nebel_release_snapshot(*kept);
-    *kept = snapshot;
+    if (lighting != NULL) (void)nebel_retain_lighting(lighting);
+    nebel_release_lighting(*kept);
+    *kept = lighting;
 }
 
-static int is_lent(const nebel_gl *gl, const nebel_snapshot *snapshot)
+static int is_lent(const nebel_gl *gl, const nebel_lighting *lighting)
 {
-    return gl->lender != NULL && gl->lender->voxels_of != NULL && nebel_is_same_voxels(gl->lender->voxels_of, snapshot);
+    return gl->lender != NULL && gl->lender->voxels_of != NULL && nebel_is_same_voxels(gl->lender->voxels_of, lighting);
 }
 
 /* Voxels stay where they are while other fog and the eye change. */
-static nebel_result upload_voxels(nebel_gl *gl, nebel_snapshot *snapshot)
+static nebel_result upload_voxels(nebel_gl *gl, nebel_lighting *lighting)
 {
     size_t count = 0;
-    nebel_result result = nebel_pack_voxels(snapshot, NULL, 0, &count);
+    nebel_result result = nebel_pack_voxels(lighting, NULL, 0, &count);
     if (result != NEBEL_OK || count == 0) return result;
-    if (is_lent(gl, snapshot)) {
+    if (is_lent(gl, lighting)) {
         gl->fog.voxels = gl->lender->voxels;
         return NEBEL_OK;
     }
-    if (gl->voxels_of == NULL || !nebel_is_same_voxels(gl->voxels_of, snapshot)) {
-        result = write_voxels(gl, snapshot, count);
-        keep(&gl->voxels_of, result == NEBEL_OK ? snapshot : NULL);
+    if (gl->voxels_of == NULL || !nebel_is_same_voxels(gl->voxels_of, lighting)) {
+        result = write_voxels(gl, lighting, count);
+        keep(&gl->voxels_of, result == NEBEL_OK ? lighting : NULL);
     }
     gl->fog.voxels = gl->voxels;
     return result;
 }
 
 /* A lattice belongs to one snapshot. */
-static nebel_result write_nodes(nebel_gl *gl, const nebel_snapshot *snapshot, size_t count)
+static nebel_result write_nodes(nebel_gl *gl, const nebel_lighting *lighting, size_t count)
 {
     nebel_texel_f32 *const words = nb_allocate_zero(&gl->allocator, whole_rows(count), sizeof *words);
-    if (words == NULL) return out_of_memory(gl);
-    nebel_result result = nebel_pack_diffusion(snapshot, words, count, &count);
+    if (words == NULL) return fail_fog_memory(gl);
+    nebel_result result = nebel_pack_diffusion(lighting, words, count, &count);
     if (result == NEBEL_OK) result = fill_texture(gl, &node_texels, words, count, &gl->nodes, &gl->node_rows);
     nb_release(&gl->allocator, words);
     return result;
 }
 
-static nebel_result upload_nodes(nebel_gl *gl, nebel_snapshot *snapshot)
+static nebel_result upload_nodes(nebel_gl *gl, nebel_lighting *lighting)
 {
     size_t count = 0;
-    nebel_result result = nebel_pack_diffusion(snapshot, NULL, 0, &count);
+    nebel_result result = nebel_pack_diffusion(lighting, NULL, 0, &count);
     if (result != NEBEL_OK || count == 0) return result;
-    if (gl->nodes_of != snapshot) {
-        result = write_nodes(gl, snapshot, count);
-        keep(&gl->nodes_of, result == NEBEL_OK ? snapshot : NULL);
+    if (gl->nodes_of != lighting) {
+        result = write_nodes(gl, lighting, count);
+        keep(&gl->nodes_of, result == NEBEL_OK ? lighting : NULL);
     }
     gl->fog.diffusion = gl->nodes;
     return result;
 }
 
-static nebel_result upload_environment(nebel_gl *gl, nebel_snapshot *snapshot)
+static nebel_result upload_environment(nebel_gl *gl, nebel_lighting *lighting)
 {
     if ((gl->fog.features & NEBEL_FEATURE_ENVIRONMENT) == 0) return NEBEL_OK;
     const nebel_result result =
-        nb_environment_set(&gl->environment, &gl->allocator, &gl->log, &gl->context, snapshot, 0);
+        nb_environment_set(&gl->environment, &gl->allocator, &gl->log, &gl->context, lighting, 0);
     gl->fog.environment = gl->environment.name;
     return result;
 }
@@ -305,16 +306,16 @@ static nebel_result upload_tiles(nebel_gl *gl, size_t count)
     return result;
 }
 
-/* The snapshot is NULL where words and voxels are there already. */
-static nebel_result upload(nebel_gl *gl, nebel_snapshot *snapshot, size_t entry_count)
+/* The lighting is NULL where words and voxels are there already. */
+static nebel_result upload_fog(nebel_gl *gl, nebel_lighting *lighting, size_t entry_count)
 {
     nb_unpacking unpacking;
     nebel_result result = NEBEL_OK;
     nb_state_save_unpacking(&gl->context, &unpacking);
-    if (snapshot != NULL) result = upload_voxels(gl, snapshot);
-    if (result == NEBEL_OK && snapshot != NULL) result = upload_nodes(gl, snapshot);
-    if (result == NEBEL_OK && snapshot != NULL && !gl->dims_alone) result = upload_environment(gl, snapshot);
-    if (result == NEBEL_OK && snapshot != NULL) result = upload_words(gl);
+    if (lighting != NULL) result = upload_voxels(gl, lighting);
+    if (result == NEBEL_OK && lighting != NULL) result = upload_nodes(gl, lighting);
+    if (result == NEBEL_OK && lighting != NULL && !gl->dims_alone) result = upload_environment(gl, lighting);
+    if (result == NEBEL_OK && lighting != NULL) result = upload_words(gl);
     if (result == NEBEL_OK && entry_count > 0) result = upload_tiles(gl, entry_count);
     nb_state_restore_unpacking(&gl->context, &unpacking);
     return result;
@@ -335,11 +336,11 @@ static int are_same_views(const nebel_gl *gl, const nebel_view *views, int count
 }
 
 /* Where neither the fog nor the eye is another one the words stay, and in the same view the tiles, too. */
-static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const double eye[3], const nebel_view *views,
+static nebel_result prepare(nebel_gl *gl, nebel_lighting *lighting, const double eye[3], const nebel_view *views,
                             int view_count)
 {
-    const int has_voxels = gl->fog.voxels == gl->voxels || gl->fog.voxels == 0 || is_lent(gl, snapshot);
-    const int has_words = gl->packed == snapshot && memcmp(gl->fog.eye, eye, sizeof gl->fog.eye) == 0 && has_voxels;
+    const int has_voxels = gl->fog.voxels == gl->voxels || gl->fog.voxels == 0 || is_lent(gl, lighting);
+    const int has_words = gl->packed == lighting && memcmp(gl->fog.eye, eye, sizeof gl->fog.eye) == 0 && has_voxels;
     size_t entry_count = 0;
     nebel_result result = NEBEL_OK;
     gl->has_fog = has_words && are_same_views(gl, views, view_count);
@@ -347,15 +348,15 @@ static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const double
     memcpy(gl->views, views, (size_t)view_count * sizeof *views);
     gl->view_count = view_count;
     if (!has_words) {
-        gl->fog = (nebel_gl_fog_resources){.eye = {eye[0], eye[1], eye[2]}, .features = nebel_pack_features(snapshot)};
-        result = pack(gl, snapshot);
+        gl->fog = (nebel_gl_fog_resources){.eye = {eye[0], eye[1], eye[2]}, .features = nebel_pack_features(lighting)};
+        result = pack_fog(gl, lighting);
     }
-    if (result == NEBEL_OK && nebel_get_volume_count(snapshot) > FEW_VOLUMES) {
-        result = list_tiles(gl, snapshot, &entry_count);
+    if (result == NEBEL_OK && nb_gl_count_volumes(lighting) > FEW_VOLUMES) {
+        result = list_tiles(gl, lighting, &entry_count);
     }
-    if (result == NEBEL_OK) result = upload(gl, has_words ? NULL : snapshot, entry_count);
-    keep(&gl->packed, result == NEBEL_OK ? snapshot : NULL);
-    gl->is_crowded = result == NEBEL_OK && find_crowd(gl, snapshot);
+    if (result == NEBEL_OK) result = upload_fog(gl, has_words ? NULL : lighting, entry_count);
+    keep(&gl->packed, result == NEBEL_OK ? lighting : NULL);
+    gl->is_crowded = result == NEBEL_OK && find_crowd(gl, lighting);
     gl->may_tire = gl->is_crowded || (result == NEBEL_OK && may_tire(gl));
     gl->has_fog = result == NEBEL_OK;
     return result;
@@ -374,7 +375,7 @@ static const char *find_view_fault(const nebel_view *view)
     return "eye_from_world must be a rotation and a translation: finite numbers, 0 0 0 1 in the last row";
 }
 
-nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebel_view *view)
+nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_lighting *lighting, const nebel_view *view)
 {
     if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
     gl->has_fog = 0;
@@ -389,10 +390,10 @@ nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebe
     if (nebel_compute_view_rays(view, NULL, &rays) != NEBEL_OK) {
         return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog: %s", find_view_fault(view));
     }
-    return prepare(gl, snapshot != NULL ? snapshot : gl->empty, rays.eye, view, 1);
+    return prepare(gl, lighting != NULL ? lighting : gl->empty, rays.eye, view, 1);
 }
 
-nebel_result nb_gl_set_fog_around(nebel_gl *gl, nebel_snapshot *snapshot, const double eye[3], uint32_t width,
+nebel_result nb_gl_set_fog_around(nebel_gl *gl, nebel_lighting *lighting, const double eye[3], uint32_t width,
                                   uint32_t height)
 {
     nebel_view faces[6];
@@ -400,5 +401,5 @@ nebel_result nb_gl_set_fog_around(nebel_gl *gl, nebel_snapshot *snapshot, const 
     const nebel_result result = nb_context_check(&gl->log, gl->vertex_array);
     if (result != NEBEL_OK) return result;
     nb_panorama_faces(eye, width, height, faces);
-    return prepare(gl, snapshot != NULL ? snapshot : gl->empty, eye, faces, 6);
+    return prepare(gl, lighting != NULL ? lighting : gl->empty, eye, faces, 6);
 }

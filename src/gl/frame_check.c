@@ -1,5 +1,7 @@
 #include "frame_check.h"
 
+#include "fog_context.h"
+
 #include "method.h"
 #include "gl_panorama.h"
 
@@ -7,7 +9,7 @@
 
 enum { MOST_SIDE = 32768, MOST_SAMPLES = 4096 };
 
-static nebel_result check_size(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+static nebel_result check_frame_size(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
     GLint viewport[2] = {0, 0};
     glGetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport);
@@ -26,7 +28,7 @@ static nebel_result check_size(const nebel_gl_renderer *r, const nebel_gl_frame_
     return NEBEL_OK;
 }
 
-static nebel_result check_samples(const nebel_gl_renderer *r, uint32_t samples)
+static nebel_result check_frame_samples(const nebel_gl_renderer *r, uint32_t samples)
 {
     if (samples > MOST_SAMPLES) {
         return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: %u samples; 1 to 4096 are possible", (unsigned)samples);
@@ -55,7 +57,7 @@ static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_fram
                    "frame: taps must be finite numbers; offset, edge and brightness 0 or more");
 }
 
-static nebel_result refuse(const nebel_log *log, const char *what)
+static nebel_result refuse_frame(const nebel_log *log, const char *what)
 {
     return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
                    "frame: OpenGL cannot draw %s yet; the CPU can (nebel render --device cpu)", what);
@@ -74,7 +76,7 @@ static nebel_result check_air(const nebel_gl_renderer *r, const nebel_gl_frame_d
     if (desc->camera.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
         return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
                        "frame: orthographic cameras see no planets; take a perspective one or a panorama");
-    return r->particles.count > 0 ? refuse(&r->log, "particles in the air of a planet") : NEBEL_OK;
+    return r->particles.count > 0 ? refuse_frame(&r->log, "particles in the air of a planet") : NEBEL_OK;
 }
 
 /* What cannot be drawn with a planet is refused, not left out. */
@@ -82,7 +84,7 @@ static nebel_result check_planet(const nebel_gl_renderer *r, const nebel_gl_fram
 {
     const int has_air = nb_gl_planets_planet(r->scene) != NULL, has_layers = nb_gl_textured_planet(r->scene) != NULL;
     if (has_air && r->scene->planets[0].cloud_layer_count > 0 && !desc->clouds_by_processor)
-        return refuse(&r->log, "clouds with volume by itself");
+        return refuse_frame(&r->log, "clouds with volume by itself");
     if ((has_air || has_layers) && desc->method != NEBEL_GL_METHOD_EXACT)
         return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
                        "planets are drawn by the method exact alone: ask for no other method, or leave the planet out");
@@ -134,7 +136,7 @@ static nebel_result check_large(const nebel_gl_renderer *r, const nebel_gl_frame
                    i, NB_LARGE_EDGE);
 }
 
-static nebel_result check_mesh(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, size_t i)
+static nebel_result check_frame_mesh(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, size_t i)
 {
     const nb_mesh *const mesh = &r->meshes.list[i];
     const int is_parallel = desc->camera.projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
@@ -156,7 +158,7 @@ static nebel_result check_meshes(const nebel_gl_renderer *r, const nebel_gl_fram
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < r->meshes.count && result == NEBEL_OK; i++) {
-        result = check_mesh(r, desc, i);
+        result = check_frame_mesh(r, desc, i);
         if (result == NEBEL_OK) result = check_large(r, desc, i);
     }
     return result;
@@ -177,7 +179,7 @@ static nebel_view_error find_fog_error(const nebel_gl_renderer *r, const nebel_g
     if (nb_camera_look(&desc->camera, desc->width, desc->height, &silent, views) != NEBEL_OK) return worst;
     if (is_panorama) nb_panorama_faces(desc->camera.position, desc->width, desc->height, views);
     for (int i = 0; i < (is_panorama ? 6 : 1); i++)
-        if (nebel_find_view_error(r->fog, &views[i], &error) == NEBEL_OK) {
+        if (nebel_find_view_error(nebel_get_lighting_snapshot(r->fog), &views[i], &error) == NEBEL_OK) {
             const double by_surface = fmax(worst.by_surface, error.by_surface);
             if (!(error.error <= worst.error)) worst = error;
             worst.by_surface = by_surface;
@@ -203,7 +205,7 @@ static nebel_result refuse_pixels(const nebel_gl_renderer *r, const nebel_gl_fra
 static nebel_result check_fog(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
     const int is_exact = desc->method == NEBEL_GL_METHOD_EXACT || desc->method == NEBEL_GL_METHOD_FIVE_TAP;
-    if (!is_exact || nebel_get_volume_count(r->fog) == 0) return NEBEL_OK;
+    if (!is_exact || nb_gl_count_volumes(r->fog) == 0) return NEBEL_OK;
     const nebel_view_error error = find_fog_error(r, desc);
     if (r->meshes.count > 0 && error.by_surface > MOST_SURFACE_ERROR)
         return nb_fail(
@@ -224,8 +226,8 @@ nebel_result nb_gl_frame_check(const nebel_gl_renderer *r, const nebel_gl_frame_
 {
     if (!(fabs(desc->time) <= 1e12))
         return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: time is %g; must be within -1e12 and 1e12", desc->time);
-    nebel_result result = check_size(r, desc);
-    if (result == NEBEL_OK) result = check_samples(r, samples);
+    nebel_result result = check_frame_size(r, desc);
+    if (result == NEBEL_OK) result = check_frame_samples(r, samples);
     if (result == NEBEL_OK) result = check_planet(r, desc);
     if (result == NEBEL_OK) result = check_meshes(r, desc);
     if (result == NEBEL_OK) result = check_fog(r, desc);

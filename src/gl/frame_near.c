@@ -29,7 +29,7 @@ static double depth_of_fog(const nebel_gl_renderer *r, const nebel_gl_frame_desc
     nebel_view_error error;
     if (r->fog == NULL) return HUGE_VAL;
     if (nb_camera_look(&desc->camera, desc->width, desc->height, &silent, &view) != NEBEL_OK) return 0;
-    return nebel_find_view_error(r->fog, &view, &error) == NEBEL_OK ? error.clear : 0;
+    return nebel_find_view_error(nebel_get_lighting_snapshot(r->fog), &view, &error) == NEBEL_OK ? error.clear : 0;
 }
 
 /* Before surfaces there is room for the rounding of their places, lest they are behind the eye. */

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-static const double pi = 3.14159265358979323846;
+#define PI 3.14159265358979323846
 
 /* Where the frustum of a perspective view begins [m], and where the box of an orthographic one ends. Surfaces bring
  * their own depth, so that neither costs any digits. */
@@ -21,7 +21,7 @@ void nb_camera_subtract(const double a[3], const double b[3], float difference[3
 
 static void set_perspective(const nebel_camera *camera, nebel_view *view)
 {
-    const double scale = 1 / tan(camera->vertical_fov * (pi / 360));
+    const double scale = 1 / tan(camera->vertical_fov * (PI / 360));
     view->clip_from_eye[0] = scale * view->height / view->width;
     view->clip_from_eye[5] = scale;
     view->clip_from_eye[10] = view->clip_from_eye[11] = -1;
@@ -76,7 +76,7 @@ nebel_result nebel_view_from_camera(const nebel_camera *camera, uint32_t width, 
 
 double nb_camera_pixel(const nebel_view *view, int panorama)
 {
-    return panorama ? pi / view->height : 2 / (view->clip_from_eye[5] * view->height);
+    return panorama ? PI / view->height : 2 / (view->clip_from_eye[5] * view->height);
 }
 
 /* ---- samples --------------------------------------------------------------------------------- */

@@ -5,7 +5,7 @@
 
 enum { OLDEST = 33, OLDEST_ES = 30 };
 
-static int has(const char *extension)
+int nb_context_has(const char *extension)
 {
     return epoxy_has_gl_extension(extension) ? 1 : 0;
 }
@@ -24,17 +24,17 @@ static int read_most_turns(void)
 static void read_features(nb_context *c)
 {
     const int desktop = !c->es;
-    c->switches_by_buffer =
-        desktop || c->version >= 32 || has("GL_EXT_draw_buffers_indexed") || has("GL_OES_draw_buffers_indexed");
+    c->switches_by_buffer = desktop || c->version >= 32 || nb_context_has("GL_EXT_draw_buffers_indexed") ||
+                            nb_context_has("GL_OES_draw_buffers_indexed");
     c->blending_by_buffer = desktop ? c->version >= 40 : c->switches_by_buffer;
     c->viewport_arrays = desktop && c->version >= 41;
-    c->pauses_feedback = !desktop || c->version >= 40 || has("GL_ARB_transform_feedback2");
+    c->pauses_feedback = !desktop || c->version >= 40 || nb_context_has("GL_ARB_transform_feedback2");
     c->sample_mask = c->tells_sizes = desktop || c->version >= 31;
-    c->dual_source = desktop ? 1 : has("GL_EXT_blend_func_extended") ? 2 : 0;
-    c->depth_bounds = has("GL_EXT_depth_bounds_test");
+    c->dual_source = desktop ? 1 : nb_context_has("GL_EXT_blend_func_extended") ? 2 : 0;
+    c->depth_bounds = nb_context_has("GL_EXT_depth_bounds_test");
 }
 
-static GLint read_integer(GLenum name)
+int nb_context_integer(unsigned name)
 {
     GLint value = 0;
     glGetIntegerv(name, &value);
@@ -58,10 +58,11 @@ nebel_result nb_context_read(const nebel_log *log, nb_context *context)
     }
     read_features(context);
     context->most_turns = read_most_turns();
-    context->widest = (uint32_t)read_integer(GL_MAX_TEXTURE_SIZE);
-    if (!context->es || has("GL_EXT_clip_cull_distance")) context->clip_distances = read_integer(GL_MAX_CLIP_DISTANCES);
+    context->widest = (uint32_t)nb_context_integer(GL_MAX_TEXTURE_SIZE);
+    if (!context->es || nb_context_has("GL_EXT_clip_cull_distance"))
+        context->clip_distances = nb_context_integer(GL_MAX_CLIP_DISTANCES);
     if (context->clip_distances > 32) context->clip_distances = 32;
-    context->viewports = context->viewport_arrays ? (uint32_t)read_integer(GL_MAX_VIEWPORTS) : 1;
+    context->viewports = context->viewport_arrays ? (uint32_t)nb_context_integer(GL_MAX_VIEWPORTS) : 1;
     if (context->viewports > 32) context->viewports = 32;
     return NEBEL_OK;
 }

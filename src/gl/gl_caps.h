@@ -15,6 +15,10 @@ typedef struct nb_context {
     int most_turns;  /* of the walk through a ray's fog in one shader; 0: any number */
 } nb_context;
 
+/* Of the current context: whether it has an extension, and a number that it tells. */
+int nb_context_has(const char *extension);
+int nb_context_integer(unsigned name);
+
 /* Reads what the current context is. UNSUPPORTED where there is none or it is too old. */
 nebel_result nb_context_read(const nebel_log *log, nb_context *context);
 

@@ -21,39 +21,28 @@ struct nebel_gl_classic {
     GLboolean depth_mask, color_sum;
 };
 
-static const char text[] = "#ifdef GL_ES\n"
-                           "precision highp float;\n"
-                           "#endif\n"
-                           "vec4 nebel_classic_fog_coord(vec4 surface, float coordinate, float end, vec3 color)\n"
-                           "{\n"
-                           "    float factor = clamp((end - coordinate) / end, 0.0, 1.0);\n"
-                           "    return vec4(factor * surface.rgb + (1.0 - factor) * color, surface.a);\n"
-                           "}\n"
-                           "vec4 nebel_classic_alpha(vec3 color, float amount)\n"
-                           "{\n"
-                           "    return vec4(color, clamp(amount, 0.0, 1.0));\n"
-                           "}\n";
+static const char classic_text[] =
+    "#ifdef GL_ES\n"
+    "precision highp float;\n"
+    "#endif\n"
+    "vec4 nebel_classic_fog_coord(vec4 surface, float coordinate, float end, vec3 color)\n"
+    "{\n"
+    "    float factor = clamp((end - coordinate) / end, 0.0, 1.0);\n"
+    "    return vec4(factor * surface.rgb + (1.0 - factor) * color, surface.a);\n"
+    "}\n"
+    "vec4 nebel_classic_alpha(vec3 color, float amount)\n"
+    "{\n"
+    "    return vec4(color, clamp(amount, 0.0, 1.0));\n"
+    "}\n";
 
 const char *nebel_gl_classic_shader_source(void)
 {
-    return text;
-}
-
-static int has(const char *extension)
-{
-    return epoxy_has_gl_extension(extension) ? 1 : 0;
+    return classic_text;
 }
 
 static int has_since(const nebel_gl_classic *classic, int version, const char *extension)
 {
-    return classic->version >= version || has(extension);
-}
-
-static GLint read_integer(GLenum name)
-{
-    GLint value = 0;
-    glGetIntegerv(name, &value);
-    return value;
+    return classic->version >= version || nb_context_has(extension);
 }
 
 /* ---- making ---------------------------------------------------------------------------------- */
@@ -63,8 +52,8 @@ static int has_fixed_pipeline(int version)
 {
     if (!epoxy_is_desktop_gl()) return 0;
     if (version <= 30) return 1;
-    if (version == 31) return has("GL_ARB_compatibility");
-    return (read_integer(GL_CONTEXT_PROFILE_MASK) & GL_CONTEXT_COMPATIBILITY_PROFILE_BIT) != 0;
+    if (version == 31) return nb_context_has("GL_ARB_compatibility");
+    return (nb_context_integer(GL_CONTEXT_PROFILE_MASK) & GL_CONTEXT_COMPATIBILITY_PROFILE_BIT) != 0;
 }
 
 static nebel_result read_context(const nebel_log *log, nebel_gl_classic *classic)
@@ -145,7 +134,7 @@ static const struct {
     [NEBEL_GL_CLASSIC_ALPHA] = {GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA},
 };
 
-static nebel_result fail(const nebel_gl_classic *classic, nebel_result result, const char *what)
+static nebel_result fail_classic(const nebel_gl_classic *classic, nebel_result result, const char *what)
 {
     return nb_fail(&classic->log, result, "nebel_gl_classic: %s", what);
 }
@@ -153,8 +142,8 @@ static nebel_result fail(const nebel_gl_classic *classic, nebel_result result, c
 static void switch_textures_off(const nebel_gl_classic *classic)
 {
     const int many = has_since(classic, 13, "GL_ARB_multitexture");
-    const GLint units = many ? read_integer(GL_MAX_TEXTURE_UNITS) : 1;
-    const GLint active = many ? read_integer(GL_ACTIVE_TEXTURE) : 0;
+    const GLint units = many ? nb_context_integer(GL_MAX_TEXTURE_UNITS) : 1;
+    const GLint active = many ? nb_context_integer(GL_ACTIVE_TEXTURE) : 0;
     for (GLint i = 0; i < units; i++) {
         if (many) glActiveTexture((GLenum)(GL_TEXTURE0 + i));
         glDisable(GL_TEXTURE_1D);
@@ -169,7 +158,7 @@ static void switch_textures_off(const nebel_gl_classic *classic)
 static void begin_fog(nebel_gl_classic *classic, const float color[3])
 {
     const GLfloat opaque[4] = {color[0], color[1], color[2], 1};
-    classic->coordinate_source = read_integer(GL_FOG_COORDINATE_SOURCE);
+    classic->coordinate_source = nb_context_integer(GL_FOG_COORDINATE_SOURCE);
     glEnable(GL_FOG);
     glFogi(GL_FOG_MODE, GL_LINEAR);
     glFogf(GL_FOG_START, 0);
@@ -207,14 +196,14 @@ static void set_fixed_pass(const nebel_gl_classic *classic)
 
 static int is_full(GLenum depth, GLenum most)
 {
-    return read_integer(depth) >= read_integer(most);
+    return nb_context_integer(depth) >= nb_context_integer(most);
 }
 
 static nebel_result push_fixed(const nebel_gl_classic *classic)
 {
     if (is_full(GL_ATTRIB_STACK_DEPTH, GL_MAX_ATTRIB_STACK_DEPTH) ||
         is_full(GL_CLIENT_ATTRIB_STACK_DEPTH, GL_MAX_CLIENT_ATTRIB_STACK_DEPTH))
-        return fail(classic, NEBEL_ERROR_LIMIT, "an attribute stack of the context is full; pop before begin");
+        return fail_classic(classic, NEBEL_ERROR_LIMIT, "an attribute stack of the context is full; pop before begin");
     glPushAttrib(GL_CURRENT_BIT | GL_ENABLE_BIT | GL_FOG_BIT | GL_COLOR_BUFFER_BIT | GL_LIGHTING_BIT);
     glPushClientAttrib(GL_CLIENT_VERTEX_ARRAY_BIT);
     return NEBEL_OK;
@@ -222,7 +211,7 @@ static nebel_result push_fixed(const nebel_gl_classic *classic)
 
 static void begin_pass(nebel_gl_classic *classic)
 {
-    classic->depth_function = read_integer(GL_DEPTH_FUNC);
+    classic->depth_function = nb_context_integer(GL_DEPTH_FUNC);
     glGetBooleanv(GL_DEPTH_WRITEMASK, &classic->depth_mask);
     if (has_color_sum(classic)) classic->color_sum = glIsEnabled(GL_COLOR_SUM);
     glDepthFunc(GL_EQUAL);
@@ -248,9 +237,9 @@ nebel_result nebel_gl_begin_classic_fog(nebel_gl_classic *classic, const float c
 {
     nebel_result result = NEBEL_OK;
     if (classic == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (classic->is_begun) return fail(classic, NEBEL_ERROR_ARGUMENT, "begin after begin; call end first");
+    if (classic->is_begun) return fail_classic(classic, NEBEL_ERROR_ARGUMENT, "begin after begin; call end first");
     if (classic->kind == NEBEL_GL_CLASSIC_FOG_COORD && color == NULL)
-        return fail(classic, NEBEL_ERROR_ARGUMENT, "fog coordinates need the color of the fog");
+        return fail_classic(classic, NEBEL_ERROR_ARGUMENT, "fog coordinates need the color of the fog");
     if (classic->is_fixed) result = push_fixed(classic);
     if (result != NEBEL_OK) return result;
     if (classic->kind != NEBEL_GL_CLASSIC_FOG_COORD)
@@ -266,7 +255,7 @@ nebel_result nebel_gl_begin_classic_fog(nebel_gl_classic *classic, const float c
 nebel_result nebel_gl_end_classic_fog(nebel_gl_classic *classic)
 {
     if (classic == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (!classic->is_begun) return fail(classic, NEBEL_ERROR_ARGUMENT, "end without begin");
+    if (!classic->is_begun) return fail_classic(classic, NEBEL_ERROR_ARGUMENT, "end without begin");
     classic->is_begun = 0;
     if (classic->is_fixed) {
         glPopClientAttrib();
@@ -306,20 +295,22 @@ static int has_buffers(const nebel_gl_classic *classic)
 static nebel_result check_stream(const nebel_gl_classic *classic, const nebel_vertex_output *stream, unsigned buffer)
 {
     if (!classic->is_fixed)
-        return fail(classic, NEBEL_ERROR_UNSUPPORTED,
-                    "this context has no fixed pipeline; hand the stream to an attribute of your program");
-    if (!classic->is_begun) return fail(classic, NEBEL_ERROR_ARGUMENT, "feed without begin");
+        return fail_classic(classic, NEBEL_ERROR_UNSUPPORTED,
+                            "this context has no fixed pipeline; hand the stream to an attribute of your program");
+    if (!classic->is_begun) return fail_classic(classic, NEBEL_ERROR_ARGUMENT, "feed without begin");
     if (stream == NULL || (buffer == 0 && stream->data == NULL))
-        return fail(classic, NEBEL_ERROR_ARGUMENT, "the stream has no data");
+        return fail_classic(classic, NEBEL_ERROR_ARGUMENT, "the stream has no data");
     if (!fits(classic->kind, stream->format))
-        return fail(classic, NEBEL_ERROR_ARGUMENT, "the stream's format is not one of this method");
+        return fail_classic(classic, NEBEL_ERROR_ARGUMENT, "the stream's format is not one of this method");
     if (stream->stride > INT32_MAX || (stream->stride != 0 && stream->stride < size_of(stream->format)))
-        return fail(classic, NEBEL_ERROR_ARGUMENT, "the stream's stride is shorter than its format, or too long");
+        return fail_classic(classic, NEBEL_ERROR_ARGUMENT,
+                            "the stream's stride is shorter than its format, or too long");
     if (buffer != 0 && !(has_buffers(classic) && glIsBuffer(buffer)))
-        return fail(classic, NEBEL_ERROR_ARGUMENT, "there is no buffer of that name");
-    if (buffer == 0 && classic->version >= 30 && read_integer(GL_VERTEX_ARRAY_BINDING) != 0)
-        return fail(classic, NEBEL_ERROR_ARGUMENT,
-                    "a vertex array object takes no arrays from memory; bind 0, or put the stream into a buffer");
+        return fail_classic(classic, NEBEL_ERROR_ARGUMENT, "there is no buffer of that name");
+    if (buffer == 0 && classic->version >= 30 && nb_context_integer(GL_VERTEX_ARRAY_BINDING) != 0)
+        return fail_classic(
+            classic, NEBEL_ERROR_ARGUMENT,
+            "a vertex array object takes no arrays from memory; bind 0, or put the stream into a buffer");
     return NEBEL_OK;
 }
 
@@ -342,7 +333,7 @@ nebel_result nebel_gl_bind_classic_stream(nebel_gl_classic *classic, const nebel
     const nebel_result result = check_stream(classic, stream, buffer);
     if (result != NEBEL_OK) return result;
     const int binds = has_buffers(classic);
-    const GLint bound = binds ? read_integer(GL_ARRAY_BUFFER_BINDING) : 0;
+    const GLint bound = binds ? nb_context_integer(GL_ARRAY_BUFFER_BINDING) : 0;
     if (binds) glBindBuffer(GL_ARRAY_BUFFER, buffer);
     point(stream);
     if (binds) glBindBuffer(GL_ARRAY_BUFFER, (GLuint)bound);

@@ -14,22 +14,22 @@ static uint32_t bits_of(float number)
     return bits;
 }
 
-static uint32_t pack(float part, uint32_t most)
+static uint32_t pack_part(float part, uint32_t most)
 {
     return (uint32_t)((float)most * fmaxf(0, fminf(1, part)) + 0.5f);
 }
 
-typedef struct texels {
+typedef struct shadow_texels {
     uint32_t *words, count;
     size_t stride;
-} texels;
+} shadow_texels;
 
-static uint32_t *texel_at(const texels *t, uint32_t i)
+static uint32_t *texel_at(const shadow_texels *t, uint32_t i)
 {
     return t->words + NB_CLOUD_SHADE_TEXELS * t->stride * i;
 }
 
-static void add(texels *t, float at, uint32_t light)
+static void add(shadow_texels *t, float at, uint32_t light)
 {
     uint32_t *const texel = texel_at(t, t->count++);
     texel[0] = bits_of(at);
@@ -37,9 +37,9 @@ static void add(texels *t, float at, uint32_t light)
 }
 
 /* Pieces of the same light are one. */
-static void add_fog(texels *t, uint32_t first, float end, float sun, float sky)
+static void add_fog(shadow_texels *t, uint32_t first, float end, float sun, float sky)
 {
-    const uint32_t light = pack(sun, 65535) | pack(sky, 65535) << 16;
+    const uint32_t light = pack_part(sun, 65535) | pack_part(sky, 65535) << 16;
     if (t->count > first && texel_at(t, t->count - 1)[1] == light) t->count--;
     add(t, end, light);
 }
@@ -47,10 +47,11 @@ static void add_fog(texels *t, uint32_t first, float end, float sun, float sky)
 uint32_t nb_gl_cloud_shade_write(const nb_shadowed_segment *air, uint32_t air_count, const nb_fog_shadow *fog,
                                  uint32_t *words, size_t stride)
 {
-    texels t = {words, 1, stride};
+    shadow_texels t = {words, 1, stride};
     for (uint32_t k = 0; k < air_count; k++)
         add(&t, air[k].t,
-            pack(air[k].part[0], 2047) | pack(air[k].part[1], 2047) << 11 | pack(air[k].part[2], 1023) << 22);
+            pack_part(air[k].part[0], 2047) | pack_part(air[k].part[1], 2047) << 11 |
+                pack_part(air[k].part[2], 1023) << 22);
     const uint32_t first = t.count;
     if (fog != NULL) {
         const nebel_fog_shadow *const p = &fog->pieces;

@@ -9,13 +9,13 @@
 
 typedef struct nb_environment {
     unsigned name;      /* in OpenGL; 0: not made yet */
-    nebel_snapshot *of; /* what it was made of, of which it is an owner; NULL: of nothing */
+    nebel_lighting *of; /* what it was made of, of which it is an owner; NULL: of nothing */
 } nb_environment;
 
 /* Makes the texture of a snapshot's environment, where it is not there already. Changes the texture of the active unit;
  * wants the usual unpacking. LIMIT, MEMORY. */
 nebel_result nb_environment_set(nb_environment *environment, const nebel_allocator *allocator, const nebel_log *log,
-                                const nb_context *context, nebel_snapshot *snapshot, int surfaces);
+                                const nb_context *context, nebel_lighting *lighting, int surfaces);
 
 /* The same, for surfaces, where there is no fog. */
 nebel_result nb_environment_show(nb_environment *environment, const nebel_allocator *allocator, const nebel_log *log,

@@ -9,16 +9,16 @@
 #include <nebel/scene.h>
 
 typedef struct nb_gl_daylit_fog {
-    nebel_snapshot *of, *lit;    /* what was asked for last; NULL: nothing. The same in such a sun; NULL: needs none */
+    nebel_lighting *of, *lit;    /* what was asked for last; NULL: nothing. The same in such a sun; NULL: needs none */
     nebel_sun sun;               /* of the scene */
     int by_air;                  /* the air leaves more or less by place */
     nb_cloud_shadow_extent roof; /* what clouds leave */
 } nb_gl_daylit_fog;
 
 /* Sets daylit->lit, for `fog`, which may be NULL. `clouds`: of the scene at this time; NULL: it has none. Tells once of fog that
- * cannot be lit so. MEMORY, and errors of nebel_relight. */
+ * cannot be lit so. MEMORY, and errors of nebel_create_lighting. */
 nebel_result nb_gl_daylit_fog_set(nb_gl_daylit_fog *daylit, const nebel_log *log, const nebel_scene_data *scene,
-                                  nebel_cloud_workspace *clouds, nebel_snapshot *fog);
+                                  nebel_cloud_workspace *clouds, nebel_lighting *fog);
 
 void nb_gl_daylit_fog_release(nb_gl_daylit_fog *daylit);
 

@@ -11,11 +11,9 @@
 
 #include <math.h>
 
-typedef nb_gl_frame frame;
-
 /* ---- what is drawn ---------------------------------------------------------------------------- */
 
-static nebel_result set_method(frame *f)
+static nebel_result set_method(nb_gl_frame *f)
 {
     const nebel_result result = nb_method_set(&f->method, f->desc);
     if (result == NEBEL_OK) return result;
@@ -23,9 +21,12 @@ static nebel_result set_method(frame *f)
 }
 
 /* Whether models shade fog: that of the pass, or before particles. */
-static int find_shafts(frame *f)
+static int find_shafts(nb_gl_frame *f)
 {
-    return f->casts && f->fog != NULL && !f->method.replaces_fog && nebel_snapshot_sunlit_fog(f->fog, &f->sunlit);
+    const nebel_sun sun = nebel_get_lighting_sun(f->fog);
+    memcpy(f->sunlit.direction, sun.direction, sizeof f->sunlit.direction);
+    return f->casts && !f->method.replaces_fog &&
+           nebel_get_lit_bounds(f->fog, NEBEL_LIGHT_GROUP_SUN, &f->sunlit.bounds);
 }
 
 static int is_fog_shaded(const nebel_gl_renderer *r)
@@ -33,7 +34,7 @@ static int is_fog_shaded(const nebel_gl_renderer *r)
     return r->daylit.lit != NULL && r->daylit.roof.is_shaded;
 }
 
-static nebel_result set_fog(frame *f)
+static nebel_result set_fog(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     nebel_cloud_workspace *clouds = NULL;
@@ -46,7 +47,7 @@ static nebel_result set_fog(frame *f)
 }
 
 /* Planets end nowhere near. */
-static double reach_of(const frame *f)
+static double reach_of(const nb_gl_frame *f)
 {
     const nb_meshes *const meshes = &f->renderer->meshes;
     double farthest = 0;
@@ -57,7 +58,7 @@ static double reach_of(const frame *f)
 }
 
 /* The nearest surface that is seen, of a perspective view: planes of it may cut off nothing that is seen. */
-static void set_near_plane(frame *f)
+static void set_near_plane(nb_gl_frame *f)
 {
     const nb_meshes *const meshes = &f->renderer->meshes;
     double *const near = &f->view.clip_from_eye[14]; /* twice its distance, and less than 0 */
@@ -68,7 +69,7 @@ static void set_near_plane(frame *f)
     }
 }
 
-static nebel_result set_frame(frame *f)
+static nebel_result set_frame(nb_gl_frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
     const nebel_gl_frame_desc *const desc = f->desc;
@@ -98,7 +99,7 @@ void nb_gl_frame_set_vector(unsigned program, const char *name, const float v[3]
     glUniform3fv(glGetUniformLocation(program, name), 1, v);
 }
 
-void nb_gl_frame_set_rays(const frame *f, unsigned program)
+void nb_gl_frame_set_rays(const nb_gl_frame *f, unsigned program)
 {
     float rays[6][3];
     for (int i = 0; i < 6; i++) {
@@ -109,7 +110,7 @@ void nb_gl_frame_set_rays(const frame *f, unsigned program)
 
 /* From positions relative to the eye. Parallel rays have no room for the digits of where they begin: nothing is clipped
  * there, and fragments behind the eye are given up. */
-static void set_clip(const frame *f, unsigned program)
+static void set_clip(const nb_gl_frame *f, unsigned program)
 {
     const double *const clip = f->sample_view.clip_from_eye, *const eye = f->sample_view.eye_from_world;
     float matrix[16];
@@ -132,7 +133,7 @@ void nb_gl_frame_bind_texture(GLuint unit, GLenum target, unsigned texture)
     glBindSampler(unit, 0);
 }
 
-static void draw_meshes(const frame *f, unsigned program)
+static void draw_meshes(const nb_gl_frame *f, unsigned program)
 {
     const nb_meshes *const meshes = &f->renderer->meshes;
     const GLint offset = glGetUniformLocation(program, "scene_offset"),
@@ -158,7 +159,7 @@ static void draw_meshes(const frame *f, unsigned program)
 }
 
 /* Behind nearer surfaces. */
-static void draw_ground(const frame *f)
+static void draw_ground(const nb_gl_frame *f)
 {
     const nb_scene_programs *const shading = &f->renderer->shading;
     const unsigned program = f->panorama ? shading->round_ground : shading->ground;
@@ -169,7 +170,7 @@ static void draw_ground(const frame *f)
     glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
-static void draw_surfaces(const frame *f)
+static void draw_surfaces(const nb_gl_frame *f)
 {
     static const GLfloat zeros[4] = {0, 0, 0, 0};
     const nebel_gl_renderer *const r = f->renderer;
@@ -189,7 +190,7 @@ static void draw_surfaces(const frame *f)
     if (f->layers != NULL) nb_gl_frame_draw_shell_ground(f);
 }
 
-static int has_lamps(const frame *f)
+static int has_lamps(const nb_gl_frame *f)
 {
     return f->renderer->scene->light_count > 0 && (f->renderer->meshes.count > 0 || f->planet != NULL);
 }
@@ -204,14 +205,14 @@ static void clear_fog(void)
     glClearBufferfv(GL_COLOR, 1, clear);
 }
 
-static nebel_result set_eye_fog(const frame *f)
+static nebel_result set_eye_fog(const nb_gl_frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
     return f->panorama ? nb_gl_set_fog_around(r->eye_fog, f->fog, f->eye, f->view.width, f->view.height)
                        : nebel_gl_set_fog(r->eye_fog, f->fog, &f->view);
 }
 
-static void set_factor_numbers(const frame *f, unsigned program)
+static void set_factor_numbers(const nb_gl_frame *f, unsigned program)
 {
     float color[3];
     for (int i = 0; i < 3; i++) color[i] = (float)f->method.factor.color[i];
@@ -222,7 +223,7 @@ static void set_factor_numbers(const frame *f, unsigned program)
 }
 
 /* Table fog of an orthographic camera goes by device depth. */
-static void set_device_depth(const frame *f, unsigned program)
+static void set_device_depth(const nb_gl_frame *f, unsigned program)
 {
     const nb_device_planes *const planes = &f->method.planes;
     const int is_device = f->method.kind == NEBEL_GL_METHOD_D3D9 && f->view.clip_from_eye[15] != 0 && !f->panorama;
@@ -231,7 +232,7 @@ static void set_device_depth(const frame *f, unsigned program)
 }
 
 /* The fog that vertices bring. */
-static void draw_vertex_fog(const frame *f)
+static void draw_vertex_fog(const nb_gl_frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
     const unsigned program = f->panorama ? r->shading.round_vertex_fog : r->shading.vertex_fog;
@@ -247,7 +248,7 @@ static void draw_vertex_fog(const frame *f)
 }
 
 /* Distance is depth where rays do not part. */
-static void set_axis(const frame *f, unsigned program)
+static void set_axis(const nb_gl_frame *f, unsigned program)
 {
     const double *const eye = f->view.eye_from_world;
     const int parallel = f->view.clip_from_eye[15] != 0;
@@ -257,7 +258,7 @@ static void set_axis(const frame *f, unsigned program)
     nb_gl_frame_set_vector(program, "scene_axis", axis);
 }
 
-static nebel_result draw_factor(const frame *f)
+static nebel_result draw_factor(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     const nebel_result result = nb_scene_programs_make_factor(&r->shading, &r->context, &r->log, f->panorama);
@@ -275,7 +276,7 @@ static nebel_result draw_factor(const frame *f)
     return NEBEL_OK;
 }
 
-static void set_lamps(const frame *f, unsigned program)
+static void set_lamps(const nb_gl_frame *f, unsigned program)
 {
     const nb_light_maps *const lamps = &f->renderer->lamps;
     nb_gl_frame_bind_texture(NB_UNIT_LIGHTS, GL_TEXTURE_2D, lamps->words);
@@ -294,7 +295,7 @@ static void set_lamp_shade(const void *of, unsigned program)
 }
 
 /* From the surfaces' distances. */
-static nebel_result draw_exact_fog(const frame *f)
+static nebel_result draw_exact_fog(const nb_gl_frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
     const nebel_gl_pass pass = {
@@ -309,8 +310,8 @@ static nebel_result draw_exact_fog(const frame *f)
                                  .cloud_shade = f->clouds != NULL ? &r->cloud_shade : NULL,
                                  .is_turned = f->clouds != NULL && f->place == r->cloud_ends,
                                  .shafts = f->shafts ? &r->shafts : NULL};
-    double low[3], high[3];
-    if (has_lamps(f) && r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, low, high))
+    nebel_bounds lit;
+    if (has_lamps(f) && nebel_get_lit_bounds(r->fog, NEBEL_LIGHT_GROUP_LOCAL, &lit))
         picture.shade = (nb_gl_visibility){{nb_light_map_text, nb_light_shade_text}, set_lamp_shade, f};
     if (!f->panorama && nebel_compute_view_rays(&f->sample_view, &pass.depth, &picture.rays) != NEBEL_OK)
         return NEBEL_ERROR_ARGUMENT;
@@ -318,14 +319,14 @@ static nebel_result draw_exact_fog(const frame *f)
 }
 
 /* Or air. Cells and factors have no need of the renderer's fog. */
-int nb_gl_frame_has_fog(const frame *f)
+int nb_gl_frame_has_fog(const nb_gl_frame *f)
 {
     return f->renderer->fog != NULL || f->planet != NULL || nb_method_takes_cells(f->desc->method) ||
            f->method.replaces_fog;
 }
 
 /* A wall may hide a vertex whose triangle is seen beside it. */
-static nb_vertex_source find_source(const frame *f)
+static nb_vertex_source find_source(const nb_gl_frame *f)
 {
     const nebel_gl_method method = f->desc->method;
     nb_vertex_source source = {.fog = f->renderer->fog,
@@ -344,20 +345,20 @@ static nb_vertex_source find_source(const frame *f)
     return source;
 }
 
-static nebel_result draw_pixel_fog(const frame *f)
+static nebel_result draw_pixel_fog(const nb_gl_frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
     const nb_vertex_source source = find_source(f);
     return nb_pixel_fog_set(&r->targets, &r->allocator, &r->log, &f->rays, &source);
 }
 
-int nb_gl_frame_has_particles(const frame *f)
+int nb_gl_frame_has_particles(const nb_gl_frame *f)
 {
     return f->renderer->particles.count > 0 && !f->method.replaces_fog;
 }
 
 /* Particles ask for the renderer's fog before them whatever is on surfaces, and lamps for that before surfaces. */
-nebel_result nb_gl_frame_draw_fog(const frame *f)
+nebel_result nb_gl_frame_draw_fog(const nb_gl_frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
     if (!nb_gl_frame_has_fog(f)) return NEBEL_OK;
@@ -387,7 +388,7 @@ nebel_depth_taps nebel_gl_default_taps(void)
         .offset = .0005, .background_depth = 100000, .edge_threshold = .5, .depth_margin = .125, .brightness = 1};
 }
 
-static void set_taps(const frame *f, unsigned program)
+static void set_taps(const nb_gl_frame *f, unsigned program)
 {
     const double *const eye = f->view.eye_from_world;
     const nebel_depth_taps taps = f->desc->taps != NULL ? *f->desc->taps : nebel_gl_default_taps();
@@ -397,7 +398,7 @@ static void set_taps(const frame *f, unsigned program)
     glUniform1f(glGetUniformLocation(program, "scene_brightness"), (float)taps.brightness);
 }
 
-static void set_face_tiles(const frame *f, const nebel_gl_fog_resources *fog, unsigned program)
+static void set_face_tiles(const nb_gl_frame *f, const nebel_gl_fog_resources *fog, unsigned program)
 {
     const nebel_gl *const gl = f->renderer->eye_fog;
     glUniform3i(glGetUniformLocation(program, "face_tiling"), (GLint)gl->views[0].width, NB_GL_TILE_SHIFT,
@@ -414,7 +415,7 @@ static void bind_media(const nebel_gl_fog_resources *fog)
     if (fog->diffusion != 0) nb_gl_frame_bind_texture(NB_UNIT_NODES, GL_TEXTURE_2D, fog->diffusion);
 }
 
-static void set_particles(const frame *f, const nebel_gl_fog_resources *fog, unsigned program)
+static void set_particles(const nb_gl_frame *f, const nebel_gl_fog_resources *fog, unsigned program)
 {
     const int parallel = f->view.clip_from_eye[15] != 0;
     const double *const eye = f->view.eye_from_world;
@@ -437,7 +438,7 @@ static void set_particles(const frame *f, const nebel_gl_fog_resources *fog, uns
     }
 }
 
-nebel_result nb_gl_frame_find_light(const frame *f, const nebel_gl *passes, nb_composite_key kind,
+nebel_result nb_gl_frame_find_light(const nb_gl_frame *f, const nebel_gl *passes, nb_composite_key kind,
                                     nebel_gl_fog_resources *fog, unsigned *program)
 {
     nebel_gl_renderer *const r = f->renderer;
@@ -454,13 +455,13 @@ nebel_result nb_gl_frame_find_light(const frame *f, const nebel_gl *passes, nb_c
     return nb_scene_programs_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, program);
 }
 
-int nb_gl_frame_count_veil_layers(const frame *f)
+int nb_gl_frame_count_veil_layers(const nb_gl_frame *f)
 {
     return !nb_gl_frame_has_particles(f) ? 0 : f->renderer->particles.is_grey ? 1 : 3;
 }
 
 /* Whatever comes to the farthest particle, and what it adds, passes through each. */
-nebel_result nb_gl_frame_draw_particles(const frame *f)
+nebel_result nb_gl_frame_draw_particles(const nb_gl_frame *f)
 {
     static const GLfloat clear[2][4] = {{0, 0, 0, 1}, {0, 1, 0, 0}};
     nebel_gl_renderer *const r = f->renderer;
@@ -469,7 +470,7 @@ nebel_result nb_gl_frame_draw_particles(const frame *f)
     const int layers = nb_gl_frame_count_veil_layers(f);
     if (layers == 0) return NEBEL_OK;
     nb_renderer_judge_particles(r);
-    const int has_fog = r->fog != NULL && nebel_get_volume_count(r->fog) > 0;
+    const int has_fog = r->fog != NULL && nb_gl_count_volumes(r->fog) > 0;
     const nb_composite_key kind = {.of_particles = r->particles.profiles,
                                    .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
                                    .veil_layers = layers,
@@ -489,7 +490,7 @@ nebel_result nb_gl_frame_draw_particles(const frame *f)
 /* ---- lamps ----------------------------------------------------------------------------------- */
 
 /* Of the whole frame. */
-static nebel_result prepare_lamps(const frame *f)
+static nebel_result prepare_lamps(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     if (!has_lamps(f)) return NEBEL_OK;
@@ -504,14 +505,14 @@ static nebel_result prepare_lamps(const frame *f)
 
 /* ---- light ----------------------------------------------------------------------------------- */
 
-static void bind_fog(const frame *f, const nebel_gl_fog_resources *fog, unsigned program)
+static void bind_fog(const nb_gl_frame *f, const nebel_gl_fog_resources *fog, unsigned program)
 {
     bind_media(fog);
     if (fog->tiles != 0 && f->casts && f->planet == NULL) nb_gl_frame_set_tiles(f, fog, program);
 }
 
 /* What comes through the particles of the sun's light to each surface. */
-static nebel_result draw_dimming(const frame *f)
+static nebel_result draw_dimming(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     nebel_gl_fog_resources fog;
@@ -534,11 +535,11 @@ static nebel_result draw_dimming(const frame *f)
 }
 
 /* Of the whole frame. */
-static nebel_result prepare_air(const frame *f)
+static nebel_result prepare_air(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     const int is_lit = r->scene->has_sun && (r->scene->mesh_count > 0 || r->daylit.by_air);
-    const int ends = r->meshes.count > 0 || f->clouds != NULL || (r->fog != NULL && nebel_get_volume_count(r->fog) > 0);
+    const int ends = r->meshes.count > 0 || f->clouds != NULL || (r->fog != NULL && nb_gl_count_volumes(r->fog) > 0);
     if (f->planet == NULL) return NEBEL_OK;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_AIR);
     nebel_result result =
@@ -549,13 +550,13 @@ static nebel_result prepare_air(const frame *f)
                : result;
 }
 
-static int has_environment(const frame *f)
+static int has_environment(const nb_gl_frame *f)
 {
     return f->light.environment.type != NEBEL_ENVIRONMENT_CONSTANT;
 }
 
 /* Of the whole frame. */
-static nebel_result prepare_environment(const frame *f)
+static nebel_result prepare_environment(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     if (!has_environment(f)) return NEBEL_OK;
@@ -566,7 +567,7 @@ static nebel_result prepare_environment(const frame *f)
     return result;
 }
 
-static void set_light(const frame *f, const nebel_gl_fog_resources *fog, unsigned program)
+static void set_light_uniforms(const nb_gl_frame *f, const nebel_gl_fog_resources *fog, unsigned program)
 {
     const nebel_gl_renderer *const r = f->renderer;
     const nb_targets *const t = &r->targets;
@@ -597,7 +598,7 @@ static void set_light(const frame *f, const nebel_gl_fog_resources *fog, unsigne
 }
 
 /* The first sample replaces what was there. */
-static void start_picture(const frame *f, uint32_t sample)
+static void start_picture(const nb_gl_frame *f, uint32_t sample)
 {
     const nebel_gl_renderer *const r = f->renderer;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.picture_buffer);
@@ -605,7 +606,7 @@ static void start_picture(const frame *f, uint32_t sample)
     if (sample > 0) nb_state_add(&r->context);
 }
 
-static nebel_result draw_light(const frame *f, uint32_t sample)
+static nebel_result draw_light(const nb_gl_frame *f, uint32_t sample)
 {
     nebel_gl_renderer *const r = f->renderer;
     nebel_gl_fog_resources fog;
@@ -625,7 +626,7 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     const nebel_result result = nb_gl_frame_find_light(f, passes, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     start_picture(f, sample);
-    set_light(f, &fog, program);
+    set_light_uniforms(f, &fog, program);
     glBindVertexArray(r->vertex_array);
     glDrawArrays(GL_TRIANGLES, 0, 3);
     return NEBEL_OK;
@@ -633,7 +634,7 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
 
 /* ---- the frame ------------------------------------------------------------------------------- */
 
-static nebel_result set_sample(frame *f, nb_pixel_position point)
+static nebel_result set_sample(nb_gl_frame *f, nb_pixel_position point)
 {
     f->point = point;
     if (f->panorama) {
@@ -647,7 +648,7 @@ static nebel_result set_sample(frame *f, nb_pixel_position point)
 }
 
 /* Fog among them is found along the rays that they are found along. */
-static nebel_result trace_clouds(frame *f)
+static nebel_result trace_clouds(nb_gl_frame *f)
 {
     const nb_pixel_position point = f->point;
     nebel_result result = set_sample(f, nb_pixel_sample(0, 1));
@@ -655,7 +656,7 @@ static nebel_result trace_clouds(frame *f)
     return result == NEBEL_OK ? set_sample(f, point) : result;
 }
 
-static nebel_result draw_sample(frame *f, uint32_t sample)
+static nebel_result draw_sample(nb_gl_frame *f, uint32_t sample)
 {
     nebel_result result = set_sample(f, nb_pixel_sample(sample, f->samples));
     if (result != NEBEL_OK) return result;
@@ -672,7 +673,7 @@ static nebel_result draw_sample(frame *f, uint32_t sample)
     return result == NEBEL_OK ? draw_light(f, sample) : result;
 }
 
-nebel_result nb_gl_frame_ask(const frame *f)
+nebel_result nb_gl_frame_ask(const nb_gl_frame *f)
 {
     const nebel_gl_frame_desc *const desc = f->desc;
     if (desc->progress == NULL || desc->progress(f->done, f->samples, desc->progress_user) == 0) return NEBEL_OK;
@@ -680,14 +681,14 @@ nebel_result nb_gl_frame_ask(const frame *f)
 }
 
 /* Waits for the sample first, so that progress is that of the work. */
-static nebel_result report(frame *f)
+static nebel_result report(nb_gl_frame *f)
 {
     if (f->desc->progress != NULL) glFinish();
     f->done++;
     return nb_gl_frame_ask(f);
 }
 
-static nebel_result prepare_particles(const frame *f)
+static nebel_result prepare_particles(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     const double *const eye = f->view.eye_from_world, forward[3] = {-eye[2], -eye[6], -eye[10]};
@@ -698,12 +699,12 @@ static nebel_result prepare_particles(const frame *f)
     return result == NEBEL_OK ? nb_particles_sort(&r->particles, &r->log, f->eye, parallel ? forward : NULL) : result;
 }
 
-static int has_vertex_fog(const frame *f)
+static int has_vertex_fog(const nb_gl_frame *f)
 {
     return nb_method_is_by_vertex(&f->method) && nb_gl_frame_has_fog(f);
 }
 
-static nebel_result prepare_vertices(const frame *f)
+static nebel_result prepare_vertices(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     if (!has_vertex_fog(f)) return NEBEL_OK;
@@ -713,7 +714,7 @@ static nebel_result prepare_vertices(const frame *f)
 }
 
 /* Behind the fog of the vertices, which corners take over. */
-static nebel_result prepare_panorama(const frame *f)
+static nebel_result prepare_panorama(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     nebel_result result =
@@ -722,7 +723,7 @@ static nebel_result prepare_panorama(const frame *f)
     return result == NEBEL_OK && has_vertex_fog(f) ? nb_triangle_instances_set_fog(&r->meshes) : result;
 }
 
-static nebel_result draw_samples(frame *f)
+static nebel_result draw_samples(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     glActiveTexture(GL_TEXTURE0);
@@ -745,7 +746,7 @@ nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_f
 {
     if (renderer == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_gl_frame_desc near = *desc;
-    frame f = {.renderer = renderer, .desc = &near, .ahead = nb_gl_frame_go_near(renderer, &near.camera, desc)};
+    nb_gl_frame f = {.renderer = renderer, .desc = &near, .ahead = nb_gl_frame_go_near(renderer, &near.camera, desc)};
     renderer->has_frame = 0;
     nebel_result result = nb_context_check(&renderer->log, renderer->vertex_array);
     if (result == NEBEL_OK) result = set_frame(&f);

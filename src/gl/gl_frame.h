@@ -19,7 +19,7 @@ typedef struct nb_gl_frame {
     const nebel_planet *planet;          /* with air; NULL: none */
     const nebel_textured_planet *layers; /* a planet of them; NULL: none */
     const nebel_clouds *clouds;          /* with volume, in that air; NULL: none */
-    nebel_snapshot *fog;                 /* the renderer's, or that of r->daylit; NULL: none */
+    nebel_lighting *fog;                 /* the renderer's, or that of r->daylit; NULL: none */
     float even_shade;      /* part of that sun that clouds leave to it, where that is the same everywhere */
     unsigned place, depth; /* where rays end now: as those of the targets */
     nb_method method;
@@ -32,7 +32,7 @@ typedef struct nb_gl_frame {
     int casts;               /* the sun shines, and there is something to cast shadows */
     int dims;                /* particles dim the sun */
     int shafts;              /* models shade fog */
-    nebel_sunlit_fog sunlit; /* that fog */
+    nb_sunlit_fog sunlit;    /* that fog */
 } nb_gl_frame;
 
 /* Moves a camera of parallel rays up to what it sees. Returns how far [m]. */

@@ -30,7 +30,7 @@ static float *make_plane(const nb_gl_frame *f)
 
 static int has_fog(const nb_gl_frame *f)
 {
-    return f->renderer->fog != NULL && nebel_get_volume_count(f->renderer->fog) > 0;
+    return f->renderer->fog != NULL && nb_gl_count_volumes(f->renderer->fog) > 0;
 }
 
 static nebel_result ask(void *user)
@@ -65,7 +65,7 @@ static nb_cloud_picture picture_of_middles(nb_gl_frame *f)
 }
 
 /* The usual unpacking. A plane of 4 numbers. */
-static nebel_result upload(const nb_gl_frame *f, unsigned *texture, const float *texels)
+static nebel_result upload_plane(const nb_gl_frame *f, unsigned *texture, const float *texels)
 {
     glActiveTexture(GL_TEXTURE0);
     nb_texel_texture_bind(texture);
@@ -88,7 +88,7 @@ static nebel_result find_fog(nb_gl_frame *f, float *ends, float *left, float *li
 {
     nebel_gl_renderer *const r = f->renderer;
     for (size_t i = 0; i < count_pixels(f); i++) ends[4 * i] = fmaxf(ends[4 * i], 1e-30f);
-    nebel_result result = upload(f, &r->cloud_ends, ends);
+    nebel_result result = upload_plane(f, &r->cloud_ends, ends);
     f->place = r->cloud_ends;
     if (result == NEBEL_OK) result = nb_gl_frame_draw_fog(f);
     if (result != NEBEL_OK) return result;
@@ -191,8 +191,8 @@ nebel_result nb_gl_frame_end_clouds(nb_gl_frame *f)
         result = nb_cloud_picture_end(&r->clouds, &picture, &middle, places, over, shade);
     }
     result = fail_memory(f, result);
-    if (result == NEBEL_OK) result = upload(f, &r->cloud_over, over);
-    if (result == NEBEL_OK) result = upload(f, &r->cloud_dimming, shade);
+    if (result == NEBEL_OK) result = upload_plane(f, &r->cloud_over, over);
+    if (result == NEBEL_OK) result = upload_plane(f, &r->cloud_dimming, shade);
     nb_release(&r->allocator, places);
     nb_release(&r->allocator, over);
     nb_release(&r->allocator, shade);

@@ -140,7 +140,7 @@ static void draw_side(const nb_gl_frame *f, uint32_t number, int is_far)
 }
 
 /* Behind those that were drawn before. */
-static nebel_result lay_over(const nb_gl_frame *f)
+static nebel_result blend_shells(const nb_gl_frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
     const nb_composite_key kind = {
@@ -168,7 +168,7 @@ static nebel_result add_side(nb_gl_frame *f, uint32_t number, int is_far)
     draw_side(f, number, is_far);
     nebel_result result = nb_gl_frame_draw_fog(f);
     if (result == NEBEL_OK) result = nb_gl_frame_draw_particles(f);
-    return result == NEBEL_OK ? lay_over(f) : result;
+    return result == NEBEL_OK ? blend_shells(f) : result;
 }
 
 /* From the smallest to the largest; of equal ones the first before the second, or behind it. */

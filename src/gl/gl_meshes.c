@@ -114,7 +114,7 @@ static int set_face(const float *a, const float *b, const float *c, float face[3
     return 1;
 }
 
-static void include(nb_mesh *made, const float *position)
+static void include_vertex(nb_mesh *made, const float *position)
 {
     for (int i = 0; i < 3; i++) {
         made->low[i] = fminf(made->low[i], position[i]);
@@ -129,7 +129,7 @@ static double length_between(const float *a, const float *b)
     return sqrt(square);
 }
 
-static nebel_result out_of_memory(const nb_meshes *meshes)
+static nebel_result fail_mesh_memory(const nb_meshes *meshes)
 {
     return nb_fail(&meshes->log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory; use fewer triangles");
 }
@@ -148,7 +148,7 @@ static void add_triangle(nb_gl_mesh_builder *d, const uint32_t *corners)
     const nebel_mesh *const mesh = d->mesh;
     nb_vertex last = vertex_of(mesh, corners[2]);
     if (!set_face(position_of(mesh, corners[0]), position_of(mesh, corners[1]), last.position, last.face)) return;
-    for (int k = 0; k < 3; k++) include(d->made, position_of(mesh, corners[k]));
+    for (int k = 0; k < 3; k++) include_vertex(d->made, position_of(mesh, corners[k]));
     d->made->longest = fmax(d->made->longest, longest_edge(mesh, corners));
     for (int e = 0; e < 2; e++) {
         for (int k = 0; k < 3; k++) last.edges[e][k] = position_of(mesh, corners[e])[k] - last.position[k];
@@ -184,7 +184,7 @@ static nebel_result find_large(const nb_meshes *meshes, const nebel_mesh *mesh, 
     }
     if (count == 0) return NEBEL_OK;
     made->large = nb_allocate(&meshes->allocator, count, sizeof *made->large);
-    if (made->large == NULL) return out_of_memory(meshes);
+    if (made->large == NULL) return fail_mesh_memory(meshes);
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         const uint32_t *const corners = mesh->indices + 3 * t;
         if (longest_edge(mesh, corners) > NB_LARGE_EDGE) made->large[made->large_count++] = plane_of(mesh, corners);
@@ -192,7 +192,7 @@ static nebel_result find_large(const nb_meshes *meshes, const nebel_mesh *mesh, 
     return NEBEL_OK;
 }
 
-static void fill(nb_gl_mesh_builder *d)
+static void fill_mesh(nb_gl_mesh_builder *d)
 {
     const nebel_mesh *const mesh = d->mesh;
     for (int i = 0; i < 3; i++) {
@@ -211,7 +211,7 @@ static void set_attribute(GLuint place, GLint size, size_t offset)
     glVertexAttribPointer(place, size, GL_FLOAT, GL_FALSE, sizeof(nb_vertex), (const void *)offset);
 }
 
-static nebel_result upload(const nb_meshes *meshes, const nb_gl_mesh_builder *d)
+static nebel_result upload_mesh(const nb_meshes *meshes, const nb_gl_mesh_builder *d)
 {
     nb_mesh *const made = d->made;
     glGenVertexArrays(1, &made->vertex_array);
@@ -238,7 +238,7 @@ static nebel_result make_mesh(nb_meshes *meshes, const nebel_mesh *mesh, nb_mesh
     d.vertices = nb_allocate(&meshes->allocator, mesh->vertex_count + triangles, sizeof *d.vertices);
     d.indices = nb_allocate(&meshes->allocator, 3 * triangles, sizeof *d.indices);
     const int room = d.vertices != NULL && d.indices != NULL;
-    nebel_result result = room ? NEBEL_OK : out_of_memory(meshes);
+    nebel_result result = room ? NEBEL_OK : fail_mesh_memory(meshes);
     memcpy(made->origin, mesh->origin, sizeof made->origin);
     memcpy(made->base_color, mesh->base_color, sizeof made->base_color);
     if (mesh->texture >= 0 && mesh->uvs != NULL) made->texture = meshes->textures[mesh->texture];
@@ -248,8 +248,8 @@ static nebel_result make_mesh(nb_meshes *meshes, const nebel_mesh *mesh, nb_mesh
     }
     if (result == NEBEL_OK) result = find_large(meshes, mesh, made);
     if (result == NEBEL_OK) {
-        fill(&d);
-        result = upload(meshes, &d);
+        fill_mesh(&d);
+        result = upload_mesh(meshes, &d);
     }
     nb_release(&meshes->allocator, d.vertices);
     nb_release(&meshes->allocator, d.indices);
@@ -278,7 +278,7 @@ static void include_mesh(nb_meshes *meshes, const nb_mesh *made)
 /* ---- textures -------------------------------------------------------------------------------- */
 
 /* As the CPU renderer looks texels up: between four of them in linear light, without smaller versions. */
-static nebel_result make_texture(const nb_meshes *meshes, const nebel_texture *texture, unsigned *name)
+static nebel_result make_mesh_texture(const nb_meshes *meshes, const nebel_texture *texture, unsigned *name)
 {
     glGenTextures(1, name);
     glBindTexture(GL_TEXTURE_2D, *name);
@@ -295,7 +295,7 @@ static nebel_result make_textures(nb_meshes *meshes, const nebel_scene_data *sce
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < scene->texture_count && result == NEBEL_OK; i++) {
-        result = make_texture(meshes, &scene->textures[i], &meshes->textures[i]);
+        result = make_mesh_texture(meshes, &scene->textures[i], &meshes->textures[i]);
         meshes->texture_count = i + 1;
     }
     return result;
@@ -325,12 +325,12 @@ nebel_result nb_meshes_make(nb_meshes *meshes, const nb_context *context, const 
     if (result != NEBEL_OK) return result;
     meshes->list = nb_allocate_zero(&meshes->allocator, scene->mesh_count, sizeof *meshes->list);
     meshes->textures = nb_allocate_zero(&meshes->allocator, scene->texture_count, sizeof *meshes->textures);
-    if (meshes->list == NULL || meshes->textures == NULL) return out_of_memory(meshes);
+    if (meshes->list == NULL || meshes->textures == NULL) return fail_mesh_memory(meshes);
     result = make_textures(meshes, scene);
     return result == NEBEL_OK ? make_meshes(meshes, scene) : result;
 }
 
-static void delete_objects(const nb_meshes *meshes)
+static void delete_mesh_objects(const nb_meshes *meshes)
 {
     glDeleteTextures((GLsizei)meshes->texture_count, meshes->textures);
     for (size_t i = 0; i < meshes->count; i++) {
@@ -364,7 +364,7 @@ int nb_meshes_unmap(unsigned buffer, const void *mapped)
 
 void nb_meshes_delete(nb_meshes *meshes, int in_context)
 {
-    if (in_context) delete_objects(meshes);
+    if (in_context) delete_mesh_objects(meshes);
     for (size_t i = 0; i < meshes->count; i++) nb_release(&meshes->allocator, meshes->list[i].large);
     nb_release(&meshes->allocator, meshes->list);
     nb_release(&meshes->allocator, meshes->textures);

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-static const double pi = 3.14159265358979323846;
+#define PI 3.14159265358979323846
 
 /* ---- texts ----------------------------------------------------------------------------------- */
 
@@ -131,8 +131,8 @@ void nb_panorama_rays(const nebel_view *view, const double eye[3], nb_pixel_posi
 void nb_panorama_direction(const nebel_rays *rays, double x, double y, double direction[3])
 {
     const nebel_texel_f32 *const w = rays->texels;
-    const double longitude = .5 * pi * ((double)w[0].v[0] + x * (double)w[1].v[0]);
-    const double latitude = .5 * pi * ((double)w[0].v[1] + y * (double)w[1].v[1]);
+    const double longitude = .5 * PI * ((double)w[0].v[0] + x * (double)w[1].v[0]);
+    const double latitude = .5 * PI * ((double)w[0].v[1] + y * (double)w[1].v[1]);
     const double along = cos(latitude) * cos(longitude), across = cos(latitude) * sin(longitude);
     for (int i = 0; i < 3; i++) {
         direction[i] = along * (double)w[3].v[i] + across * (double)w[4].v[i] + sin(latitude) * (double)w[5].v[i];
@@ -142,7 +142,7 @@ void nb_panorama_direction(const nebel_rays *rays, double x, double y, double di
 void nb_panorama_look(const nebel_view *view, double x, double y, double direction[3])
 {
     const double *const axes = view->eye_from_world;
-    const double longitude = pi * (2 * x / view->width - 1), latitude = pi * (y / view->height - .5);
+    const double longitude = PI * (2 * x / view->width - 1), latitude = PI * (y / view->height - .5);
     const double along = cos(latitude) * cos(longitude), across = cos(latitude) * sin(longitude);
     for (int i = 0; i < 3; i++)
         direction[i] = -along * axes[4 * i + 2] + across * axes[4 * i] + sin(latitude) * axes[4 * i + 1];
@@ -168,7 +168,7 @@ static nebel_view face_of(const double eye[3], int axis, double sign, uint32_t s
 /* A pixel in the middle of a face is two of its width wide. */
 void nb_panorama_faces(const double eye[3], uint32_t width, uint32_t height, nebel_view faces[6])
 {
-    const double pixels = fmax(width / pi, 2 * height / pi);
+    const double pixels = fmax(width / PI, 2 * height / PI);
     const uint32_t size = pixels < 65535 ? (uint32_t)pixels + 1 : 65536;
     for (int i = 0; i < 6; i++) faces[i] = face_of(eye, i / 2, i % 2 == 0 ? 1 : -1, size);
 }

@@ -19,7 +19,7 @@ static int is_within(const double *numbers, int count, double low, double high)
 }
 
 /* As for nebel_add_volume. */
-static nebel_result check(const nebel_log *log, const nebel_particle *list, size_t count)
+static nebel_result check_particles(const nebel_log *log, const nebel_particle *list, size_t count)
 {
     for (size_t i = 0; i < count; i++) {
         const nebel_particle *const p = &list[i];
@@ -42,7 +42,7 @@ nebel_result nb_particles_set(nb_particles *particles, const nebel_allocator *al
                               const nebel_particle *list, size_t count)
 {
     nb_particles made = {.count = count, .is_grey = 1};
-    const nebel_result valid = check(log, list, count);
+    const nebel_result valid = check_particles(log, list, count);
     if (valid != NEBEL_OK) return valid;
     made.list = nb_allocate(allocator, count, sizeof *made.list);
     made.balls = nb_allocate(allocator, count, sizeof *made.balls);
@@ -66,16 +66,19 @@ nebel_result nb_particles_set(nb_particles *particles, const nebel_allocator *al
 }
 
 nebel_result nb_particles_commit(const nb_particles *particles, const nebel_allocator *allocator, const nebel_log *log,
-                                 nebel_snapshot **cloud)
+                                 nebel_lighting **cloud)
 {
     nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
     const nebel_fog_desc desc = {.allocator = *allocator, .log = *log};
     nebel_result result = nebel_create_fog(&desc, &fog);
     for (size_t i = 0; i < particles->count && result == NEBEL_OK; i++) {
         const nebel_volume_desc volume = nebel_volume_from_particle(&particles->list[i]);
         result = nebel_add_volume(fog, &volume, NULL);
     }
-    if (result == NEBEL_OK) result = nebel_commit_fog(fog, cloud);
+    if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
+    if (result == NEBEL_OK) result = nebel_create_lighting(snapshot, NULL, cloud);
+    nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
     return result;
 }
@@ -139,7 +142,7 @@ static void sort_balls(nb_particles *particles, const double eye[3], const doubl
 }
 
 /* Attributes of an instance: three vectors of four. */
-static void make_objects(nb_particles *particles)
+static void make_particle_objects(nb_particles *particles)
 {
     glGenVertexArrays(1, &particles->vertex_array);
     glGenBuffers(1, &particles->buffer);
@@ -157,7 +160,7 @@ nebel_result nb_particles_sort(nb_particles *particles, const nebel_log *log, co
                                const double *forward)
 {
     sort_balls(particles, eye, forward);
-    if (particles->buffer == 0) make_objects(particles);
+    if (particles->buffer == 0) make_particle_objects(particles);
     glBindBuffer(GL_ARRAY_BUFFER, particles->buffer);
     glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(particles->count * sizeof *particles->balls), particles->balls,
                  GL_STREAM_DRAW);

@@ -34,7 +34,7 @@ nebel_result nb_particles_set(nb_particles *particles, const nebel_allocator *al
 
 /* All of them as fog. MEMORY. */
 nebel_result nb_particles_commit(const nb_particles *particles, const nebel_allocator *allocator, const nebel_log *log,
-                                 nebel_snapshot **cloud);
+                                 nebel_lighting **cloud);
 
 /* Sorts and hands them over as an eye sees them; `forward` where rays are parallel, else NULL. MEMORY. */
 nebel_result nb_particles_sort(nb_particles *particles, const nebel_log *log, const double eye[3],

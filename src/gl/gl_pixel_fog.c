@@ -29,7 +29,7 @@ static void find_ray(const nb_pixel_fog_work *w, double x, double y, double orig
     for (int i = 0; i < 3; i++) direction[i] /= sqrt(length2);
 }
 
-static void find_place(const nb_pixel_fog_work *w, uint32_t x, uint32_t y, float t, float place[3])
+static void find_pixel_place(const nb_pixel_fog_work *w, uint32_t x, uint32_t y, float t, float place[3])
 {
     double origin[3] = {0, 0, 0}, direction[3];
     if (w->source->projection == NEBEL_PROJECTION_PANORAMA)
@@ -46,7 +46,7 @@ static nebel_result set_row(const nb_pixel_fog_work *w, uint32_t y)
     const size_t first = (size_t)y * width;
     nebel_vertices places = {.positions = w->places, .position_stride = sizeof *w->places};
     for (int i = 0; i < 3; i++) places.origin[i] = places.eye[i] = w->rays->eye[i];
-    for (uint32_t x = 0; x < width; x++) find_place(w, x, y, w->texels[first + x][0], w->places[x]);
+    for (uint32_t x = 0; x < width; x++) find_pixel_place(w, x, y, w->texels[first + x][0], w->places[x]);
     const nebel_result result = nb_vertex_fog_find(w->source, width, &places, w->fog);
     for (uint32_t x = 0; x < width && result == NEBEL_OK; x++) {
         float *const light = w->texels[first + x], *const through = w->transmittance[first + x];
@@ -60,7 +60,7 @@ static nebel_result set_row(const nb_pixel_fog_work *w, uint32_t y)
     return result;
 }
 
-static void upload(const nb_targets *t, unsigned texture, const float (*texels)[4])
+static void upload_texels(const nb_targets *t, unsigned texture, const float (*texels)[4])
 {
     glBindTexture(GL_TEXTURE_2D, texture);
     glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, (GLsizei)t->width, (GLsizei)t->height, GL_RGBA, GL_FLOAT, texels);
@@ -75,8 +75,8 @@ static nebel_result set_picture(const nb_pixel_fog_work *w)
     glReadPixels(0, 0, (GLsizei)t->width, (GLsizei)t->height, GL_RGBA, GL_FLOAT, w->texels);
     for (uint32_t y = 0; y < t->height && result == NEBEL_OK; y++) result = set_row(w, y);
     if (result != NEBEL_OK) return result;
-    upload(t, t->in_scattering, (const float(*)[4])w->texels);
-    upload(t, t->transmittance, (const float(*)[4])w->transmittance);
+    upload_texels(t, t->in_scattering, (const float(*)[4])w->texels);
+    upload_texels(t, t->transmittance, (const float(*)[4])w->transmittance);
     return result;
 }
 

@@ -23,8 +23,8 @@ enum {
     DAYLIGHT_WORDS = DEPTHS + SKIES
 };
 
-static int are_same(const nb_gl_air *air, const nebel_sky_view_desc *desc, const nb_planet *worlds, int count,
-                    int is_lit)
+static int is_same_air(const nb_gl_air *air, const nebel_sky_view_desc *desc, const nb_planet *worlds, int count,
+                       int is_lit)
 {
     const nebel_sky_view_desc *const of = &air->of;
     int same = air->count == count && of->has_ray_ends == desc->has_ray_ends && (air->light[0] >= 0) == is_lit;
@@ -114,7 +114,7 @@ static void pack_daylight(const nb_irradiance_table *daylight, nebel_texel_f32 *
         words[DEPTHS + i] = (nebel_texel_f32){{sky[3 * i], sky[3 * i + 1], sky[3 * i + 2], 0}};
 }
 
-static nebel_result pack(const nb_gl_air *air, nebel_texel_f32 *words, size_t total)
+static nebel_result pack_airs(const nb_gl_air *air, nebel_texel_f32 *words, size_t total)
 {
     nebel_result result = NEBEL_OK;
     for (int i = 0; i < air->count && result == NEBEL_OK; i++) {
@@ -126,8 +126,8 @@ static nebel_result pack(const nb_gl_air *air, nebel_texel_f32 *words, size_t to
     return result;
 }
 
-static nebel_result fill(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
-                         const nb_context *context)
+static nebel_result fill_air(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
+                             const nb_context *context)
 {
     size_t count = 0;
     nebel_result result = measure(air, &count);
@@ -135,7 +135,7 @@ static nebel_result fill(nb_gl_air *air, const nebel_allocator *allocator, const
     const size_t rows = (count + NEBEL_TEXTURE_WIDTH - 1) / NEBEL_TEXTURE_WIDTH;
     nebel_texel_f32 *const words = nb_allocate_zero(allocator, rows * NEBEL_TEXTURE_WIDTH, sizeof *words);
     if (words == NULL) return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL: out of memory for the planet's air");
-    result = pack(air, words, count);
+    result = pack_airs(air, words, count);
     if (result == NEBEL_OK)
         result =
             nb_texel_texture_upload(&air->texture, log, context, words, rows, "the texture of the planet's air", "");
@@ -158,12 +158,12 @@ nebel_result nb_gl_planets_set(nb_gl_air *air, const nebel_allocator *allocator,
                                       .allocator = *allocator,
                                       .log = *log};
     glBindTexture(GL_TEXTURE_2D, air->texture);
-    if (are_same(air, &desc, worlds, count, is_lit)) return NEBEL_OK;
+    if (is_same_air(air, &desc, worlds, count, is_lit)) return NEBEL_OK;
     forget_views(air);
     memcpy(air->worlds, worlds, (size_t)count * sizeof *worlds);
     nebel_result result = make_views(air, desc, count);
     if (result == NEBEL_OK && is_lit) result = set_daylights(air, allocator, log, scene);
-    if (result == NEBEL_OK) result = fill(air, allocator, log, context);
+    if (result == NEBEL_OK) result = fill_air(air, allocator, log, context);
     if (result != NEBEL_OK) forget_views(air);
     air->of = desc;
     return result;

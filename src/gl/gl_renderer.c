@@ -7,7 +7,7 @@
 
 enum { USUAL_SHADOW_SIZE = 2048, LEAST_SHADOW_SIZE = 64, MOST_SHADOW_SIZE = 16384 };
 
-static nebel_result check(const nebel_scene_data *scene, const nebel_gl_renderer_desc *desc)
+static nebel_result check_renderer(const nebel_scene_data *scene, const nebel_gl_renderer_desc *desc)
 {
     const nebel_log *const log = &desc->log;
     if (scene == NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "OpenGL renderer: scene is NULL");
@@ -33,7 +33,7 @@ static nebel_result check_context(const nb_context *context, const nebel_log *lo
 }
 
 /* A vertex array exists once it was bound. */
-static nebel_result make_objects(nebel_gl_renderer *r)
+static nebel_result make_renderer_objects(nebel_gl_renderer *r)
 {
     glGenVertexArrays(1, &r->vertex_array);
     glBindVertexArray(r->vertex_array);
@@ -42,7 +42,7 @@ static nebel_result make_objects(nebel_gl_renderer *r)
     return result;
 }
 
-static nebel_result make(nebel_gl_renderer *r)
+static nebel_result make_renderer(nebel_gl_renderer *r)
 {
     const nebel_gl_desc desc = {.allocator = r->allocator, .log = r->log};
     nb_scene_state state;
@@ -53,19 +53,19 @@ static nebel_result make(nebel_gl_renderer *r)
     r->sun_fog->dims_alone = r->sun_cloud->dims_alone = 1;
     r->eye_fog->lender = r->sun_fog;
     nb_scene_state_enter(&r->context, &state);
-    result = make_objects(r);
+    result = make_renderer_objects(r);
     nb_scene_state_leave(&r->context, &state);
     return result;
 }
 
-nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snapshot *fog,
+nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_lighting *lighting,
                                       const nebel_gl_renderer_desc *desc, nebel_gl_renderer **renderer)
 {
     nb_context context;
     if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
     *renderer = NULL;
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
-    nebel_result result = check(scene, desc);
+    nebel_result result = check_renderer(scene, desc);
     if (result == NEBEL_OK) result = nb_context_read(&desc->log, &context);
     if (result == NEBEL_OK) result = check_context(&context, &desc->log);
     if (result != NEBEL_OK) return result;
@@ -84,8 +84,8 @@ nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snaps
     made->shafts.maps.count = NB_MAX_MAPS;
     made->shafts.maps.leaning = 1;
     made->lamps.most_face = size / 4;
-    made->fog = fog != NULL ? nebel_retain_snapshot(fog) : NULL;
-    result = make(made);
+    made->fog = nebel_retain_lighting(lighting);
+    result = make_renderer(made);
     if (result != NEBEL_OK) {
         nebel_destroy_gl_renderer(made);
         return result;
@@ -119,9 +119,9 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     nebel_destroy_gl(r->eye_fog);
     nebel_destroy_gl(r->sun_fog);
     nebel_destroy_gl(r->sun_cloud);
-    nebel_release_snapshot(r->cloud);
-    nebel_release_snapshot(r->environment.of);
-    nebel_release_snapshot(r->fog);
+    nebel_release_lighting(r->cloud);
+    nebel_release_lighting(r->environment.of);
+    nebel_release_lighting(r->fog);
     nb_gl_daylit_fog_release(&r->daylit);
     nb_release(&r->allocator, r->shading.lights);
     nb_release(&r->allocator, r->shadows.blocks);
@@ -133,12 +133,12 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     nb_release(&allocator, r);
 }
 
-nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *r, nebel_snapshot *fog)
+nebel_result nebel_set_gl_renderer_lighting(nebel_gl_renderer *r, nebel_lighting *lighting)
 {
     if (r == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (fog != NULL) nebel_retain_snapshot(fog);
-    nebel_release_snapshot(r->fog);
-    r->fog = fog;
+    (void)nebel_retain_lighting(lighting);
+    nebel_release_lighting(r->fog);
+    r->fog = lighting;
     r->has_judged_particles = 0;
     return NEBEL_OK;
 }
@@ -156,7 +156,7 @@ nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *r, const nebel_p
     r->has_judged_particles = 0;
     const nebel_result result = nb_particles_set(&r->particles, &r->allocator, &r->log, particles, count);
     if (result != NEBEL_OK) return result;
-    nebel_release_snapshot(r->cloud);
+    nebel_release_lighting(r->cloud);
     r->cloud = NULL;
     return result;
 }
@@ -166,17 +166,17 @@ static int dim_lamps(const nebel_gl_renderer *r)
 {
     static const double any[3] = {0, 1, 0}, low[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL},
                         high[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
-    double fog_low[3], fog_high[3];
-    const int are_lit =
-        r->scene->light_count > 0 || (r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, fog_low, fog_high));
+    nebel_bounds lit;
+    const int are_lit = r->scene->light_count > 0 || nebel_get_lit_bounds(r->fog, NEBEL_LIGHT_GROUP_LOCAL, &lit);
     return are_lit && nb_particles_shade(&r->particles, any, low, high);
 }
 
 static int shade_sunlit_fog(const nebel_gl_renderer *r)
 {
-    nebel_sunlit_fog lit;
-    return r->fog != NULL && nebel_snapshot_sunlit_fog(r->fog, &lit) &&
-           nb_particles_shade(&r->particles, lit.direction, lit.min, lit.max);
+    nebel_bounds lit;
+    const nebel_sun sun = nebel_get_lighting_sun(r->fog);
+    return nebel_get_lit_bounds(r->fog, NEBEL_LIGHT_GROUP_SUN, &lit) &&
+           nb_particles_shade(&r->particles, sun.direction, lit.min, lit.max);
 }
 
 void nb_renderer_judge_particles(nebel_gl_renderer *r)

@@ -22,14 +22,14 @@ struct nebel_gl_renderer {
     nebel_allocator allocator;
     nebel_log log;
     const nebel_scene_data *scene;
-    nebel_snapshot *fog; /* NULL: none */
+    nebel_lighting *fog; /* NULL: none */
     nb_gl_daylit_fog daylit;
     nb_context context;
     unsigned vertex_array; /* without attributes */
     nebel_gl *eye_fog;     /* as the eye sees it */
     nebel_gl *sun_fog;     /* with tiles as the sun sees them */
     nebel_gl *sun_cloud;   /* the particles, so, too */
-    nebel_snapshot *cloud; /* of the particles; NULL: not made yet */
+    nebel_lighting *cloud; /* of the particles; NULL: not made yet */
     nb_meshes meshes;
     nb_scene_programs shading;
     nb_shadows shadows;

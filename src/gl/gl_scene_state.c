@@ -3,17 +3,17 @@
 #include "scene_programs.h"
 
 /* Which contexts know a switch. */
-typedef enum nb_scene_capability { EVERYWHERE, DESKTOP, FIXED_INDEX } nb_scene_capability;
+typedef enum nb_scene_capability { SCENE_EVERYWHERE, SCENE_DESKTOP, SCENE_FIXED_INDEX } nb_scene_capability;
 
 static const struct {
     GLenum name;
     nb_scene_capability known;
-} switches[] = {
-    {GL_POLYGON_OFFSET_FILL, EVERYWHERE},
-    {GL_DEPTH_CLAMP, DESKTOP},
-    {GL_PRIMITIVE_RESTART_FIXED_INDEX, FIXED_INDEX},
+} scene_switches[] = {
+    {GL_POLYGON_OFFSET_FILL, SCENE_EVERYWHERE},
+    {GL_DEPTH_CLAMP, SCENE_DESKTOP},
+    {GL_PRIMITIVE_RESTART_FIXED_INDEX, SCENE_FIXED_INDEX},
 };
-enum { SWITCHES = sizeof switches / sizeof *switches, FIRST_UNIT = NB_STATE_UNITS };
+enum { SCENE_SWITCHES = sizeof scene_switches / sizeof *scene_switches, FIRST_UNIT = NB_STATE_UNITS };
 
 static const GLenum array_units[NB_SCENE_ARRAYS] = {GL_TEXTURE0 + NB_UNIT_SHADOWS, GL_TEXTURE0 + NB_UNIT_SHADE,
                                                     GL_TEXTURE0 + NB_UNIT_VEIL, GL_TEXTURE0 + NB_UNIT_LIGHT_MAPS};
@@ -22,12 +22,12 @@ static const GLenum array_units[NB_SCENE_ARRAYS] = {GL_TEXTURE0 + NB_UNIT_SHADOW
 static const GLenum pack_names[NB_SCENE_PACK] = {GL_PACK_ALIGNMENT,   GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS,
                                                  GL_PACK_SKIP_PIXELS, GL_PACK_SWAP_BYTES, GL_PACK_LSB_FIRST};
 
-static int knows(const nb_context *c, nb_scene_capability known)
+static int knows_scene_switch(const nb_context *c, nb_scene_capability known)
 {
     switch (known) {
-    case DESKTOP:
+    case SCENE_DESKTOP:
         return !c->es;
-    case FIXED_INDEX:
+    case SCENE_FIXED_INDEX:
         return c->es || c->version >= 43;
     default:
         return 1;
@@ -54,18 +54,9 @@ static int pack_count(const nb_context *c)
     return c->es ? NB_SCENE_PACK - 2 : NB_SCENE_PACK;
 }
 
-static void set_switch(GLenum name, int on)
-{
-    if (on) {
-        glEnable(name);
-    } else {
-        glDisable(name);
-    }
-}
-
 /* ---- reading --------------------------------------------------------------------------------- */
 
-static void save_units(nb_scene_state *s)
+static void save_scene_units(nb_scene_state *s)
 {
     for (int i = 0; i < NB_SCENE_UNITS; i++) {
         glActiveTexture((GLenum)(GL_TEXTURE0 + FIRST_UNIT + i));
@@ -93,8 +84,9 @@ static void save_depth(const nb_context *c, nb_scene_state *s)
     glGetBooleanv(GL_DEPTH_WRITEMASK, &s->depth_mask);
     glGetFloatv(GL_DEPTH_RANGE, s->depth_range);
     s->switches = 0;
-    for (unsigned i = 0; i < SWITCHES; i++) {
-        if (knows(c, switches[i].known) && glIsEnabled(switches[i].name)) s->switches |= 1u << i;
+    for (unsigned i = 0; i < SCENE_SWITCHES; i++) {
+        if (knows_scene_switch(c, scene_switches[i].known) && glIsEnabled(scene_switches[i].name))
+            s->switches |= 1u << i;
     }
     if (!c->es) glGetIntegerv(GL_PROVOKING_VERTEX, &s->provoking_vertex);
     if (has_clip_control(c)) {
@@ -105,10 +97,10 @@ static void save_depth(const nb_context *c, nb_scene_state *s)
 
 /* ---- setting --------------------------------------------------------------------------------- */
 
-static void set_switches(const nb_context *c, uint32_t on)
+static void set_scene_switches(const nb_context *c, uint32_t on)
 {
-    for (unsigned i = 0; i < SWITCHES; i++) {
-        if (knows(c, switches[i].known)) set_switch(switches[i].name, on >> i & 1);
+    for (unsigned i = 0; i < SCENE_SWITCHES; i++) {
+        if (knows_scene_switch(c, scene_switches[i].known)) nb_state_switch(scene_switches[i].name, on >> i & 1);
     }
 }
 
@@ -125,7 +117,7 @@ void nb_scene_state_enter(const nb_context *c, nb_scene_state *s)
 {
     const GLfloat range[2] = {0, 1};
     nb_state_save(c, &s->base);
-    save_units(s);
+    save_scene_units(s);
     save_buffers(c, s);
     save_depth(c, s);
     nb_state_save_unpacking(c, &s->unpacking);
@@ -133,7 +125,7 @@ void nb_scene_state_enter(const nb_context *c, nb_scene_state *s)
     glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
     for (int i = 0; i < pack_count(c); i++) glPixelStorei(pack_names[i], i == 0 ? 4 : 0);
     if (!c->es) glClampColor(GL_CLAMP_READ_COLOR, GL_FALSE);
-    set_switches(c, 0);
+    set_scene_switches(c, 0);
     glDepthFunc(GL_LESS);
     glDepthMask(GL_TRUE);
     set_depth_range(c, range);
@@ -141,7 +133,7 @@ void nb_scene_state_enter(const nb_context *c, nb_scene_state *s)
     if (has_clip_control(c)) set_clip_control(c, GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
 }
 
-static void restore_units(const nb_scene_state *s)
+static void restore_scene_units(const nb_scene_state *s)
 {
     for (int i = 0; i < NB_SCENE_UNITS; i++) {
         glActiveTexture((GLenum)(GL_TEXTURE0 + FIRST_UNIT + i));
@@ -165,14 +157,14 @@ static void restore_buffers(const nb_context *c, const nb_scene_state *s)
 
 void nb_scene_state_leave(const nb_context *c, const nb_scene_state *s)
 {
-    set_switches(c, s->switches);
+    set_scene_switches(c, s->switches);
     glDepthFunc((GLenum)s->depth_function);
     glDepthMask(s->depth_mask);
     set_depth_range(c, s->depth_range);
     if (!c->es) glProvokingVertex((GLenum)s->provoking_vertex);
     if (has_clip_control(c)) set_clip_control(c, (GLenum)s->clip_control[0], (GLenum)s->clip_control[1]);
     nb_state_restore_unpacking(c, &s->unpacking);
-    restore_units(s);
+    restore_scene_units(s);
     nb_state_restore(c, &s->base);
     restore_buffers(c, s);
 }

@@ -41,7 +41,7 @@ static int knows(const nb_context *c, nb_capability known)
     }
 }
 
-static void set_switch(GLenum name, int on)
+void nb_state_switch(GLenum name, int on)
 {
     if (on) {
         glEnable(name);
@@ -53,7 +53,7 @@ static void set_switch(GLenum name, int on)
 static void set_indexed_switch(int by_index, GLenum name, GLuint index, int on)
 {
     if (!by_index) {
-        if (index == 0) set_switch(name, on);
+        if (index == 0) nb_state_switch(name, on);
     } else if (on) {
         glEnablei(name, index);
     } else {
@@ -199,9 +199,10 @@ static void set_scissors(const nb_context *c, uint32_t on)
 static void set_switches(const nb_context *c, uint32_t on, uint32_t clip_distances)
 {
     for (unsigned i = 0; i < SWITCHES; i++) {
-        if (knows(c, switches[i].known)) set_switch(switches[i].name, on >> i & 1);
+        if (knows(c, switches[i].known)) nb_state_switch(switches[i].name, on >> i & 1);
     }
-    for (int i = 0; i < c->clip_distances; i++) set_switch((GLenum)(GL_CLIP_DISTANCE0 + i), clip_distances >> i & 1);
+    for (int i = 0; i < c->clip_distances; i++)
+        nb_state_switch((GLenum)(GL_CLIP_DISTANCE0 + i), clip_distances >> i & 1);
 }
 
 static void set_mask(const nb_context *c, GLuint buffer, const GLboolean mask[4])

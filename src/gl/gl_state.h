@@ -45,6 +45,9 @@ void nb_state_restore(const nb_context *context, const nb_gl_state *state);
 /* Everything that would keep fragments away or change them is switched off; fragments cover the rectangle alone. */
 void nb_state_clear(const nb_context *context, uint32_t x, uint32_t y, uint32_t width, uint32_t height);
 
+/* glEnable or glDisable. */
+void nb_state_switch(GLenum name, int on);
+
 /* Of nb_gl_state alone. */
 void nb_blending_save(const nb_context *context, nb_blending *blending);
 void nb_blending_restore(const nb_context *context, const nb_blending *blending);

@@ -58,7 +58,7 @@ static nebel_result make_map(const nb_context *context, const nebel_log *log, co
     return result;
 }
 
-static void delete_maps(nb_gl_shells *shells)
+static void delete_shell_maps(nb_gl_shells *shells)
 {
     glDeleteTextures(1, &shells->ground.name);
     for (int i = 0; i < NEBEL_MAX_CLOUD_SHELLS; i++) {
@@ -70,8 +70,8 @@ static void delete_maps(nb_gl_shells *shells)
     shells->of = NULL;
 }
 
-static nebel_result make_maps(nb_gl_shells *shells, const nb_context *context, const nebel_log *log,
-                              const nebel_textured_planet *layers)
+static nebel_result make_shell_maps(nb_gl_shells *shells, const nb_context *context, const nebel_log *log,
+                                    const nebel_textured_planet *layers)
 {
     const nebel_textured_planet_desc *const desc = nebel_get_textured_planet_desc(layers);
     nebel_result result = make_map(context, log, layers, &desc->color_map, &shells->ground);
@@ -87,12 +87,12 @@ static nebel_result fit_maps(nb_gl_shells *shells, const nb_context *context, co
                              const nebel_textured_planet *layers)
 {
     if (shells->of == layers) return NEBEL_OK;
-    delete_maps(shells);
-    const nebel_result result = make_maps(shells, context, log, layers);
+    delete_shell_maps(shells);
+    const nebel_result result = make_shell_maps(shells, context, log, layers);
     if (result == NEBEL_OK)
         shells->of = layers;
     else
-        delete_maps(shells);
+        delete_shell_maps(shells);
     return result;
 }
 
@@ -130,7 +130,7 @@ static nebel_result fit_targets(nb_gl_shells *shells, const nebel_log *log, uint
 
 /* ---- programs -------------------------------------------------------------------------------- */
 
-static void set_units(unsigned program)
+static void set_shell_units(unsigned program)
 {
     glUseProgram(program);
     glUniform1i(glGetUniformLocation(program, "shell_map"), NB_UNIT_NORMAL);
@@ -149,7 +149,7 @@ static nebel_result fit_program(const nb_context *context, const nebel_log *log,
                                       7};
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
-    if (result == NEBEL_OK) set_units(*name);
+    if (result == NEBEL_OK) set_shell_units(*name);
     return result;
 }
 
@@ -168,7 +168,7 @@ nebel_result nb_gl_textured_set(nb_gl_shells *shells, const nb_context *context,
 
 void nb_gl_textured_delete(nb_gl_shells *shells)
 {
-    delete_maps(shells);
+    delete_shell_maps(shells);
     delete_targets(shells);
     for (int i = 0; i < NB_SHELL_PROGRAMS; i++) {
         glDeleteProgram(shells->programs[0][i]);

@@ -8,14 +8,14 @@
 #include <math.h>
 #include <string.h>
 
-enum { FOG_SIZE = 4 * sizeof(float) };
+enum { VERTEX_FOG_SIZE = 4 * sizeof(float) };
 
 static nebel_result make_attribute(const nb_meshes *meshes, nb_mesh *mesh)
 {
     if (mesh->fog != 0) return NEBEL_OK;
     glGenBuffers(1, &mesh->fog);
     glBindBuffer(GL_ARRAY_BUFFER, mesh->fog);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(mesh->vertex_count * FOG_SIZE), NULL, GL_STREAM_DRAW);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(mesh->vertex_count * VERTEX_FOG_SIZE), NULL, GL_STREAM_DRAW);
     const nebel_result result = nb_context_check_memory(&meshes->log, "fog at vertices; use fewer triangles");
     if (result != NEBEL_OK) {
         glDeleteBuffers(1, &mesh->fog);
@@ -24,7 +24,7 @@ static nebel_result make_attribute(const nb_meshes *meshes, nb_mesh *mesh)
     }
     glBindVertexArray(mesh->vertex_array);
     glEnableVertexAttribArray(NB_ATTRIBUTE_FOG);
-    glVertexAttribPointer(NB_ATTRIBUTE_FOG, 4, GL_FLOAT, GL_FALSE, FOG_SIZE, NULL);
+    glVertexAttribPointer(NB_ATTRIBUTE_FOG, 4, GL_FLOAT, GL_FALSE, VERTEX_FOG_SIZE, NULL);
     return result;
 }
 
@@ -41,7 +41,7 @@ static nebel_cell_view view_towards(const nb_vertex_source *source, const double
     return view;
 }
 
-static void find_place(const nebel_vertices *vertices, size_t vertex, double place[3])
+static void find_vertex_place(const nebel_vertices *vertices, size_t vertex, double place[3])
 {
     const char *const positions = vertices->positions;
     const float *const p = (const float *)(const void *)(positions + vertex * vertices->position_stride);
@@ -56,7 +56,7 @@ static nebel_result fog_by_cells(const nb_vertex_source *source, size_t count, c
     for (size_t v = 0; v < count && result == NEBEL_OK; v++) {
         nebel_cell_point point = {.position = {0, 0, 0}};
         nebel_cell_fog fog = {.alpha = 0};
-        find_place(vertices, v, point.position);
+        find_vertex_place(vertices, v, point.position);
         const nebel_cell_view view = view_towards(source, point.position);
         const int is_eye = view.forward[0] == 0 && view.forward[1] == 0 && view.forward[2] == 0;
         if (!is_eye) result = nebel_compute_cell_fog(source->cells, &view, 1, &point, 0, &fog, 0);
@@ -90,18 +90,18 @@ static void set_color(double amount, const double color[3], float out[4])
     out[3] = (float)amount;
 }
 
-static void set_light(double amount, const double light[3], float out[4])
+static void set_light_color(double amount, const double light[3], float out[4])
 {
     const double color[3] = {nb_device_store(light[0]), nb_device_store(light[1]), nb_device_store(light[2])};
     set_color(amount, color, out);
 }
 
-static void set_factor(const nebel_factor_desc *factor, double coordinate, float out[4])
+static void set_factor_color(const nebel_factor_desc *factor, double coordinate, float out[4])
 {
     set_color(1 - nebel_compute_fog_factor(factor, coordinate), factor->color, out);
 }
 
-static void set_device(const nebel_d3d9_fog *d3d9, const nebel_d3d9_vertex *vertex, float out[4])
+static void set_device_color(const nebel_d3d9_fog *d3d9, const nebel_d3d9_vertex *vertex, float out[4])
 {
     double color[3];
     nebel_get_d3d9_color(d3d9, color);
@@ -119,12 +119,12 @@ static void fog_by_place(const nb_vertex_source *source, size_t count, const neb
     for (size_t v = 0; v < count; v++) {
         nebel_d3d9_vertex vertex = {.source = NEBEL_D3D9_FIXED};
         double place[3];
-        find_place(vertices, v, place);
+        find_vertex_place(vertices, v, place);
         find_seen(source, place, vertex.position);
         if (source->d3d9 != NULL)
-            set_device(source->d3d9, &vertex, out[v]);
+            set_device_color(source->d3d9, &vertex, out[v]);
         else
-            set_factor(source->factor, nebel_compute_fog_coordinate(source->factor, vertex.position, 0), out[v]);
+            set_factor_color(source->factor, nebel_compute_fog_coordinate(source->factor, vertex.position, 0), out[v]);
     }
 }
 
@@ -133,7 +133,11 @@ static void fog_by_place(const nb_vertex_source *source, size_t count, const neb
 static nebel_result trace(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices, float (*out)[4])
 {
     const nebel_vertex_output output = {source->format, out, sizeof *out};
-    if (source->fog != NULL) return nebel_compute_vertex_fog(source->fog, source->look, count, vertices, &output, 1);
+    if (source->fog != NULL) {
+        nebel_vertex_desc desc = source->look != NULL ? *source->look : (nebel_vertex_desc){.channel = 0};
+        desc.lighting = source->fog;
+        return nebel_compute_vertex_fog(nebel_get_lighting_snapshot(source->fog), &desc, count, vertices, &output, 1);
+    }
     memset(out, source->format == NEBEL_VERTEX_SPECULAR_ALPHA ? 0xff : 0, count * sizeof *out);
     return NEBEL_OK;
 }
@@ -146,7 +150,7 @@ static nebel_result trace_parallel(const nb_vertex_source *source, size_t count,
         nebel_vertices one = *vertices;
         double place[3];
         one.positions = (const char *)vertices->positions + v * vertices->position_stride;
-        find_place(vertices, v, place);
+        find_vertex_place(vertices, v, place);
         const nebel_cell_view view = view_towards(source, place);
         for (int i = 0; i < 3; i++) one.eye[i] = view.eye[i];
         result = trace(source, 1, &one, &out[v]);
@@ -159,9 +163,9 @@ static void unpack_coordinate(const nb_vertex_source *source, float out[4])
     enum { END = 100 };
     const double coordinate = (double)out[0];
     if (source->factor == NULL)
-        set_light(coordinate / END, source->look->color, out);
+        set_light_color(coordinate / END, source->look->color, out);
     else if (source->factor->stage == NEBEL_STAGE_VERTEX)
-        set_factor(source->factor, coordinate, out);
+        set_factor_color(source->factor, coordinate, out);
     else
         out[3] = (float)coordinate;
 }
@@ -178,7 +182,7 @@ static void unpack(const nb_vertex_source *source, float out[4])
         unpack_coordinate(source, out);
         break;
     case NEBEL_VERTEX_SPECULAR_ALPHA:
-        set_device(source->d3d9, &vertex, out);
+        set_device_color(source->d3d9, &vertex, out);
         break;
     case NEBEL_VERTEX_ALPHA:
         for (int i = 0; i < 3; i++) color[i] = floor(255 * nb_device_store(source->look->color[i]) + .5) / 255;
@@ -209,13 +213,13 @@ nebel_result nb_vertex_fog_find(const nb_vertex_source *source, size_t count, co
 /* ---- attributes ------------------------------------------------------------------------------ */
 
 /* Positions are where OpenGL has them, and nowhere else. */
-static nebel_result fill(const nb_meshes *meshes, const nb_mesh *mesh, const nb_vertex_source *source)
+static nebel_result fill_vertex_fog(const nb_meshes *meshes, const nb_mesh *mesh, const nb_vertex_source *source)
 {
     const size_t count = mesh->vertex_count;
     const GLbitfield writing = GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT;
     nebel_vertices vertices = {.positions = nb_meshes_map(mesh->vertices, count * sizeof(nb_vertex), GL_MAP_READ_BIT),
                                .position_stride = sizeof(nb_vertex)};
-    void *const out = nb_meshes_map(mesh->fog, count * FOG_SIZE, writing);
+    void *const out = nb_meshes_map(mesh->fog, count * VERTEX_FOG_SIZE, writing);
     const int mapped = vertices.positions != NULL && out != NULL;
     for (int i = 0; i < 3; i++) {
         vertices.origin[i] = mesh->origin[i];
@@ -234,7 +238,7 @@ nebel_result nb_vertex_fog_set(nb_meshes *meshes, const nb_vertex_source *source
         nb_mesh *const mesh = &meshes->list[i];
         if (mesh->index_count == 0) continue;
         result = make_attribute(meshes, mesh);
-        if (result == NEBEL_OK) result = fill(meshes, mesh, source);
+        if (result == NEBEL_OK) result = fill_vertex_fog(meshes, mesh, source);
     }
     return result;
 }

@@ -7,7 +7,7 @@
 /* What fogs the vertices: volumes, or cells, a fog factor or a device's vertex fog in their place. Rays of an orthographic camera begin in the plane across
  * them through the eye; each ray of a panorama is its own axis. */
 typedef struct nb_vertex_source {
-    const nebel_snapshot *fog;
+    const nebel_lighting *fog;
     const nebel_cells *cells;        /* NULL: none */
     const nebel_factor_desc *factor; /* resolved; NULL: none */
     const nebel_d3d9_fog *d3d9;      /* NULL: none */

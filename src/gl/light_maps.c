@@ -22,7 +22,7 @@
 
 enum { FACES = 6, LEAST_FACE = 64 };
 
-static nebel_result out_of_memory(const nebel_log *log)
+static nebel_result fail_light_memory(const nebel_log *log)
 {
     return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory for lamps");
 }
@@ -54,13 +54,13 @@ static void set_words(const nebel_light *lamp, const double eye[3], int layer, i
 }
 
 /* Whether it is the lamp of this number in the fog, too. */
-static int is_in_fog(const nebel_light *lamp, const nebel_snapshot *fog, size_t number)
+static int is_in_fog(const nebel_light *lamp, const nebel_lighting *fog, size_t number)
 {
-    double place[3], radius;
-    if (fog == NULL || number >= nebel_snapshot_lamp_count(fog)) return 0;
-    nebel_snapshot_lamp(fog, number, place, &radius);
+    const nebel_light *lights;
+    if (number >= nebel_get_lighting_lights(fog, &lights)) return 0;
+    const double *const place = lights[number].position;
     return place[0] == lamp->position[0] && place[1] == lamp->position[1] && place[2] == lamp->position[2] &&
-           radius == lamp->radius;
+           lights[number].radius == lamp->radius;
 }
 
 static void fill_words(nb_light_maps *lamps, uint32_t rows)
@@ -80,7 +80,7 @@ static void fill_words(nb_light_maps *lamps, uint32_t rows)
     glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, NEBEL_TEXTURE_WIDTH, (GLsizei)rows, GL_RGBA, GL_FLOAT, lamps->texels);
 }
 
-static int make_room(nb_light_maps *lamps, const nebel_allocator *allocator, uint32_t rows)
+static int reserve_texels(nb_light_maps *lamps, const nebel_allocator *allocator, uint32_t rows)
 {
     const size_t wanted = (size_t)rows * (NEBEL_TEXTURE_WIDTH / NB_LIGHT_MAP_TEXELS);
     if (wanted <= lamps->capacity) return 1;
@@ -132,7 +132,7 @@ static uint32_t face_for(const nb_light_maps *lamps, size_t count)
     return face;
 }
 
-static void delete_maps(nb_light_maps *lamps)
+static void delete_light_maps(nb_light_maps *lamps)
 {
     glDeleteFramebuffers(1, &lamps->buffer);
     glDeleteTextures(1, &lamps->maps);
@@ -143,7 +143,7 @@ static int resize(nb_light_maps *lamps, const nebel_allocator *allocator, size_t
 {
     const uint32_t face = face_for(lamps, count);
     if (count == lamps->layer_count && face == lamps->face) return 1;
-    delete_maps(lamps);
+    delete_light_maps(lamps);
     nb_release(allocator, lamps->sources);
     lamps->sources = count > 0 ? nb_allocate_zero(allocator, count, sizeof *lamps->sources) : NULL;
     lamps->layer_count = lamps->sources != NULL ? count : 0;
@@ -198,7 +198,7 @@ static int choose_layers(nb_light_maps *lamps, const nebel_allocator *allocator,
 }
 
 nebel_result nb_light_maps_set(nb_light_maps *lamps, const nebel_allocator *allocator, const nebel_log *log,
-                               const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3])
+                               const nebel_scene_data *scene, const nebel_lighting *fog, const double eye[3])
 {
     const uint32_t rows = (uint32_t)(scene->light_count * NB_LIGHT_MAP_TEXELS / NEBEL_TEXTURE_WIDTH + 1);
     if (scene->light_count == 0) return NEBEL_OK;
@@ -207,7 +207,8 @@ nebel_result nb_light_maps_set(nb_light_maps *lamps, const nebel_allocator *allo
                        "frame: %zu lamps; OpenGL lights with at most %d. The CPU renderer has no such bound",
                        scene->light_count, (int)NB_MAX_SHADED_LIGHTS);
     }
-    if (!make_room(lamps, allocator, rows) || !choose_layers(lamps, allocator, scene, eye)) return out_of_memory(log);
+    if (!reserve_texels(lamps, allocator, rows) || !choose_layers(lamps, allocator, scene, eye))
+        return fail_light_memory(log);
     for (size_t i = 0; i < scene->light_count; i++) {
         const nebel_light *const lamp = &scene->lights[i];
         const int layer = lamps->layers[i];
@@ -219,7 +220,7 @@ nebel_result nb_light_maps_set(nb_light_maps *lamps, const nebel_allocator *allo
 
 /* ---- maps ------------------------------------------------------------------------------------ */
 
-static nebel_result make_maps(nb_light_maps *lamps, const nebel_log *log)
+static nebel_result make_light_maps(nb_light_maps *lamps, const nebel_log *log)
 {
     const GLenum none = GL_NONE;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_LIGHT_MAPS);
@@ -302,9 +303,9 @@ nebel_result nb_light_maps_draw(nb_light_maps *lamps, const nb_context *context,
 {
     if (lamps->layer_count == 0) return NEBEL_OK;
     if (lamps->maps == 0) {
-        const nebel_result result = make_maps(lamps, log);
+        const nebel_result result = make_light_maps(lamps, log);
         if (result != NEBEL_OK) {
-            delete_maps(lamps);
+            delete_light_maps(lamps);
             return result;
         }
     }

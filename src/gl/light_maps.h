@@ -32,7 +32,7 @@ typedef struct nb_light_maps {
  * there is room, then those that are brightest at the eye. Changes the bindings of TEXTURE_2D on the active unit. LIMIT,
  * MEMORY. */
 nebel_result nb_light_maps_set(nb_light_maps *lamps, const nebel_allocator *allocator, const nebel_log *log,
-                               const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3]);
+                               const nebel_scene_data *scene, const nebel_lighting *fog, const double eye[3]);
 
 /* Draws the maps that are not there yet. `program` is nb_scene_programs.lamp_map. Depth is tested afterwards. MEMORY. */
 nebel_result nb_light_maps_draw(nb_light_maps *lamps, const nb_context *context, const nebel_log *log, unsigned program,

@@ -27,7 +27,7 @@ int nb_method_is_by_vertex(const nb_method *m)
     }
 }
 
-static nebel_result set_factor(nb_method *m, const nebel_gl_frame_desc *desc)
+static nebel_result set_factor_method(nb_method *m, const nebel_gl_frame_desc *desc)
 {
     const nebel_gl_method method = m->kind;
     if (desc->factor == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -62,7 +62,7 @@ static nebel_factor_mode mode_of(uint32_t table_mode)
 }
 
 /* Table fog is a factor of pixels. */
-static nebel_result set_device(nb_method *m, const nebel_gl_frame_desc *desc)
+static nebel_result set_device_method(nb_method *m, const nebel_gl_frame_desc *desc)
 {
     const nebel_d3d9_fog *const d3d9 = desc->d3d9;
     if (d3d9 == NULL || d3d9->fog_table_mode > NEBEL_D3DFOG_LINEAR || d3d9->fog_vertex_mode > NEBEL_D3DFOG_LINEAR)
@@ -104,10 +104,10 @@ nebel_result nb_method_set(nb_method *m, const nebel_gl_frame_desc *desc)
     case NEBEL_GL_METHOD_EXP:
     case NEBEL_GL_METHOD_EXP2:
         m->replaces_fog = 1;
-        return set_factor(m, desc);
+        return set_factor_method(m, desc);
     case NEBEL_GL_METHOD_D3D9:
         m->replaces_fog = 1;
-        return set_device(m, desc);
+        return set_device_method(m, desc);
     case NEBEL_GL_METHOD_FOG_COORD:
     case NEBEL_GL_METHOD_TWO_PASS:
     case NEBEL_GL_METHOD_ALPHA:

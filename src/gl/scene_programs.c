@@ -660,7 +660,7 @@ nebel_result nb_scene_programs_make_round(nb_scene_programs *shading, const nb_c
                       NB_UNIT_PLACE, &shading->round_vertex_fog);
 }
 
-static void write_head(const nb_context *context, const nb_composite_key *kind, char *text, size_t size)
+static void write_composite_head(const nb_context *context, const nb_composite_key *kind, char *text, size_t size)
 {
     char limits[128], air[NB_AIR_HEAD];
     (void)snprintf(
@@ -682,7 +682,7 @@ static void write_head(const nb_context *context, const nb_composite_key *kind, 
         (unsigned)kind->features, precision_of(context));
 }
 
-static void set_units(unsigned program)
+static void set_composite_units(unsigned program)
 {
     const unsigned block = glGetUniformBlockIndex(program, "nebel_fog_block");
     if (block != GL_INVALID_INDEX) glUniformBlockBinding(program, block, 0);
@@ -721,7 +721,7 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
                                unsigned *name)
 {
     char head[1280];
-    write_head(context, kind, head, sizeof head);
+    write_composite_head(context, kind, head, sizeof head);
     const char *const fog = nebel_get_shader_source(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const char *const ray = kind->panorama ? nb_panorama_ray_text : nb_ray_text;
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
@@ -744,11 +744,11 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
                                                  : kind->of_shells  ? &shell
                                                                     : &light,
                                                  name);
-    if (result == NEBEL_OK) set_units(*name);
+    if (result == NEBEL_OK) set_composite_units(*name);
     return result;
 }
 
-static int is_same(const nb_composite_key *a, const nb_composite_key *b)
+static int is_same_composite(const nb_composite_key *a, const nb_composite_key *b)
 {
     return a->of_particles == b->of_particles && a->of_dimming == b->of_dimming && a->dimmed == b->dimmed &&
            a->sunlit == b->sunlit && a->environment == b->environment && a->lamplit == b->lamplit &&
@@ -765,7 +765,7 @@ nebel_result nb_scene_programs_find_light(nb_scene_programs *shading, const nb_c
 {
     for (size_t i = 0; i < shading->light_count; i++) {
         *program = shading->lights[i].name;
-        if (is_same(&shading->lights[i].kind, kind)) return NEBEL_OK;
+        if (is_same_composite(&shading->lights[i].kind, kind)) return NEBEL_OK;
     }
     void *list = shading->lights;
     if (!nb_grow(allocator, &list, sizeof *shading->lights, shading->light_count, &shading->light_capacity,

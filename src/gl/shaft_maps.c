@@ -111,12 +111,6 @@ const char nb_shaft_text[] =
 
 /* ---- blocks ---------------------------------------------------------------------------------- */
 
-static const char triangle_text[] =
-    "void main()\n"
-    "{\n"
-    "    gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, float(gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0);\n"
-    "}\n";
-
 static const char range_text[] =
     "uniform highp sampler2DArray range_source;\n"
     "uniform ivec3 range_place;\n" /* size of the maps, of a block; layer */
@@ -140,7 +134,7 @@ static nebel_result make_program(nb_shaft_maps *shafts, const nb_context *contex
 {
     const char *const version = nb_program_version(context);
     const char *const precision = context->es ? "precision highp float;\nprecision highp int;\n" : "";
-    const nb_shader_parts vertex = {{version, triangle_text}, 2};
+    const nb_shader_parts vertex = {{version, nb_triangle_text}, 2};
     const nb_shader_parts fragment = {{version, precision, range_text}, 3};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &shafts->program);
     if (result != NEBEL_OK) return result;
@@ -181,7 +175,7 @@ static void draw_level(const nb_shaft_maps *shafts, const nb_context *context, i
 
 /* ---- all of it ------------------------------------------------------------------------------- */
 
-static nebel_result make(nb_shaft_maps *shafts, const nb_context *context, const nebel_log *log)
+static nebel_result make_shaft_maps(nb_shaft_maps *shafts, const nb_context *context, const nebel_log *log)
 {
     nebel_result result = NEBEL_OK;
     if (shafts->program == 0) result = make_program(shafts, context, log);
@@ -192,9 +186,9 @@ static nebel_result make(nb_shaft_maps *shafts, const nb_context *context, const
 nebel_result nb_shaft_maps_draw(nb_shaft_maps *shafts, const nb_context *context, const nebel_log *log,
                                 unsigned program, unsigned vertex_array, const nb_shadows *surfaces,
                                 const nb_targets *targets, const nebel_rays *rays, int panorama,
-                                const nb_meshes *meshes, const nebel_sunlit_fog *fog)
+                                const nb_meshes *meshes, const nb_sunlit_fog *fog)
 {
-    nebel_result result = make(shafts, context, log);
+    nebel_result result = make_shaft_maps(shafts, context, log);
     if (result != NEBEL_OK) return result;
     nb_shadows_fit_fog(&shafts->maps, surfaces, targets, rays, panorama, meshes, fog);
     result = nb_shadows_draw(&shafts->maps, context, log, program, meshes, rays->eye);

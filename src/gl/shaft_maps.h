@@ -19,7 +19,7 @@ typedef struct nb_shaft_maps {
 nebel_result nb_shaft_maps_draw(nb_shaft_maps *shafts, const nb_context *context, const nebel_log *log,
                                 unsigned program, unsigned vertex_array, const nb_shadows *surfaces,
                                 const nb_targets *targets, const nebel_rays *rays, int panorama,
-                                const nb_meshes *meshes, const nebel_sunlit_fog *fog);
+                                const nb_meshes *meshes, const nb_sunlit_fog *fog);
 
 /* Sets what nb_shaft_text reads in the current program, and binds textures to the units of shadow maps and of the veil. */
 void nb_shaft_maps_set(const nb_shaft_maps *shafts, unsigned program);

@@ -31,7 +31,7 @@ static rectangle nothing(void)
     return (rectangle){{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
 }
 
-static void include(rectangle *r, const double at[2])
+static void include_point(rectangle *r, const double at[2])
 {
     for (int i = 0; i < 2; i++) {
         r->low[i] = fmin(r->low[i], at[i]);
@@ -177,7 +177,7 @@ static void include_beam(const nb_shadows *shadows, const beam *b, double near, 
             at[k] = nb_vector_dot(shadows->across[k], b->origin[i / 2]) +
                     steps[i & 1] * nb_vector_dot(shadows->across[k], b->way[i / 2]);
         }
-        include(seen, at);
+        include_point(seen, at);
     }
 }
 
@@ -205,8 +205,8 @@ static void include_cone(const nb_shadows *shadows, const double middle[3], doub
         at[0][k] = fmin(near * least, far * least);
         at[1][k] = fmax(near * most, far * most);
     }
-    include(seen, at[0]);
-    include(seen, at[1]);
+    include_point(seen, at[0]);
+    include_point(seen, at[1]);
 }
 
 static void include_round(const nb_shadows *shadows, const nb_seen_survey *s, const extent *e, double near, double far,
@@ -291,7 +291,7 @@ static rectangle casting(const nb_shadows *shadows, const double eye[3], const n
             const double way = (corner >> i & 1 ? meshes->high[i] : meshes->low[i]) - eye[i];
             for (int k = 0; k < 2; k++) at[k] += shadows->across[k][i] * way;
         }
-        include(&r, at);
+        include_point(&r, at);
     }
     return r;
 }
@@ -478,8 +478,8 @@ static region places_before(const nb_shadows *shadows, const nb_seen_survey *s, 
             find_radii(&r, &nearest, &farthest);
             all.nearest = fmin(all.nearest, nearest);
             all.farthest = fmax(all.farthest, farthest);
-            include(&all.around, r.low);
-            include(&all.around, r.high);
+            include_point(&all.around, r.low);
+            include_point(&all.around, r.high);
         }
     }
     return all;
@@ -527,7 +527,7 @@ static int are_parallel(const nb_seen_survey *s)
 }
 
 void nb_shadows_fit_fog(nb_shadows *shadows, const nb_shadows *surfaces, const nb_targets *targets,
-                        const nebel_rays *rays, int panorama, const nb_meshes *meshes, const nebel_sunlit_fog *fog)
+                        const nebel_rays *rays, int panorama, const nb_meshes *meshes, const nb_sunlit_fog *fog)
 {
     static const double longest = 1000; /* times the way across: of rays nearly along the light */
     nb_seen_survey s = {.rays = rays,
@@ -538,8 +538,8 @@ void nb_shadows_fit_fog(nb_shadows *shadows, const nb_shadows *surfaces, const n
                         .width = targets->width,
                         .height = targets->height};
     for (int i = 0; i < 3; i++) {
-        s.low[i] = fog->min[i] - rays->eye[i];
-        s.high[i] = fog->max[i] - rays->eye[i];
+        s.low[i] = fog->bounds.min[i] - rays->eye[i];
+        s.high[i] = fog->bounds.max[i] - rays->eye[i];
     }
     const rectangle all = casting(shadows, rays->eye, meshes);
     double nearest;
@@ -558,7 +558,7 @@ void nb_shadows_fit_fog(nb_shadows *shadows, const nb_shadows *surfaces, const n
 
 /* ---- maps ------------------------------------------------------------------------------------ */
 
-static nebel_result make_texture(nb_shadows *shadows, const nebel_log *log)
+static nebel_result make_shadow_texture(nb_shadows *shadows, const nebel_log *log)
 {
     const GLsizei size = (GLsizei)shadows->size;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_SHADOWS);
@@ -583,7 +583,7 @@ static int is_in_map(const nb_shadows *shadows, int map, const nb_mesh *mesh, co
             const double p = (double)(corner >> i & 1 ? mesh->high[i] : mesh->low[i]) + (mesh->origin[i] - eye[i]);
             for (int k = 0; k < 2; k++) at[k] += shadows->across[k][i] * p;
         }
-        include(&r, at);
+        include_point(&r, at);
     }
     const float *const place = shadows->places[map];
     for (int i = 0; i < 2; i++) {
@@ -623,7 +623,7 @@ nebel_result nb_shadows_draw(nb_shadows *shadows, const nb_context *context, con
 {
     static const GLfloat empty = 1;
     if (shadows->texture == 0) {
-        const nebel_result result = make_texture(shadows, log);
+        const nebel_result result = make_shadow_texture(shadows, log);
         if (result != NEBEL_OK) return result;
     }
     glBindFramebuffer(GL_FRAMEBUFFER, shadows->buffer);

@@ -24,6 +24,12 @@ typedef struct nb_shadows {
     int sees_ground; /* which casts no shadow, and may reach far beyond all that does */
 } nb_shadows;
 
+/* Fog that the sun lights. */
+typedef struct nb_sunlit_fog {
+    double direction[3]; /* towards the sun, of length 1 */
+    nebel_bounds bounds; /* no such fog is outside */
+} nb_sunlit_fog;
+
 /* The axes of a sun in this direction. */
 void nb_shadows_turn(nb_shadows *shadows, const double sun[3]);
 
@@ -40,7 +46,7 @@ nebel_result nb_shadows_fit(nb_shadows *shadows, const nb_context *context, cons
 
 /* Lays the maps around all places before those surfaces where shadows may be in the fog. */
 void nb_shadows_fit_fog(nb_shadows *shadows, const nb_shadows *surfaces, const nb_targets *targets,
-                        const nebel_rays *rays, int panorama, const nb_meshes *meshes, const nebel_sunlit_fog *fog);
+                        const nebel_rays *rays, int panorama, const nb_meshes *meshes, const nb_sunlit_fog *fog);
 
 /* Draws the maps. Depth is tested afterwards. MEMORY, UNSUPPORTED. */
 nebel_result nb_shadows_draw(nb_shadows *shadows, const nb_context *context, const nebel_log *log, unsigned program,

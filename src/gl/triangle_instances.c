@@ -20,8 +20,8 @@ static nebel_result no_access(const nb_meshes *meshes)
 typedef void gather(const uint32_t *indices, const void *vertices, void *corners);
 
 /* Fills a buffer of triangles, `size` bytes each, from one of vertices. */
-static nebel_result fill(const nb_meshes *meshes, const nb_mesh *mesh, unsigned from, size_t from_size, unsigned to,
-                         size_t size, gather *one)
+static nebel_result fill_instances(const nb_meshes *meshes, const nb_mesh *mesh, unsigned from, size_t from_size,
+                                   unsigned to, size_t size, gather *one)
 {
     const size_t count = (size_t)mesh->index_count / 3;
     const uint32_t *const indices = nb_meshes_map(mesh->indices, 3 * count * sizeof *indices, GL_MAP_READ_BIT);
@@ -78,8 +78,8 @@ static nebel_result make_triangles(const nb_meshes *meshes, nb_mesh *mesh)
     set_attributes(NB_CORNER_NORMAL, 3, 3, sizeof(nb_triangle_instance), offsetof(nb_triangle_instance, normal));
     set_attributes(NB_CORNER_UV, 3, 2, sizeof(nb_triangle_instance), offsetof(nb_triangle_instance, uv));
     set_attributes(NB_CORNER_FACE, 1, 3, sizeof(nb_triangle_instance), offsetof(nb_triangle_instance, face));
-    return fill(meshes, mesh, mesh->vertices, sizeof(nb_vertex), mesh->corners, sizeof(nb_triangle_instance),
-                gather_triangle);
+    return fill_instances(meshes, mesh, mesh->vertices, sizeof(nb_vertex), mesh->corners, sizeof(nb_triangle_instance),
+                          gather_triangle);
 }
 
 static void drop_triangles(nb_mesh *mesh)
@@ -131,7 +131,7 @@ nebel_result nb_triangle_instances_set_fog(nb_meshes *meshes)
         if (mesh->index_count == 0) continue;
         if (mesh->corner_fog == 0) result = make_fog(meshes, mesh);
         if (result != NEBEL_OK) return result;
-        result = fill(meshes, mesh, mesh->fog, FOG_SIZE, mesh->corner_fog, CORNERS_FOG_SIZE, gather_fog);
+        result = fill_instances(meshes, mesh, mesh->fog, FOG_SIZE, mesh->corner_fog, CORNERS_FOG_SIZE, gather_fog);
     }
     return result;
 }

@@ -42,7 +42,7 @@ typedef struct nb_nanovdb_reader {
     size_t at;
 } nb_nanovdb_reader;
 
-static nebel_result fail(const nb_nanovdb_reader *in, nebel_result result, const char *text)
+static nebel_result fail_nanovdb(const nb_nanovdb_reader *in, nebel_result result, const char *text)
 {
     return nb_fail(&in->codec->log, result, "%s: %s", in->codec->name, text);
 }
@@ -82,15 +82,16 @@ static nebel_result read_segment(nb_nanovdb_reader *in, segment *s)
 {
     const unsigned char *header = in->bytes->data + in->at;
     if (bytes_left(in) < HEADER_SIZE)
-        return in->at == 0 ? fail(in, NEBEL_ERROR_FORMAT, "is not a NanoVDB file") : fail_short(in);
-    if (!is_magic(header)) return fail(in, NEBEL_ERROR_FORMAT, "is not a NanoVDB file");
+        return in->at == 0 ? fail_nanovdb(in, NEBEL_ERROR_FORMAT, "is not a NanoVDB file") : fail_short(in);
+    if (!is_magic(header)) return fail_nanovdb(in, NEBEL_ERROR_FORMAT, "is not a NanoVDB file");
     const uint64_t major = number_at(header + 8, 4) >> 21;
     if (major != MAJOR_VERSION)
         return nb_fail(&in->codec->log, NEBEL_ERROR_UNSUPPORTED,
                        "%s: is of NanoVDB's version %u; this program reads %d", in->codec->name, (unsigned)major,
                        MAJOR_VERSION);
     *s = (segment){(uint16_t)number_at(header + 12, 2), (uint16_t)number_at(header + 14, 2)};
-    if (s->codec > CODEC_BLOSC) return fail(in, NEBEL_ERROR_UNSUPPORTED, "is compressed in a way that is not known");
+    if (s->codec > CODEC_BLOSC)
+        return fail_nanovdb(in, NEBEL_ERROR_UNSUPPORTED, "is compressed in a way that is not known");
     in->at += HEADER_SIZE;
     return NEBEL_OK;
 }
@@ -176,8 +177,9 @@ static nebel_result unzip(nb_nanovdb_reader *in, unsigned char *to, size_t size)
     uLongf written = (uLongf)size;
     if (!take_piece(in, &piece, &piece_size)) return fail_short(in);
     const int unzipped = uncompress(to, &written, piece, (uLong)piece_size);
-    if (unzipped == Z_MEM_ERROR) return fail(in, NEBEL_ERROR_MEMORY, "out of memory");
-    if (unzipped != Z_OK || written != size) return fail(in, NEBEL_ERROR_FORMAT, "its compressed bytes are damaged");
+    if (unzipped == Z_MEM_ERROR) return fail_nanovdb(in, NEBEL_ERROR_MEMORY, "out of memory");
+    if (unzipped != Z_OK || written != size)
+        return fail_nanovdb(in, NEBEL_ERROR_FORMAT, "its compressed bytes are damaged");
     return NEBEL_OK;
 }
 
@@ -190,7 +192,7 @@ static nebel_result unblosc(nb_nanovdb_reader *in, unsigned char *to, size_t siz
         if (!take_piece(in, &piece, &piece_size)) return fail_short(in);
         if (blosc_cbuffer_validate(piece, piece_size, &says) != 0 || says != wanted ||
             blosc_decompress_ctx(piece, to, wanted, 1) != (int)wanted)
-            return fail(in, NEBEL_ERROR_FORMAT, "its compressed bytes are damaged");
+            return fail_nanovdb(in, NEBEL_ERROR_FORMAT, "its compressed bytes are damaged");
         to += wanted;
         size -= wanted;
     }
@@ -242,10 +244,10 @@ static nebel_result check_entry(const nb_nanovdb_reader *in, uint16_t codec, con
                        "%s: its voxels are of NanoVDB's type %u; float, double, Fp4, Fp8, Fp16 and FpN are read",
                        in->codec->name, (unsigned)e->type);
     if (e->grid_class == CLASS_LEVEL_SET)
-        return fail(in, NEBEL_ERROR_UNSUPPORTED,
-                    "is a level set, which holds distances; make a fog volume of it (vdb_tool -ls2fog)");
+        return fail_nanovdb(in, NEBEL_ERROR_UNSUPPORTED,
+                            "is a level set, which holds distances; make a fog volume of it (vdb_tool -ls2fog)");
     if (e->grid_size < GRID_SIZE + TREE_SIZE || e->grid_size > SIZE_MAX / 2)
-        return fail(in, NEBEL_ERROR_FORMAT, "says of its grid that it is too small or too large");
+        return fail_nanovdb(in, NEBEL_ERROR_FORMAT, "says of its grid that it is too small or too large");
     if (!may_hold(in, codec, e->grid_size)) return fail_short(in);
     return NEBEL_OK;
 }
@@ -257,18 +259,19 @@ static nebel_result open_tree(const nb_nanovdb_reader *in, const entry *e, unsig
     const pnanovdb_grid_handle_t grid = {{0}};
     t->buffer = pnanovdb_make_buf((uint32_t *)(void *)memory, e->grid_size / sizeof(uint32_t));
     if (!is_magic(memory) || pnanovdb_grid_get_grid_type(t->buffer, grid) != e->type)
-        return fail(in, NEBEL_ERROR_FORMAT, "its grid is damaged, or is not what its entry says");
+        return fail_nanovdb(in, NEBEL_ERROR_FORMAT, "its grid is damaged, or is not what its entry says");
     t->root = pnanovdb_tree_get_root(t->buffer, pnanovdb_grid_get_tree(t->buffer, grid));
     const uint64_t tiles = pnanovdb_root_get_tile_count(t->buffer, t->root), root = t->root.address.byte_offset;
     const uint64_t room = PNANOVDB_GRID_TYPE_GET(t->type, root_size) +
                           (tiles <= MOST_TILES ? tiles : 0) * PNANOVDB_GRID_TYPE_GET(t->type, root_tile_size);
-    if (root > e->grid_size || room > e->grid_size - root) return fail(in, NEBEL_ERROR_FORMAT, "its tree is damaged");
-    if (tiles > MOST_TILES) return fail(in, NEBEL_ERROR_LIMIT, "its voxels are too far apart");
+    if (root > e->grid_size || room > e->grid_size - root)
+        return fail_nanovdb(in, NEBEL_ERROR_FORMAT, "its tree is damaged");
+    if (tiles > MOST_TILES) return fail_nanovdb(in, NEBEL_ERROR_LIMIT, "its voxels are too far apart");
     const pnanovdb_coord_t low = pnanovdb_root_get_bbox_min(t->buffer, t->root);
     const pnanovdb_coord_t high = pnanovdb_root_get_bbox_max(t->buffer, t->root);
     const int64_t first[3] = {low.x, low.y, low.z}, last[3] = {high.x, high.y, high.z};
     for (int i = 0; i < 3; i++) {
-        if (first[i] > last[i]) return fail(in, NEBEL_ERROR_FORMAT, "has no active voxels");
+        if (first[i] > last[i]) return fail_nanovdb(in, NEBEL_ERROR_FORMAT, "has no active voxels");
         t->low[i] = first[i];
         voxels->size[i] = (size_t)(last[i] - first[i] + 1);
     }

@@ -5,7 +5,7 @@
 
 #include "openvdb_read.h"
 
-static nebel_result fail(const nb_codec *codec, nb_openvdb_answer answer, const char *message)
+static nebel_result fail_openvdb(const nb_codec *codec, nb_openvdb_answer answer, const char *message)
 {
     static const nebel_result results[] = {[NB_OPENVDB_DAMAGED] = NEBEL_ERROR_FORMAT,
                                            [NB_OPENVDB_UNSUPPORTED] = NEBEL_ERROR_UNSUPPORTED,
@@ -24,7 +24,7 @@ static nebel_result take_voxels(const nb_codec *codec, const nb_openvdb *grid, c
     const nebel_result result = nb_voxels_allocate(codec, voxels);
     if (result != NEBEL_OK) return result;
     const nb_openvdb_answer answer = nb_openvdb_copy(grid, voxels->data);
-    return answer == NB_OPENVDB_OK ? NEBEL_OK : fail(codec, answer, "");
+    return answer == NB_OPENVDB_OK ? NEBEL_OK : fail_openvdb(codec, answer, "");
 }
 
 nebel_result nb_vdb_read(const nb_codec *codec, const char *name, nb_voxels *voxels)
@@ -36,7 +36,7 @@ nebel_result nb_vdb_read(const nb_codec *codec, const char *name, nb_voxels *vox
     nebel_result result = nb_file_check(&codec->log, NULL, "grid", codec->name);
     if (result != NEBEL_OK) return result;
     const nb_openvdb_answer answer = nb_openvdb_open(codec->name, name, &grid, size, message, sizeof message);
-    if (answer != NB_OPENVDB_OK) return fail(codec, answer, message);
+    if (answer != NB_OPENVDB_OK) return fail_openvdb(codec, answer, message);
     result = take_voxels(codec, grid, size, voxels);
     nb_openvdb_close(grid);
     return result;

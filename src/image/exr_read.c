@@ -29,7 +29,7 @@ bool nb_exr_is(const nb_bytes *bytes)
 
 /* ---- OpenEXR's callbacks --------------------------------------------------------------------- */
 
-static void on_error(exr_const_context_t exr, exr_result_t code, const char *message)
+static void on_exr_read_error(exr_const_context_t exr, exr_result_t code, const char *message)
 {
     void *user = NULL;
     (void)code;
@@ -45,8 +45,8 @@ static int64_t on_size(exr_const_context_t exr, void *user)
     return (int64_t)in->bytes->size;
 }
 
-static int64_t on_read(exr_const_context_t exr, void *user, void *buffer, uint64_t size, uint64_t offset,
-                       exr_stream_error_func_ptr_t error)
+static int64_t on_exr_read(exr_const_context_t exr, void *user, void *buffer, uint64_t size, uint64_t offset,
+                           exr_stream_error_func_ptr_t error)
 {
     const nb_exr_decoder *in = user;
     (void)exr;
@@ -62,7 +62,7 @@ static int64_t on_read(exr_const_context_t exr, void *user, void *buffer, uint64
 static nebel_result fail_unsupported(const nb_exr_decoder *in, const char *what);
 
 /* Whether a call of OpenEXR succeeded; keeps why it did not. */
-static bool is_good(nb_exr_decoder *in, exr_result_t result)
+static bool has_succeeded(nb_exr_decoder *in, exr_result_t result)
 {
     if (result == EXR_ERR_SUCCESS) return true;
     if (in->failure == EXR_ERR_SUCCESS) in->failure = result;
@@ -104,12 +104,12 @@ static nebel_result check_header(nb_exr_decoder *in)
 {
     exr_storage_t storage;
     exr_compression_t compression;
-    if (!is_good(in, exr_get_storage(in->exr, 0, &storage)) ||
-        !is_good(in, exr_get_compression(in->exr, 0, &compression)) ||
-        !is_good(in, exr_get_data_window(in->exr, 0, &in->data)) ||
-        !is_good(in, exr_get_display_window(in->exr, 0, &in->display)) ||
-        !is_good(in, exr_get_channels(in->exr, 0, &in->channels)) || is_empty(&in->data) || is_empty(&in->display) ||
-        in->channels->num_channels < 1)
+    if (!has_succeeded(in, exr_get_storage(in->exr, 0, &storage)) ||
+        !has_succeeded(in, exr_get_compression(in->exr, 0, &compression)) ||
+        !has_succeeded(in, exr_get_data_window(in->exr, 0, &in->data)) ||
+        !has_succeeded(in, exr_get_display_window(in->exr, 0, &in->display)) ||
+        !has_succeeded(in, exr_get_channels(in->exr, 0, &in->channels)) || is_empty(&in->data) ||
+        is_empty(&in->display) || in->channels->num_channels < 1)
         return fail_format(in);
     /* OpenEXR 3.1.5 decodes them, without an error, to other numbers than were written. */
     if (compression == EXR_COMPRESSION_B44 || compression == EXR_COMPRESSION_B44A)
@@ -181,10 +181,10 @@ static bool grow_block(nb_exr_decoder *in, const exr_chunk_info_t *chunk)
     if (wanted > NB_MAX_SAMPLES) return false;
     const bool grown = nb_grow(&in->codec->allocator, &block, sizeof(float), 0, &in->block_capacity, (size_t)wanted);
     in->block = block;
-    return grown || is_good(in, EXR_ERR_OUT_OF_MEMORY);
+    return grown || has_succeeded(in, EXR_ERR_OUT_OF_MEMORY);
 }
 
-static void aim_channels(nb_exr_decoder *in, const exr_chunk_info_t *chunk)
+static void aim_read_channels(nb_exr_decoder *in, const exr_chunk_info_t *chunk)
 {
     const size_t plane = (size_t)chunk->width * (size_t)chunk->height;
     for (int c = 0; c < in->pipeline.channel_count; c++) {
@@ -202,12 +202,12 @@ static bool decode_block(nb_exr_decoder *in, int64_t x0, int64_t y0, const exr_c
     if (!grow_block(in, chunk)) return false;
     const exr_result_t prepared = in->pipeline_ready ? exr_decoding_update(in->exr, 0, chunk, &in->pipeline)
                                                      : exr_decoding_initialize(in->exr, 0, chunk, &in->pipeline);
-    if (!is_good(in, prepared) || in->pipeline.channel_count != in->channels->num_channels) return false;
-    aim_channels(in, chunk);
-    if (!in->pipeline_ready && !is_good(in, exr_decoding_choose_default_routines(in->exr, 0, &in->pipeline)))
+    if (!has_succeeded(in, prepared) || in->pipeline.channel_count != in->channels->num_channels) return false;
+    aim_read_channels(in, chunk);
+    if (!in->pipeline_ready && !has_succeeded(in, exr_decoding_choose_default_routines(in->exr, 0, &in->pipeline)))
         return false;
     in->pipeline_ready = true;
-    if (!is_good(in, exr_decoding_run(in->exr, 0, &in->pipeline))) return false;
+    if (!has_succeeded(in, exr_decoding_run(in->exr, 0, &in->pipeline))) return false;
     place_block(in, x0, y0, chunk);
     return true;
 }
@@ -216,9 +216,9 @@ static bool decode_lines(nb_exr_decoder *in)
 {
     int32_t step = 0;
     exr_chunk_info_t chunk;
-    if (!is_good(in, exr_get_scanlines_per_chunk(in->exr, 0, &step)) || step < 1) return false;
+    if (!has_succeeded(in, exr_get_scanlines_per_chunk(in->exr, 0, &step)) || step < 1) return false;
     for (int64_t y = in->data.min.y; y <= in->data.max.y; y += step)
-        if (!is_good(in, exr_read_scanline_chunk_info(in->exr, 0, (int)y, &chunk)) ||
+        if (!has_succeeded(in, exr_read_scanline_chunk_info(in->exr, 0, (int)y, &chunk)) ||
             !decode_block(in, in->data.min.x, y, &chunk))
             return false;
     return true;
@@ -228,12 +228,13 @@ static bool decode_tiles(nb_exr_decoder *in)
 {
     int32_t width = 0, height = 0;
     exr_chunk_info_t chunk;
-    if (!is_good(in, exr_get_tile_sizes(in->exr, 0, 0, 0, &width, &height)) || width < 1 || height < 1) return false;
+    if (!has_succeeded(in, exr_get_tile_sizes(in->exr, 0, 0, 0, &width, &height)) || width < 1 || height < 1)
+        return false;
     const int64_t columns = ((int64_t)window_width(&in->data) + width - 1) / width;
     const int64_t rows = ((int64_t)window_height(&in->data) + height - 1) / height;
     for (int64_t i = 0; i < columns * rows; i++) {
         const int64_t x = i % columns, y = i / columns;
-        if (!is_good(in, exr_read_tile_chunk_info(in->exr, 0, (int)x, (int)y, 0, 0, &chunk)) ||
+        if (!has_succeeded(in, exr_read_tile_chunk_info(in->exr, 0, (int)x, (int)y, 0, 0, &chunk)) ||
             !decode_block(in, in->data.min.x + x * width, in->data.min.y + y * height, &chunk))
             return false;
     }
@@ -260,15 +261,15 @@ nebel_result nb_exr_read_image(const nb_codec *codec, const nb_bytes *bytes, neb
 {
     nb_exr_decoder in = {.codec = codec, .bytes = bytes, .image = image};
     exr_context_initializer_t start = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    start.error_handler_fn = on_error;
+    start.error_handler_fn = on_exr_read_error;
     start.user_data = &in;
-    start.read_fn = on_read;
+    start.read_fn = on_exr_read;
     start.size_fn = on_size;
     start.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
     *image = (nebel_image){0};
     if (has_parts(bytes)) return fail_unsupported(&in, "of several parts");
     nebel_result result = NEBEL_OK;
-    if (!is_good(&in, exr_start_read(&in.exr, codec->name, &start))) result = fail_format(&in);
+    if (!has_succeeded(&in, exr_start_read(&in.exr, codec->name, &start))) result = fail_format(&in);
     if (result == NEBEL_OK) result = check_header(&in);
     if (result == NEBEL_OK) result = allocate_image(&in);
     if (result == NEBEL_OK) result = decode_pixels(&in);

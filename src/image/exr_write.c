@@ -22,7 +22,7 @@ struct nb_exr_encoder {
 
 /* ---- OpenEXR's callbacks --------------------------------------------------------------------- */
 
-static void on_error(exr_const_context_t exr, exr_result_t code, const char *message)
+static void on_exr_write_error(exr_const_context_t exr, exr_result_t code, const char *message)
 {
     void *user = NULL;
     (void)code;
@@ -32,8 +32,8 @@ static void on_error(exr_const_context_t exr, exr_result_t code, const char *mes
 }
 
 /* `error` must not be called: OpenEXR 3.1 holds the lock that it would take. */
-static int64_t on_write(exr_const_context_t exr, void *user, const void *data, uint64_t size, uint64_t offset,
-                        exr_stream_error_func_ptr_t error)
+static int64_t on_exr_write(exr_const_context_t exr, void *user, const void *data, uint64_t size, uint64_t offset,
+                            exr_stream_error_func_ptr_t error)
 {
     const nb_exr_encoder *out = user;
     (void)exr;
@@ -43,7 +43,7 @@ static int64_t on_write(exr_const_context_t exr, void *user, const void *data, u
 
 /* ---- encoding -------------------------------------------------------------------------------- */
 
-static bool write_header(nb_exr_encoder *out, const nb_picture_plan *plan)
+static bool write_exr_header(nb_exr_encoder *out, const nb_picture_plan *plan)
 {
     int part;
     bool good = exr_add_part(out->exr, NULL, EXR_STORAGE_SCANLINE, &part) == EXR_ERR_SUCCESS &&
@@ -61,7 +61,7 @@ static bool write_header(nb_exr_encoder *out, const nb_picture_plan *plan)
 }
 
 /* The file's channels are sorted by name; the picture's are not. */
-static void aim_channels(nb_exr_encoder *out, size_t y)
+static void aim_write_channels(nb_exr_encoder *out, size_t y)
 {
     const nebel_image *image = out->rows;
     const float *row = image->samples + y * image->width * image->channel_count;
@@ -103,7 +103,7 @@ static bool write_block(nb_exr_encoder *out, uint32_t y)
     const exr_result_t prepared = out->pipeline_ready ? exr_encoding_update(out->exr, 0, &chunk, &out->pipeline)
                                                       : exr_encoding_initialize(out->exr, 0, &chunk, &out->pipeline);
     if (prepared != EXR_ERR_SUCCESS) return false;
-    aim_channels(out, y);
+    aim_write_channels(out, y);
     if (!out->pipeline_ready && !start_pipeline(out)) return false;
     return exr_encoding_run(out->exr, 0, &out->pipeline) == EXR_ERR_SUCCESS;
 }
@@ -118,7 +118,7 @@ static bool write_blocks(nb_exr_encoder *out)
 }
 
 /* What the sink has to say it says when it is finished. */
-static nebel_result finding(const nb_exr_encoder *out, bool good)
+static nebel_result exr_finding(const nb_exr_encoder *out, bool good)
 {
     if (good) return NEBEL_OK;
     if (nb_sink_has_failed(out->sink)) return NEBEL_ERROR_FILE;
@@ -136,20 +136,20 @@ nebel_result nb_exr_write_begin(const nb_codec *codec, const nb_picture_plan *pl
         return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: the OpenEXR picture cannot be made: out of memory",
                        codec->name);
     *out = (nb_exr_encoder){.codec = codec, .sink = sink};
-    start.error_handler_fn = on_error;
+    start.error_handler_fn = on_exr_write_error;
     start.user_data = out;
-    start.write_fn = on_write;
+    start.write_fn = on_exr_write;
     if ((uint64_t)plan->width * plan->channel_count > INT32_MAX / 4)
         return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: a row of %llu samples; at most %d", codec->name,
                        (unsigned long long)plan->width * plan->channel_count, INT32_MAX / 4);
     const bool good = exr_start_write(&out->exr, codec->name, EXR_WRITE_FILE_DIRECTLY, &start) == EXR_ERR_SUCCESS;
-    return finding(out, good && write_header(out, plan));
+    return exr_finding(out, good && write_exr_header(out, plan));
 }
 
 nebel_result nb_exr_write_rows(nb_exr_encoder *encoder, const nebel_image *rows)
 {
     encoder->rows = rows;
-    const nebel_result result = finding(encoder, write_blocks(encoder));
+    const nebel_result result = exr_finding(encoder, write_blocks(encoder));
     encoder->row_number += rows->height;
     return result;
 }
@@ -166,7 +166,7 @@ static bool finish(nb_exr_encoder *encoder)
 
 nebel_result nb_exr_write_end(nb_exr_encoder *encoder)
 {
-    return finding(encoder, finish(encoder));
+    return exr_finding(encoder, finish(encoder));
 }
 
 void nb_exr_write_free(nb_exr_encoder *encoder)

@@ -17,7 +17,7 @@ nebel_result nb_codec_prepare(const nebel_scene_desc *desc, const char *name, nb
     return NEBEL_OK;
 }
 
-static nebel_result decode(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image)
+static nebel_result decode_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image)
 {
     if (nb_png_is(bytes)) return nb_png_read_image(codec, bytes, image);
     if (nb_exr_is(bytes)) return nb_exr_read_image(codec, bytes, image);
@@ -30,7 +30,7 @@ static nebel_result read_image(const nb_codec *codec, nebel_image *image)
     nebel_result result =
         nb_file_read(&codec->allocator, &codec->log, NULL, "picture", codec->name, NB_FILE_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
-    result = decode(codec, &bytes, image);
+    result = decode_image(codec, &bytes, image);
     nb_release(&codec->allocator, bytes.data);
     return result;
 }
@@ -96,7 +96,7 @@ nebel_result nb_image_check(const nb_codec *codec, const nebel_image *image)
     return nb_codec_check_size(codec, image->width, image->height, image->channel_count);
 }
 
-static nebel_result fail_ending(const nb_codec *codec)
+nebel_result nb_codec_fail_ending(const nb_codec *codec)
 {
     return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: unknown picture format; the name must end in .png or .exr",
                    codec->name);
@@ -108,6 +108,6 @@ nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *de
     nb_codec codec;
     const nebel_result result = nb_codec_prepare(desc, path, &codec);
     if (result != NEBEL_OK) return result;
-    if (nebel_get_image_format(path) == NEBEL_IMAGE_NONE) return fail_ending(&codec);
+    if (nebel_get_image_format(path) == NEBEL_IMAGE_NONE) return nb_codec_fail_ending(&codec);
     return nb_file_try(&codec.allocator, &codec.log, path);
 }

@@ -45,6 +45,9 @@ static inline bool nb_codec_is_little_endian(void)
     return first == 1;
 }
 
+/* FORMAT: the name has no ending that is known. */
+nebel_result nb_codec_fail_ending(const nb_codec *codec);
+
 /* Files are told apart by their first bytes. */
 bool nb_png_is(const nb_bytes *bytes);
 bool nb_exr_is(const nb_bytes *bytes);

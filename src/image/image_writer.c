@@ -13,13 +13,7 @@ struct nebel_image_writer {
     nebel_result failed;  /* of what was done so far */
 };
 
-static nebel_result fail_ending(const nb_codec *codec)
-{
-    return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: unknown picture format; the name must end in .png or .exr",
-                   codec->name);
-}
-
-static bool is_good(const char *record)
+static bool is_good_record(const char *record)
 {
     size_t size = 0;
     for (; record[size] != '\0'; size++)
@@ -29,7 +23,7 @@ static bool is_good(const char *record)
 
 nebel_result nb_record_check(const nb_codec *codec, const char *record)
 {
-    if (record == NULL || is_good(record)) return NEBEL_OK;
+    if (record == NULL || is_good_record(record)) return NEBEL_OK;
     return nb_fail(&codec->log, NEBEL_ERROR_ARGUMENT, "%s: a record is 1 to %d printable characters of ASCII",
                    codec->name, NEBEL_MAX_RECORD);
 }
@@ -41,7 +35,7 @@ static nebel_result begin(nebel_image_writer *writer)
     return nb_exr_write_begin(codec, &writer->plan, writer->sink, &writer->exr);
 }
 
-static nebel_result write_rows(nebel_image_writer *writer, const nebel_image *rows)
+static nebel_result write_image_rows(nebel_image_writer *writer, const nebel_image *rows)
 {
     return writer->png != NULL ? nb_png_write_rows(writer->png, rows) : nb_exr_write_rows(writer->exr, rows);
 }
@@ -72,7 +66,7 @@ nebel_result nebel_create_image_writer(const char *path, const nebel_image_desc 
     result = check_plan(&codec, &plan);
     if (result != NEBEL_OK) return result;
     const nebel_image_format format = nebel_get_image_format(path);
-    if (format == NEBEL_IMAGE_NONE) return fail_ending(&codec);
+    if (format == NEBEL_IMAGE_NONE) return nb_codec_fail_ending(&codec);
     nebel_image_writer *made = nb_allocate_zero(&codec.allocator, 1, sizeof *made + strlen(path) + 1);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
     *made = (nebel_image_writer){.codec = codec, .format = format, .plan = plan};
@@ -106,7 +100,7 @@ nebel_result nebel_add_image_rows(nebel_image_writer *writer, uint32_t rows, con
     /* The samples are only read. */
     const nebel_image image = {writer->plan.width, rows, writer->plan.channel_count, writer->plan.channel_names,
                                (float *)(uintptr_t)samples};
-    writer->failed = write_rows(writer, &image);
+    writer->failed = write_image_rows(writer, &image);
     writer->rows += rows;
     if (writer->failed == NEBEL_ERROR_FILE) writer->failed = nb_sink_finish(writer->sink);
     return writer->failed;

@@ -40,7 +40,7 @@ static nebel_result result_of(int code)
     }
 }
 
-static void on_error(j_common_ptr jpeg)
+static void on_jpeg_error(j_common_ptr jpeg)
 {
     nb_jpeg_decoder *in = jpeg->client_data;
     if (in->result == NEBEL_OK) in->result = result_of(jpeg->err->msg_code);
@@ -51,7 +51,7 @@ static void on_error(j_common_ptr jpeg)
 /* A warning (level -1) means that data were corrupt and guessed at: for us the picture is broken. */
 static void on_message(j_common_ptr jpeg, int level)
 {
-    if (level < 0) on_error(jpeg);
+    if (level < 0) on_jpeg_error(jpeg);
 }
 
 static void read_rows(nb_jpeg_decoder *in)
@@ -65,7 +65,7 @@ static void read_rows(nb_jpeg_decoder *in)
     jpeg_finish_decompress(jpeg);
 }
 
-static void run(nb_jpeg_decoder *in, const nb_bytes *bytes)
+static void run_jpeg_decoder(nb_jpeg_decoder *in, const nb_bytes *bytes)
 {
     if (setjmp(in->leave) != 0) return;
     jpeg_create_decompress(&in->jpeg);
@@ -87,13 +87,13 @@ static void run(nb_jpeg_decoder *in, const nb_bytes *bytes)
 }
 
 /* The pixels in in->pixels, to be released by the caller. */
-static nebel_result decode(nb_jpeg_decoder *in, const nb_bytes *bytes)
+static nebel_result decode_jpeg(nb_jpeg_decoder *in, const nb_bytes *bytes)
 {
     in->jpeg.err = jpeg_std_error(&in->errors);
     in->jpeg.client_data = in;
-    in->errors.error_exit = on_error;
+    in->errors.error_exit = on_jpeg_error;
     in->errors.emit_message = on_message;
-    run(in, bytes);
+    run_jpeg_decoder(in, bytes);
     jpeg_destroy_decompress(&in->jpeg);
     if (in->result == NEBEL_OK || in->result == NEBEL_ERROR_LIMIT) return in->result;
     const nb_codec *codec = in->codec;
@@ -109,7 +109,7 @@ nebel_result nb_jpeg_read_texture(const nb_codec *codec, const nb_bytes *bytes, 
 {
     nb_jpeg_decoder in = {.codec = codec, .channel_count = 4, .message = "out of memory"};
     *texture = (nebel_texture){0};
-    const nebel_result result = decode(&in, bytes);
+    const nebel_result result = decode_jpeg(&in, bytes);
     if (result == NEBEL_OK) *texture = (nebel_texture){in.jpeg.output_width, in.jpeg.output_height, in.pixels};
     return result;
 }
@@ -118,7 +118,7 @@ nebel_result nb_jpeg_read_stored(const nb_codec *codec, const nb_bytes *bytes, n
 {
     nb_jpeg_decoder in = {.codec = codec, .channel_count = 3, .message = "out of memory"};
     *stored = (nb_stored){0};
-    const nebel_result result = decode(&in, bytes);
+    const nebel_result result = decode_jpeg(&in, bytes);
     if (result == NEBEL_OK) *stored = (nb_stored){in.jpeg.output_width, in.jpeg.output_height, 8, 3, in.pixels};
     return result;
 }

@@ -37,7 +37,7 @@ bool nb_png_is(const nb_bytes *bytes)
 
 /* ---- libpng's callbacks ---------------------------------------------------------------------- */
 
-static void on_error(png_structp png, png_const_charp message)
+static void on_png_read_error(png_structp png, png_const_charp message)
 {
     nb_png_decoder *in = png_get_error_ptr(png);
     if (in->result == NEBEL_OK) in->result = in->out_of_memory ? NEBEL_ERROR_MEMORY : NEBEL_ERROR_FORMAT;
@@ -45,13 +45,13 @@ static void on_error(png_structp png, png_const_charp message)
     png_longjmp(png, 1);
 }
 
-static void on_warning(png_structp png, png_const_charp message)
+static void on_png_read_warning(png_structp png, png_const_charp message)
 {
     (void)png;
     (void)message;
 }
 
-static png_voidp on_allocate(png_structp png, png_alloc_size_t size)
+static png_voidp on_png_read_allocate(png_structp png, png_alloc_size_t size)
 {
     nb_png_decoder *in = png_get_mem_ptr(png);
     void *memory = nb_allocate(&in->codec->allocator, size, 1);
@@ -59,13 +59,13 @@ static png_voidp on_allocate(png_structp png, png_alloc_size_t size)
     return memory;
 }
 
-static void on_release(png_structp png, png_voidp memory)
+static void on_png_read_release(png_structp png, png_voidp memory)
 {
     const nb_png_decoder *in = png_get_mem_ptr(png);
     nb_release(&in->codec->allocator, memory);
 }
 
-static void on_read(png_structp png, png_bytep target_bytes, size_t size)
+static void on_png_read(png_structp png, png_bytep target_bytes, size_t size)
 {
     nb_png_decoder *in = png_get_io_ptr(png);
     if (size > in->bytes->size - in->at) png_error(png, "the file ends too early");
@@ -142,22 +142,23 @@ static void read_pixels(nb_png_decoder *in)
     png_read_end(in->png, NULL);
 }
 
-static void run(nb_png_decoder *in)
+static void run_png_decoder(nb_png_decoder *in)
 {
     if (setjmp(png_jmpbuf(in->png)) != 0) return;
     png_set_user_limits(in->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
-    png_set_read_fn(in->png, in, on_read);
+    png_set_read_fn(in->png, in, on_png_read);
     read_header(in);
     read_pixels(in);
 }
 
 /* The pixels in in->pixels, to be released by the caller. */
-static nebel_result decode(nb_png_decoder *in)
+static nebel_result decode_png(nb_png_decoder *in)
 {
-    in->png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, in, on_error, on_warning, in, on_allocate, on_release);
+    in->png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, in, on_png_read_error, on_png_read_warning, in,
+                                       on_png_read_allocate, on_png_read_release);
     in->info = in->png != NULL ? png_create_info_struct(in->png) : NULL;
     if (in->info != NULL)
-        run(in);
+        run_png_decoder(in);
     else
         in->result = NEBEL_ERROR_MEMORY;
     png_destroy_read_struct(&in->png, &in->info, NULL);
@@ -191,7 +192,7 @@ nebel_result nb_png_read_image(const nb_codec *codec, const nb_bytes *bytes, neb
     static const char *const names[4][4] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
     nb_png_decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_IMAGE};
     *image = (nebel_image){0};
-    nebel_result result = decode(&in);
+    nebel_result result = decode_png(&in);
     if (result != NEBEL_OK) return result;
     const size_t channel_count = (size_t)in.channel_count;
     result = nb_image_allocate(codec, in.width, in.height, channel_count, names[channel_count - 1], image);
@@ -205,7 +206,7 @@ nebel_result nb_png_read_texture(const nb_codec *codec, const nb_bytes *bytes, n
 {
     nb_png_decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_TEXTURE};
     *texture = (nebel_texture){0};
-    const nebel_result result = decode(&in);
+    const nebel_result result = decode_png(&in);
     if (result == NEBEL_OK) *texture = (nebel_texture){in.width, in.height, in.pixels};
     return result;
 }
@@ -214,7 +215,7 @@ nebel_result nb_png_read_stored(const nb_codec *codec, const nb_bytes *bytes, bo
 {
     nb_png_decoder in = {.codec = codec, .bytes = bytes, .target = as_color ? TARGET_STORED_COLOR : TARGET_STORED};
     *stored = (nb_stored){0};
-    const nebel_result result = decode(&in);
+    const nebel_result result = decode_png(&in);
     if (result == NEBEL_OK) *stored = (nb_stored){in.width, in.height, in.bits, in.channel_count, in.pixels};
     return result;
 }
@@ -223,7 +224,7 @@ nebel_result nb_png_read_heights(const nb_codec *codec, const nb_bytes *bytes, c
 {
     nb_png_decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_HEIGHTS, .what = what};
     *heights = (nb_heights){0};
-    const nebel_result result = decode(&in);
+    const nebel_result result = decode_png(&in);
     if (result != NEBEL_OK) return result;
     const size_t count = (size_t)in.width * in.height;
     uint16_t *values = nb_allocate(&codec->allocator, count, sizeof *values);

@@ -18,32 +18,32 @@ struct nb_png_encoder {
 
 /* ---- libpng's callbacks ---------------------------------------------------------------------- */
 
-static void on_error(png_structp png, png_const_charp message)
+static void on_png_write_error(png_structp png, png_const_charp message)
 {
     nb_png_encoder *out = png_get_error_ptr(png);
     snprintf(out->message, sizeof out->message, "%s", message);
     png_longjmp(png, 1);
 }
 
-static void on_warning(png_structp png, png_const_charp message)
+static void on_png_write_warning(png_structp png, png_const_charp message)
 {
     (void)png;
     (void)message;
 }
 
-static png_voidp on_allocate(png_structp png, png_alloc_size_t size)
+static png_voidp on_png_write_allocate(png_structp png, png_alloc_size_t size)
 {
     const nb_png_encoder *out = png_get_mem_ptr(png);
     return nb_allocate(&out->codec->allocator, size, 1);
 }
 
-static void on_release(png_structp png, png_voidp memory)
+static void on_png_write_release(png_structp png, png_voidp memory)
 {
     const nb_png_encoder *out = png_get_mem_ptr(png);
     nb_release(&out->codec->allocator, memory);
 }
 
-static void on_write(png_structp png, png_bytep data, size_t size)
+static void on_png_write(png_structp png, png_bytep data, size_t size)
 {
     const nb_png_encoder *out = png_get_io_ptr(png);
     if (!nb_sink_write(out->sink, nb_sink_size(out->sink), data, size)) png_error(png, "it cannot be written");
@@ -66,13 +66,13 @@ static void set_record(nb_png_encoder *out, const char *record)
 }
 
 /* One filter and a low level: against libpng's defaults 8 % more bytes in less than half the time. */
-static void write_header(nb_png_encoder *out, const nb_stored *kind, const char *record)
+static void write_png_header(nb_png_encoder *out, const nb_stored *kind, const char *record)
 {
     static const int types[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB,
                                 PNG_COLOR_TYPE_RGBA};
     if (setjmp(png_jmpbuf(out->png)) != 0) return;
     png_set_user_limits(out->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
-    png_set_write_fn(out->png, out, on_write, on_flush);
+    png_set_write_fn(out->png, out, on_png_write, on_flush);
     png_set_IHDR(out->png, out->info, kind->width, kind->height, kind->bits, types[kind->channel_count - 1],
                  PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
     if (kind->channel_count >= 3)
@@ -93,7 +93,7 @@ static void write_stored_rows(nb_png_encoder *out, const nb_stored *stored)
     for (uint32_t y = 0; y < stored->height; y++) png_write_row(out->png, stored->pixels + y * size);
 }
 
-static void write_rows(nb_png_encoder *out, const nebel_image *rows)
+static void write_png_rows(nb_png_encoder *out, const nebel_image *rows)
 {
     if (setjmp(png_jmpbuf(out->png)) != 0) return;
     for (uint32_t y = 0; y < rows->height; y++) {
@@ -110,7 +110,7 @@ static void write_end(nb_png_encoder *out)
 }
 
 /* What the sink has to say it says when it is finished. */
-static nebel_result finding(const nb_png_encoder *out)
+static nebel_result png_finding(const nb_png_encoder *out)
 {
     if (out->message[0] == '\0') return NEBEL_OK;
     if (nb_sink_has_failed(out->sink)) return NEBEL_ERROR_FILE;
@@ -119,7 +119,7 @@ static nebel_result finding(const nb_png_encoder *out)
 }
 
 /* In *encoder also after an error. */
-static nebel_result open_encoder(const nb_codec *codec, nb_sink *sink, nb_png_encoder **encoder)
+static nebel_result open_png_encoder(const nb_codec *codec, nb_sink *sink, nb_png_encoder **encoder)
 {
     nb_png_encoder *out = nb_allocate_zero(&codec->allocator, 1, sizeof *out);
     *encoder = out;
@@ -127,11 +127,11 @@ static nebel_result open_encoder(const nb_codec *codec, nb_sink *sink, nb_png_en
         return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: the PNG picture cannot be made: out of memory",
                        codec->name);
     *out = (nb_png_encoder){.codec = codec, .sink = sink, .message = "out of memory"};
-    out->png =
-        png_create_write_struct_2(PNG_LIBPNG_VER_STRING, out, on_error, on_warning, out, on_allocate, on_release);
+    out->png = png_create_write_struct_2(PNG_LIBPNG_VER_STRING, out, on_png_write_error, on_png_write_warning, out,
+                                         on_png_write_allocate, on_png_write_release);
     out->info = out->png != NULL ? png_create_info_struct(out->png) : NULL;
     if (out->info != NULL) out->message[0] = '\0';
-    return finding(out);
+    return png_finding(out);
 }
 
 nebel_result nb_png_write_begin(const nb_codec *codec, const nb_picture_plan *plan, nb_sink *sink,
@@ -139,7 +139,7 @@ nebel_result nb_png_write_begin(const nb_codec *codec, const nb_picture_plan *pl
 {
     const nebel_image names = {.channel_count = plan->channel_count, .channel_names = plan->channel_names};
     const nb_stored kind = {plan->width, plan->height, 8, 3, NULL};
-    nebel_result result = open_encoder(codec, sink, encoder);
+    nebel_result result = open_png_encoder(codec, sink, encoder);
     nb_png_encoder *out = *encoder;
     if (result == NEBEL_OK) result = nb_rounding_find_channels(codec, &names, "a PNG", out->channels);
     if (result != NEBEL_OK) return result;
@@ -147,31 +147,31 @@ nebel_result nb_png_write_begin(const nb_codec *codec, const nb_picture_plan *pl
     if (out->row == NULL)
         return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: the PNG picture cannot be made: out of memory",
                        codec->name);
-    write_header(out, &kind, plan->record);
-    return finding(out);
+    write_png_header(out, &kind, plan->record);
+    return png_finding(out);
 }
 
 nebel_result nb_png_write_rows(nb_png_encoder *encoder, const nebel_image *rows)
 {
-    write_rows(encoder, rows);
-    return finding(encoder);
+    write_png_rows(encoder, rows);
+    return png_finding(encoder);
 }
 
 nebel_result nb_png_write_end(nb_png_encoder *encoder)
 {
     write_end(encoder);
-    return finding(encoder);
+    return png_finding(encoder);
 }
 
 nebel_result nb_png_write_stored(const nb_codec *codec, const nb_stored *stored, const char *record, nb_sink *sink)
 {
     nb_png_encoder *out;
-    nebel_result result = open_encoder(codec, sink, &out);
+    nebel_result result = open_png_encoder(codec, sink, &out);
     if (result == NEBEL_OK) {
-        write_header(out, stored, record);
+        write_png_header(out, stored, record);
         if (out->message[0] == '\0') write_stored_rows(out, stored);
         if (out->message[0] == '\0') write_end(out);
-        result = finding(out);
+        result = png_finding(out);
     }
     nb_png_write_free(out);
     return result;

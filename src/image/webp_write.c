@@ -52,7 +52,7 @@ static bool configure(nb_webp *film, int quality)
 
 /* Every picture is whole: where one is made of the one before, what has hardly changed is left as it was, so that
  * slow fog moves in patches. Without loss nothing is left that has changed. */
-static bool open_encoder(nb_webp *film, uint32_t width, uint32_t height)
+static bool open_webp_encoder(nb_webp *film, uint32_t width, uint32_t height)
 {
     WebPAnimEncoderOptions options;
     if (!WebPAnimEncoderOptionsInit(&options)) return false;
@@ -76,7 +76,7 @@ nebel_result nb_webp_begin(const nb_codec *codec, uint32_t width, uint32_t heigh
     made->codec = codec;
     made->row = nb_allocate(&codec->allocator, width, 3);
     *film = made;
-    if (made->row != NULL && configure(made, quality) && open_encoder(made, width, height)) return NEBEL_OK;
+    if (made->row != NULL && configure(made, quality) && open_webp_encoder(made, width, height)) return NEBEL_OK;
     nb_webp_free(made);
     *film = NULL;
     return fail_memory(codec);

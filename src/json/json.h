@@ -98,6 +98,9 @@ void nb_json_path(const nb_json *json, const nb_json_node *node, char path[NB_JS
 bool nb_json_fail(nb_json *json, nebel_result result, const nb_json_node *node, const char *format, ...)
     NB_PRINTF(4, 5);
 
+/* The same for memory that is out. */
+bool nb_json_fail_memory(nb_json *json, const nb_json_node *node);
+
 /* The same, pointing at the node's key. */
 bool nb_json_fail_key(nb_json *json, nebel_result result, const nb_json_node *node, const char *format, ...)
     NB_PRINTF(4, 5);

@@ -1,4 +1,5 @@
 #include "json_syntax.h"
+#include "utf8.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -57,15 +58,10 @@ static bool is_letter(char c)
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
 }
 
-static bool is_digit(char c)
-{
-    return c >= '0' && c <= '9';
-}
-
 /* Letters and digits, and what else may be in a number or a name. */
 static bool is_word(char c)
 {
-    return is_letter(c) || is_digit(c) || (c != '\0' && strchr("_.+-$", c) != NULL);
+    return is_letter(c) || nb_text_is_digit(c) || (c != '\0' && strchr("_.+-$", c) != NULL);
 }
 
 /* The word around or behind a byte, for messages. */
@@ -105,7 +101,7 @@ static const nb_json_node *innermost(const nb_json *json)
     return json->depth > 0 ? &json->nodes[json->open[json->depth - 1]] : NULL;
 }
 
-static void fail(const nb_syntax_spot *wrong, size_t at, const char *message)
+static void fail_syntax(const nb_syntax_spot *wrong, size_t at, const char *message)
 {
     char path[NB_JSON_PATH] = "";
     const nb_json_node *about = wrong->about != NULL ? wrong->about : innermost(wrong->json);
@@ -117,7 +113,7 @@ static void fail(const nb_syntax_spot *wrong, size_t at, const char *message)
     do {                                                                                                               \
         char message[400];                                                                                             \
         snprintf(message, sizeof message, __VA_ARGS__);                                                                \
-        fail(wrong, at, message);                                                                                      \
+        fail_syntax(wrong, at, message);                                                                               \
     } while (0)
 
 /* "the object that began at line 3, column 5" */
@@ -206,12 +202,12 @@ static const char *number_advice(word number)
     if (*text == '-') text++;
     if (text == end) return "a digit must follow the -";
     if (*text == '.') return "write 0 before the point";
-    if (end - text > 1 && *text == '0' && is_digit(text[1])) return "leave out the 0 in front";
-    while (text < end && is_digit(*text)) text++;
-    if (text < end && *text == '.' && (text + 1 == end || !is_digit(text[1])))
+    if (end - text > 1 && *text == '0' && nb_text_is_digit(text[1])) return "leave out the 0 in front";
+    while (text < end && nb_text_is_digit(*text)) text++;
+    if (text < end && *text == '.' && (text + 1 == end || !nb_text_is_digit(text[1])))
         return "leave out the point, or write a digit behind it";
     if (text < end && *text == '.') text++;
-    while (text < end && is_digit(*text)) text++;
+    while (text < end && nb_text_is_digit(*text)) text++;
     if (text < end && (*text | 0x20) == 'x') return "numbers are decimal: -0.5, 12, 2e3";
     return text < end && is_letter(*text) ? "write it without a unit: -0.5, 12, 2e3"
                                           : "numbers look like -0.5, 12, 2e3";
@@ -223,7 +219,7 @@ static bool lacks_exponent(word number)
     const char *const end = number.text + number.size;
     const char *at = end;
     if (at > number.text && strchr("+-", at[-1]) != NULL) at--;
-    return at - number.text > 1 && (at[-1] | 0x20) == 'e' && is_digit(at[-2]);
+    return at - number.text > 1 && (at[-1] | 0x20) == 'e' && nb_text_is_digit(at[-2]);
 }
 
 static void explain_number(const nb_syntax_spot *wrong, size_t start)
@@ -240,7 +236,7 @@ static bool is_unit(const nb_syntax_spot *wrong)
     const char *text = wrong->text + wrong->at;
     if (wrong->size - wrong->at >= 2 && memcmp(text, degree, 2) == 0) return true;
     if (*text == '%') return true;
-    if (!is_word(*text) || is_digit(*text) || strchr("+-.", *text) != NULL) return false;
+    if (!is_word(*text) || nb_text_is_digit(*text) || strchr("+-.", *text) != NULL) return false;
     const size_t end = nb_json_skip_blanks(wrong->json, wrong->at + (size_t)word_from(wrong, wrong->at).size, NULL);
     return end >= wrong->size || wrong->text[end] != ':';
 }
@@ -321,9 +317,9 @@ static void explain_key(const nb_syntax_spot *wrong)
         explain_bracket(wrong);
     else if (found == ',')
         FAIL(wrong, wrong->at, "a comma too many; remove it");
-    else if (is_digit(found) && wrong->expected == KEY)
+    else if (nb_text_is_digit(found) && wrong->expected == KEY)
         FAIL(wrong, wrong->at, "a number, but a key must follow the comma; decimals have a point, 0.5, and lists [ ]");
-    else if (is_word(found) && !is_digit(found) && strchr("+-.", found) == NULL)
+    else if (is_word(found) && !nb_text_is_digit(found) && strchr("+-.", found) == NULL)
         explain_word(wrong, "keys");
     else
         explain_character(wrong, "a key in double quotes must stand here");
@@ -356,7 +352,7 @@ static void explain_wrong_value(const nb_syntax_spot *wrong)
         explain_string(wrong);
     else if (found == '}' || found == ']' || found == ',')
         explain_missing_value(wrong);
-    else if (is_digit(found))
+    else if (nb_text_is_digit(found))
         explain_number(wrong, wrong->at);
     else if (is_word(found))
         explain_word(wrong, "texts");
@@ -390,7 +386,7 @@ static void explain_separator(const nb_syntax_spot *wrong)
         explain_bracket(wrong);
     } else if (wrong->at == wrong->end && before == '"' && is_word(found)) {
         FAIL(wrong, wrong->at, "the string before this ends here; a comma is missing, or write \\\" for a \" in it");
-    } else if (is_digit(before) && is_unit(wrong)) {
+    } else if (nb_text_is_digit(before) && is_unit(wrong)) {
         const nb_json *json = wrong->json;
         const uint32_t last = json->last[json->depth - 1]; /* 0: it was a tree of its own, and lies behind the others */
         nb_syntax_spot number = *wrong;

@@ -74,8 +74,8 @@ void nb_json_path(const nb_json *json, const nb_json_node *node, char path[NB_JS
         if ((unsigned char)*at < 0x20 || *at == 0x7F) *at = '?';
 }
 
-static bool fail(nb_json *json, nebel_result result, size_t offset, const char *path, const char *format,
-                 va_list arguments)
+static bool fail_formatted(nb_json *json, nebel_result result, size_t offset, const char *path, const char *format,
+                           va_list arguments)
 {
     if (json->result != NEBEL_OK) return false;
     json->result = result;
@@ -94,9 +94,14 @@ bool nb_json_fail(nb_json *json, nebel_result result, const nb_json_node *node, 
     nb_json_path(json, node, path);
     va_list arguments;
     va_start(arguments, format);
-    fail(json, result, node->offset, path, format, arguments);
+    fail_formatted(json, result, node->offset, path, format, arguments);
     va_end(arguments);
     return false;
+}
+
+bool nb_json_fail_memory(nb_json *json, const nb_json_node *node)
+{
+    return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
 }
 
 bool nb_json_fail_key(nb_json *json, nebel_result result, const nb_json_node *node, const char *format, ...)
@@ -105,7 +110,7 @@ bool nb_json_fail_key(nb_json *json, nebel_result result, const nb_json_node *no
     nb_json_path(json, node, path);
     va_list arguments;
     va_start(arguments, format);
-    fail(json, result, node->key_offset, path, format, arguments);
+    fail_formatted(json, result, node->key_offset, path, format, arguments);
     va_end(arguments);
     return false;
 }
@@ -114,7 +119,7 @@ bool nb_json_fail_at(nb_json *json, nebel_result result, size_t offset, const ch
 {
     va_list arguments;
     va_start(arguments, format);
-    fail(json, result, offset, path, format, arguments);
+    fail_formatted(json, result, offset, path, format, arguments);
     va_end(arguments);
     return false;
 }

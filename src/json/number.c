@@ -1,5 +1,6 @@
 #define _POSIX_C_SOURCE 200809L
 #include "number.h"
+#include "utf8.h"
 
 #include <float.h>
 #include <stdint.h>
@@ -13,14 +14,9 @@ typedef struct nb_json_decimal {
     bool negative;
 } nb_json_decimal;
 
-static bool is_digit(char c)
-{
-    return c >= '0' && c <= '9';
-}
-
 static const char *read_digits(const char *at, const char *end, nb_json_decimal *number, int exponent_step)
 {
-    for (; at < end && is_digit(*at); at++) {
+    for (; at < end && nb_text_is_digit(*at); at++) {
         if (number->digits != 0 || *at != '0') number->digit_count++;
         if (number->digit_count <= 18) number->digits = number->digits * 10 + (uint64_t)(*at - '0');
         number->exponent += exponent_step;

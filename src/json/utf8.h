@@ -35,4 +35,9 @@ bool nb_text_has_lone_surrogate(const char *raw, size_t size);
 /* How many single-character edits lead from a to b, up to 64 characters; larger ones count as far apart. */
 size_t nb_text_distance(const char *a, size_t a_size, const char *b, size_t b_size);
 
+static inline bool nb_text_is_digit(char c)
+{
+    return c >= '0' && c <= '9';
+}
+
 #endif

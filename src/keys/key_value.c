@@ -69,7 +69,7 @@ bool nb_key_value_is_key(const nb_json_node *node, const char *prefix, const cha
            memcmp(node->key + skipped, name, size) == 0;
 }
 
-static int find_key(nb_json *json, const nb_json_node *node, const char *prefix, const nb_key_set *keys)
+static int find_member_key(nb_json *json, const nb_json_node *node, const char *prefix, const nb_key_set *keys)
 {
     for (uint32_t i = 0; i < keys->count; i++)
         if ((keys->allowed & NB_BIT(i)) != 0 && nb_key_value_is_key(node, prefix, keys->names[i])) return (int)i;
@@ -79,7 +79,7 @@ static int find_key(nb_json *json, const nb_json_node *node, const char *prefix,
 
 int nb_key_value_find_key(nb_json *json, const nb_json_node *node, const nb_key_set *keys)
 {
-    return find_key(json, node, "", keys);
+    return find_member_key(json, node, "", keys);
 }
 
 static bool fail_missing(nb_json *json, const nb_json_node *object, const nb_key_set *keys, uint32_t missing)
@@ -106,7 +106,7 @@ bool nb_key_value_members_after(nb_json *json, const nb_json_node *object, const
     for (uint32_t i = 0; i < keys->count; i++) found[i] = NULL;
     for (const nb_json_node *node = nb_json_first(json, object); node != NULL; node = nb_json_next(json, node)) {
         if (!has_prefix(node, prefix)) continue;
-        const int key = find_key(json, node, prefix, keys);
+        const int key = find_member_key(json, node, prefix, keys);
         if (key < 0) return false;
         if (found[key] != NULL) return nb_key_value_fail_repeated(json, node, found[key]->key_offset);
         seen |= NB_BIT(key);
@@ -152,6 +152,13 @@ int nb_key_value_type(nb_json *json, const nb_json_node *object, const char *con
 }
 
 /* ---- numbers --------------------------------------------------------------------------------- */
+
+bool nb_key_value_replace_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count,
+                                 int *choice)
+{
+    if (node != NULL) *choice = nb_key_value_choice(json, node, names, count);
+    return *choice >= 0;
+}
 
 bool nb_key_value_is(nb_json *json, const nb_json_node *node, nb_json_type type, const char *wanted)
 {

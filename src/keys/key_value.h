@@ -40,6 +40,10 @@ int nb_key_value_type(nb_json *json, const nb_json_node *object, const char *con
 /* An index into names, of a string; -1 after an error. */
 int nb_key_value_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count);
 
+/* The same into *choice, which stays as it is without a node. False after an error. */
+bool nb_key_value_replace_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count,
+                                 int *choice);
+
 bool nb_key_value_is(nb_json *json, const nb_json_node *node, nb_json_type type, const char *wanted);
 
 bool nb_key_value_number(nb_json *json, const nb_json_node *node, const nb_range *range, double *value);

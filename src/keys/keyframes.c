@@ -8,7 +8,7 @@ static double frame_at(const double *frames, size_t stride, size_t i)
 }
 
 /* The last key at or before the frame, which lies between the first and the last. */
-static size_t find_key(const double *frames, size_t stride, size_t count, double frame)
+static size_t find_last_key(const double *frames, size_t stride, size_t count, double frame)
 {
     size_t low = 0, high = count - 1;
     while (high - low > 1) {
@@ -27,7 +27,7 @@ bool nb_keyframes_find(const double *frames, size_t stride, size_t count, double
     const bool after = !before && frame >= frame_at(frames, stride, count - 1);
     *around = (nb_keyframes){.keys = {0, after ? count - 1 : 0}};
     if (before || after) return false;
-    const size_t at = find_key(frames, stride, count, frame);
+    const size_t at = find_last_key(frames, stride, count, frame);
     around->has_before = at > 0;
     around->has_after = at + 2 < count;
     const size_t keys[4] = {around->has_before ? at - 1 : at, at, at + 1, around->has_after ? at + 2 : at + 1};

@@ -195,6 +195,12 @@ nb_environment_filter *nb_environment_filter_create(const nebel_allocator *alloc
     return filter;
 }
 
+nb_environment_filter *nb_environment_filter_retain(nb_environment_filter *filter)
+{
+    atomic_fetch_add_explicit(&filter->owners, 1, memory_order_relaxed);
+    return filter;
+}
+
 void nb_environment_filter_release(nb_environment_filter *filter)
 {
     if (filter == NULL || atomic_fetch_sub_explicit(&filter->owners, 1, memory_order_acq_rel) != 1) return;
@@ -217,7 +223,7 @@ const nb_phase *nb_environment_filter_phase(const nb_environment_filter *filter)
     return &filter->phase;
 }
 
-nb_environment_light nb_skylight_of(const nebel_environment *sky, nb_environment_filter *filter)
+nb_environment_light nb_environment_light_of(const nebel_environment *sky, nb_environment_filter *filter)
 {
     return (nb_environment_light){sky, filter, turn_of(sky)};
 }

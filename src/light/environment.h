@@ -33,9 +33,10 @@ void nb_environment_most(const nebel_environment *sky, double most[3]);
  * out. */
 nb_environment_filter *nb_environment_filter_make(const nebel_allocator *allocator, const nebel_environment *sky,
                                                   const nb_phase *phase);
+nb_environment_filter *nb_environment_filter_retain(nb_environment_filter *filter);
 void nb_environment_filter_release(nb_environment_filter *filter); /* NULL is fine */
 
-nb_environment_light nb_skylight_of(const nebel_environment *sky, nb_environment_filter *filter);
+nb_environment_light nb_environment_light_of(const nebel_environment *sky, nb_environment_filter *filter);
 
 /* The phase function of a filter. */
 const nb_phase *nb_environment_filter_phase(const nb_environment_filter *filter);

@@ -453,7 +453,7 @@ typedef struct sky_place {
 } sky_place;
 
 /* The middle of the picture is -z, x to the right, as in a panorama of a camera that looks there. */
-static sky_place place_of(const double direction[3])
+static sky_place map_place(const double direction[3])
 {
     const double across = 0.5 + atan2(direction[0], -direction[2]) / (2 * PI);
     return (sky_place){across, acos(fmin(fmax(direction[1], -1), 1)) / PI};
@@ -479,7 +479,7 @@ static const float *row_beyond(const nb_environment_table *table, ptrdiff_t row,
 
 void nb_environment_map_scattered(const nb_environment_table *table, const double direction[3], double radiance[3])
 {
-    const sky_place place = place_of(direction);
+    const sky_place place = map_place(direction);
     const double x = place.across * (double)table->columns - 0.5, y = place.down * (double)table->rows - 0.5;
     const double left = floor(x), top = floor(y);
     double across[4], down[4], sum[3] = {0, 0, 0};
@@ -504,7 +504,7 @@ void nb_environment_map_reflected(const nebel_environment_map *map, const double
 
 void nb_environment_map_radiance(const nebel_environment_map *map, const double direction[3], double radiance[3])
 {
-    const sky_place place = place_of(direction);
+    const sky_place place = map_place(direction);
     const double x = place.across * (double)map->width + (double)map->width - 0.5;
     const double y = fmin(fmax(place.down * (double)map->height - 0.5, 0), (double)map->height - 1);
     const size_t left = (size_t)x, upper = (size_t)y, lower = upper + 1 < map->height ? upper + 1 : upper;

@@ -4,7 +4,7 @@
 
 #include "base/base.h"
 
-#include <nebel/nebel.h>
+#include <nebel/light.h>
 
 typedef struct nb_light {
     double place[3], intensity[3];

@@ -99,7 +99,7 @@ static double cells_along(const nb_sun_lattice *l)
 }
 
 /* Along a side, of a column so many cells along the axis. */
-static double place_of(const nb_sun_lattice *l, int s, double column, double layer)
+static double column_place(const nb_sun_lattice *l, int s, double column, double layer)
 {
     return (l->first[s] + column) / l->per_cell + l->lean[s] * layer;
 }
@@ -117,7 +117,7 @@ static int part_column(const nb_sun_lattice *l, const nebel_grid *grid, const do
     for (int s = 0; s < 2; s++)
         for (int far = 0; far < 2; far++) {
             const double held = far ? nb_grid_end(grid, l->side[s]) - HELD : nb_grid_margin(grid) + HELD;
-            const double at = (held - place_of(l, s, column[s], 0)) / l->lean[s];
+            const double at = (held - column_place(l, s, column[s], 0)) / l->lean[s];
             if (!(at > 0 && at < last)) continue; /* nor where the column is level */
             int i = ++count;
             for (; layer[i - 1] > at; i--) layer[i] = layer[i - 1];
@@ -146,7 +146,8 @@ static int set_line(const nb_sun_lattice *l, const nebel_grid *grid, const doubl
     for (int s = 0; s < 2; s++) {
         const int side = l->side[s];
         const double least = nb_grid_margin(grid) + HELD, most = nb_grid_end(grid, side) - HELD;
-        const double from = place_of(l, s, column[s], start), middle = place_of(l, s, column[s], 0.5 * (start + end));
+        const double from = column_place(l, s, column[s], start),
+                     middle = column_place(l, s, column[s], 0.5 * (start + end));
         const int is_held = middle < least || middle > most;
         line->from[side] = fmin(fmax(from, least), most);
         line->slope[side] = is_held ? 0 : -to_sun[side];
@@ -331,7 +332,7 @@ static double most_outside(const nb_sun_lattice *l, int i, int j)
         const int column[2] = {i + n % 2, j + n / 2};
         double end = l->end[2];
         for (int s = 0; s < 2; s++) {
-            const double at = (l->end[s] - place_of(l, s, column[s], 0)) / l->lean[s];
+            const double at = (l->end[s] - column_place(l, s, column[s], 0)) / l->lean[s];
             if (isfinite(at)) end = l->up ? fmin(end, at) : fmax(end, at);
         }
         const double node = l->up ? floor(end * l->per_layer) : ceil(end * l->per_layer);

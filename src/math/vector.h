@@ -11,6 +11,16 @@ static inline double nb_vector_dot(const double a[3], const double b[3])
 }
 
 /* `out` must be another than a and b. */
+static inline int nb_vector_is_zero(const double v[3])
+{
+    return v[0] == 0 && v[1] == 0 && v[2] == 0;
+}
+
+static inline double nb_vector_largest(const double v[3])
+{
+    return fmax(v[0], fmax(v[1], v[2]));
+}
+
 static inline void nb_vector_cross(const double a[3], const double b[3], double out[3])
 {
     out[0] = a[1] * b[2] - a[2] * b[1];

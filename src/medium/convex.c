@@ -29,7 +29,7 @@ static const double cube_factors[] = {8, 8.0 * 65536, 8.0 * 65536 * 65536};
 enum { ATTEMPTS = 3 };
 
 /* Weights up to this are rounding of zero; what is lost by dropping them goes into the slack. */
-static const double level = 1e-14;
+static const double weight_rounding = 1e-14;
 
 typedef struct linear_program {
     const double (*planes)[4];
@@ -39,15 +39,15 @@ typedef struct linear_program {
     double objective[DIMENSION];
 } linear_program;
 
-typedef struct row {
+typedef struct plane_row {
     double a[DIMENSION];
     double d;
-} row;
+} plane_row;
 
-typedef struct basis {
+typedef struct plane_basis {
     size_t member[DIMENSION];
     double weight[DIMENSION];
-} basis;
+} plane_basis;
 
 /* What a basis proves: objective . x <= value + slack . |x|. */
 typedef struct proof {
@@ -63,9 +63,9 @@ static size_t row_count(const linear_program *p)
     return p->count + CUBE_FACES + (p->dimension == DIMENSION ? 1 : 0);
 }
 
-static row row_at(const linear_program *p, size_t index)
+static plane_row row_at(const linear_program *p, size_t index)
 {
-    row r = {{0}, p->cube};
+    plane_row r = {{0}, p->cube};
     if (index < p->count) {
         memcpy(r.a, p->planes[index], 3 * sizeof(double));
         r.a[3] = 1;
@@ -109,11 +109,11 @@ static int solve(int n, double matrix[DIMENSION][DIMENSION], double right[DIMENS
 }
 
 /* The corner where the planes of the basis meet. */
-static int find_corner(const linear_program *p, const basis *b, double corner[DIMENSION])
+static int find_corner(const linear_program *p, const plane_basis *b, double corner[DIMENSION])
 {
     double matrix[DIMENSION][DIMENSION];
     for (int i = 0; i < p->dimension; i++) {
-        const row r = row_at(p, b->member[i]);
+        const plane_row r = row_at(p, b->member[i]);
         memcpy(matrix[i], r.a, sizeof r.a);
         corner[i] = r.d;
     }
@@ -121,12 +121,12 @@ static int find_corner(const linear_program *p, const basis *b, double corner[DI
 }
 
 /* `target` as a combination of the normals of the basis. */
-static int find_combination(const linear_program *p, const basis *b, const double target[DIMENSION],
+static int find_combination(const linear_program *p, const plane_basis *b, const double target[DIMENSION],
                             double weights[DIMENSION])
 {
     double matrix[DIMENSION][DIMENSION];
     for (int i = 0; i < p->dimension; i++) {
-        const row r = row_at(p, b->member[i]);
+        const plane_row r = row_at(p, b->member[i]);
         for (int k = 0; k < p->dimension; k++) matrix[k][i] = r.a[k];
     }
     memcpy(weights, target, DIMENSION * sizeof(double));
@@ -156,7 +156,7 @@ static size_t choose_entering(const linear_program *p, const double corner[DIMEN
         worst = v;
     }
     for (size_t i = p->count; i < rows; i++) {
-        const row r = row_at(p, i);
+        const plane_row r = row_at(p, i);
         const double v = violation(r.a, r.a[3], r.d, corner);
         if (!(v > worst)) continue;
         chosen = i;
@@ -168,7 +168,7 @@ static size_t choose_entering(const linear_program *p, const double corner[DIMEN
 
 /* The member whose weight falls to zero first as the new row comes in; -1 when none falls. Of equals the one with the
  * largest share leaves (a well conditioned basis remains), or the smallest index where cycling has to be ruled out. */
-static int choose_leaving(const linear_program *p, const basis *b, const double share[DIMENSION], int greedy)
+static int choose_leaving(const linear_program *p, const plane_basis *b, const double share[DIMENSION], int greedy)
 {
     int chosen = -1;
     double least = HUGE_VAL;
@@ -186,9 +186,9 @@ static int choose_leaving(const linear_program *p, const basis *b, const double 
 }
 
 /* The corner of the cube that lies furthest along the objective. */
-static basis first_basis(const linear_program *p)
+static plane_basis first_basis(const linear_program *p)
 {
-    basis b = {{0}, {0}};
+    plane_basis b = {{0}, {0}};
     for (int k = 0; k < p->dimension; k++) {
         const size_t face = k < 3 ? 2 * (size_t)k + (p->objective[k] < 0 ? 1 : 0) : CUBE_FACES;
         b.member[k] = p->count + face;
@@ -197,20 +197,20 @@ static basis first_basis(const linear_program *p)
     return b;
 }
 
-static basis optimize(const linear_program *p)
+static plane_basis optimize(const linear_program *p)
 {
-    basis b = first_basis(p);
+    plane_basis b = first_basis(p);
     for (int step = 0; step < STEPS; step++) {
         const int greedy = step < GREEDY_STEPS;
         double corner[DIMENSION] = {0}, share[DIMENSION];
         if (!find_corner(p, &b, corner)) break;
         const size_t entering = choose_entering(p, corner, greedy);
         if (entering == row_count(p)) break;
-        const row r = row_at(p, entering);
+        const plane_row r = row_at(p, entering);
         if (!find_combination(p, &b, r.a, share)) break;
         const int leaving = choose_leaving(p, &b, share, greedy);
         if (leaving < 0) break;
-        basis next = b;
+        plane_basis next = b;
         next.member[leaving] = entering;
         if (!find_combination(p, &next, p->objective, next.weight)) break;
         b = next;
@@ -218,14 +218,14 @@ static basis optimize(const linear_program *p)
     return b;
 }
 
-static proof prove(const linear_program *p, const basis *b)
+static proof prove(const linear_program *p, const plane_basis *b)
 {
     proof result = {0};
     double sum[3] = {0}, size[3] = {0};
     for (int i = 0; i < p->dimension; i++) {
-        const row r = row_at(p, b->member[i]);
+        const plane_row r = row_at(p, b->member[i]);
         const double y = b->weight[i];
-        if (!(y > level)) continue;
+        if (!(y > weight_rounding)) continue;
         result.value += y * r.d;
         result.magnitude += y * fabs(r.d);
         if (b->member[i] >= p->count) result.leans_on_cube = 1;
@@ -254,7 +254,7 @@ static proof solve_program(linear_program *p, double scale, int (*good_enough)(c
     proof result = {0};
     for (int attempt = 0; attempt < ATTEMPTS; attempt++) {
         p->cube = cube_factors[attempt] * scale;
-        const basis b = optimize(p);
+        const plane_basis b = optimize(p);
         result = prove(p, &b);
         if (good_enough(&result)) break;
     }
@@ -284,7 +284,7 @@ static int has_interior(const double (*planes)[4], size_t n, double scale)
     return holds_ball(&result);
 }
 
-static double reach(const proof *result, const double extent[3])
+static double cube_reach(const proof *result, const double extent[3])
 {
     if (result->leans_on_cube) return HUGE_VAL;
     double bound = result->value + 8 * DBL_EPSILON * result->magnitude;
@@ -307,7 +307,7 @@ static void find_extent(const proof faces[CUBE_FACES], double cube, double exten
         extent[k] = endless ? cube : 0;
     }
     for (int face = 0; face < CUBE_FACES; face++) {
-        const double bound = fabs(reach(&faces[face], extent));
+        const double bound = fabs(cube_reach(&faces[face], extent));
         if (bound < infinity) largest = fmax(largest, bound);
     }
     for (int k = 0; k < 3; k++)
@@ -328,8 +328,8 @@ int nb_convex_bounds(const double (*planes)[4], size_t n, double low[3], double 
     double extent[3];
     find_extent(faces, cube_factors[ATTEMPTS - 1] * scale, extent);
     for (int k = 0; k < 3; k++) {
-        high[k] = reach(&faces[2 * k], extent);
-        low[k] = -reach(&faces[2 * k + 1], extent);
+        high[k] = cube_reach(&faces[2 * k], extent);
+        low[k] = -cube_reach(&faces[2 * k + 1], extent);
     }
     return 1;
 }

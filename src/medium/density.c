@@ -267,6 +267,11 @@ double nb_density_most(const nb_volume *volume, const nb_line *line, double from
     }
 }
 
+double nb_density_peak(const nebel_density *density)
+{
+    return density->type == NEBEL_DENSITY_GRID ? nb_grid_peak(density->grid) : 1;
+}
+
 /* Under the base of fog that is capped there, and where fog that grows is at its limit, nothing changes any more. */
 static double height_scale(const nebel_density *density, const nb_line *line, double from)
 {

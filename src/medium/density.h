@@ -13,6 +13,9 @@ double nb_density_within(const nb_volume *volume, const double place[3]);
 /* The same at any place: 0 outside. */
 double nb_density_at(const nb_volume *volume, const double place[3]);
 
+/* The most that voxels have; 1 for densities in closed form. */
+double nb_density_peak(const nebel_density *density);
+
 /* No place of the piece from `from` to `to` [m], which may be infinite, has more. */
 double nb_density_most(const nb_volume *volume, const nb_line *line, double from, double to);
 

@@ -98,7 +98,7 @@ static nebel_result check_round(const nebel_log *log, const nebel_shape *shape)
     return NEBEL_OK;
 }
 
-static nebel_result check_axis(const nebel_log *log, const nebel_shape *shape)
+static nebel_result check_shape_axis(const nebel_log *log, const nebel_shape *shape)
 {
     if (!is_place(shape->from) || !is_place(shape->to)) return bad(log, "from and to", PLACE_RULE);
     const double length = distance(shape->from, shape->to);
@@ -169,7 +169,7 @@ static nebel_result check_shape(const nebel_log *log, const nebel_shape *shape, 
     case NEBEL_SHAPE_CYLINDER:
     case NEBEL_SHAPE_CAPSULE:
     case NEBEL_SHAPE_CONE:
-        return check_axis(log, shape);
+        return check_shape_axis(log, shape);
     case NEBEL_SHAPE_CONVEX:
         return check_convex(log, shape);
     default:
@@ -229,13 +229,6 @@ static nebel_result check_density(const nebel_log *log, const nebel_density *den
     default:
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "density: type %d is unknown", (int)density->type);
     }
-}
-
-nebel_result nb_check_sun(const nebel_log *log, const nebel_sun *sun)
-{
-    if (!is_zero(sun->irradiance, 3) && !is_direction(length_of(sun->direction)))
-        return bad(log, "sun direction", DIRECTION_RULE);
-    return nb_check_color(log, "sun irradiance", sun->irradiance, NEBEL_MAX_AMOUNT);
 }
 
 static nebel_result check_light(const nebel_log *log, const nebel_volume_desc *desc)

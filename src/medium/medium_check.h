@@ -7,7 +7,6 @@
 #include <nebel/nebel.h>
 
 nebel_result nb_check_volume(const nebel_log *log, const nebel_volume_desc *desc);
-nebel_result nb_check_sun(const nebel_log *log, const nebel_sun *sun);
 nebel_result nb_check_color(const nebel_log *log, const char *what, const double color[3], double largest);
 
 #endif

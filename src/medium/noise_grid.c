@@ -206,21 +206,22 @@ static void fill(const nebel_noise_desc *desc, point *points, uint16_t *voxels)
             }
 }
 
-static nebel_result bad(const nebel_noise_desc *desc, const char *what, double value, const char *range)
+static nebel_result bad_noise(const nebel_noise_desc *desc, const char *what, double value, const char *range)
 {
     return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "noise: %s is %g; must be %s", what, value, range);
 }
 
-static nebel_result check_axis(const nebel_noise_desc *desc, int i)
+static nebel_result check_noise_axis(const nebel_noise_desc *desc, int i)
 {
     if (desc->size[i] < 1 || desc->size[i] > NEBEL_MAX_GRID_SIZE)
         return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "noise: %zu x %zu x %zu voxels; must be 1 to %d on each axis",
                        desc->size[0], desc->size[1], desc->size[2], NEBEL_MAX_GRID_SIZE);
     if (!(desc->frequency[i] > 0 && 2 * desc->frequency[i] <= (double)desc->size[i]))
-        return bad(desc, "cells", desc->frequency[i], "more than 0, and of two voxels each at least");
+        return bad_noise(desc, "cells", desc->frequency[i], "more than 0, and of two voxels each at least");
     if (!(fabs(desc->offset[i]) <= NEBEL_MAX_NOISE_OFFSET))
-        return bad(desc, "offset", desc->offset[i], "within -1e9 and 1e9");
-    if (!(desc->falloff[i] >= 0 && desc->falloff[i] <= 0.5)) return bad(desc, "edge", desc->falloff[i], "0 to 0.5");
+        return bad_noise(desc, "offset", desc->offset[i], "within -1e9 and 1e9");
+    if (!(desc->falloff[i] >= 0 && desc->falloff[i] <= 0.5))
+        return bad_noise(desc, "edge", desc->falloff[i], "0 to 0.5");
     return NEBEL_OK;
 }
 
@@ -229,13 +230,14 @@ static nebel_result check(const nebel_noise_desc *desc)
     if (!nb_allocator_is_valid(&desc->allocator))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "noise: the allocator needs both functions or neither");
     for (int i = 0; i < 3; i++) {
-        const nebel_result result = check_axis(desc, i);
+        const nebel_result result = check_noise_axis(desc, i);
         if (result != NEBEL_OK) return result;
     }
-    if (desc->octaves < 0 || desc->octaves > MOST_OCTAVES) return bad(desc, "octaves", desc->octaves, "0 to 16");
-    if (!(desc->gain >= 0 && desc->gain <= 1)) return bad(desc, "gain", desc->gain, "0 to 1");
-    if (!(desc->coverage >= 0 && desc->coverage <= 1)) return bad(desc, "coverage", desc->coverage, "0 to 1");
-    if (!(fabs(desc->time) <= NEBEL_MAX_NOISE_OFFSET)) return bad(desc, "time", desc->time, "within -1e9 and 1e9");
+    if (desc->octaves < 0 || desc->octaves > MOST_OCTAVES) return bad_noise(desc, "octaves", desc->octaves, "0 to 16");
+    if (!(desc->gain >= 0 && desc->gain <= 1)) return bad_noise(desc, "gain", desc->gain, "0 to 1");
+    if (!(desc->coverage >= 0 && desc->coverage <= 1)) return bad_noise(desc, "coverage", desc->coverage, "0 to 1");
+    if (!(fabs(desc->time) <= NEBEL_MAX_NOISE_OFFSET))
+        return bad_noise(desc, "time", desc->time, "within -1e9 and 1e9");
     return NEBEL_OK;
 }
 

@@ -14,6 +14,8 @@
 
 #include <nebel/nebel.h>
 
+#include <math.h>
+
 typedef enum nb_leaf_type {
     NB_LEAF_WORLD,
     NB_LEAF_PLANES,   /* n.x <= d for each plane */
@@ -100,6 +102,13 @@ static inline int nb_volume_has_fog(const nb_volume *volume)
 static inline double nb_volume_glow(const nb_volume *volume, int channel)
 {
     return volume->emission[channel] + (volume->lit ? 0 : volume->source[channel] * volume->extinction[channel]);
+}
+
+static inline int nb_volume_is_endless(const nb_volume *volume)
+{
+    for (int i = 0; i < 3; i++)
+        if (!isfinite(volume->low[i]) || !isfinite(volume->high[i])) return 1;
+    return 0;
 }
 
 static inline int nb_volume_covers(const nb_volume *volume)

@@ -19,7 +19,7 @@ static size_t write_some(struct aiFile *file, const char *bytes, size_t size, si
     return 0;
 }
 
-static size_t tell(struct aiFile *file)
+static size_t tell_position(struct aiFile *file)
 {
     const long at = ftell((FILE *)file->UserData);
     return at >= 0 ? (size_t)at : 0;
@@ -71,7 +71,7 @@ static struct aiFile *open_file(struct aiFileIO *io, const char *path, const cha
     FILE *stream = mode[0] == 'r' ? open_stream((nb_assimp *)(void *)io->UserData, path) : NULL;
     struct aiFile *file = stream != NULL ? malloc(sizeof *file) : NULL;
     if (file != NULL) {
-        *file = (struct aiFile){read_some, write_some, tell, file_size, seek, flush, (aiUserData)stream};
+        *file = (struct aiFile){read_some, write_some, tell_position, file_size, seek, flush, (aiUserData)stream};
         return file;
     }
     if (stream != NULL) fclose(stream);

@@ -2,6 +2,7 @@
 /* What Assimp 5.2 does not survive, looked at before it does: it reads an unfinished PLY header for ever, and stops the
  * process where its own post-processing meets faces that cannot be. And what it says too little about. */
 #include "assimp_load.h"
+#include "gltf.h"
 #include "file/path.h"
 
 #include <assimp/cimport.h>
@@ -16,9 +17,6 @@
 
 /* A PLY header longer than this is not believed. */
 enum { HEAD_SIZE = 1 << 16 };
-
-/* Magic, version and length of the whole file, four bytes each, the lowest first. */
-enum { GLB_HEADER = 12 };
 
 typedef struct file_head {
     unsigned char *bytes;
@@ -52,11 +50,6 @@ static nebel_result check_ply(const nb_model_load *load, const file_head *head)
                          load->source->file);
 }
 
-static uint32_t read_word(const unsigned char *bytes)
-{
-    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
-}
-
 /* "" where there is none. */
 static const char *suffix_of(const char *file)
 {
@@ -68,13 +61,13 @@ static const char *suffix_of(const char *file)
 static nebel_result check_glb(const nb_model_load *load, const file_head *head)
 {
     const char *file = load->source->file;
-    if (head->size < GLB_HEADER)
+    if (head->size < NB_GLB_HEADER)
         return nb_model_fail(
             load, NEBEL_ERROR_FORMAT,
             "the model \"%s\" begins like binary glTF, but ends after %zu bytes, inside its header; copy "
             "or export it again",
             file, head->size);
-    const unsigned long long version = read_word(head->bytes + 4), length = read_word(head->bytes + 8);
+    const unsigned long long version = nb_gltf_word(head->bytes + 4), length = nb_gltf_word(head->bytes + 8);
     if (version < 1 || version > 2)
         return nb_model_fail(load, NEBEL_ERROR_FORMAT,
                              "the model \"%s\" begins like binary glTF, but of version %llu; versions 1 and 2 are read",
@@ -90,7 +83,7 @@ static nebel_result check_glb(const nb_model_load *load, const file_head *head)
                          file);
 }
 
-static nebel_result check_head(const nb_model_load *load, const file_head *head)
+static nebel_result check_file_head(const nb_model_load *load, const file_head *head)
 {
     if (head->file_size == 0)
         return nb_model_fail(load, NEBEL_ERROR_FORMAT, "the model \"%s\" is empty; copy or export it again",
@@ -108,7 +101,7 @@ nebel_result nb_assimp_check_file(const nb_model_load *load)
     file_head head = {.bytes = nb_allocate(&load->allocator, HEAD_SIZE, 1)};
     if (head.bytes == NULL) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
     nebel_result result = read_head(load, &head);
-    if (result == NEBEL_OK) result = check_head(load, &head);
+    if (result == NEBEL_OK) result = check_file_head(load, &head);
     nb_release(&load->allocator, head.bytes);
     return result;
 }
@@ -146,7 +139,7 @@ nebel_result nb_assimp_refuse(const nb_assimp *in, const char *reason)
 
 /* ---- the meshes before they are worked on ---------------------------------------------------- */
 
-static bool is_finite(const struct aiVector3D *v)
+static bool is_finite_vector(const struct aiVector3D *v)
 {
     return isfinite(v->x) && isfinite(v->y) && isfinite(v->z);
 }
@@ -158,7 +151,7 @@ static bool check_face(nb_assimp *in, const struct aiMesh *mesh, const struct ai
     bool finite = true;
     for (unsigned k = 0; k < face->mNumIndices; k++) {
         if (face->mIndices[k] >= mesh->mNumVertices) return false;
-        finite = finite && is_finite(&mesh->mVertices[face->mIndices[k]]);
+        finite = finite && is_finite_vector(&mesh->mVertices[face->mIndices[k]]);
     }
     for (unsigned k = 1; k < face->mNumIndices && !finite; k++) face->mIndices[k] = face->mIndices[0];
     in->left_out_triangles += finite ? 0 : 1;
@@ -172,7 +165,7 @@ static unsigned primitive_type(unsigned corner_count)
 }
 
 /* Also tells Assimp which kinds of faces there are, since some of its readers miscount. */
-static bool check_mesh(nb_assimp *in, struct aiMesh *mesh)
+static bool check_assimp_mesh(nb_assimp *in, struct aiMesh *mesh)
 {
     mesh->mPrimitiveTypes = 0;
     for (unsigned i = 0; i < mesh->mNumFaces; i++) {
@@ -180,14 +173,14 @@ static bool check_mesh(nb_assimp *in, struct aiMesh *mesh)
         mesh->mPrimitiveTypes |= primitive_type(mesh->mFaces[i].mNumIndices);
     }
     for (unsigned i = 0; i < mesh->mNumVertices; i++)
-        if (!is_finite(&mesh->mVertices[i])) mesh->mVertices[i] = (struct aiVector3D){0, 0, 0};
+        if (!is_finite_vector(&mesh->mVertices[i])) mesh->mVertices[i] = (struct aiVector3D){0, 0, 0};
     return true;
 }
 
 nebel_result nb_assimp_check_meshes(nb_assimp *in, const struct aiScene *scene)
 {
     for (unsigned i = 0; i < scene->mNumMeshes; i++)
-        if (!check_mesh(in, scene->mMeshes[i]))
+        if (!check_assimp_mesh(in, scene->mMeshes[i]))
             return nb_model_fail(in->load, NEBEL_ERROR_FORMAT,
                                  "the model \"%s\" cannot be read: a face has no corners, or one that does not exist",
                                  in->load->source->file);

@@ -95,7 +95,7 @@ static nebel_result push(const nb_assimp *in, stack *nodes, const struct aiNode 
     return NEBEL_OK;
 }
 
-static nebel_result take_mesh(nb_assimp *in, const struct aiMesh *mesh, const nb_affine *place)
+static nebel_result take_assimp_mesh(nb_assimp *in, const struct aiMesh *mesh, const nb_affine *place)
 {
     return in->load->points != NULL ? nb_assimp_add_points(in, mesh, place) : nb_assimp_add_mesh(in, mesh, place);
 }
@@ -107,7 +107,7 @@ static nebel_result visit(nb_assimp *in, stack *nodes)
     nebel_result result = NEBEL_OK;
     for (unsigned i = 0; i < top.node->mNumMeshes && result == NEBEL_OK; i++)
         if (top.node->mMeshes[i] < in->scene->mNumMeshes)
-            result = take_mesh(in, in->scene->mMeshes[top.node->mMeshes[i]], &place);
+            result = take_assimp_mesh(in, in->scene->mMeshes[top.node->mMeshes[i]], &place);
     for (unsigned i = top.node->mNumChildren; i > 0 && result == NEBEL_OK; i--)
         result = push(in, nodes, top.node->mChildren[i - 1], &place);
     return result;
@@ -183,7 +183,7 @@ static void note_refusal(const nb_assimp *in)
                       in->load->source->file, in->files.refused, nb_model_files_refusal_text(in->files.refusal));
 }
 
-static nebel_result take(nb_assimp *in)
+static nebel_result take_scene(nb_assimp *in)
 {
     note_refusal(in);
     if (in->scene->mRootNode == NULL)
@@ -191,7 +191,7 @@ static nebel_result take(nb_assimp *in)
     return in->load->points != NULL ? convert_points(in) : convert_meshes(in);
 }
 
-static nebel_result prepare(nb_assimp *in)
+static nebel_result prepare_files(nb_assimp *in)
 {
     const nb_gltf_file *text = &in->made.files[NB_GLTF_TEXT];
     nebel_result result = nb_gltf_prepare(in->load, &in->files, &in->made);
@@ -202,13 +202,13 @@ static nebel_result prepare(nb_assimp *in)
     return in->name != NULL ? NEBEL_OK : nb_model_fail(in->load, NEBEL_ERROR_MEMORY, "out of memory");
 }
 
-static nebel_result load_file(nb_assimp *in)
+static nebel_result load_assimp_file(nb_assimp *in)
 {
     const nb_model_load *load = in->load;
     nebel_result result = nb_assimp_check_file(load);
-    if (result == NEBEL_OK) result = prepare(in);
+    if (result == NEBEL_OK) result = prepare_files(in);
     if (result == NEBEL_OK) result = import(in);
-    if (result == NEBEL_OK) result = take(in);
+    if (result == NEBEL_OK) result = take_scene(in);
     if (in->scene != NULL && load->sink == NULL) aiReleaseImport(in->scene); /* behind a sink the process ends */
     nb_gltf_release_files(&load->allocator, &in->made);
     nb_release(&load->allocator, in->textures);
@@ -228,7 +228,7 @@ nebel_result nb_assimp_load(const nb_model_load *load)
                               .user = load->opened_user}};
     nebel_result result = nb_model_files_begin(&in.files, &load->log);
     nb_assimp_set_files(&in);
-    if (result == NEBEL_OK) result = load_file(&in);
+    if (result == NEBEL_OK) result = load_assimp_file(&in);
     nb_model_files_end(&in.files);
     return result;
 }

@@ -12,11 +12,11 @@
 #include <unistd.h>
 
 /* The largest file of a texture. */
-#define FILE_LIMIT ((size_t)1 << 30)
+#define TEXTURE_FILE_LIMIT ((size_t)1 << 30)
 
 /* ---- pictures -------------------------------------------------------------------------------- */
 
-static nebel_result decode(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture)
+static nebel_result decode_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture)
 {
     if (nb_png_is(bytes)) return nb_png_read_texture(codec, bytes, texture);
     if (nb_jpeg_is(bytes)) return nb_jpeg_read_texture(codec, bytes, texture);
@@ -47,16 +47,16 @@ static nebel_result read_embedded(const nb_codec *codec, const struct aiTexture 
         return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: the embedded picture is empty", codec->name);
     if (source->mHeight > 0) return copy_texels(codec, source, texture);
     const nb_bytes bytes = {(unsigned char *)source->pcData, source->mWidth, source->mWidth};
-    return decode(codec, &bytes, texture);
+    return decode_texture(codec, &bytes, texture);
 }
 
-static nebel_result read_file(const nb_codec *codec, int file, nebel_texture *texture)
+static nebel_result read_texture_file(const nb_codec *codec, int file, nebel_texture *texture)
 {
     nb_bytes bytes;
-    nebel_result result =
-        nb_file_read_open(&codec->allocator, &codec->log, NULL, "texture", codec->name, file, FILE_LIMIT, &bytes);
+    nebel_result result = nb_file_read_open(&codec->allocator, &codec->log, NULL, "texture", codec->name, file,
+                                            TEXTURE_FILE_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
-    result = decode(codec, &bytes, texture);
+    result = decode_texture(codec, &bytes, texture);
     nb_release(&codec->allocator, bytes.data);
     return result;
 }
@@ -118,7 +118,7 @@ static nebel_result read_named(nb_assimp *in, const nb_codec *codec, const char 
     const nb_refusal refusal = in->files.refusal;
     in->files.refusal = before;
     if (file >= 0) {
-        const nebel_result result = read_file(codec, file, texture);
+        const nebel_result result = read_texture_file(codec, file, texture);
         close(file);
         return result;
     }

@@ -64,7 +64,7 @@ static uint32_t number_in_draft(const uint32_t *kept, uint32_t i)
     return kept != NULL ? kept[i] : i;
 }
 
-static void place_vertices(const nb_mesh_builder *out, const uint32_t *kept, nebel_mesh *mesh)
+static void place_mesh_vertices(const nb_mesh_builder *out, const uint32_t *kept, nebel_mesh *mesh)
 {
     const nb_weld_mesh *draft = &out->draft;
     float *positions = (float *)mesh->positions, *normals = (float *)mesh->normals;
@@ -96,7 +96,7 @@ static void place_uvs(const nb_weld_mesh *draft, const nb_assimp_surface *surfac
     }
 }
 
-static bool is_finite(const float *v)
+static bool is_finite_place(const float *v)
 {
     return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
 }
@@ -108,7 +108,7 @@ static bool is_same(const float *a, const float *b)
 
 /* A mirror turns triangles inside out; two corners change places to undo it. Triangles with two corners at one place
  * are left out, and those with a corner that was taken beyond the floats. */
-static void place_triangles(const nb_mesh_builder *out, nebel_mesh *mesh)
+static void place_mesh_triangles(const nb_mesh_builder *out, nebel_mesh *mesh)
 {
     uint32_t *indices = (uint32_t *)mesh->indices, count = 0;
     for (size_t i = 0; i < mesh->triangle_count; i++) {
@@ -116,7 +116,7 @@ static void place_triangles(const nb_mesh_builder *out, nebel_mesh *mesh)
                                     indices[3 * i + (out->mirrored ? 1 : 2)]};
         const float *p[3];
         for (int k = 0; k < 3; k++) p[k] = mesh->positions + 3 * (size_t)corner[k];
-        if (!is_finite(p[0]) || !is_finite(p[1]) || !is_finite(p[2]))
+        if (!is_finite_place(p[0]) || !is_finite_place(p[1]) || !is_finite_place(p[2]))
             out->in->left_out_triangles++;
         else if (!is_same(p[0], p[1]) && !is_same(p[1], p[2]) && !is_same(p[2], p[0]))
             memcpy(indices + 3 * (size_t)count++, corner, sizeof corner);
@@ -129,7 +129,7 @@ static void clear_broken_positions(nebel_mesh *mesh)
 {
     for (size_t i = 0; i < mesh->vertex_count; i++) {
         float *position = (float *)mesh->positions + 3 * i;
-        if (!is_finite(position)) memset(position, 0, 3 * sizeof *position);
+        if (!is_finite_place(position)) memset(position, 0, 3 * sizeof *position);
     }
 }
 
@@ -209,9 +209,9 @@ static bool find_vertices(nb_weld_mesh *draft, uint32_t **kept, uint32_t *count)
 
 static void fill(const nb_mesh_builder *out, const nb_assimp_surface *surface, const uint32_t *kept, nebel_mesh *mesh)
 {
-    place_vertices(out, kept, mesh);
+    place_mesh_vertices(out, kept, mesh);
     if (out->draft.uvs != NULL) place_uvs(&out->draft, surface, kept, mesh);
-    place_triangles(out, mesh);
+    place_mesh_triangles(out, mesh);
     clear_broken_positions(mesh);
     mend_normals(mesh);
     mesh->texture = surface->texture;
@@ -223,7 +223,8 @@ static void fill(const nb_mesh_builder *out, const nb_assimp_surface *surface, c
     }
 }
 
-static bool build(nb_mesh_builder *out, const struct aiMesh *source, const nb_assimp_surface *surface, nebel_mesh *mesh)
+static bool build_mesh(nb_mesh_builder *out, const struct aiMesh *source, const nb_assimp_surface *surface,
+                       nebel_mesh *mesh)
 {
     nb_weld_mesh *draft = &out->draft;
     uint32_t *kept = NULL, vertex_count = 0;
@@ -265,7 +266,7 @@ nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *source, cons
                                      .triangle_count = triangle_count},
                            .place = *place};
     find_normal_matrix(&out);
-    if (!build(&out, source, &surface, &mesh)) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
+    if (!build_mesh(&out, source, &surface, &mesh)) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
     if (mesh.triangle_count > 0) return nb_model_add_mesh(load, &mesh);
     nb_mesh_release(&load->allocator, &mesh);
     return NEBEL_OK;

@@ -26,7 +26,7 @@ static float dot(const struct aiVector3D *a, const struct aiVector3D *b)
     return a->x * b->x + a->y * b->y + a->z * b->z;
 }
 
-static void add(struct aiVector3D *sum, const struct aiVector3D *v)
+static void add_vector(struct aiVector3D *sum, const struct aiVector3D *v)
 {
     sum->x += v->x;
     sum->y += v->y;
@@ -58,7 +58,7 @@ static void smooth_all(const smoother *in)
     for (size_t i = 0; i < draft->triangle_count; i++) {
         const uint32_t *corner = draft->corners + 3 * i;
         in->faces[i] = face_normal(draft, corner);
-        for (int k = 0; k < 3; k++) add(&normals[in->place[corner[k]]], &in->faces[i]);
+        for (int k = 0; k < 3; k++) add_vector(&normals[in->place[corner[k]]], &in->faces[i]);
     }
     for (uint32_t i = 0; i < draft->given_count; i++) {
         const struct aiVector3D *sum = &normals[i];
@@ -115,7 +115,7 @@ static struct aiVector3D smooth_corner(const smoother *in, uint32_t first, uint3
     struct aiVector3D sum = {0, 0, 0};
     for (uint32_t i = first; i < end; i++) {
         const struct aiVector3D *other = &in->faces[in->around[i] / 3];
-        if (i == own || dot(face, other) >= smoothing_cosine) add(&sum, other);
+        if (i == own || dot(face, other) >= smoothing_cosine) add_vector(&sum, other);
     }
     return unit((double)sum.x, (double)sum.y, (double)sum.z);
 }
@@ -137,7 +137,7 @@ static void split_sharp_places(const smoother *in)
     }
 }
 
-static bool make_room(smoother *in, uint32_t copy_count)
+static bool reserve_copies(smoother *in, uint32_t copy_count)
 {
     nb_weld_mesh *draft = in->draft;
     const nebel_allocator *allocator = &draft->allocator;
@@ -163,7 +163,7 @@ static bool smooth(smoother *in)
     find_sharp_places(in);
     const uint32_t copy_count = count_around(in);
     if (copy_count == 0) return true;
-    if (!make_room(in, copy_count)) return false;
+    if (!reserve_copies(in, copy_count)) return false;
     collect_around(in);
     split_sharp_places(in);
     return true;

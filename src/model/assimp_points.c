@@ -16,7 +16,7 @@ static bool place_point(const nb_assimp *in, const struct aiVector3D *v, const n
     return finite;
 }
 
-static nebel_result make_room(const nb_assimp *in, size_t more)
+static nebel_result reserve_points(const nb_assimp *in, size_t more)
 {
     const nb_model_load *load = in->load;
     nb_point_set *points = load->points;
@@ -36,7 +36,7 @@ static nebel_result add_distinct(nb_assimp *in, const struct aiMesh *mesh, const
 {
     uint32_t count = 0;
     for (uint32_t i = 0; i < mesh->mNumVertices; i++) count += first[i] == i;
-    const nebel_result result = make_room(in, count);
+    const nebel_result result = reserve_points(in, count);
     if (result != NEBEL_OK) return result;
     nb_point_set *points = in->load->points;
     for (uint32_t i = 0; i < mesh->mNumVertices; i++) {

@@ -6,7 +6,7 @@
 #include <string.h>
 
 /* A free slot of the table, a vertex without a number. */
-static const uint32_t none = UINT32_MAX;
+static const uint32_t no_vertex = UINT32_MAX;
 
 /* In a table that is at most half full no run of taken slots is half as long as this, unless someone made the numbers
  * to collide; then some equal vertices stay two, and the time stays bounded. */
@@ -58,7 +58,7 @@ static uint32_t find_or_add(const lookup *in, uint32_t vertex)
     const size_t start = hash_key(key, count);
     for (size_t i = 0; i < LONGEST_SEARCH; i++) {
         uint32_t *slot = &in->table[(start + i) & in->mask];
-        if (*slot == none) return *slot = vertex;
+        if (*slot == no_vertex) return *slot = vertex;
         (void)load_key(in->draft, in->likeness, *slot, other);
         if (memcmp(key, other, count * sizeof *key) == 0) return *slot;
     }
@@ -85,7 +85,7 @@ static uint32_t number_used(const nb_weld_mesh *draft, const uint32_t *first, ui
     memset(numbers, 0xff, count * sizeof *numbers);
     for (size_t i = 0; i < 3 * (size_t)draft->triangle_count; i++) numbers[first[draft->corners[i]]] = 0;
     for (uint32_t i = 0; i < count; i++) {
-        if (numbers[i] == none) continue;
+        if (numbers[i] == no_vertex) continue;
         numbers[i] = used;
         kept[used++] = i;
     }

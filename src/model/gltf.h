@@ -6,6 +6,15 @@
 #include "file/file.h"
 #include "json/json.h"
 
+/* glTF 2.0, section 4.4: magic, version and length of the file; then chunks of length, type, content, JSON first. Numbers are
+ * four bytes each, the lowest first. */
+enum { NB_GLB_HEADER = 12, NB_GLB_CHUNK_HEADER = 8 };
+
+static inline uint32_t nb_gltf_word(const unsigned char *bytes)
+{
+    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
+}
+
 /* Whether the name says that it is glTF. */
 bool nb_gltf_is(const char *file);
 

@@ -17,7 +17,7 @@ nebel_result nb_gltf_fail(const nb_gltf_data *data, const char *what, size_t ind
                          data->load->source->file, what, index, problem);
 }
 
-static nebel_result fail_memory(const nb_gltf_data *data)
+nebel_result nb_gltf_fail_memory(const nb_gltf_data *data)
 {
     return nb_model_fail(data->load, NEBEL_ERROR_MEMORY, "out of memory");
 }
@@ -25,7 +25,7 @@ static nebel_result fail_memory(const nb_gltf_data *data)
 /* ---- base64 ---------------------------------------------------------------------------------- */
 
 /* RFC 4648, section 4. */
-static int digit(char c)
+static int base64_digit(char c)
 {
     if (c >= 'A' && c <= 'Z') return c - 'A';
     if (c >= 'a' && c <= 'z') return c - 'a' + 26;
@@ -34,13 +34,13 @@ static int digit(char c)
 }
 
 /* The bytes of four digits each; returns how many there are, SIZE_MAX where a digit is none. */
-static size_t decode(const char *text, size_t size, unsigned char *bytes)
+static size_t decode_base64(const char *text, size_t size, unsigned char *bytes)
 {
     uint32_t bits = 0;
     size_t count = 0, digits = 0;
     while (size > 0 && text[size - 1] == '=') size--;
     for (size_t i = 0; i < size; i++) {
-        const int value = digit(text[i]);
+        const int value = base64_digit(text[i]);
         if (value < 0) return SIZE_MAX;
         bits = bits << 6 | (uint32_t)value;
         if (++digits % 4 == 1) continue;
@@ -58,8 +58,8 @@ static nebel_result load_embedded(nb_gltf_data *data, nb_gltf_buffer *buffer, si
         return nb_gltf_fail(data, "buffers", index, "holds data that are not base64");
     const size_t size = buffer->uri_size - lead;
     buffer->bytes.data = nb_allocate(&data->load->allocator, size / 4 * 3 + 3, 1);
-    if (buffer->bytes.data == NULL) return fail_memory(data);
-    buffer->bytes.size = decode(comma + 1, size, buffer->bytes.data);
+    if (buffer->bytes.data == NULL) return nb_gltf_fail_memory(data);
+    buffer->bytes.size = decode_base64(comma + 1, size, buffer->bytes.data);
     return buffer->bytes.size != SIZE_MAX ? NEBEL_OK
                                           : nb_gltf_fail(data, "buffers", index, "holds data that are not base64");
 }
@@ -74,13 +74,13 @@ static nebel_result fail_file(const nb_gltf_data *data, const char *uri, int err
                          data->load->source->file, uri, refusal != NB_REFUSAL_NONE ? "it " : "", reason);
 }
 
-static nebel_result load_file(nb_gltf_data *data, nb_gltf_buffer *buffer)
+static nebel_result load_buffer_file(nb_gltf_data *data, nb_gltf_buffer *buffer)
 {
     const nb_model_load *load = data->load;
     const char *folder = nb_path_folder(&data->arena, data->files->name);
     const char *uri = nb_arena_copy_text(&data->arena, buffer->uri, buffer->uri_size);
     const char *path = folder != NULL && uri != NULL ? nb_path_join(&data->arena, folder, uri) : NULL;
-    if (path == NULL) return fail_memory(data);
+    if (path == NULL) return nb_gltf_fail_memory(data);
     const int file = nb_model_files_open(data->files, path);
     if (file < 0) return fail_file(data, uri, errno);
     const nebel_result result =
@@ -96,7 +96,7 @@ static nebel_result load(nb_gltf_data *data, size_t index)
     buffer->is_loaded = true;
     if (buffer->uri == NULL) return NEBEL_OK; /* the chunk, or nothing */
     if (buffer->uri_size > 5 && memcmp(buffer->uri, "data:", 5) == 0) return load_embedded(data, buffer, index);
-    return load_file(data, buffer);
+    return load_buffer_file(data, buffer);
 }
 
 nebel_result nb_gltf_find_bytes(nb_gltf_data *data, const nb_gltf_range *range, const unsigned char **bytes)

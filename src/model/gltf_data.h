@@ -110,4 +110,7 @@ unsigned char *nb_gltf_add_extra(nb_gltf_data *data, uint64_t size, uint64_t *of
 /* FORMAT, with the model's name. */
 nebel_result nb_gltf_fail(const nb_gltf_data *data, const char *what, size_t index, const char *problem);
 
+/* MEMORY. */
+nebel_result nb_gltf_fail_memory(const nb_gltf_data *data);
+
 #endif

@@ -10,22 +10,14 @@
 /* The most JSON that is looked at. */
 #define JSON_LIMIT ((size_t)1 << 30)
 
-/* glTF 2.0, section 4.4: magic, version, length of the file; then chunks of length, type, content, JSON first. */
-enum { GLB_HEADER = 12, CHUNK_HEADER = 8 };
-
-static uint32_t read_word(const unsigned char *bytes)
-{
-    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
-}
-
 static size_t read_json_size(FILE *stream)
 {
-    unsigned char head[GLB_HEADER + CHUNK_HEADER];
+    unsigned char head[NB_GLB_HEADER + NB_GLB_CHUNK_HEADER];
     if (fread(head, 1, sizeof head, stream) != sizeof head || memcmp(head, "glTF", 4) != 0) return 0;
-    return memcmp(head + GLB_HEADER + 4, "JSON", 4) == 0 ? read_word(head + GLB_HEADER) : 0;
+    return memcmp(head + NB_GLB_HEADER + 4, "JSON", 4) == 0 ? nb_gltf_word(head + NB_GLB_HEADER) : 0;
 }
 
-static nebel_result read_chunk(const nebel_allocator *allocator, FILE *stream, nb_bytes *text)
+static nebel_result read_json_chunk(const nebel_allocator *allocator, FILE *stream, nb_bytes *text)
 {
     const size_t size = read_json_size(stream);
     if (size == 0 || size > JSON_LIMIT) return NEBEL_ERROR_FORMAT;
@@ -40,7 +32,7 @@ static nebel_result read_binary(const nebel_allocator *allocator, const char *fi
     const nebel_log silent = {0};
     FILE *stream = nb_file_open_stream(&silent, NULL, "model", file);
     if (stream == NULL) return NEBEL_ERROR_FILE;
-    const nebel_result result = read_chunk(allocator, stream, text);
+    const nebel_result result = read_json_chunk(allocator, stream, text);
     fclose(stream);
     return result;
 }

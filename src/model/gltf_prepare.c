@@ -19,11 +19,6 @@
 /* The longest text that stands for a view, an accessor or a buffer. */
 enum { OBJECT_SIZE = 400 };
 
-static nebel_result fail_memory(const nb_gltf_data *data)
-{
-    return nb_model_fail(data->load, NEBEL_ERROR_MEMORY, "out of memory");
-}
-
 /* ---- compressed views ------------------------------------------------------------------------ */
 
 /* What the extension asks of its numbers. */
@@ -55,7 +50,7 @@ static nebel_result unpack(nb_gltf_data *data, size_t index)
     nebel_result result = nb_gltf_find_bytes(data, &packed->range, &bytes);
     if (result != NEBEL_OK) return result;
     unsigned char *made = nb_gltf_add_extra(data, packed->count * packed->stride, &view->unpacked);
-    if (made == NULL) return fail_memory(data);
+    if (made == NULL) return nb_gltf_fail_memory(data);
     if (data->load->unpack(packed, bytes, made)) return NEBEL_OK;
     return nb_gltf_fail(data, "bufferViews", index, "does not decompress");
 }
@@ -120,16 +115,16 @@ static nebel_result find_view(nb_gltf_data *data, const nb_gltf_view *view, cons
 }
 
 /* Numbers of an accessor one after the other. */
-typedef struct numbers {
+typedef struct number_range {
     int64_t view; /* or -1 */
     uint64_t offset, count;
     unsigned tight;  /* bytes of each */
     bool is_strided; /* where its view says so */
-} numbers;
+} number_range;
 
 /* Where they begin and how far they are apart, within their view. */
-static nebel_result find_numbers(nb_gltf_data *data, size_t index, const numbers *wanted, const unsigned char **bytes,
-                                 uint64_t *stride)
+static nebel_result find_numbers(nb_gltf_data *data, size_t index, const number_range *wanted,
+                                 const unsigned char **bytes, uint64_t *stride)
 {
     if (wanted->view < 0 || (uint64_t)wanted->view >= data->view_count)
         return nb_gltf_fail(data, "accessors", index, "has a view that does not exist");
@@ -154,25 +149,25 @@ static void convert_one(const nb_gltf_accessor *accessor, const unsigned char *b
     }
 }
 
-static numbers numbers_of(const nb_gltf_accessor *accessor)
+static number_range numbers_of(const nb_gltf_accessor *accessor)
 {
-    return (numbers){accessor->view, accessor->offset, accessor->count,
-                     component_size(accessor->type) * accessor->width, true};
+    return (number_range){accessor->view, accessor->offset, accessor->count,
+                          component_size(accessor->type) * accessor->width, true};
 }
 
 /* glTF 2.0, section 3.6.2.3: indices and values are tight. */
-static numbers indices_of(const nb_gltf_accessor *accessor)
+static number_range indices_of(const nb_gltf_accessor *accessor)
 {
     const nb_gltf_sparse *sparse = &accessor->sparse;
-    return (numbers){sparse->index_view, sparse->index_offset, sparse->count, component_size(sparse->index_type),
-                     false};
+    return (number_range){sparse->index_view, sparse->index_offset, sparse->count, component_size(sparse->index_type),
+                          false};
 }
 
-static numbers values_of(const nb_gltf_accessor *accessor)
+static number_range values_of(const nb_gltf_accessor *accessor)
 {
     const nb_gltf_sparse *sparse = &accessor->sparse;
-    return (numbers){sparse->value_view, sparse->value_offset, sparse->count,
-                     component_size(accessor->type) * accessor->width, false};
+    return (number_range){sparse->value_view, sparse->value_offset, sparse->count,
+                          component_size(accessor->type) * accessor->width, false};
 }
 
 static nebel_result check_sparse(nb_gltf_data *data, size_t index)
@@ -185,7 +180,7 @@ static nebel_result check_sparse(nb_gltf_data *data, size_t index)
         return nb_gltf_fail(data, "accessors", index, "has sparse indices that are no whole numbers");
     if (accessor->sparse.count == 0 || accessor->sparse.count > accessor->count)
         return nb_gltf_fail(data, "accessors", index, "has more sparse numbers than numbers, or none");
-    const numbers indices = indices_of(accessor), values = values_of(accessor);
+    const number_range indices = indices_of(accessor), values = values_of(accessor);
     const nebel_result result = find_numbers(data, index, &indices, &bytes, &stride);
     return result == NEBEL_OK ? find_numbers(data, index, &values, &bytes, &stride) : result;
 }
@@ -200,7 +195,7 @@ static uint32_t read_index(const unsigned char *bytes, unsigned size)
 static nebel_result put_sparse(nb_gltf_data *data, size_t index, unsigned char *made)
 {
     const nb_gltf_accessor *accessor = &data->accessors[index];
-    const numbers indices = indices_of(accessor), values = values_of(accessor);
+    const number_range indices = indices_of(accessor), values = values_of(accessor);
     const unsigned char *places = NULL, *bytes = NULL;
     uint64_t stride = 0;
     nebel_result result = find_numbers(data, index, &indices, &places, &stride);
@@ -220,7 +215,7 @@ static nebel_result convert(nb_gltf_data *data, size_t index, uint64_t *offset)
 {
     const nb_gltf_accessor *accessor = &data->accessors[index];
     const bool has_base = accessor->view >= 0 || !accessor->is_sparse;
-    const numbers base = numbers_of(accessor);
+    const number_range base = numbers_of(accessor);
     const uint64_t size = accessor->width * sizeof(float);
     const unsigned char *bytes = NULL;
     uint64_t stride = 0;
@@ -230,7 +225,7 @@ static nebel_result convert(nb_gltf_data *data, size_t index, uint64_t *offset)
     if (result == NEBEL_OK && accessor->is_sparse) result = check_sparse(data, index);
     if (result != NEBEL_OK) return result;
     unsigned char *made = nb_gltf_add_extra(data, accessor->count * size, offset);
-    if (made == NULL) return fail_memory(data);
+    if (made == NULL) return nb_gltf_fail_memory(data);
     memset(made, 0, (size_t)(accessor->count * size));
     if (has_base) result = find_numbers(data, index, &base, &bytes, &stride); /* the extra file may have moved */
     for (uint64_t i = 0; i < accessor->count && has_base && result == NEBEL_OK; i++)
@@ -276,7 +271,7 @@ static nebel_result write_text(const nb_gltf_data *data, text_changes *list, nb_
     size_t size = data->text.size, at = 0;
     for (size_t i = 0; i < list->count; i++) size += strlen(list->items[i].text);
     *text = (nb_bytes){.data = nb_allocate(list->allocator, size, 1), .capacity = size};
-    if (text->data == NULL) return fail_memory(data);
+    if (text->data == NULL) return nb_gltf_fail_memory(data);
     qsort(list->items, list->count, sizeof *list->items, compare);
     for (size_t i = 0; i < list->count; i++) {
         const change *next = &list->items[i];
@@ -344,17 +339,17 @@ static nebel_result change_accessors(nb_gltf_data *data, text_changes *list)
             /* Zeros, or in the hands of Assimp's decoder of Draco, which makes floats where they are wanted. */
             snprintf(text, sizeof text, "{\"componentType\":%d,\"count\":%llu,\"type\":\"%s\"}", NB_GLTF_FLOAT,
                      (unsigned long long)accessor->count, accessor->type_name);
-            if (!replace(list, accessor->span, text)) return fail_memory(data);
+            if (!replace(list, accessor->span, text)) return nb_gltf_fail_memory(data);
             continue;
         }
         const nebel_result result = convert(data, i, &offset);
         if (result != NEBEL_OK) return result;
         snprintf(text, sizeof text, "{\"bufferView\":%zu,\"componentType\":%d,\"count\":%llu,\"type\":\"%s\"}",
                  data->view_count + made++, NB_GLTF_FLOAT, (unsigned long long)accessor->count, accessor->type_name);
-        if (!replace(list, accessor->span, text)) return fail_memory(data);
+        if (!replace(list, accessor->span, text)) return nb_gltf_fail_memory(data);
         snprintf(text, sizeof text, ",{\"buffer\":%zu,\"byteOffset\":%llu,\"byteLength\":%llu}", data->buffer_count,
                  (unsigned long long)offset, (unsigned long long)(accessor->count * accessor->width * sizeof(float)));
-        if (!replace(list, behind(&data->views[data->view_count - 1].span), text)) return fail_memory(data);
+        if (!replace(list, behind(&data->views[data->view_count - 1].span), text)) return nb_gltf_fail_memory(data);
     }
     return NEBEL_OK;
 }
@@ -370,7 +365,7 @@ static nebel_result make(nb_gltf_data *data, text_changes *list, nb_gltf_files *
     snprintf(text, sizeof text, ",{\"byteLength\":%zu,\"uri\":\"" EXTRA_NAME "\"}", data->extra.size);
     if (!change_views(data, list) || !change_buffers(data, list) ||
         !replace(list, behind(&data->buffers[data->buffer_count - 1].span), text))
-        return fail_memory(data);
+        return nb_gltf_fail_memory(data);
     made->files[NB_GLTF_TEXT].name = TEXT_NAME;
     made->files[NB_GLTF_CHUNK] = (nb_gltf_file){CHUNK_NAME, data->chunk};
     made->files[NB_GLTF_EXTRA] = (nb_gltf_file){EXTRA_NAME, data->extra};
@@ -381,17 +376,16 @@ static nebel_result make(nb_gltf_data *data, text_changes *list, nb_gltf_files *
 /* ---- the file -------------------------------------------------------------------------------- */
 
 /* The second chunk of a .glb file (glTF 2.0, section 4.4); nothing where there is none. */
-static nebel_result read_chunk(nb_gltf_data *data)
+static nebel_result read_binary_chunk(nb_gltf_data *data)
 {
-    enum { HEADER = 12, CHUNK_HEADER = 8 };
-    unsigned char head[CHUNK_HEADER];
-    const size_t begin = HEADER + CHUNK_HEADER + data->text.size;
+    unsigned char head[NB_GLB_CHUNK_HEADER];
+    const size_t begin = NB_GLB_HEADER + NB_GLB_CHUNK_HEADER + data->text.size;
     const char *file = data->load->source->file;
     const int opened = nb_model_files_open(data->files, data->files->name);
     if (opened < 0) return nb_model_fail(data->load, NEBEL_ERROR_FILE, "cannot read the model \"%s\"", file);
     nebel_result result = NEBEL_OK;
-    if (pread(opened, head, sizeof head, (off_t)begin) == CHUNK_HEADER && memcmp(head + 4, "BIN", 4) == 0) {
-        lseek(opened, (off_t)(begin + CHUNK_HEADER), SEEK_SET);
+    if (pread(opened, head, sizeof head, (off_t)begin) == NB_GLB_CHUNK_HEADER && memcmp(head + 4, "BIN", 4) == 0) {
+        lseek(opened, (off_t)(begin + NB_GLB_CHUNK_HEADER), SEEK_SET);
         result = nb_file_read_open(&data->load->allocator, &data->load->log, NULL, "model", file, opened,
                                    SIZE_MAX >> 30, &data->chunk);
         data->has_chunk = result == NEBEL_OK;
@@ -416,14 +410,14 @@ static bool takes_making(const nb_gltf_data *data)
     return found && data->view_count > 0 && data->buffer_count > 0;
 }
 
-static nebel_result prepare(nb_gltf_data *data, nb_gltf_files *made)
+static nebel_result prepare_gltf(nb_gltf_data *data, nb_gltf_files *made)
 {
     text_changes list = {.arena = &data->arena, .allocator = &data->load->allocator};
     nebel_result result = nb_gltf_read_data(data);
     memcpy(made->fault, data->fault, sizeof made->fault);
     if (result == NEBEL_ERROR_FORMAT && data->fault[0] != '\0') return NEBEL_OK;
     if (result != NEBEL_OK || !takes_making(data)) return result;
-    if (is_glb(data->files->name)) result = read_chunk(data);
+    if (is_glb(data->files->name)) result = read_binary_chunk(data);
     if (result == NEBEL_OK) result = make(data, &list, made);
     nb_release(list.allocator, list.items);
     return result;
@@ -440,7 +434,7 @@ static bool begins_object(const nb_bytes *text)
 nebel_result nb_gltf_prepare_text(const nb_model_load *load, nb_model_files *files, nb_bytes *text, nb_gltf_files *made)
 {
     nb_gltf_data data = {.load = load, .files = files, .arena = {.allocator = load->allocator}, .text = *text};
-    const nebel_result result = begins_object(text) ? prepare(&data, made) : NEBEL_OK;
+    const nebel_result result = begins_object(text) ? prepare_gltf(&data, made) : NEBEL_OK;
     *text = (nb_bytes){0};
     nb_gltf_release_data(&data);
     return result;

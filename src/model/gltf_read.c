@@ -88,13 +88,8 @@ static nb_gltf_range find_range(const nb_json *json, const nb_json_node *object)
                            .size = (uint64_t)find_whole(json, object, "byteLength", 0)};
 }
 
-static bool fail_memory(nb_json *json, const nb_json_node *node)
-{
-    return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
-}
-
 /* One more of an array; NULL when memory is out. */
-static void *add(nb_gltf_data *data, void **array, size_t size, size_t *count, size_t *capacity)
+static void *add_element(nb_gltf_data *data, void **array, size_t size, size_t *count, size_t *capacity)
 {
     if (!nb_grow(&data->load->allocator, array, size, *count, capacity, *count + 1)) return NULL;
     void *fresh = (char *)*array + size * *count;
@@ -145,9 +140,9 @@ static bool take_buffer(nb_json *json, const nb_json_node *node, nb_gltf_data *d
 {
     const char *text = (const char *)data->text.data;
     void *buffers = data->buffers;
-    nb_gltf_buffer *buffer = add(data, &buffers, sizeof *buffer, &data->buffer_count, &data->buffer_capacity);
+    nb_gltf_buffer *buffer = add_element(data, &buffers, sizeof *buffer, &data->buffer_count, &data->buffer_capacity);
     data->buffers = buffers;
-    if (buffer == NULL) return fail_memory(json, node);
+    if (buffer == NULL) return nb_json_fail_memory(json, node);
     buffer->span = span_of(node);
     buffer->size = (uint64_t)find_whole(json, node, "byteLength", 0);
     buffer->is_fallback = is_true(json, find(json, find(json, node, "extensions"), MESHOPT), "fallback");
@@ -157,7 +152,7 @@ static bool take_buffer(nb_json *json, const nb_json_node *node, nb_gltf_data *d
     buffer->uri_size = uri->string_size;
     if (uri->string >= text && uri->string < text + data->text.size) return true;
     buffer->uri = nb_arena_copy_text(&data->arena, uri->string, uri->string_size);
-    return buffer->uri != NULL || fail_memory(json, node);
+    return buffer->uri != NULL || nb_json_fail_memory(json, node);
 }
 
 static bool take_packed(nb_json *json, const nb_json_node *node, const nb_gltf_data *data, nb_gltf_view *view)
@@ -186,9 +181,9 @@ static bool is_stride(uint64_t stride)
 static bool take_view(nb_json *json, const nb_json_node *node, nb_gltf_data *data)
 {
     void *views = data->views;
-    nb_gltf_view *view = add(data, &views, sizeof *view, &data->view_count, &data->view_capacity);
+    nb_gltf_view *view = add_element(data, &views, sizeof *view, &data->view_count, &data->view_capacity);
     data->views = views;
-    if (view == NULL) return fail_memory(json, node);
+    if (view == NULL) return nb_json_fail_memory(json, node);
     view->span = span_of(node);
     view->range = find_range(json, node);
     view->stride = (uint64_t)find_whole(json, node, "byteStride", 0);
@@ -219,9 +214,9 @@ static bool take_accessor(nb_json *json, const nb_json_node *node, nb_gltf_data 
     static const unsigned widths[] = {1, 2, 3, 4, 0, 0, 0}; /* matrices are no numbers of vertices */
     void *accessors = data->accessors;
     nb_gltf_accessor *accessor =
-        add(data, &accessors, sizeof *accessor, &data->accessor_count, &data->accessor_capacity);
+        add_element(data, &accessors, sizeof *accessor, &data->accessor_count, &data->accessor_capacity);
     data->accessors = accessors;
-    if (accessor == NULL) return fail_memory(json, node);
+    if (accessor == NULL) return nb_json_fail_memory(json, node);
     accessor->span = span_of(node);
     if (!is_whole(json, node, "byteOffset") || !is_whole(json, node, "count"))
         return nb_json_stop(json, nb_gltf_fail(data, "accessors", data->accessor_count - 1,
@@ -259,15 +254,15 @@ static bool take_attributes(nb_json *json, const nb_json_node *attributes, nb_gl
         if (!takes_floats(node) || node->type != NB_JSON_NUMBER || !(node->number >= 0 && node->number < UINT32_MAX))
             continue;
         void *list = data->attributes;
-        uint32_t *number = add(data, &list, sizeof *number, &data->attribute_count, &data->attribute_capacity);
+        uint32_t *number = add_element(data, &list, sizeof *number, &data->attribute_count, &data->attribute_capacity);
         data->attributes = list;
-        if (number == NULL) return fail_memory(json, node);
+        if (number == NULL) return nb_json_fail_memory(json, node);
         *number = (uint32_t)node->number;
     }
     return true;
 }
 
-static bool take_mesh(nb_json *json, const nb_json_node *mesh, nb_gltf_data *data)
+static bool take_gltf_mesh(nb_json *json, const nb_json_node *mesh, nb_gltf_data *data)
 {
     const nb_json_node *list = find(json, mesh, "primitives");
     const nb_json_node *node = list != NULL && list->type == NB_JSON_ARRAY ? nb_json_first(json, list) : NULL;
@@ -294,10 +289,10 @@ static bool take_skin(nb_json *json, const nb_json_node *skin, nb_gltf_data *dat
 
 /* ---- the text -------------------------------------------------------------------------------- */
 
-static const char *const streamed[] = {"buffers", "bufferViews", "accessors", "meshes",
-                                       "nodes",   "images",      "skins",     NULL};
+static const char *const streamed_names[] = {"buffers", "bufferViews", "accessors", "meshes",
+                                             "nodes",   "images",      "skins",     NULL};
 
-static bool take(nb_json *json, const nb_json_node *value, void *user)
+static bool take_gltf_value(nb_json *json, const nb_json_node *value, void *user)
 {
     nb_gltf_data *data = user;
     const nb_json_node *parent = nb_json_parent(json, value);
@@ -312,7 +307,7 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
     if (nb_json_has_key(parent, "bufferViews")) return take_view(json, value, data);
     if (nb_json_has_key(parent, "accessors")) return take_accessor(json, value, data);
     if (nb_json_has_key(parent, "skins")) return take_skin(json, value, data);
-    return !nb_json_has_key(parent, "meshes") || take_mesh(json, value, data);
+    return !nb_json_has_key(parent, "meshes") || take_gltf_mesh(json, value, data);
 }
 
 static void keep_fault(nebel_result result, const char *message, void *user)
@@ -332,8 +327,8 @@ nebel_result nb_gltf_read_data(nb_gltf_data *data)
                                .name = data->load->source->file,
                                .allocator = data->load->allocator,
                                .log = {keep_fault, data},
-                               .streamed = streamed,
-                               .take = take,
+                               .streamed = streamed_names,
+                               .take = take_gltf_value,
                                .user = data};
     const nebel_result result = nb_json_read(&json, &desc);
     if (result != NEBEL_OK) return result;

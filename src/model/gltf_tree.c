@@ -4,12 +4,7 @@
 #include <string.h>
 
 /* Parents of nodes that have none: those that the scene begins with, and those it does not show. */
-static const uint32_t root = UINT32_MAX, apart = UINT32_MAX - 1;
-
-static bool fail_memory(nb_json *json, const nb_json_node *node)
-{
-    return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
-}
+static const uint32_t scene_root = UINT32_MAX, apart = UINT32_MAX - 1;
 
 static bool add_link(nb_json *json, nb_gltf_links *links, const nb_json_node *node, size_t parent)
 {
@@ -18,7 +13,7 @@ static bool add_link(nb_json *json, nb_gltf_links *links, const nb_json_node *no
     static const nb_range range = {.low = 0, .high = UINT32_MAX - 2, .text = "the number of a node"};
     if (!nb_key_value_number(json, node, &range, &child)) return false;
     if (!nb_grow(&json->desc.allocator, &items, sizeof *links->items, links->count, &links->capacity, links->count + 1))
-        return fail_memory(json, node);
+        return nb_json_fail_memory(json, node);
     links->items = items;
     links->items[links->count++] = (nb_gltf_link){(uint32_t)parent, (uint32_t)child};
     return true;
@@ -70,7 +65,7 @@ static bool take_node(nb_json *json, const nb_json_node *node, nb_gltf_tree *tre
 {
     void *places = tree->places;
     if (!nb_grow(&tree->allocator, &places, sizeof *tree->places, tree->count, &tree->capacity, tree->count + 1))
-        return fail_memory(json, node);
+        return nb_json_fail_memory(json, node);
     tree->places = places;
     const size_t number = tree->count++;
     return read_place(json, node, &tree->places[number]) &&
@@ -86,7 +81,7 @@ static bool take_scenes(nb_json *json, const nb_json_node *scenes, nb_gltf_tree 
 }
 
 /* Only nodes are streamed: their tree is no child of the root object, the others are. */
-static bool take(nb_json *json, const nb_json_node *value, void *user)
+static bool take_node_value(nb_json *json, const nb_json_node *value, void *user)
 {
     nb_gltf_tree *tree = user;
     const nb_json_node *parent = nb_json_parent(json, value);
@@ -101,12 +96,12 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
 static void hang_up(nb_gltf_tree *tree)
 {
     const nb_gltf_links *children = &tree->children, *roots = &tree->roots;
-    for (size_t i = 0; i < tree->count; i++) tree->parents[i] = roots->count > 0 ? apart : root;
+    for (size_t i = 0; i < tree->count; i++) tree->parents[i] = roots->count > 0 ? apart : scene_root;
     for (size_t i = 0; i < children->count; i++)
         if (children->items[i].child < tree->count) tree->parents[children->items[i].child] = children->items[i].parent;
     for (size_t i = 0; i < roots->count; i++)
         if ((double)roots->items[i].parent == tree->scene && roots->items[i].child < tree->count)
-            tree->parents[roots->items[i].child] = root;
+            tree->parents[roots->items[i].child] = scene_root;
 }
 
 /* Takes the nodes of a way up from their parents' coordinates to the world's, the uppermost first. */
@@ -115,7 +110,7 @@ static void place_path(nb_gltf_tree *tree, const uint32_t *path, size_t count, b
     for (size_t i = count; i > 0; i--) {
         const uint32_t node = path[i - 1];
         if (is_shown) tree->places[node] = nb_affine_compose(&tree->places[tree->parents[node]], &tree->places[node]);
-        tree->parents[node] = is_shown ? root : apart;
+        tree->parents[node] = is_shown ? scene_root : apart;
     }
 }
 
@@ -128,11 +123,11 @@ static bool place_all(nb_gltf_tree *tree)
     for (size_t i = 0; i < tree->count; i++) {
         size_t count = 0;
         uint32_t at = (uint32_t)i;
-        while (tree->parents[at] != root && tree->parents[at] != apart && count < tree->count) {
+        while (tree->parents[at] != scene_root && tree->parents[at] != apart && count < tree->count) {
             path[count++] = at;
             at = tree->parents[at];
         }
-        place_path(tree, path, count, tree->parents[at] == root);
+        place_path(tree, path, count, tree->parents[at] == scene_root);
     }
     nb_release(&tree->allocator, path);
     return true;
@@ -145,7 +140,7 @@ nebel_result nb_gltf_read_tree(const nb_json_desc *desc, nb_gltf_tree *tree)
     nb_json_desc own = *desc;
     *tree = (nb_gltf_tree){.allocator = desc->allocator};
     own.streamed = streamed;
-    own.take = take;
+    own.take = take_node_value;
     own.user = tree;
     const nebel_result result = nb_json_read(&json, &own);
     if (result != NEBEL_OK) return result;
@@ -166,5 +161,5 @@ void nb_gltf_release_tree(nb_gltf_tree *tree)
 bool nb_gltf_find_place(const nb_gltf_tree *tree, size_t node, nb_affine *place)
 {
     *place = tree->places[node];
-    return tree->parents[node] == root;
+    return tree->parents[node] == scene_root;
 }

@@ -7,7 +7,7 @@ static double height_at(const nb_heights *map, const nb_model_source *source, ui
 }
 
 /* The picture's top row is the far edge, -z. */
-static void place_vertices(const nb_heights *map, const nb_model_source *source, float *positions)
+static void place_grid_vertices(const nb_heights *map, const nb_model_source *source, float *positions)
 {
     for (uint32_t z = 0; z < map->height; z++)
         for (uint32_t x = 0; x < map->width; x++) {
@@ -42,7 +42,7 @@ static void place_normals(const nb_heights *map, const nb_model_source *source, 
 }
 
 /* Counter-clockwise seen from above. */
-static void place_triangles(const nb_heights *map, uint32_t *indices)
+static void place_grid_triangles(const nb_heights *map, uint32_t *indices)
 {
     for (uint32_t z = 0; z + 1 < map->height; z++)
         for (uint32_t x = 0; x + 1 < map->width; x++) {
@@ -52,7 +52,7 @@ static void place_triangles(const nb_heights *map, uint32_t *indices)
         }
 }
 
-static nebel_result build(const nb_model_load *load, const nb_heights *map)
+static nebel_result build_heightfield(const nb_model_load *load, const nb_heights *map)
 {
     const nb_model_source *source = load->source;
     const uint64_t triangle_count = 2 * (uint64_t)(map->width - 1) * (map->height - 1);
@@ -70,9 +70,9 @@ static nebel_result build(const nb_model_load *load, const nb_heights *map)
         nb_mesh_release(&load->allocator, &mesh);
         return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
     }
-    place_vertices(map, source, (float *)mesh.positions);
+    place_grid_vertices(map, source, (float *)mesh.positions);
     place_normals(map, source, (float *)mesh.normals);
-    place_triangles(map, (uint32_t *)mesh.indices);
+    place_grid_triangles(map, (uint32_t *)mesh.indices);
     for (int i = 0; i < 3; i++) {
         mesh.origin[i] = source->position[i];
         mesh.base_color[i] = source->has_color ? (float)source->color[i] : 0.5f;
@@ -81,7 +81,7 @@ static nebel_result build(const nb_model_load *load, const nb_heights *map)
 }
 
 /* The largest file of a height map. */
-#define FILE_LIMIT ((size_t)1 << 31)
+#define HEIGHT_FILE_LIMIT ((size_t)1 << 31)
 
 static nebel_result read_map(const nb_model_load *load, nb_heights *map)
 {
@@ -91,7 +91,7 @@ static nebel_result read_map(const nb_model_load *load, nb_heights *map)
         .allocator = load->allocator, .log = nb_note_log(&note), .name = file, .room = nb_model_room(load)};
     nb_bytes bytes;
     nebel_result result =
-        nb_file_read(&load->allocator, &load->log, load->source->where, "height map", file, FILE_LIMIT, &bytes);
+        nb_file_read(&load->allocator, &load->log, load->source->where, "height map", file, HEIGHT_FILE_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
     if (!nb_png_is(&bytes))
         result = nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" is not a PNG picture", file);
@@ -110,7 +110,7 @@ nebel_result nb_heightfield_load(const nb_model_load *load)
         result = nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" has %lu x %lu pixels; a height map needs 2 x 2",
                                load->source->file, (unsigned long)map.width, (unsigned long)map.height);
     else
-        result = build(load, &map);
+        result = build_heightfield(load, &map);
     nb_release(&load->allocator, map.values);
     return result;
 }

@@ -1,6 +1,8 @@
 #define _POSIX_C_SOURCE 200809L
 #include "model_budget.h"
 
+#include <time.h>
+
 /* The most that files count together. */
 static const uint64_t max_bytes = (uint64_t)1 << 36;
 
@@ -54,4 +56,11 @@ unsigned nb_budget_cpu_seconds(const nb_budget *budget)
 unsigned nb_budget_wall_seconds(const nb_budget *budget)
 {
     return nb_budget_cpu_seconds(budget) + spare_seconds;
+}
+
+double nb_budget_now(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }

@@ -42,4 +42,7 @@ bool nb_budget_is_cut(const nb_budget *budget);           /* the scene has less 
 unsigned nb_budget_cpu_seconds(const nb_budget *budget);  /* of processor time */
 unsigned nb_budget_wall_seconds(const nb_budget *budget); /* more than of processor time */
 
+/* Seconds of a clock that is never set. */
+double nb_budget_now(void);
+
 #endif

@@ -45,7 +45,7 @@ void nb_model_files_end(nb_model_files *files)
 
 /* ---- names ----------------------------------------------------------------------------------- */
 
-static int digit(char c)
+static int hex_digit(char c)
 {
     if (c >= '0' && c <= '9') return c - '0';
     if (c >= 'a' && c <= 'f') return c - 'a' + 10;
@@ -57,7 +57,7 @@ bool nb_model_files_decode(const char *text, char *decoded)
 {
     bool found = false;
     while (*text != '\0') {
-        const int high = text[0] == '%' ? digit(text[1]) : -1, low = high >= 0 ? digit(text[2]) : -1;
+        const int high = text[0] == '%' ? hex_digit(text[1]) : -1, low = high >= 0 ? hex_digit(text[2]) : -1;
         const bool encoded = low >= 0 && high + low > 0;
         *decoded++ = encoded ? (char)(high * 16 + low) : *text;
         text += encoded ? 3 : 1;
@@ -118,7 +118,7 @@ static int refuse(nb_model_files *files, nb_refusal refusal, const char *path)
     return -1;
 }
 
-static void tell(const nb_model_files *files, const char *path, bool is_model, const struct stat *status)
+static void tell_opened(const nb_model_files *files, const char *path, bool is_model, const struct stat *status)
 {
     char joined[PATH_SIZE];
     if (files->opened == NULL) return;
@@ -155,7 +155,7 @@ static int open_regular(nb_model_files *files, const char *path)
         close(file);
         return refuse(files, NB_REFUSAL_SPECIAL, path);
     }
-    tell(files, is_model ? files->file : inside, is_model, &status);
+    tell_opened(files, is_model ? files->file : inside, is_model, &status);
     return file;
 }
 

@@ -282,7 +282,7 @@ static nebel_result fail_time(const nb_model_load *load, const nb_budget *budget
                          load->source->file, seconds);
 }
 
-static nebel_result fail_memory(const nb_model_load *load, const nb_budget *budget)
+static nebel_result fail_budget(const nb_model_load *load, const nb_budget *budget)
 {
     return nb_model_fail(load, NEBEL_ERROR_LIMIT, "reading the model \"%s\" takes more than %llu MB of memory; " REMEDY,
                          load->source->file, (unsigned long long)nb_budget_memory(budget) / 1000000);
@@ -305,13 +305,13 @@ static nebel_result judge(const nb_receiver *received, nb_receipt receipt, int s
     const nb_model_load *load = received->load;
     switch (receipt) {
     case NB_RECEIPT_WHOLE:
-        return received->result == NEBEL_ERROR_MEMORY ? fail_memory(load, received->budget) : received->result;
+        return received->result == NEBEL_ERROR_MEMORY ? fail_budget(load, received->budget) : received->result;
     case NB_RECEIPT_CUT:
         return fail_cut(load, received->budget, status);
     case NB_RECEIPT_LATE:
         return fail_time(load, received->budget);
     case NB_RECEIPT_TOO_BIG:
-        return fail_memory(load, received->budget);
+        return fail_budget(load, received->budget);
     case NB_RECEIPT_VERSION:
         return nb_model_fail(load, NEBEL_ERROR_FILE,
                              "cannot read the model \"%s\": \"%s\" belongs to another version of nebel; install both "

@@ -10,7 +10,7 @@
 #include <string.h>
 #include <time.h>
 
-static nebel_result fail_memory(const nb_model_load *load)
+static nebel_result fail_load_memory(const nb_model_load *load)
 {
     return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
 }
@@ -41,23 +41,23 @@ static nebel_result find_name(const nb_model_load *load, nb_arena *scratch, cons
     }
     const size_t length = strlen(rest);
     char *below = nb_arena_allocate(scratch, length + 2, 1);
-    if (below == NULL) return fail_memory(load);
+    if (below == NULL) return fail_load_memory(load);
     memcpy(below, rest, length);
     below[length] = '/';
     placed->name = nb_path_join(scratch, below, name);
-    return placed->name != NULL ? NEBEL_OK : fail_memory(load);
+    return placed->name != NULL ? NEBEL_OK : fail_load_memory(load);
 }
 
 static nebel_result place(nb_model_load *load, nb_arena *scratch)
 {
     const char *file = load->source->file, *own = nb_path_folder(scratch, file);
-    if (own == NULL) return fail_memory(load);
+    if (own == NULL) return fail_load_memory(load);
     load->folder = load->source->folder != NULL ? load->source->folder : own;
     load->name = nb_path_name(file);
     return load->source->folder != NULL ? find_name(load, scratch, own, load) : NEBEL_OK;
 }
 
-static nebel_result read_file(const nb_model_load *load)
+static nebel_result read_model_file(const nb_model_load *load)
 {
     nb_arena scratch = {.allocator = load->allocator};
     nb_model_load placed = *load;
@@ -68,24 +68,17 @@ static nebel_result read_file(const nb_model_load *load)
     return result;
 }
 
-static double now(void)
-{
-    struct timespec time;
-    clock_gettime(CLOCK_MONOTONIC, &time);
-    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-}
-
 /* One after the other models could take any time, each within its own limit. */
 nebel_result nb_model_read(const nb_model_load *load)
 {
-    const double begin = now();
+    const double begin = nb_budget_now();
     if (load->seconds != NULL && *load->seconds >= load->most_seconds && !NB_SANITIZED)
         return nb_model_fail(
             load, NEBEL_ERROR_LIMIT,
             "the model \"%s\" is not read any more: the scene has taken %.0f s of preparation, the most "
             "with its memory (nebel: --memory)",
             load->source->file, *load->seconds);
-    const nebel_result result = load->source->is_heightfield ? nb_heightfield_load(load) : read_file(load);
-    if (load->seconds != NULL) *load->seconds += now() - begin;
+    const nebel_result result = load->source->is_heightfield ? nb_heightfield_load(load) : read_model_file(load);
+    if (load->seconds != NULL) *load->seconds += nb_budget_now() - begin;
     return result;
 }

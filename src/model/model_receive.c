@@ -32,18 +32,11 @@ static void hint_large(void *memory, size_t size)
 
 /* ---- bytes ----------------------------------------------------------------------------------- */
 
-static double now(void)
-{
-    struct timespec time;
-    clock_gettime(CLOCK_MONOTONIC, &time);
-    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-}
-
 /* Until there is something to read, or the time is over. */
 static nb_receipt await(const nb_receiver *in)
 {
     for (;;) {
-        const double left = in->start + nb_budget_wall_seconds(in->budget) - now();
+        const double left = in->start + nb_budget_wall_seconds(in->budget) - nb_budget_now();
         struct pollfd wanted = {.fd = in->file, .events = POLLIN};
         if (!(left > 0)) return NB_RECEIPT_LATE;
         const int count = poll(&wanted, 1, left < 1e6 ? (int)(left * 1000) + 1 : 1000000);
@@ -189,7 +182,7 @@ static bool is_texture(const nb_receiver *in, int32_t index)
     return index >= -1 && (index < 0 || (size_t)index < in->load->set->texture_count);
 }
 
-static bool check_head(const nb_receiver *in, const nb_wire_mesh *head)
+static bool check_received_head(const nb_receiver *in, const nb_wire_mesh *head)
 {
     bool good = head->vertex_count > 0 && head->triangle_count > 0 && head->triangle_count <= NB_MAX_TRIANGLES &&
                 head->has_uvs <= 1 && is_texture(in, head->texture) && is_texture(in, head->mask);
@@ -198,7 +191,7 @@ static bool check_head(const nb_receiver *in, const nb_wire_mesh *head)
     return good && (head->has_uvs != 0) == (head->texture >= 0 || head->mask >= 0);
 }
 
-static bool check_mesh(const nebel_mesh *mesh)
+static bool check_received_mesh(const nebel_mesh *mesh)
 {
     const size_t vertices = mesh->vertex_count;
     return are_finite(mesh->positions, 3 * vertices) && are_finite(mesh->normals, 3 * vertices) &&
@@ -218,10 +211,10 @@ static nb_receipt take_arrays(const nb_receiver *in, nebel_mesh *mesh)
     if (receipt == NB_RECEIPT_WHOLE && mesh->uvs != NULL)
         receipt = take_bytes(in, (void *)mesh->uvs, 2 * sizeof(float) * vertices);
     if (receipt == NB_RECEIPT_WHOLE) receipt = take_bytes(in, (void *)mesh->indices, sizeof(uint32_t) * corners);
-    return receipt == NB_RECEIPT_WHOLE && !check_mesh(mesh) ? NB_RECEIPT_BAD : receipt;
+    return receipt == NB_RECEIPT_WHOLE && !check_received_mesh(mesh) ? NB_RECEIPT_BAD : receipt;
 }
 
-static nb_receipt take_mesh(nb_receiver *in, const nb_wire_frame *frame)
+static nb_receipt take_received_mesh(nb_receiver *in, const nb_wire_frame *frame)
 {
     const nb_model_load *load = in->load;
     const nebel_allocator *allocator = &load->allocator;
@@ -231,7 +224,7 @@ static nb_receipt take_mesh(nb_receiver *in, const nb_wire_frame *frame)
     if (receipt != NB_RECEIPT_WHOLE) return receipt;
     const uint64_t size = (head.has_uvs != 0 ? 8 : 6) * sizeof(float) * (uint64_t)head.vertex_count +
                           3 * sizeof(uint32_t) * (uint64_t)head.triangle_count;
-    if (!check_head(in, &head) || frame->size != sizeof head + size) return NB_RECEIPT_BAD;
+    if (!check_received_head(in, &head) || frame->size != sizeof head + size) return NB_RECEIPT_BAD;
     if (!fits(in, size)) return NB_RECEIPT_TOO_BIG;
     in->result = nb_model_check_room(load, nb_mesh_bytes(head.vertex_count, head.has_uvs != 0, head.triangle_count));
     if (in->result != NEBEL_OK) return NB_RECEIPT_REFUSED;
@@ -301,7 +294,7 @@ static nb_receipt take_frame(nb_receiver *in, const nb_wire_frame *frame)
     case NB_WIRE_TEXTURE:
         return take_texture(in, frame);
     case NB_WIRE_MESH:
-        return take_mesh(in, frame);
+        return take_received_mesh(in, frame);
     case NB_WIRE_PLACES:
         return take_places(in, frame);
     case NB_WIRE_END:
@@ -314,7 +307,7 @@ static nb_receipt take_frame(nb_receiver *in, const nb_wire_frame *frame)
 nb_receipt nb_model_receive(nb_receiver *in)
 {
     nb_wire_frame frame;
-    in->start = now();
+    in->start = nb_budget_now();
     nb_receipt receipt = take_bytes(in, &frame, sizeof frame);
     if (receipt == NB_RECEIPT_WHOLE && (frame.type != NB_WIRE_HELLO || frame.size != 0)) return NB_RECEIPT_BAD;
     if (receipt == NB_RECEIPT_WHOLE && frame.code != NB_WIRE_VERSION) return NB_RECEIPT_VERSION;

@@ -84,14 +84,14 @@ static void load(program *rules, size_t offset)
     add(rules, BPF_LD | BPF_W | BPF_ABS, (uint32_t)offset, 0, 0);
 }
 
-static void answer(program *rules, uint32_t action)
+static void add_answer(program *rules, uint32_t action)
 {
     add(rules, BPF_RET | BPF_K, action, 0, 0);
 }
 
 static void deny(program *rules)
 {
-    answer(rules, SECCOMP_RET_ERRNO | EPERM);
+    add_answer(rules, SECCOMP_RET_ERRNO | EPERM);
 }
 
 /* A call that is fine with one first argument only, whose upper half is 0. */
@@ -100,7 +100,7 @@ static void allow_for(program *rules, unsigned number, uint32_t argument)
     add(rules, BPF_JMP | BPF_JEQ | BPF_K, number, 0, 4);
     load(rules, offsetof(struct seccomp_data, args));
     add(rules, BPF_JMP | BPF_JEQ | BPF_K, argument, 0, 1);
-    answer(rules, SECCOMP_RET_ALLOW);
+    add_answer(rules, SECCOMP_RET_ALLOW);
     deny(rules);
 }
 
@@ -110,7 +110,7 @@ void nb_confine_calls(void)
     if (NB_SANITIZED) return;
     load(&rules, offsetof(struct seccomp_data, arch));
     add(&rules, BPF_JMP | BPF_JEQ | BPF_K, ARCHITECTURE, 1, 0);
-    answer(&rules, SECCOMP_RET_KILL_PROCESS);
+    add_answer(&rules, SECCOMP_RET_KILL_PROCESS);
     load(&rules, offsetof(struct seccomp_data, nr));
     add(&rules, BPF_JMP | BPF_JGE | BPF_K, OTHER_INTERFACE, 0, 1);
     deny(&rules);
@@ -121,7 +121,7 @@ void nb_confine_calls(void)
     allow_for(&rules, SYS_tgkill, (uint32_t)getpid()); /* abort() */
     load(&rules, offsetof(struct seccomp_data, nr));
     allow_for(&rules, SYS_prlimit64, 0);
-    answer(&rules, SECCOMP_RET_ALLOW);
+    add_answer(&rules, SECCOMP_RET_ALLOW);
     const struct sock_fprog whole = {rules.count, rules.lines};
     if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0) prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &whole);
 }

@@ -98,8 +98,8 @@ static nebel_result read_exr(const nb_codec *codec, const nb_bytes *bytes, const
     return result;
 }
 
-static nebel_result read_numbers(const nb_codec *codec, const nb_bytes *bytes, const char *channel,
-                                 nb_depth_numbers *numbers)
+static nebel_result read_depth_numbers(const nb_codec *codec, const nb_bytes *bytes, const char *channel,
+                                       nb_depth_numbers *numbers)
 {
     if (nb_png_is(bytes)) return read_png(codec, bytes, numbers);
     if (nb_exr_is(bytes)) return read_exr(codec, bytes, channel, numbers);
@@ -151,7 +151,7 @@ static float meters_of_float(const rule *r, float number)
     return (double)meters >= ENDLESS ? INFINITY : meters;
 }
 
-static nebel_result convert(const nb_codec *codec, const nb_depth_numbers *numbers, const rule *r, float *depth)
+static nebel_result convert_depth(const nb_codec *codec, const nb_depth_numbers *numbers, const rule *r, float *depth)
 {
     enum { SHORTS = 65536 };
     const size_t count = (size_t)numbers->width * numbers->height;
@@ -253,7 +253,7 @@ static nebel_result make_map(const nb_codec *codec, const nb_depth_numbers *numb
                                                                         : NEBEL_PIXEL_DEPTH_AXIAL};
     map->depth = nb_allocate(&codec->allocator, (size_t)map->width * map->height, sizeof *map->depth);
     if (map->depth == NULL) return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", codec->name);
-    const nebel_result result = convert(codec, numbers, r, map->depth);
+    const nebel_result result = convert_depth(codec, numbers, r, map->depth);
     return result == NEBEL_OK ? count_known(codec, map) : result;
 }
 
@@ -267,7 +267,7 @@ static nebel_result read_map(const nb_codec *codec, const nebel_depth_source *so
     if (result == NEBEL_OK)
         result = nb_file_read(&codec->allocator, &codec->log, NULL, "depth", codec->name, NB_FILE_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
-    result = read_numbers(codec, &bytes, source->channel, &numbers);
+    result = read_depth_numbers(codec, &bytes, source->channel, &numbers);
     nb_release(&codec->allocator, bytes.data);
     if (result == NEBEL_OK) result = check_files(codec, format, source, &numbers);
     if (result == NEBEL_OK) result = make_map(codec, &numbers, &r, map);

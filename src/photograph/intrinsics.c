@@ -45,7 +45,7 @@ static const char *end_of_number(const char *at)
 }
 
 /* Up to `most` numbers from `at` to `end`, with nothing else between them; -1: something else stands there. */
-static int read_numbers(const intrinsics_reader *in, const char *at, const char *end, int most, double *numbers)
+static int read_number_list(const intrinsics_reader *in, const char *at, const char *end, int most, double *numbers)
 {
     int count = 0;
     for (;; count++) {
@@ -73,7 +73,7 @@ static const char *find_line(const intrinsics_reader *in, const char *word, cons
     return NULL;
 }
 
-static nebel_result fail(const intrinsics_reader *in, const char *what)
+static nebel_result fail_intrinsics(const intrinsics_reader *in, const char *what)
 {
     return nb_fail(&in->codec->log, NEBEL_ERROR_FORMAT, "%s: not a camera: %s", in->codec->name, what);
 }
@@ -88,14 +88,15 @@ static void take_matrix(const double *m, int columns, nebel_intrinsics *camera)
 static nebel_result read_plain(const intrinsics_reader *in, nebel_intrinsics *camera)
 {
     double m[MOST_NUMBERS];
-    const int count = read_numbers(in, in->text, in->text + in->size, MOST_NUMBERS, m);
+    const int count = read_number_list(in, in->text, in->text + in->size, MOST_NUMBERS, m);
     if (count == 9 || count == 16) {
         take_matrix(m, count == 9 ? 3 : 4, camera);
         return NEBEL_OK;
     }
     if (count != 4 && count != 5)
-        return fail(in, "write fx fy cx cy and nothing else, or give JSON of Cityscapes, a calib.txt of KITTI or "
-                        "YAML of OpenCV");
+        return fail_intrinsics(
+            in, "write fx fy cx cy and nothing else, or give JSON of Cityscapes, a calib.txt of KITTI or "
+                "YAML of OpenCV");
     *camera = (nebel_intrinsics){m[0], m[1], m[2], m[3], count == 5 ? m[4] : 0};
     return NEBEL_OK;
 }
@@ -107,10 +108,10 @@ static nebel_result read_kitti(const intrinsics_reader *in, const char *left, co
 {
     double m[12], other[12];
     const char *end, *at = find_line(in, left, &end);
-    if (at == NULL || read_numbers(in, at, end, 12, m) != 12) return fail(in, "P2 must have 12 numbers");
+    if (at == NULL || read_number_list(in, at, end, 12, m) != 12) return fail_intrinsics(in, "P2 must have 12 numbers");
     take_matrix(m, 4, camera);
     at = find_line(in, right, &end);
-    if (at != NULL && read_numbers(in, at, end, 12, other) == 12 && m[0] > 0)
+    if (at != NULL && read_number_list(in, at, end, 12, other) == 12 && m[0] > 0)
         camera->baseline = fmax(0, (m[3] - other[3]) / m[0]);
     return NEBEL_OK;
 }
@@ -122,8 +123,8 @@ static nebel_result read_yaml(const intrinsics_reader *in, nebel_intrinsics *cam
     if (at == NULL) at = find_line(in, "K:", &line_end);
     const char *data = at != NULL ? strstr(at, "data:") : NULL;
     const char *open = data != NULL ? strchr(data, '[') : NULL, *close = open != NULL ? strchr(open, ']') : NULL;
-    if (close == NULL || read_numbers(in, open, close, 9, m) != 9)
-        return fail(in, "camera_matrix must have data of 9 numbers");
+    if (close == NULL || read_number_list(in, open, close, 9, m) != 9)
+        return fail_intrinsics(in, "camera_matrix must have data of 9 numbers");
     take_matrix(m, 3, camera);
     return NEBEL_OK;
 }
@@ -171,7 +172,7 @@ static nebel_result read_cityscapes(const intrinsics_reader *in, nebel_intrinsic
                                .user = &all};
     const nebel_result result = nb_json_read(&json, &desc);
     if (result != NEBEL_OK) return result;
-    if ((all.found & 15) != 15) return fail(in, "JSON needs intrinsic with fx, fy, u0 and v0");
+    if ((all.found & 15) != 15) return fail_intrinsics(in, "JSON needs intrinsic with fx, fy, u0 and v0");
     *camera = all.camera;
     return NEBEL_OK;
 }
@@ -207,7 +208,8 @@ static nebel_result read_checked(const nb_codec *codec, const nb_bytes *bytes, n
     nebel_result result = NEBEL_ERROR_MEMORY;
     if (in.text != NULL && in.c_locale != (locale_t)0) {
         memcpy((char *)in.text, bytes->data, bytes->size);
-        result = memchr(in.text, '\0', in.size) == NULL ? read_text(&in, camera) : fail(&in, "it is no text");
+        result =
+            memchr(in.text, '\0', in.size) == NULL ? read_text(&in, camera) : fail_intrinsics(&in, "it is no text");
         const char *fault = result == NEBEL_OK ? fault_of(camera) : NULL;
         if (fault != NULL) result = nb_fail(&codec->log, NEBEL_ERROR_VALUE, "%s: %s", codec->name, fault);
     } else {

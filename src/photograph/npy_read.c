@@ -18,7 +18,7 @@ bool nb_npy_is(const nb_bytes *bytes)
     return bytes->size >= 10 && memcmp(bytes->data, "\x93NUMPY", 6) == 0;
 }
 
-static nebel_result fail(const nb_codec *codec, const char *what)
+static nebel_result fail_npy(const nb_codec *codec, const char *what)
 {
     return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: not a good NPY: %s", codec->name, what);
 }
@@ -62,15 +62,15 @@ static bool read_shape(const char *at, header *head)
 static nebel_result read_dictionary(const nb_codec *codec, const char *text, header *head)
 {
     const char *type = find_key(text, "'descr'"), *order = find_key(text, "'fortran_order'");
-    if (type == NULL || order == NULL || *type != '\'') return fail(codec, "its header is not understood");
+    if (type == NULL || order == NULL || *type != '\'') return fail_npy(codec, "its header is not understood");
     const size_t size = strcspn(type + 1, "'");
-    if (size >= sizeof head->type) return fail(codec, "its numbers have names; save one array of numbers");
+    if (size >= sizeof head->type) return fail_npy(codec, "its numbers have names; save one array of numbers");
     memcpy(head->type, type + 1, size);
     head->type[size] = '\0';
     if (strncmp(order, "False", 5) != 0)
-        return fail(codec, "it is in Fortran's order; save numpy.ascontiguousarray of it");
+        return fail_npy(codec, "it is in Fortran's order; save numpy.ascontiguousarray of it");
     if (!read_shape(find_key(text, "'shape'"), head))
-        return fail(codec, "depth has two dimensions, rows and columns; save array.squeeze()");
+        return fail_npy(codec, "depth has two dimensions, rows and columns; save array.squeeze()");
     return NEBEL_OK;
 }
 
@@ -79,10 +79,10 @@ static nebel_result read_header(const nb_codec *codec, const nb_bytes *bytes, he
     char text[MOST_HEADER + 1];
     const unsigned char *b = bytes->data;
     const size_t start = b[6] == 1 ? 10 : 12;
-    if (bytes->size < start) return fail(codec, "the file ends too early");
+    if (bytes->size < start) return fail_npy(codec, "the file ends too early");
     const size_t size = b[6] == 1 ? (size_t)b[8] | (size_t)b[9] << 8
                                   : (size_t)b[8] | (size_t)b[9] << 8 | (size_t)b[10] << 16 | (size_t)b[11] << 24;
-    if (size > MOST_HEADER || size > bytes->size - start) return fail(codec, "its header is too long");
+    if (size > MOST_HEADER || size > bytes->size - start) return fail_npy(codec, "its header is too long");
     memcpy(text, b + start, size);
     text[size] = '\0';
     head->data = start + size;
@@ -107,7 +107,7 @@ static float float_of_double(const unsigned char *at)
     return (float)number;
 }
 
-static void convert(const nb_bytes *bytes, const header *head, size_t size, nb_depth_numbers *numbers)
+static void convert_npy(const nb_bytes *bytes, const header *head, size_t size, nb_depth_numbers *numbers)
 {
     const unsigned char *at = bytes->data + head->data;
     for (size_t i = 0; i < head->width * head->height; i++, at += size) {
@@ -134,8 +134,8 @@ nebel_result nb_npy_read(const nb_codec *codec, const nb_bytes *bytes, nb_depth_
         result = nb_depth_allocate(codec, head.width, head.height, types[i].files, numbers);
         if (result != NEBEL_OK) return result;
         if ((bytes->size - head.data) / types[i].size / head.width < head.height)
-            return fail(codec, "the file ends too early");
-        convert(bytes, &head, types[i].size, numbers);
+            return fail_npy(codec, "the file ends too early");
+        convert_npy(bytes, &head, types[i].size, numbers);
         return NEBEL_OK;
     }
     return nb_fail(&codec->log, NEBEL_ERROR_UNSUPPORTED,

@@ -11,7 +11,7 @@ bool nb_pfm_is(const nb_bytes *bytes)
            isspace(bytes->data[2]);
 }
 
-static nebel_result fail(const nb_codec *codec, const char *what)
+static nebel_result fail_pfm(const nb_codec *codec, const char *what)
 {
     return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: not a good PFM: %s", codec->name, what);
 }
@@ -58,15 +58,15 @@ nebel_result nb_pfm_read(const nb_codec *codec, const nb_bytes *bytes, nb_depth_
 {
     char width[32], height[32], scale[32];
     size_t at = 3;
-    if (bytes->data[1] == 'F') return fail(codec, "it is a picture in color; depth is \"Pf\", one number a pixel");
+    if (bytes->data[1] == 'F') return fail_pfm(codec, "it is a picture in color; depth is \"Pf\", one number a pixel");
     read_word(bytes, &at, width);
     read_word(bytes, &at, height);
     read_word(bytes, &at, scale);
     const uint64_t w = whole_of(width), h = whole_of(height);
-    if (w == 0 || h == 0 || !is_scale(scale)) return fail(codec, "its header has no width, height and scale");
+    if (w == 0 || h == 0 || !is_scale(scale)) return fail_pfm(codec, "its header has no width, height and scale");
     const nebel_result result = nb_depth_allocate(codec, w, h, NEBEL_DEPTH_FILES_FLOAT, numbers);
     if (result != NEBEL_OK) return result;
-    if (bytes->size - at < w * h * sizeof(float)) return fail(codec, "the file ends too early");
+    if (bytes->size - at < w * h * sizeof(float)) return fail_pfm(codec, "the file ends too early");
     for (size_t y = 0; y < h; y++)
         for (size_t x = 0; x < w; x++)
             numbers->floats[(h - 1 - y) * w + x] = read_float(bytes->data + at + (y * w + x) * 4, scale[0] == '-');

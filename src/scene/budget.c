@@ -107,7 +107,7 @@ static const nb_json_node *find(const nb_json *json, const nb_json_node *object,
     return node;
 }
 
-static bool is_zero(const nb_json *json, const nb_json_node *object, const char *key)
+static bool is_zero_member(const nb_json *json, const nb_json_node *object, const char *key)
 {
     const nb_json_node *node = find(json, object, key);
     if (node == NULL || node->type == NB_JSON_NUMBER) return node == NULL || node->number == 0;
@@ -119,7 +119,8 @@ static bool is_zero(const nb_json *json, const nb_json_node *object, const char 
 bool nb_scene_charge_noise(nb_scene_reader *in, const nb_json_node *density)
 {
     const nb_json_node *size = find(in->json, density, "size"), *octaves = find(in->json, density, "octaves");
-    const double grids = is_zero(in->json, density, "velocity") && is_zero(in->json, density, "evolution") ? 1 : 2;
+    const double grids =
+        is_zero_member(in->json, density, "velocity") && is_zero_member(in->json, density, "evolution") ? 1 : 2;
     double voxels = grids;
     if (size == NULL) return true;
     for (const nb_json_node *at = nb_json_first(in->json, size); at != NULL; at = nb_json_next(in->json, at))

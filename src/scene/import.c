@@ -53,7 +53,8 @@ static bool check_placement(nb_json *json, const nb_json_node *node, const nb_im
            check(json, cause, "the scale", transform->scale, 3, &nb_range_factor);
 }
 
-static bool check_shape(nb_json *json, const nb_json_node *node, const nb_import_causes *from, const nebel_shape *shape)
+static bool check_imported_shape(nb_json *json, const nb_json_node *node, const nb_import_causes *from,
+                                 const nebel_shape *shape)
 {
     const nb_json_node *cause = nb_import_either(from->lengths, node);
     const bool has_radius =
@@ -73,7 +74,7 @@ static bool check_numbers(nb_json *json, const nb_json_node *node, const nb_impo
         const nebel_volume_desc *volume = &fog->volumes[i];
         if (!check_light(json, node, from, volume) || !check_density(json, node, from, &volume->density) ||
             !check_placement(json, node, from, &volume->shape.transform) ||
-            !check_shape(json, node, from, &volume->shape))
+            !check_imported_shape(json, node, from, &volume->shape))
             return false;
     }
     return true;

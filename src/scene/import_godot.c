@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-static const double ln2 = 0.69314718055994530942;
+#define LN2 0.69314718055994530942
 
 /* Color(r, g, b, a) holds sRGB values, also beyond 1. */
 static bool read_color(nb_json *json, const nb_json_node *node, const nb_range *range, double color[3])
@@ -128,7 +128,7 @@ static bool soften(nb_scene_reader *in, const nb_json_node *node, nebel_volume_d
 }
 
 /* Three rows of the basis, then the origin, as in a scene file. */
-static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transform *transform)
+static bool read_godot_transform(nb_json *json, const nb_json_node *node, nebel_transform *transform)
 {
     double numbers[12];
     nb_affine map;
@@ -159,7 +159,7 @@ bool nb_import_godot_fog_volume(nb_scene_reader *in, const nb_json_node *node, n
     if (!nb_key_value_members(json, node, &keys, found) ||
         !nb_key_value_integer(json, found[SHAPE], 0, WORLD, &shape) ||
         !nb_key_value_numbers(json, found[SIZE], &nb_range_extent, 3, size) ||
-        !read_transform(json, found[TRANSFORM], &volume->shape.transform) ||
+        !read_godot_transform(json, found[TRANSFORM], &volume->shape.transform) ||
         !nb_key_value_number(json, found[DENSITY], &nb_range_amount, &density) ||
         !read_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) ||
         !read_color(json, found[EMISSION], &nb_range_light, emission) ||
@@ -180,6 +180,6 @@ bool nb_import_godot_fog_volume(nb_scene_reader *in, const nb_json_node *node, n
                                         .placement = found[TRANSFORM]};
     fog->count = 1;
     if (falloff == 0) return soften(in, node, volume, edge_of(size, fade));
-    nb_import_set_height(volume, volume->shape.transform.position[1], 1 / (falloff * ln2), NEBEL_BELOW_CONSTANT);
+    nb_import_set_height(volume, volume->shape.transform.position[1], 1 / (falloff * LN2), NEBEL_BELOW_CONSTANT);
     return true;
 }

@@ -3,7 +3,9 @@
 
 #include <math.h>
 
-static const double ln2 = 0.69314718055994530942, centimetre = 0.01;
+#define LN2 0.69314718055994530942
+
+static const double centimetre = 0.01;
 
 /* As the engine's own glTF exporter does it, so that models exported from there fit. */
 static void convert_location(double location[3])
@@ -16,27 +18,27 @@ static void convert_location(double location[3])
 
 /* ---- height fog ------------------------------------------------------------------------------ */
 
-typedef struct layer {
+typedef struct height_layer {
     double density, falloff, offset; /* as the editor has them; cm */
     nb_import_causes causes;
-} layer;
+} height_layer;
 
 /* The shader's line integral over 2^(-f (z - h)) leaves out 1 / ln 2, and transmittance is 2 to the power of its
  * negative: the extinction is (ln 2)^2 times the density. Both settings are scaled by 1/1000 per cm, which is 1/10 per
  * m. */
-static void add_layer(nb_import *fog, const layer *from, double height, double start, const double color[3])
+static void add_layer(nb_import *fog, const height_layer *from, double height, double start, const double color[3])
 {
     if (from->density == 0) return;
     nebel_volume_desc *volume = &fog->volumes[fog->count];
     fog->causes[fog->count++] = from->causes;
-    *volume = nb_import_world(ln2 * ln2 * from->density / 10);
+    *volume = nb_import_world(LN2 * LN2 * from->density / 10);
     volume->start = start;
     if (from->falloff > 0)
-        nb_import_set_height(volume, height + centimetre * from->offset, 10 / (from->falloff * ln2), NEBEL_BELOW_GROW);
+        nb_import_set_height(volume, height + centimetre * from->offset, 10 / (from->falloff * LN2), NEBEL_BELOW_GROW);
     for (int c = 0; c < 3; c++) volume->source[c] = color[c];
 }
 
-static bool read_second(nb_json *json, const nb_json_node *node, layer *second)
+static bool read_second(nb_json *json, const nb_json_node *node, height_layer *second)
 {
     enum { DENSITY, FALLOFF, OFFSET, COUNT };
     static const char *const names[] = {"FogDensity", "FogHeightFalloff", "FogHeightOffset"};
@@ -62,7 +64,7 @@ bool nb_import_unreal_height_fog(nb_scene_reader *in, const nb_json_node *node, 
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     json->unit = centimetre;
-    layer first = {.density = 0.02, .falloff = 0.2}, second = {.falloff = 0.2};
+    height_layer first = {.density = 0.02, .falloff = 0.2}, second = {.falloff = 0.2};
     double color[3] = {0}, location[3] = {0}, start = 0, opacity = 1;
     if (!nb_key_value_members(json, node, &keys, found) ||
         !nb_key_value_number(json, found[DENSITY], &nb_range_light, &first.density) ||

@@ -80,3 +80,8 @@ nebel_result nebel_save_scene(const char *path, const nebel_scene_desc *desc, co
     nb_release(&allocator, save.targets);
     return result;
 }
+
+bool nb_key_patch_same_phase(const nebel_phase *a, const nebel_phase *b)
+{
+    return a->type == b->type && a->g == b->g && a->alpha == b->alpha && a->diameter == b->diameter;
+}

@@ -40,6 +40,8 @@ void nb_key_patch_object(nb_key_patch *save, const nb_json *json, const nb_json_
 void nb_key_patch_integer(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *object, const char *key,
                           double was, double now);
 
+bool nb_key_patch_same_phase(const nebel_phase *a, const nebel_phase *b);
+
 /* The same for a shape, `was` and `now` in metres, and for the density of a volume or nebula, in the file's numbers. */
 void nb_key_patch_shape(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, const nebel_shape *was,
                         const nebel_shape *now);

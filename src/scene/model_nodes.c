@@ -106,7 +106,7 @@ static bool read_text(nodes_reader *nodes, nb_json *json, const nb_json_node *te
     return result == NEBEL_OK || nb_json_stop(json, result);
 }
 
-static bool read_fog(nodes_reader *nodes, nb_json *json, const nb_json_node *extras, size_t number)
+static bool read_fog_node(nodes_reader *nodes, nb_json *json, const nb_json_node *extras, size_t number)
 {
     const nb_json_node *whole = find_member(json, extras, "nebel"), *flat = find_flat(json, extras);
     nb_fog_node node = {.name = nodes->name, .prefix = whole == NULL ? NB_NODE_PREFIX : ""};
@@ -129,14 +129,14 @@ static bool take_node(nodes_reader *nodes, nb_json *json, const nb_json_node *no
     const nb_json_node *extras = find_member(json, node, "extras"), *mesh = find_member(json, node, "mesh");
     if (extras == NULL || (find_flat(json, extras) == NULL && find_member(json, extras, "nebel") == NULL)) return true;
     set_name(nodes, json, node);
-    const bool good = mesh == NULL ? read_fog(nodes, json, extras, node->index)
+    const bool good = mesh == NULL ? read_fog_node(nodes, json, extras, node->index)
                                    : nb_json_fail(json, NEBEL_ERROR_FORMAT, extras,
                                                   "has fog and a mesh; fog belongs to a node without, an empty");
     nodes->name[0] = '\0';
     return good;
 }
 
-static bool take(nb_json *json, const nb_json_node *value, void *user)
+static bool take_model_value(nb_json *json, const nb_json_node *value, void *user)
 {
     nodes_reader *nodes = user;
     const nb_json_node *parent = nb_json_parent(json, value);
@@ -170,7 +170,7 @@ static nebel_result read_nodes(nodes_reader *nodes, const nb_bytes *text)
                                .allocator = nodes->in->scene->allocator,
                                .log = {pass_on, nodes},
                                .streamed = streamed,
-                               .take = take,
+                               .take = take_model_value,
                                .user = nodes};
     nebel_result result = nb_gltf_read_tree(&desc, &nodes->tree);
     if (result == NEBEL_OK) result = nb_json_read(&json, &desc);

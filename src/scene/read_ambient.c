@@ -51,7 +51,7 @@ static nebel_result keep_colors(const nb_codec *codec, nebel_image *image)
     return NEBEL_OK;
 }
 
-static nebel_result make_map(const nb_codec *codec, const nebel_image *image, nebel_environment_map **map)
+static nebel_result make_environment_map(const nb_codec *codec, const nebel_image *image, nebel_environment_map **map)
 {
     nb_note note = {""};
     const nebel_environment_map_desc desc = {.allocator = codec->allocator,
@@ -76,7 +76,7 @@ static nebel_result load_map(const nebel_scene *scene, const nebel_log *log, con
     nebel_result result = nb_image_read(&codec, &image);
     if (result != NEBEL_OK) return result;
     result = keep_colors(&codec, &image);
-    if (result == NEBEL_OK) result = make_map(&codec, &image, map);
+    if (result == NEBEL_OK) result = make_environment_map(&codec, &image, map);
     *bytes = (double)image.width * image.height * (double)sizeof(float[3]);
     nb_image_release(&scene->allocator, &image);
     return result;
@@ -85,11 +85,17 @@ static nebel_result load_map(const nebel_scene *scene, const nebel_log *log, con
 /* The core knows what intensity is too much for the brightest pixel. */
 static bool try_environment(nb_scene_reader *in, const nb_json_node *node, const nebel_environment *environment)
 {
-    const nebel_result result = nebel_set_environment(in->trial, environment);
+    nebel_snapshot *empty = NULL;
+    nebel_lighting *trial = NULL;
+    nebel_result result = nebel_commit_fog(in->trial, &empty);
+    if (result == NEBEL_OK)
+        result = nebel_create_lighting(empty, &(nebel_lighting_desc){.environment = *environment}, &trial);
+    nebel_release_lighting(trial);
+    nebel_release_snapshot(empty);
     return result == NEBEL_OK || nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "%s", in->core_message);
 }
 
-static bool read_file(nb_scene_reader *in, const nb_json_node *node, nebel_environment *environment)
+static bool read_map_file(nb_scene_reader *in, const nb_json_node *node, nebel_environment *environment)
 {
     nebel_scene *scene = in->scene;
     const char *path = "";
@@ -126,7 +132,7 @@ static bool read_map(nb_scene_reader *in, const nb_json_node *node, nebel_enviro
     return nb_key_value_members(in->json, node, &keys, found) &&
            nb_key_value_number(in->json, found[ROTATION], &rotation_range, &environment->rotation) &&
            nb_key_value_number(in->json, found[INTENSITY], &intensity_range, &environment->intensity) &&
-           read_file(in, found[FILE_KEY], environment) &&
+           read_map_file(in, found[FILE_KEY], environment) &&
            try_environment(in, found[INTENSITY] != NULL ? found[INTENSITY] : node, environment);
 }
 

@@ -1,16 +1,31 @@
 /* The sections "camera", its turntable and its keys. */
 #include "scene_data.h"
 
-enum { POSITION, LOOK_AT, UP, VERTICAL_FOV, VIEW_HEIGHT, PROJECTION, TURNTABLE, KEYS, FRAME, CAMERA_KEY_COUNT };
+enum {
+    CAMERA_POSITION,
+    CAMERA_LOOK_AT,
+    CAMERA_UP,
+    CAMERA_VERTICAL_FOV,
+    CAMERA_VIEW_HEIGHT,
+    CAMERA_PROJECTION,
+    CAMERA_TURNTABLE,
+    CAMERA_KEYS,
+    CAMERA_FRAME,
+    CAMERA_KEY_COUNT
+};
 
-static const char *const names[] = {"position",   "look_at",   "up",   "vertical_fov", "view_height",
-                                    "projection", "turntable", "keys", "frame"};
+static const char *const camera_key_names[] = {"position",   "look_at",   "up",   "vertical_fov", "view_height",
+                                               "projection", "turntable", "keys", "frame"};
 
-#define VIEW_KEYS (NB_BIT(POSITION) | NB_BIT(LOOK_AT) | NB_BIT(UP) | NB_BIT(VERTICAL_FOV) | NB_BIT(VIEW_HEIGHT))
+#define VIEW_KEYS                                                                                                      \
+    (NB_BIT(CAMERA_POSITION) | NB_BIT(CAMERA_LOOK_AT) | NB_BIT(CAMERA_UP) | NB_BIT(CAMERA_VERTICAL_FOV) |              \
+     NB_BIT(CAMERA_VIEW_HEIGHT))
 
 static const nb_key_set camera_keys = {
-    names, CAMERA_KEY_COUNT, VIEW_KEYS | NB_BIT(PROJECTION) | NB_BIT(TURNTABLE) | NB_BIT(KEYS), 0, "a camera"};
-static const nb_key_set key_keys = {names, CAMERA_KEY_COUNT, VIEW_KEYS | NB_BIT(FRAME), NB_BIT(FRAME), "a camera key"};
+    camera_key_names, CAMERA_KEY_COUNT,
+    VIEW_KEYS | NB_BIT(CAMERA_PROJECTION) | NB_BIT(CAMERA_TURNTABLE) | NB_BIT(CAMERA_KEYS), 0, "a camera"};
+static const nb_key_set key_keys = {camera_key_names, CAMERA_KEY_COUNT, VIEW_KEYS | NB_BIT(CAMERA_FRAME),
+                                    NB_BIT(CAMERA_FRAME), "a camera key"};
 
 static const nb_range fov_range = {.low = 0, .high = 180, .open = true, .text = "a number of degrees, > 0 and < 180"};
 
@@ -25,11 +40,11 @@ static bool check_view(const nb_scene_reader *in, const nb_json_node *node, cons
                        nebel_camera camera)
 {
     nb_json *json = in->json;
-    const nb_json_node *at = found[LOOK_AT] != NULL ? found[LOOK_AT] : node;
+    const nb_json_node *at = found[CAMERA_LOOK_AT] != NULL ? found[CAMERA_LOOK_AT] : node;
     nb_file_units_convert_camera(&in->space, &camera);
     if (!nb_camera_is_apart(&camera))
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, at, "the camera looks at its own position; move one of them");
-    if (found[UP] != NULL) at = found[UP];
+    if (found[CAMERA_UP] != NULL) at = found[CAMERA_UP];
     if (!nb_camera_is_upright(&camera))
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, at,
                             "the view is along \"up\"; give an \"up\" in another direction, such as [0, 0, -1]");
@@ -41,12 +56,12 @@ static bool read_view(const nb_scene_reader *in, const nb_json_node *node, const
                       const double *ahead, nebel_camera *camera)
 {
     nb_json *json = in->json;
-    if (!nb_key_value_place(json, found[POSITION], camera->position)) return false;
-    if (found[LOOK_AT] == NULL && ahead != NULL) look_ahead(camera, ahead);
-    return nb_key_value_place(json, found[LOOK_AT], camera->look_at) &&
-           nb_key_value_direction(json, found[UP], camera->up) &&
-           nb_key_value_number(json, found[VERTICAL_FOV], &fov_range, &camera->vertical_fov) &&
-           nb_key_value_number(json, found[VIEW_HEIGHT], &nb_range_extent, &camera->view_height) &&
+    if (!nb_key_value_place(json, found[CAMERA_POSITION], camera->position)) return false;
+    if (found[CAMERA_LOOK_AT] == NULL && ahead != NULL) look_ahead(camera, ahead);
+    return nb_key_value_place(json, found[CAMERA_LOOK_AT], camera->look_at) &&
+           nb_key_value_direction(json, found[CAMERA_UP], camera->up) &&
+           nb_key_value_number(json, found[CAMERA_VERTICAL_FOV], &fov_range, &camera->vertical_fov) &&
+           nb_key_value_number(json, found[CAMERA_VIEW_HEIGHT], &nb_range_extent, &camera->view_height) &&
            check_view(in, node, found, *camera);
 }
 
@@ -73,15 +88,16 @@ static bool read_turntable(nb_json *json, const nb_json_node *node, uint32_t *fr
     return true;
 }
 
-static bool read_key(const nb_scene_reader *in, const nb_json_node *node, const double *ahead, nebel_camera_key *key)
+static bool read_camera_key(const nb_scene_reader *in, const nb_json_node *node, const double *ahead,
+                            nebel_camera_key *key)
 {
     const nb_json_node *found[CAMERA_KEY_COUNT];
     return nb_key_value_members(in->json, node, &key_keys, found) &&
-           nb_key_value_number(in->json, found[FRAME], &nb_range_frame, &key->frame) &&
+           nb_key_value_number(in->json, found[CAMERA_FRAME], &nb_range_frame, &key->frame) &&
            read_view(in, node, found, ahead, &key->camera);
 }
 
-static bool read_keys(nb_scene_reader *in, const nb_json_node *node, const double *ahead)
+static bool read_camera_keys(nb_scene_reader *in, const nb_json_node *node, const double *ahead)
 {
     nebel_scene_data *data = &in->scene->data;
     if (node == NULL) return true;
@@ -92,7 +108,7 @@ static bool read_keys(nb_scene_reader *in, const nb_json_node *node, const doubl
     size_t i = 0;
     for (const nb_json_node *at = nb_json_first(in->json, node); at != NULL; at = nb_json_next(in->json, at), i++) {
         keys[i].camera = data->camera;
-        if (!read_key(in, at, ahead, &keys[i])) return false;
+        if (!read_camera_key(in, at, ahead, &keys[i])) return false;
         if (i > 0 && keys[i].frame <= keys[i - 1].frame)
             return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, at,
                                 "its frame %.15g is not after the key before it, %.15g; frames must ascend",
@@ -109,16 +125,16 @@ bool nb_keys_read_camera(nb_scene_reader *in, const nb_json_node *node)
     const nb_json_node *found[CAMERA_KEY_COUNT];
     nebel_scene_data *data = &in->scene->data;
     if (!nb_key_value_members(in->json, node, &camera_keys, found)) return false;
-    if (found[TURNTABLE] != NULL && found[KEYS] != NULL)
-        return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, found[KEYS],
+    if (found[CAMERA_TURNTABLE] != NULL && found[CAMERA_KEYS] != NULL)
+        return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, found[CAMERA_KEYS],
                                 "a camera has \"turntable\" or \"keys\", not both; remove one");
     double ahead[3];
     nb_file_units_restore_camera(&in->space, &data->camera);
     for (int i = 0; i < 3; i++) ahead[i] = data->camera.look_at[i] - data->camera.position[i];
-    if (!read_projection(in->json, found[PROJECTION], &data->camera.projection) ||
+    if (!read_projection(in->json, found[CAMERA_PROJECTION], &data->camera.projection) ||
         !read_view(in, node, found, ahead, &data->camera) ||
-        !read_turntable(in->json, found[TURNTABLE], &data->turntable_frames) ||
-        !read_keys(in, found[KEYS], found[LOOK_AT] == NULL ? ahead : NULL))
+        !read_turntable(in->json, found[CAMERA_TURNTABLE], &data->turntable_frames) ||
+        !read_camera_keys(in, found[CAMERA_KEYS], found[CAMERA_LOOK_AT] == NULL ? ahead : NULL))
         return false;
     nb_file_units_convert_camera(&in->space, &data->camera);
     return true;

@@ -4,15 +4,16 @@
 #include <string.h>
 
 /* In the order of nebel_cell_model and nebel_cell_span. */
-static const char *const model_names[] = {"linear", "exponential"};
+static const char *const cell_model_names[] = {"linear", "exponential"};
 static const char *const span_names[] = {"ray", "depth", "printed"};
 
 /* ---- cells ----------------------------------------------------------------------------------- */
 
-enum { NAME, SHAPE, DENSITY, COLOR, CELL_KEY_COUNT };
+enum { CELL_NAME, CELL_SHAPE, CELL_DENSITY, CELL_COLOR, CELL_KEY_COUNT };
 
 static const char *const cell_names[] = {"name", "shape", "density", "color"};
-static const nb_key_set cell_keys = {cell_names, CELL_KEY_COUNT, NB_BIT(CELL_KEY_COUNT) - 1, NB_BIT(SHAPE), "a cell"};
+static const nb_key_set cell_keys = {cell_names, CELL_KEY_COUNT, NB_BIT(CELL_KEY_COUNT) - 1, NB_BIT(CELL_SHAPE),
+                                     "a cell"};
 
 /* What the section becomes, in the scene's arena. */
 typedef struct cells_draft {
@@ -38,7 +39,7 @@ static bool check_name(nb_json *json, const nb_json_node *node, const cells_draf
                         "is the name of cells[%zu], too; portals need to tell them apart", first);
 }
 
-static bool check_shape(nb_json *json, const nb_json_node *node, nebel_shape_type type)
+static bool check_cell_shape(nb_json *json, const nb_json_node *node, nebel_shape_type type)
 {
     if (type == NEBEL_SHAPE_BOX || type == NEBEL_SHAPE_CONVEX) return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
@@ -54,11 +55,11 @@ static bool read_cell(nb_scene_reader *in, const nb_json_node *node, const cells
     draft->names[index] = "";
     if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "a cell {\"shape\": ...}") ||
         !nb_key_value_members(json, node, &cell_keys, found) ||
-        !nb_key_value_text(json, found[NAME], &in->scene->arena, &draft->names[index]) ||
-        !check_name(json, found[NAME], draft, index) || !nb_keys_read_shape(in, found[SHAPE], &cell->shape) ||
-        !check_shape(json, found[SHAPE], cell->shape.type) ||
-        !nb_key_value_number(json, found[DENSITY], &nb_range_amount, &cell->density) ||
-        !nb_key_value_color(json, found[COLOR], &nb_range_light, cell->color))
+        !nb_key_value_text(json, found[CELL_NAME], &in->scene->arena, &draft->names[index]) ||
+        !check_name(json, found[CELL_NAME], draft, index) || !nb_keys_read_shape(in, found[CELL_SHAPE], &cell->shape) ||
+        !check_cell_shape(json, found[CELL_SHAPE], cell->shape.type) ||
+        !nb_key_value_number(json, found[CELL_DENSITY], &nb_range_amount, &cell->density) ||
+        !nb_key_value_color(json, found[CELL_COLOR], &nb_range_light, cell->color))
         return false;
     nb_file_units_convert_cell(&in->space, cell);
     return true;
@@ -153,18 +154,12 @@ static bool read_portals(nb_scene_reader *in, const nb_json_node *node, const ce
 
 /* ---- the section ----------------------------------------------------------------------------- */
 
-static bool read_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count, int *choice)
-{
-    if (node != NULL) *choice = nb_key_value_choice(json, node, names, count);
-    return *choice >= 0;
-}
-
 static bool read_manner(nb_json *json, const nb_json_node *model, const nb_json_node *span,
                         const nb_json_node *grouping, nebel_cells_desc *desc)
 {
     int chosen_model = 0, chosen_span = 0;
-    if (!read_choice(json, model, model_names, NEBEL_CELL_MODEL_COUNT, &chosen_model) ||
-        !read_choice(json, span, span_names, NEBEL_SPAN_COUNT, &chosen_span) ||
+    if (!nb_key_value_replace_choice(json, model, cell_model_names, NEBEL_CELL_MODEL_COUNT, &chosen_model) ||
+        !nb_key_value_replace_choice(json, span, span_names, NEBEL_SPAN_COUNT, &chosen_span) ||
         (grouping != NULL && !nb_key_value_is(json, grouping, NB_JSON_BOOLEAN, "true or false")))
         return false;
     desc->model = (nebel_cell_model)chosen_model;

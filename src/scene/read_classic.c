@@ -10,12 +10,6 @@ const char *const nb_stage_names[NEBEL_STAGE_COUNT] = {"vertex", "pixel"};
 const char *const nb_curve_names[NEBEL_CURVE_TABLE] = {"physical", "linear", "exp", "exp2"};
 const char *const nb_d3d9_mode_names[4] = {"none", "exp", "exp2", "linear"};
 
-static bool read_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count, int *choice)
-{
-    if (node != NULL) *choice = nb_key_value_choice(json, node, names, count);
-    return *choice >= 0;
-}
-
 /* ---- response curves ------------------------------------------------------------------------- */
 
 /* Weights at even distances become all entries, by lines between them. */
@@ -48,7 +42,7 @@ static bool read_table(nb_scene_reader *in, const nb_json_node *node)
 static bool read_curve(nb_scene_reader *in, const nb_json_node *curve, const nb_json_node *table)
 {
     int chosen = NEBEL_CURVE_PHYSICAL;
-    if (!read_choice(in->json, curve, nb_curve_names, NEBEL_CURVE_TABLE, &chosen)) return false;
+    if (!nb_key_value_replace_choice(in->json, curve, nb_curve_names, NEBEL_CURVE_TABLE, &chosen)) return false;
     if (curve != NULL && table != NULL)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, table, "there is a \"curve\", too; leave one of them out");
     in->scene->data.classic_curve = (nebel_curve_type)chosen;
@@ -73,7 +67,7 @@ static uint32_t pack_color(const double color[3])
 }
 
 /* Of an orthographic camera, in metres where they are left out. */
-static bool read_planes(nb_scene_reader *in, const nb_json_node *near_node, const nb_json_node *far_node)
+static bool read_clip_planes(nb_scene_reader *in, const nb_json_node *near_node, const nb_json_node *far_node)
 {
     const double unit = in->space.unit;
     nebel_scene_data *const data = &in->scene->data;
@@ -103,14 +97,14 @@ static bool read_d3d9(nb_scene_reader *in, const nb_json_node *node)
     if (node == NULL) return true;
     if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {\"fog_vertex_mode\": ...}") ||
         !nb_key_value_members(json, node, &keys, found) ||
-        !read_choice(json, found[VERTEX_MODE], nb_d3d9_mode_names, 4, &vertex_mode) ||
-        !read_choice(json, found[TABLE_MODE], nb_d3d9_mode_names, 4, &table_mode) ||
+        !nb_key_value_replace_choice(json, found[VERTEX_MODE], nb_d3d9_mode_names, 4, &vertex_mode) ||
+        !nb_key_value_replace_choice(json, found[TABLE_MODE], nb_d3d9_mode_names, 4, &table_mode) ||
         !nb_key_value_number(json, found[START], &nb_range_place, &start) ||
         !nb_key_value_number(json, found[END], &nb_range_place, &end) ||
         !nb_key_value_number(json, found[DENSITY], &nb_range_density, &density) ||
         !read_stored_color(json, found[COLOR], color) ||
         (found[RANGE] != NULL && !nb_key_value_is(json, found[RANGE], NB_JSON_BOOLEAN, "true or false")) ||
-        !read_planes(in, found[NEAR], found[FAR]))
+        !read_clip_planes(in, found[NEAR], found[FAR]))
         return false;
     nebel_d3d9_fog *d3d9 = nb_arena_allocate(&in->scene->arena, 1, sizeof *d3d9);
     if (d3d9 == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
@@ -174,8 +168,9 @@ bool nb_keys_read_classic(nb_scene_reader *in, const nb_json_node *node)
         !nb_key_value_number(json, found[END], &nb_range_place, &factor->end) ||
         !nb_key_value_number(json, found[DENSITY], &nb_range_density, &factor->density) ||
         !nb_key_value_color(json, found[COLOR], &nb_range_light, factor->color) ||
-        !read_choice(json, found[COORDINATE], nb_coordinate_names, NEBEL_COORDINATE_COUNT, &coordinate) ||
-        !read_choice(json, found[STAGE], nb_stage_names, NEBEL_STAGE_COUNT, &stage) ||
+        !nb_key_value_replace_choice(json, found[COORDINATE], nb_coordinate_names, NEBEL_COORDINATE_COUNT,
+                                     &coordinate) ||
+        !nb_key_value_replace_choice(json, found[STAGE], nb_stage_names, NEBEL_STAGE_COUNT, &stage) ||
         !read_curve(in, found[CURVE], found[TABLE]) || !read_d3d9(in, found[D3D9]))
         return false;
     factor->coordinate = (nebel_factor_coordinate)coordinate;

@@ -5,25 +5,26 @@
 #include <string.h>
 
 enum {
-    TYPE,
-    BASE,
-    TOP,
-    COVERAGE,
-    EXTINCTION,
-    CELL_SIZE,
-    EROSION,
-    PATCHINESS,
-    DROPLET_DIAMETER,
-    SEED,
-    WIND,
-    WEATHER_MAP,
-    KEY_COUNT
+    CLOUD_TYPE,
+    CLOUD_BASE,
+    CLOUD_TOP,
+    CLOUD_COVERAGE,
+    CLOUD_EXTINCTION,
+    CLOUD_CELL_SIZE,
+    CLOUD_EROSION,
+    CLOUD_PATCHINESS,
+    CLOUD_DROPLET_DIAMETER,
+    CLOUD_SEED,
+    CLOUD_WIND,
+    CLOUD_WEATHER_MAP,
+    CLOUD_KEY_COUNT
 };
 
-static const char *const names[] = {"type",      "base",       "top",        "coverage",         "extinction",
-                                    "cell_size", "erosion",    "patchiness", "droplet_diameter", "seed",
-                                    "wind",      "weather_map"};
-static const nb_key_set keys = {names, KEY_COUNT, NB_BIT(KEY_COUNT) - 1, 0, "a layer of clouds"};
+static const char *const cloud_key_names[] = {"type",      "base",       "top",        "coverage",         "extinction",
+                                              "cell_size", "erosion",    "patchiness", "droplet_diameter", "seed",
+                                              "wind",      "weather_map"};
+static const nb_key_set cloud_keys = {cloud_key_names, CLOUD_KEY_COUNT, NB_BIT(CLOUD_KEY_COUNT) - 1, 0,
+                                      "a layer of clouds"};
 
 /* A part that 0 leaves nothing of. */
 static bool read_part(nb_json *json, const nb_json_node *node, double *value)
@@ -44,14 +45,15 @@ static bool read_numbers(nb_scene_reader *in, const nb_json_node *const *found, 
         .low = 4, .high = NEBEL_MAX_DROPLET_DIAMETER, .text = "a number of micrometres from 4 to 50"};
     static const nb_range wind_range = {.low = -1e12, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
     nb_json *json = in->json;
-    if (!nb_key_value_number(json, found[BASE], &height_range, &layer->base) ||
-        !nb_key_value_number(json, found[TOP], &height_range, &layer->top) ||
-        !nb_key_value_number(json, found[COVERAGE], &nb_range_fraction, &layer->coverage) ||
-        !nb_key_value_number(json, found[EXTINCTION], &amount_range, &layer->extinction) ||
-        !nb_key_value_number(json, found[CELL_SIZE], &size_range, &layer->cell_size) ||
-        !read_part(json, found[EROSION], &layer->erosion) || !read_part(json, found[PATCHINESS], &layer->patchiness) ||
-        !nb_key_value_number(json, found[DROPLET_DIAMETER], &diameter_range, &layer->droplet_diameter) ||
-        !nb_key_value_numbers(json, found[WIND], &wind_range, 2, layer->wind))
+    if (!nb_key_value_number(json, found[CLOUD_BASE], &height_range, &layer->base) ||
+        !nb_key_value_number(json, found[CLOUD_TOP], &height_range, &layer->top) ||
+        !nb_key_value_number(json, found[CLOUD_COVERAGE], &nb_range_fraction, &layer->coverage) ||
+        !nb_key_value_number(json, found[CLOUD_EXTINCTION], &amount_range, &layer->extinction) ||
+        !nb_key_value_number(json, found[CLOUD_CELL_SIZE], &size_range, &layer->cell_size) ||
+        !read_part(json, found[CLOUD_EROSION], &layer->erosion) ||
+        !read_part(json, found[CLOUD_PATCHINESS], &layer->patchiness) ||
+        !nb_key_value_number(json, found[CLOUD_DROPLET_DIAMETER], &diameter_range, &layer->droplet_diameter) ||
+        !nb_key_value_numbers(json, found[CLOUD_WIND], &wind_range, 2, layer->wind))
         return false;
     const double unit = in->space.unit;
     layer->base *= unit;
@@ -76,8 +78,8 @@ static bool try_layer(nb_scene_reader *in, const nb_json_node *node, double thic
     return nb_key_value_fail_within(in->json, node, message, "");
 }
 
-static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const nebel_planet *planet,
-                        const nebel_cloud_layer *layer)
+static bool check_layers_apart(nb_scene_reader *in, const nb_json_node *node, const nebel_planet *planet,
+                               const nebel_cloud_layer *layer)
 {
     for (uint32_t i = 0; i < planet->cloud_layer_count; i++) {
         nebel_cloud_layer other;
@@ -105,24 +107,25 @@ static bool check_size(nb_json *json, const nb_json_node *node, const nebel_plan
 static bool read_layer(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
 {
     static const char *const type_names[] = {"cumulus", "stratus", "cirrus"};
-    const nb_json_node *found[KEY_COUNT];
+    const nb_json_node *found[CLOUD_KEY_COUNT];
     nb_json *json = in->json;
     nebel_cloud_layer *layer = &planet->cloud_layers[planet->cloud_layer_count];
     *layer = (nebel_cloud_layer){.seed = 1 + planet->cloud_layer_count};
     if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {...}") ||
-        !nb_key_value_members(json, node, &keys, found))
+        !nb_key_value_members(json, node, &cloud_keys, found))
         return false;
-    const int type =
-        found[TYPE] != NULL ? nb_key_value_choice(json, found[TYPE], type_names, NEBEL_CLOUD_TYPE_COUNT) : 0;
-    if (type < 0 || !read_numbers(in, found, layer) || !nb_keys_read_seed(in, found[SEED], &layer->seed) ||
-        !nb_keys_read_map(in, found[WEATHER_MAP], 1, &layer->weather_map))
+    const int type = found[CLOUD_TYPE] != NULL
+                         ? nb_key_value_choice(json, found[CLOUD_TYPE], type_names, NEBEL_CLOUD_TYPE_COUNT)
+                         : 0;
+    if (type < 0 || !read_numbers(in, found, layer) || !nb_keys_read_seed(in, found[CLOUD_SEED], &layer->seed) ||
+        !nb_keys_read_map(in, found[CLOUD_WEATHER_MAP], 1, &layer->weather_map))
         return false;
     layer->type = (nebel_cloud_type)type;
     nebel_cloud_layer resolved;
     if (!try_layer(in, node, planet->atmosphere_desc.thickness, layer, &resolved)) return false;
-    if (found[COVERAGE] != NULL && layer->coverage == 0) return true;
-    if (!check_size(json, node, planet, found[CELL_SIZE] != NULL, resolved.cell_size) ||
-        !check_apart(in, node, planet, &resolved))
+    if (found[CLOUD_COVERAGE] != NULL && layer->coverage == 0) return true;
+    if (!check_size(json, node, planet, found[CLOUD_CELL_SIZE] != NULL, resolved.cell_size) ||
+        !check_layers_apart(in, node, planet, &resolved))
         return false;
     planet->cloud_layer_count++;
     in->scene->data.has_endless_motion |= layer->wind[0] != 0 || layer->wind[1] != 0;

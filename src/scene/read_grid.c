@@ -7,21 +7,22 @@
 
 #include <string.h>
 
-enum { TYPE, FILE_KEY, FILTER, GRID, SLICES, SIZE, VOXELS, GRID_KEY_COUNT };
+enum { GRID_TYPE, GRID_FILE, GRID_FILTER, GRID_GRID, GRID_SLICES, GRID_SIZE, GRID_VOXELS, GRID_KEY_COUNT };
 
-static const char *const key_names[] = {"type", "file", "filter", "grid", "slices", "size", "voxels"};
+static const char *const grid_key_names[] = {"type", "file", "filter", "grid", "slices", "size", "voxels"};
 static const char *const filter_names[] = {"linear", "nearest"};
 static const char *const voxel_names[] = {"float", "uint8", "uint16"};
 
-#define ANY_FILE (NB_BIT(TYPE) | NB_BIT(FILE_KEY) | NB_BIT(FILTER))
+#define ANY_FILE (NB_BIT(GRID_TYPE) | NB_BIT(GRID_FILE) | NB_BIT(GRID_FILTER))
 
 /* In the order of nb_voxel_file. */
 static const nb_key_set grid_keys[] = {
-    {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(SIZE) | NB_BIT(VOXELS),
-     NB_BIT(FILE_KEY) | NB_BIT(SIZE) | NB_BIT(VOXELS), "a grid of numbers (no .nvdb, .vdb, .png)"},
-    {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(GRID), NB_BIT(FILE_KEY), "a grid of NanoVDB"},
-    {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(SLICES), NB_BIT(FILE_KEY) | NB_BIT(SLICES), "a grid of pictures"},
-    {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(GRID), NB_BIT(FILE_KEY), "a grid of OpenVDB"}};
+    {grid_key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(GRID_SIZE) | NB_BIT(GRID_VOXELS),
+     NB_BIT(GRID_FILE) | NB_BIT(GRID_SIZE) | NB_BIT(GRID_VOXELS), "a grid of numbers (no .nvdb, .vdb, .png)"},
+    {grid_key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(GRID_GRID), NB_BIT(GRID_FILE), "a grid of NanoVDB"},
+    {grid_key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(GRID_SLICES), NB_BIT(GRID_FILE) | NB_BIT(GRID_SLICES),
+     "a grid of pictures"},
+    {grid_key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(GRID_GRID), NB_BIT(GRID_FILE), "a grid of OpenVDB"}};
 
 static nb_voxel_file kind_of(const nb_json *json, const nb_json_node *object)
 {
@@ -43,8 +44,8 @@ static bool names_file(nb_json *json, const nb_json_node *object)
 static bool read_choices(nb_json *json, const nb_json_node *const *found, nebel_grid_file *file)
 {
     int filter = 0, type = 0;
-    if (found[FILTER] != NULL) filter = nb_key_value_choice(json, found[FILTER], filter_names, 2);
-    if (found[VOXELS] != NULL) type = nb_key_value_choice(json, found[VOXELS], voxel_names, 3);
+    if (found[GRID_FILTER] != NULL) filter = nb_key_value_choice(json, found[GRID_FILTER], filter_names, 2);
+    if (found[GRID_VOXELS] != NULL) type = nb_key_value_choice(json, found[GRID_VOXELS], voxel_names, 3);
     file->filter = (nebel_grid_filter)filter;
     file->type = (nebel_voxel_type)type;
     return filter >= 0 && type >= 0;
@@ -66,21 +67,21 @@ bool nb_keys_read_grid_size(nb_json *json, const nb_json_node *node, size_t size
     return true;
 }
 
-static bool read_file(nb_scene_reader *in, const nb_json_node *const *found, nebel_grid_file *file)
+static bool read_grid_file(nb_scene_reader *in, const nb_json_node *const *found, nebel_grid_file *file)
 {
     nb_arena *arena = &in->scene->arena;
     const char *path = "";
     int slices = 0;
-    if (!nb_key_value_text(in->json, found[FILE_KEY], arena, &path) ||
-        (found[GRID] != NULL && !nb_key_value_text(in->json, found[GRID], arena, &file->grid_name)) ||
-        !nb_key_value_integer(in->json, found[SLICES], 1, NEBEL_MAX_GRID_SIZE, &slices) ||
-        !nb_keys_read_grid_size(in->json, found[SIZE], file->size) || !read_choices(in->json, found, file))
+    if (!nb_key_value_text(in->json, found[GRID_FILE], arena, &path) ||
+        (found[GRID_GRID] != NULL && !nb_key_value_text(in->json, found[GRID_GRID], arena, &file->grid_name)) ||
+        !nb_key_value_integer(in->json, found[GRID_SLICES], 1, NEBEL_MAX_GRID_SIZE, &slices) ||
+        !nb_keys_read_grid_size(in->json, found[GRID_SIZE], file->size) || !read_choices(in->json, found, file))
         return false;
     if (path[0] == '\0')
-        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, found[FILE_KEY], "is empty; must be the path of a file");
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, found[GRID_FILE], "is empty; must be the path of a file");
     file->slice_count = (size_t)slices;
     file->path = nb_path_join(arena, in->scene->folder, path);
-    return file->path != NULL || nb_json_fail(in->json, NEBEL_ERROR_MEMORY, found[FILE_KEY], "out of memory");
+    return file->path != NULL || nb_json_fail(in->json, NEBEL_ERROR_MEMORY, found[GRID_FILE], "out of memory");
 }
 
 bool nb_scene_keep_grid(nb_scene_reader *in, const nb_json_node *node, nebel_grid *grid)
@@ -104,7 +105,7 @@ bool nb_keys_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_dens
     const nebel_scene_desc desc = {
         .allocator = in->scene->allocator, .log = nb_note_log(&note), .memory = nb_scene_room(in->scene)};
     if (!names_file(json, node) || !nb_key_value_members(json, node, &grid_keys[kind_of(json, node)], found) ||
-        !read_file(in, found, &file))
+        !read_grid_file(in, found, &file))
         return false;
     file.name = nb_arena_copy_text(&in->scene->arena, json->desc.text + node->offset, node->end - node->offset);
     if (file.name == NULL || !nb_scene_keep_file(in->scene, file.path))
@@ -112,6 +113,6 @@ bool nb_keys_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_dens
     *density = (nebel_density){.type = NEBEL_DENSITY_GRID};
     uint64_t bytes = 0;
     const nebel_result result = nb_voxels_load(&file, &desc, &in->space, &density->grid, &bytes);
-    if (result != NEBEL_OK) return nb_json_fail(json, result, found[FILE_KEY], "%s", note.text);
+    if (result != NEBEL_OK) return nb_json_fail(json, result, found[GRID_FILE], "%s", note.text);
     return nb_scene_keep_grid(in, node, density->grid) && nb_scene_charge(in, node, (double)bytes, 0);
 }

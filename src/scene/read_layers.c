@@ -6,8 +6,8 @@
 
 #include <string.h>
 
-static const nb_range radius_range = {.low = 1, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
-static const nb_range height_range = {
+static const nb_range planet_radius_range = {.low = 1, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
+static const nb_range shell_height_range = {
     .low = 0, .high = 1e12, .open = true, .dimension = NB_LENGTH, .text = "a height above the ground"};
 static const nb_range period_range = {.low = -1e12, .high = 1e12, .text = "a number of frames from -1e12 to 1e12"};
 static const nb_range part_range = {
@@ -115,7 +115,7 @@ static bool read_cloud(nb_scene_reader *in, const nb_json_node *node, nebel_clou
     nb_json *json = in->json;
     if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {...}") ||
         !nb_key_value_members(json, node, &keys, found) ||
-        !nb_key_value_number(json, found[HEIGHT], &height_range, &shell->height) ||
+        !nb_key_value_number(json, found[HEIGHT], &shell_height_range, &shell->height) ||
         !nb_key_value_number(json, found[ROTATION_PERIOD], &period_range, &shell->rotation_period) ||
         !nb_key_value_color(json, found[COLOR], &nb_range_fraction, shell->color) ||
         !nb_keys_read_map(in, found[COVERAGE_MAP], 1, &shell->coverage_map) ||
@@ -151,7 +151,7 @@ static bool read_ramp(nb_json *json, const nb_json_node *node, nebel_atmosphere_
     return air->ramp_count > 0 || nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is empty; leave it out for a blue one");
 }
 
-static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_atmosphere_shell *air)
+static bool read_air_shell(nb_scene_reader *in, const nb_json_node *node, nebel_atmosphere_shell *air)
 {
     enum { HEIGHT, BRIGHTNESS, RAMP, COUNT };
     static const char *const names[] = {"height", "brightness", "ramp"};
@@ -162,7 +162,7 @@ static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_atmosp
     if (node == NULL) return true;
     if (!nb_key_value_is(json, node, NB_JSON_OBJECT, "an object {...}") ||
         !nb_key_value_members(json, node, &keys, found) ||
-        !nb_key_value_number(json, found[HEIGHT], &height_range, &air->height) ||
+        !nb_key_value_number(json, found[HEIGHT], &shell_height_range, &air->height) ||
         !nb_key_value_number(json, found[BRIGHTNESS], &brightness_range, &air->brightness) ||
         !read_ramp(json, found[RAMP], air))
         return false;
@@ -204,14 +204,14 @@ bool nb_keys_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_te
     double radius = 6.36e6 / in->space.unit, scale[3] = {1, 1, 1};
     *desc = (nebel_textured_planet_desc){.rotation = {0, 0, 0, 1}};
     if (!nb_key_value_members(json, node, &keys, found) ||
-        !nb_key_value_number(json, found[RADIUS], &radius_range, &radius) ||
+        !nb_key_value_number(json, found[RADIUS], &planet_radius_range, &radius) ||
         !nb_key_value_place(json, found[CENTER], desc->center) ||
         !nb_key_value_rotation(json, found[ROTATION], desc->rotation) ||
         !nb_key_value_number(json, found[ROTATION_PERIOD], &period_range, &desc->rotation_period) ||
         !nb_keys_read_map(in, found[COLOR_MAP], 3, &desc->color_map) ||
         !nb_key_value_number(json, found[LAND_COVERAGE], &part_range, &desc->land_coverage) ||
         !nb_keys_read_seed(in, found[SEED], &desc->seed) || !read_clouds(in, found[CLOUDS], desc) ||
-        !read_air(in, found[ATMOSPHERE], &desc->atmosphere))
+        !read_air_shell(in, found[ATMOSPHERE], &desc->atmosphere))
         return false;
     desc->radius = radius * in->space.unit;
     nb_file_units_convert_placement(&in->space, desc->center, desc->rotation, scale);

@@ -68,18 +68,29 @@ bool nb_keys_read_sun(nb_scene_reader *in, const nb_json_node *node)
     return true;
 }
 
-enum { TYPE, NAME, POSITION, INTENSITY, RADIUS, DIRECTION, INNER_ANGLE, OUTER_ANGLE, LIGHT_KEY_COUNT };
+enum {
+    LIGHT_TYPE,
+    LIGHT_NAME,
+    LIGHT_POSITION,
+    LIGHT_INTENSITY,
+    LIGHT_RADIUS,
+    LIGHT_DIRECTION,
+    LIGHT_INNER_ANGLE,
+    LIGHT_OUTER_ANGLE,
+    LIGHT_KEY_COUNT
+};
 
 static const char *const light_names[] = {"type",   "name",      "position",    "intensity",
                                           "radius", "direction", "inner_angle", "outer_angle"};
 
-#define POINT_REQUIRED (NB_BIT(TYPE) | NB_BIT(POSITION) | NB_BIT(INTENSITY))
-#define POINT_KEYS (POINT_REQUIRED | NB_BIT(NAME) | NB_BIT(RADIUS))
-#define SPOT_REQUIRED (POINT_REQUIRED | NB_BIT(DIRECTION) | NB_BIT(OUTER_ANGLE))
+#define POINT_REQUIRED (NB_BIT(LIGHT_TYPE) | NB_BIT(LIGHT_POSITION) | NB_BIT(LIGHT_INTENSITY))
+#define POINT_KEYS (POINT_REQUIRED | NB_BIT(LIGHT_NAME) | NB_BIT(LIGHT_RADIUS))
+#define SPOT_REQUIRED (POINT_REQUIRED | NB_BIT(LIGHT_DIRECTION) | NB_BIT(LIGHT_OUTER_ANGLE))
 
-static const nb_key_set light_keys[] = {
-    {light_names, LIGHT_KEY_COUNT, POINT_KEYS, POINT_REQUIRED, "a point light"},
-    {light_names, LIGHT_KEY_COUNT, SPOT_REQUIRED | POINT_KEYS | NB_BIT(INNER_ANGLE), SPOT_REQUIRED, "a spot light"}};
+static const nb_key_set light_keys[] = {{light_names, LIGHT_KEY_COUNT, POINT_KEYS, POINT_REQUIRED, "a point light"},
+                                        {light_names, LIGHT_KEY_COUNT,
+                                         SPOT_REQUIRED | POINT_KEYS | NB_BIT(LIGHT_INNER_ANGLE), SPOT_REQUIRED,
+                                         "a spot light"}};
 
 static bool read_cone(nb_json *json, const nb_json_node *const *found, nebel_light *lamp)
 {
@@ -87,12 +98,12 @@ static bool read_cone(nb_json *json, const nb_json_node *const *found, nebel_lig
         .low = DBL_TRUE_MIN, .high = 180, .text = "a number of degrees from the axis, > 0 and <= 180"};
     static const nb_range inner_range = {
         .low = 0, .high = 180, .text = "a number of degrees from the axis, from 0 to outer_angle"};
-    if (!nb_key_value_direction(json, found[DIRECTION], lamp->direction) ||
-        !nb_key_value_number(json, found[OUTER_ANGLE], &outer_range, &lamp->outer_angle) ||
-        !nb_key_value_number(json, found[INNER_ANGLE], &inner_range, &lamp->inner_angle))
+    if (!nb_key_value_direction(json, found[LIGHT_DIRECTION], lamp->direction) ||
+        !nb_key_value_number(json, found[LIGHT_OUTER_ANGLE], &outer_range, &lamp->outer_angle) ||
+        !nb_key_value_number(json, found[LIGHT_INNER_ANGLE], &inner_range, &lamp->inner_angle))
         return false;
     if (lamp->inner_angle <= lamp->outer_angle) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[INNER_ANGLE], "is %.15g; must be %s", lamp->inner_angle,
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[LIGHT_INNER_ANGLE], "is %.15g; must be %s", lamp->inner_angle,
                         inner_range.text);
 }
 
@@ -138,10 +149,10 @@ bool nb_keys_read_light(nb_scene_reader *in, const nb_json_node *node)
                             "unknown; must be one of: point, spot; a ball that shines is a point with a \"radius\"");
     const int type = nb_key_value_type(in->json, node, types, 2);
     if (type < 0 || !nb_key_value_members(in->json, node, &light_keys[type], found) ||
-        !nb_key_value_text(in->json, found[NAME], &in->scene->arena, &name) ||
-        !nb_key_value_place(in->json, found[POSITION], lamp.position) ||
-        !nb_key_value_color(in->json, found[INTENSITY], &nb_range_light, lamp.intensity) ||
-        !nb_key_value_number(in->json, found[RADIUS], &radius_range, &lamp.radius) ||
+        !nb_key_value_text(in->json, found[LIGHT_NAME], &in->scene->arena, &name) ||
+        !nb_key_value_place(in->json, found[LIGHT_POSITION], lamp.position) ||
+        !nb_key_value_color(in->json, found[LIGHT_INTENSITY], &nb_range_light, lamp.intensity) ||
+        !nb_key_value_number(in->json, found[LIGHT_RADIUS], &radius_range, &lamp.radius) ||
         !read_cone(in->json, found, &lamp))
         return false;
     lamp.type = (nebel_light_type)type;

@@ -9,11 +9,22 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { FILE_KEY, UP, UNIT, POSITION, ROTATION, SCALE, FOLDER, HEIGHTFIELD, COLOR, MODEL_KEY_COUNT };
+enum {
+    MODEL_FILE,
+    MODEL_UP,
+    MODEL_UNIT,
+    MODEL_POSITION,
+    MODEL_ROTATION,
+    MODEL_SCALE,
+    MODEL_FOLDER,
+    MODEL_HEIGHTFIELD,
+    MODEL_COLOR,
+    MODEL_KEY_COUNT
+};
 
-static const char *const model_names[] = {"file",  "up",     "unit",        "position", "rotation",
-                                          "scale", "folder", "heightfield", "color"};
-static const nb_key_set model_keys = {model_names, MODEL_KEY_COUNT, NB_BIT(MODEL_KEY_COUNT) - 1, 0, "a model"};
+static const char *const model_key_names[] = {"file",  "up",     "unit",        "position", "rotation",
+                                              "scale", "folder", "heightfield", "color"};
+static const nb_key_set model_keys = {model_key_names, MODEL_KEY_COUNT, NB_BIT(MODEL_KEY_COUNT) - 1, 0, "a model"};
 
 static const nb_model_source unplaced = {.space = {false, 1}, .rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
 
@@ -28,7 +39,7 @@ static const char *describe_place(nb_scene_reader *in, const nb_json_node *node)
     return tail != NULL ? nb_path_join(&in->scene->arena, in->json->desc.name, tail) : NULL;
 }
 
-static bool read_file(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
+static bool read_model_file(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
 {
     nb_arena *arena = &in->scene->arena;
     const char *file = "";
@@ -65,18 +76,18 @@ static bool read_heightfield(nb_scene_reader *in, const nb_json_node *node, nb_m
     static const nb_key_set keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a heightfield"};
     const nb_json_node *found[COUNT];
     model->is_heightfield = true;
-    return nb_key_value_members(in->json, node, &keys, found) && read_file(in, found[HEIGHTFIELD_FILE], model) &&
+    return nb_key_value_members(in->json, node, &keys, found) && read_model_file(in, found[HEIGHTFIELD_FILE], model) &&
            nb_key_value_numbers(in->json, found[SIZE], &nb_range_extent, 2, model->size) &&
            nb_key_value_number(in->json, found[HEIGHT], &nb_range_extent, &model->height);
 }
 
-static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_node *const *found)
+static bool check_model_kind(nb_json *json, const nb_json_node *node, const nb_json_node *const *found)
 {
-    if (found[FILE_KEY] == NULL && found[HEIGHTFIELD] == NULL)
+    if (found[MODEL_FILE] == NULL && found[MODEL_HEIGHTFIELD] == NULL)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is neither; a model has \"file\" or \"heightfield\"");
-    if (found[HEIGHTFIELD] == NULL) return true;
-    for (int i = FILE_KEY; i <= FOLDER; i++) {
-        if (i == POSITION || found[i] == NULL) continue;
+    if (found[MODEL_HEIGHTFIELD] == NULL) return true;
+    for (int i = MODEL_FILE; i <= MODEL_FOLDER; i++) {
+        if (i == MODEL_POSITION || found[i] == NULL) continue;
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[i],
                                 "does not go with \"heightfield\", which has: position, color");
     }
@@ -107,10 +118,11 @@ static void convert_model(const nb_file_units *space, nb_model_source *model)
 
 static bool read_placement(nb_json *json, const nb_json_node *const *found, nb_model_source *model)
 {
-    return nb_keys_read_up(json, found[UP], &model->space) && nb_keys_read_unit(json, found[UNIT], &model->space) &&
-           nb_key_value_place(json, found[POSITION], model->position) &&
-           nb_key_value_rotation(json, found[ROTATION], model->rotation) &&
-           nb_key_value_scale(json, found[SCALE], model->scale);
+    return nb_keys_read_up(json, found[MODEL_UP], &model->space) &&
+           nb_keys_read_unit(json, found[MODEL_UNIT], &model->space) &&
+           nb_key_value_place(json, found[MODEL_POSITION], model->position) &&
+           nb_key_value_rotation(json, found[MODEL_ROTATION], model->rotation) &&
+           nb_key_value_scale(json, found[MODEL_SCALE], model->scale);
 }
 
 /* What the public face says of a model. */
@@ -153,22 +165,23 @@ bool nb_keys_read_model(nb_scene_reader *in, const nb_json_node *node)
     const nb_json_node *found[MODEL_KEY_COUNT];
     nb_json *json = in->json;
     nb_model_source model = unplaced;
-    if (!nb_key_value_members(json, node, &model_keys, found) || !check_kind(json, node, found)) return false;
-    model.has_color = found[COLOR] != NULL;
-    const bool is_file = found[FILE_KEY] != NULL;
-    if (!(is_file ? read_file(in, found[FILE_KEY], &model) : read_heightfield(in, found[HEIGHTFIELD], &model)) ||
-        !read_folder(in, found[FOLDER], &model) || !read_placement(json, found, &model) ||
-        !nb_key_value_color(json, found[COLOR], &nb_range_fraction, model.color))
+    if (!nb_key_value_members(json, node, &model_keys, found) || !check_model_kind(json, node, found)) return false;
+    model.has_color = found[MODEL_COLOR] != NULL;
+    const bool is_file = found[MODEL_FILE] != NULL;
+    if (!(is_file ? read_model_file(in, found[MODEL_FILE], &model)
+                  : read_heightfield(in, found[MODEL_HEIGHTFIELD], &model)) ||
+        !read_folder(in, found[MODEL_FOLDER], &model) || !read_placement(json, found, &model) ||
+        !nb_key_value_color(json, found[MODEL_COLOR], &nb_range_fraction, model.color))
         return false;
     convert_model(&in->space, &model);
-    return (!is_file || nb_keys_read_nodes(in, found[FILE_KEY], &model)) && keep_model(in, node, &model);
+    return (!is_file || nb_keys_read_nodes(in, found[MODEL_FILE], &model)) && keep_model(in, node, &model);
 }
 
 /* ---- points ---------------------------------------------------------------------------------- */
 
-static const nb_key_set points_keys = {model_names, MODEL_KEY_COUNT,
-                                       NB_BIT(MODEL_KEY_COUNT) - 1 - NB_BIT(HEIGHTFIELD) - NB_BIT(COLOR),
-                                       NB_BIT(FILE_KEY), "a set of points"};
+static const nb_key_set points_keys = {model_key_names, MODEL_KEY_COUNT,
+                                       NB_BIT(MODEL_KEY_COUNT) - 1 - NB_BIT(MODEL_HEIGHTFIELD) - NB_BIT(MODEL_COLOR),
+                                       NB_BIT(MODEL_FILE), "a set of points"};
 
 /* A copy of the points that lives as long as the scene. */
 static bool keep_points(nb_scene_reader *in, const nb_json_node *node, const nb_point_set *points,
@@ -199,8 +212,8 @@ bool nb_keys_read_points(nb_scene_reader *in, const nb_json_node *node, size_t l
                                 .most_seconds = nb_scene_most_seconds(in->scene),
                                 .seconds = &in->scene->budget.seconds};
     if (node == NULL) return true;
-    if (!nb_key_value_members(in->json, node, &points_keys, found) || !read_file(in, found[FILE_KEY], &model) ||
-        !read_folder(in, found[FOLDER], &model) || !read_placement(in->json, found, &model))
+    if (!nb_key_value_members(in->json, node, &points_keys, found) || !read_model_file(in, found[MODEL_FILE], &model) ||
+        !read_folder(in, found[MODEL_FOLDER], &model) || !read_placement(in->json, found, &model))
         return false;
     convert_model(&in->space, &model);
     memcpy(place->position, model.position, sizeof place->position);

@@ -5,28 +5,28 @@
 #include <string.h>
 
 enum {
-    NAME,
-    SHAPE,
-    POINTS,
-    DENSITY,
-    COUNT,
-    DIMMING,
-    SEED,
-    PROFILE,
-    RADIUS_RANGE,
-    ABSORPTION,
-    EMISSION,
-    COLORS,
-    TURBULENCE,
-    TURBULENCE_SCALE,
+    NEBULA_NAME,
+    NEBULA_SHAPE,
+    NEBULA_POINTS,
+    NEBULA_DENSITY,
+    NEBULA_COUNT,
+    NEBULA_DIMMING,
+    NEBULA_SEED,
+    NEBULA_PROFILE,
+    NEBULA_RADIUS_RANGE,
+    NEBULA_ABSORPTION,
+    NEBULA_EMISSION,
+    NEBULA_COLORS,
+    NEBULA_TURBULENCE,
+    NEBULA_TURBULENCE_SCALE,
     NEBULA_KEY_COUNT
 };
 
-static const char *const key_names[] = {"name",     "shape",  "points",     "density",         "count",
-                                        "dimming",  "seed",   "profile",    "radius_range",    "absorption",
-                                        "emission", "colors", "turbulence", "turbulence_scale"};
+static const char *const nebula_key_names[] = {"name",     "shape",  "points",     "density",         "count",
+                                               "dimming",  "seed",   "profile",    "radius_range",    "absorption",
+                                               "emission", "colors", "turbulence", "turbulence_scale"};
 
-static const nb_key_set nebula_keys = {key_names, NEBULA_KEY_COUNT, NB_BIT(NEBULA_KEY_COUNT) - 1, 0, "a nebula"};
+static const nb_key_set nebula_keys = {nebula_key_names, NEBULA_KEY_COUNT, NB_BIT(NEBULA_KEY_COUNT) - 1, 0, "a nebula"};
 
 #define MOST_PARTICLES 1000000
 #define MOST_COLORS 64
@@ -34,9 +34,9 @@ static const nb_key_set nebula_keys = {key_names, NEBULA_KEY_COUNT, NB_BIT(NEBUL
 static bool read_counts(nb_json *json, const nb_json_node *const *found, nebel_nebula_desc *nebula)
 {
     int count = 10000, seed = 0;
-    if (!nb_key_value_integer(json, found[COUNT], 1, MOST_PARTICLES, &count) ||
-        !nb_key_value_number(json, found[DIMMING], &nb_range_fraction, &nebula->dimming) ||
-        !nb_key_value_integer(json, found[SEED], 0, INT32_MAX, &seed))
+    if (!nb_key_value_integer(json, found[NEBULA_COUNT], 1, MOST_PARTICLES, &count) ||
+        !nb_key_value_number(json, found[NEBULA_DIMMING], &nb_range_fraction, &nebula->dimming) ||
+        !nb_key_value_integer(json, found[NEBULA_SEED], 0, INT32_MAX, &seed))
         return false;
     nebula->count = (size_t)count;
     nebula->seed = (uint64_t)seed;
@@ -53,16 +53,16 @@ static bool read_profile(nb_json *json, const nb_json_node *node, nebel_particle
     return choice >= 0;
 }
 
-static bool read_sizes(nb_json *json, const nb_json_node *const *found, nebel_nebula_desc *nebula)
+static bool read_nebula_sizes(nb_json *json, const nb_json_node *const *found, nebel_nebula_desc *nebula)
 {
     nb_range radius = nb_range_extent;
     if (nebula->profile == NEBEL_PARTICLE_GAUSSIAN) radius.low *= 3; /* its sigma is a third of the radius */
-    if (!nb_key_value_numbers(json, found[RADIUS_RANGE], &radius, 2, nebula->radius_range) ||
-        !nb_key_value_number(json, found[TURBULENCE], &nb_range_distance, &nebula->turbulence) ||
-        !nb_key_value_number(json, found[TURBULENCE_SCALE], &nb_range_extent, &nebula->turbulence_scale))
+    if (!nb_key_value_numbers(json, found[NEBULA_RADIUS_RANGE], &radius, 2, nebula->radius_range) ||
+        !nb_key_value_number(json, found[NEBULA_TURBULENCE], &nb_range_distance, &nebula->turbulence) ||
+        !nb_key_value_number(json, found[NEBULA_TURBULENCE_SCALE], &nb_range_extent, &nebula->turbulence_scale))
         return false;
     if (nebula->radius_range[0] <= nebula->radius_range[1]) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[RADIUS_RANGE],
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[NEBULA_RADIUS_RANGE],
                         "is larger first; must be [smallest, largest] radius");
 }
 
@@ -124,12 +124,12 @@ static bool keep_nebula(nb_scene_reader *in, const nb_json_node *node, const neb
     return true;
 }
 
-static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_node *const *found)
+static bool check_nebula_kind(nb_json *json, const nb_json_node *node, const nb_json_node *const *found)
 {
-    static const int strewn[] = {SHAPE, DENSITY, COUNT, DIMMING};
-    if (found[POINTS] == NULL && found[SHAPE] == NULL)
+    static const int strewn[] = {NEBULA_SHAPE, NEBULA_DENSITY, NEBULA_COUNT, NEBULA_DIMMING};
+    if (found[NEBULA_POINTS] == NULL && found[NEBULA_SHAPE] == NULL)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is nowhere; a nebula has \"shape\" or \"points\"");
-    for (size_t i = 0; i < sizeof strewn / sizeof *strewn && found[POINTS] != NULL; i++)
+    for (size_t i = 0; i < sizeof strewn / sizeof *strewn && found[NEBULA_POINTS] != NULL; i++)
         if (found[strewn[i]] != NULL)
             return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[strewn[i]],
                                     "does not go with \"points\", of which each is a particle");
@@ -189,15 +189,16 @@ bool nb_keys_read_nebula(nb_scene_reader *in, const nb_json_node *node)
     const char *name = "";
     return nb_key_value_is(json, node, NB_JSON_OBJECT, "a nebula {\"shape\": ...}") &&
            nb_key_value_members(json, node, &nebula_keys, found) &&
-           nb_key_value_text(json, found[NAME], &in->scene->arena, &name) && check_kind(json, node, found) &&
-           (found[SHAPE] == NULL || nb_keys_read_shape(in, found[SHAPE], &nebula.shape)) &&
-           check_bounds(json, found[SHAPE], nebula.shape.type) &&
-           nb_keys_read_density(in, found[DENSITY], nebula.shape.type, &nebula.density) &&
-           read_counts(json, found, &nebula) && read_profile(json, found[PROFILE], &nebula.profile) &&
-           read_sizes(json, found, &nebula) &&
-           nb_key_value_amount(json, found[ABSORPTION], &nb_range_amount, nebula.absorption) &&
-           nb_key_value_color(json, found[EMISSION], &nb_range_amount, nebula.emission) &&
-           read_colors(in, found[COLORS], &nebula) &&
-           nb_keys_read_points(in, found[POINTS], MOST_PARTICLES, &nebula, &place) &&
-           finish_nebula(in, node, found[SHAPE], &nebula, &place, name);
+           nb_key_value_text(json, found[NEBULA_NAME], &in->scene->arena, &name) &&
+           check_nebula_kind(json, node, found) &&
+           (found[NEBULA_SHAPE] == NULL || nb_keys_read_shape(in, found[NEBULA_SHAPE], &nebula.shape)) &&
+           check_bounds(json, found[NEBULA_SHAPE], nebula.shape.type) &&
+           nb_keys_read_density(in, found[NEBULA_DENSITY], nebula.shape.type, &nebula.density) &&
+           read_counts(json, found, &nebula) && read_profile(json, found[NEBULA_PROFILE], &nebula.profile) &&
+           read_nebula_sizes(json, found, &nebula) &&
+           nb_key_value_amount(json, found[NEBULA_ABSORPTION], &nb_range_amount, nebula.absorption) &&
+           nb_key_value_color(json, found[NEBULA_EMISSION], &nb_range_amount, nebula.emission) &&
+           read_colors(in, found[NEBULA_COLORS], &nebula) &&
+           nb_keys_read_points(in, found[NEBULA_POINTS], MOST_PARTICLES, &nebula, &place) &&
+           finish_nebula(in, node, found[NEBULA_SHAPE], &nebula, &place, name);
 }

@@ -4,18 +4,30 @@
 #include <limits.h>
 #include <string.h>
 
-enum { TYPE, SIZE, CELLS, OCTAVES, GAIN, COVERAGE, EDGE, VELOCITY, EVOLUTION, SEED, NOISE_KEY_COUNT };
+enum {
+    NOISE_TYPE,
+    NOISE_SIZE,
+    NOISE_CELLS,
+    NOISE_OCTAVES,
+    NOISE_GAIN,
+    NOISE_COVERAGE,
+    NOISE_EDGE,
+    NOISE_VELOCITY,
+    NOISE_EVOLUTION,
+    NOISE_SEED,
+    NOISE_KEY_COUNT
+};
 
-static const char *const key_names[] = {"type",     "size", "cells",    "octaves",   "gain",
-                                        "coverage", "edge", "velocity", "evolution", "seed"};
+static const char *const noise_key_names[] = {"type",     "size", "cells",    "octaves",   "gain",
+                                              "coverage", "edge", "velocity", "evolution", "seed"};
 
-static const nb_key_set noise_keys = {key_names, NOISE_KEY_COUNT, NB_BIT(NOISE_KEY_COUNT) - 1,
-                                      NB_BIT(SIZE) | NB_BIT(CELLS), "noise"};
+static const nb_key_set noise_keys = {noise_key_names, NOISE_KEY_COUNT, NB_BIT(NOISE_KEY_COUNT) - 1,
+                                      NB_BIT(NOISE_SIZE) | NB_BIT(NOISE_CELLS), "noise"};
 
 /* Further than this per frame nothing is left of the frame before. */
 #define MOST_MOTION 1000
 
-static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_scene_noise *noise)
+static bool read_noise_members(nb_json *json, const nb_json_node *const *found, nebel_scene_noise *noise)
 {
     static const nb_range part = {.low = 1e-6, .high = 1, .text = "a number from 1e-6 to 1"};
     static const nb_range half = {.low = 0, .high = 0.5, .text = "a number from 0 to 0.5"};
@@ -23,15 +35,15 @@ static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_
     static const nb_range cells = {.low = 1e-6, .high = NEBEL_MAX_GRID_SIZE / 2, .text = "a number from 1e-6 to 2048"};
     nebel_noise_desc *desc = &noise->desc;
     int seed = 0;
-    if (!nb_keys_read_grid_size(json, found[SIZE], desc->size) ||
-        !nb_key_value_numbers(json, found[CELLS], &cells, 3, desc->frequency) ||
-        !nb_key_value_integer(json, found[OCTAVES], 1, 16, &desc->octaves) ||
-        !nb_key_value_number(json, found[GAIN], &part, &desc->gain) ||
-        !nb_key_value_number(json, found[COVERAGE], &part, &desc->coverage) ||
-        !nb_key_value_numbers(json, found[EDGE], &half, 3, desc->falloff) ||
-        !nb_key_value_numbers(json, found[VELOCITY], &motion, 3, noise->velocity) ||
-        !nb_key_value_number(json, found[EVOLUTION], &motion, &noise->evolution) ||
-        !nb_key_value_integer(json, found[SEED], 0, INT_MAX, &seed))
+    if (!nb_keys_read_grid_size(json, found[NOISE_SIZE], desc->size) ||
+        !nb_key_value_numbers(json, found[NOISE_CELLS], &cells, 3, desc->frequency) ||
+        !nb_key_value_integer(json, found[NOISE_OCTAVES], 1, 16, &desc->octaves) ||
+        !nb_key_value_number(json, found[NOISE_GAIN], &part, &desc->gain) ||
+        !nb_key_value_number(json, found[NOISE_COVERAGE], &part, &desc->coverage) ||
+        !nb_key_value_numbers(json, found[NOISE_EDGE], &half, 3, desc->falloff) ||
+        !nb_key_value_numbers(json, found[NOISE_VELOCITY], &motion, 3, noise->velocity) ||
+        !nb_key_value_number(json, found[NOISE_EVOLUTION], &motion, &noise->evolution) ||
+        !nb_key_value_integer(json, found[NOISE_SEED], 0, INT_MAX, &seed))
         return false;
     desc->seed = (uint32_t)seed;
     return true;
@@ -43,7 +55,7 @@ bool nb_keys_read_noise_numbers(nb_json *json, const nb_json_node *node, nebel_s
     noise->desc.octaves = 1;
     noise->desc.gain = 0.5;
     noise->desc.coverage = 1;
-    return nb_key_value_members(json, node, &noise_keys, found) && read_members(json, found, noise);
+    return nb_key_value_members(json, node, &noise_keys, found) && read_noise_members(json, found, noise);
 }
 
 bool nb_noise_moves(const nebel_scene_noise *noise)

@@ -5,54 +5,54 @@
 #include <string.h>
 
 enum {
-    TYPE,
-    TRANSFORM,
-    MIN,
-    MAX,
-    CENTER,
-    RADIUS,
-    RADII,
-    FROM,
-    TO,
-    RADIUS_FROM,
-    RADIUS_TO,
-    POINT,
-    NORMAL,
-    PLANES,
-    SHAPES,
+    SHAPE_TYPE,
+    SHAPE_TRANSFORM,
+    SHAPE_MIN,
+    SHAPE_MAX,
+    SHAPE_CENTER,
+    SHAPE_RADIUS,
+    SHAPE_RADII,
+    SHAPE_FROM,
+    SHAPE_TO,
+    SHAPE_RADIUS_FROM,
+    SHAPE_RADIUS_TO,
+    SHAPE_POINT,
+    SHAPE_NORMAL,
+    SHAPE_PLANES,
+    SHAPE_SHAPES,
     SHAPE_KEY_COUNT
 };
 
-static const char *const key_names[] = {"type",      "transform", "min",    "max",    "center",
-                                        "radius",    "radii",     "from",   "to",     "radius_from",
-                                        "radius_to", "point",     "normal", "planes", "shapes"};
+static const char *const shape_key_names[] = {"type",      "transform", "min",    "max",    "center",
+                                              "radius",    "radii",     "from",   "to",     "radius_from",
+                                              "radius_to", "point",     "normal", "planes", "shapes"};
 
-static const char *const type_names[] = {"world",   "half_space", "box",    "sphere", "ellipsoid",   "cylinder",
-                                         "capsule", "cone",       "convex", "union",  "intersection"};
+static const char *const shape_type_names[] = {"world",   "half_space", "box",    "sphere", "ellipsoid",   "cylinder",
+                                               "capsule", "cone",       "convex", "union",  "intersection"};
 
 /* In the order of nebel_shape_type. Only "transform" and "type" are not required. */
 #define SHAPE_KEYS(required, owner)                                                                                    \
     {                                                                                                                  \
-        key_names, SHAPE_KEY_COUNT, (required) | NB_BIT(TYPE) | NB_BIT(TRANSFORM), (required), owner                   \
+        shape_key_names, SHAPE_KEY_COUNT, (required) | NB_BIT(SHAPE_TYPE) | NB_BIT(SHAPE_TRANSFORM), (required), owner \
     }
 
 static const nb_key_set shape_keys[NEBEL_SHAPE_COUNT] = {
     SHAPE_KEYS(0, "a shape \"world\""),
-    SHAPE_KEYS(NB_BIT(POINT) | NB_BIT(NORMAL), "a half space"),
-    SHAPE_KEYS(NB_BIT(MIN) | NB_BIT(MAX), "a box"),
-    SHAPE_KEYS(NB_BIT(CENTER) | NB_BIT(RADIUS), "a sphere"),
-    SHAPE_KEYS(NB_BIT(CENTER) | NB_BIT(RADII), "an ellipsoid"),
-    SHAPE_KEYS(NB_BIT(FROM) | NB_BIT(TO) | NB_BIT(RADIUS), "a cylinder"),
-    SHAPE_KEYS(NB_BIT(FROM) | NB_BIT(TO) | NB_BIT(RADIUS), "a capsule"),
-    SHAPE_KEYS(NB_BIT(FROM) | NB_BIT(TO) | NB_BIT(RADIUS_FROM) | NB_BIT(RADIUS_TO), "a cone"),
-    SHAPE_KEYS(NB_BIT(PLANES), "a convex body"),
-    SHAPE_KEYS(NB_BIT(SHAPES), "a union"),
-    SHAPE_KEYS(NB_BIT(SHAPES), "an intersection"),
+    SHAPE_KEYS(NB_BIT(SHAPE_POINT) | NB_BIT(SHAPE_NORMAL), "a half space"),
+    SHAPE_KEYS(NB_BIT(SHAPE_MIN) | NB_BIT(SHAPE_MAX), "a box"),
+    SHAPE_KEYS(NB_BIT(SHAPE_CENTER) | NB_BIT(SHAPE_RADIUS), "a sphere"),
+    SHAPE_KEYS(NB_BIT(SHAPE_CENTER) | NB_BIT(SHAPE_RADII), "an ellipsoid"),
+    SHAPE_KEYS(NB_BIT(SHAPE_FROM) | NB_BIT(SHAPE_TO) | NB_BIT(SHAPE_RADIUS), "a cylinder"),
+    SHAPE_KEYS(NB_BIT(SHAPE_FROM) | NB_BIT(SHAPE_TO) | NB_BIT(SHAPE_RADIUS), "a capsule"),
+    SHAPE_KEYS(NB_BIT(SHAPE_FROM) | NB_BIT(SHAPE_TO) | NB_BIT(SHAPE_RADIUS_FROM) | NB_BIT(SHAPE_RADIUS_TO), "a cone"),
+    SHAPE_KEYS(NB_BIT(SHAPE_PLANES), "a convex body"),
+    SHAPE_KEYS(NB_BIT(SHAPE_SHAPES), "a union"),
+    SHAPE_KEYS(NB_BIT(SHAPE_SHAPES), "an intersection"),
 };
 
 static const nebel_transform no_transform = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
 
-static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transform *transform)
+static bool read_shape_transform(nb_json *json, const nb_json_node *node, nebel_transform *transform)
 {
     enum { POSITION, ROTATION, SCALE, COUNT };
     static const char *const names[] = {"position", "rotation", "scale"};
@@ -136,7 +136,7 @@ static bool try_planes(nb_scene_reader *in, const nb_json_node *node, const nebe
     return nb_keys_read_try(in, node, "convex: ", &body);
 }
 
-static bool read_planes(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
+static bool read_shape_planes(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
 {
     nb_json *json = in->json;
     if (!nb_key_value_is(json, node, NB_JSON_ARRAY, "an array of planes [nx, ny, nz, d]")) return false;
@@ -191,27 +191,29 @@ static bool check_nesting(nb_json *json, const nb_json_node *node, const nesting
                         NEBEL_MAX_SHAPE_LEAVES);
 }
 
-static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_shape *shape)
+static bool read_shape_members(nb_json *json, const nb_json_node *const *found, nebel_shape *shape)
 {
-    return read_transform(json, found[TRANSFORM], &shape->transform) &&
-           nb_key_value_place(json, found[MIN], shape->min) && nb_key_value_place(json, found[MAX], shape->max) &&
-           nb_key_value_place(json, found[CENTER], shape->center) &&
-           nb_key_value_number(json, found[RADIUS], &nb_range_extent, &shape->radius) &&
-           nb_key_value_numbers(json, found[RADII], &nb_range_extent, 3, shape->radii) &&
-           nb_key_value_place(json, found[FROM], shape->from) && nb_key_value_place(json, found[TO], shape->to) &&
-           nb_key_value_number(json, found[RADIUS_FROM], &nb_range_end, &shape->radius_from) &&
-           nb_key_value_number(json, found[RADIUS_TO], &nb_range_end, &shape->radius_to) &&
-           nb_key_value_place(json, found[POINT], shape->point) &&
-           nb_key_value_direction(json, found[NORMAL], shape->normal);
+    return read_shape_transform(json, found[SHAPE_TRANSFORM], &shape->transform) &&
+           nb_key_value_place(json, found[SHAPE_MIN], shape->min) &&
+           nb_key_value_place(json, found[SHAPE_MAX], shape->max) &&
+           nb_key_value_place(json, found[SHAPE_CENTER], shape->center) &&
+           nb_key_value_number(json, found[SHAPE_RADIUS], &nb_range_extent, &shape->radius) &&
+           nb_key_value_numbers(json, found[SHAPE_RADII], &nb_range_extent, 3, shape->radii) &&
+           nb_key_value_place(json, found[SHAPE_FROM], shape->from) &&
+           nb_key_value_place(json, found[SHAPE_TO], shape->to) &&
+           nb_key_value_number(json, found[SHAPE_RADIUS_FROM], &nb_range_end, &shape->radius_from) &&
+           nb_key_value_number(json, found[SHAPE_RADIUS_TO], &nb_range_end, &shape->radius_to) &&
+           nb_key_value_place(json, found[SHAPE_POINT], shape->point) &&
+           nb_key_value_direction(json, found[SHAPE_NORMAL], shape->normal);
 }
 
 /* What one number has to do with another. */
 static bool check_members(nb_json *json, const nb_json_node *const *found, const nebel_shape *shape)
 {
-    const nb_json_node *box = found[MAX] != NULL ? found[MAX] : found[MIN];
-    const nb_json_node *axis = found[TO] != NULL ? found[TO] : found[FROM];
-    const nb_json_node *cone = found[RADIUS_TO] != NULL ? found[RADIUS_TO] : found[RADIUS_FROM];
-    return (box == NULL || check_box(json, found[MIN], found[MAX], shape)) &&
+    const nb_json_node *box = found[SHAPE_MAX] != NULL ? found[SHAPE_MAX] : found[SHAPE_MIN];
+    const nb_json_node *axis = found[SHAPE_TO] != NULL ? found[SHAPE_TO] : found[SHAPE_FROM];
+    const nb_json_node *cone = found[SHAPE_RADIUS_TO] != NULL ? found[SHAPE_RADIUS_TO] : found[SHAPE_RADIUS_FROM];
+    return (box == NULL || check_box(json, found[SHAPE_MIN], found[SHAPE_MAX], shape)) &&
            (axis == NULL || check_axis(json, axis, shape)) && (cone == NULL || check_cone(json, cone, shape));
 }
 
@@ -219,14 +221,15 @@ static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shap
 {
     const nb_json_node *found[SHAPE_KEY_COUNT];
     nb_json *json = in->json;
-    const int type = nb_key_value_type(json, node, type_names, NEBEL_SHAPE_COUNT);
+    const int type = nb_key_value_type(json, node, shape_type_names, NEBEL_SHAPE_COUNT);
     if (type < 0 || !nb_key_value_members(json, node, &shape_keys[type], found)) return false;
     *shape = (nebel_shape){.type = (nebel_shape_type)type, .transform = no_transform};
-    if (!read_members(json, found, shape)) return false;
-    where->leaf_count += found[SHAPES] == NULL;
+    if (!read_shape_members(json, found, shape)) return false;
+    where->leaf_count += found[SHAPE_SHAPES] == NULL;
     if (!check_nesting(json, node, where)) return false;
-    if (found[SHAPES] != NULL) return read_parts(in, found[SHAPES], shape, where);
-    return check_members(json, found, shape) && (found[PLANES] == NULL || read_planes(in, found[PLANES], shape));
+    if (found[SHAPE_SHAPES] != NULL) return read_parts(in, found[SHAPE_SHAPES], shape, where);
+    return check_members(json, found, shape) &&
+           (found[SHAPE_PLANES] == NULL || read_shape_planes(in, found[SHAPE_PLANES], shape));
 }
 
 bool nb_keys_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
@@ -239,8 +242,8 @@ bool nb_keys_read_shape_key(nb_scene_reader *in, const nb_json_node *node, nebel
 {
     const nb_json_node *found[SHAPE_KEY_COUNT];
     nb_key_set keys = shape_keys[shape->type];
-    keys.allowed &= ~(NB_BIT(TYPE) | NB_BIT(PLANES) | NB_BIT(SHAPES));
+    keys.allowed &= ~(NB_BIT(SHAPE_TYPE) | NB_BIT(SHAPE_PLANES) | NB_BIT(SHAPE_SHAPES));
     keys.required = 0;
     return node == NULL || (nb_key_value_members(in->json, node, &keys, found) &&
-                            read_members(in->json, found, shape) && check_members(in->json, found, shape));
+                            read_shape_members(in->json, found, shape) && check_members(in->json, found, shape));
 }

@@ -6,46 +6,50 @@
 #include <string.h>
 
 enum {
-    NAME,
-    SHAPE,
-    OPERATION,
-    PRIORITY,
-    DENSITY,
-    PRESET,
-    EXTINCTION,
-    MEAN_FREE_PATH,
-    VISIBILITY,
-    CONTRAST,
-    SOURCE,
-    ALBEDO,
-    PHASE,
-    EMISSION,
-    START,
-    CUTOFF,
-    KEYS,
-    FRAME,
+    VOLUME_NAME,
+    VOLUME_SHAPE,
+    VOLUME_OPERATION,
+    VOLUME_PRIORITY,
+    VOLUME_DENSITY,
+    VOLUME_PRESET,
+    VOLUME_EXTINCTION,
+    VOLUME_MEAN_FREE_PATH,
+    VOLUME_VISIBILITY,
+    VOLUME_CONTRAST,
+    VOLUME_SOURCE,
+    VOLUME_ALBEDO,
+    VOLUME_PHASE,
+    VOLUME_EMISSION,
+    VOLUME_START,
+    VOLUME_CUTOFF,
+    VOLUME_KEYS,
+    VOLUME_FRAME,
     VOLUME_KEY_COUNT
 };
 
-static const char *const key_names[] = {"name",       "shape",          "operation",  "priority", "density", "preset",
-                                        "extinction", "mean_free_path", "visibility", "contrast", "source",  "albedo",
-                                        "phase",      "emission",       "start",      "cutoff",   "keys",    "frame"};
+static const char *const volume_key_names[] = {
+    "name",     "shape",  "operation", "priority", "density",  "preset", "extinction", "mean_free_path", "visibility",
+    "contrast", "source", "albedo",    "phase",    "emission", "start",  "cutoff",     "keys",           "frame"};
 
-#define PLACE_KEYS (NB_BIT(NAME) | NB_BIT(OPERATION) | NB_BIT(PRIORITY) | NB_BIT(START) | NB_BIT(CUTOFF))
-#define EXCLUDE_KEYS (PLACE_KEYS | NB_BIT(SHAPE) | NB_BIT(KEYS))
-#define FOG_KEYS (NB_BIT(VOLUME_KEY_COUNT) - 1 - NB_BIT(FRAME))
-#define STILL_KEYS (PLACE_KEYS | NB_BIT(PRESET) | NB_BIT(PHASE) | NB_BIT(KEYS))
-#define MOVING_KEYS (FOG_KEYS - STILL_KEYS + NB_BIT(FRAME))
+#define PLACE_KEYS                                                                                                     \
+    (NB_BIT(VOLUME_NAME) | NB_BIT(VOLUME_OPERATION) | NB_BIT(VOLUME_PRIORITY) | NB_BIT(VOLUME_START) |                 \
+     NB_BIT(VOLUME_CUTOFF))
+#define EXCLUDE_KEYS (PLACE_KEYS | NB_BIT(VOLUME_SHAPE) | NB_BIT(VOLUME_KEYS))
+#define FOG_KEYS (NB_BIT(VOLUME_KEY_COUNT) - 1 - NB_BIT(VOLUME_FRAME))
+#define STILL_KEYS (PLACE_KEYS | NB_BIT(VOLUME_PRESET) | NB_BIT(VOLUME_PHASE) | NB_BIT(VOLUME_KEYS))
+#define MOVING_KEYS (FOG_KEYS - STILL_KEYS + NB_BIT(VOLUME_FRAME))
 
 /* In the order of nebel_operation. */
 static const nb_key_set volume_keys[] = {
-    {key_names, VOLUME_KEY_COUNT, FOG_KEYS, NB_BIT(SHAPE), "a volume"},
-    {key_names, VOLUME_KEY_COUNT, EXCLUDE_KEYS, NB_BIT(SHAPE), "a volume with \"operation\": \"exclude\""},
-    {key_names, VOLUME_KEY_COUNT, FOG_KEYS, NB_BIT(SHAPE), "a volume"}};
+    {volume_key_names, VOLUME_KEY_COUNT, FOG_KEYS, NB_BIT(VOLUME_SHAPE), "a volume"},
+    {volume_key_names, VOLUME_KEY_COUNT, EXCLUDE_KEYS, NB_BIT(VOLUME_SHAPE),
+     "a volume with \"operation\": \"exclude\""},
+    {volume_key_names, VOLUME_KEY_COUNT, FOG_KEYS, NB_BIT(VOLUME_SHAPE), "a volume"}};
 static const nb_key_set moving_keys[] = {
-    {key_names, VOLUME_KEY_COUNT, MOVING_KEYS, NB_BIT(FRAME), "a key of fog"},
-    {key_names, VOLUME_KEY_COUNT, NB_BIT(FRAME) | NB_BIT(SHAPE), NB_BIT(FRAME), "a key of excluded fog"},
-    {key_names, VOLUME_KEY_COUNT, MOVING_KEYS, NB_BIT(FRAME), "a key of fog"}};
+    {volume_key_names, VOLUME_KEY_COUNT, MOVING_KEYS, NB_BIT(VOLUME_FRAME), "a key of fog"},
+    {volume_key_names, VOLUME_KEY_COUNT, NB_BIT(VOLUME_FRAME) | NB_BIT(VOLUME_SHAPE), NB_BIT(VOLUME_FRAME),
+     "a key of excluded fog"},
+    {volume_key_names, VOLUME_KEY_COUNT, MOVING_KEYS, NB_BIT(VOLUME_FRAME), "a key of fog"}};
 
 static bool read_operation(nb_json *json, const nb_json_node *volume, const char *prefix, nebel_operation *operation)
 {
@@ -75,7 +79,7 @@ static bool read_length(nb_json *json, const nb_json_node *node, double depth, d
 static bool check_amount_count(nb_json *json, const nb_json_node *const *found)
 {
     const nb_json_node *first = NULL;
-    for (int i = EXTINCTION; i <= VISIBILITY; i++) {
+    for (int i = VOLUME_EXTINCTION; i <= VOLUME_VISIBILITY; i++) {
         if (found[i] == NULL) continue;
         if (first != NULL)
             return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[i],
@@ -87,8 +91,8 @@ static bool check_amount_count(nb_json *json, const nb_json_node *const *found)
 
 static bool check_amount_given(nb_json *json, const nb_json_node *volume, const nb_json_node *const *found)
 {
-    if (found[EXTINCTION] != NULL || found[MEAN_FREE_PATH] != NULL || found[VISIBILITY] != NULL ||
-        found[PRESET] != NULL)
+    if (found[VOLUME_EXTINCTION] != NULL || found[VOLUME_MEAN_FREE_PATH] != NULL || found[VOLUME_VISIBILITY] != NULL ||
+        found[VOLUME_PRESET] != NULL)
         return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, volume,
                         "the amount is missing; give one of extinction, mean_free_path, visibility, or a preset");
@@ -99,33 +103,34 @@ static bool read_amount(nb_json *json, const nb_json_node *const *found, double 
 {
     static const nb_range contrast_range = {.low = 0, .high = 1, .open = true, .text = "a number > 0 and < 1"};
     if (!check_amount_count(json, found)) return false;
-    if (found[CONTRAST] != NULL && found[VISIBILITY] == NULL)
-        return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[CONTRAST],
+    if (found[VOLUME_CONTRAST] != NULL && found[VOLUME_VISIBILITY] == NULL)
+        return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[VOLUME_CONTRAST],
                                 "belongs to \"visibility\", which is absent");
-    if (!nb_key_value_number(json, found[CONTRAST], &contrast_range, contrast)) return false;
-    if (found[EXTINCTION] != NULL) return nb_key_value_amount(json, found[EXTINCTION], &nb_range_amount, extinction);
-    if (found[VISIBILITY] != NULL)
-        return read_length(json, found[VISIBILITY], nebel_extinction_from_visibility(1, *contrast), extinction);
-    return found[MEAN_FREE_PATH] == NULL || read_length(json, found[MEAN_FREE_PATH], 1, extinction);
+    if (!nb_key_value_number(json, found[VOLUME_CONTRAST], &contrast_range, contrast)) return false;
+    if (found[VOLUME_EXTINCTION] != NULL)
+        return nb_key_value_amount(json, found[VOLUME_EXTINCTION], &nb_range_amount, extinction);
+    if (found[VOLUME_VISIBILITY] != NULL)
+        return read_length(json, found[VOLUME_VISIBILITY], nebel_extinction_from_visibility(1, *contrast), extinction);
+    return found[VOLUME_MEAN_FREE_PATH] == NULL || read_length(json, found[VOLUME_MEAN_FREE_PATH], 1, extinction);
 }
 
 /* ---- presets --------------------------------------------------------------------------------- */
 
 /* What other keys may replace: a source stands for the light. */
-static bool read_preset(nb_json *json, const nb_json_node *const *found, nebel_volume_desc *volume)
+static bool read_volume_preset(nb_json *json, const nb_json_node *const *found, nebel_volume_desc *volume)
 {
     enum { MOST_PRESETS = 16 };
     const char *names[MOST_PRESETS];
     size_t count;
     const nebel_fog_preset *const presets = nebel_list_fog_presets(&count);
-    if (found[PRESET] == NULL) return true;
+    if (found[VOLUME_PRESET] == NULL) return true;
     if (count > MOST_PRESETS) count = MOST_PRESETS;
     for (size_t i = 0; i < count; i++) names[i] = presets[i].name;
-    const int choice = nb_key_value_choice(json, found[PRESET], names, (int)count);
+    const int choice = nb_key_value_choice(json, found[VOLUME_PRESET], names, (int)count);
     if (choice < 0) return false;
     const nebel_fog_preset *const preset = &presets[choice];
     for (int i = 0; i < 3; i++) volume->extinction[i] = preset->extinction[i] * json->unit;
-    if (found[SOURCE] != NULL) return true;
+    if (found[VOLUME_SOURCE] != NULL) return true;
     memcpy(volume->albedo, preset->albedo, sizeof volume->albedo);
     volume->phase = preset->phase;
     return true;
@@ -136,21 +141,22 @@ static bool read_preset(nb_json *json, const nb_json_node *const *found, nebel_v
 /* Whether a volume has an albedo, be it 0. */
 static bool is_lit(const nb_json_node *const *found)
 {
-    return found[ALBEDO] != NULL || (found[PRESET] != NULL && found[SOURCE] == NULL);
+    return found[VOLUME_ALBEDO] != NULL || (found[VOLUME_PRESET] != NULL && found[VOLUME_SOURCE] == NULL);
 }
 
-static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, nebel_volume_desc *volume)
+static bool read_volume_light(nb_scene_reader *in, const nb_json_node *const *found, nebel_volume_desc *volume)
 {
     nb_json *json = in->json;
-    if (found[SOURCE] != NULL && found[ALBEDO] != NULL)
-        return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[ALBEDO],
+    if (found[VOLUME_SOURCE] != NULL && found[VOLUME_ALBEDO] != NULL)
+        return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[VOLUME_ALBEDO],
                                 "a volume has \"source\" or \"albedo\", not both; remove one");
-    if (found[PHASE] != NULL && !is_lit(found))
-        return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[PHASE], "belongs to \"albedo\", which is absent");
-    if (!nb_key_value_color(json, found[SOURCE], &nb_range_light, volume->source) ||
-        !nb_key_value_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) ||
-        !nb_keys_read_phase(in, found[PHASE], &volume->phase) ||
-        !nb_key_value_color(json, found[EMISSION], &nb_range_amount, volume->emission))
+    if (found[VOLUME_PHASE] != NULL && !is_lit(found))
+        return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[VOLUME_PHASE],
+                                "belongs to \"albedo\", which is absent");
+    if (!nb_key_value_color(json, found[VOLUME_SOURCE], &nb_range_light, volume->source) ||
+        !nb_key_value_color(json, found[VOLUME_ALBEDO], &nb_range_fraction, volume->albedo) ||
+        !nb_keys_read_phase(in, found[VOLUME_PHASE], &volume->phase) ||
+        !nb_key_value_color(json, found[VOLUME_EMISSION], &nb_range_amount, volume->emission))
         return false;
     return true;
 }
@@ -213,11 +219,11 @@ static bool keep_volume(nb_scene_reader *in, const nb_json_node *node, const neb
 /* A volume is lit in one way at all frames, so that it is in between, too. */
 static bool check_light_key(nb_json *json, const nb_json_node *const *entry, const nb_json_node *const *found)
 {
-    if (found[SOURCE] != NULL && is_lit(entry))
-        return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[SOURCE],
+    if (found[VOLUME_SOURCE] != NULL && is_lit(entry))
+        return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[VOLUME_SOURCE],
                                 "does not go with the volume's \"albedo\"; a volume has one of them at all frames");
-    if (found[ALBEDO] == NULL || is_lit(entry)) return true;
-    return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[ALBEDO],
+    if (found[VOLUME_ALBEDO] == NULL || is_lit(entry)) return true;
+    return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[VOLUME_ALBEDO],
                             "moves only where the volume itself has an \"albedo\"; give it one, 0 perhaps");
 }
 
@@ -232,19 +238,19 @@ static bool check_scale_signs(nb_json *json, const nb_json_node *node, const neb
     return true;
 }
 
-static bool read_key(nb_scene_reader *in, const nb_json_node *node, const nb_json_node *const *entry,
-                     nebel_volume_key *key)
+static bool read_volume_key(nb_scene_reader *in, const nb_json_node *node, const nb_json_node *const *entry,
+                            nebel_volume_key *key)
 {
     const nb_json_node *found[VOLUME_KEY_COUNT];
     nb_json *json = in->json;
     nebel_volume_desc *volume = &key->volume;
     double contrast = nb_volume_entry_default().contrast;
     return nb_key_value_members(json, node, &moving_keys[volume->operation], found) &&
-           nb_key_value_number(json, found[FRAME], &nb_range_frame, &key->frame) &&
-           nb_keys_read_shape_key(in, found[SHAPE], &volume->shape) &&
-           nb_keys_read_density_key(in, found[DENSITY], &volume->density) &&
+           nb_key_value_number(json, found[VOLUME_FRAME], &nb_range_frame, &key->frame) &&
+           nb_keys_read_shape_key(in, found[VOLUME_SHAPE], &volume->shape) &&
+           nb_keys_read_density_key(in, found[VOLUME_DENSITY], &volume->density) &&
            read_amount(json, found, volume->extinction, &contrast) && check_light_key(json, entry, found) &&
-           read_light(in, found, volume);
+           read_volume_light(in, found, volume);
 }
 
 /* The parts are those of the volume, which are converted with it, once. */
@@ -264,7 +270,7 @@ static bool read_key_list(nb_scene_reader *in, const nb_json_node *list, const n
     size_t i = 0;
     for (const nb_json_node *at = nb_json_first(json, list); at != NULL; at = nb_json_next(json, at), i++) {
         keys[i].volume = *volume;
-        if (!read_key(in, at, entry, &keys[i])) return false;
+        if (!read_volume_key(in, at, entry, &keys[i])) return false;
         if (i > 0 && keys[i].frame <= keys[i - 1].frame)
             return nb_json_fail(json, NEBEL_ERROR_FORMAT, at,
                                 "its frame %.15g is not after the key before it, %.15g; frames must ascend",
@@ -275,8 +281,8 @@ static bool read_key_list(nb_scene_reader *in, const nb_json_node *list, const n
 }
 
 /* `volume` is still in the file's numbers. */
-static bool read_keys(nb_scene_reader *in, const nb_json_node *list, const nb_json_node *const *found,
-                      const nebel_volume_desc *volume, nebel_volume_track *entry)
+static bool read_volume_keys(nb_scene_reader *in, const nb_json_node *list, const nb_json_node *const *found,
+                             const nebel_volume_desc *volume, nebel_volume_track *entry)
 {
     if (list == NULL) return true;
     if (!nb_key_value_is(in->json, list, NB_JSON_ARRAY, "an array of keys {\"frame\": ...}")) return false;
@@ -316,10 +322,10 @@ static bool start_moving(nb_scene_reader *in, const nb_json_node *node, nebel_vo
 static bool finish_volume(nb_scene_reader *in, const nb_json_node *node, const nb_json_node *const *found,
                           nebel_volume_desc *volume, nebel_volume_track *entry, const char *name)
 {
-    if (!read_keys(in, found[KEYS], found, volume, entry)) return false;
+    if (!read_volume_keys(in, found[VOLUME_KEYS], found, volume, entry)) return false;
     nb_file_units_convert_volume(&in->space, volume);
     if (in->node != NULL && !nb_keys_read_place_volume(in, node, volume)) return false;
-    if (!nb_keys_read_try(in, node, "", volume) || !try_keys(in, found[KEYS], entry) ||
+    if (!nb_keys_read_try(in, node, "", volume) || !try_keys(in, found[VOLUME_KEYS], entry) ||
         !start_moving(in, node, volume, entry))
         return false;
     nebel_volume_origin origin = in->node != NULL ? NEBEL_VOLUME_FROM_NODE : NEBEL_VOLUME_STATIC;
@@ -328,8 +334,8 @@ static bool finish_volume(nb_scene_reader *in, const nb_json_node *node, const n
 }
 
 /* A node of a model has its shape from the modelling program, where it names none, and does not move. */
-static bool read_members(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume,
-                         const nb_json_node **found)
+static bool read_volume_members(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume,
+                                const nb_json_node **found)
 {
     const char *prefix = in->node != NULL ? in->node->prefix : "";
     if (!nb_key_value_is(in->json, node, NB_JSON_OBJECT, "a volume {\"shape\": ...}") ||
@@ -338,12 +344,12 @@ static bool read_members(nb_scene_reader *in, const nb_json_node *node, nebel_vo
     nb_key_set keys = volume_keys[volume->operation];
     if (in->node == NULL)
         return nb_key_value_members(in->json, node, &keys, found) &&
-               nb_keys_read_shape(in, found[SHAPE], &volume->shape);
-    keys.allowed &= ~NB_BIT(KEYS);
+               nb_keys_read_shape(in, found[VOLUME_SHAPE], &volume->shape);
+    keys.allowed &= ~NB_BIT(VOLUME_KEYS);
     keys.required = 0;
     keys.owner = "a fog node";
     return nb_key_value_members_after(in->json, node, prefix, &keys, found) &&
-           nb_keys_read_node_shape(in, found[SHAPE], &volume->shape);
+           nb_keys_read_node_shape(in, found[VOLUME_SHAPE], &volume->shape);
 }
 
 static bool read_name(nb_scene_reader *in, const nb_json_node *node, const char **name)
@@ -404,12 +410,12 @@ static bool is_imported(const nb_json *json, const nb_json_node *volume)
 /* What all volumes have, also those without fog. */
 static bool read_place(nb_json *json, const nb_json_node *const *found, nebel_volume_desc *volume)
 {
-    if (!nb_key_value_integer(json, found[PRIORITY], INT_MIN, INT_MAX, &volume->priority) ||
-        !nb_key_value_number(json, found[START], &nb_range_distance, &volume->start) ||
-        !nb_key_value_number(json, found[CUTOFF], &nb_range_distance, &volume->cutoff))
+    if (!nb_key_value_integer(json, found[VOLUME_PRIORITY], INT_MIN, INT_MAX, &volume->priority) ||
+        !nb_key_value_number(json, found[VOLUME_START], &nb_range_distance, &volume->start) ||
+        !nb_key_value_number(json, found[VOLUME_CUTOFF], &nb_range_distance, &volume->cutoff))
         return false;
-    if (found[CUTOFF] == NULL || volume->cutoff > volume->start) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[CUTOFF], "is %.15g; must be more than \"start\", %.15g",
+    if (found[VOLUME_CUTOFF] == NULL || volume->cutoff > volume->start) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[VOLUME_CUTOFF], "is %.15g; must be more than \"start\", %.15g",
                         volume->cutoff, volume->start);
 }
 
@@ -421,12 +427,12 @@ bool nb_keys_read_volume(nb_scene_reader *in, const nb_json_node *node)
     nebel_volume_desc volume = {.operation = NEBEL_OPERATION_ADD};
     nebel_volume_track entry = nb_volume_entry_default();
     const char *name = "";
-    if (!read_members(in, node, &volume, found) || !read_place(json, found, &volume)) return false;
-    if (!read_name(in, found[NAME], &name)) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    if (!read_volume_members(in, node, &volume, found) || !read_place(json, found, &volume)) return false;
+    if (!read_name(in, found[VOLUME_NAME], &name)) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     if (volume.operation != NEBEL_OPERATION_EXCLUDE &&
-        (!nb_keys_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||
-         !check_amount_given(json, node, found) || !read_preset(json, found, &volume) ||
-         !read_amount(json, found, volume.extinction, &entry.contrast) || !read_light(in, found, &volume)))
+        (!nb_keys_read_density(in, found[VOLUME_DENSITY], volume.shape.type, &volume.density) ||
+         !check_amount_given(json, node, found) || !read_volume_preset(json, found, &volume) ||
+         !read_amount(json, found, volume.extinction, &entry.contrast) || !read_volume_light(in, found, &volume)))
         return false;
     return finish_volume(in, node, found, &volume, &entry, name);
 }

@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* In the place of the section, or where it would stand. */
-static void put(nb_key_patch *save, const nb_json_node *node, const char *key, const char *words)
+static void put_member(nb_key_patch *save, const nb_json_node *node, const char *key, const char *words)
 {
     if (node != NULL)
         nb_json_patch_replace(&save->edit, node, words);
@@ -17,7 +17,7 @@ static void put_color(nb_key_patch *save, const nb_json_node *node, const char *
 {
     char words[NB_EDIT_NUMBERS];
     nb_json_patch_write_numbers(3, color, NB_EDIT_AMOUNT, words);
-    put(save, node, key, words);
+    put_member(save, node, key, words);
 }
 
 static void put_gradient(nb_key_patch *save, const nb_json_node *node, const nebel_environment *now)
@@ -28,7 +28,7 @@ static void put_gradient(nb_key_patch *save, const nb_json_node *node, const neb
     nb_json_patch_write_numbers(3, now->ground, NB_EDIT_AMOUNT, ground);
     snprintf(words, sizeof words, "{ \"type\": \"gradient\", \"zenith\": %s, \"horizon\": %s, \"ground\": %s }", zenith,
              horizon, ground);
-    put(save, node, "ambient", words);
+    put_member(save, node, "ambient", words);
 }
 
 static void change_environment(nb_key_patch *save, const nb_json *json, const nb_json_node *node)
@@ -70,7 +70,7 @@ void nb_key_patch_background(nb_key_patch *save, const nb_scene_reader *in, cons
         nb_json_patch_numbers(&save->edit, in->json, &save->root, "background", 3, was->background, now->background,
                               NB_EDIT_AMOUNT);
     else if (now->shows_ambient && !was->shows_ambient)
-        put(save, node, "background", "\"ambient\"");
+        put_member(save, node, "background", "\"ambient\"");
     else if (!now->shows_ambient)
         put_color(save, node, "background", now->background);
 }

@@ -1,14 +1,10 @@
 /* Changed, new and lost volumes of fog, back into the file. */
 #include "key_patch.h"
+#include "math/vector.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-
-static bool is_zero(const double rgb[3])
-{
-    return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
-}
 
 static bool is_clear(const double extinction[3])
 {
@@ -97,7 +93,7 @@ static bool is_same_kind(const nebel_volume_desc *a, const nebel_volume_desc *b)
 
 static bool has_changed_to(const double was[3], const double now[3])
 {
-    return !is_zero(now) && memcmp(was, now, sizeof(double[3])) != 0;
+    return !nb_vector_is_zero(now) && memcmp(was, now, sizeof(double[3])) != 0;
 }
 
 /* What the volume is now needs no such key, and the file may have it. */
@@ -108,8 +104,8 @@ static nb_removed_keys find_lost_keys(const nb_written_volume *was, const nb_wri
     if (b->cutoff == 0 && a->cutoff != 0) nb_key_patch_lose(&lost, "cutoff");
     if (is_clear(b->extinction) && memcmp(a->extinction, b->extinction, sizeof a->extinction) != 0)
         nb_key_patch_lose(&lost, "contrast");
-    if (has_changed_to(a->albedo, b->albedo) && is_zero(b->source)) nb_key_patch_lose(&lost, "source");
-    if (has_changed_to(a->source, b->source) && is_zero(b->albedo)) {
+    if (has_changed_to(a->albedo, b->albedo) && nb_vector_is_zero(b->source)) nb_key_patch_lose(&lost, "source");
+    if (has_changed_to(a->source, b->source) && nb_vector_is_zero(b->albedo)) {
         nb_key_patch_lose(&lost, "albedo");
         nb_key_patch_lose(&lost, "phase");
     }
@@ -126,11 +122,6 @@ static unsigned find_mask(const nb_removed_keys *lost)
     return mask;
 }
 
-static bool is_same_phase(const nebel_phase *a, const nebel_phase *b)
-{
-    return a->type == b->type && a->g == b->g && a->alpha == b->alpha && a->diameter == b->diameter;
-}
-
 static void save_phase(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *volume,
                        const nb_written_volume *was, const nb_written_volume *now)
 {
@@ -140,8 +131,8 @@ static void save_phase(nb_key_patch *save, const nb_json *json, const nb_json_pa
     const bool has_hidden = nb_json_patch_member(json, volume->node, "preset") != NULL &&
                             nb_json_patch_member(json, volume->node, "source") != NULL;
     char words[NB_EDIT_NUMBERS];
-    if (is_zero(now->volume.albedo)) return;
-    if (!has_hidden && is_same_phase(&was->volume.phase, to)) return;
+    if (nb_vector_is_zero(now->volume.albedo)) return;
+    if (!has_hidden && nb_key_patch_same_phase(&was->volume.phase, to)) return;
     nb_key_patch_write_phase(to, words);
     if (node != NULL)
         nb_json_patch_replace(&save->edit, node, words);
@@ -233,7 +224,7 @@ static void save_keys(nb_key_patch *save, const nb_scene_reader *in, const nb_js
 static void save_lit_keys(nb_key_patch *save, const nb_json *json, const nb_json_patch_object *volume,
                           const nb_written_volume *now)
 {
-    if (is_zero(now->volume.albedo) && nb_key_patch_has_lit_key(&now->entry) &&
+    if (nb_vector_is_zero(now->volume.albedo) && nb_key_patch_has_lit_key(&now->entry) &&
         nb_json_patch_member(json, volume->node, "albedo") == NULL)
         nb_json_patch_add(&save->edit, volume, "albedo", "0");
 }

@@ -8,7 +8,7 @@
         key, offsetof(type, member), count, style                                                                      \
     }
 #define NUMBER(type, member) PLACE(type, #member, member, 1, NB_EDIT_EACH)
-#define END                                                                                                            \
+#define END_OF_KEYS                                                                                                    \
     {                                                                                                                  \
         NULL, 0, 0, NB_EDIT_EACH                                                                                       \
     }
@@ -16,7 +16,7 @@
 static const nb_key_entry physical_places[] = {
     PLACE(nebel_planet, "ground_albedo", atmosphere_desc.ground_albedo, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_planet, "sun_angular_diameter", sun_angular_diameter, 1, NB_EDIT_EACH),
-    END,
+    END_OF_KEYS,
 };
 
 static const nb_key_entry air_places[] = {
@@ -25,7 +25,7 @@ static const nb_key_entry air_places[] = {
     NUMBER(nebel_atmosphere_component, scale_height),
     PLACE(nebel_atmosphere_component, "center_height", center_height, 1, NB_EDIT_EACH),
     PLACE(nebel_atmosphere_component, "half_width", half_width, 1, NB_EDIT_EACH),
-    END,
+    END_OF_KEYS,
 };
 
 static const unsigned air_masks[NEBEL_COMPONENT_PROFILE_COUNT] = {
@@ -43,13 +43,13 @@ static const nb_key_entry cloud_places[] = {
     PLACE(nebel_cloud_layer, "patchiness", patchiness, 1, NB_EDIT_EACH),
     PLACE(nebel_cloud_layer, "droplet_diameter", droplet_diameter, 1, NB_EDIT_EACH),
     PLACE(nebel_cloud_layer, "wind", wind, 2, NB_EDIT_EACH),
-    END,
+    END_OF_KEYS,
 };
 
 static const nb_key_entry layers_places[] = {
     PLACE(nebel_textured_planet_desc, "rotation_period", rotation_period, 1, NB_EDIT_EACH),
     PLACE(nebel_textured_planet_desc, "land_coverage", land_coverage, 1, NB_EDIT_EACH),
-    END,
+    END_OF_KEYS,
 };
 
 static const nb_key_entry shell_places[] = {
@@ -59,13 +59,13 @@ static const nb_key_entry shell_places[] = {
     PLACE(nebel_cloud_shell, "uv_tiling", uv_tiling, 3, NB_EDIT_EACH),
     NUMBER(nebel_cloud_shell, gain),
     NUMBER(nebel_cloud_shell, coverage),
-    END,
+    END_OF_KEYS,
 };
 
 static const nb_key_entry air_shell_places[] = {
     NUMBER(nebel_atmosphere_shell, height),
     NUMBER(nebel_atmosphere_shell, brightness),
-    END,
+    END_OF_KEYS,
 };
 
 /* ---- in the file's numbers ------------------------------------------------------------------- */
@@ -121,15 +121,10 @@ static nebel_planet restore(const nb_file_units *space, const nebel_planet *plan
 
 /* ---- kinds of air ---------------------------------------------------------------------------- */
 
-static bool is_same_phase(const nebel_phase *a, const nebel_phase *b)
-{
-    return a->type == b->type && a->g == b->g && a->alpha == b->alpha && a->diameter == b->diameter;
-}
-
 static bool are_same_airs(const nebel_atmosphere_desc *a, const nebel_atmosphere_desc *b)
 {
     for (uint32_t i = 0; i < a->component_count; i++) {
-        if (!is_same_phase(&a->components[i].phase, &b->components[i].phase)) return false;
+        if (!nb_key_patch_same_phase(&a->components[i].phase, &b->components[i].phase)) return false;
         for (size_t k = 0; air_places[k].key != NULL; k++)
             if (nb_place_differs(&a->components[i], &b->components[i], &air_places[k])) return false;
     }
@@ -143,7 +138,7 @@ static void change_air(nb_key_patch *save, const nb_json *json, const nb_json_no
     const nb_json_node *phase = nb_json_patch_member(json, node, "phase");
     char text[NB_EDIT_NUMBERS];
     nb_key_patch_places(save, json, &air, air_places, air_masks[now->profile], was, now);
-    if (is_same_phase(&was->phase, &now->phase)) return;
+    if (nb_key_patch_same_phase(&was->phase, &now->phase)) return;
     nb_key_patch_write_phase(&now->phase, text);
     if (phase != NULL)
         nb_json_patch_replace(&save->edit, phase, text);

@@ -118,27 +118,37 @@ bool nb_key_patch_model(nb_key_patch *save, nb_scene_reader *in, const nb_json_n
 
 /* ---- sections -------------------------------------------------------------------------------- */
 
-enum { CAMERA, AMBIENT, BACKGROUND, MAX_OPACITY, SUN, CLASSIC, FOG, MODELS, SECTIONS };
+enum {
+    SAVE_CAMERA,
+    SAVE_AMBIENT,
+    SAVE_BACKGROUND,
+    SAVE_MAX_OPACITY,
+    SAVE_SUN,
+    SAVE_CLASSIC,
+    SAVE_FOG,
+    SAVE_MODELS,
+    SAVE_SECTIONS
+};
 
-static const char *const section_names[SECTIONS] = {"camera", "ambient", "background", "max_opacity",
-                                                    "sun",    "classic", "fog",        "models"};
+static const char *const saved_names[SAVE_SECTIONS] = {"camera", "ambient", "background", "max_opacity",
+                                                       "sun",    "classic", "fog",        "models"};
 
 /* Of a section that comes or goes as a whole. */
 static bool is_there(const nebel_scene_data *scene, int section)
 {
-    if (section == SUN) return scene->has_sun;
-    return section == CLASSIC ? scene->classic != NULL : true;
+    if (section == SAVE_SUN) return scene->has_sun;
+    return section == SAVE_CLASSIC ? scene->classic != NULL : true;
 }
 
 /* `node`: where it stands; NULL: it is not in the file. */
 static void save_light(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, int section)
 {
-    if (section == AMBIENT)
+    if (section == SAVE_AMBIENT)
         nb_key_patch_ambient(save, in, node);
-    else if (section == BACKGROUND)
+    else if (section == SAVE_BACKGROUND)
         nb_key_patch_background(save, in, node);
     else
-        nb_json_patch_numbers(&save->edit, in->json, &save->root, section_names[section], 1, &save->before->max_opacity,
+        nb_json_patch_numbers(&save->edit, in->json, &save->root, saved_names[section], 1, &save->before->max_opacity,
                               &save->changed->max_opacity, NB_EDIT_AMOUNT);
 }
 
@@ -146,19 +156,19 @@ static void save_light(nb_key_patch *save, const nb_scene_reader *in, const nb_j
 static void save_section(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, int section)
 {
     switch (section) {
-    case CAMERA:
+    case SAVE_CAMERA:
         nb_key_patch_camera(save, in);
         break;
-    case SUN:
+    case SAVE_SUN:
         save_sun(save, in, node);
         break;
-    case CLASSIC:
+    case SAVE_CLASSIC:
         nb_key_patch_classic(save, in, node);
         break;
-    case FOG:
+    case SAVE_FOG:
         nb_key_patch_entries(save, in, node);
         break;
-    case MODELS:
+    case SAVE_MODELS:
         nb_json_patch_remove(&save->edit, save->models.spans, save->models.count);
         break;
     default:
@@ -169,13 +179,13 @@ static void save_section(nb_key_patch *save, const nb_scene_reader *in, const nb
 void nb_key_patch_section(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node)
 {
     int section = 0;
-    while (section < SECTIONS && !nb_json_has_key(node, section_names[section])) section++;
+    while (section < SAVE_SECTIONS && !nb_json_has_key(node, saved_names[section])) section++;
     /* A file that has got such a section since is refused at its end. */
-    const bool is_new = section < SECTIONS && !is_there(save->before, section);
-    const bool goes = section < SECTIONS && !is_there(save->changed, section);
+    const bool is_new = section < SAVE_SECTIONS && !is_there(save->before, section);
+    const bool goes = section < SAVE_SECTIONS && !is_there(save->changed, section);
     save->sections[save->section_count++] = (nb_json_patch_span){node->key_offset, node->end, goes};
     if (!goes) save->root = (nb_json_patch_object){nb_json_parent(in->json, node), node->key_offset, node->end};
-    if (section == SECTIONS) return;
+    if (section == SAVE_SECTIONS) return;
     save->done |= 1u << section;
     if (!goes && !is_new) save_section(save, in, node, section);
 }
@@ -183,13 +193,13 @@ void nb_key_patch_section(nb_key_patch *save, const nb_scene_reader *in, const n
 /* One that is not in the file. */
 static void add_section(nb_key_patch *save, const nb_scene_reader *in, int section)
 {
-    if (section == CAMERA)
+    if (section == SAVE_CAMERA)
         nb_key_patch_camera(save, in);
-    else if (section <= MAX_OPACITY)
+    else if (section <= SAVE_MAX_OPACITY)
         save_light(save, in, NULL, section);
-    else if (section == SUN && save->changed->has_sun)
+    else if (section == SAVE_SUN && save->changed->has_sun)
         add_sun(save, &in->space);
-    else if (section == CLASSIC && save->changed->classic != NULL)
+    else if (section == SAVE_CLASSIC && save->changed->classic != NULL)
         nb_key_patch_add_classic(save, &in->space);
 }
 
@@ -229,7 +239,7 @@ bool nb_key_patch_rest(nb_key_patch *save, const nb_scene_reader *in, const nb_j
 {
     if (!check_counts(in, save, root) || !nb_key_patch_check_removed(save, in, root)) return false;
     save->root.node = root;
-    for (int i = 0; i < SECTIONS; i++)
+    for (int i = 0; i < SAVE_SECTIONS; i++)
         if ((save->done >> i & 1) == 0) add_section(save, in, i);
     nb_json_patch_remove(&save->edit, save->sections, save->section_count);
     return true;

@@ -1,5 +1,6 @@
 /* Whole volumes as JSON, for those that the file has not, or has as something else. */
 #include "key_patch.h"
+#include "math/vector.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -13,16 +14,16 @@ typedef struct writer {
     bool good, is_first; /* whether a comma is due before the next member */
 } writer;
 
-static void put(writer *out, const char *words)
+static void put_words(writer *out, const char *words)
 {
     out->good = out->good && nb_bytes_write(out->allocator, &out->text, out->text.size, words, strlen(words));
 }
 
 static void put_key(writer *out, const char *key)
 {
-    put(out, out->is_first ? " \"" : ", \"");
-    put(out, key);
-    put(out, "\": ");
+    put_words(out, out->is_first ? " \"" : ", \"");
+    put_words(out, key);
+    put_words(out, "\": ");
     out->is_first = false;
 }
 
@@ -36,19 +37,19 @@ static void put_numbers(writer *out, size_t count, const double *numbers, nb_jso
 {
     char text[NB_EDIT_NUMBERS];
     nb_json_patch_write_numbers(count, numbers, style, text);
-    put(out, text);
+    put_words(out, text);
 }
 
 static void open_object(writer *out, const char *key)
 {
     put_key(out, key);
-    put(out, "{");
+    put_words(out, "{");
     out->is_first = true;
 }
 
 static void close_object(writer *out)
 {
-    put(out, out->is_first ? "}" : " }");
+    put_words(out, out->is_first ? "}" : " }");
     out->is_first = false;
 }
 
@@ -73,20 +74,20 @@ static void put_planes(writer *out, const nebel_shape *shape)
         nebel_plane plane = shape->planes[i];
         nb_file_units_restore_plane(out->space, &plane);
         const double numbers[4] = {plane.normal[0], plane.normal[1], plane.normal[2], plane.distance};
-        put(out, i == 0 ? "[" : ", ");
+        put_words(out, i == 0 ? "[" : ", ");
         put_numbers(out, 4, numbers, NB_EDIT_WHOLE);
     }
-    put(out, "]");
+    put_words(out, "]");
 }
 
 static void put_parts(writer *out, const nebel_shape *shape)
 {
     put_key(out, "shapes");
     for (size_t i = 0; i < shape->part_count; i++) {
-        put(out, i == 0 ? "[" : ", ");
+        put_words(out, i == 0 ? "[" : ", ");
         put_shape(out, &shape->parts[i]);
     }
-    put(out, "]");
+    put_words(out, "]");
     out->is_first = false;
 }
 
@@ -112,7 +113,7 @@ static void put_shape(writer *out, const nebel_shape *shape)
     nebel_shape own = *shape;
     nb_file_units_restore_shape(out->space, &own);
     complete_transform(&own.transform);
-    put(out, "{");
+    put_words(out, "{");
     out->is_first = true;
     put_text(out, "type", nb_shape_names[own.type]);
     put_places(out, nb_shape_places, nb_shape_masks[own.type], &own, NULL);
@@ -131,8 +132,8 @@ static void put_density(writer *out, const nebel_density *density)
     if (density->type == NEBEL_DENSITY_CONSTANT) return;
     if (density->type == NEBEL_DENSITY_GRID) { /* its name is what the file said of it */
         put_key(out, "density");
-        put(out,
-            nebel_get_grid_name(density->grid)[0] != '\0' ? nebel_get_grid_name(density->grid) : "{ \"file\": \"\" }");
+        put_words(out, nebel_get_grid_name(density->grid)[0] != '\0' ? nebel_get_grid_name(density->grid)
+                                                                     : "{ \"file\": \"\" }");
         return;
     }
     open_object(out, "density");
@@ -160,15 +161,10 @@ void nb_key_patch_write_phase(const nebel_phase *phase, char text[NB_EDIT_NUMBER
     snprintf(text, NB_EDIT_NUMBERS, "{ \"type\": \"%.20s\"%s%s }", nb_phase_names[phase->type], first, second);
 }
 
-static bool is_zero(const double rgb[3])
-{
-    return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
-}
-
 bool nb_key_patch_has_lit_key(const nebel_volume_track *entry)
 {
     for (size_t i = 0; i < entry->key_count; i++)
-        if (!is_zero(entry->keys[i].volume.albedo)) return true;
+        if (!nb_vector_is_zero(entry->keys[i].volume.albedo)) return true;
     return false;
 }
 
@@ -193,7 +189,7 @@ static void put_phase(writer *out, const nebel_phase *phase)
     if (phase->type == NEBEL_PHASE_ISOTROPIC) return;
     nb_key_patch_write_phase(phase, text);
     put_key(out, "phase");
-    put(out, text);
+    put_words(out, text);
 }
 
 /* ---- keys ------------------------------------------------------------------------------------ */
@@ -237,7 +233,7 @@ static void put_key_object(writer *out, const nebel_volume_desc *own, const nebe
     nebel_volume_desc volume = key->volume;
     nb_file_units_restore_volume(out->space, &volume);
     complete_transform(&volume.shape.transform);
-    put(out, "{");
+    put_words(out, "{");
     out->is_first = true;
     put_key(out, "frame");
     put_numbers(out, 1, &key->frame, NB_EDIT_EACH);
@@ -258,17 +254,17 @@ static void put_keys(writer *out, const nb_written_volume *volume, const nb_byte
     nebel_volume_desc own = volume->volume;
     nb_file_units_restore_volume(out->space, &own);
     complete_transform(&own.shape.transform);
-    put(out, "[");
+    put_words(out, "[");
     for (size_t i = 0; i < volume->entry.key_count; i++) {
-        put(out, i > 0 ? "," : "");
-        put(out, i > 0 ? gap : "");
+        put_words(out, i > 0 ? "," : "");
+        put_words(out, i > 0 ? gap : "");
         if (kept != NULL && kept[i].size > 0)
             out->good =
                 out->good && nb_bytes_write(out->allocator, &out->text, out->text.size, kept[i].data, kept[i].size);
         else
             put_key_object(out, &own, &volume->entry.keys[i]);
     }
-    put(out, "]");
+    put_words(out, "]");
     out->is_first = false;
 }
 
@@ -308,10 +304,10 @@ static void put_members(writer *out, const nebel_volume_desc *own, const nb_writ
         put_amount(out, own, written->entry.contrast);
     }
     put_places(out, nb_volume_places, has_fog ? NB_ALL_PLACES : distances, own, &nothing);
-    if (has_fog && !is_zero(own->albedo)) put_phase(out, &own->phase);
-    if (has_fog && is_zero(own->albedo) && nb_key_patch_has_lit_key(&written->entry)) {
+    if (has_fog && !nb_vector_is_zero(own->albedo)) put_phase(out, &own->phase);
+    if (has_fog && nb_vector_is_zero(own->albedo) && nb_key_patch_has_lit_key(&written->entry)) {
         put_key(out, "albedo");
-        put(out, "0");
+        put_words(out, "0");
     }
     if (written->entry.key_count == 0) return;
     put_key(out, "keys");
@@ -324,7 +320,7 @@ bool nb_key_patch_write_volume(const nebel_allocator *allocator, const nb_file_u
     nebel_volume_desc own = volume->volume;
     writer out = {.allocator = allocator, .space = space, .good = true, .is_first = true};
     nb_file_units_restore_volume(space, &own);
-    put(&out, "{");
+    put_words(&out, "{");
     if (volume->name[0] != '\0') put_text(&out, "name", volume->name);
     put_members(&out, &own, volume);
     close_object(&out);

@@ -12,22 +12,22 @@
 #include <string.h>
 
 enum {
-    NEBEL,
-    UP,
-    UNIT,
-    CAMERA,
-    BACKGROUND,
-    SUN,
-    AMBIENT,
-    MAX_OPACITY,
-    LIGHTS,
-    MODELS,
-    FOG,
-    NEBULA,
-    CELLS,
-    CLASSIC,
-    MULTIPLE_SCATTERING,
-    PLANET,
+    SECTION_NEBEL,
+    SECTION_UP,
+    SECTION_UNIT,
+    SECTION_CAMERA,
+    SECTION_BACKGROUND,
+    SECTION_SUN,
+    SECTION_AMBIENT,
+    SECTION_MAX_OPACITY,
+    SECTION_LIGHTS,
+    SECTION_MODELS,
+    SECTION_FOG,
+    SECTION_NEBULA,
+    SECTION_CELLS,
+    SECTION_CLASSIC,
+    SECTION_MULTIPLE_SCATTERING,
+    SECTION_PLANET,
     SECTION_COUNT = NB_SCENE_SECTIONS
 };
 
@@ -36,7 +36,7 @@ static const char *const section_names[] = {
     "fog",   "nebula", "cells", "classic", "multiple_scattering", "planet"};
 static const char *const streamed_names[] = {"lights", "models", "fog", "nebula", NULL};
 static const nb_key_set section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
-                                        NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
+                                        NB_BIT(SECTION_NEBEL) | NB_BIT(SECTION_FOG), "a scene"};
 
 /* ---- reading --------------------------------------------------------------------------------- */
 
@@ -51,7 +51,8 @@ static bool read_version(nb_json *json, const nb_json_node *node)
 /* Known since find_space, unless it is wrong. */
 static bool read_space(nb_scene_reader *in, const nb_json_node *node, int section)
 {
-    return section == UP ? nb_keys_read_up(in->json, node, &in->space) : nb_keys_read_unit(in->json, node, &in->space);
+    return section == SECTION_UP ? nb_keys_read_up(in->json, node, &in->space)
+                                 : nb_keys_read_unit(in->json, node, &in->space);
 }
 
 static bool read_section(nb_scene_reader *in, const nb_json_node *node)
@@ -64,29 +65,29 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
     in->seen |= NB_BIT(section);
     in->section_offsets[section] = node->key_offset;
     switch (section) {
-    case NEBEL:
+    case SECTION_NEBEL:
         return read_version(in->json, node);
-    case UP:
-    case UNIT:
+    case SECTION_UP:
+    case SECTION_UNIT:
         return read_space(in, node, section);
-    case CAMERA:
+    case SECTION_CAMERA:
         return nb_keys_read_camera(in, node);
-    case BACKGROUND:
+    case SECTION_BACKGROUND:
         return nb_keys_read_background(in, node);
-    case SUN:
+    case SECTION_SUN:
         return nb_keys_read_sun(in, node);
-    case AMBIENT:
+    case SECTION_AMBIENT:
         in->scene->has_ambient = true;
         return nb_keys_read_ambient(in, node);
-    case MAX_OPACITY:
+    case SECTION_MAX_OPACITY:
         return nb_key_value_number(in->json, node, &nb_range_fraction, &data->max_opacity);
-    case CELLS:
+    case SECTION_CELLS:
         return nb_keys_read_cells(in, node) && (in->save == NULL || nb_key_patch_cells(in->save, in, node));
-    case CLASSIC:
+    case SECTION_CLASSIC:
         return nb_keys_read_classic(in, node);
-    case MULTIPLE_SCATTERING:
+    case SECTION_MULTIPLE_SCATTERING:
         return nb_keys_read_multiple_scattering(in, node);
-    case PLANET:
+    case SECTION_PLANET:
         return nb_keys_read_planet(in, node) && (in->save == NULL || nb_key_patch_planets(in->save, in, node));
     default:
         return nb_key_value_is(in->json, node, NB_JSON_ARRAY, "an array [...]");
@@ -131,13 +132,13 @@ static bool check_whole(nb_scene_reader *in, const nb_json_node *root)
     const uint32_t missing = section_keys.required & ~in->seen;
     if (missing != 0)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, root, "the key \"%s\" is missing; a scene needs it",
-                            (missing & NB_BIT(NEBEL)) != 0 ? "nebel" : "fog");
+                            (missing & NB_BIT(SECTION_NEBEL)) != 0 ? "nebel" : "fog");
     nb_finish_classic(in);
-    if ((in->seen & NB_BIT(MAX_OPACITY)) == 0) in->scene->data.max_opacity = in->imported_opacity;
+    if ((in->seen & NB_BIT(SECTION_MAX_OPACITY)) == 0) in->scene->data.max_opacity = in->imported_opacity;
     return true;
 }
 
-static bool take(nb_json *json, const nb_json_node *value, void *user)
+static bool take_scene_value(nb_json *json, const nb_json_node *value, void *user)
 {
     nb_scene_reader *in = user;
     const nb_json_node *parent = nb_json_parent(json, value);
@@ -196,7 +197,7 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
                          .allocator = scene->allocator,
                          .log = scene->log,
                          .streamed = streamed_names,
-                         .take = take,
+                         .take = take_scene_value,
                          .user = &in};
     scene->folder = nb_path_folder(&scene->arena, name);
     nebel_result result = scene->folder != NULL ? nebel_create_fog(&fog, &in.trial) : NEBEL_ERROR_MEMORY;
@@ -406,15 +407,8 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
     nebel_fog_desc desc = {.allocator = scene->allocator, .log = scene->log};
     *snapshot = NULL;
     if (!nb_scene_is_frame(scene, frame)) return NEBEL_ERROR_VALUE;
-    memcpy(desc.ambient, scene->data.ambient, sizeof desc.ambient);
     desc.max_opacity = scene->data.max_opacity;
-    nebel_environment ambient;
-    nebel_result result = nebel_find_scene_light(scene, frame, &desc.sun, &ambient);
-    if (result != NEBEL_OK) return result;
-    result = nebel_create_fog(&desc, &fog);
-    if (result == NEBEL_OK && ambient.type != NEBEL_ENVIRONMENT_CONSTANT) result = nebel_set_environment(fog, &ambient);
-    if (result == NEBEL_OK) result = nebel_set_lamps(fog, scene->data.light_count, scene->data.lights);
-    if (result == NEBEL_OK) result = nebel_set_diffusion(fog, scene->data.diffusion);
+    nebel_result result = nebel_create_fog(&desc, &fog);
     if (result == NEBEL_OK) result = add_volumes(fog, scene, frame, seed);
     if (result == NEBEL_OK) result = add_cells(fog, scene->data.cells);
     if (result == NEBEL_OK && with_particles) result = add_particles(fog, scene);
@@ -442,6 +436,24 @@ nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double fram
 nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot)
 {
     return nebel_commit_scene_fog_at(scene, 0, snapshot);
+}
+
+nebel_result nebel_create_scene_lighting(const nebel_scene *scene, nebel_snapshot *snapshot, double frame,
+                                         const nebel_lighting *previous, nebel_lighting **made)
+{
+    if (scene == NULL || snapshot == NULL || made == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_lighting_desc desc = {.allocator = scene->allocator,
+                                .log = scene->log,
+                                .lights = scene->data.lights,
+                                .light_count = scene->data.light_count,
+                                .diffusion = scene->data.diffusion,
+                                .previous = previous};
+    *made = NULL;
+    const nebel_result result = nebel_find_scene_light(scene, frame, &desc.sun, &desc.environment);
+    if (result != NEBEL_OK) return result;
+    if (desc.environment.type == NEBEL_ENVIRONMENT_CONSTANT)
+        memcpy(desc.environment.radiance, scene->data.ambient, sizeof desc.environment.radiance);
+    return nebel_create_lighting(snapshot, &desc, made);
 }
 
 void nebel_destroy_scene(nebel_scene *scene)

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-static const double pi = 3.14159265358979323846;
+#define PI 3.14159265358979323846
 
 nebel_camera nb_camera_default(void)
 {
@@ -74,7 +74,7 @@ static bool is_usable(const double numbers[NUMBER_COUNT], const nebel_camera *ca
 
 /* Between keys that look in opposite directions the cubic may pass through a place where there is no view or no up:
  * there the camera keeps the direction of the nearer key. */
-static nebel_camera mend(const nebel_camera *between, const nebel_camera *nearer)
+static nebel_camera mend_camera(const nebel_camera *between, const nebel_camera *nearer)
 {
     nebel_camera camera = *nearer;
     for (int i = 0; i < 3; i++) {
@@ -97,7 +97,7 @@ nebel_camera nebel_interpolate_camera(const nebel_camera_key *keys, size_t count
         numbers[i] = nb_keyframes_between(&around, i >= FIRST_LIMITED, values);
     }
     const nebel_camera camera = from_numbers(numbers, keys->camera.projection);
-    return is_usable(numbers, &camera) ? camera : mend(&camera, &keys[nb_keyframes_nearer(&around)].camera);
+    return is_usable(numbers, &camera) ? camera : mend_camera(&camera, &keys[nb_keyframes_nearer(&around)].camera);
 }
 
 /* ---- turntable ------------------------------------------------------------------------------- */
@@ -105,7 +105,7 @@ nebel_camera nebel_interpolate_camera(const nebel_camera_key *keys, size_t count
 /* Rotation by Rodrigues' formula, right-handed about up: the camera walks to its right. */
 static nebel_camera turn(const nebel_camera *start, double frame, uint32_t frames)
 {
-    const double angle = 2 * pi * fmod(frame, frames) / frames;
+    const double angle = 2 * PI * fmod(frame, frames) / frames;
     double axis[3], arm[3], side[3];
     memcpy(axis, start->up, sizeof axis);
     nb_vector_normalize(axis, 3);

@@ -9,9 +9,9 @@
 #include <string.h>
 
 /* The sky of the origin as a map: pixels, each the mean of a few directions. */
-enum { WIDTH = 64, HEIGHT = WIDTH / 2, WITHIN = 4, LOOKS = WIDTH * WITHIN * WITHIN };
+enum { SKY_WIDTH = 64, SKY_HEIGHT = SKY_WIDTH / 2, WITHIN = 4, LOOKS = SKY_WIDTH * WITHIN * WITHIN };
 
-static const double pi = 3.14159265358979323846;
+#define PI 3.14159265358979323846
 
 /* One row of pixels, as nebel_environment_map_desc has them. */
 typedef struct nb_sky_row {
@@ -22,9 +22,9 @@ typedef struct nb_sky_row {
 static void aim(int row, nb_sky_row *looks)
 {
     for (int i = 0; i < LOOKS; i++) {
-        const int column = i % (WIDTH * WITHIN), line = row * WITHIN + i / (WIDTH * WITHIN);
-        const double longitude = 2 * pi * ((column + 0.5) / (WIDTH * WITHIN) - 0.5);
-        const double latitude = pi * (0.5 - (line + 0.5) / (HEIGHT * WITHIN));
+        const int column = i % (SKY_WIDTH * WITHIN), line = row * WITHIN + i / (SKY_WIDTH * WITHIN);
+        const double longitude = 2 * PI * ((column + 0.5) / (SKY_WIDTH * WITHIN) - 0.5);
+        const double latitude = PI * (0.5 - (line + 0.5) / (SKY_HEIGHT * WITHIN));
         looks->direction[0][i] = cos(latitude) * sin(longitude);
         looks->direction[1][i] = sin(latitude);
         looks->direction[2][i] = -cos(latitude) * cos(longitude);
@@ -53,25 +53,25 @@ static double radiance(const nb_sky_row *looks, const nebel_planet *planet, cons
     double cosine = 0;
     for (int k = 0; k < 3; k++) cosine += sun[k] * (double)looks->normal[k][i];
     const double arrives = fmax(0, cosine) * (double)looks->sun[c][i] + (double)looks->sky[c][i];
-    return light + (double)looks->transmittance[c][i] * planet->atmosphere_desc.ground_albedo[c] / pi * arrives;
+    return light + (double)looks->transmittance[c][i] * planet->atmosphere_desc.ground_albedo[c] / PI * arrives;
 }
 
-static nebel_result make_map(nebel_scene *scene, const nebel_planet *planet, const nebel_sky_view *view,
-                             nebel_environment_map **map)
+static nebel_result make_sky_map(nebel_scene *scene, const nebel_planet *planet, const nebel_sky_view *view,
+                                 nebel_environment_map **map)
 {
     nebel_result result = NEBEL_ERROR_MEMORY;
     nb_sky_row *looks = nb_allocate(&scene->allocator, 1, sizeof *looks);
-    float *pixels = nb_allocate_zero(&scene->allocator, (size_t)WIDTH * HEIGHT * 3, sizeof *pixels);
-    for (int row = 0; row < HEIGHT && looks != NULL && pixels != NULL; row++) {
+    float *pixels = nb_allocate_zero(&scene->allocator, (size_t)SKY_WIDTH * SKY_HEIGHT * 3, sizeof *pixels);
+    for (int row = 0; row < SKY_HEIGHT && looks != NULL && pixels != NULL; row++) {
         aim(row, looks);
         look(view, looks);
         for (int i = 0; i < LOOKS; i++)
             for (int c = 0; c < 3; c++)
-                pixels[3 * (row * WIDTH + i % (WIDTH * WITHIN) / WITHIN) + c] +=
+                pixels[3 * (row * SKY_WIDTH + i % (SKY_WIDTH * WITHIN) / WITHIN) + c] +=
                     (float)(radiance(looks, planet, scene->data.sun_direction, i, c) / (WITHIN * WITHIN));
     }
     const nebel_environment_map_desc desc = {
-        .allocator = scene->allocator, .log = scene->log, .width = WIDTH, .height = HEIGHT, .pixels = pixels};
+        .allocator = scene->allocator, .log = scene->log, .width = SKY_WIDTH, .height = SKY_HEIGHT, .pixels = pixels};
     if (looks != NULL && pixels != NULL) result = nebel_create_environment_map(&desc, map);
     nb_release(&scene->allocator, looks);
     nb_release(&scene->allocator, pixels);
@@ -91,7 +91,7 @@ static nebel_result set_environment(nebel_scene *scene, const nebel_planet *plan
     nebel_result result = nebel_create_sky_view(&desc, &view);
     if (result != NEBEL_OK) return result;
     nebel_environment_map *map = NULL;
-    result = make_map(scene, planet, view, &map);
+    result = make_sky_map(scene, planet, view, &map);
     nebel_destroy_sky_view(view);
     if (result != NEBEL_OK) return result;
     nebel_release_environment_map(scene->environment_map);
@@ -104,7 +104,7 @@ static nebel_result set_environment(nebel_scene *scene, const nebel_planet *plan
 static double uneclipsed(const nebel_scene_data *data, const double to_sun[3])
 {
     static const double origin[3] = {0, 0, 0};
-    const double sun = 0.5 * data->planets[0].sun_angular_diameter * (pi / 180);
+    const double sun = 0.5 * data->planets[0].sun_angular_diameter * (PI / 180);
     double left = 1;
     for (size_t i = 1; i < data->planet_count; i++) {
         const nebel_atmosphere_desc *air = &data->planets[i].atmosphere_desc;

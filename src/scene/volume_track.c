@@ -136,7 +136,7 @@ static bool is_sound(const nebel_volume_desc *volume)
     return density->type != NEBEL_DENSITY_LINEAR || distance(density->from, density->to) >= NEBEL_MIN_LENGTH;
 }
 
-static void mend(const nebel_volume_desc *nearer, nebel_volume_desc *volume)
+static void mend_volume(const nebel_volume_desc *nearer, nebel_volume_desc *volume)
 {
     const nebel_shape *shape = &nearer->shape;
     const nebel_density *density = &nearer->density;
@@ -163,7 +163,7 @@ static nebel_volume_desc volume_between(const nebel_volume_key *keys, const nb_k
     volume = at[1];
     if (!move_numbers(around, at, &volume)) return *nearer;
     unpack_shape(&volume.shape);
-    mend(nearer, &volume);
+    mend_volume(nearer, &volume);
     return is_sound(&volume) ? volume : *nearer;
 }
 

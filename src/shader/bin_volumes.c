@@ -16,7 +16,7 @@
 /* What rounding in the shader may move a ray by, in pixels; a ray is half a pixel from its tile's border. */
 #define MARGIN (1.0 / 64)
 
-enum { CORNERS = 8, CUTS = 12, VERTICES = CORNERS + CUTS };
+enum { BOX_CORNERS = 8, CUTS = 12, VERTICES = BOX_CORNERS + CUTS };
 
 typedef struct vertex {
     double x, y, w; /* in pixels times w */
@@ -52,7 +52,7 @@ typedef struct screen {
 
 /* ---- hulls ----------------------------------------------------------------------------------- */
 
-static double transform(const double row[4], const double p[3])
+static double transform_row(const double row[4], const double p[3])
 {
     return ((row[0] * p[0] + row[1] * p[1]) + row[2] * p[2]) + row[3];
 }
@@ -65,8 +65,8 @@ static double doubt_of(const double row[4], const double p[3])
 
 static vertex project(const screen *s, const double p[3])
 {
-    const double w = transform(s->matrix[2], p);
-    return (vertex){transform(s->matrix[0], p), transform(s->matrix[1], p),
+    const double w = transform_row(s->matrix[2], p);
+    return (vertex){transform_row(s->matrix[0], p), transform_row(s->matrix[1], p),
                     fabs(w) <= doubt_of(s->matrix[2], p) ? 0 : w};
 }
 
@@ -83,19 +83,19 @@ static vertex cut(const vertex *front, const vertex *back)
     return (vertex){front->x + t * (back->x - front->x), front->y + t * (back->y - front->y), 0};
 }
 
-static void project_corners(const screen *s, const double low[3], const double high[3], vertex corners[CORNERS])
+static void project_corners(const screen *s, const double low[3], const double high[3], vertex corners[BOX_CORNERS])
 {
-    for (int i = 0; i < CORNERS; i++) {
+    for (int i = 0; i < BOX_CORNERS; i++) {
         const double p[3] = {i & 1 ? high[0] : low[0], i & 2 ? high[1] : low[1], i & 4 ? high[2] : low[2]};
         corners[i] = project(s, p);
     }
 }
 
 /* A corner with w = 0 is a cut's corner already. */
-static void place_corners(hull *h, const vertex corners[CORNERS], int place[CORNERS])
+static void place_corners(hull *h, const vertex corners[BOX_CORNERS], int place[BOX_CORNERS])
 {
     for (int pass = 0; pass < 2; pass++) {
-        for (int i = 0; i < CORNERS; i++) {
+        for (int i = 0; i < BOX_CORNERS; i++) {
             if (pass == 0) place[i] = -1;
             if (pass == 0 ? corners[i].w > 0 : corners[i].w == 0) {
                 place[i] = h->count;
@@ -110,13 +110,13 @@ static void place_corners(hull *h, const vertex corners[CORNERS], int place[CORN
  * cut's own edges and some within it. */
 static void make_hull(const screen *s, const double low[3], const double high[3], hull *h)
 {
-    vertex corners[CORNERS];
-    int place[CORNERS];
+    vertex corners[BOX_CORNERS];
+    int place[BOX_CORNERS];
     h->count = h->edge_count = h->first_cut = 0;
     project_corners(s, low, high, corners);
     place_corners(h, corners, place);
-    for (int i = 0; i < CORNERS; i++) {
-        for (int bit = 1; bit < CORNERS; bit <<= 1) {
+    for (int i = 0; i < BOX_CORNERS; i++) {
+        for (int bit = 1; bit < BOX_CORNERS; bit <<= 1) {
             const int j = i | bit;
             if (j == i) continue;
             const int front = corners[i].w > 0 ? i : j, back = front == i ? j : i;
@@ -245,19 +245,12 @@ static int find_footprint(tiler *t, const nb_volume *body, footprint *f)
     return add_spans(t, &h, first_row, last_row, f);
 }
 
-static int is_endless(const nb_volume *body)
-{
-    for (int i = 0; i < 3; i++)
-        if (!isfinite(body->low[i]) || !isfinite(body->high[i])) return 1;
-    return 0;
-}
-
 static int find_footprints(tiler *t)
 {
     for (size_t i = 0; i < t->snapshot->medium_count; i++) {
         const nb_volume *body = &t->snapshot->media[i].body;
         footprint *f = &t->footprints[i];
-        if (!is_endless(body)) {
+        if (!nb_volume_is_endless(body)) {
             if (!find_footprint(t, body, f)) return 0;
             continue;
         }

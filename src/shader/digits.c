@@ -62,13 +62,6 @@ static void set_sight(sight *s, const nebel_view *view, const double eye[3])
 
 /* ---- where bodies are ------------------------------------------------------------------------ */
 
-static int is_endless(const nb_volume *body)
-{
-    for (int i = 0; i < 3; i++)
-        if (!isfinite(body->low[i]) || !isfinite(body->high[i])) return 1;
-    return 0;
-}
-
 static double diagonal_of(const nb_volume *body)
 {
     double square = 0;
@@ -91,7 +84,7 @@ static void corner_of(const nb_volume *body, int number, double corner[3])
     for (int i = 0; i < 3; i++) corner[i] = number >> i & 1 ? body->high[i] : body->low[i];
 }
 
-static void transform(const double matrix[16], const double p[4], double out[4])
+static void transform_point(const double matrix[16], const double p[4], double out[4])
 {
     for (int row = 0; row < 4; row++)
         out[row] = matrix[row] * p[0] + matrix[4 + row] * p[1] + matrix[8 + row] * p[2] + matrix[12 + row] * p[3];
@@ -101,12 +94,12 @@ static void transform(const double matrix[16], const double p[4], double out[4])
 static int is_seen(const sight *s, const nb_volume *body)
 {
     int beside[5] = {0};
-    if (is_endless(body)) return 1;
+    if (nb_volume_is_endless(body)) return 1;
     for (int number = 0; number < 8; number++) {
         double place[4] = {0, 0, 0, 1}, in_eye[4], clip[4];
         corner_of(body, number, place);
-        transform(s->view->eye_from_world, place, in_eye);
-        transform(s->view->clip_from_eye, in_eye, clip);
+        transform_point(s->view->eye_from_world, place, in_eye);
+        transform_point(s->view->clip_from_eye, in_eye, clip);
         for (int i = 0; i < 2; i++) beside[2 * i] += clip[i] > clip[3], beside[2 * i + 1] += clip[i] < -clip[3];
         beside[4] += s->parallel ? in_eye[2] > 0 : clip[3] < 0;
     }
@@ -168,7 +161,8 @@ static side side_of(const nb_leaf *leaf, const nb_face *face, const double eye[3
 static void note_planes(const sight *s, const nb_volume *body, const nb_leaf *leaf, double through, narrowness *n)
 {
     double middle[3], eye[3], place[3];
-    for (int i = 0; i < 3; i++) middle[i] = is_endless(body) ? s->eye[i] : 0.5 * (body->low[i] + body->high[i]);
+    for (int i = 0; i < 3; i++)
+        middle[i] = nb_volume_is_endless(body) ? s->eye[i] : 0.5 * (body->low[i] + body->high[i]);
     bring_to_frame(s->eye, leaf, eye);
     bring_to_frame(middle, leaf, place);
     for (size_t i = 0; i < leaf->face_count; i++) {
@@ -196,7 +190,7 @@ static void note_round(const sight *s, const nb_volume *body, const nb_leaf *lea
     double least = HUGE_VAL;
     for (int i = 0; i < 3; i++) least = fmin(least, nb_vector_length(&leaf->matrix[3 * i]));
     const double extent = (is_ball ? leaf->radius : 2 + leaf->length) / least;
-    const double reach = is_endless(body) ? distance_to(s, leaf->origin) + extent : farthest_of(s, body);
+    const double reach = nb_volume_is_endless(body) ? distance_to(s, leaf->origin) + extent : farthest_of(s, body);
     note(n, reach + s->wide, (is_ball ? 2 * leaf->radius : 1) / leaf->scale);
 }
 
@@ -270,7 +264,7 @@ static nebel_view_error error_of(const sight *s, const nb_medium *medium)
     narrowness n = {0, 0, HUGE_VAL};
     for (size_t i = 0; i < body->leaf_count; i++) note_leaf(s, body, &body->leaves[i], &n);
     note_density(s, body, &n);
-    const double far = is_endless(body) ? n.reach : farthest_of(s, body);
+    const double far = nb_volume_is_endless(body) ? n.reach : farthest_of(s, body);
     const double pixel = s->parallel ? s->pixel : s->pixel * far, weight = weight_of(medium) * ROUNDING;
     if (diagonal_of(body) < pixel) return (nebel_view_error){.error = 0}; /* none of it is a pixel beside an outline */
     const double beside = !has_outline(body) ? 0 : s->parallel ? far / s->pixel : 1 / s->pixel;
@@ -283,7 +277,7 @@ static nebel_view_error error_of(const sight *s, const nb_medium *medium)
 }
 
 /* How far from the eye a body begins, or what of its density is not thin: at least. */
-static double nearest_of(const sight *s, const nb_volume *body)
+static double nearest_to_eye(const sight *s, const nb_volume *body)
 {
     const nebel_density *const density = &body->density;
     double square = 0, near = 0, eye[3];
@@ -306,11 +300,11 @@ static double nearest_of(const sight *s, const nb_volume *body)
 static double depth_of(const sight *s, const nb_volume *body)
 {
     double least = HUGE_VAL;
-    if (is_endless(body)) return 0;
+    if (nb_volume_is_endless(body)) return 0;
     for (int number = 0; number < 8; number++) {
         double place[4] = {0, 0, 0, 1}, in_eye[4];
         corner_of(body, number, place);
-        transform(s->view->eye_from_world, place, in_eye);
+        transform_point(s->view->eye_from_world, place, in_eye);
         least = fmin(least, -in_eye[2]);
     }
     return fmax(least, 0);
@@ -330,7 +324,7 @@ static void add(const sight *s, const nb_medium *medium, double little, digit_su
 {
     const nebel_view_error one = error_of(s, medium);
     const double by_surface = nb_volume_has_fog(&medium->body) && isfinite(medium->densest)
-                                  ? 2 * ROUNDING * medium->densest * nearest_of(s, &medium->body)
+                                  ? 2 * ROUNDING * medium->densest * nearest_to_eye(s, &medium->body)
                                   : 0;
     if (by_surface > 0 && (by_surface <= little || is_seen(s, &medium->body))) total->by_surface += by_surface;
     if (!(one.error > 0) || (one.error > little && !is_seen(s, &medium->body))) return;

@@ -6,16 +6,16 @@
 #include "diffusion/diffusion.h"
 #include "fog/snapshot.h"
 
-#define MOST_TEXELS ((size_t)1 << 24) /* indices are exact floats */
+#define MOST_DIFFUSION_TEXELS ((size_t)1 << 24) /* indices are exact floats */
 
 /* The lattice, the one of what is beside it, and that of own light. */
 enum { MOST_LATTICES = 3 };
 
-static size_t list_lattices(const nebel_snapshot *snapshot, const nb_diffusion *all[MOST_LATTICES])
+static size_t list_lattices(const nebel_lighting *lighting, const nb_diffusion *all[MOST_LATTICES])
 {
     size_t count = 0;
-    for (const nb_diffusion *d = snapshot->diffusion; d != NULL; d = d->beside) all[count++] = d;
-    if (snapshot->own_diffusion != NULL) all[count++] = snapshot->own_diffusion;
+    for (const nb_diffusion *d = lighting->diffusion; d != NULL; d = d->beside) all[count++] = d;
+    if (lighting->local_diffusion != NULL) all[count++] = lighting->local_diffusion;
     return count;
 }
 
@@ -30,32 +30,32 @@ static size_t texels_of_node(const nb_diffusion *d)
     return 2 * (size_t)d->channel_count + 1 + second_texels(d);
 }
 
-static size_t count_texels(const nebel_snapshot *snapshot)
+static size_t count_diffusion_texels(const nebel_lighting *lighting)
 {
     const nb_diffusion *all[MOST_LATTICES];
-    const size_t lattices = list_lattices(snapshot, all);
+    const size_t lattices = list_lattices(lighting, all);
     size_t count = 0;
     for (size_t i = 0; i < lattices; i++)
         count += nb_diffusion_lattice_nodes(&all[i]->lattice) * texels_of_node(all[i]);
     return count;
 }
 
-nebel_result nb_check_lattices(const nebel_snapshot *snapshot)
+nebel_result nb_check_lattices(const nebel_lighting *lighting)
 {
-    const size_t count = count_texels(snapshot);
-    if (count <= MOST_TEXELS) return NEBEL_OK;
-    return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
+    const size_t count = count_diffusion_texels(lighting);
+    if (count <= MOST_DIFFUSION_TEXELS) return NEBEL_OK;
+    return nb_fail(&lighting->log, NEBEL_ERROR_LIMIT,
                    "pack: the lattice of multiple scattering is too large for shaders: it takes %zu texels, of which "
                    "%zu can be addressed; use fewer cells, or nebel_trace or the CPU's renderer (--device cpu)",
-                   count, MOST_TEXELS);
+                   count, MOST_DIFFUSION_TEXELS);
 }
 
 /* ---- words ----------------------------------------------------------------------------------- */
 
-size_t nb_count_lattice_words(const nebel_snapshot *snapshot)
+size_t nb_count_lattice_words(const nebel_lighting *lighting)
 {
     const nb_diffusion *all[MOST_LATTICES];
-    return NB_LATTICE_TEXELS * list_lattices(snapshot, all);
+    return NB_LATTICE_TEXELS * list_lattices(lighting, all);
 }
 
 static int flags_of(const nb_diffusion *d)
@@ -66,7 +66,7 @@ static int flags_of(const nb_diffusion *d)
     return flags;
 }
 
-static void pack_lattice(const nb_diffusion *d, const long double eye[3], size_t first, nebel_texel_f32 *word)
+static void pack_diffusion_lattice(const nb_diffusion *d, const long double eye[3], size_t first, nebel_texel_f32 *word)
 {
     const nb_diffusion_lattice *l = &d->lattice;
     for (int a = 0; a < 3; a++) {
@@ -85,18 +85,18 @@ static void pack_lattice(const nb_diffusion *d, const long double eye[3], size_t
     word[9] = (nebel_texel_f32){{(float)light[0], (float)light[1], (float)light[2]}};
 }
 
-size_t nb_own_lattice_word(const nebel_snapshot *snapshot)
+size_t nb_own_lattice_word(const nebel_lighting *lighting)
 {
-    return snapshot->own_diffusion != NULL ? nb_count_lattice_words(snapshot) - NB_LATTICE_TEXELS : 0;
+    return lighting->local_diffusion != NULL ? nb_count_lattice_words(lighting) - NB_LATTICE_TEXELS : 0;
 }
 
-void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye[3], nebel_texel_f32 *words)
+void nb_pack_lattice_words(const nebel_lighting *lighting, const long double eye[3], nebel_texel_f32 *words)
 {
     const nb_diffusion *all[MOST_LATTICES];
-    const size_t lattices = list_lattices(snapshot, all);
+    const size_t lattices = list_lattices(lighting, all);
     size_t first = 0;
     for (size_t i = 0; i < lattices; i++) {
-        pack_lattice(all[i], eye, first, &words[i * NB_LATTICE_TEXELS]);
+        pack_diffusion_lattice(all[i], eye, first, &words[i * NB_LATTICE_TEXELS]);
         first += nb_diffusion_lattice_nodes(&all[i]->lattice) * texels_of_node(all[i]);
     }
 }
@@ -129,21 +129,21 @@ static nebel_texel_f32 *pack_nodes(const nb_diffusion *d, nebel_texel_f32 *word)
     return word;
 }
 
-nebel_result nebel_pack_diffusion(const nebel_snapshot *snapshot, nebel_texel_f32 *words, size_t capacity,
+nebel_result nebel_pack_diffusion(const nebel_lighting *lighting, nebel_texel_f32 *words, size_t capacity,
                                   size_t *count)
 {
-    if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (lighting == NULL) return NEBEL_ERROR_ARGUMENT;
     if (count == NULL || (words == NULL && capacity > 0))
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "pack: words and count must not be NULL");
-    const nebel_result result = nb_check_lattices(snapshot);
+        return nb_fail(&lighting->log, NEBEL_ERROR_ARGUMENT, "pack: words and count must not be NULL");
+    const nebel_result result = nb_check_lattices(lighting);
     if (result != NEBEL_OK) return result;
-    *count = count_texels(snapshot);
+    *count = count_diffusion_texels(lighting);
     if (words == NULL) return NEBEL_OK;
     if (capacity < *count)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
+        return nb_fail(&lighting->log, NEBEL_ERROR_LIMIT,
                        "pack: %zu words of multiple scattering are needed, there is room for %zu", *count, capacity);
     const nb_diffusion *all[MOST_LATTICES];
-    const size_t lattices = list_lattices(snapshot, all);
+    const size_t lattices = list_lattices(lighting, all);
     for (size_t i = 0; i < lattices; i++) words = pack_nodes(all[i], words);
     return NEBEL_OK;
 }

@@ -4,7 +4,7 @@
 
 #include "texel_layout.h"
 
-#include "fog/snapshot.h"
+#include "light/lighting.h"
 #include "light/environment_map.h"
 
 #include <math.h>
@@ -25,17 +25,18 @@ static size_t table_words(const nb_environment_table *table)
     return 1 + table->rows * table->columns;
 }
 
-static size_t filter_words(const nebel_snapshot *snapshot, size_t number)
+static size_t filter_words(const nebel_lighting *lighting, size_t number)
 {
-    return snapshot->sky.type == NEBEL_ENVIRONMENT_MAP ? table_words(&snapshot->skylights[number].filter->table)
-                                                       : 1 + NB_FILTER_PIECES;
+    return lighting->environment.type == NEBEL_ENVIRONMENT_MAP
+               ? table_words(&lighting->environment_lights[number].filter->table)
+               : 1 + NB_FILTER_PIECES;
 }
 
 /* The first word of a filter, or behind the last one. */
-static size_t filter_place(const nebel_snapshot *snapshot, size_t number)
+static size_t filter_place(const nebel_lighting *lighting, size_t number)
 {
     size_t place = NB_ENVIRONMENT_TEXELS;
-    for (size_t i = 0; i < number; i++) place += filter_words(snapshot, i);
+    for (size_t i = 0; i < number; i++) place += filter_words(lighting, i);
     return place;
 }
 
@@ -47,34 +48,35 @@ static size_t surface_words(const nebel_environment *sky)
     return table_words(nb_environment_map_reflection(sky->map)) + 1 + width * height;
 }
 
-static size_t count_words(const nebel_snapshot *snapshot, int surfaces)
+static size_t count_environment_words(const nebel_lighting *lighting, int surfaces)
 {
-    if (!surfaces && snapshot->skylight_count == 0) return 0;
-    return filter_place(snapshot, snapshot->skylight_count) + (surfaces ? surface_words(&snapshot->sky) : 0);
+    if (!surfaces && lighting->environment_light_count == 0) return 0;
+    return filter_place(lighting, lighting->environment_light_count) +
+           (surfaces ? surface_words(&lighting->environment) : 0);
 }
 
-static nebel_result check_count(const nebel_snapshot *snapshot, size_t count)
+static nebel_result check_count(const nebel_lighting *lighting, size_t count)
 {
     if (count <= MOST_WORDS) return NEBEL_OK;
     return nb_fail(
-        &snapshot->log, NEBEL_ERROR_LIMIT,
+        &lighting->log, NEBEL_ERROR_LIMIT,
         "pack: the environment takes %zu words, of which shaders can address %zu; use fewer phase functions, "
         "or nebel_trace or the CPU's renderer (--device cpu)",
         count, MOST_WORDS);
 }
 
-nebel_result nb_check_environment(const nebel_snapshot *snapshot)
+nebel_result nb_check_environment(const nebel_lighting *lighting)
 {
-    return check_count(snapshot, count_words(snapshot, 0));
+    return check_count(lighting, count_environment_words(lighting, 0));
 }
 
-void nb_place_filters(const nebel_snapshot *snapshot, nebel_texel_f32 *words)
+void nb_place_filters(const nebel_lighting *lighting, nebel_texel_f32 *words)
 {
-    for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const nb_environment_light *sky = snapshot->media[i].sky;
+    for (size_t i = 0; i < lighting->snapshot->medium_count; i++) {
+        const nb_environment_light *sky = lighting->media[i].environment;
         if (sky == NULL) continue;
         words[NB_HEADER_TEXELS + i * NB_MEDIUM_TEXELS + NB_MEDIUM_FILTER].v[3] =
-            (float)filter_place(snapshot, (size_t)(sky - snapshot->skylights));
+            (float)filter_place(lighting, (size_t)(sky - lighting->environment_lights));
     }
 }
 
@@ -85,9 +87,9 @@ static nebel_texel_f32 color_word(const double color[3])
     return (nebel_texel_f32){{(float)color[0], (float)color[1], (float)color[2], 0}};
 }
 
-static void pack_head(const nebel_environment *sky, size_t surfaces, nebel_texel_f32 *words)
+static void pack_environment_head(const nebel_environment *sky, size_t surfaces, nebel_texel_f32 *words)
 {
-    const nb_environment_light light = nb_skylight_of(sky, NULL);
+    const nb_environment_light light = nb_environment_light_of(sky, NULL);
     memset(words, 0, NB_ENVIRONMENT_TEXELS * sizeof *words);
     words[0].v[0] = (float)sky->type;
     switch (sky->type) {
@@ -125,11 +127,11 @@ static void pack_gradient_filter(const nb_environment_filter *filter, nebel_texe
         for (int k = 0; k < 4; k++) word[i].v[k] = (float)filter->rectified[i + k];
 }
 
-static void pack_filter(const nebel_snapshot *snapshot, size_t number, nebel_texel_f32 *words)
+static void pack_filter(const nebel_lighting *lighting, size_t number, nebel_texel_f32 *words)
 {
-    const nb_environment_filter *filter = snapshot->skylights[number].filter;
-    nebel_texel_f32 *word = &words[filter_place(snapshot, number)];
-    if (snapshot->sky.type == NEBEL_ENVIRONMENT_MAP)
+    const nb_environment_filter *filter = lighting->environment_lights[number].filter;
+    nebel_texel_f32 *word = &words[filter_place(lighting, number)];
+    if (lighting->environment.type == NEBEL_ENVIRONMENT_MAP)
         (void)pack_rgb(filter->table.coefficients, filter->table.columns, filter->table.rows, word);
     else
         pack_gradient_filter(filter, word);
@@ -143,24 +145,24 @@ static void pack_surfaces(const nebel_environment_map *map, nebel_texel_f32 *wor
     (void)pack_rgb(pixels, width, height, pack_rgb(table->coefficients, table->columns, table->rows, word));
 }
 
-nebel_result nebel_pack_environment(const nebel_snapshot *snapshot, int surfaces, nebel_texel_f32 *words,
+nebel_result nebel_pack_environment(const nebel_lighting *lighting, int surfaces, nebel_texel_f32 *words,
                                     size_t capacity, size_t *count)
 {
-    if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (lighting == NULL) return NEBEL_ERROR_ARGUMENT;
     if (count == NULL || (words == NULL && capacity > 0))
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "pack: words and count must not be NULL");
-    const nebel_result result = check_count(snapshot, count_words(snapshot, surfaces));
+        return nb_fail(&lighting->log, NEBEL_ERROR_ARGUMENT, "pack: words and count must not be NULL");
+    const nebel_result result = check_count(lighting, count_environment_words(lighting, surfaces));
     if (result != NEBEL_OK) return result;
-    *count = count_words(snapshot, surfaces);
+    *count = count_environment_words(lighting, surfaces);
     if (words == NULL || *count == 0) return NEBEL_OK;
     if (capacity < *count)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
+        return nb_fail(&lighting->log, NEBEL_ERROR_LIMIT,
                        "pack: %zu words of the environment are needed, there is room for %zu", *count, capacity);
-    const size_t behind = filter_place(snapshot, snapshot->skylight_count);
-    const int is_map = snapshot->sky.type == NEBEL_ENVIRONMENT_MAP;
-    pack_head(&snapshot->sky, surfaces && is_map ? behind : 0, words);
-    for (size_t i = 0; i < snapshot->skylight_count; i++) pack_filter(snapshot, i, words);
-    if (surfaces && is_map) pack_surfaces(snapshot->sky.map, &words[behind]);
+    const size_t behind = filter_place(lighting, lighting->environment_light_count);
+    const int is_map = lighting->environment.type == NEBEL_ENVIRONMENT_MAP;
+    pack_environment_head(&lighting->environment, surfaces && is_map ? behind : 0, words);
+    for (size_t i = 0; i < lighting->environment_light_count; i++) pack_filter(lighting, i, words);
+    if (surfaces && is_map) pack_surfaces(lighting->environment.map, &words[behind]);
     return NEBEL_OK;
 }
 
@@ -186,12 +188,13 @@ static int is_same_sky(const nebel_environment *a, const nebel_environment *b)
     }
 }
 
-int nebel_is_same_environment(const nebel_snapshot *a, const nebel_snapshot *b)
+int nebel_is_same_environment(const nebel_lighting *a, const nebel_lighting *b)
 {
     if (a == NULL || b == NULL) return a == b;
-    int same = a->skylight_count == b->skylight_count && is_same_sky(&a->sky, &b->sky);
-    for (size_t i = 0; i < a->skylight_count && same; i++)
-        same = nb_phase_compare(nb_environment_filter_phase(a->skylights[i].filter),
-                                nb_environment_filter_phase(b->skylights[i].filter)) == 0;
+    int same =
+        a->environment_light_count == b->environment_light_count && is_same_sky(&a->environment, &b->environment);
+    for (size_t i = 0; i < a->environment_light_count && same; i++)
+        same = nb_phase_compare(nb_environment_filter_phase(a->environment_lights[i].filter),
+                                nb_environment_filter_phase(b->environment_lights[i].filter)) == 0;
     return same;
 }

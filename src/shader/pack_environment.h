@@ -5,9 +5,9 @@
 #include <nebel/shader.h>
 
 /* LIMIT when they are too many. */
-nebel_result nb_check_environment(const nebel_snapshot *snapshot);
+nebel_result nb_check_environment(const nebel_lighting *lighting);
 
 /* Tells each packed medium where the filter of its phase function is. */
-void nb_place_filters(const nebel_snapshot *snapshot, nebel_texel_f32 *words);
+void nb_place_filters(const nebel_lighting *lighting, nebel_texel_f32 *words);
 
 #endif

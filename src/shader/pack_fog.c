@@ -27,7 +27,7 @@ _Static_assert(NEBEL_MAX_PACKED_VOLUMES == (MOST_WORDS - NB_HEADER_TEXELS) / NB_
 #define STEP_TOLERANCE 3e-5
 
 typedef struct packer {
-    const nebel_snapshot *snapshot;
+    const nebel_lighting *lighting;
     nebel_texel_f32 *words;
     size_t used; /* words behind those of the media that are taken */
     size_t rank; /* of the medium, counted from 0 */
@@ -214,7 +214,7 @@ static void pack_linear(const packer *p, const nebel_density *density, nebel_tex
     word->v[3] = narrow(value / square);
 }
 
-static void pack_grid(const nb_volume *body, nebel_texel_f32 *word)
+static void pack_grid_rate(const nb_volume *body, nebel_texel_f32 *word)
 {
     double rate[3];
     nb_grid_rate(body->density.grid, body->leaves[0].low, body->leaves[0].high, rate);
@@ -262,7 +262,7 @@ static void pack_density(packer *p, const nb_volume *body, nebel_texel_f32 *word
         word->v[3] = narrow(1 / (long double)density->edge_width);
         break;
     case NEBEL_DENSITY_GRID:
-        pack_grid(body, word);
+        pack_grid_rate(body, word);
         break;
     case NEBEL_DENSITY_ALTITUDE:
         pack_altitude(p, density, word);
@@ -275,18 +275,21 @@ static void pack_density(packer *p, const nb_volume *body, nebel_texel_f32 *word
 /* ---- scattering ------------------------------------------------------------------------------ */
 
 /* Whether anything needs to know what it scatters: of ambient light diffusion does. */
-static int scatters(const nebel_snapshot *snapshot, const nb_medium *medium)
+static int scatters(const nebel_lighting *lighting, size_t number)
 {
-    const int is_diffuse = (snapshot->diffusion != NULL && nb_medium_is_lit(medium)) ||
-                           (snapshot->own_diffusion != NULL && nb_medium_scatters(medium));
-    return medium->is_sunlit || medium->is_lamplit || is_diffuse;
+    const nb_medium *medium = &lighting->snapshot->media[number];
+    const nb_medium_light *lit = &lighting->media[number];
+    const int is_diffuse = (lighting->diffusion != NULL && nb_medium_is_lit(medium, lit)) ||
+                           (lighting->local_diffusion != NULL && nb_medium_scatters(medium));
+    return lit->scatters_sun || lit->scatters_lights || is_diffuse;
 }
 
-static void pack_scattering(packer *p, const nb_medium *medium, nebel_texel_f32 *word)
+static void pack_scattering(packer *p, size_t number, nebel_texel_f32 *word)
 {
+    const nb_medium *medium = &p->lighting->snapshot->media[number];
     const nb_phase *phase = &medium->body.phase;
     nebel_texel_f32 *scattering = &p->words[p->used];
-    if (!scatters(p->snapshot, medium)) return;
+    if (!scatters(p->lighting, number)) return;
     word[NB_MEDIUM_SCATTERING].v[3] = (float)p->used;
     word[NB_MEDIUM_AHEAD].v[3] = (float)medium->ahead;
     p->used += NB_SCATTERING_TEXELS;
@@ -299,14 +302,14 @@ static void pack_scattering(packer *p, const nb_medium *medium, nebel_texel_f32 
     }
 }
 
-static void pack_sun(const nebel_snapshot *snapshot, nebel_texel_f32 word[2])
+static void pack_sun(const nebel_lighting *lighting, nebel_texel_f32 word[2])
 {
     memset(word, 0, 2 * sizeof *word);
-    if (!snapshot->is_sunlit) return;
-    const nb_sun_depth_method way = snapshot->way_to_sun;
+    if (!lighting->scatters_sun) return;
+    const nb_sun_depth_method way = lighting->sun_depth_method;
     const int form = way == NB_SUN_DEPTH_FLAT ? NB_SUN_FLAT : way == NB_SUN_DEPTH_HEIGHT ? NB_SUN_HEIGHT : NB_SUN_STEPS;
-    set_color(&word[0], snapshot->to_sun, form);
-    set_color(&word[1], snapshot->irradiance, 0);
+    set_color(&word[0], lighting->to_sun, form);
+    set_color(&word[1], lighting->irradiance, 0);
 }
 
 static void pack_lamp(const packer *p, const nb_light *lamp, nebel_texel_f32 word[NB_LIGHT_TEXELS])
@@ -321,13 +324,13 @@ static void pack_lamp(const packer *p, const nb_light *lamp, nebel_texel_f32 wor
     word[3].v[1] = (float)lamp->inner;
 }
 
-static void pack_lamps(packer *p, const nebel_snapshot *snapshot)
+static void pack_lamps(packer *p, const nebel_lighting *lighting)
 {
-    if (!snapshot->is_lamplit) return;
-    p->words[0].v[3] = (float)snapshot->lamp_count;
+    if (!lighting->scatters_lights) return;
+    p->words[0].v[3] = (float)lighting->light_count;
     p->words[NB_HEADER_LIGHTS].v[3] = (float)p->used;
-    for (size_t i = 0; i < snapshot->lamp_count; i++, p->used += NB_LIGHT_TEXELS)
-        pack_lamp(p, &snapshot->lamps[i], &p->words[p->used]);
+    for (size_t i = 0; i < lighting->light_count; i++, p->used += NB_LIGHT_TEXELS)
+        pack_lamp(p, &lighting->lights[i], &p->words[p->used]);
 }
 
 /* ---- fog ------------------------------------------------------------------------------------- */
@@ -347,11 +350,11 @@ static double length_of(const nebel_density *density)
 }
 
 /* How wide fog is: the widest of its bodies; where none has bounds, the lengths of densities, or how far light goes. */
-static double width_of(const nebel_snapshot *snapshot)
+static double width_of(const nebel_lighting *lighting)
 {
     double body = 0, length = 0, way = 0;
-    for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const nb_volume *b = &snapshot->media[i].body;
+    for (size_t i = 0; i < lighting->snapshot->medium_count; i++) {
+        const nb_volume *b = &lighting->snapshot->media[i].body;
         for (int k = 0; k < 3; k++) {
             const double width = b->high[k] - b->low[k];
             if (width < HUGE_VAL) body = fmax(body, width);
@@ -363,9 +366,9 @@ static double width_of(const nebel_snapshot *snapshot)
 }
 
 /* Floats near 1 are as fine as a tenth of that. */
-static float nearest_of(const nebel_snapshot *snapshot)
+static float nearest_distance(const nebel_lighting *lighting)
 {
-    const double width = width_of(snapshot);
+    const double width = width_of(lighting);
     return (float)(1e-6 * (width > 0 && width < 1 ? width : 1));
 }
 
@@ -375,13 +378,15 @@ static double light_flags(const nb_medium *medium, size_t rank)
            NB_LIGHT_RANK * (double)rank;
 }
 
-static void pack_medium(packer *p, const nb_medium *medium, nebel_texel_f32 *word)
+static void pack_medium(packer *p, size_t number, nebel_texel_f32 *word)
 {
+    const nb_medium *medium = &p->lighting->snapshot->media[number];
+    const nb_medium_light *lit = &p->lighting->media[number];
     const nb_volume *body = &medium->body;
-    const int by_direction = medium->sky != NULL;
+    const int by_direction = lit->environment != NULL;
     set_color(&word[0], body->extinction, kind_of(body));
-    set_color(&word[1], by_direction ? body->emission : medium->light, light_flags(medium, p->rank));
-    set_color(&word[2], by_direction ? body->albedo : medium->radiance, (double)body->leaf_count);
+    set_color(&word[1], by_direction ? body->emission : lit->light, light_flags(medium, p->rank));
+    set_color(&word[2], by_direction ? body->albedo : lit->radiance, (double)body->leaf_count);
     pack_density(p, body, &word[3]);
     if (body->leaf_count > 1)
         pack_group(p, body, &word[NB_MEDIUM_LEAF]);
@@ -389,69 +394,69 @@ static void pack_medium(packer *p, const nb_medium *medium, nebel_texel_f32 *wor
         pack_leaf(p, body, &body->leaves[0], 1, &word[NB_MEDIUM_LEAF]);
     word[NB_MEDIUM_START].v[3] = (float)body->start;
     word[NB_MEDIUM_CUTOFF].v[3] = narrow((long double)body->cutoff);
-    pack_scattering(p, medium, word);
+    pack_scattering(p, number, word);
 }
 
-static size_t count_words(const nebel_snapshot *snapshot)
+static size_t count_fog_words(const nebel_lighting *lighting)
 {
-    size_t count = NB_HEADER_TEXELS + snapshot->medium_count * NB_MEDIUM_TEXELS;
-    for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const nb_volume *body = &snapshot->media[i].body;
+    size_t count = NB_HEADER_TEXELS + lighting->snapshot->medium_count * NB_MEDIUM_TEXELS;
+    for (size_t i = 0; i < lighting->snapshot->medium_count; i++) {
+        const nb_volume *body = &lighting->snapshot->media[i].body;
         count += body->face_count + (body->leaf_count > 1 ? body->leaf_count * NB_LEAF_TEXELS : 0);
-        count += scatters(snapshot, &snapshot->media[i]) ? NB_SCATTERING_TEXELS : 0;
+        count += scatters(lighting, i) ? NB_SCATTERING_TEXELS : 0;
         count += body->density.type == NEBEL_DENSITY_ALTITUDE;
     }
-    if (snapshot->is_lamplit) count += snapshot->lamp_count * NB_LIGHT_TEXELS;
-    return count + nb_count_lattice_words(snapshot);
+    if (lighting->scatters_lights) count += lighting->light_count * NB_LIGHT_TEXELS;
+    return count + nb_count_lattice_words(lighting);
 }
 
-nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_texel_f32 *words,
+nebel_result nebel_pack_fog(const nebel_lighting *lighting, const double eye[3], nebel_texel_f32 *words,
                             size_t capacity, size_t *count)
 {
-    if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (lighting == NULL) return NEBEL_ERROR_ARGUMENT;
     if (eye == NULL || count == NULL || (words == NULL && capacity > 0))
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "pack: eye, words and count must not be NULL");
+        return nb_fail(&lighting->log, NEBEL_ERROR_ARGUMENT, "pack: eye, words and count must not be NULL");
     for (int i = 0; i < 3; i++)
         if (!(fabs(eye[i]) <= 1e15))
-            return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
+            return nb_fail(&lighting->log, NEBEL_ERROR_ARGUMENT,
                            "pack: the eye must be finite and at most 1e15 m away");
-    nebel_result result = nb_check_voxels(snapshot);
-    if (result == NEBEL_OK) result = nb_check_lattices(snapshot);
-    if (result == NEBEL_OK) result = nb_check_environment(snapshot);
+    nebel_result result = nb_check_voxels(lighting);
+    if (result == NEBEL_OK) result = nb_check_lattices(lighting);
+    if (result == NEBEL_OK) result = nb_check_environment(lighting);
     if (result != NEBEL_OK) return result;
-    *count = count_words(snapshot);
+    *count = count_fog_words(lighting);
     if (*count > MOST_WORDS)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
+        return nb_fail(&lighting->log, NEBEL_ERROR_LIMIT,
                        "pack: %zu volumes are too many for shaders: they take %zu words, of which %zu can be "
                        "addressed; use fewer volumes, or nebel_trace",
-                       snapshot->medium_count, *count, MOST_WORDS);
+                       lighting->snapshot->medium_count, *count, MOST_WORDS);
     if (words == NULL) return NEBEL_OK;
     if (capacity < *count)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT, "pack: %zu words are needed, there is room for %zu", *count,
+        return nb_fail(&lighting->log, NEBEL_ERROR_LIMIT, "pack: %zu words are needed, there is room for %zu", *count,
                        capacity);
-    packer p = {snapshot,
+    packer p = {lighting,
                 words,
-                NB_HEADER_TEXELS + snapshot->medium_count * NB_MEDIUM_TEXELS,
+                NB_HEADER_TEXELS + lighting->snapshot->medium_count * NB_MEDIUM_TEXELS,
                 0,
                 {(long double)eye[0], (long double)eye[1], (long double)eye[2]}};
-    words[0] =
-        (nebel_texel_f32){{(float)snapshot->medium_count, (float)(STEP_TOLERANCE * fmax(1, snapshot->largest_radiance)),
-                           (float)snapshot->max_opacity, 0}};
-    pack_sun(snapshot, &words[NB_HEADER_SUN]);
-    words[NB_HEADER_LATTICE] = (nebel_texel_f32){{0, 0, nearest_of(snapshot), 0}};
+    words[0] = (nebel_texel_f32){{(float)lighting->snapshot->medium_count,
+                                  (float)(STEP_TOLERANCE * fmax(1, lighting->largest_radiance)),
+                                  (float)lighting->snapshot->max_opacity, 0}};
+    pack_sun(lighting, &words[NB_HEADER_SUN]);
+    words[NB_HEADER_LATTICE] = (nebel_texel_f32){{0, 0, nearest_distance(lighting), 0}};
     const unsigned precision = nb_full_precision();
-    for (size_t i = 0; i < snapshot->medium_count; i++) {
-        if (i > 0 && snapshot->media[i].body.rank > snapshot->media[i - 1].body.rank) p.rank++;
-        pack_medium(&p, &snapshot->media[i], &words[NB_HEADER_TEXELS + i * NB_MEDIUM_TEXELS]);
+    for (size_t i = 0; i < lighting->snapshot->medium_count; i++) {
+        if (i > 0 && lighting->snapshot->media[i].body.rank > lighting->snapshot->media[i - 1].body.rank) p.rank++;
+        pack_medium(&p, i, &words[NB_HEADER_TEXELS + i * NB_MEDIUM_TEXELS]);
     }
-    pack_lamps(&p, snapshot);
-    if (snapshot->diffusion != NULL) words[NB_HEADER_LATTICE].v[0] = (float)p.used;
-    if (snapshot->own_diffusion != NULL)
-        words[NB_HEADER_LATTICE].v[1] = (float)(p.used + nb_own_lattice_word(snapshot));
-    nb_pack_lattice_words(snapshot, p.eye, &words[p.used]);
+    pack_lamps(&p, lighting);
+    if (lighting->diffusion != NULL) words[NB_HEADER_LATTICE].v[0] = (float)p.used;
+    if (lighting->local_diffusion != NULL)
+        words[NB_HEADER_LATTICE].v[1] = (float)(p.used + nb_own_lattice_word(lighting));
+    nb_pack_lattice_words(lighting, p.eye, &words[p.used]);
     nb_restore_precision(precision);
-    nb_place_voxels(snapshot, words);
-    nb_place_filters(snapshot, words);
+    nb_place_voxels(lighting, words);
+    nb_place_filters(lighting, words);
     return NEBEL_OK;
 }
 
@@ -484,33 +489,37 @@ static uint32_t features_of_kind(int kind)
 }
 
 /* Whether two media may differ in their quotient of light and extinction, on which the walk for light depends. */
-static int is_mixed(const nebel_snapshot *snapshot)
+static int is_mixed(const nebel_lighting *lighting)
 {
-    const nb_medium *first = NULL;
-    for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const nb_medium *medium = &snapshot->media[i];
-        if (!nb_volume_has_fog(&medium->body)) continue;
+    const nb_medium *media = lighting->snapshot->media;
+    const nb_medium_light *first = NULL;
+    int first_emits = 0;
+    for (size_t i = 0; i < lighting->snapshot->medium_count; i++) {
+        const nb_medium_light *lit = &lighting->media[i];
+        if (!nb_volume_has_fog(&media[i].body)) continue;
         if (first == NULL) {
-            first = medium;
+            first = lit;
+            first_emits = media[i].emits;
             continue;
         }
-        if (medium->emits || first->emits || medium->sky != first->sky) return 1;
+        if (media[i].emits || first_emits || lit->environment != first->environment) return 1;
         for (int c = 0; c < 3; c++)
-            if (medium->radiance[c] < first->radiance[c] || medium->radiance[c] > first->radiance[c]) return 1;
+            if (lit->radiance[c] < first->radiance[c] || lit->radiance[c] > first->radiance[c]) return 1;
     }
     return 0;
 }
 
-uint32_t nebel_pack_features(const nebel_snapshot *snapshot)
+uint32_t nebel_pack_features(const nebel_lighting *lighting)
 {
-    if (snapshot == NULL) return NB_HAS_ALL;
-    uint32_t features = (snapshot->medium_count > 1 ? NB_HAS_SEVERAL : 0) | (is_mixed(snapshot) ? NB_HAS_MIXED : 0) |
-                        (snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0) | (snapshot->is_sunlit ? NB_HAS_SUN : 0) |
-                        (snapshot->is_lamplit ? NB_HAS_LIGHTS : 0) |
-                        (snapshot->diffusion != NULL || snapshot->own_diffusion != NULL ? NB_HAS_DIFFUSION : 0) |
-                        (snapshot->skylight_count > 0 ? NB_HAS_ENVIRONMENT : 0);
-    for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const nb_volume *body = &snapshot->media[i].body;
+    if (lighting == NULL) return NB_HAS_ALL;
+    uint32_t features = (lighting->snapshot->medium_count > 1 ? NB_HAS_SEVERAL : 0) |
+                        (is_mixed(lighting) ? NB_HAS_MIXED : 0) |
+                        (lighting->snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0) |
+                        (lighting->scatters_sun ? NB_HAS_SUN : 0) | (lighting->scatters_lights ? NB_HAS_LIGHTS : 0) |
+                        (lighting->diffusion != NULL || lighting->local_diffusion != NULL ? NB_HAS_DIFFUSION : 0) |
+                        (lighting->environment_light_count > 0 ? NB_HAS_ENVIRONMENT : 0);
+    for (size_t i = 0; i < lighting->snapshot->medium_count; i++) {
+        const nb_volume *body = &lighting->snapshot->media[i].body;
         features |= features_of_kind(kind_of(body)) | (body->leaf_count > 1 ? NB_HAS_GROUP : 0) |
                     (nb_volume_covers(body) ? NB_HAS_OVERRIDE : 0) |
                     (nb_volume_has_distances(body) ? NB_HAS_DISTANCES : 0);

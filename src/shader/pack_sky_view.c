@@ -50,7 +50,7 @@ static void pack_lobes(const nebel_sky_view *view, nebel_texel_f32 *words)
     }
 }
 
-static void pack_head(const nebel_sky_view *view, const nb_air_parts *parts, nebel_texel_f32 *words)
+static void pack_sky_view_head(const nebel_sky_view *view, const nb_air_parts *parts, nebel_texel_f32 *words)
 {
     const nb_elevation_map *o = &view->outlook;
     const nb_scattering_table *scatter = &view->atmosphere->scatter;
@@ -85,7 +85,7 @@ static void pack_entries(const nebel_sky_view *view, nebel_texel_f32 *word)
 static void pack_words(const nebel_sky_view *view, const nb_air_parts *parts, nebel_texel_f32 *words)
 {
     const nb_scattering_table *scatter = &view->atmosphere->scatter;
-    pack_head(view, parts, words);
+    pack_sky_view_head(view, parts, words);
     pack_entries(view, words + parts->entries);
     for (size_t i = 0; i < parts->suns - parts->extinction; i++)
         words[parts->extinction + i] = word_of(view->extinction[i]);

@@ -10,29 +10,29 @@
 #include <math.h>
 #include <string.h>
 
-enum { BRICK_CELLS = BRICK * BRICK * BRICK, CORNERS = BRICK + 1, MOST_STEPS = UINT16_MAX };
+enum { BRICK_CELLS = BRICK * BRICK * BRICK, BRICK_CORNERS = BRICK + 1, MOST_STEPS = UINT16_MAX };
 
 /* ---- the grids of a snapshot ----------------------------------------------------------------- */
 
-static const nebel_grid *grid_of(const nebel_snapshot *snapshot, size_t medium)
+nebel_grid *nb_grid_of_medium(const nebel_lighting *lighting, size_t medium)
 {
-    const nebel_density *density = &snapshot->media[medium].body.density;
+    const nebel_density *density = &lighting->snapshot->media[medium].body.density;
     return density->type == NEBEL_DENSITY_GRID ? density->grid : NULL;
 }
 
 /* The first medium that has this one's grid. */
-static size_t first_of(const nebel_snapshot *snapshot, size_t medium)
+static size_t first_with_grid(const nebel_lighting *lighting, size_t medium)
 {
     size_t first = 0;
-    while (grid_of(snapshot, first) != grid_of(snapshot, medium)) first++;
+    while (nb_grid_of_medium(lighting, first) != nb_grid_of_medium(lighting, medium)) first++;
     return first;
 }
 
 /* The next medium, from `medium` on, with a grid that none before it has; medium_count: there is none. */
-static size_t next_grid(const nebel_snapshot *snapshot, size_t medium)
+static size_t next_grid(const nebel_lighting *lighting, size_t medium)
 {
-    while (medium < snapshot->medium_count &&
-           (grid_of(snapshot, medium) == NULL || first_of(snapshot, medium) != medium))
+    while (medium < lighting->snapshot->medium_count &&
+           (nb_grid_of_medium(lighting, medium) == NULL || first_with_grid(lighting, medium) != medium))
         medium++;
     return medium;
 }
@@ -47,16 +47,16 @@ static int is_even(const brick *b)
     return !(b->least < b->most);
 }
 
-static size_t count_texels(const nebel_grid *grid)
+static size_t count_grid_texels(const nebel_grid *grid)
 {
     return 1 + count_bricks(grid) + grid->uneven_bricks * BRICK_CELLS;
 }
 
-static size_t count_grids(const nebel_snapshot *snapshot)
+static size_t count_grids(const nebel_lighting *lighting)
 {
     size_t count = 0;
-    for (size_t i = next_grid(snapshot, 0); i < snapshot->medium_count; i = next_grid(snapshot, i + 1))
-        count += count_texels(grid_of(snapshot, i));
+    for (size_t i = next_grid(lighting, 0); i < lighting->snapshot->medium_count; i = next_grid(lighting, i + 1))
+        count += count_grid_texels(nb_grid_of_medium(lighting, i));
     return count;
 }
 
@@ -66,50 +66,51 @@ static size_t room_beside(size_t grids)
     return grids < NB_MAX_TEXELS ? NB_MAX_TEXELS - grids : 0;
 }
 
-static size_t count_all(const nebel_snapshot *snapshot)
+static size_t count_all(const nebel_lighting *lighting)
 {
-    const size_t grids = count_grids(snapshot);
-    return grids + nb_count_sun_lattice_texels(snapshot, room_beside(grids));
+    const size_t grids = count_grids(lighting);
+    return grids + nb_count_sun_lattice_texels(lighting, room_beside(grids));
 }
 
-nebel_result nb_check_voxels(const nebel_snapshot *snapshot)
+nebel_result nb_check_voxels(const nebel_lighting *lighting)
 {
-    const size_t count = count_all(snapshot);
+    const size_t count = count_all(lighting);
     if (count <= NB_MAX_TEXELS) return NEBEL_OK;
-    return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
+    return nb_fail(&lighting->log, NEBEL_ERROR_LIMIT,
                    "pack: the grids are too large for shaders: where they are not even they take %zu texels, of which "
                    "%zu can be addressed; use fewer voxels, or nebel_trace or the CPU's renderer (--device cpu)",
                    count, NB_MAX_TEXELS);
 }
 
-void nb_place_voxels(const nebel_snapshot *snapshot, nebel_texel_f32 *words)
+void nb_place_voxels(const nebel_lighting *lighting, nebel_texel_f32 *words)
 {
     size_t next = 0;
-    for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const nebel_grid *grid = grid_of(snapshot, i);
+    for (size_t i = 0; i < lighting->snapshot->medium_count; i++) {
+        const nebel_grid *grid = nb_grid_of_medium(lighting, i);
         if (grid == NULL) continue;
         nebel_texel_f32 *word = &words[NB_HEADER_TEXELS + i * NB_MEDIUM_TEXELS + 3];
-        const size_t first = first_of(snapshot, i);
+        const size_t first = first_with_grid(lighting, i);
         word->v[3] = first < i ? words[NB_HEADER_TEXELS + first * NB_MEDIUM_TEXELS + 3].v[3] : (float)next;
-        if (first == i) next += count_texels(grid);
+        if (first == i) next += count_grid_texels(grid);
     }
-    nb_place_sun_lattices(snapshot, room_beside(next), next, words);
+    nb_place_sun_lattices(lighting, room_beside(next), next, words);
 }
 
-int nebel_is_same_voxels(const nebel_snapshot *a, const nebel_snapshot *b)
+int nebel_is_same_voxels(const nebel_lighting *a, const nebel_lighting *b)
 {
     if (a == NULL || b == NULL) return a == b;
     size_t i = next_grid(a, 0), k = next_grid(b, 0);
-    while (i < a->medium_count && k < b->medium_count && nb_grid_compare(grid_of(a, i), grid_of(b, k)) == 0) {
+    while (i < a->snapshot->medium_count && k < b->snapshot->medium_count &&
+           nb_grid_compare(nb_grid_of_medium(a, i), nb_grid_of_medium(b, k)) == 0) {
         i = next_grid(a, i + 1);
         k = next_grid(b, k + 1);
     }
-    return i == a->medium_count && k == b->medium_count && nb_same_sun_lattices(a, b);
+    return i == a->snapshot->medium_count && k == b->snapshot->medium_count && nb_same_sun_lattices(a, b);
 }
 
 /* ---- texels ---------------------------------------------------------------------------------- */
 
-static uint32_t bits_of(double x)
+uint32_t nb_texel_bits(double x)
 {
     const float narrow = (float)x;
     uint32_t bits;
@@ -126,12 +127,12 @@ static size_t voxel_at(const nebel_grid *grid, int axis, int block, int i)
 
 /* The corners of a brick's cells, in steps above its least voxel. */
 static void measure_corners(const nebel_grid *grid, const brick *b, const int block[3],
-                            uint16_t steps[CORNERS][CORNERS][CORNERS])
+                            uint16_t steps[BRICK_CORNERS][BRICK_CORNERS][BRICK_CORNERS])
 {
     const double rate = MOST_STEPS / (b->most - b->least);
-    for (int z = 0; z < CORNERS; z++)
-        for (int y = 0; y < CORNERS; y++)
-            for (int x = 0; x < CORNERS; x++) {
+    for (int z = 0; z < BRICK_CORNERS; z++)
+        for (int y = 0; y < BRICK_CORNERS; y++)
+            for (int x = 0; x < BRICK_CORNERS; x++) {
                 const size_t row =
                     row_of(grid, (int)voxel_at(grid, 1, block[1], y), (int)voxel_at(grid, 2, block[2], z));
                 const double voxel = voxel_of(grid->type, grid->voxels, row + voxel_at(grid, 0, block[0], x));
@@ -142,7 +143,7 @@ static void measure_corners(const nebel_grid *grid, const brick *b, const int bl
 /* Cells of nearest voxels have one corner eight times. */
 static void pack_cells(const nebel_grid *grid, const brick *b, const int block[3], nebel_texel_u32 *texel)
 {
-    uint16_t steps[CORNERS][CORNERS][CORNERS];
+    uint16_t steps[BRICK_CORNERS][BRICK_CORNERS][BRICK_CORNERS];
     const int far = grid->filter == NEBEL_GRID_FILTER_LINEAR;
     measure_corners(grid, b, block, steps);
     for (int z = 0; z < BRICK; z++)
@@ -155,7 +156,7 @@ static void pack_cells(const nebel_grid *grid, const brick *b, const int block[3
 }
 
 /* Returns the texel behind the last. `first`: how many texels come before the grid. */
-static size_t pack_grid(const nebel_grid *grid, size_t first, nebel_texel_u32 *texels)
+static size_t pack_grid_voxels(const nebel_grid *grid, size_t first, nebel_texel_u32 *texels)
 {
     const brick *b = grid->brick;
     nebel_texel_u32 *head = &texels[first];
@@ -166,8 +167,8 @@ static size_t pack_grid(const nebel_grid *grid, size_t first, nebel_texel_u32 *t
         for (int y = 0; y < grid->bricks[1]; y++)
             for (int x = 0; x < grid->bricks[0]; x++, b++) {
                 const double step = grid->scale * ((b->most - b->least) / MOST_STEPS);
-                *head++ = (nebel_texel_u32){
-                    {bits_of(density_of(grid, b->least)), bits_of(step), is_even(b) ? 0 : (uint32_t)cells, 0}};
+                *head++ = (nebel_texel_u32){{nb_texel_bits(density_of(grid, b->least)), nb_texel_bits(step),
+                                             is_even(b) ? 0 : (uint32_t)cells, 0}};
                 if (is_even(b)) continue;
                 pack_cells(grid, b, (int[]){x, y, z}, &texels[cells]);
                 cells += BRICK_CELLS;
@@ -175,20 +176,20 @@ static size_t pack_grid(const nebel_grid *grid, size_t first, nebel_texel_u32 *t
     return cells;
 }
 
-nebel_result nebel_pack_voxels(const nebel_snapshot *snapshot, nebel_texel_u32 *texels, size_t capacity, size_t *count)
+nebel_result nebel_pack_voxels(const nebel_lighting *lighting, nebel_texel_u32 *texels, size_t capacity, size_t *count)
 {
-    if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (lighting == NULL) return NEBEL_ERROR_ARGUMENT;
     if (count == NULL || (texels == NULL && capacity > 0))
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "pack: texels and count must not be NULL");
-    const nebel_result result = nb_check_voxels(snapshot);
+        return nb_fail(&lighting->log, NEBEL_ERROR_ARGUMENT, "pack: texels and count must not be NULL");
+    const nebel_result result = nb_check_voxels(lighting);
     if (result != NEBEL_OK) return result;
-    *count = count_all(snapshot);
+    *count = count_all(lighting);
     if (texels == NULL) return NEBEL_OK;
     if (capacity < *count)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
+        return nb_fail(&lighting->log, NEBEL_ERROR_LIMIT,
                        "pack: %zu texels of voxels are needed, there is room for %zu", *count, capacity);
     size_t next = 0;
-    for (size_t i = next_grid(snapshot, 0); i < snapshot->medium_count; i = next_grid(snapshot, i + 1))
-        next = pack_grid(grid_of(snapshot, i), next, texels);
-    return nb_pack_sun_lattices(snapshot, room_beside(next), &texels[next]);
+    for (size_t i = next_grid(lighting, 0); i < lighting->snapshot->medium_count; i = next_grid(lighting, i + 1))
+        next = pack_grid_voxels(nb_grid_of_medium(lighting, i), next, texels);
+    return nb_pack_sun_lattices(lighting, room_beside(next), &texels[next]);
 }

@@ -13,9 +13,9 @@ int nb_boxes_list(const nebel_snapshot *snapshot, const double origin[3], int ch
 
 /* 1 when the fog weakens all colours alike and every volume has the same radiance, so that what it adds is that
  * radiance times what it takes away. */
-int nb_boxes_have_one_color(const nebel_snapshot *snapshot);
+int nb_boxes_have_one_color(const nebel_lighting *lighting);
 
 /* 1 when the fog is one volume everywhere, of constant density and of one colour in that sense. */
-int nb_boxes_are_haze(const nebel_snapshot *snapshot);
+int nb_boxes_are_haze(const nebel_lighting *lighting);
 
 #endif

@@ -1,5 +1,5 @@
 /* The public queries: arguments checked, a kernel chosen. */
-#include "diffusion/diffusion.h"
+#include "trace_kernel.h"
 
 #include "base/isa.h"
 #include "base/isa_list.h"
@@ -7,9 +7,10 @@
 #include "base/stride.h"
 
 #include <math.h>
+#include <string.h>
 
-#define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_trace_##suffix,
-static nb_trace_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(KERNEL)};
+#define TRACE_KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_trace_##suffix,
+static nb_trace_fn *const trace_kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(TRACE_KERNEL)};
 
 int nebel_isa_available(nebel_isa isa)
 {
@@ -155,12 +156,13 @@ static nebel_result check_pieces(const nebel_snapshot *snapshot, const nebel_ray
 }
 
 /* Where lights reach the rays of a call. */
-static nebel_result check_shadows(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n)
+static nebel_result check_shadows(const nebel_lighting *lighting, const nebel_trace_desc *desc, size_t n)
 {
+    const nebel_snapshot *snapshot = lighting->snapshot;
     nebel_result result = NEBEL_OK;
     if (desc->sun_visibility != NULL)
         result = check_pieces(snapshot, desc->sun_visibility, "sun_visibility", n, desc->failed_ray);
-    for (size_t i = 0; i < snapshot->lamp_count && desc->light_visibility != NULL && result == NEBEL_OK; i++)
+    for (size_t i = 0; i < lighting->light_count && desc->light_visibility != NULL && result == NEBEL_OK; i++)
         result = check_pieces(snapshot, &desc->light_visibility[i], "light_visibility", n, desc->failed_ray);
     return result;
 }
@@ -169,17 +171,97 @@ static nebel_result check_shadows(const nebel_snapshot *snapshot, const nebel_tr
 #define FLOAT_ROUNDING 1e-4
 #define DOUBLE_ROUNDING 1e-8
 
+/* Asks `kernel` about a job that says where rays and transfers are, and what lights them. */
+static nebel_result run_kernel(nb_trace_fn *kernel, nb_trace_job *job, double tolerance)
+{
+    const nebel_lighting *lighting = job->lighting;
+    job->budget = tolerance * fmax(1, lighting->largest_radiance);
+    job->promised = job->budget + (kernel == nb_trace_double ? DOUBLE_ROUNDING : FLOAT_ROUNDING);
+    return kernel(job);
+}
+
+/* ---- groups of light ------------------------------------------------------------------------- */
+
+static int wants_group(const nebel_transfer_planes *planes, int group)
+{
+    float *const *plane = planes->group[group].in_scattering;
+    return plane[0] != NULL || plane[1] != NULL || plane[2] != NULL;
+}
+
+static int wants_groups(const nebel_transfer_planes *planes)
+{
+    int wants = 0;
+    for (int i = 0; i < NEBEL_TRANSFER_GROUPS; i++) wants |= wants_group(planes, i);
+    return wants;
+}
+
+/* What of the light that neither the sun nor lights give the media may give: of the environment, and of themselves. */
+static nb_group_of_rest find_rest(const nebel_lighting *lighting)
+{
+    const nebel_snapshot *snapshot = lighting->snapshot;
+    int by_environment = 0, by_itself = 0;
+    for (size_t i = 0; i < snapshot->medium_count; i++)
+        for (int c = 0; c < 3; c++) {
+            by_environment |= snapshot->media[i].body.lit && lighting->media[i].radiance[c] > 0;
+            by_itself |= snapshot->unlit.media[i].light[c] > 0;
+        }
+    return by_environment && by_itself ? NB_REST_IS_BOTH : by_itself ? NB_REST_IS_LOCAL : NB_REST_IS_ENVIRONMENT;
+}
+
+/* Light of fog itself, which is gathered with that of the environment, has a march of its own into the local group's planes. */
+static nebel_result trace_own_light(nb_trace_fn *kernel, nb_trace_job *job, double tolerance)
+{
+    const nebel_transfer_planes *to = job->light_planes;
+    nebel_transfer_planes own = {.in_scattering_stride = to->in_scattering_stride};
+    memcpy(own.in_scattering, to->group[NEBEL_LIGHT_GROUP_LOCAL].in_scattering, sizeof own.in_scattering);
+    nb_trace_job alone = {.snapshot = job->snapshot,
+                          .lighting = &job->snapshot->unlit,
+                          .ignore_distances = job->ignore_distances,
+                          .max_opacity = 1,
+                          .count = job->count,
+                          .ray_planes = job->ray_planes,
+                          .light_planes = &own};
+    const nebel_result result = run_kernel(kernel, &alone, tolerance);
+    job->failed = alone.failed;
+    return result;
+}
+
+static nebel_result trace_groups(nb_trace_fn *kernel, nb_trace_job *job, double tolerance)
+{
+    const nebel_transfer_planes *asked = job->light_planes;
+    nebel_transfer_planes to = *asked;
+    float **local = to.group[NEBEL_LIGHT_GROUP_LOCAL].in_scattering;
+    job->rest = find_rest(job->lighting);
+    if (job->rest != NB_REST_IS_BOTH) return run_kernel(kernel, job, tolerance);
+    const size_t plane = job->count * (to.in_scattering_stride / sizeof(float));
+    float *unasked = nb_allocate(&job->snapshot->allocator, 3 * plane, sizeof *unasked);
+    if (unasked == NULL) return NEBEL_ERROR_MEMORY;
+    for (int c = 0; c < 3; c++)
+        if (local[c] == NULL)
+            local[c] = unasked + (size_t)c * plane; /* what is left for the environment is found by it */
+    job->light_planes = &to;
+    nebel_result result = trace_own_light(kernel, job, tolerance);
+    if (result == NEBEL_OK) result = run_kernel(kernel, job, tolerance);
+    job->light_planes = asked;
+    nb_release(&job->snapshot->allocator, unasked);
+    return result;
+}
+
+/* ---- jobs ------------------------------------------------------------------------------------ */
+
 /* Asks `kernel`, NULL where there is none, about a job that says where rays and transfers are. */
 static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, nb_trace_fn *kernel,
                         nb_trace_job *job)
 {
     const double tolerance = desc->tolerance == 0 ? NEBEL_DEFAULT_TOLERANCE : desc->tolerance;
+    const nebel_lighting *lighting = nb_lighting_of(snapshot, desc->lighting);
+    if (lighting == NULL) return NEBEL_ERROR_ARGUMENT;
     if (!(tolerance > 0 && isfinite(tolerance)))
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "tolerance: must be finite and more than 0");
     if (kernel == NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
                        nebel_isa_name(desc->isa));
-    const nebel_result shadows = check_shadows(snapshot, desc, n);
+    const nebel_result shadows = check_shadows(lighting, desc, n);
     if (shadows != NEBEL_OK) return shadows;
     if (desc->sun_visibility != NULL) {
         job->first_boundary = desc->sun_visibility->offsets;
@@ -187,14 +269,14 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
     }
     job->lamplit = desc->light_visibility;
     job->snapshot = snapshot;
-    job->budget = tolerance * fmax(1, snapshot->largest_radiance);
-    job->promised = job->budget + (kernel == nb_trace_double ? DOUBLE_ROUNDING : FLOAT_ROUNDING);
+    job->lighting = lighting;
+    job->max_opacity = desc->ignore_max_opacity ? 1 : snapshot->max_opacity;
     job->count = n;
     const unsigned precision = nb_full_precision();
-    const nebel_result result = kernel(job);
-    const int is_diffuse = result == NEBEL_OK && (snapshot->diffusion != NULL || snapshot->own_diffusion != NULL) &&
-                           !job->transmittance_only;
-    const nebel_result added = is_diffuse ? nb_diffusion_add(job) : NEBEL_OK; /* which has said what is wrong */
+    const nebel_result result =
+        job->wants_groups ? trace_groups(kernel, job, tolerance) : run_kernel(kernel, job, tolerance);
+    const int is_diffuse = result == NEBEL_OK && lighting->add_diffusion != NULL && !job->transmittance_only;
+    const nebel_result added = is_diffuse ? lighting->add_diffusion(lighting, job) : NEBEL_OK; /* which explains */
     nb_restore_precision(precision);
     return added == NEBEL_OK ? explain(job, result, desc->failed_ray) : added;
 }
@@ -222,7 +304,7 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
                         .ray_stride = ray_stride,
                         .transfers = transfers,
                         .transfer_stride = transfer_stride};
-    return run(snapshot, desc, n, is_float ? kernels[nb_isa_select(desc->isa)] : nb_trace_double, &job);
+    return run(snapshot, desc, n, is_float ? trace_kernels[nb_isa_select(desc->isa)] : nb_trace_double, &job);
 }
 
 /* ---- planes ---------------------------------------------------------------------------------- */
@@ -280,15 +362,18 @@ nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trac
     set_stride(&to.error_stride, sizeof(float));
     fault = fault_of_strides(&from, &to);
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "planes: %s", fault);
-    const int wants_light = to.in_scattering[0] != NULL || to.in_scattering[1] != NULL || to.in_scattering[2] != NULL;
+    const int by_groups = wants_groups(&to);
+    const int wants_light =
+        by_groups || to.in_scattering[0] != NULL || to.in_scattering[1] != NULL || to.in_scattering[2] != NULL;
     const nebel_trace_desc plain = {0};
     const nebel_trace_desc *asked = desc != NULL ? desc : &plain;
     nb_trace_job job = {.transmittance_only = !wants_light,
                         .ignore_distances = asked->ignore_distances,
                         .wants_error = to.error != NULL,
+                        .wants_groups = by_groups,
                         .ray_planes = &from,
                         .light_planes = &to};
-    return run(snapshot, asked, n, kernels[nb_isa_select(asked->isa)], &job);
+    return run(snapshot, asked, n, trace_kernels[nb_isa_select(asked->isa)], &job);
 }
 
 /* ---- visibility ------------------------------------------------------------------------------ */

@@ -29,6 +29,8 @@ static double settle_lane(const nb_trace_job *job, size_t i, const nebel_ray *ra
 {
     nebel_transfer truth;
     nb_trace_job one = {.snapshot = job->snapshot,
+                        .lighting = job->lighting,
+                        .max_opacity = job->max_opacity,
                         .budget = job->budget,
                         .promised = job->promised,
                         .transmittance_only = job->transmittance_only,

@@ -277,10 +277,10 @@ static void look_at_sky(packet_state *m, const nb_environment_light *sky)
     m->sky = sky;
 }
 
-static void set_skylight(packet_state *m, medium_hit *k, const nb_medium *medium)
+static void set_skylight(packet_state *m, medium_hit *k)
 {
-    const nb_volume *body = &medium->body;
-    if (m->sky != medium->sky) look_at_sky(m, medium->sky);
+    const nb_volume *body = &k->medium->body;
+    if (m->sky != k->lit->environment) look_at_sky(m, k->lit->environment);
     for (int c = 0; c < 3; c++) {
         k->radiance[c] = REAL(body->albedo[c]) * m->sky_light[c];
         k->light[c] = k->radiance[c] * k->extinction[c] + REAL(body->emission[c]);
@@ -292,24 +292,25 @@ static void set_glow(medium_hit *k, const packet *rays, const struct sunlight *s
 static double most_scattered(const nb_volume *body);
 
 /* Adds a medium to the march when any ray meets it. */
-static void meet_medium(packet_state *m, const nb_medium *medium)
+static void meet_medium(packet_state *m, const nb_medium *medium, const nb_medium_light *lit)
 {
     medium_hit *k = &m->contacts[m->contact_count];
     k->medium = medium;
+    k->lit = lit;
     k->first_span = m->span_count;
     k->noise = NB_F(0.0);
     k->steepest = 0;
     for (int c = 0; c < 3; c++) {
         k->extinction[c] = REAL(medium->body.extinction[c]);
-        k->light[c] = REAL(medium->light[c]);
-        k->radiance[c] = REAL(medium->radiance[c]);
+        k->light[c] = REAL(lit->light[c]);
+        k->radiance[c] = REAL(lit->radiance[c]);
         k->glow[c] = NB_F(0.0);
     }
-    if (medium->sky != NULL && m->wants_sky) set_skylight(m, k, medium);
+    if (lit->environment != NULL && m->wants_sky) set_skylight(m, k);
     k->lamps = NB_F(0.0);
-    if (m->sun != NULL && medium->is_sunlit) set_glow(k, &m->rays, m->sun);
-    if (m->sun != NULL && medium->is_lamplit) k->lamps = m->lamps * REAL(most_scattered(&medium->body));
-    k->least_slack = 1 / fmax(medium->densest + medium->brightest, 1e-9);
+    if (m->sun != NULL && lit->scatters_sun) set_glow(k, &m->rays, m->sun);
+    if (m->sun != NULL && lit->scatters_lights) k->lamps = m->lamps * REAL(most_scattered(&medium->body));
+    k->least_slack = 1 / fmax(medium->densest + lit->brightest, 1e-9);
     if (nb_volume_has_fog(&medium->body)) profile_contact(k, &m->rays);
     if (!meet_leaves(m, k)) return;
 #if defined(ASKS_QUAD)

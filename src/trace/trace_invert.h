@@ -78,7 +78,7 @@ nebel_result NB_SUFFIXED(nb_invert_)(nb_invert_job *job)
     for (size_t i = 0; i < job->count && result == NEBEL_OK; i++) {
         const nebel_ray *ray = nb_stride_from(job->rays, job->ray_stride, i);
         w.m.rays = load_packet(ray, job->ray_stride, 1);
-        if (!meet_fog(&w, job->snapshot)) {
+        if (!meet_fog(&w, &job->snapshot->unlit)) {
             result = NEBEL_ERROR_MEMORY;
 #if defined(ASKS_QUAD)
         } else if (!is_clear(&w.m, NB_F(0.0))) {

@@ -161,18 +161,20 @@ static int find_media(workspace *w, const nebel_snapshot *snapshot)
     return 1;
 }
 
-static int meet_one(workspace *w, const nebel_snapshot *snapshot, size_t index)
+static int meet_one(workspace *w, const nebel_lighting *lighting, size_t index)
 {
+    const nebel_snapshot *snapshot = lighting->snapshot;
     const nb_medium *medium = &snapshot->media[index];
     if (!w->m.wants_error && all_miss(&w->m.rays, medium)) return 1;
     if (!reserve(w, &snapshot->allocator, medium->body.leaf_count)) return 0;
-    meet_medium(&w->m, medium);
+    meet_medium(&w->m, medium, &lighting->media[index]);
     return 1;
 }
 
 /* Meets all media the packet can touch. 0 when memory is out. */
-static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
+static int meet_fog(workspace *w, const nebel_lighting *lighting)
 {
+    const nebel_snapshot *snapshot = lighting->snapshot;
     packet_state *m = &w->m;
     m->contact_count = 0;
     m->span_count = 0;
@@ -185,13 +187,13 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
     m->sky = NULL;
     if (snapshot->bounded_count <= FEW_MEDIA) {
         for (size_t i = 0; i < snapshot->medium_count; i++)
-            if (!meet_one(w, snapshot, i)) return 0;
+            if (!meet_one(w, lighting, i)) return 0;
     } else {
         if (!find_media(w, snapshot)) return 0;
         for (size_t i = 0; i < w->found_count; i++)
-            if (!meet_one(w, snapshot, w->found[i])) return 0;
+            if (!meet_one(w, lighting, w->found[i])) return 0;
     }
-    return open_crowd(m, &snapshot->allocator, snapshot);
+    return open_crowd(m, lighting);
 }
 
 /* ---- light out ------------------------------------------------------------------------------- */
@@ -234,11 +236,14 @@ static void note_clear(const packet_state *m, const ray_segment *p, gathered_lig
 /* Sunlight that is found while voxels are crossed anyway. Returns the lanes that it is still to be added in. */
 static nb_mask cross_sunlit_voxels(packet_state *m, const ray_segment *p, gathered_light *g, nb_estimate *along)
 {
-    if (m->sun == NULL || m->sun->snapshot->is_lit_crowd) return nb_mask_false;
+    if (m->sun == NULL || m->sun->lighting->is_lit_overlap_set) return nb_mask_false;
 #if !defined(NB_DOUBLE)
     if (has_lattice(m)) {
         m->whole = along;
-        return gather_by_lattice(m->sun, m, p, g, along);
+        const nb_real before[3] = {g->radiance[0], g->radiance[1], g->radiance[2]};
+        const nb_mask rest = gather_by_lattice(m->sun, m, p, g, along);
+        note_group(m->sun->by_sun, before, g);
+        return rest;
     }
 #else
     (void)g, (void)along;
@@ -259,7 +264,7 @@ static void gather_piece(packet_state *m, const ray_segment *p, const allowance 
         return;
     }
     *unbounded = nb_or(*unbounded, is_unbounded(m, p, &sum));
-    if (m->sun != NULL && !m->sun->snapshot->is_lit_crowd) gather_lights(m->sun, m, p, sunlit, g);
+    if (m->sun != NULL && !m->sun->lighting->is_lit_overlap_set) gather_lights(m->sun, m, p, sunlit, g);
     const nb_mask closed = nb_and(p->lanes, nb_not(sum.mixed));
     const nb_mask mixed = nb_and(p->lanes, sum.mixed);
     if (nb_any(closed)) gather_closed(g, &sum, closed);
@@ -365,7 +370,7 @@ static nb_real most_radiance(const packet_state *m, int c)
         const medium_hit *k = &m->contacts[i];
         const nb_mask met = nb_narrow_mask(k->hull_enter < k->hull_leave);
         const nb_real radiance = k->radiance[c] + k->glow[c] / nb_max(k->extinction[c], NB_TINY);
-        const int has_limit = !k->medium->emits && !k->medium->is_lamplit;
+        const int has_limit = !k->medium->emits && !k->lit->scatters_lights;
         most = nb_max(most, nb_select(met, has_limit ? radiance : NB_HUGE, NB_F(0.0)));
     }
     return most;
@@ -377,11 +382,11 @@ static void limit_radiance(const packet_state *m, gathered_light *g)
     for (int c = 0; c < 3; c++) g->radiance[c] = nb_min(g->radiance[c], most_radiance(m, c));
 }
 
-/* The fog's opacity limited to what the snapshot says: no bit of other light changes. */
-static inline void limit_opacity(const nebel_snapshot *snapshot, nb_real transmittance[3], nb_real radiance[3])
+/* The fog's opacity limited to what the job says: no bit of other light changes. */
+static inline void limit_opacity(const nb_trace_job *job, nb_real transmittance[3], nb_real radiance[3])
 {
-    if (!(snapshot->max_opacity < 1)) return;
-    const nb_real most = REAL(snapshot->max_opacity), least = REAL(1 - snapshot->max_opacity);
+    if (!(job->max_opacity < 1)) return;
+    const nb_real most = REAL(job->max_opacity), least = REAL(1 - job->max_opacity);
     for (int c = 0; c < 3; c++) {
         const nb_mask beyond = transmittance[c] < least;
         const nb_real limited = nb_min(radiance[c] * (most / nb_max(NB_F(1.0) - transmittance[c], most)), radiance[c]);
@@ -480,10 +485,10 @@ static nb_real bound_by_range(const packet_state *m, const gathered_light *g, nb
 
 /* What limited opacity adds to the error of radiance S: most / (1 - T) is off by most / (1 - T)^2 times the error of T,
  * where it is below 1; but what it leaves is never more than S. That of T grows by the rounding of the limit alone. */
-static packet_bounds limit_errors(const nebel_snapshot *snapshot, const gathered_light *g, packet_bounds b)
+static packet_bounds limit_errors(const nb_trace_job *job, const gathered_light *g, packet_bounds b)
 {
-    if (!(snapshot->max_opacity < 1)) return b;
-    const nb_real most = REAL(snapshot->max_opacity);
+    if (!(job->max_opacity < 1)) return b;
+    const nb_real most = REAL(job->max_opacity);
     nb_real radiance = b.radiance;
     for (int c = 0; c < 3; c++) {
         const nb_real opacity = NB_F(1.0) - g->transmittance[c];
@@ -500,11 +505,11 @@ static nb_real reported_error(const nb_trace_job *job, const packet_state *m, co
 {
     const nb_real own_rounding = NB_F(1.0) + NB_F(16.0) * NB_EPSILON;
     packet_bounds b = bound_errors(m, g);
-    if (job->transmittance_only) return limit_errors(job->snapshot, g, b).transmittance * own_rounding;
+    if (job->transmittance_only) return limit_errors(job, g, b).transmittance * own_rounding;
     const nb_mask doubtful = nb_not(b.radiance <= REAL(job->promised));
     if (nb_any(doubtful))
         b.radiance = nb_select(doubtful, nb_min(b.radiance, bound_by_range(m, g, b.transmittance)), b.radiance);
-    b = limit_errors(job->snapshot, g, b);
+    b = limit_errors(job, g, b);
     return nb_max(b.transmittance, b.radiance) * own_rounding;
 }
 
@@ -539,7 +544,7 @@ static size_t packet_size(const nb_trace_job *job, size_t first)
  * there are at most two per leaf. */
 static allowance share_budget(const nb_trace_job *job)
 {
-    const double most = job->snapshot->largest_radiance;
+    const double most = job->lighting->largest_radiance;
     const double radiance = most > 1 ? most : 1;
     const double budget = fmin(job->budget, LARGEST_BUDGET * radiance);
     return (allowance){job->transmittance_only, REAL(0.14 * budget), REAL(0.4 * budget), REAL(0.1 * budget),
@@ -554,8 +559,8 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     job->failed = first;
     w->m.wants_error = job->wants_error;
     w->m.ignores_distances = job->ignore_distances;
-    if (w->m.sun != NULL && job->snapshot->is_lamplit) w->m.lamps = most_of_lamps(&w->m);
-    if (!meet_fog(w, job->snapshot)) return NEBEL_ERROR_MEMORY;
+    if (w->m.sun != NULL && job->lighting->scatters_lights) w->m.lamps = most_of_lamps(&w->m);
+    if (!meet_fog(w, job->lighting)) return NEBEL_ERROR_MEMORY;
     allowance share = *may;
     const nb_real pieces = w->m.event_count + NB_F(1.0);
     share.last_share = share.last_share / pieces;
@@ -563,7 +568,7 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     nb_mask unbounded;
     if (w->m.sun != NULL) begin_lights(w->m.sun, job, first, count);
     *g = gather_light(&w->m, &share, &unbounded);
-    if (w->m.sun != NULL && job->snapshot->is_lit_crowd) gather_crowd_lights(w->m.sun, &w->m, g);
+    if (w->m.sun != NULL && job->lighting->is_lit_overlap_set) gather_crowd_lights(w->m.sun, &w->m, g);
     if (w->m.sun != NULL && w->m.sun->out_of_memory) return NEBEL_ERROR_MEMORY;
     limit_radiance(&w->m, g);
     for (size_t i = 0; i < count && nb_any(unbounded); i++)
@@ -589,13 +594,13 @@ static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowanc
     if (result != NEBEL_OK) return result;
     nb_real error = reported_error(job, &w->m, &g);
 #if !defined(NB_DOUBLE)
-    limit_opacity(job->snapshot, g.transmittance, g.radiance);
+    limit_opacity(job, g.transmittance, g.radiance);
     error = settle_doubts(job, &g, error, rays, job->ray_stride, count);
 #else
 #if !defined(ASKS_QUAD)
     error = weigh_ends(job, w, may, &g, error);
 #endif
-    limit_opacity(job->snapshot, g.transmittance, g.radiance);
+    limit_opacity(job, g.transmittance, g.radiance);
 #endif
     store_light(job, &g, error, first, count);
     return NEBEL_OK;
@@ -623,27 +628,29 @@ static nebel_result trace_job(nb_trace_job *job, workspace *w)
 }
 
 /* What part of the budget the sun may spend, or all lamps: nothing but lights spends any in fog of one medium. */
-static double share_of_light(const nebel_snapshot *snapshot)
+static double share_of_light(const nebel_lighting *lighting)
 {
-    const double all = snapshot->medium_count == 1 ? 0.9 : 0.3;
-    return all / (double)(snapshot->is_sunlit + snapshot->is_lamplit);
+    const double all = lighting->snapshot->medium_count == 1 ? 0.9 : 0.3;
+    return all / (double)(lighting->scatters_sun + lighting->scatters_lights);
 }
 
 /* With a second march, to the lights. */
 static nebel_result trace_lit(nb_trace_job *job, workspace *w)
 {
-    const nebel_snapshot *snapshot = job->snapshot;
+    const nebel_lighting *lighting = job->lighting;
+    const nebel_snapshot *snapshot = lighting->snapshot;
     workspace way;
     nb_wide turns[STACK_TURNS];
     lit_shadow shadows[STACK_SHADOWS];
-    sunlight sun = {.snapshot = snapshot,
-                    .direction = unit_vector(wide_vector(snapshot->to_sun)),
+    sunlight sun = {.lighting = lighting,
+                    .snapshot = snapshot,
+                    .direction = unit_vector(wide_vector(lighting->to_sun)),
                     .way = &way,
                     .turns = turns,
                     .turn_capacity = STACK_TURNS,
                     .shadows = shadows,
                     .shadow_capacity = STACK_SHADOWS,
-                    .share = share_of_light(snapshot) * job->budget};
+                    .share = share_of_light(lighting) * job->budget};
     if (!open_lamp_shades(&sun, job)) return NEBEL_ERROR_MEMORY;
     open_workspace(&way);
     w->m.sun = &sun;
@@ -662,7 +669,7 @@ nebel_result NB_SUFFIXED(nb_trace_)(nb_trace_job *job)
 #endif
     workspace w;
     open_workspace(&w);
-    const int is_lit = (job->snapshot->is_sunlit || job->snapshot->is_lamplit) && !job->transmittance_only;
+    const int is_lit = (job->lighting->scatters_sun || job->lighting->scatters_lights) && !job->transmittance_only;
 #if defined(NB_DOUBLE)
     w.m.wants_sky = 1; /* more digits are asked by what light may be off, also where transmittance alone is wanted */
 #else

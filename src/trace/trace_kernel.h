@@ -3,14 +3,28 @@
 #define NB_TRACE_TRACE_KERNEL_H
 
 #include "fog/snapshot.h"
+#include "light/environment.h"
+#include "light/point_light.h"
+#include "light/sun_lattice.h"
+
+/* In which group light of the environment and of fog itself belongs, which are gathered as one. */
+typedef enum nb_group_of_rest {
+    NB_REST_IS_ENVIRONMENT = 0,
+    NB_REST_IS_LOCAL,
+    NB_REST_IS_BOTH /* what is in the planes of the local group already is that of fog itself */
+} nb_group_of_rest;
 
 /* Rays and lights are structures or, in float, planes. */
 typedef struct nb_trace_job {
     const nebel_snapshot *snapshot;
-    double budget;   /* what adaptive integration may add to the error of in-scattering, absolute */
-    double promised; /* where the error would be larger than this, more digits are asked */
+    const nebel_lighting *lighting; /* of the snapshot */
+    double budget;                  /* what adaptive integration may add to the error of in-scattering, absolute */
+    double promised;                /* where the error would be larger than this, more digits are asked */
     int transmittance_only;
     int wants_error;
+    int wants_groups;      /* of planes alone */
+    nb_group_of_rest rest; /* whose light all is that neither the sun nor lights give */
+    double max_opacity;    /* of the snapshot, or 1 */
     int ignore_distances;
     size_t count;
     const nebel_ray *rays; /* checked; strides in bytes */

@@ -142,7 +142,7 @@ typedef struct lit_half {
 static nb_real glow_in(const medium_hit *k, const overlap_light *light, int c)
 {
     if (light->pass == NULL) return k->glow[c];
-    return k->medium->is_lamplit ? k->extinction[c] * REAL(k->medium->body.albedo[c]) : NB_F(0.0);
+    return k->lit->scatters_lights ? k->extinction[c] * REAL(k->medium->body.albedo[c]) : NB_F(0.0);
 }
 
 /* The mean place and the mean of its square within a part from s on, of length l. Densities are linear from end to end of it: what that
@@ -455,7 +455,7 @@ static nb_mask find_lit_stretch(const packet_state *m, int by_lamp, nb_wide *fir
     *last = NB_W(0.0);
     for (size_t i = 0; i < m->contact_count; i++) {
         const medium_hit *k = &m->contacts[i];
-        if (!(by_lamp ? k->medium->is_lamplit : k->medium->is_sunlit)) continue;
+        if (!(by_lamp ? k->lit->scatters_lights : k->lit->scatters_sun)) continue;
         const nb_wmask met = k->hull_enter < k->hull_leave;
         *first = nb_wselect(met, nb_wmin(*first, k->hull_enter), *first);
         *last = nb_wselect(met, nb_wmax(*last, k->hull_leave), *last);
@@ -571,22 +571,26 @@ static nb_real most_sunlight(const packet_state *m)
 /* Adds what all lights give along the rays. */
 static void gather_crowd_lights(sunlight *sun, const packet_state *m, gathered_light *g)
 {
-    const nebel_snapshot *snapshot = sun->snapshot;
-    if (snapshot->is_sunlit) {
+    const nebel_lighting *lighting = sun->lighting;
+    nb_real before[3] = {g->radiance[0], g->radiance[1], g->radiance[2]};
+    if (lighting->scatters_sun) {
         const overlap_light light = {.most = most_sunlight(m), .share = sun->share};
         gather_light_of_crowd(sun, m, &light, sun->shade.boundaries != NULL ? &sun->shade : NULL, g);
     }
+    note_group(sun->by_sun, before, g);
+    for (int c = 0; c < 3; c++) before[c] = g->radiance[c];
     nb_real most = NB_F(0.0);
     const nb_phase *phase = NULL;
     for (size_t i = 0; i < m->contact_count; i++) {
         const medium_hit *k = &m->contacts[i];
-        if (!k->medium->is_lamplit) continue;
+        if (!k->lit->scatters_lights) continue;
         phase = &k->medium->body.phase;
         most = nb_max(most, nb_select(is_met(k), REAL(most_scattered(&k->medium->body)), NB_F(0.0)));
     }
-    for (size_t i = 0; i < snapshot->lamp_count && phase != NULL; i++) {
-        light_pass pass = pass_lamp(m, &snapshot->lamps[i]);
-        const overlap_light light = {&pass, phase, most, sun->share / (double)snapshot->lamp_count};
+    for (size_t i = 0; i < lighting->light_count && phase != NULL; i++) {
+        light_pass pass = pass_lamp(m, &lighting->lights[i]);
+        const overlap_light light = {&pass, phase, most, sun->share / (double)lighting->light_count};
         gather_light_of_crowd(sun, m, &light, sun->lamp_shades != NULL ? &sun->lamp_shades[i] : NULL, g);
     }
+    note_group(sun->by_lights, before, g);
 }

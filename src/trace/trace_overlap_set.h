@@ -62,7 +62,7 @@ static void list_events(const packet_state *m, overlap_set *c, int lane)
     size_t seats = 0;
     for (uint32_t i = 0; i < m->contact_count; i++) {
         const medium_hit *k = &m->contacts[i];
-        if (!k->medium->joins || !nb_lane(is_met(k), lane)) continue;
+        if (!k->lit->joins || !nb_lane(is_met(k), lane)) continue;
         const leaf_span *span = &m->spans[k->first_span];
         const lane_place enter = nb_lane(span->enter, lane), leave = nb_lane(span->leave, lane);
         events[2 * seats] = (overlap_event){enter, enter, i, (uint32_t)seats, 1};
@@ -85,7 +85,7 @@ static void find_common_radiance(const packet_state *m, overlap_set *c)
     c->is_even = nb_mask_true;
     for (size_t i = 0; i < m->contact_count; i++) {
         const medium_hit *k = &m->contacts[i];
-        if (!k->medium->joins) continue;
+        if (!k->lit->joins) continue;
         const nb_mask met = is_met(k);
         for (int channel = 0; channel < 3; channel++) {
             nb_real *common = &c->radiance[channel];
@@ -102,7 +102,7 @@ static size_t count_crowd(const packet_state *m, nb_scalar lane[NB_WIDTH])
 {
     nb_real met = NB_F(0.0);
     for (size_t i = 0; i < m->contact_count; i++)
-        if (m->contacts[i].medium->joins) met = met + nb_select(is_met(&m->contacts[i]), NB_F(1.0), NB_F(0.0));
+        if (m->contacts[i].lit->joins) met = met + nb_select(is_met(&m->contacts[i]), NB_F(1.0), NB_F(0.0));
     nb_store_lanes(lane, met);
     size_t most = 0;
     for (int i = 0; i < NB_WIDTH; i++) most = (size_t)lane[i] > most ? (size_t)lane[i] : most;
@@ -142,32 +142,35 @@ static medium_hit *crowd_contact(packet_state *m)
 }
 
 /* Lists the crowds of all lanes that have one. 0 when memory is out. */
-static int open_crowd(packet_state *m, const nebel_allocator *allocator, const nebel_snapshot *snapshot)
+static int open_crowd(packet_state *m, const nebel_lighting *lighting)
 {
+    const nebel_allocator *allocator = &lighting->snapshot->allocator;
     overlap_set *c = &m->crowd;
     c->lanes = nb_mask_false;
     c->is_walking = 0;
-    if (snapshot->joining_count < NB_MIN_OVERLAP_SET || m->contact_count < NB_MIN_OVERLAP_SET) return 1;
+    if (lighting->joining_count < NB_MIN_OVERLAP_SET || m->contact_count < NB_MIN_OVERLAP_SET) return 1;
     nb_scalar met[NB_WIDTH];
     const size_t most = count_crowd(m, met);
     if (most < NB_MIN_OVERLAP_SET) return 1;
     if (!reserve_crowd(c, allocator, most)) return 0;
     c->lanes = nb_load_lanes(met) >= nb_splat(NB_MIN_OVERLAP_SET);
-    c->rank = snapshot->joining->body.rank;
+    c->rank = lighting->joining->body.rank;
     for (int i = 0; i < NB_WIDTH; i++) {
         c->next[i] = c->present[i] = c->count[i] = 0;
         if (nb_lane(c->lanes, i)) list_events(m, c, i);
         met[i] = (nb_scalar)(1 + height_of((size_t)met[i]));
     }
     find_common_radiance(m, c);
-    *crowd_contact(m) = (medium_hit){.medium = snapshot->joining, .noise = nb_load_lanes(met) * NB_EPSILON};
+    *crowd_contact(m) = (medium_hit){.medium = lighting->joining,
+                                     .lit = &lighting->media[lighting->joining - lighting->snapshot->media],
+                                     .noise = nb_load_lanes(met) * NB_EPSILON};
     return 1;
 }
 
 /* Whether the walk finds the medium in the crowd instead of in its window. */
 static int is_in_crowd(const packet_state *m, size_t index)
 {
-    return m->crowd.is_walking && m->contacts[index].medium->joins;
+    return m->crowd.is_walking && m->contacts[index].lit->joins;
 }
 
 /* ---- the walk -------------------------------------------------------------------------------- */

@@ -33,6 +33,7 @@ typedef struct leaf_span {
 /* A medium as the packet meets it. */
 typedef struct medium_hit {
     const nb_medium *medium;
+    const nb_medium_light *lit;
     size_t first_span;
     nb_wide hull_enter, hull_leave; /* from the first entry to the last exit */
     nb_real extinction[3], light[3], radiance[3];

@@ -90,20 +90,20 @@ static uint32_t end_row(const nebel_pixels *p)
     return p->row_count != 0 ? p->first_row + p->row_count : p->height;
 }
 
-static void set_radiance(const nebel_snapshot *snapshot, nb_pixels_job *job)
+static void set_radiance(const nebel_lighting *lighting, nb_pixels_job *job)
 {
-    for (int c = 0; c < 3 && snapshot->medium_count > 0; c++) {
-        const double radiance = fmin(snapshot->media[0].radiance[c], 1);
+    for (int c = 0; c < 3 && lighting->snapshot->medium_count > 0; c++) {
+        const double radiance = fmin(lighting->media[0].radiance[c], 1);
         job->radiance[c] = (uint32_t)(radiance * NB_PIXEL_WHITE + .5);
     }
 }
 
-static void fog_boxes(const nebel_snapshot *snapshot, nb_pixels_fn *kernel, const nebel_pixels *p,
+static void fog_boxes(const nebel_lighting *lighting, nb_pixels_fn *kernel, const nebel_pixels *p,
                       const nb_fog_box *boxes)
 {
     const size_t row = 4 * (size_t)p->width;
     nb_pixels_job job = {.boxes = boxes,
-                         .box_count = snapshot->medium_count,
+                         .box_count = lighting->snapshot->medium_count,
                          .along_ray = p->depth_type == NEBEL_PIXEL_DEPTH_RADIAL,
                          .width = p->width,
                          .first_row = p->first_row,
@@ -117,7 +117,7 @@ static void fog_boxes(const nebel_snapshot *snapshot, nb_pixels_fn *kernel, cons
     memcpy(job.corner, p->corner, sizeof job.corner);
     memcpy(job.step_x, p->step_x, sizeof job.step_x);
     memcpy(job.step_y, p->step_y, sizeof job.step_y);
-    set_radiance(snapshot, &job);
+    set_radiance(lighting, &job);
     kernel(&job);
 }
 
@@ -197,7 +197,8 @@ static nebel_result trace_piece(const piece *at)
         job.in_scattering[c] = transfers.in_scattering[c] = all.in_scattering[c];
     }
     const nebel_result result =
-        nebel_trace_planes(at->snapshot, &(nebel_trace_desc){.isa = at->isa}, at->count, &rays, &transfers);
+        nebel_trace_planes(at->snapshot, &(nebel_trace_desc){.lighting = at->pixels->lighting, .isa = at->isa},
+                           at->count, &rays, &transfers);
     if (result == NEBEL_OK) at->kernel(&job);
     return result;
 }
@@ -242,13 +243,13 @@ static nebel_result fog_pieces(piece *at)
     return NEBEL_OK;
 }
 
-static nb_picture_haze make_haze(const nebel_snapshot *snapshot, const nebel_pixels *p)
+static nb_picture_haze make_haze(const nebel_lighting *lighting, const nebel_pixels *p)
 {
     const double ln2 = 0.69314718055994531, most = 1e30; /* 0 times it is 0 */
-    const nb_medium *medium = &snapshot->media[0];
+    const nb_medium *medium = &lighting->snapshot->media[0];
     nb_picture_haze haze = {.octaves = (float)(-fmin(medium->body.extinction[0], most) / ln2),
                             .along_ray = p->depth_type == NEBEL_PIXEL_DEPTH_RADIAL};
-    for (int c = 0; c < 3; c++) haze.radiance[c] = (float)medium->radiance[c];
+    for (int c = 0; c < 3; c++) haze.radiance[c] = (float)lighting->media[0].radiance[c];
     return haze;
 }
 
@@ -259,20 +260,22 @@ nebel_result nebel_apply_fog_to_pixels(const nebel_snapshot *snapshot, nebel_isa
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     const char *fault = pixels != NULL ? fault_of(pixels) : "must not be NULL";
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "pixels: %s", fault);
+    const nebel_lighting *lighting = nb_lighting_of(snapshot, pixels->lighting);
+    if (lighting == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_isa chosen = nb_isa_select(isa);
     if (box_kernels[chosen] == NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
                        nebel_isa_name(isa));
     const int is_plain = pixels->type == NEBEL_PIXEL_RGBA8 && !pixels->srgb && pixels->transmittance == NULL;
     nb_fog_box boxes[NB_FOG_BOXES];
-    if (is_plain && nb_boxes_have_one_color(snapshot) && nb_boxes_list(snapshot, pixels->eye, 0, 0, boxes)) {
-        fog_boxes(snapshot, box_kernels[chosen], pixels, boxes);
+    if (is_plain && nb_boxes_have_one_color(lighting) && nb_boxes_list(snapshot, pixels->eye, 0, 0, boxes)) {
+        fog_boxes(lighting, box_kernels[chosen], pixels, boxes);
         return NEBEL_OK;
     }
     piece all = {.pixels = pixels, .snapshot = snapshot, .isa = isa, .kernel = picture_kernels[chosen]};
     nb_picture_haze haze;
-    if (nb_boxes_are_haze(snapshot)) {
-        haze = make_haze(snapshot, pixels);
+    if (nb_boxes_are_haze(lighting)) {
+        haze = make_haze(lighting, pixels);
         all.haze = &haze;
     }
     return fog_pieces(&all);

@@ -186,6 +186,41 @@ static void unload_rays(const stream *s, const loaded *p, nebel_ray rays[NB_WIDT
         rays[i] = (nebel_ray){{lane[0][i], lane[1][i], lane[2][i]}, {lane[3][i], lane[4][i], lane[5][i]}, lane[6][i]};
 }
 
+/* ---- light by groups ------------------------------------------------------------------------- */
+
+/* `part` becomes no more than `rest`, and is taken from it. */
+FORCE_INLINE void take_part(nb_real *part, nb_real *rest)
+{
+    *part = nb_max(nb_min(*part, *rest), NB_F(0.0));
+    *rest = *rest - *part;
+}
+
+/* `radiance` before opacity was limited, `limited` after it. */
+NEVER_INLINE void store_groups(const nb_trace_job *job, const workspace *w, size_t first, size_t count,
+                               const nb_real radiance[3], const nb_real limited[3])
+{
+    const nebel_transfer_planes *to = job->light_planes;
+    const nebel_transfer_group *local_planes = &to->group[NEBEL_LIGHT_GROUP_LOCAL];
+    const size_t stride = to->in_scattering_stride;
+    nb_real group[NEBEL_LIGHT_GROUP_COUNT][3];
+    for (int c = 0; c < 3; c++) {
+        const nb_real scale = limited[c] / nb_max(radiance[c], NB_TINY);
+        nb_real rest = radiance[c], none = NB_F(0.0);
+        nb_real sun = w->m.sun != NULL ? w->m.sun->by_sun[c] : none;
+        nb_real lights = w->m.sun != NULL ? w->m.sun->by_lights[c] : none, own = none;
+        if (job->rest == NB_REST_IS_LOCAL) own = rest;
+        if (job->rest == NB_REST_IS_BOTH) own = load_floats(local_planes->in_scattering[c], stride, first, count);
+        take_part(&sun, &rest);
+        take_part(&lights, &rest);
+        take_part(&own, &rest);
+        group[NEBEL_LIGHT_GROUP_SUN][c] = sun * scale;
+        group[NEBEL_LIGHT_GROUP_ENVIRONMENT][c] = rest * scale;
+        group[NEBEL_LIGHT_GROUP_LOCAL][c] = (lights + own) * scale;
+    }
+    for (int i = 0; i < NEBEL_LIGHT_GROUP_COUNT; i++)
+        store_colors(to->group[i].in_scattering, stride, first, count, group[i]);
+}
+
 /* ---- the march ------------------------------------------------------------------------------- */
 
 static nebel_result march_planes(nb_trace_job *job, workspace *w, const allowance *may, const stream *s, size_t first,
@@ -200,7 +235,9 @@ static nebel_result march_planes(nb_trace_job *job, workspace *w, const allowanc
     if (result != NEBEL_OK) return result;
     const nb_real error = job->wants_error ? reported_error(job, &w->m, &g) : NB_F(0.0);
     const nebel_transfer_planes *to = s->transfers;
-    limit_opacity(job->snapshot, g.transmittance, g.radiance);
+    const nb_real unlimited[3] = {g.radiance[0], g.radiance[1], g.radiance[2]};
+    limit_opacity(job, g.transmittance, g.radiance);
+    if (job->wants_groups) store_groups(job, w, first, count, unlimited, g.radiance);
     store_colors(to->transmittance, to->transmittance_stride, first, count, g.transmittance);
     store_colors(to->in_scattering, to->in_scattering_stride, first, count, g.radiance);
     if (!job->wants_error) return NEBEL_OK;
@@ -228,9 +265,11 @@ typedef struct straight {
 static int is_straight(const nb_trace_job *job)
 {
     const nebel_snapshot *snapshot = job->snapshot;
-    if (snapshot->medium_count != 1 || job->wants_error) return 0;
+    if (snapshot->medium_count != 1 || job->wants_error || job->wants_groups) return 0;
     const nb_medium *medium = &snapshot->media[0];
-    const int is_lit = (medium->is_sunlit || medium->is_lamplit || medium->sky != NULL) && !job->transmittance_only;
+    const nb_medium_light *lit = &job->lighting->media[0];
+    const int is_lit =
+        (lit->scatters_sun || lit->scatters_lights || lit->environment != NULL) && !job->transmittance_only;
     return nb_volume_has_fog(&medium->body) && medium->body.leaf_count == 1 && !medium->emits && !is_lit &&
            medium->body.density.type == NEBEL_DENSITY_CONSTANT &&
            (job->ignore_distances || !nb_volume_has_distances(&medium->body));
@@ -244,6 +283,7 @@ static nb_wvec3 reciprocals(nb_wvec3 d)
 static void open_straight(straight *way, const nb_trace_job *job, const stream *s)
 {
     const nb_medium *medium = &job->snapshot->media[0];
+    const nb_medium_light *lit = &job->lighting->media[0];
     const double *extinction = medium->body.extinction;
     way->medium = medium;
     way->leaf = &medium->body.leaves[0];
@@ -257,8 +297,8 @@ static void open_straight(straight *way, const nb_trace_job *job, const stream *
     way->inverse = reciprocals(s->direction);
     for (int c = 0; c < 3; c++) {
         way->extinction[c] = REAL(extinction[c]);
-        way->light[c] = REAL(medium->light[c]);
-        way->radiance[c] = REAL(medium->radiance[c]);
+        way->light[c] = REAL(lit->light[c]);
+        way->radiance[c] = REAL(lit->radiance[c]);
     }
     way->may_miss = s->has_directions && !s->has_offsets;
     set_bounds(medium, s->origin, &way->nearest, &way->farthest);
@@ -348,7 +388,7 @@ FORCE_INLINE nebel_result trace_straight(nb_trace_job *job, const straight *way,
     }
     nb_real transmittance[3], radiance[3];
     light_piece(way, nb_select(inside, nb_narrow(leave - enter), NB_F(0.0)), transmittance, radiance);
-    limit_opacity(job->snapshot, transmittance, radiance);
+    limit_opacity(job, transmittance, radiance);
     store_colors(to->transmittance, to->transmittance_stride, first, count, transmittance);
     store_colors(to->in_scattering, to->in_scattering_stride, first, count, radiance);
     return NEBEL_OK;

@@ -72,10 +72,10 @@ static nb_real most_of_lamp(const light_pass *pass, nb_wide start, nb_wide end)
 /* The most irradiance of all lamps anywhere on the rays. */
 static nb_real most_of_lamps(const packet_state *m)
 {
-    const nebel_snapshot *snapshot = m->sun->snapshot;
+    const nebel_lighting *lighting = m->sun->lighting;
     nb_real most = NB_F(0.0);
-    for (size_t i = 0; i < snapshot->lamp_count; i++) {
-        const light_pass pass = pass_lamp(m, &snapshot->lamps[i]);
+    for (size_t i = 0; i < lighting->light_count; i++) {
+        const light_pass pass = pass_lamp(m, &lighting->lights[i]);
         most = most + most_fluence(&pass, NB_W(0.0), m->rays.t_max);
     }
     return most;
@@ -119,7 +119,7 @@ static lit_fog lamplit_fog(const packet_state *m, const light_pass *pass, nb_wid
         const medium_hit *k = present(m, i);
         const nb_volume *body = &k->medium->body;
         const nb_real density = nb_select(k->inside, contact_density(k, t), zero);
-        const nb_real value = k->medium->is_lamplit ? scattered(&body->phase, turn) * fluence : zero;
+        const nb_real value = k->lit->scatters_lights ? scattered(&body->phase, turn) * fluence : zero;
         for (int c = 0; c < 3; c++) {
             const nb_real radiance = REAL(body->albedo[c]) * (value * REAL(lamp->intensity[c]));
             fog.extinction[c] = fog.extinction[c] + k->extinction[c] * density;
@@ -216,7 +216,7 @@ static nb_mask lamplit_lanes(const packet_state *m, const ray_segment *p, nb_rea
     *scatter = NB_F(0.0);
     for (size_t i = m->present_first; i < m->present_end; i++) {
         const medium_hit *k = present(m, i);
-        if (!k->medium->is_lamplit) continue;
+        if (!k->lit->scatters_lights) continue;
         lit = nb_or(lit, k->inside);
         *scatter = nb_select(k->inside, nb_max(*scatter, REAL(most_scattered(&k->medium->body))), *scatter);
     }
@@ -230,15 +230,15 @@ static void gather_lamplight(sunlight *sun, const packet_state *m, const ray_seg
     nb_real scatter, behind[3];
     const nb_mask lit = lamplit_lanes(m, p, &scatter);
     if (!nb_any(lit)) return;
-    const nebel_snapshot *snapshot = sun->snapshot;
+    const nebel_lighting *lighting = sun->lighting;
     const sun_piece s = sun_piece_of(m, p, g, lanes_in_voxels(m));
     transmittance_until(m, p, &s.before, p->end, behind);
     nb_real drop = NB_F(0.0);
     for (int c = 0; c < 3; c++) drop = nb_max(drop, s.before.transmittance[c] - behind[c]);
-    for (size_t i = 0; i < snapshot->lamp_count; i++) {
-        light_pass pass = pass_lamp(m, &snapshot->lamps[i]);
+    for (size_t i = 0; i < lighting->light_count; i++) {
+        light_pass pass = pass_lamp(m, &lighting->lights[i]);
         pass.shade = sun->lamp_shades != NULL ? &sun->lamp_shades[i] : NULL;
-        pass.share = sun->share / (double)snapshot->lamp_count;
+        pass.share = sun->share / (double)lighting->light_count;
         pass.scatter = scatter;
         const nb_real most = most_fluence(&pass, p->start, p->end) * scatter;
         const nb_mask faint = most <= REAL(FAINT_SHARE * pass.share);
@@ -255,16 +255,20 @@ static void gather_lamplight(sunlight *sun, const packet_state *m, const ray_seg
 /* `sunlit`: the lanes in which the sun's light is still to be added. */
 static void gather_lights(sunlight *sun, const packet_state *m, const ray_segment *p, nb_mask sunlit, gathered_light *g)
 {
-    if (sun->snapshot->is_sunlit) gather_sunlight(sun, m, p, sunlit, g);
-    if (sun->snapshot->is_lamplit) gather_lamplight(sun, m, p, g);
+    nb_real before[3] = {g->radiance[0], g->radiance[1], g->radiance[2]};
+    if (sun->lighting->scatters_sun) gather_sunlight(sun, m, p, sunlit, g);
+    note_group(sun->by_sun, before, g);
+    for (int c = 0; c < 3; c++) before[c] = g->radiance[c];
+    if (sun->lighting->scatters_lights) gather_lamplight(sun, m, p, g);
+    note_group(sun->by_lights, before, g);
 }
 
 /* Room for the shadows of all lamps, where there are any. 0 when memory is out. */
 static int open_lamp_shades(sunlight *sun, const nb_trace_job *job)
 {
-    const nebel_snapshot *snapshot = sun->snapshot;
-    if (!snapshot->is_lamplit || job->lamplit == NULL) return 1;
-    char *raw = nb_allocate(&snapshot->allocator, snapshot->lamp_count + 1,
+    const nebel_lighting *lighting = sun->lighting;
+    if (!lighting->scatters_lights || job->lamplit == NULL) return 1;
+    char *raw = nb_allocate(&sun->snapshot->allocator, lighting->light_count + 1,
                             sizeof(sun_attenuation) > ALIGNMENT ? sizeof(sun_attenuation) : ALIGNMENT);
     if (raw == NULL) return 0;
     sun->shade_memory = raw;
@@ -277,8 +281,9 @@ static int open_lamp_shades(sunlight *sun, const nb_trace_job *job)
 static void begin_lights(sunlight *sun, const nb_trace_job *job, size_t first, size_t count)
 {
     sun->has_turns = 0;
+    for (int c = 0; c < 3; c++) sun->by_sun[c] = sun->by_lights[c] = NB_F(0.0);
     begin_shade(&sun->shade, job->first_boundary != NULL ? job->first_boundary + first : NULL, job->boundaries, count);
-    for (size_t i = 0; sun->lamp_shades != NULL && i < sun->snapshot->lamp_count; i++) {
+    for (size_t i = 0; sun->lamp_shades != NULL && i < sun->lighting->light_count; i++) {
         const nebel_ray_visibility *lit = &job->lamplit[i];
         begin_shade(&sun->lamp_shades[i], lit->offsets + job->first_lamplit + first, lit->boundaries, count);
     }

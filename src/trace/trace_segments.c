@@ -9,8 +9,8 @@
 
 #include <math.h>
 
-#define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_transmit_##suffix,
-static nb_transmit_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(KERNEL)};
+#define TRANSMIT_KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_transmit_##suffix,
+static nb_transmit_fn *const transmit_kernels[NEBEL_ISA_COUNT + 1] = {NB_ISA_LIST(TRANSMIT_KERNEL)};
 
 /* A ray of no length where the segment has none or is not finite. */
 static nebel_ray ray_of_segment(const nebel_segments *segments, const float *from, const float *to)
@@ -79,7 +79,7 @@ nebel_result nebel_compute_segment_transmittance(const nebel_snapshot *snapshot,
         if (!(fabs(segments->origin[c]) <= NEBEL_MAX_LENGTH))
             return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
                            "segments origin: must be finite and at most 1e15 m away");
-    nb_transmit_fn *kernel = kernels[nb_isa_select(isa)];
+    nb_transmit_fn *kernel = transmit_kernels[nb_isa_select(isa)];
     if (kernel == NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
                        nebel_isa_name(isa));

@@ -1,7 +1,7 @@
 /* Optical depth on the way from places on the rays to a light: by a march of its own, or in closed form where one is
  * known. Included by trace_sun.h. */
 
-static int meet_fog(workspace *w, const nebel_snapshot *snapshot);
+static int meet_fog(workspace *w, const nebel_lighting *lighting);
 static gathered_light gather_light(packet_state *m, const allowance *may, nb_mask *unbounded);
 
 /* Optical depth from a place on each ray to a light, and by how much it may be off. */
@@ -31,7 +31,7 @@ static light_depth depth_by_march(sunlight *sun, const packet_state *m, nb_wide 
     way->wants_signature = sun->snapshot->has_parts;
     way->signature = NB_F(0.0);
     light_depth to_light = no_depth();
-    sun->out_of_memory = sun->out_of_memory || !meet_fog(sun->way, sun->snapshot);
+    sun->out_of_memory = sun->out_of_memory || !meet_fog(sun->way, sun->lighting);
     if (sun->out_of_memory) return to_light;
     const gathered_light g = gather_light(way, &may, &unbounded);
     const nb_mask watched = ends_matter(way);
@@ -181,7 +181,7 @@ static light_depth depth_of_grid(const sunlight *sun, const packet_state *m, nb_
 static light_depth depth_to_sun(sunlight *sun, const packet_state *m, nb_wide t, nb_wmask lanes)
 {
     const nb_wide reach = nb_wselect(lanes, NB_WFAR, NB_W(0.0));
-    switch (sun->snapshot->way_to_sun) {
+    switch (sun->lighting->sun_depth_method) {
     case NB_SUN_DEPTH_HEIGHT:
         return depth_of_height(sun, m, t);
     case NB_SUN_DEPTH_ALTITUDE:

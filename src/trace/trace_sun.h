@@ -28,10 +28,11 @@ typedef struct sun_attenuation {
 
 /* What sunlight needs besides the march of the rays. */
 typedef struct sunlight {
-    const nebel_snapshot *snapshot;
-    nb_wvec3 direction; /* of length 1, in all lanes */
-    workspace *way;     /* from places on the rays to the sun */
-    nb_wide *turns;     /* of all media in all lanes, in any order; NB_WFAR and more: none */
+    const nebel_lighting *lighting;
+    const nebel_snapshot *snapshot; /* of the lighting */
+    nb_wvec3 direction;             /* of length 1, in all lanes */
+    workspace *way;                 /* from places on the rays to the sun */
+    nb_wide *turns;                 /* of all media in all lanes, in any order; NB_WFAR and more: none */
     size_t turn_count, turn_capacity;
     int has_turns;           /* of the packet at hand */
     const nb_light *turning; /* they are this lamp's; NULL: the sun's */
@@ -44,7 +45,14 @@ typedef struct sunlight {
     void *shade_memory;
     double share; /* what steps may add to the error of radiance, all together: of the sun, of all lamps */
     int out_of_memory;
+    nb_real by_sun[3], by_lights[3]; /* of the packet's radiance, before opacity is limited */
 } sunlight;
+
+/* Adds what radiance has gained to a group's part of it. */
+static void note_group(nb_real part[3], const nb_real before[3], const gathered_light *g)
+{
+    for (int c = 0; c < 3; c++) part[c] = part[c] + (g->radiance[c] - before[c]);
+}
 
 /* What a phase function makes of light that turns so, per steradian. */
 static nb_real scattered(const nb_phase *phase, nb_turn turn)
@@ -61,7 +69,7 @@ static void set_glow(medium_hit *k, const packet *rays, const sunlight *sun)
 {
     const nb_medium *medium = k->medium;
     const nb_real value = scattered(&medium->body.phase, nb_turn_between(rays->direction, sun->direction));
-    for (int c = 0; c < 3; c++) k->glow[c] = REAL(medium->shine[c] * medium->body.extinction[c]) * value;
+    for (int c = 0; c < 3; c++) k->glow[c] = REAL(k->lit->shine[c] * medium->body.extinction[c]) * value;
 }
 
 #include "trace_breakpoints.h"
@@ -73,7 +81,7 @@ static void set_glow(medium_hit *k, const packet *rays, const sunlight *sun)
 static int is_ball_alone(const sunlight *sun)
 {
     const nb_medium *medium = &sun->snapshot->media[0];
-    return sun->snapshot->way_to_sun == NB_SUN_DEPTH_ADDED && sun->snapshot->medium_count == 1 &&
+    return sun->lighting->sun_depth_method == NB_SUN_DEPTH_ADDED && sun->snapshot->medium_count == 1 &&
            medium->body.leaves[0].type == NB_LEAF_SPHERE;
 }
 
@@ -507,7 +515,7 @@ static nb_mask sunlit_lanes(const packet_state *m, const ray_segment *p)
 {
     nb_mask lit = nb_mask_false;
     for (size_t i = m->present_first; i < m->present_end; i++)
-        if (present(m, i)->medium->is_sunlit) lit = nb_or(lit, present(m, i)->inside);
+        if (present(m, i)->lit->scatters_sun) lit = nb_or(lit, present(m, i)->inside);
     return nb_and(lit, p->lanes);
 }
 

@@ -4,7 +4,8 @@
 
 static int has_closed_steps(const sunlight *sun)
 {
-    return sun->snapshot->way_to_sun == NB_SUN_DEPTH_FLAT || sun->snapshot->way_to_sun == NB_SUN_DEPTH_HEIGHT;
+    return sun->lighting->sun_depth_method == NB_SUN_DEPTH_FLAT ||
+           sun->lighting->sun_depth_method == NB_SUN_DEPTH_HEIGHT;
 }
 
 /* By how much the whole depth changes over a length of `length` at density 1. In height fog that is known without the
@@ -13,7 +14,7 @@ static int has_closed_steps(const sunlight *sun)
 static nb_real change_of_depth(const sunlight *sun, const packet_state *m, const medium_hit *k, int c, nb_real length,
                                nb_real difference)
 {
-    if (sun->snapshot->way_to_sun != NB_SUN_DEPTH_HEIGHT) return nb_abs(difference);
+    if (sun->lighting->sun_depth_method != NB_SUN_DEPTH_HEIGHT) return nb_abs(difference);
     const nb_real kept = NB_F(1.0) - nb_narrow(m->rays.direction.y / sun->direction.y);
     return nb_abs(k->extinction[c] * kept) * length;
 }
@@ -99,7 +100,7 @@ static sun_place next_place(const sun_place *from, const sun_interval *s, nb_wid
 /* The depths to the sun from both places. */
 static void look_at_sun(sunlight *sun, const packet_state *m, sun_place *from, sun_place *to, nb_wmask lanes)
 {
-    if (sun->snapshot->way_to_sun == NB_SUN_DEPTH_HEIGHT) {
+    if (sun->lighting->sun_depth_method == NB_SUN_DEPTH_HEIGHT) {
         to->to_sun = depth_to_sun(sun, m, to->t, lanes); /* there are no faces: the depth at `from` is known */
         return;
     }
@@ -137,7 +138,7 @@ static void add_closed_step(const sunlight *sun, const packet_state *m, const su
  * NB_WFAR, where ways end, and the depth is not linear. */
 static nb_wide end_of_light(const sunlight *sun, const packet_state *m, const ray_segment *p)
 {
-    if (sun->snapshot->way_to_sun != NB_SUN_DEPTH_FLAT) return p->end;
+    if (sun->lighting->sun_depth_method != NB_SUN_DEPTH_FLAT) return p->end;
     const lit_fog fog = sunlit_fog(m, p->start);
     const nb_real thinnest = nb_min(nb_min(fog.extinction[0], fog.extinction[1]), fog.extinction[2]);
     return nb_wmin(p->end, p->start + nb_widen(OPAQUE_DEPTH * nb_rcp_bounded(thinnest)));
@@ -150,7 +151,7 @@ static void gather_in_closed_form(sunlight *sun, const packet_state *m, const ra
     const nb_wide last = end_of_light(sun, m, p);
     nb_wmask lanes = nb_wand(nb_widen_mask(lit), p->start < last);
     sun_place from = first_place(p, g);
-    if (sun->snapshot->way_to_sun == NB_SUN_DEPTH_HEIGHT) from.to_sun = depth_to_sun(sun, m, from.t, lanes);
+    if (sun->lighting->sun_depth_method == NB_SUN_DEPTH_HEIGHT) from.to_sun = depth_to_sun(sun, m, from.t, lanes);
     while (nb_wany(lanes)) {
         pass_boundaries(&sun->shade, from.t, lanes);
         const nb_wmask dark = nb_wand(lanes, sun->shade.is_dark);

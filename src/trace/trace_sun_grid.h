@@ -9,7 +9,7 @@
 
 static int is_grid_alone(const sunlight *sun)
 {
-    return sun->snapshot->way_to_sun == NB_SUN_DEPTH_GRID;
+    return sun->lighting->sun_depth_method == NB_SUN_DEPTH_GRID;
 }
 
 /* The nodes of the rule as shares of the density's integral. Nearly nothing is not nothing: before the first voxel with

@@ -369,7 +369,7 @@ static lattice_light light_of_lattice(sunlight *sun, const packet_state *m, cons
 {
     const medium_hit *k = present(m, m->present_first);
     const voxel_rays rays = voxel_rays_of(k);
-    const lattice_rays to_sun = lattice_rays_of(k->medium->lattice, &rays);
+    const lattice_rays to_sun = lattice_rays_of(k->lit->sun_lattice, &rays);
     const nb_real zero = NB_F(0.0), hidden = amount_that_hides(sun, k, g->depth, LEFT_OUT);
     const nb_wmask lanes = nb_widen_mask(lit);
     lattice_light light = {.light = {zero, zero, zero}, .doubt = zero, .square = zero, .left_out = zero};
@@ -397,7 +397,7 @@ static lattice_light light_of_lattice(sunlight *sun, const packet_state *m, cons
 
 static int has_lattice(const packet_state *m)
 {
-    return m->present_end - m->present_first == 1 && present(m, m->present_first)->medium->lattice != NULL;
+    return m->present_end - m->present_first == 1 && present(m, m->present_first)->lit->sun_lattice != NULL;
 }
 
 /* What cells are off by has any sign, so that most of it cancels along a ray, but for rays that keep to one side of the

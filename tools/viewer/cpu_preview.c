@@ -132,14 +132,14 @@ static nebel_result prepare(nb_preview_work *w)
     const nebel_cpu_renderer_desc desc = {.thread_count = 0};
     take_light(&twin->scene, &w->wish);
     const nebel_result result = w->renderer != NULL
-                                    ? nebel_set_renderer_fog(w->renderer, w->wish.fog)
+                                    ? nebel_set_renderer_lighting(w->renderer, w->wish.fog)
                                     : nebel_create_cpu_renderer(&twin->scene, w->wish.fog, &desc, &w->renderer);
     return result == NEBEL_OK ? set_method(w) : result;
 }
 
 static void forget(nb_preview_request *wish)
 {
-    nebel_release_snapshot(wish->fog);
+    nebel_release_lighting(wish->fog);
     nebel_destroy_cells(wish->cells);
     free(wish->lamps);
     wish->fog = NULL;
@@ -241,7 +241,7 @@ void nb_cpu_preview_rest(nb_cpu_preview *twin)
 
 void nb_cpu_preview_ask(nb_cpu_preview *twin, const nb_preview_request *wish)
 {
-    nebel_snapshot *const fog = nebel_retain_snapshot(wish->fog);
+    nebel_lighting *const fog = nebel_retain_lighting(wish->fog);
     mtx_lock(&twin->lock);
     nb_preview_request before = twin->wish;
     twin->wish = *wish;

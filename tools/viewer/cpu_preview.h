@@ -20,7 +20,7 @@ typedef struct nb_preview_request {
     nebel_cells *cells;     /* of the methods of that name; the twin's from then on */
     nebel_light *lamps;     /* by malloc; the twin's from then on */
     nebel_scene_data light; /* sun, ambient and background of it, and how many lamps there are */
-    nebel_snapshot *fog;
+    nebel_lighting *fog;
 } nb_preview_request;
 
 typedef struct nb_preview_image {

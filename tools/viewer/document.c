@@ -110,15 +110,20 @@ static nebel_result find_fog_light(const nb_document *draft, const nb_document_s
 /* Also where it fails the fog is the caller's. */
 static nebel_result create_fog(const nb_document *draft, const nb_document_state *edition, nebel_fog **fog)
 {
-    nebel_fog_desc desc = {.log = draft->log, .max_opacity = edition->max_opacity};
-    const nebel_scene_data *const file = nebel_get_scene_data(draft->file);
-    nebel_environment environment;
-    nebel_result result = find_fog_light(draft, edition, &desc.sun, &environment);
-    if (result == NEBEL_OK) result = nebel_create_fog(&desc, fog);
-    if (result == NEBEL_OK) result = nebel_set_environment(*fog, &environment);
-    if (result == NEBEL_OK) result = nebel_set_lamps(*fog, edition->lamp_count, edition->lamps);
-    if (result == NEBEL_OK) result = nebel_set_diffusion(*fog, file->diffusion);
-    return result;
+    return nebel_create_fog(&(nebel_fog_desc){.log = draft->log, .max_opacity = edition->max_opacity}, fog);
+}
+
+/* The edition's light, for fog of the draft. */
+static nebel_result light_fog(const nb_document *draft, const nb_document_state *edition, nebel_snapshot *snapshot,
+                              nebel_lighting **made)
+{
+    nebel_lighting_desc desc = {.log = draft->log,
+                                .lights = edition->lamps,
+                                .light_count = edition->lamp_count,
+                                .diffusion = nebel_get_scene_data(draft->file)->diffusion,
+                                .previous = draft->volumes};
+    const nebel_result result = find_fog_light(draft, edition, &desc.sun, &desc.environment);
+    return result == NEBEL_OK ? nebel_create_lighting(snapshot, &desc, made) : result;
 }
 
 /* A volume as it is at the present frame; its grid has one more owner, also where this fails. */
@@ -149,17 +154,26 @@ static nebel_result change_volume(const nb_document *draft, const nb_document_st
     return result;
 }
 
-static nebel_result commit_fog(nb_document *draft)
+/* The snapshot is let go. */
+static nebel_result use_fog(nb_document *draft, const nb_document_state *edition, nebel_snapshot *snapshot)
 {
-    nebel_snapshot *fresh = NULL;
-    const nebel_result result = nebel_commit_fog(draft->fog, &fresh);
+    nebel_lighting *fresh = NULL;
+    const nebel_result result = light_fog(draft, edition, snapshot, &fresh);
+    nebel_release_snapshot(snapshot);
     if (result != NEBEL_OK) return result;
-    nebel_release_snapshot(draft->volumes);
-    nebel_release_snapshot(draft->whole);
+    nebel_release_lighting(draft->volumes);
+    nebel_release_lighting(draft->whole);
     draft->volumes = fresh;
     draft->whole = NULL;
     draft->fog_frame = draft->frame;
     return NEBEL_OK;
+}
+
+static nebel_result commit_fog(nb_document *draft, const nb_document_state *edition)
+{
+    nebel_snapshot *snapshot = NULL;
+    const nebel_result result = nebel_commit_fog(draft->fog, &snapshot);
+    return result == NEBEL_OK ? use_fog(draft, edition, snapshot) : result;
 }
 
 /* As exact fog, each for itself. */
@@ -206,7 +220,7 @@ static nebel_result fill_fog(nb_document *draft, const nb_document_state *editio
     free(draft->ids);
     draft->fog = fog;
     draft->ids = ids;
-    return commit_fog(draft);
+    return commit_fog(draft, edition);
 }
 
 static int has_changed(const nb_document *draft, const nebel_volume_desc *was, const nebel_volume_desc *now)
@@ -215,20 +229,20 @@ static int has_changed(const nb_document *draft, const nebel_volume_desc *was, c
     return !nb_document_state_is_same_volume(now, was) || (may_move && draft->frame != draft->fog_frame);
 }
 
-/* Only numbers of the edition are not as they were. */
+/* Only numbers of the edition are not as they were. Where they are those of light alone the fog is not committed again. */
 static nebel_result change_fog(nb_document *draft, const nb_document_state *was, const nb_document_state *now)
 {
-    nebel_result result = NEBEL_OK;
-    for (size_t i = 0; i < now->count && result == NEBEL_OK; i++)
-        if (has_changed(draft, &was->volumes[i], &now->volumes[i])) result = change_volume(draft, now, i);
-    nebel_environment environment;
-    nebel_sun sun;
-    if (result == NEBEL_OK) result = find_fog_light(draft, now, &sun, &environment);
-    if (result == NEBEL_OK) result = nebel_set_environment(draft->fog, &environment);
-    if (result == NEBEL_OK) result = nebel_set_sun(draft->fog, &sun);
-    if (result == NEBEL_OK) result = nebel_set_lamps(draft->fog, now->lamp_count, now->lamps);
-    if (result == NEBEL_OK) result = nebel_set_max_opacity(draft->fog, now->max_opacity > 0 ? now->max_opacity : 1);
-    return result == NEBEL_OK ? commit_fog(draft) : result;
+    const double max_opacity = now->max_opacity > 0 ? now->max_opacity : 1;
+    nebel_snapshot *const before = nebel_get_lighting_snapshot(draft->volumes);
+    int has_same_fog = before != NULL && nebel_get_max_opacity(before) == max_opacity;
+    nebel_result result = nebel_set_max_opacity(draft->fog, max_opacity);
+    for (size_t i = 0; i < now->count && result == NEBEL_OK; i++) {
+        if (!has_changed(draft, &was->volumes[i], &now->volumes[i])) continue;
+        has_same_fog = 0;
+        result = change_volume(draft, now, i);
+    }
+    if (result != NEBEL_OK) return result;
+    return has_same_fog ? use_fog(draft, now, nebel_retain_snapshot(before)) : commit_fog(draft, now);
 }
 
 /* ---- particles
@@ -310,7 +324,7 @@ static nebel_result generate_particles(nb_document *draft, const nb_document_sta
     free(draft->particles);
     draft->particles = particles;
     draft->particle_count = count;
-    nebel_release_snapshot(draft->whole);
+    nebel_release_lighting(draft->whole);
     draft->whole = NULL;
     return NEBEL_OK;
 }
@@ -328,16 +342,19 @@ static nebel_result add_all(const nb_document *draft, nebel_fog *fog)
     return result;
 }
 
-nebel_result nb_document_whole(nb_document *draft, nebel_snapshot **whole)
+nebel_result nb_document_whole(nb_document *draft, nebel_lighting **whole)
 {
     nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
     nebel_result result = NEBEL_OK;
     if (draft->whole == NULL && draft->particle_count == 0) {
-        draft->whole = nebel_retain_snapshot(draft->volumes);
+        draft->whole = nebel_retain_lighting(draft->volumes);
     } else if (draft->whole == NULL) {
         result = create_fog(draft, &draft->good, &fog);
         if (result == NEBEL_OK) result = add_all(draft, fog);
-        if (result == NEBEL_OK) result = nebel_commit_fog(fog, &draft->whole);
+        if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
+        if (result == NEBEL_OK) result = light_fog(draft, &draft->good, snapshot, &draft->whole);
+        nebel_release_snapshot(snapshot);
         nebel_destroy_fog(fog);
     }
     *whole = draft->whole;
@@ -451,8 +468,8 @@ nebel_result nb_document_open(const char *path, double frame, const nebel_log *l
 
 void nb_document_close(nb_document *draft)
 {
-    nebel_release_snapshot(draft->volumes);
-    nebel_release_snapshot(draft->whole);
+    nebel_release_lighting(draft->volumes);
+    nebel_release_lighting(draft->whole);
     nebel_destroy_fog(draft->fog);
     nebel_destroy_cells(draft->cells);
     free(draft->ids);

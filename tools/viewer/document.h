@@ -16,8 +16,8 @@ typedef struct nb_document {
     nebel_fog *fog; /* the volumes of `good` */
     nebel_volume_id *ids;
     double fog_frame;          /* that its noise is of */
-    nebel_snapshot *volumes;   /* of the fog */
-    nebel_snapshot *whole;     /* with the particles; NULL: not asked for yet */
+    nebel_lighting *volumes;   /* of the fog, with its snapshot */
+    nebel_lighting *whole;     /* with the particles; NULL: not asked for yet */
     nebel_particle *particles; /* of all nebulae */
     size_t particle_count;
     nebel_cells *cells;   /* of `good`; NULL: the scene has none */
@@ -42,8 +42,8 @@ void nb_document_show(nb_document *draft);
  * where planets have. */
 nebel_result nb_document_commit(nb_document *draft);
 
-/* All fog with its particles, as volumes. The snapshot is the draft's, until the next change. */
-nebel_result nb_document_whole(nb_document *draft, nebel_snapshot **whole);
+/* All fog with its particles, as volumes. The lighting is the draft's, until the next change. */
+nebel_result nb_document_whole(nb_document *draft, nebel_lighting **whole);
 
 /* Loads the models of `good` anew. Nobody may use the meshes of `data` meanwhile: they are others then, unless that
  * fails. */

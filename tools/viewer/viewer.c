@@ -121,10 +121,10 @@ static void set_home(viewer *all)
 static nebel_result set_fog(viewer *all)
 {
     nb_document *const draft = &all->draft;
-    nebel_snapshot *fog = draft->volumes;
+    nebel_lighting *fog = draft->volumes;
     const int is_whole = all->look.particles == NB_LOOK_AS_FOG;
     nebel_result result = is_whole ? nb_document_whole(draft, &fog) : NEBEL_OK;
-    if (result == NEBEL_OK) result = nebel_set_gl_renderer_fog(all->stage.renderer, fog);
+    if (result == NEBEL_OK) result = nebel_set_gl_renderer_lighting(all->stage.renderer, fog);
     if (result != NEBEL_OK) return result;
     return nebel_set_gl_renderer_particles(all->stage.renderer, draft->particles, is_whole ? 0 : draft->particle_count);
 }
