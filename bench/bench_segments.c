@@ -14,7 +14,7 @@
 
 enum { LARGE = 64 << 20 };
 
-static const float eye[3] = {0, 16, 62};
+static const double eye[3] = {0, 16, 62};
 
 /* The kernel is float throughout, the magazine's code too; they round differently. */
 static const float largest_difference = 1e-4f;
@@ -25,7 +25,7 @@ static const char failed[] = "segments: a query failed or gave another result th
 /* Points on the terrain, repeated until there are `count`, with every way to fog them. */
 typedef struct nb_field {
     size_t count;
-    float *points; /* 3 each */
+    float *points; /* 3 each, relative to the eye */
     float *found;
     nb_old_vertex *vertices;
     nb_boxes boxes;
@@ -50,6 +50,7 @@ static void copy_points(const nb_terrain *terrain, nb_field *field)
         const float *const p = field->points + 3 * i;
         field->vertices[i] = (nb_old_vertex){.position = {p[0], p[1], p[2]}, .normal = {0, 1, 0}};
     }
+    for (size_t i = 0; i < 3 * field->count; i++) field->points[i] -= (float)eye[i % 3];
 }
 
 static void free_field(nb_field *field)
@@ -79,7 +80,7 @@ static int make_field(const nb_terrain *terrain, nb_setting setting, size_t coun
 static double run_kernel(void *user)
 {
     const nb_segment_entry *const c = user;
-    const nebel_segments segments = {.from = eye, .to = c->field->points};
+    const nebel_segments segments = {.origin = {eye[0], eye[1], eye[2]}, .to = c->field->points};
     const double start = nb_clock_cpu();
     for (int i = 0; i < c->field->rounds; i++) {
         if (nebel_compute_segment_transmittance(c->field->fog, c->isa, 0, c->field->count, &segments, c->field->found,
@@ -93,7 +94,7 @@ static double run_kernel(void *user)
 static double run_magazine(void *user)
 {
     const nb_segment_entry *const c = user;
-    const nb_old_camera camera = {{eye[0], eye[1], eye[2]}};
+    const nb_old_camera camera = {{(float)eye[0], (float)eye[1], (float)eye[2]}};
     const double start = nb_clock_cpu();
     for (int i = 0; i < c->field->rounds; i++) {
         nb_magazine_fog(&camera, c->field->boxes.list, c->field->boxes.count, c->field->vertices, c->field->count);

@@ -41,7 +41,8 @@ string(REPLACE "-O3" "-O2" CMAKE_C_FLAGS_RELEASE "${CMAKE_C_FLAGS_RELEASE}")
 
 function(nebel_set_options target)
     set_target_properties(${target} PROPERTIES
-        C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
+        C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON
+        C_VISIBILITY_PRESET hidden CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
     # Fuzzers count branches of what they link. Tests and the libraries above that are faster without.
     set(sanitizers ${nebel_sanitizers})
     if(target MATCHES "^nebel_(test|cpu|gl|bench)")
@@ -123,9 +124,8 @@ function(nebel_add_library name sources extra_objects)
     # PUBLIC where the library is static: whoever links it links with the sanitizers' run time, too.
     target_link_options(${name} PUBLIC $<BUILD_INTERFACE:${nebel_sanitizers}>)
     if(BUILD_SHARED_LIBS)
-        set(map ${PROJECT_SOURCE_DIR}/cmake/nebel.map)
-        target_link_options(${name} PRIVATE LINKER:--version-script=${map} LINKER:--no-undefined)
-        set_target_properties(${name} PROPERTIES LINK_DEPENDS ${map})
+        target_compile_definitions(${name}_objects PRIVATE NEBEL_BUILDING_SHARED)
+        target_link_options(${name} PRIVATE LINKER:--no-undefined)
     endif()
 endfunction()
 

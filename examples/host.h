@@ -7,9 +7,9 @@
 #include <stdio.h>
 
 /* For nebel's own words. */
-static inline void host_write(nebel_result result, const char *message, void *user)
+static inline void host_write(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
-    (void)result, (void)user;
+    (void)level, (void)result, (void)user;
     fprintf(stderr, "nebel: %s\n", message);
 }
 

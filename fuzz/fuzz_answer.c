@@ -9,9 +9,9 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-static void drop_message(nebel_result result, const char *message, void *user)
+static void drop_message(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
-    (void)result, (void)user;
+    (void)level, (void)result, (void)user;
     for (; *message != '\0'; message++)
         if ((unsigned char)*message < 0x20 || *message == 0x7F) abort();
 }

@@ -8,9 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void count_message(nebel_result result, const char *message, void *user)
+static void count_message(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     witness *seen = user;
+    (void)level;
     if (message[0] == '\0') abort();
     seen->messages += result != NEBEL_OK;
 }

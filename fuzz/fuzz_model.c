@@ -15,9 +15,10 @@
 static const char *const formats[] = {"gltf", "glb",   "obj", "ply",  "stl", "fbx", "dae", "3ds", "off",  "x",
                                       "ac",   "blend", "lwo", "ms3d", "md2", "smd", "bvh", "x3d", "ogex", "ifc"};
 
-static void count_message(nebel_result result, const char *message, void *user)
+static void count_message(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     size_t *errors = user;
+    (void)level;
     if (message[0] == '\0') abort();
     *errors += result != NEBEL_OK;
 }

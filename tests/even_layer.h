@@ -90,7 +90,7 @@ static inline double radiance(const even *e, double down, double around)
     const nebel_ray ray = {
         {-way * level * around, height, -way * level * side}, {level * around, -down, level * side}, HUGE_VAL};
     nebel_cloud_transfer nodes;
-    assert_int_equal(nebel_trace_clouds(e->workspace, 1, &ray, 0, &spread, 0, &nodes, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_clouds(e->workspace, 1, &ray, 0, spread, NULL, &nodes, 0), NEBEL_OK);
     assert_true(nodes.count > 0);
     return (double)nodes.in_scattering[nodes.count - 1][1];
 }

@@ -72,9 +72,10 @@ typedef struct fog_messages {
     char text[512];
 } fog_messages;
 
-static inline void fog_messages_write(nebel_result result, const char *message, void *user)
+static inline void fog_messages_write(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     fog_messages *const messages = user;
+    assert_true((level == NEBEL_LOG_ERROR) == (result != NEBEL_OK));
     assert_non_null(message);
     assert_true(message[0] != 0);
     assert_null(strchr(message, '\n'));

@@ -31,13 +31,14 @@ POINTERS = {"const char": '"test_null"', "const float": "floats", "float": "out.
 VALUES = {"nebel_isa": "NEBEL_ISA_DEFAULT", "nebel_method": "NEBEL_METHOD_VERTEX", "nebel_cell_stage": "NEBEL_CELLS_PER_VERTEX",
           "nebel_blend_mode": "NEBEL_BLEND_OVER", "nebel_shader_dialect": "NEBEL_DIALECT_GLSL_330", "nebel_volume_id": "made.id",
           "nebel_result": "NEBEL_OK"}
-NAMED = {"transmittance": ".5", "f": ".5", "chance": ".5", "tile_size": "16", "capacity": "64", "size": "2", "n": "1", "count": "1",
+NAMED = {"pixel_spread": ".5", "transmittance": ".5", "f": ".5", "chance": ".5", "tile_size": "16", "capacity": "64", "size": "2", "n": "1", "count": "1",
          "output_count": "1", "room": "1", "parts": "1", "width": "1", "height": "1", "thickness": "1e5", "scale": "1"}
 
 
 def declarations(text):
     """(result, name, [parameter, ...]) of each function."""
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+    text = re.sub(r"^NEBEL_API ", "", text, flags=re.M)
     text = re.sub(r"^\s*#.*(?:\\\n.*)*", "", text, flags=re.M)
     for found in re.finditer(r"^([A-Za-z_][\w \*]*?\b\**)(nebel_\w+)\(([^;{]*?)\);", text, flags=re.M | re.S):
         if "typedef" not in found[1]:

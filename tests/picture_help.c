@@ -45,16 +45,18 @@ void picture_free(picture_pair *pair)
     free_frame(&pair->gl);
 }
 
-static void write_message(nebel_result result, const char *message, void *user)
+static void write_message(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
+    (void)level;
     (void)user;
     print_message("%d: %s\n", (int)result, message);
 }
 
-static void count_message(nebel_result result, const char *message, void *user)
+static void count_message(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
+    (void)level;
     ++*(int *)user;
-    write_message(result, message, NULL);
+    write_message(level, result, message, NULL);
 }
 
 nebel_lighting *picture_commit_scene(const nebel_scene *scene, int with_particles)

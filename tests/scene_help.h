@@ -17,9 +17,10 @@ typedef struct journal {
     char last[1024];
 } journal;
 
-static inline void remember(nebel_result result, const char *message, void *user)
+static inline void remember(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     journal *kept = user;
+    assert_true((level == NEBEL_LOG_ERROR) == (result != NEBEL_OK));
     kept->count++;
     kept->result = result;
     snprintf(kept->last, sizeof kept->last, "%s", message);

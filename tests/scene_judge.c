@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void say(nebel_result result, const char *message, void *user)
+static void say(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
-    (void)result;
+    (void)level, (void)result;
     (void)user;
     printf("%s\n", message);
 }

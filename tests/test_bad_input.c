@@ -382,18 +382,16 @@ static void test_null_arguments_are_refused(void **unused)
 
     const float point[3] = {0, 0, 0};
     float out = 0;
-    const nebel_segments segments = {.from = point, .to = point}, no_from = {.to = point}, no_to = {.from = point};
+    const nebel_segments segments = {.from = point, .to = point}, no_to = {.from = point};
     assert_int_equal(nebel_compute_segment_transmittance(NULL, NEBEL_ISA_DEFAULT, 0, 1, &segments, &out, 0), ARGUMENT);
     assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 1, NULL, &out, 0), ARGUMENT);
-    assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &no_from, &out, 0),
-                     ARGUMENT);
     assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &no_to, &out, 0), ARGUMENT);
     assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 1, &segments, NULL, 0),
                      ARGUMENT);
     assert_int_equal(
         nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 0, &(nebel_segments){0}, NULL, 0),
         NEBEL_OK);
-    assert_int_equal(messages.count, 11);
+    assert_int_equal(messages.count, 10);
 
     assert_null(nebel_retain_snapshot(NULL));
     nebel_release_snapshot(NULL);

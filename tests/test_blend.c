@@ -4,6 +4,8 @@
 
 #include "fog_help.h"
 
+#include <nebel/classic.h>
+
 enum { LAYERS = 6, STACKS = 20000 };
 
 typedef struct surface {

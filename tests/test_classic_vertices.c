@@ -122,8 +122,9 @@ static void test_boxes_have_the_bits_of_segments(void **unused)
     for (size_t n = 1; n <= 3; n++) {
         nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){0}, boxes, n);
         const nebel_vertices vertices = {.positions = p.at, .origin = {1, 2, 3}, .eye = {-10, 5, 12.5}};
-        const float from[3] = {-11, 3, 9.5f};
-        const nebel_segments segments = {.origin = {1, 2, 3}, .from = from, .to = p.at[0]};
+        points from;
+        for (int i = 0; i < COUNT; i++) memcpy(from.at[i], (const float[3]){-11, 3, 9.5f}, sizeof from.at[i]);
+        const nebel_segments segments = {.origin = {1, 2, 3}, .from = from.at[0], .to = p.at[0]};
         float a[COUNT], b[COUNT];
         assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, COUNT, &segments, a, 0),
                          NEBEL_OK);

@@ -173,7 +173,7 @@ static void test_ways_to_a_sun_below_level(void **state)
 static double light_of_opaque(nebel_cloud_workspace *workspace, const nebel_ray *ray, double spread)
 {
     nebel_cloud_transfer nodes;
-    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &spread, 0, &nodes, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, spread, NULL, &nodes, 0), NEBEL_OK);
     return nodes.count > 0 && nodes.transmittance[nodes.count - 1] < .05f
                ? (double)nodes.in_scattering[nodes.count - 1][1]
                : 0;
@@ -292,7 +292,7 @@ static void test_light_of_dense_clouds(void **state)
             const double down = dice(&numbers, .01, .5), turn = dice(&numbers, -PI, PI), level = sqrt(1 - down * down);
             const nebel_ray ray = {{0, 3000, 0}, {level * sin(turn), -down, level * cos(turn)}, HUGE_VAL};
             nebel_cloud_transfer nodes;
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){.01}, 0, &nodes, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, .01, NULL, &nodes, 0), NEBEL_OK);
             for (uint32_t k = 0; k < nodes.count; k++)
                 for (int c = 0; c < 3; c++)
                     assert_true(isfinite(nodes.in_scattering[k][c]) && nodes.in_scattering[k][c] >= 0);

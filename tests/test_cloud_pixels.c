@@ -55,7 +55,7 @@ static void compare_wide_pixels(const nebel_cloud_layer *layer, double aside, si
             const nebel_ray ray = {{0, 4e5, 0}, {x, -1, z}, HUGE_VAL};
             const double length = sqrt(1 + x * x + z * z);
             nebel_cloud_transfer nodes;
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){spreads[s]}, 0, &nodes, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, spreads[s], NULL, &nodes, 0), NEBEL_OK);
             seen += (nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1) / pixels;
             for (int k = 0; k < RAYS; k++) {
                 const double half = .5 * spreads[s] * length, a = x + dice(&numbers, -half, half);
@@ -115,11 +115,10 @@ static void compare_light_of_pixels(const nebel_cloud_layer *layer)
             const nebel_ray thin = {
                 {x - far * unit[0], 1500 - far * unit[1], z - far * unit[2]}, {unit[0], unit[1], unit[2]}, HUGE_VAL};
             nebel_cloud_transfer nodes;
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &thin, 0, &(double){1 / far}, 0, &nodes, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &thin, 0, 1 / far, NULL, &nodes, 0), NEBEL_OK);
             if (nodes.count > 0) truth += (double)nodes.in_scattering[nodes.count - 1][1] / (pixels * RAYS);
             if (!is_first) continue;
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &pixel, 0, &(double){width / far}, 0, &nodes, 0),
-                             NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &pixel, 0, width / far, NULL, &nodes, 0), NEBEL_OK);
             if (nodes.count > 0) seen += (double)nodes.in_scattering[nodes.count - 1][1] / pixels;
         }
         print_message("pixels of %.0f m: light of %.4f, of thin rays %.4f\n", width, seen, truth);
@@ -152,7 +151,7 @@ static nb_shown show_pixels(nebel_cloud_workspace *workspace, const double unit[
         const nebel_ray ray = {
             {x - far * unit[0], 1500 - far * unit[1], z - far * unit[2]}, {unit[0], unit[1], unit[2]}, HUGE_VAL};
         nebel_cloud_transfer nodes;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){width / far}, 0, &nodes, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, width / far, NULL, &nodes, 0), NEBEL_OK);
         const double light = nodes.count > 0 ? (double)nodes.in_scattering[nodes.count - 1][1] : 0;
         sum += light / count;
         squares += light * light / count;
@@ -232,7 +231,7 @@ static double show_horizon(nebel_cloud_workspace *workspace, double height, doub
         const double turn = PI / 3 * (i + .5 - RAYS / 2) / RAYS;
         const nebel_ray ray = {{0, height, 0}, {level * sin(turn), rise, -level * cos(turn)}, HUGE_VAL};
         nebel_cloud_transfer nodes;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &spread, 0, &nodes, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, spread, NULL, &nodes, 0), NEBEL_OK);
         assert_true(nodes.count > 0 && nodes.transmittance[nodes.count - 1] < .02f);
         sum += (double)nodes.in_scattering[nodes.count - 1][1] / RAYS;
     }
@@ -313,7 +312,7 @@ static void test_weather_ends_where_it_ends(void **state)
         const double t = (16e6 - sqrt(under)) / square, latitude = fabs(asin(y * t / radius));
         /* A texel, and what a pixel hides. */
         if (fabs(latitude - edge) < PI / HIGH + step * t / radius) continue;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){step}, 0, &nodes, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, step, NULL, &nodes, 0), NEBEL_OK);
         if (latitude < edge) within += nodes.count > 0;
         if (latitude > edge) beyond += nodes.count > 0;
     }
@@ -369,7 +368,7 @@ static nebel_ray ray_beside_sun(const nb_before_sun *scene, const double from[2]
 static nb_look look_along(const nb_before_sun *scene, const nebel_ray *ray, double spread)
 {
     nebel_cloud_transfer nodes;
-    assert_int_equal(nebel_trace_clouds(scene->workspace, 1, ray, 0, &spread, 0, &nodes, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_clouds(scene->workspace, 1, ray, 0, spread, NULL, &nodes, 0), NEBEL_OK);
     if (nodes.count == 0) return (nb_look){0, 1};
     return (nb_look){(double)nodes.in_scattering[nodes.count - 1][1], (double)nodes.transmittance[nodes.count - 1]};
 }

@@ -29,7 +29,7 @@ static void check_rays(const sky_case *is)
     for (int i = 0; i < is->rays; i++) {
         const nebel_ray ray = draw_ray(&numbers);
         nebel_cloud_transfer nodes;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, NULL, &nodes, 0), NEBEL_OK);
         const double up = ray.direction[1], left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
         const double truth = brute_force(clouds, &ray, .5 * is->low / up, (is->high + 20) / up, 1);
         const double off = fabs(left - truth), more = off - (double)nodes.error;

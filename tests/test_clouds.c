@@ -211,7 +211,7 @@ static void test_no_lines_in_thin_clouds(void **state)
         const double length = sqrt(x * x + y * y + 1);
         const nebel_ray ray = {{0, 1359.375, 0}, {x / length, y / length, -1 / length}, 300};
         nebel_cloud_transfer nodes;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, NULL, &nodes, 0), NEBEL_OK);
         const double left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
         const double truth = brute_force(clouds, &ray, 0, 300, 1), step = fabs(left - truth - last);
         last = left - truth;
@@ -263,7 +263,7 @@ static double find_grain(const nebel_cloud_layer *layer, const nebel_sun *sun, c
     assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
     for (int i = 0; i < COUNT; i++) {
         const nebel_ray ray = pixel_ray(w, i % SIDE, i / SIDE);
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &pixel, 0, &nodes[i], 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, pixel, NULL, &nodes[i], 0), NEBEL_OK);
         assert_true(nodes[i].count > 0);
     }
     for (int i = SIDE; i < COUNT - SIDE; i++) {
@@ -352,7 +352,7 @@ static void test_billows_that_are_missed(void **state)
         const double begin = i % 3 == 0 ? 0 : (i % 3 == 1 ? 800 : 2200) / fabs(rise),
                      end = (i % 3 == 2 ? 4120 : 2720 - height) / fabs(rise);
         nebel_cloud_transfer nodes;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, NULL, &nodes, 0), NEBEL_OK);
         const double left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
         const double off = fabs(left - brute_force(clouds, &ray, begin, end, 1));
         const double beyond = off - (nodes.count > 0 ? (double)nodes.error : 0);
@@ -372,7 +372,7 @@ static void test_billows_that_are_missed(void **state)
 static double excess_of(const nebel_clouds *clouds, nebel_cloud_workspace *workspace, const nebel_ray *ray, double end)
 {
     nebel_cloud_transfer nodes;
-    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, 0, NULL, &nodes, 0), NEBEL_OK);
     const double left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
     return left - brute_force(clouds, ray, 0, end, 2);
 }
@@ -435,7 +435,7 @@ static void test_thin_layers(void **state)
         const double length = sqrt(1.04);
         const nebel_ray ray = {{200. * (i - .5 * RAYS), 0, 0}, {0, 1 / length, .2 / length}, HUGE_VAL};
         nebel_cloud_transfer nodes;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &nodes, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, NULL, &nodes, 0), NEBEL_OK);
         const double truth = brute_force(clouds, &ray, 860 * length, 911 * length, .05);
         const double left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
         met += truth < .9;
@@ -461,7 +461,7 @@ static void test_thick_cloud_ends_where_it_is_seen(void **state)
         const double rise = -.03 + .0015 * i;
         const nebel_ray ray = {{0, 600, 0}, {cos(rise), sin(rise), 0}, HUGE_VAL};
         nebel_cloud_transfer nodes;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &nodes, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, NULL, &nodes, 0), NEBEL_OK);
         const double end = (double)nodes.t[nodes.count - 1];
         double depth = 0;
         assert_true(end < 1e4);
@@ -485,10 +485,10 @@ static void test_below_the_ground_is_on_it(void **state)
     for (int i = 0; i < 20; i++) {
         nebel_ray ray = {{0, 0, 0}, {.3 - .02 * i, .1 + .04 * i, 1}, HUGE_VAL};
         nebel_cloud_transfer on, below;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &on, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, NULL, &on, 0), NEBEL_OK);
         for (size_t k = 0; k < sizeof depths / sizeof *depths; k++) {
             ray.origin[1] = -depths[k];
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &below, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, NULL, &below, 0), NEBEL_OK);
             assert_int_equal(below.count, on.count);
             if (on.count == 0) continue;
             const uint32_t last = on.count - 1;
@@ -520,11 +520,9 @@ static void compare_orders(double spread)
     memset(nodes, 0, sizeof nodes);
     assert_int_equal(nebel_create_cloud_workspace(view, &other), NEBEL_OK);
     lay_rays(rays);
-    assert_int_equal(
-        nebel_trace_clouds(workspace, RAYS, rays, sizeof *rays, &(double){spread}, 0, nodes[0], sizeof **nodes),
-        NEBEL_OK);
+    assert_int_equal(nebel_trace_clouds(workspace, RAYS, rays, 0, spread, NULL, nodes[0], 0), NEBEL_OK);
     for (int i = RAYS - 1; i >= 0; i--)
-        assert_int_equal(nebel_trace_clouds(other, 1, &rays[i], 0, &(double){spread}, 0, &nodes[1][i], 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(other, 1, &rays[i], 0, spread, NULL, &nodes[1][i], 0), NEBEL_OK);
     assert_memory_equal(nodes[0], nodes[1], sizeof nodes[0]);
     int some = 0;
     for (int i = 0; i < RAYS; i++) {
@@ -573,9 +571,8 @@ static void test_instruction_sets_agree(void **state)
             nebel_cloud_transfer *seen = nodes[isa != NEBEL_ISA_SCALAR];
             assert_int_equal(nebel_create_cloud_lighting(&desc, &view), NEBEL_OK);
             assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
-            assert_int_equal(
-                nebel_trace_clouds(workspace, RAYS, rays, sizeof *rays, &(double){1e-3}, 0, seen, sizeof *seen),
-                NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, RAYS, rays, sizeof *rays, 1e-3, NULL, seen, sizeof *seen),
+                             NEBEL_OK);
             if (isa != NEBEL_ISA_SCALAR) assert_memory_equal(nodes[0], nodes[1], sizeof nodes[0]);
             nebel_destroy_cloud_workspace(workspace);
             nebel_destroy_cloud_lighting(view);
@@ -588,9 +585,9 @@ static void test_instruction_sets_agree(void **state)
 
 /* ---- bad input ------------------------------------------------------------------------------- */
 
-static void keep_text(nebel_result result, const char *message, void *user)
+static void keep_text(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
-    (void)result;
+    (void)level, (void)result;
     (void)snprintf(user, 200, "%s", message);
 }
 
@@ -715,12 +712,12 @@ static void test_bad_calls_are_refused(void **state)
     assert_int_equal(nebel_compute_cloud_extinction(clouds, 0, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_compute_cloud_extinction(clouds, none, 0, 0, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_compute_cloud_sun_transmittance(workspace, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){-1}, 0, &nodes, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, -1, NULL, &nodes, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, NULL, NULL, 0), NEBEL_ERROR_ARGUMENT);
     ray.t_max = none;
-    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, NULL, &nodes, 0), NEBEL_ERROR_ARGUMENT);
     ray = (nebel_ray){{0, 0, 0}, {0, 0, 0}, 1};
-    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &nodes, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, NULL, &nodes, 0), NEBEL_ERROR_ARGUMENT);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_workspace(NULL);
     nebel_destroy_cloud_lighting(view);

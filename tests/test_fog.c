@@ -284,13 +284,12 @@ static nebel_result find(bench *b)
 static nebel_result transmit(bench *b)
 {
     float to[RAYS][3], out[RAYS];
-    const float from[3] = {-9, 0, 0};
     for (int i = 0; i < RAYS; i++) {
-        to[i][0] = 9;
+        to[i][0] = 18;
         to[i][1] = .1f * (float)i;
         to[i][2] = 0;
     }
-    const nebel_segments segments = {.from = from, .to = &to[0][0], .to_stride = sizeof to[0]};
+    const nebel_segments segments = {.origin = {-9, 0, 0}, .to = &to[0][0], .to_stride = sizeof to[0]};
     return nebel_compute_segment_transmittance(b->snapshot, NEBEL_ISA_DEFAULT, 0, b->ray_count, &segments, out, 0);
 }
 
@@ -518,7 +517,7 @@ static void test_every_result_has_a_text_of_its_own(void **unused)
         assert_string_equal(nebel_result_text(results[i]), texts[i]);
         for (size_t j = 0; j < i; j++) assert_string_not_equal(texts[i], texts[j]);
     }
-    const int unknown[] = {1, 99, -9, -1000, INT32_MAX, INT32_MIN};
+    const int unknown[] = {1, 99, -10, -1000, INT32_MAX, INT32_MIN};
     for (size_t i = 0; i < sizeof unknown / sizeof unknown[0]; i++) {
         const char *const text = nebel_result_text((nebel_result)unknown[i]);
         assert_non_null(text);

@@ -249,8 +249,7 @@ static void test_segment_kernels_are_bit_equal_for_every_stride(void **state)
         nebel_snapshot *fog = boxes_of_fog(1 + round % 16);
         fill_points(from, POINTS);
         fill_points(to, 5 * POINTS / 3);
-        const nebel_segments segments = {
-            .from = from, .from_stride = round % 2 ? 12 : 0, .to = to, .to_stride = round % 3 ? 12 : 20};
+        const nebel_segments segments = {.from = round % 2 ? from : NULL, .to = to, .to_stride = round % 3 ? 12 : 20};
         assert_int_equal(
             nebel_compute_segment_transmittance(fog, NEBEL_ISA_SCALAR, round % 3, POINTS, &segments, reference, 4),
             NEBEL_OK);
@@ -274,12 +273,12 @@ static void test_a_segment_gives_the_same_bits_in_any_layout(void **state)
     enum { MANY = 5003 };
     static const size_t counts[] = {1, 15, 17, 33, 150, POINTS, MANY};
     static float packed[3 * MANY], spread[5 * MANY], expected_light[2 * MANY], out[MANY];
-    const float eye[3] = {1.5f, -14.25f, 9.f};
     fill_points(packed, MANY);
     for (int i = 0; i < MANY; i++) memcpy(spread + 5 * i, packed + 3 * i, 3 * sizeof(float));
     for (int boxes = 1; boxes <= 6; boxes++) {
         nebel_snapshot *fog = boxes_of_fog(boxes);
-        const nebel_segments slow = {.from = eye, .to = spread, .to_stride = 20}, fast = {.from = eye, .to = packed};
+        const nebel_segments slow = {.origin = {1.5, -14.25, 9}, .to = spread, .to_stride = 20},
+                             fast = {.origin = {1.5, -14.25, 9}, .to = packed};
         assert_int_equal(nebel_compute_segment_transmittance(fog, NEBEL_ISA_SCALAR, 1, MANY, &slow, expected_light, 8),
                          NEBEL_OK);
         for (nebel_isa isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++)
@@ -298,17 +297,16 @@ static void test_segment_kernel_agrees_with_the_reference(void **state)
 {
     (void)state;
     static float to[3 * POINTS], out[POINTS];
-    const float eye[3] = {1.5f, -2.25f, 20.f};
     nebel_snapshot *fog = boxes_of_fog(5);
     for (int i = 0; i < 3 * POINTS; i++) to[i] = (float)dice(-15, 15);
-    const nebel_segments segments = {.from = eye, .to = to};
+    const nebel_segments segments = {.origin = {1.5, -2.25, 20}, .to = to};
     assert_int_equal(nebel_compute_segment_transmittance(fog, NEBEL_ISA_DEFAULT, 1, POINTS, &segments, out, 0),
                      NEBEL_OK);
     for (int i = 0; i < POINTS; i++) {
         nebel_ray ray = {.origin = {1.5, -2.25, 20}};
         double square = 0;
         for (int c = 0; c < 3; c++) {
-            ray.direction[c] = (double)to[3 * i + c] - (double)eye[c];
+            ray.direction[c] = (double)to[3 * i + c];
             square += ray.direction[c] * ray.direction[c];
         }
         ray.t_max = sqrt(square);

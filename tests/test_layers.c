@@ -362,9 +362,9 @@ static void coverage_is_about_what_is_asked(void **state)
 
 /* ---- bad input ------------------------------------------------------------------------------- */
 
-static void keep_text(nebel_result result, const char *message, void *user)
+static void keep_text(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
-    (void)result;
+    (void)level, (void)result;
     (void)snprintf(user, 200, "%s", message);
 }
 

@@ -73,8 +73,9 @@ typedef struct stage {
     int objects;
 } stage;
 
-static void write_message(nebel_result result, const char *message, void *user)
+static void write_message(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
+    (void)level;
     (void)user;
     print_message("%d: %s\n", (int)result, message);
 }

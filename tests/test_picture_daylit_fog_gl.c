@@ -265,9 +265,9 @@ static void fences_shade_mist(void **state)
 
 /* ---- what is not lit so ---------------------------------------------------------------------- */
 
-static void count_warnings(nebel_result result, const char *message, void *user)
+static void count_warnings(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
-    (void)result;
+    (void)level, (void)result;
     *(int *)user += strstr(message, "the scene's origin, however far") != NULL;
 }
 

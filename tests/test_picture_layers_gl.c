@@ -256,9 +256,9 @@ typedef struct stage {
     char said[256];
 } stage;
 
-static void keep(nebel_result result, const char *message, void *user)
+static void keep(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
-    (void)result;
+    (void)level, (void)result;
     snprintf(user, 256, "%s", message);
 }
 

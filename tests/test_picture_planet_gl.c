@@ -224,9 +224,9 @@ static void the_table_stays_while_the_camera_turns(void **state)
     nebel_destroy_atmosphere(w.atmosphere);
 }
 
-static void keep(nebel_result result, const char *message, void *user)
+static void keep(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
-    (void)result;
+    (void)level, (void)result;
     snprintf(user, 256, "%s", message);
 }
 

@@ -384,12 +384,12 @@ static void check_frames(nebel_gl_renderer *renderer, const test_stage *s)
     assert_int_equal(nebel_gl_read_planes(renderer, &(nebel_gl_planes){0}), NEBEL_ERROR_ARGUMENT);
     desc.progress = stop;
     desc.progress_user = &calls;
-    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_LIMIT);
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_CANCELLED);
     assert_int_equal(calls, 2);
     assert_int_equal(nebel_gl_get_textures(renderer, &textures), NEBEL_ERROR_ARGUMENT);
     desc = frame_of(s, 1);
     desc.width = 1u << 30;
-    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_LIMIT);
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_CANCELLED);
     desc.width = 0;
     assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_VALUE);
     desc = frame_of(s, 5000);

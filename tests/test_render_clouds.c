@@ -81,8 +81,7 @@ static void clouds_and_air_are_one(void **state)
             nebel_air_shadow shade;
             double light[3];
             assert_int_equal(nebel_trace_cloud_shadow_on_air(workspace, 1, &ray, 0, &shade, 0), NEBEL_OK);
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){spread / length}, 0, &nodes, 0),
-                             NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, spread / length, NULL, &nodes, 0), NEBEL_OK);
             compose(&w, &sun, &ray, &nodes, &shade, light);
             cloudy += nodes.count > 0;
             for (int c = 0; c < 3; c++)
@@ -151,9 +150,9 @@ static void clouds_end_at_surfaces(void **state)
         nebel_cloud_transfer nodes;
         if (i % WIDTH >= WIDTH / 2) continue;
         ray.t_max = way * length / fabs(ray.direction[2]);
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0,
-                                            &(double){2 * tan(30 * test_pi / 180) / HEIGHT / length}, 0, &nodes, 0),
-                         NEBEL_OK);
+        assert_int_equal(
+            nebel_trace_clouds(workspace, 1, &ray, 0, 2 * tan(30 * test_pi / 180) / HEIGHT / length, NULL, &nodes, 0),
+            NEBEL_OK);
         const double left = nodes.count > 0 ? (double)nodes.transmittance[nodes.count - 1] : 1;
         const nebel_transfer air = air_to(&w, &sun, ray, ray.t_max);
         cloudy += left > .05 && left < .95;
@@ -247,12 +246,12 @@ static int have_same_nodes(nebel_cloud_workspace *workspace, const nebel_ray *ra
                            double tolerance, nebel_cloud_transfer *nodes)
 {
     enum { OTHERS = 6 };
-    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &(double){spread}, 0, nodes, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, spread, NULL, nodes, 0), NEBEL_OK);
     for (int i = 0; i < OTHERS; i++) {
         nebel_ray other = *ray;
         nebel_cloud_transfer its;
         other.direction[i % 3] *= 1 + (i < 3 ? 1e-13 : -1e-13);
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &other, 0, &(double){spread}, 0, &its, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &other, 0, spread, NULL, &its, 0), NEBEL_OK);
         if (its.count != nodes->count) return 0;
         for (uint32_t k = 0; k < its.count; k++)
             if (fabs((double)its.t[k] / (double)nodes->t[k] - 1) > 1e-6 ||

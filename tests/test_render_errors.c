@@ -9,9 +9,10 @@ typedef struct test_log {
     char text[256];
 } test_log;
 
-static void write_log(nebel_result result, const char *message, void *user)
+static void write_log(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     test_log *log = user;
+    (void)level;
     log->messages++;
     log->result = result;
     strncpy(log->text, message, sizeof log->text - 1);
@@ -247,7 +248,7 @@ static void test_progress_rises_and_ends(void **state)
     assert_int_equal(progress.last, progress.total);
     assert_in_range(progress.calls, 50, 101);
     progress = (test_progress){.stop_at = 10};
-    assert_int_equal(nebel_render_frame(renderer, &frame, &(nebel_frame){0}), NEBEL_ERROR_LIMIT);
+    assert_int_equal(nebel_render_frame(renderer, &frame, &(nebel_frame){0}), NEBEL_ERROR_CANCELLED);
     assert_true(progress.last < progress.total);
     nebel_destroy_renderer(renderer);
 }

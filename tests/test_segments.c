@@ -181,9 +181,9 @@ static void test_segments_may_start_at_one_place(void **unused)
         nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){0}, &kinds[kind], 1);
         const points to = random_points(&state, 15);
         points from;
-        for (int i = 0; i < COUNT; i++) memcpy(from.at[i], (const float[3]){-11, 3, 2.5f}, sizeof from.at[i]);
-        const nebel_segments each = {.from = from.at[0], .from_stride = 12, .to = to.at[0]};
-        const nebel_segments once = {.from = from.at[0], .from_stride = 0, .to = to.at[0]};
+        for (int i = 0; i < COUNT; i++) memset(from.at[i], 0, sizeof from.at[i]);
+        const nebel_segments each = {.origin = {-11, 3, 2.5}, .from = from.at[0], .to = to.at[0]};
+        const nebel_segments once = {.origin = {-11, 3, 2.5}, .to = to.at[0]};
         float a[COUNT], b[COUNT];
         transmit(snapshot, NEBEL_ISA_DEFAULT, 0, &each, a);
         transmit(snapshot, NEBEL_ISA_DEFAULT, 0, &once, b);
@@ -251,8 +251,8 @@ static void test_long_segments_cross_all_fog(void **unused)
         {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-1, -1, -1}, .max = {1, 1, 1}}, .extinction = {.5, .5, .5}}};
     for (int kind = 0; kind < 2; kind++) {
         nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){0}, &kinds[kind], 1);
-        const float from[3] = {-4, 0, 0}, to[4][3] = {{4, 0, 0}, {1e6f, 0, 0}, {1e16f, 0, 0}, {1e18f, 0, 0}};
-        const nebel_segments segments = {.from = from, .to = to[0]};
+        const float to[4][3] = {{8, 0, 0}, {1e6f, 0, 0}, {1e16f, 0, 0}, {1e18f, 0, 0}};
+        const nebel_segments segments = {.origin = {-4, 0, 0}, .to = to[0]};
         float out[4];
         assert_int_equal(nebel_compute_segment_transmittance(snapshot, NEBEL_ISA_DEFAULT, 0, 4, &segments, out, 0),
                          NEBEL_OK);

@@ -114,8 +114,9 @@ static const smoke smokes[] = {
      .alone = 1},
 };
 
-static void write_message(nebel_result result, const char *message, void *user)
+static void write_message(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
+    (void)level;
     (void)user;
     print_message("%d: %s\n", (int)result, message);
 }

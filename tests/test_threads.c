@@ -27,8 +27,7 @@ typedef struct question {
 static void ask(const nebel_lighting *lighting, const question *q, answers *a)
 {
     const nebel_snapshot *snapshot = nebel_get_lighting_snapshot(lighting);
-    const float from[3] = {0, 0, 0};
-    const nebel_segments segments = {.from = from, .to = &q->to[0][0], .to_stride = sizeof q->to[0]};
+    const nebel_segments segments = {.to = &q->to[0][0], .to_stride = sizeof q->to[0]};
     const nebel_trace_desc in_double = {.lighting = lighting};
     const nebel_trace_desc in_float = {.lighting = lighting, .precision = NEBEL_PRECISION_FLOAT};
     const nebel_result results[] = {

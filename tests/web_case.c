@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void print_message(nebel_result result, const char *message, void *user)
+static void print_message(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
-    (void)result;
+    (void)level, (void)result;
     (void)user;
     (void)fprintf(stderr, "web_case: %s\n", message);
 }

@@ -404,7 +404,7 @@ static nebel_result create_classic(nb_fixed_work *w)
 static nebel_result say(const nb_fixed_work *w, nebel_result result, const char *text)
 {
     const nebel_log *const log = &w->fixed->log;
-    if (log->write != NULL) log->write(result, text, log->user);
+    if (log->write != NULL) log->write(NEBEL_LOG_ERROR, result, text, log->user);
     return result;
 }
 

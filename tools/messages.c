@@ -106,21 +106,15 @@ static const char *skip_ray(const char *message)
     return digits > 0 && strncmp(rest, ": ", 2) == 0 ? rest + 2 : message;
 }
 
-/* What a library does all the same, but not as well as it should: no quiet hides that. */
-static int is_warning(const char *message)
-{
-    static const char word[] = "warning: ";
-    return strncmp(message, word, sizeof word - 1) == 0;
-}
-
-static void hand_on(nebel_result result, const char *message, void *user)
+static void hand_on(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     nb_report_listener *const listener = user;
-    if (result == NEBEL_OK && is_warning(message)) {
-        if (listener->mode != NB_REPORT_DROP) nb_report_message("%s", message);
+    (void)result;
+    if (level == NEBEL_LOG_WARNING) { /* which no quiet hides */
+        if (listener->mode != NB_REPORT_DROP) nb_report_message("warning: %s", message);
         return;
     }
-    if (result == NEBEL_OK) {
+    if (level == NEBEL_LOG_INFO) {
         if (!listener->quiet && listener->mode != NB_REPORT_DROP) nb_report_message("note: %s", message);
         return;
     }

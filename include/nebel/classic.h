@@ -31,9 +31,9 @@ extern "C" {
 /* f = (end - c) / (end - start), exp(-density c) or exp(-(density c)^2), clamped to [0, 1] last; colour = f surface +
  * (1 - f) fog. c is the distance or fog coordinate [m]. end == start gives a step: 1 below start, 0 from it on.
  * Source: OpenGL 2.1, section 3.10. Any thread. */
-double nebel_fog_factor_linear(double c, double start, double end);
-double nebel_fog_factor_exp(double c, double density);
-double nebel_fog_factor_exp2(double c, double density);
+NEBEL_API double nebel_fog_factor_linear(double c, double start, double end);
+NEBEL_API double nebel_fog_factor_exp(double c, double density);
+NEBEL_API double nebel_fog_factor_exp2(double c, double density);
 
 typedef enum nebel_factor_mode {
     NEBEL_FACTOR_EXP = 0, /* exp(-density c) */
@@ -67,19 +67,19 @@ typedef struct nebel_factor_desc {
 /* Checks a description and puts its defaults in; *resolved may be *desc. What is resolved stays as it is when resolved
  * again. Any thread. Errors: ARGUMENT (NULL, an unknown mode, coordinate or stage), VALUE (a number that is not finite,
  * a density below 0). */
-nebel_result nebel_resolve_factor(const nebel_factor_desc *desc, nebel_factor_desc *resolved);
+NEBEL_API nebel_result nebel_resolve_factor(const nebel_factor_desc *desc, nebel_factor_desc *resolved);
 
 /* c of a place in eye coordinates [m] for a resolved description; `user` is returned with COORDINATE_USER. Any thread.
  */
-double nebel_compute_fog_coordinate(const nebel_factor_desc *resolved, const double place[3], double user);
+NEBEL_API double nebel_compute_fog_coordinate(const nebel_factor_desc *resolved, const double place[3], double user);
 
 /* f for a resolved description, clamped to [0, 1] last; 1 where anything is a NaN. Source: OpenGL 2.1, section 3.10.
  * Any thread. */
-double nebel_compute_fog_factor(const nebel_factor_desc *resolved, double c);
+NEBEL_API double nebel_compute_fog_factor(const nebel_factor_desc *resolved, double c);
 
 /* out = f surface + (1 - f) fog in red, green and blue; alpha is that of the surface. out may be surface. Any thread.
  */
-void nebel_blend_fog_factor(double f, const float surface[4], const double fog[3], float out[4]);
+NEBEL_API void nebel_blend_fog_factor(double f, const float surface[4], const double fog[3], float out[4]);
 
 /* ---- Direct3D 9 ------------------------------------------------------------------------------ */
 
@@ -116,12 +116,12 @@ typedef struct nebel_d3d9_fog {
 } nebel_d3d9_fog;
 
 /* The documented defaults. Any thread. */
-void nebel_reset_d3d9_fog(nebel_d3d9_fog *fog);
+NEBEL_API void nebel_reset_d3d9_fog(nebel_d3d9_fog *fog);
 
 /* SetRenderState and GetRenderState for the states above; start, end and density are the bits of a float, as there.
  * Any thread. Errors: ARGUMENT (NULL, another state), VALUE (a mode that is none); nothing has changed then. */
-nebel_result nebel_set_d3d9_state(nebel_d3d9_fog *fog, uint32_t state, uint32_t value);
-nebel_result nebel_get_d3d9_state(const nebel_d3d9_fog *fog, uint32_t state, uint32_t *value);
+NEBEL_API nebel_result nebel_set_d3d9_state(nebel_d3d9_fog *fog, uint32_t state, uint32_t value);
+NEBEL_API nebel_result nebel_get_d3d9_state(const nebel_d3d9_fog *fog, uint32_t state, uint32_t *value);
 
 /* Where a vertex comes from. */
 typedef enum nebel_d3d9_source {
@@ -139,19 +139,19 @@ typedef struct nebel_d3d9_vertex {
 
 /* The factor of a vertex: what ProcessVertices writes to specular alpha, what is interpolated over a triangle. 1 where
  * fog is switched off. Any thread. */
-double nebel_compute_d3d9_vertex_factor(const nebel_d3d9_fog *fog, const nebel_d3d9_vertex *vertex);
+NEBEL_API double nebel_compute_d3d9_vertex_factor(const nebel_d3d9_fog *fog, const nebel_d3d9_vertex *vertex);
 
 /* The factor of a pixel: with table fog that of `depth`, otherwise `vertex_factor`, the interpolated one. `depth` is
  * the pixel's z in camera space where nebel_d3d9_uses_w says so (1 / rhw of transformed vertices), and its device
  * depth otherwise. Any thread. */
-double nebel_compute_d3d9_pixel_factor(const nebel_d3d9_fog *fog, double vertex_factor, double depth);
+NEBEL_API double nebel_compute_d3d9_pixel_factor(const nebel_d3d9_fog *fog, double vertex_factor, double depth);
 
 /* 1 where table fog goes by w, 0 where by z: by the element [3][4] of the projection that the device was given, row by
  * row as D3DMATRIX has it. It counts for transformed vertices, too. Any thread. */
-int nebel_d3d9_uses_w(const float projection[16]);
+NEBEL_API int nebel_d3d9_uses_w(const float projection[16]);
 
 /* FOGCOLOR as red, green and blue, 0 to 1, for nebel_blend_fog_factor. Any thread. */
-void nebel_get_d3d9_color(const nebel_d3d9_fog *fog, double rgb[3]);
+NEBEL_API void nebel_get_d3d9_color(const nebel_d3d9_fog *fog, double rgb[3]);
 
 /* ---- response curves ------------------------------------------------------------------------- */
 
@@ -175,14 +175,14 @@ typedef struct nebel_curve {
 
 /* Checks a curve and puts its default in; *resolved may be *curve. Any thread. Errors: ARGUMENT (NULL, an unknown type,
  * no table), VALUE (a k that is negative or not finite). */
-nebel_result nebel_resolve_curve(const nebel_curve *curve, nebel_curve *resolved);
+NEBEL_API nebel_result nebel_resolve_curve(const nebel_curve *curve, nebel_curve *resolved);
 
 /* The amount of a resolved curve as its formula gives it, not clamped; s [m], 0 where it is negative or a NaN. Any
  * thread. */
-double nebel_compute_curve_amount(const nebel_curve *resolved, double s);
+NEBEL_API double nebel_compute_curve_amount(const nebel_curve *resolved, double s);
 
 /* The same as a weight for blending, clamped to [0, 1]. Any thread. */
-double nebel_compute_curve_weight(const nebel_curve *resolved, double s);
+NEBEL_API double nebel_compute_curve_weight(const nebel_curve *resolved, double s);
 
 /* ---- fog per vertex -------------------------------------------------------------------------- */
 
@@ -190,7 +190,7 @@ double nebel_compute_curve_weight(const nebel_curve *resolved, double s);
  * numbers in the memory order of OpenGL and of Direct3D, which is the same: those of the translation are 12 to 14. One
  * inversion a frame and object stands for the transformation of each vertex. Any thread. Errors: ARGUMENT (NULL, not
  * finite, not affine, or without an inverse); then `eye` is as it was. */
-nebel_result nebel_compute_object_eye(const double eye_from_object[16], double eye[3]);
+NEBEL_API nebel_result nebel_compute_object_eye(const double eye_from_object[16], double eye[3]);
 
 typedef struct nebel_vertices {
     const void *positions;  /* three floats each, x y z [m] */
@@ -235,7 +235,7 @@ typedef struct nebel_vertex_desc {
 /* Checks a description and puts its defaults in. Any thread. Errors: ARGUMENT (NULL, a channel or curve that is none,
  * a curve without its table, another isa than those of nebel.h), VALUE (a color or coordinate_end that is negative or
  * not a finite float). */
-nebel_result nebel_resolve_vertex_desc(const nebel_vertex_desc *desc, nebel_vertex_desc *resolved);
+NEBEL_API nebel_result nebel_resolve_vertex_desc(const nebel_vertex_desc *desc, nebel_vertex_desc *resolved);
 
 /* What fog does between the eye and each of n vertices, written to `output_count` streams at once. In float; through
  * boxes of constant density f is what nebel_compute_segment_transmittance gives, to the bit, and the fastest. A byte is 255 times
@@ -247,9 +247,35 @@ nebel_result nebel_resolve_vertex_desc(const nebel_vertex_desc *desc, nebel_vert
  * an eye or origin that is not finite or more than 1e15 m away, curves as above), VALUE, UNSUPPORTED (isa not
  * available), MEMORY (scratch for very many volumes on one ray). Nothing has been written when the error is one of the
  * arguments. */
-nebel_result nebel_compute_vertex_fog(const nebel_snapshot *snapshot, const nebel_vertex_desc *desc, size_t n,
-                                      const nebel_vertices *vertices, const nebel_vertex_output *outputs,
-                                      size_t output_count);
+NEBEL_API nebel_result nebel_compute_vertex_fog(const nebel_snapshot *snapshot, const nebel_vertex_desc *desc, size_t n,
+                                                const nebel_vertices *vertices, const nebel_vertex_output *outputs,
+                                                size_t output_count);
+
+/* ---- transparent surfaces in fog ------------------------------------------------------------- */
+
+/* What a surface does to the light L behind it. `color` and `alpha` are the surface's own, without fog. */
+typedef enum nebel_blend_mode {
+    NEBEL_BLEND_OVER = 0,      /* alpha color + (1 - alpha) L */
+    NEBEL_BLEND_PREMULTIPLIED, /* color + (1 - alpha) L */
+    NEBEL_BLEND_ADDITIVE,      /* color + L */
+    NEBEL_BLEND_MULTIPLY,      /* color L */
+    NEBEL_BLEND_SCREEN,        /* color + (1 - color) L */
+    NEBEL_BLEND_COUNT
+} nebel_blend_mode;
+
+/* The pixel becomes source + factor * pixel. In OpenGL: the first and second colour of glBlendFunc(GL_ONE,
+ * GL_SRC1_COLOR). */
+typedef struct nebel_blend {
+    double source[3], factor[3];
+} nebel_blend;
+
+/* How to draw a transparent surface over a pixel that has its fog already: `fog` is the light of the way from the eye
+ * to the surface. Exact for every mode, RGB transmittance, any fog behind and any stack of surfaces drawn from the back
+ * to the front, as long as all of them and the pixel were fogged by the same fog. alpha is read by OVER and
+ * PREMULTIPLIED alone. An unknown mode leaves the pixel as it is. Linear light. Source of the formulas:
+ * src/formulas/blend.inc. Any thread. */
+NEBEL_API nebel_blend nebel_blend_surface(nebel_blend_mode mode, const double color[3], double alpha,
+                                          const nebel_transfer *fog);
 
 /* ---- tessellation ---------------------------------------------------------------------------- */
 
@@ -311,9 +337,9 @@ typedef struct nebel_tessellation {
  * or allocator that is none, a depth above 48), VALUE (a bound that is negative or not finite, an eye or origin that is
  * not finite or more than 1e15 m away, a vertex of a triangle that is not finite, or farther than 5e5 m from the eye
  * along an axis), UNSUPPORTED (fog without a proof), LIMIT (2^32 - 1 vertices or edges), MEMORY. */
-nebel_result nebel_tessellate(const nebel_snapshot *snapshot, const nebel_tessellation_desc *desc,
-                              const nebel_triangles *triangles, nebel_tessellation **tessellation);
-void nebel_destroy_tessellation(nebel_tessellation *tessellation); /* NULL is fine */
+NEBEL_API nebel_result nebel_tessellate(const nebel_snapshot *snapshot, const nebel_tessellation_desc *desc,
+                                        const nebel_triangles *triangles, nebel_tessellation **tessellation);
+NEBEL_API void nebel_destroy_tessellation(nebel_tessellation *tessellation); /* NULL is fine */
 
 /* ==== cells with portals ========================================================================== */
 
@@ -407,17 +433,17 @@ typedef struct nebel_cells nebel_cells;
  * body, that is empty (planes that face inwards), without end, or overlaps another; a density that is negative or not
  * finite; a portal of one and the same or of unknown cells, that is not convex or of no area, or does not lie
  * where its cells touch. */
-nebel_result nebel_create_cells(const nebel_cells_desc *desc, nebel_cells **cells);
-void nebel_destroy_cells(nebel_cells *cells); /* NULL is fine */
+NEBEL_API nebel_result nebel_create_cells(const nebel_cells_desc *desc, nebel_cells **cells);
+NEBEL_API void nebel_destroy_cells(nebel_cells *cells); /* NULL is fine */
 
 /* The portals, given or derived; arrays of the second live as long as the cells. Vertices of derived ones go
  * counterclockwise as seen from cells[1]. index < nebel_get_cell_portal_count. Any thread. */
-size_t nebel_get_cell_portal_count(const nebel_cells *cells);
-nebel_portal nebel_get_cell_portal(const nebel_cells *cells, size_t index);
+NEBEL_API size_t nebel_get_cell_portal_count(const nebel_cells *cells);
+NEBEL_API nebel_portal nebel_get_cell_portal(const nebel_cells *cells, size_t index);
 
 /* The same fog as a volume for nebel_add_volume: extinction D in all colours, source F. Its arrays are the cell's. Any
  * thread. */
-nebel_volume_desc nebel_volume_from_cell(const nebel_cell *cell);
+NEBEL_API nebel_volume_desc nebel_volume_from_cell(const nebel_cell *cell);
 
 /* ---- asking ---------------------------------------------------------------------------------- */
 
@@ -460,15 +486,15 @@ typedef struct nebel_cell_segment {
  * and Z is kept between 0 and the point's Zmax. A way that runs in a face belongs to one of the two cells, by the rule
  * of docs/scene-file.md. A point that is not finite has no fog. Any thread. Errors: ARGUMENT (NULL, an eye that is not
  * finite, a forward that has no direction, a stride shorter than its elements, points and fog that share bytes). */
-nebel_result nebel_compute_cell_fog(const nebel_cells *cells, const nebel_cell_view *view, size_t n,
-                                    const nebel_cell_point *points, size_t point_stride, nebel_cell_fog *fog,
-                                    size_t fog_stride);
+NEBEL_API nebel_result nebel_compute_cell_fog(const nebel_cells *cells, const nebel_cell_view *view, size_t n,
+                                              const nebel_cell_point *points, size_t point_stride, nebel_cell_fog *fog,
+                                              size_t fog_stride);
 
 /* The layers of fog before one point, from the eye on, as many as there is room for; in *count how many there are, at
  * most NEBEL_MAX_CELLS. Any thread. Errors as nebel_compute_cell_fog. */
-nebel_result nebel_compute_cell_segments(const nebel_cells *cells, const nebel_cell_view *view,
-                                         const nebel_cell_point *point, size_t room, nebel_cell_segment *layers,
-                                         size_t *count);
+NEBEL_API nebel_result nebel_compute_cell_segments(const nebel_cells *cells, const nebel_cell_view *view,
+                                                   const nebel_cell_point *point, size_t room,
+                                                   nebel_cell_segment *layers, size_t *count);
 
 #ifdef __cplusplus
 }

@@ -67,11 +67,11 @@ typedef struct nebel_gl_desc {
 /* Makes what the passes need, in the current context; programs are compiled when a pass first needs them. Destroy it
  * with nebel_destroy_gl. On an error *gl is NULL. Errors: ARGUMENT, MEMORY, UNSUPPORTED (no current context; older than
  * OpenGL 3.3 or OpenGL ES 3.0). */
-nebel_result nebel_create_gl(const nebel_gl_desc *desc, nebel_gl **gl);
+NEBEL_API nebel_result nebel_create_gl(const nebel_gl_desc *desc, nebel_gl **gl);
 
 /* Frees everything, in the context where it was made. Where that context is lost, or no longer current, the objects of
  * OpenGL are left alone: they went or go with it. NULL is fine. */
-void nebel_destroy_gl(nebel_gl *gl);
+NEBEL_API void nebel_destroy_gl(nebel_gl *gl);
 
 /* Hands over the fog as one eye sees it: packed relative to the eye of `view`, with lists of volumes per screen tile
  * where there are more than a few. It holds until the next call, and the lighting is retained until then, whose
@@ -81,7 +81,7 @@ void nebel_destroy_gl(nebel_gl *gl);
  * volumes, larger grids or more phase functions of an environment than the largest texture holds), UNSUPPORTED (the
  * context is another one, or lost). On an error there is no fog.
  */
-nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_lighting *lighting, const nebel_view *view);
+NEBEL_API nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_lighting *lighting, const nebel_view *view);
 
 typedef enum nebel_gl_output {
     NEBEL_GL_OUTPUT_COMPOSE = 0, /* transmittance * color + in-scattering; alpha of the colour texture */
@@ -117,7 +117,7 @@ typedef struct nebel_gl_pass {
  * buffers do not fit the output, or whose samples do not; a depth convention that nebel_compute_view_rays refuses), MEMORY,
  * UNSUPPORTED (multisampled textures in OpenGL ES 3.0, BLEND where the context cannot; a shader that the driver does
  * not take, with the driver's words; the context is another one, or lost). On an error nothing was drawn. */
-nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass);
+NEBEL_API nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass);
 
 /* The fog of nebel_gl_set_fog, for the host's own shaders. */
 typedef struct nebel_gl_fog_resources {
@@ -137,7 +137,7 @@ typedef struct nebel_gl_fog_resources {
 
 /* The names stay what they are until the next nebel_gl_set_fog. Calls no OpenGL. Errors: ARGUMENT (also where no fog
  * was set). */
-nebel_result nebel_gl_get_fog_resources(const nebel_gl *gl, nebel_gl_fog_resources *fog);
+NEBEL_API nebel_result nebel_gl_get_fog_resources(const nebel_gl *gl, nebel_gl_fog_resources *fog);
 
 /* ==== fog per vertex in OpenGL ==================================================================== */
 
@@ -229,29 +229,29 @@ typedef struct nebel_gl_classic_desc {
 /* Asks the current context what it can. Where FOG_COORD is wanted and neither OpenGL 1.4 nor GL_EXT_fog_coord is there
  * the method is TWO_PASS, and the log is told so. On an error *classic is NULL. Errors: ARGUMENT, VALUE (coordinate_end
  * is negative or not finite), MEMORY, UNSUPPORTED (no current context, or one that is too old). */
-nebel_result nebel_create_gl_classic(const nebel_gl_classic_desc *desc, nebel_gl_classic **classic);
+NEBEL_API nebel_result nebel_create_gl_classic(const nebel_gl_classic_desc *desc, nebel_gl_classic **classic);
 
 /* Not between begin and end. Calls no OpenGL. NULL is fine. */
-void nebel_destroy_gl_classic(nebel_gl_classic *classic);
+NEBEL_API void nebel_destroy_gl_classic(nebel_gl_classic *classic);
 
 /* The method that is used. */
-nebel_gl_classic_kind nebel_gl_get_classic_method(const nebel_gl_classic *classic);
+NEBEL_API nebel_gl_classic_kind nebel_gl_get_classic_method(const nebel_gl_classic *classic);
 
 /* Sets the state of the method. `color` is that of the fog for FOG_COORD; the others have it in their streams, and NULL
  * will do. Errors: ARGUMENT (FOG_COORD without a colour; after another begin), LIMIT (an attribute stack is full).
  * Nothing has changed then. */
-nebel_result nebel_gl_begin_classic_fog(nebel_gl_classic *classic, const float color[3]);
+NEBEL_API nebel_result nebel_gl_begin_classic_fog(nebel_gl_classic *classic, const float color[3]);
 
 /* The next draw calls take their fog from `stream`, as nebel_compute_vertex_fog wrote it: in memory, or in the buffer object
  * of that name, where `data` is the offset of the first vertex's (buffer 0: memory). It must lie there until they have
  * drawn. For the fixed pipeline alone. Errors: ARGUMENT (not after begin; a format that is not the method's; no data; a
  * stride that is shorter than the format or longer than INT32_MAX; a name that is no buffer; memory while a vertex
  * array object is bound), UNSUPPORTED (no fixed pipeline). */
-nebel_result nebel_gl_bind_classic_stream(nebel_gl_classic *classic, const nebel_vertex_output *stream,
-                                          unsigned buffer);
+NEBEL_API nebel_result nebel_gl_bind_classic_stream(nebel_gl_classic *classic, const nebel_vertex_output *stream,
+                                                    unsigned buffer);
 
 /* Puts the state back. Errors: ARGUMENT (not after begin). */
-nebel_result nebel_gl_end_classic_fog(nebel_gl_classic *classic);
+NEBEL_API nebel_result nebel_gl_end_classic_fog(nebel_gl_classic *classic);
 
 /* Functions for the engine's shaders, in every version of GLSL, for vertex and fragment stages; zero-terminated; lives
  * for ever; put it behind #version. It makes highp the default precision in OpenGL ES. Calls no OpenGL; any thread.
@@ -262,7 +262,7 @@ nebel_result nebel_gl_end_classic_fog(nebel_gl_classic *classic);
  *         ALPHA: the second pass's output of the interpolated amount.
  *
  * TWO_PASS and ADDITIVE put out the interpolated stream as it is. */
-const char *nebel_gl_classic_shader_source(void);
+NEBEL_API const char *nebel_gl_classic_shader_source(void);
 
 /* ==== scenes in OpenGL ============================================================================ */
 
@@ -317,14 +317,14 @@ typedef struct nebel_gl_renderer_desc {
  * On an error *renderer is NULL. O(vertices + triangles + texels). Errors: ARGUMENT and VALUE as nebel_create_cpu_renderer,
  * MEMORY, LIMIT (a texture larger than GL_MAX_TEXTURE_SIZE), UNSUPPORTED (no current context, or one that is too old or
  * cannot draw into textures of floats). */
-nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_lighting *lighting,
-                                      const nebel_gl_renderer_desc *desc, nebel_gl_renderer **renderer);
+NEBEL_API nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_lighting *lighting,
+                                                const nebel_gl_renderer_desc *desc, nebel_gl_renderer **renderer);
 
 /* NULL is fine. As nebel_destroy_gl where the context is lost. */
-void nebel_destroy_gl_renderer(nebel_gl_renderer *renderer);
+NEBEL_API void nebel_destroy_gl_renderer(nebel_gl_renderer *renderer);
 
 /* The fog of the frames from now on, and its light. The lighting is retained; NULL: no fog. Errors: ARGUMENT. */
-nebel_result nebel_set_gl_renderer_lighting(nebel_gl_renderer *renderer, nebel_lighting *lighting);
+NEBEL_API nebel_result nebel_set_gl_renderer_lighting(nebel_gl_renderer *renderer, nebel_lighting *lighting);
 
 /* The particles of the frames from now on, beside the fog and not among it: commit that with
  * nebel_commit_scene_volumes_at. They are copied; count 0: none. Each is drawn as a ball whose transmittance and light
@@ -332,8 +332,8 @@ nebel_result nebel_set_gl_renderer_lighting(nebel_gl_renderer *renderer, nebel_l
  * their light from each other as if one were behind the other, and fog counts before a particle's middle. They dim
  * the sun unless a frame leaves that out. O(count log count) for each frame, and what they cover. Errors: ARGUMENT,
  * VALUE (numbers that nebel_add_volume would refuse), MEMORY, UNSUPPORTED (OpenGL ES without GL_EXT_float_blend). */
-nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *renderer, const nebel_particle *particles,
-                                             size_t count);
+NEBEL_API nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *renderer, const nebel_particle *particles,
+                                                       size_t count);
 
 /* The exact picture, or a classic technique in place of a part of it. */
 typedef enum nebel_gl_method {
@@ -374,7 +374,7 @@ typedef struct nebel_depth_taps {
 } nebel_depth_taps;
 
 /* 0.0005, 100000, 0.5, 0.125, 1. Any thread. */
-nebel_depth_taps nebel_gl_default_taps(void);
+NEBEL_API nebel_depth_taps nebel_gl_default_taps(void);
 
 typedef struct nebel_gl_frame_desc {
     nebel_camera camera;
@@ -404,12 +404,12 @@ typedef struct nebel_gl_frame_desc {
 
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not, or without what it
  * needs), VALUE (a camera, light or time as for nebel_render_frame; taps that are not finite or negative; a factor as for
- * nebel_resolve_factor), LIMIT (a picture, or a map of layers, too large for this context; fog or triangles that floats do not hold in this view; more than 4,096 lamps; stopped by progress),
+ * nebel_resolve_factor), LIMIT (a picture, or a map of layers, too large for this context; fog or triangles that floats do not hold in this view; more than 4,096 lamps), CANCELLED (by progress),
  * MEMORY, UNSUPPORTED (more than one sample, or a textured planet, where OpenGL ES cannot blend floats; a planet with
  * clouds of volume where the processor may not walk through them, by another method than EXACT, or, if it has air, in an
  * orthographic view or with particles; a shader that the driver does not take; the context is another one, or lost). The first panorama copies the triangles of all
  * meshes: 108 bytes each, with fog per vertex 48 more. */
-nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc);
+NEBEL_API nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc);
 
 /* What the last frame is made of: RGBA32F, linear light, the lowest row first, without filters or mipmaps. */
 typedef struct nebel_gl_textures {
@@ -421,7 +421,7 @@ typedef struct nebel_gl_textures {
 } nebel_gl_textures;
 
 /* The names hold until the next frame. Calls no OpenGL. Errors: ARGUMENT (also where no frame was drawn). */
-nebel_result nebel_gl_get_textures(const nebel_gl_renderer *renderer, nebel_gl_textures *textures);
+NEBEL_API nebel_result nebel_gl_get_textures(const nebel_gl_renderer *renderer, nebel_gl_textures *textures);
 
 /* The planes of the last frame, as those of nebel_frame in nebel/render.h: caller memory, width * height pixels, top
  * row first, or NULL when not wanted. */
@@ -435,13 +435,13 @@ typedef struct nebel_gl_planes {
 
 /* Errors: ARGUMENT (also where no frame was drawn), MEMORY, UNSUPPORTED (the context is another one, or lost; the driver draws
  * nothing). */
-nebel_result nebel_gl_read_planes(nebel_gl_renderer *renderer, const nebel_gl_planes *planes);
+NEBEL_API nebel_result nebel_gl_read_planes(nebel_gl_renderer *renderer, const nebel_gl_planes *planes);
 
 /* The view of a camera without near and far planes, for nebel_gl_set_fog and nebel_compute_view_rays with
  * NEBEL_DEPTH_ENCODING_RADIAL: the projection is infinite and begins 1e-6 m before the eye. Errors: ARGUMENT, VALUE as
  * for nebel_render_frame, UNSUPPORTED (a panorama, which no matrix makes). Any thread. */
-nebel_result nebel_view_from_camera(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
-                                    nebel_view *view);
+NEBEL_API nebel_result nebel_view_from_camera(const nebel_camera *camera, uint32_t width, uint32_t height,
+                                              const nebel_log *log, nebel_view *view);
 
 #ifdef __cplusplus
 }

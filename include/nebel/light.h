@@ -60,13 +60,14 @@ typedef struct nebel_environment_map_desc {
 /* Makes an environment map in *map, with one owner; on an error *map is NULL. The allocator must be usable as long as the map, or
  * a snapshot that it lights, lives. Cost: some 0.1 s, 1 s for the largest. Any thread. Errors: ARGUMENT, VALUE (a pixel
  * out of range, another shape), LIMIT, MEMORY. */
-nebel_result nebel_create_environment_map(const nebel_environment_map_desc *desc, nebel_environment_map **map);
+NEBEL_API nebel_result nebel_create_environment_map(const nebel_environment_map_desc *desc,
+                                                    nebel_environment_map **map);
 
 /* One more owner of the map; any thread. Returns its argument. */
-nebel_environment_map *nebel_retain_environment_map(nebel_environment_map *map);
+NEBEL_API nebel_environment_map *nebel_retain_environment_map(nebel_environment_map *map);
 
 /* One owner less; the last one frees it. Any thread. NULL is fine. */
-void nebel_release_environment_map(nebel_environment_map *map);
+NEBEL_API void nebel_release_environment_map(nebel_environment_map *map);
 
 typedef enum nebel_environment_type {
     NEBEL_ENVIRONMENT_CONSTANT = 0, /* radiance */
@@ -92,12 +93,13 @@ typedef struct nebel_environment {
 
 /* Radiance that comes from a direction, of any length. Where it is none, 0 or not finite, a constant environment sends
  * what it always does and others 0. `environment` must be in order. Any thread. */
-void nebel_evaluate_environment(const nebel_environment *environment, const double direction[3], double radiance[3]);
+NEBEL_API void nebel_evaluate_environment(const nebel_environment *environment, const double direction[3],
+                                          double radiance[3]);
 
 /* Radiance of a white Lambertian surface of a normal, taken as the direction above, that nothing hides from the sky:
  * irradiance over pi. Of a gradient in closed form, of a map within 1e-3 of the brightest normal's. Any thread. */
-void nebel_evaluate_environment_diffuse(const nebel_environment *environment, const double normal[3],
-                                        double radiance[3]);
+NEBEL_API void nebel_evaluate_environment_diffuse(const nebel_environment *environment, const double normal[3],
+                                                  double radiance[3]);
 
 /* More phase functions than these cannot scatter an environment that is not constant. */
 #define NEBEL_MAX_ENVIRONMENT_PHASES 64
@@ -182,33 +184,34 @@ typedef struct nebel_lighting_desc {
  * Any thread. Errors: ARGUMENT, VALUE, MEMORY; LIMIT, where more than NEBEL_MAX_ENVIRONMENT_PHASES phase functions scatter an
  * environment that is not constant; UNSUPPORTED, where diffusion meets fog with max_opacity, start or cutoff, or lit fog that
  * goes on endlessly along x or z but changes on the way. */
-nebel_result nebel_create_lighting(nebel_snapshot *snapshot, const nebel_lighting_desc *desc, nebel_lighting **made);
+NEBEL_API nebel_result nebel_create_lighting(nebel_snapshot *snapshot, const nebel_lighting_desc *desc,
+                                             nebel_lighting **made);
 
 /* One more owner of the lighting; any thread. Returns its argument. */
-nebel_lighting *nebel_retain_lighting(nebel_lighting *lighting);
+NEBEL_API nebel_lighting *nebel_retain_lighting(nebel_lighting *lighting);
 
 /* One owner less; the last one frees it. Any thread. NULL is fine. */
-void nebel_release_lighting(nebel_lighting *lighting);
+NEBEL_API void nebel_release_lighting(nebel_lighting *lighting);
 
 /* The snapshot that it is of, which lives as long as the lighting. Any thread. NULL of NULL. */
-nebel_snapshot *nebel_get_lighting_snapshot(const nebel_lighting *lighting);
+NEBEL_API nebel_snapshot *nebel_get_lighting_snapshot(const nebel_lighting *lighting);
 
 /* The sun as it was given, its direction of length 1; all zero where there is none. Any thread. */
-nebel_sun nebel_get_lighting_sun(const nebel_lighting *lighting);
+NEBEL_API nebel_sun nebel_get_lighting_sun(const nebel_lighting *lighting);
 
 /* The environment as it was given; its map lives as long as the lighting. Any thread. */
-nebel_environment nebel_get_lighting_environment(const nebel_lighting *lighting);
+NEBEL_API nebel_environment nebel_get_lighting_environment(const nebel_lighting *lighting);
 
 /* How many point and spot lights there are, and themselves in *lights (NULL: not wanted), as they were given, for as long as
  * the lighting lives. Any thread. */
-size_t nebel_get_lighting_lights(const nebel_lighting *lighting, const nebel_light **lights);
+NEBEL_API size_t nebel_get_lighting_lights(const nebel_lighting *lighting, const nebel_light **lights);
 
 /* How light is scattered more than once, for as long as the lighting lives; NULL where it is not. Any thread. */
-const nebel_diffusion_desc *nebel_get_lighting_diffusion(const nebel_lighting *lighting);
+NEBEL_API const nebel_diffusion_desc *nebel_get_lighting_diffusion(const nebel_lighting *lighting);
 
 /* Writes bounds outside of which no fog is lit by the lights of a group, whatever it emits by itself, and returns 1; or returns
  * 0 where they light none, with *bounds as it was. Cost O(n). Any thread. */
-int nebel_get_lit_bounds(const nebel_lighting *lighting, nebel_light_group group, nebel_bounds *bounds);
+NEBEL_API int nebel_get_lit_bounds(const nebel_lighting *lighting, nebel_light_group group, nebel_bounds *bounds);
 
 #ifdef __cplusplus
 }

@@ -45,6 +45,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* Marks what shared libraries give away; all else in them is hidden. */
+#if defined(_WIN32) && defined(NEBEL_BUILDING_SHARED)
+#define NEBEL_API __declspec(dllexport)
+#elif defined(__GNUC__) && !defined(_WIN32)
+#define NEBEL_API __attribute__((visibility("default")))
+#else
+#define NEBEL_API
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -54,7 +63,7 @@ extern "C" {
 #define NEBEL_VERSION_PATCH 0
 
 /* The version as text, "0.1.0". Never NULL; lives for ever; any thread. */
-const char *nebel_version(void);
+NEBEL_API const char *nebel_version(void);
 
 /* ---- results --------------------------------------------------------------------------------- */
 
@@ -68,7 +77,8 @@ const char *nebel_version(void);
     X(ERROR_LIMIT, -5, "a limit is exceeded")                                                                          \
     X(ERROR_FILE, -6, "a file could not be read or written")                                                           \
     X(ERROR_FORMAT, -7, "a file is not what it should be")                                                             \
-    X(ERROR_UNSUPPORTED, -8, "this build or this version cannot do that")
+    X(ERROR_UNSUPPORTED, -8, "this build or this version cannot do that")                                              \
+    X(ERROR_CANCELLED, -9, "stopped by the caller")
 
 typedef enum nebel_result {
 #define NEBEL_RESULT_ENUM(name, value, text) NEBEL_##name = value,
@@ -77,7 +87,7 @@ typedef enum nebel_result {
 } nebel_result;
 
 /* The text of a result, in English. Never NULL, also for numbers that are no result; any thread. */
-const char *nebel_result_text(nebel_result result);
+NEBEL_API const char *nebel_result_text(nebel_result result);
 
 /* ---- memory, messages, processors ------------------------------------------------------------ */
 
@@ -90,8 +100,14 @@ typedef struct nebel_allocator {
     void *user;
 } nebel_allocator;
 
+typedef enum nebel_log_level {
+    NEBEL_LOG_ERROR = 0, /* the call fails with `result` */
+    NEBEL_LOG_WARNING,   /* it goes on, but not as well as it should; `result` is NEBEL_OK */
+    NEBEL_LOG_INFO       /* the same, in a way that is worth knowing */
+} nebel_log_level;
+
 /* Messages to the caller: what, where and how to mend it, one line without a newline, valid during the call only. */
-typedef void (*nebel_log_fn)(nebel_result result, const char *message, void *user);
+typedef void (*nebel_log_fn)(nebel_log_level level, nebel_result result, const char *message, void *user);
 
 typedef struct nebel_log {
     nebel_log_fn write; /* NULL: silent */
@@ -110,11 +126,11 @@ typedef enum nebel_isa {
 } nebel_isa;
 
 /* 1 when this build and this processor can run `isa`, else 0. Any thread. */
-int nebel_isa_available(nebel_isa isa);
+NEBEL_API int nebel_isa_available(nebel_isa isa);
 
 /* The name as the command line takes it: "scalar", "sse2", "avx2", "avx512", "neon"; "default" for DEFAULT, "unknown" for
  * unknown numbers. Any thread. */
-const char *nebel_isa_name(nebel_isa isa);
+NEBEL_API const char *nebel_isa_name(nebel_isa isa);
 
 /* ---- describing fog -------------------------------------------------------------------------- */
 
@@ -213,7 +229,7 @@ typedef struct nebel_grid_desc {
 /* Makes a grid in *grid, with one owner; on an error *grid is NULL. The allocator must be usable as long as the grid
  * lives. Memory: the voxels and 16 bytes for each block of 8 x 8 x 8. Cost: linear in the voxels. Any thread.
  * Errors: ARGUMENT, VALUE (NaN, infinite or negative density), LIMIT, MEMORY. */
-nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid);
+NEBEL_API nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid);
 
 /* Noise: a grid that is made, for wisps and clouds. Simplex noise with `cells` across the box, whose waves are two cells
  * long, in `octaves` each of half the size and `gain` times the weight of the one before; octaves whose cells would be smaller than two voxels
@@ -239,16 +255,16 @@ typedef struct nebel_noise_desc {
 
 /* Makes a grid of noise in *grid, with one owner; on an error *grid is NULL. Cost: voxels times octaves. Any thread.
  * Errors: ARGUMENT, VALUE, LIMIT, MEMORY. */
-nebel_result nebel_create_noise_grid(const nebel_noise_desc *desc, nebel_grid **grid);
+NEBEL_API nebel_result nebel_create_noise_grid(const nebel_noise_desc *desc, nebel_grid **grid);
 
 /* The grid's name, "" where it has none; lives as long as the grid. Any thread. */
-const char *nebel_get_grid_name(const nebel_grid *grid);
+NEBEL_API const char *nebel_get_grid_name(const nebel_grid *grid);
 
 /* One more owner of the grid; any thread. Returns its argument. */
-nebel_grid *nebel_retain_grid(nebel_grid *grid);
+NEBEL_API nebel_grid *nebel_retain_grid(nebel_grid *grid);
 
 /* One owner less; the last one frees it. Any thread. NULL is fine. */
-void nebel_release_grid(nebel_grid *grid);
+NEBEL_API void nebel_release_grid(nebel_grid *grid);
 
 /* What fraction of the stated extinction a place has. Height, linear, gaussian and altitude are in world coordinates;
  * radial, soft edge and grid follow the shape and its transform. */
@@ -361,39 +377,39 @@ typedef struct nebel_volume_desc {
  * NaN when the phase function or the cosine is out of range. Any thread. Sources: Henyey and Greenstein 1941; Cornette
  * and Shanks 1992; Draine 2003; droplets: Jendersie and d'Eon 2023, a fit of Mie's theory for 5 to 50 micrometres with
  * others below. */
-double nebel_evaluate_phase(const nebel_phase *phase, double cosine);
+NEBEL_API double nebel_evaluate_phase(const nebel_phase *phase, double cosine);
 
 /* The mean cosine over all scattered light, -1 to 1. NaN when the phase function is out of range. Any thread. */
-double nebel_phase_mean_cosine(const nebel_phase *phase);
+NEBEL_API double nebel_phase_mean_cosine(const nebel_phase *phase);
 
 /* Sampling: the cosine below which `part`, 0 to 1, of the light is scattered; random parts give random cosines as the
  * phase function has them. NaN when something is out of range. Any thread. */
-double nebel_sample_phase(const nebel_phase *phase, double part);
+NEBEL_API double nebel_sample_phase(const nebel_phase *phase, double part);
 
 /* ---- fog as it is measured ------------------------------------------------------------------- */
 
 /* Extinction [1/m] of fog through which contrast falls to `contrast` over `visibility` metres: -ln(contrast) /
  * visibility. contrast 0 means 0.05, the meteorological optical range of the WMO; 0.02 gives Koschmieder's. NaN when
  * visibility is not > 0 or contrast not within (0, 1). Any thread. */
-double nebel_extinction_from_visibility(double visibility, double contrast);
+NEBEL_API double nebel_extinction_from_visibility(double visibility, double contrast);
 
 /* The other way round: how far one sees [m] in fog of an extinction [1/m]. NaN when the extinction is not > 0 or the
  * contrast not within (0, 1). Any thread. */
-double nebel_visibility_from_extinction(double extinction, double contrast);
+NEBEL_API double nebel_visibility_from_extinction(double extinction, double contrast);
 
 /* Extinction [1/m] of fog that holds so much liquid water [g/m^3], where nothing is known of its droplets, and the other
  * way round: 0.1447 water^0.88. Measured fogs differ from that by a factor of two. NaN when the number is not >= 0. Any
  * thread. Source: Kunkel 1984. */
-double nebel_extinction_from_water(double water);
-double nebel_water_from_extinction(double extinction);
+NEBEL_API double nebel_extinction_from_water(double water);
+NEBEL_API double nebel_water_from_extinction(double extinction);
 
 /* The same where the effective radius of the droplets [micrometres] is known: twice their area, 3 water / (2 rho
  * radius). Mie's theory has 3 to 10 % more for droplets of 20 to 3 micrometres. NaN when the water is not >= 0 or the radius not > 0. Any thread. */
-double nebel_extinction_from_droplets(double water, double radius);
+NEBEL_API double nebel_extinction_from_droplets(double water, double radius);
 
 /* The radius [micrometres] of `number` droplets to the cm^3 that hold so much water [g/m^3], all of one size. NaN when
  * either is not > 0. Any thread. */
-double nebel_droplet_radius(double water, double number);
+NEBEL_API double nebel_droplet_radius(double water, double number);
 
 /* How many droplets of which size: scale r^power exp(-rate r^exponent) to the cm^3 and micrometre of radius r, a
  * modified gamma distribution (Deirmendjian 1969). */
@@ -410,7 +426,8 @@ typedef struct nebel_droplet_properties {
 
 /* What all droplets together are, in closed form. Any thread. Errors: ARGUMENT (NULL), VALUE (a number out of range, or
  * sums that are not finite); *sums stays as it is then. */
-nebel_result nebel_compute_droplet_properties(const nebel_droplet_distribution *sizes, nebel_droplet_properties *sums);
+NEBEL_API nebel_result nebel_compute_droplet_properties(const nebel_droplet_distribution *sizes,
+                                                        nebel_droplet_properties *sums);
 
 /* Fog with a name: what a volume takes of it, and its droplets where they are known (else all 0). */
 typedef struct nebel_fog_preset {
@@ -424,8 +441,8 @@ typedef struct nebel_fog_preset {
 
 /* heavy_advection, moderate_advection, heavy_radiation, moderate_radiation, mist, haze, smoke, black_smoke: all of them
  * in this order, and one by its name; NULL where there is none. They live as long as the program. Any thread. */
-const nebel_fog_preset *nebel_list_fog_presets(size_t *count);
-const nebel_fog_preset *nebel_lookup_fog_preset(const char *name);
+NEBEL_API const nebel_fog_preset *nebel_list_fog_presets(size_t *count);
+NEBEL_API const nebel_fog_preset *nebel_lookup_fog_preset(const char *name);
 
 /* ---- fog that can be edited ------------------------------------------------------------------ */
 
@@ -442,45 +459,45 @@ typedef struct nebel_fog_desc {
 
 /* Makes an empty fog in *fog; destroy it with nebel_destroy_fog. On an error *fog is NULL.
  * Errors: ARGUMENT, VALUE, MEMORY. */
-nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog);
+NEBEL_API nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog);
 
 /* Frees a fog; its snapshots live on. NULL is fine. */
-void nebel_destroy_fog(nebel_fog *fog);
+NEBEL_API void nebel_destroy_fog(nebel_fog *fog);
 
 /* Adds a volume; its id in *id (NULL: not wanted). The description is copied. Cost: amortised O(1), plus the checks of
  * a convex body (linear in its planes on average). On an error nothing has changed. Errors: ARGUMENT, VALUE, LIMIT,
  * MEMORY. */
-nebel_result nebel_add_volume(nebel_fog *fog, const nebel_volume_desc *desc, nebel_volume_id *id);
+NEBEL_API nebel_result nebel_add_volume(nebel_fog *fog, const nebel_volume_desc *desc, nebel_volume_id *id);
 
 /* Replaces the description of a volume, which keeps its id. Cost and errors as nebel_add_volume; an unknown id is
  * ARGUMENT. */
-nebel_result nebel_update_volume(nebel_fog *fog, nebel_volume_id id, const nebel_volume_desc *desc);
+NEBEL_API nebel_result nebel_update_volume(nebel_fog *fog, nebel_volume_id id, const nebel_volume_desc *desc);
 
 /* Removes a volume. Cost O(1). An id that is unknown or was removed is ARGUMENT. */
-nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id);
+NEBEL_API nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id);
 
 /* Sets the most that all fog together hides, 0 to 1; 0: no limit, as 1. Where transmittance T of a channel is less than
  * 1 - max_opacity it becomes that, and in-scattering is weakened by as much as opacity is: S max_opacity / (1 - T).
  * Every query answers so. No physics: a ray's fog is no longer that of its parts. Cost O(1). Errors: ARGUMENT, VALUE. */
-nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity);
+NEBEL_API nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity);
 
 /* Makes an immutable snapshot of the fog as it is. Cost O(n log n) in the number of volumes. The same volumes give the
  * same bits in every query, in whatever order they were added. Free it with nebel_release_snapshot. Errors: ARGUMENT,
  * MEMORY. */
-nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot);
+NEBEL_API nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot);
 
 /* One more owner of the snapshot; any thread. Returns its argument. */
-nebel_snapshot *nebel_retain_snapshot(nebel_snapshot *snapshot);
+NEBEL_API nebel_snapshot *nebel_retain_snapshot(nebel_snapshot *snapshot);
 
 /* One owner less; the last one frees it, through the fog's allocator (which must still be usable). Any thread. NULL is
  * fine. */
-void nebel_release_snapshot(nebel_snapshot *snapshot);
+NEBEL_API void nebel_release_snapshot(nebel_snapshot *snapshot);
 
 /* How many volumes the snapshot holds. */
-size_t nebel_get_volume_count(const nebel_snapshot *snapshot);
+NEBEL_API size_t nebel_get_volume_count(const nebel_snapshot *snapshot);
 
 /* The most that all fog together hides, > 0 to 1; 1: no limit, also of NULL. Any thread. */
-double nebel_get_max_opacity(const nebel_snapshot *snapshot);
+NEBEL_API double nebel_get_max_opacity(const nebel_snapshot *snapshot);
 
 /* A box with its sides along the axes. */
 typedef struct nebel_bounds {
@@ -493,7 +510,7 @@ typedef struct nebel_bounds {
 
 /* Writes bounds outside of which no fog scatters light, and returns 1; or returns 0 where none does, with *bounds as it
  * was. `flags`: 0, or NEBEL_BOUNDS_WITHOUT_LEVEL_FOG. Cost O(n). Any thread. */
-int nebel_get_scattering_bounds(const nebel_snapshot *snapshot, uint32_t flags, nebel_bounds *bounds);
+NEBEL_API int nebel_get_scattering_bounds(const nebel_snapshot *snapshot, uint32_t flags, nebel_bounds *bounds);
 
 /* ---- queries --------------------------------------------------------------------------------- */
 
@@ -555,7 +572,7 @@ typedef struct nebel_trace_desc {
 
 #define NEBEL_DEFAULT_TOLERANCE 0.002
 
-/* What the fog does along each of n rays. `ray_stride` and `transfer_stride` are in bytes, multiples
+/* What the fog does along each of n rays. `ray_stride` and `transfer_stride` are in bytes, 0: packed; multiples
  * of the alignment of what they part. desc NULL: the same as all
  * zero. rays and transfers must not overlap. A ray with t_max 0 gives transmittance 1, in-scattering 0. Float results are the same bits for every isa and
  * for every way of splitting the rays into calls. Any thread. Errors: ARGUMENT (NULL, an unknown precision, an odd stride, a tolerance or a ray that is NaN,
@@ -570,15 +587,17 @@ typedef struct nebel_trace_desc {
  * density varies each piece of the ray between two ends is integrated, mostly in one to ten steps of O(k). Lights ask for
  * as much again at each place where they are looked at; where nine volumes or more add, of no voxels, altitudes or parts, for O(N)
  * at once and the j of N in whose shadow it is at each place, of which there are not more for more volumes. */
-nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
-                         size_t ray_stride, nebel_transfer *transfers, size_t transfer_stride);
+NEBEL_API nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
+                                   const nebel_ray *rays, size_t ray_stride, nebel_transfer *transfers,
+                                   size_t transfer_stride);
 
 /* Visibility: how far one sees along each ray until the transmittance of `channel` (0 red, 1 green, 2 blue) falls to
  * `transmittance` (0 < transmittance < 1): distances[i] in metres, INFINITY where it does not within t_max. In double
  * precision, to 1e-12 relative where the fog is not vanishing. `start` and `cutoff` of volumes count. Errors as
  * nebel_trace. Any thread. */
-nebel_result nebel_invert_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
-                                        const nebel_ray *rays, size_t ray_stride, double *distances);
+NEBEL_API nebel_result nebel_invert_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel,
+                                                  size_t n, const nebel_ray *rays, size_t ray_stride,
+                                                  double *distances);
 
 /* ---- fog at single places -------------------------------------------------------------------- */
 
@@ -599,11 +618,11 @@ typedef struct nebel_medium_properties {
                              sun and the ambient light are not in it: they are the renderer's to bring there */
 } nebel_medium_properties;
 
-/* What fog is at each of n places: shapes, profiles and priorities counted. Strides in bytes. places and matter must
+/* What fog is at each of n places: shapes, profiles and priorities counted. Strides in bytes, 0: packed. places and matter must
  * not overlap. max_opacity does not count, which is no property of places. Cost for each place O(k + log N), k of N
  * volumes near it. Any thread. Errors: ARGUMENT (NULL, a position that is a NaN or farther than NEBEL_MAX_LENGTH). */
-nebel_result nebel_sample_medium(const nebel_snapshot *snapshot, size_t n, const nebel_sample_point *places,
-                                 size_t place_stride, nebel_medium_properties *matter, size_t matter_stride);
+NEBEL_API nebel_result nebel_sample_medium(const nebel_snapshot *snapshot, size_t n, const nebel_sample_point *places,
+                                           size_t place_stride, nebel_medium_properties *matter, size_t matter_stride);
 
 /* One of the volumes that scatter at a place. */
 typedef struct nebel_scatterer {
@@ -616,8 +635,8 @@ typedef struct nebel_scatterer {
  * 2 blue; -1: of all together), so that the mean over all chances of phase value * scattering / probability is what all
  * volumes scatter of that channel, or of each. Any thread. Errors: ARGUMENT, as nebel_sample_medium; a chance or a channel
  * out of range. */
-nebel_result nebel_sample_scatterer(const nebel_snapshot *snapshot, const nebel_sample_point *place, int channel,
-                                    double chance, nebel_scatterer *scatterer);
+NEBEL_API nebel_result nebel_sample_scatterer(const nebel_snapshot *snapshot, const nebel_sample_point *place,
+                                              int channel, double chance, nebel_scatterer *scatterer);
 
 /* A piece of a ray on which fog is bounded. */
 typedef struct nebel_majorant_segment {
@@ -634,12 +653,12 @@ typedef struct nebel_majorant_segment {
  * there. Ends of volumes are found to some 1e-12 of the distances; over so short a piece a bound may count a volume
  * that is not there, never leave one out. Cost O(k + log N), k of N volumes on the rest of the ray. Any thread. Errors:
  * ARGUMENT, as nebel_trace; `from` that is a NaN or below 0. */
-nebel_result nebel_next_majorant(const nebel_snapshot *snapshot, const nebel_ray *ray, int ignore_distances,
-                                 double from, nebel_majorant_segment *bound);
+NEBEL_API nebel_result nebel_next_majorant(const nebel_snapshot *snapshot, const nebel_ray *ray, int ignore_distances,
+                                           double from, nebel_majorant_segment *bound);
 
 /* 1 where every volume takes all channels alike, so that one path of light stands for all three; else 0. What volumes
  * scatter and emit may have colour. Any thread. */
-int nebel_is_extinction_gray(const nebel_snapshot *snapshot);
+NEBEL_API int nebel_is_extinction_gray(const nebel_snapshot *snapshot);
 
 /* ---- planes of rays in, planes of light out: the hot path of a renderer ---------------------- */
 
@@ -689,16 +708,16 @@ typedef struct nebel_transfer_planes {
  * `isa`, `tolerance`, `failed_ray`, `ignore_distances`, `sun_visibility` and `light_visibility` are read. rays and transfers must not overlap. Same
  * bits for every isa and for every way of splitting the rays into calls; a few hundred rays are enough for a call to be
  * worth it. Any thread. Errors as nebel_trace. */
-nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
-                                const nebel_ray_planes *rays, const nebel_transfer_planes *transfers);
+NEBEL_API nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
+                                          const nebel_ray_planes *rays, const nebel_transfer_planes *transfers);
 
 /* ---- segments in, transmittances out: the hot path of an engine ------------------------------ */
 
 /* n segments in caller memory, from[i] to to[i], three floats each, relative to `origin` (so that floats suffice far
- * from the world's origin). Strides in bytes, multiples of 4; from_stride 0: all segments start at the same place. */
+ * from the world's origin). Strides in bytes, multiples of 4; 0: packed. */
 typedef struct nebel_segments {
     double origin[3];
-    const float *from;
+    const float *from; /* NULL: all start at `origin` */
     size_t from_stride;
     const float *to;
     size_t to_stride;     /* 0: 12 */
@@ -709,8 +728,9 @@ typedef struct nebel_segments {
 /* The transmittance of one colour channel over each segment, in float throughout: out[i] within 0..1, out_stride in
  * bytes (0: 4). Boxes of constant density take the shortest way; everything else goes through nebel_trace in float. A
  * segment that holds a NaN gives 1. Same bits for every isa. Any thread. Errors as nebel_trace. */
-nebel_result nebel_compute_segment_transmittance(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
-                                                 const nebel_segments *segments, float *out, size_t out_stride);
+NEBEL_API nebel_result nebel_compute_segment_transmittance(const nebel_snapshot *snapshot, nebel_isa isa, int channel,
+                                                           size_t n, const nebel_segments *segments, float *out,
+                                                           size_t out_stride);
 
 /* ---- pixels in, pixels out: fog over a finished picture -------------------------------------- */
 
@@ -735,7 +755,7 @@ typedef enum nebel_pixel_type {
 } nebel_pixel_type;
 
 /* Bytes of a pixel; 0: no such type. Any thread. */
-size_t nebel_pixel_size(nebel_pixel_type type);
+NEBEL_API size_t nebel_pixel_size(nebel_pixel_type type);
 
 /* A picture in caller memory, its depth, and the rays it was seen along. Rows `pitch` bytes apart, 0: without gaps. */
 typedef struct nebel_pixels {
@@ -768,32 +788,8 @@ typedef struct nebel_pixels {
  * all colours alike and have one source, take the shortest way; everything else goes
  * through nebel_trace_planes with the default tolerance. A pixel whose depth is a NaN or negative stays as it is.
  * Same bits for every isa and for every way of splitting the rows. Any thread. Errors as nebel_trace. */
-nebel_result nebel_apply_fog_to_pixels(const nebel_snapshot *snapshot, nebel_isa isa, const nebel_pixels *pixels);
-
-/* ---- transparent surfaces in fog ------------------------------------------------------------- */
-
-/* What a surface does to the light L behind it. `color` and `alpha` are the surface's own, without fog. */
-typedef enum nebel_blend_mode {
-    NEBEL_BLEND_OVER = 0,      /* alpha color + (1 - alpha) L */
-    NEBEL_BLEND_PREMULTIPLIED, /* color + (1 - alpha) L */
-    NEBEL_BLEND_ADDITIVE,      /* color + L */
-    NEBEL_BLEND_MULTIPLY,      /* color L */
-    NEBEL_BLEND_SCREEN,        /* color + (1 - color) L */
-    NEBEL_BLEND_COUNT
-} nebel_blend_mode;
-
-/* The pixel becomes source + factor * pixel. In OpenGL: the first and second colour of glBlendFunc(GL_ONE,
- * GL_SRC1_COLOR). */
-typedef struct nebel_blend {
-    double source[3], factor[3];
-} nebel_blend;
-
-/* How to draw a transparent surface over a pixel that has its fog already: `fog` is the light of the way from the eye
- * to the surface. Exact for every mode, RGB transmittance, any fog behind and any stack of surfaces drawn from the back
- * to the front, as long as all of them and the pixel were fogged by the same fog. alpha is read by OVER and
- * PREMULTIPLIED alone. An unknown mode leaves the pixel as it is. Linear light. Source of the formulas:
- * src/formulas/blend.inc. Any thread. */
-nebel_blend nebel_blend_surface(nebel_blend_mode mode, const double color[3], double alpha, const nebel_transfer *fog);
+NEBEL_API nebel_result nebel_apply_fog_to_pixels(const nebel_snapshot *snapshot, nebel_isa isa,
+                                                 const nebel_pixels *pixels);
 
 #ifdef __cplusplus
 }

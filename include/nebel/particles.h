@@ -37,7 +37,7 @@ typedef struct nebel_particle {
 } nebel_particle;
 
 /* The particle as fog. Any thread. */
-nebel_volume_desc nebel_volume_from_particle(const nebel_particle *particle);
+NEBEL_API nebel_volume_desc nebel_volume_from_particle(const nebel_particle *particle);
 
 typedef struct nebel_nebula_desc {
     nebel_allocator allocator;
@@ -68,7 +68,7 @@ typedef struct nebel_nebula_desc {
 /* Strews desc->count particles. O(count / share of the shape's bounding box that is taken). Any thread.
  * Errors: ARGUMENT; MEMORY; VALUE (as for nebel_add_volume, a shape without bounds, or one in which no place is found;
  * a point that is not finite). */
-nebel_result nebel_generate_nebula(const nebel_nebula_desc *desc, nebel_particle *particles);
+NEBEL_API nebel_result nebel_generate_nebula(const nebel_nebula_desc *desc, nebel_particle *particles);
 
 #ifdef __cplusplus
 }

@@ -40,18 +40,19 @@ typedef struct nebel_photograph {
 /* Reads a PNG of 8 or 16 bits, a JPEG or an OpenEXR picture; the first bytes of the file say which. The channels R, G, B and
  * A of OpenEXR are read, or Y alone. Free the photograph with nebel_free_photograph and the same allocator. After an error the
  * photograph is empty. Errors: ARGUMENT, FILE, FORMAT, LIMIT, UNSUPPORTED (among them fewer than 8 bits, CMYK), MEMORY. */
-nebel_result nebel_read_photograph(const char *path, const nebel_scene_desc *desc, nebel_photograph *photograph);
-void nebel_free_photograph(const nebel_scene_desc *desc, nebel_photograph *photograph);
+NEBEL_API nebel_result nebel_read_photograph(const char *path, const nebel_scene_desc *desc,
+                                             nebel_photograph *photograph);
+NEBEL_API void nebel_free_photograph(const nebel_scene_desc *desc, nebel_photograph *photograph);
 
 /* Writes whole numbers to a .png in sRGB with the bits of the photograph, floats to an .exr. The file is replaced as by
  * nebel_write_image. `record` is that of nebel_image_desc: what the picture was made from, for nebel_read_record; NULL: none.
  * Errors: ARGUMENT, FILE, FORMAT (another ending, or one that does not fit the numbers), LIMIT, MEMORY. */
-nebel_result nebel_write_photograph(const char *path, const nebel_scene_desc *desc, const nebel_photograph *photograph,
-                                    const char *record);
+NEBEL_API nebel_result nebel_write_photograph(const char *path, const nebel_scene_desc *desc,
+                                              const nebel_photograph *photograph, const char *record);
 
 /* Writes one number per pixel, 0 to 1, to a gray, linear PNG of 16 bits. Values outside are clamped. Errors: as above. */
-nebel_result nebel_write_gray(const char *path, const nebel_scene_desc *desc, uint32_t width, uint32_t height,
-                              const float *values, const char *record);
+NEBEL_API nebel_result nebel_write_gray(const char *path, const nebel_scene_desc *desc, uint32_t width, uint32_t height,
+                                        const float *values, const char *record);
 
 /* Estimates the color of endless fog from the dark channel of a photograph: 0 to 1 as the photograph stores it, or light if it
  * stores floats. The dark channel of a pixel is the smallest number within 15 x 15 pixels around it. The candidates are the
@@ -60,8 +61,8 @@ nebel_result nebel_write_gray(const char *path, const nebel_scene_desc *desc, ui
  * Sources: He, Sun and Tang, "Single image haze removal using dark channel prior" (2009), with the brightest candidate;
  * Sakaridis, Dai and Van Gool, "Semantic foggy scene understanding with synthetic data" (2018), with the median.
  * Errors: ARGUMENT, MEMORY. Any thread. O(pixels). */
-nebel_result nebel_estimate_airlight(const nebel_scene_desc *desc, const nebel_photograph *photograph,
-                                     double airlight[3]);
+NEBEL_API nebel_result nebel_estimate_airlight(const nebel_scene_desc *desc, const nebel_photograph *photograph,
+                                               double airlight[3]);
 
 /* ---- cameras --------------------------------------------------------------------------------- */
 
@@ -81,16 +82,18 @@ typedef struct nebel_intrinsics {
  *     numbers                  fx fy cx cy, then the baseline if it is known; or a matrix of 3 x 3 or 4 x 4
  *
  * Errors: ARGUMENT, FILE, FORMAT, VALUE (focal lengths that are not 1e-6 to 1e9, numbers that are not finite), LIMIT, MEMORY. */
-nebel_result nebel_read_intrinsics(const char *path, const nebel_scene_desc *desc, nebel_intrinsics *intrinsics);
+NEBEL_API nebel_result nebel_read_intrinsics(const char *path, const nebel_scene_desc *desc,
+                                             nebel_intrinsics *intrinsics);
 
 /* Computes the intrinsics of a camera that sees `degrees`, 0 < degrees < 180, from the left edge of the picture to the right
  * one. Pixels are square, and the axis meets the middle of the picture. */
-nebel_intrinsics nebel_intrinsics_of_view(double degrees, uint32_t width, uint32_t height);
+NEBEL_API nebel_intrinsics nebel_intrinsics_of_view(double degrees, uint32_t width, uint32_t height);
 
 /* Sets eye, corner, step_x and step_y of `pixels`. Of `camera` position, look_at and up are read; NULL: a camera at the origin
  * that looks along -z, y up. Errors: ARGUMENT (NULL, focal lengths that are not positive, numbers that are not finite, a camera
  * without a direction). */
-nebel_result nebel_aim_pixels(nebel_pixels *pixels, const nebel_intrinsics *intrinsics, const nebel_camera *camera);
+NEBEL_API nebel_result nebel_aim_pixels(nebel_pixels *pixels, const nebel_intrinsics *intrinsics,
+                                        const nebel_camera *camera);
 
 /* ---- depth ----------------------------------------------------------------------------------- */
 
@@ -121,10 +124,10 @@ enum {
 };
 
 /* The formats from 0 on; NULL behind the last. "metric" is the first: any file, meters times the caller's scale. */
-const nebel_depth_format *nebel_depth_format_at(size_t i);
+NEBEL_API const nebel_depth_format *nebel_depth_format_at(size_t i);
 
 /* NULL: there is none of that name. */
-const nebel_depth_format *nebel_find_depth_format(const char *name);
+NEBEL_API const nebel_depth_format *nebel_find_depth_format(const char *name);
 
 typedef struct nebel_depth_source {
     const char *format;             /* NULL: "metric" */
@@ -146,14 +149,14 @@ typedef struct nebel_depth_map {
  * Unknown are the numbers that the format calls invalid; floats that are NaN or negative; and the float 0, unless the measure is
  * INVERSE. Floats from 1e9 m on are infinite. Free the map with nebel_free_depth and the same allocator. After an error the map
  * is empty. Errors: ARGUMENT, FILE, FORMAT, VALUE (all pixels are unknown; a baseline is missing), LIMIT, UNSUPPORTED, MEMORY. */
-nebel_result nebel_read_depth(const char *path, const nebel_depth_source *source, const nebel_scene_desc *desc,
-                              nebel_depth_map *map);
-void nebel_free_depth(const nebel_scene_desc *desc, nebel_depth_map *map);
+NEBEL_API nebel_result nebel_read_depth(const char *path, const nebel_depth_source *source,
+                                        const nebel_scene_desc *desc, nebel_depth_map *map);
+NEBEL_API void nebel_free_depth(const nebel_scene_desc *desc, nebel_depth_map *map);
 
 /* Replaces unknown depth by the larger of the nearest known depths to the left and to the right, or by the only one. Rows without
  * any known depth are filled from the rows above and below in the same way. Source: the development kit of KITTI stereo fills
  * disparity so, because most missing depth belongs to background that something nearer hides. */
-void nebel_fill_depth(nebel_depth_map *map);
+NEBEL_API void nebel_fill_depth(nebel_depth_map *map);
 
 #ifdef __cplusplus
 }

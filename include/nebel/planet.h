@@ -76,11 +76,11 @@ typedef struct nebel_atmosphere_desc {
 /* Known airs: "earth" (constants of the demonstration of Hillaire, A Scalable and Production Ready Sky and Atmosphere
  * Rendering Technique, 2020), "mars", "toy", a ball of 1 km in the Earth's colours, and "moon", which has no air: one kind of it that
  * does nothing to light. NULL where there is none of that name. Any thread. */
-const nebel_atmosphere_desc *nebel_lookup_atmosphere(const char *name);
+NEBEL_API const nebel_atmosphere_desc *nebel_lookup_atmosphere(const char *name);
 
 /* Writes the description with every default in its place. desc may be resolved. Errors: ARGUMENT, VALUE (a number out of range;
  * the description's log says which); *resolved is then untouched. Any thread. */
-nebel_result nebel_resolve_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere_desc *resolved);
+NEBEL_API nebel_result nebel_resolve_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere_desc *resolved);
 
 /* ---- atmospheres ----------------------------------------------------------------------------- */
 
@@ -89,19 +89,19 @@ typedef struct nebel_atmosphere nebel_atmosphere;
 /* Makes an atmosphere that does not change any more, with its table: the same bits however `run` splits the work. Free
  * it with nebel_destroy_atmosphere. Errors: ARGUMENT (NULL), VALUE (a number out of range; the log says which), MEMORY;
  * *atmosphere is then NULL. Any thread. */
-nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere **atmosphere);
+NEBEL_API nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere **atmosphere);
 
 /* NULL is fine. */
-void nebel_destroy_atmosphere(nebel_atmosphere *atmosphere);
+NEBEL_API void nebel_destroy_atmosphere(nebel_atmosphere *atmosphere);
 
 /* What the air does along each of n rays, up to t_max, the ground or the end of the air, whichever comes first. A place
  * below the ground counts as that on it straight above, the centre as that at y, here and below. The light of the ground
  * itself is not in it. Strides are in bytes. sun NULL: no light. `error` is what the quality promises: see
  * docs/planet.md. Any thread. Errors: ARGUMENT (NULL, a sun or a ray that is NaN, infinite where it must not be, of no
  * direction, of negative t_max); then no transfers are written. */
-nebel_result nebel_trace_atmosphere(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
-                                    const nebel_ray *rays, size_t ray_stride, nebel_transfer *transfers,
-                                    size_t transfer_stride);
+NEBEL_API nebel_result nebel_trace_atmosphere(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
+                                              const nebel_ray *rays, size_t ray_stride, nebel_transfer *transfers,
+                                              size_t transfer_stride);
 
 /* Light that arrives at a place. */
 typedef struct nebel_irradiance {
@@ -109,12 +109,12 @@ typedef struct nebel_irradiance {
     double sky[3]; /* irradiance on level ground below the place, of all that the air scatters; above the air, too */
 } nebel_irradiance;
 
-/* The light at each of n places; strides in bytes. Nothing tells an error: the sun's part is as exact as the optical depth, the
+/* The light at each of n places; strides in bytes, 0: packed. Nothing tells an error: the sun's part is as exact as the optical depth, the
  * sky's as the table of the quality, both in docs/planet.md, "How far off", whose rays down have this light behind them.
  * Any thread. Errors: ARGUMENT; then no lights are written. */
-nebel_result nebel_compute_atmosphere_irradiance(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
-                                                 const double (*places)[3], size_t place_stride,
-                                                 nebel_irradiance *irradiances, size_t irradiance_stride);
+NEBEL_API nebel_result nebel_compute_atmosphere_irradiance(const nebel_atmosphere *atmosphere, const nebel_sun *sun,
+                                                           size_t n, const double (*places)[3], size_t place_stride,
+                                                           nebel_irradiance *irradiances, size_t irradiance_stride);
 
 /* ---- many rays from one place ---------------------------------------------------------------- */
 
@@ -136,17 +136,17 @@ typedef struct nebel_sky_view_desc {
 
 /* Makes the table. Errors: ARGUMENT (NULL, a sun or a place that is not in order), MEMORY; *view is then NULL. The same
  * bits however `run` splits the work. */
-nebel_result nebel_create_sky_view(const nebel_sky_view_desc *desc, nebel_sky_view **view);
+NEBEL_API nebel_result nebel_create_sky_view(const nebel_sky_view_desc *desc, nebel_sky_view **view);
 
 /* NULL is fine. */
-void nebel_destroy_sky_view(nebel_sky_view *view);
+NEBEL_API void nebel_destroy_sky_view(nebel_sky_view *view);
 
 /* What nebel_trace_atmosphere says of n rays from the view's place, from the table. Planes have no gaps: strides of `lights` are
  * not read, its planes of three are given all or none. t_max NULL: to the ground or the end of the air; one that is NaN or negative counts as 0. A direction may be of any
  * length from 1e-150 to 1e150; those of none meet no air. `error` adds what the table misses, estimated from its own differences, to what
  * nebel_trace_atmosphere tells. Any thread. Errors: ARGUMENT (NULL, a component of the direction too). */
-nebel_result nebel_trace_sky_view(const nebel_sky_view *view, size_t n, const double *const direction[3],
-                                  const float *t_max, const nebel_transfer_planes *transfers);
+NEBEL_API nebel_result nebel_trace_sky_view(const nebel_sky_view *view, size_t n, const double *const direction[3],
+                                            const float *t_max, const nebel_transfer_planes *transfers);
 
 /* Where rays meet the ground, and the light there. Planes without gaps; each may be NULL. */
 typedef struct nebel_ground_planes {
@@ -157,8 +157,8 @@ typedef struct nebel_ground_planes {
 } nebel_ground_planes;
 
 /* The ground along n rays from the view's place, as of nebel_trace_sky_view. Any thread. Errors: ARGUMENT (NULL). */
-nebel_result nebel_trace_ground(const nebel_sky_view *view, size_t n, const double *const direction[3],
-                                const nebel_ground_planes *planes);
+NEBEL_API nebel_result nebel_trace_ground(const nebel_sky_view *view, size_t n, const double *const direction[3],
+                                          const nebel_ground_planes *planes);
 
 /* ==== the textured planet ========================================================================= */
 
@@ -206,10 +206,10 @@ typedef struct nebel_planet_map_desc {
 } nebel_planet_map_desc;
 
 /* The size that such a map has, in map->width, height and channels; map->texels stays. Errors: ARGUMENT, VALUE. */
-nebel_result nebel_get_planet_map_size(const nebel_planet_map_desc *desc, nebel_planet_map *map);
+NEBEL_API nebel_result nebel_get_planet_map_size(const nebel_planet_map_desc *desc, nebel_planet_map *map);
 
 /* Writes width * height * channels floats. The same everywhere for the same description. Errors as nebel_get_planet_map_size's. */
-nebel_result nebel_generate_planet_map(const nebel_planet_map_desc *desc, float *texels);
+NEBEL_API nebel_result nebel_generate_planet_map(const nebel_planet_map_desc *desc, float *texels);
 
 /* ---- planets --------------------------------------------------------------------------------- */
 
@@ -260,10 +260,11 @@ typedef struct nebel_textured_planet nebel_textured_planet;
 
 /* Makes a planet that does not change any more; maps are copied. Free it with nebel_destroy_textured_planet. Errors: ARGUMENT
  * (NULL), VALUE (a number out of range; the log says which), MEMORY; *layers is then NULL. Any thread. */
-nebel_result nebel_create_textured_planet(const nebel_textured_planet_desc *desc, nebel_textured_planet **layers);
+NEBEL_API nebel_result nebel_create_textured_planet(const nebel_textured_planet_desc *desc,
+                                                    nebel_textured_planet **layers);
 
 /* NULL is fine. */
-void nebel_destroy_textured_planet(nebel_textured_planet *layers);
+NEBEL_API void nebel_destroy_textured_planet(nebel_textured_planet *layers);
 
 /* ---- what a ray meets ------------------------------------------------------------------------ */
 
@@ -291,21 +292,22 @@ typedef struct nebel_shell_hits {
 
 /* What each of n rays meets up to its t_max. Strides are in bytes. Any thread. Errors: ARGUMENT (NULL, a view or a ray
  * that is NaN, infinite where it must not be, from more than 1e15 m away, of no direction, of negative t_max). */
-nebel_result nebel_trace_textured_planet(const nebel_textured_planet *layers, const nebel_textured_planet_query *view,
-                                         size_t n, const nebel_ray *rays, size_t ray_stride, nebel_shell_hits *hits,
-                                         size_t hit_stride);
+NEBEL_API nebel_result nebel_trace_textured_planet(const nebel_textured_planet *layers,
+                                                   const nebel_textured_planet_query *view, size_t n,
+                                                   const nebel_ray *rays, size_t ray_stride, nebel_shell_hits *hits,
+                                                   size_t hit_stride);
 
 /* ---- for those who draw it themselves ---------------------------------------------------------- */
 
 /* What a planet is made of: where the description had zeros stands what they stood for, and the maps are the planet's own,
  * generated ones, too, which live as long as it does. A shell whose detail is {0} takes that from its map. NULL: NULL. */
-const nebel_textured_planet_desc *nebel_get_textured_planet_desc(const nebel_textured_planet *layers);
+NEBEL_API const nebel_textured_planet_desc *nebel_get_textured_planet_desc(const nebel_textured_planet *layers);
 
 /* Maps are read between texels and between levels, so that what is small in a picture is averaged. Level 0 is the map; each
  * next one is half as wide and high, rounded down to 1 at the least, and its texels are means of those that they cover.
  * `map` is one of that description. Any thread. Errors: ARGUMENT (NULL, another map, no such level). */
-nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *layers, const nebel_planet_map *map, uint32_t level,
-                                      nebel_planet_map *coarser);
+NEBEL_API nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *layers, const nebel_planet_map *map,
+                                                uint32_t level, nebel_planet_map *coarser);
 
 /* ==== clouds with volume ========================================================================== */
 
@@ -374,27 +376,28 @@ typedef struct nebel_clouds nebel_clouds;
 
 /* Writes a layer with every number in its place, for air of that thickness, in m. desc may be resolved. Errors: ARGUMENT,
  * VALUE (a number out of range; the log says which); *resolved is then untouched. Any thread. */
-nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer *desc, const nebel_log *log,
-                                       nebel_cloud_layer *resolved);
+NEBEL_API nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer *desc, const nebel_log *log,
+                                                 nebel_cloud_layer *resolved);
 
 /* Makes clouds that do not change any more. Free them with nebel_destroy_clouds. Errors: ARGUMENT (NULL), VALUE (a number
  * out of range, layers around a planet without air; the log says which), LIMIT (layers), MEMORY; *clouds is then NULL. Any
  * thread. */
-nebel_result nebel_create_clouds(const nebel_clouds_desc *desc, nebel_clouds **clouds);
+NEBEL_API nebel_result nebel_create_clouds(const nebel_clouds_desc *desc, nebel_clouds **clouds);
 
 /* NULL is fine. */
-void nebel_destroy_clouds(nebel_clouds *clouds);
+NEBEL_API void nebel_destroy_clouds(nebel_clouds *clouds);
 
-/* Extinction of all layers at n places, 1/m, as a mean over about `width` metres (0: as it is). Strides in bytes. time:
+/* Extinction of all layers at n places, 1/m, as a mean over about `width` metres (0: as it is). Stride in bytes, 0: packed. time:
  * in the units of the wind, within -1e12 and 1e12. Any thread. Errors: ARGUMENT. */
-nebel_result nebel_compute_cloud_extinction(const nebel_clouds *clouds, double time, double width, size_t n,
-                                            const double (*places)[3], size_t place_stride, float *extinction);
+NEBEL_API nebel_result nebel_compute_cloud_extinction(const nebel_clouds *clouds, double time, double width, size_t n,
+                                                      const double (*places)[3], size_t place_stride,
+                                                      float *extinction);
 
 /* The phase function of a layer's droplets, 1/sr for red, green and blue (light of 680, 550 and 440 nm), at n cosines within -1 and 1 of the
  * angle by which light is turned. Cumulus and stratus: Mie's theory for water, sizes of a gamma distribution with an effective
  * variance of 0.1, by a table; cirrus: NEBEL_PHASE_DROPLETS. docs/clouds.md says how far off. Any thread. Errors: ARGUMENT. */
-nebel_result nebel_cloud_phase(const nebel_clouds *clouds, uint32_t layer, size_t n, const double *cosines,
-                               double (*phases)[3]);
+NEBEL_API nebel_result nebel_cloud_phase(const nebel_clouds *clouds, uint32_t layer, size_t n, const double *cosines,
+                                         double (*phases)[3]);
 
 /* ---- light ----------------------------------------------------------------------------------- */
 
@@ -413,20 +416,21 @@ typedef struct nebel_cloud_lighting_desc {
 
 /* Errors: ARGUMENT, VALUE (time, tolerance), UNSUPPORTED (isa not available), MEMORY; *view is then NULL. Any
  * thread. */
-nebel_result nebel_create_cloud_lighting(const nebel_cloud_lighting_desc *desc, nebel_cloud_lighting **view);
+NEBEL_API nebel_result nebel_create_cloud_lighting(const nebel_cloud_lighting_desc *desc, nebel_cloud_lighting **view);
 
 /* NULL is fine. */
-void nebel_destroy_cloud_lighting(nebel_cloud_lighting *view);
+NEBEL_API void nebel_destroy_cloud_lighting(nebel_cloud_lighting *view);
 
 /* What was found so far of shadows in a view, which must outlive it: some 20 MB and 6 for each layer. Results do not hang on it.
  * One thread at a time. */
 typedef struct nebel_cloud_workspace nebel_cloud_workspace;
 
 /* With the view's allocator. Errors: ARGUMENT, MEMORY; *workspace is then NULL. */
-nebel_result nebel_create_cloud_workspace(const nebel_cloud_lighting *view, nebel_cloud_workspace **workspace);
+NEBEL_API nebel_result nebel_create_cloud_workspace(const nebel_cloud_lighting *view,
+                                                    nebel_cloud_workspace **workspace);
 
 /* NULL is fine. */
-void nebel_destroy_cloud_workspace(nebel_cloud_workspace *workspace);
+NEBEL_API void nebel_destroy_cloud_workspace(nebel_cloud_workspace *workspace);
 
 /* What clouds do along a ray up to some places of it. Between two of them transmittance is in between. Together with the air, which leaves
  * A up to each place and has the light L (nebel_trace_atmosphere to each t): from place to place the light of both grows by the mean of A at
@@ -442,25 +446,27 @@ typedef struct nebel_cloud_transfer {
     uint32_t density_queries;
 } nebel_cloud_transfer;
 
-/* Along n rays up to t_max or the ground. spreads: width of a ray's pixel per metre of the way, 0 to 10: what is narrower is seen as
- * a mean. Strides in bytes; of spreads 0 is one for all rays. Sixteen rays and more at once take half as long as one by one, and
+/* Along n rays up to t_max or the ground. pixel_spread: width of a ray's pixel per metre of the way, 0 to 10: what is narrower is
+ * seen as a mean; pixel_spreads: one for each ray instead, NULL: the same for all. Strides in bytes, 0: packed. Sixteen rays and more at once take half as long as one by one, and
  * have the same bits. One thread per workspace. Errors: ARGUMENT (NULL, a ray or spread not in order); then nothing is written. */
-nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
-                                const double *spreads, size_t spread_stride, nebel_cloud_transfer *nodes,
-                                size_t node_stride);
+NEBEL_API nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays,
+                                          size_t ray_stride, double pixel_spread, const double *pixel_spreads,
+                                          nebel_cloud_transfer *nodes, size_t node_stride);
 
 /* What part of the sun's light comes through clouds to n places, straight or scattered on the way; width as of
  * nebel_compute_cloud_extinction. Nothing tells an error: of even layers it is within 0.01, but 0.025 where the sun is less than four
  * degrees high (docs/clouds.md, "Light of clouds", has the tables); of cumulus the mean over the ground is within 0.02, and that of
  * one place is not known. Errors: ARGUMENT. */
-nebel_result nebel_compute_cloud_sun_transmittance(nebel_cloud_workspace *workspace, double width, size_t n,
-                                                   const double (*places)[3], size_t place_stride, float *parts);
+NEBEL_API nebel_result nebel_compute_cloud_sun_transmittance(nebel_cloud_workspace *workspace, double width, size_t n,
+                                                             const double (*places)[3], size_t place_stride,
+                                                             float *parts);
 
 /* What part of the sky's light comes through clouds to n places, straight or scattered: that of straight above, as a mean
  * over as wide a place as is far above, or width where that is more. Nothing tells an error: docs/clouds.md, "Clouds in
  * pictures", has how far it is from columns under closed clouds, 4 %; that gaps are seen aslant, too, is left out. Errors: ARGUMENT. */
-nebel_result nebel_compute_cloud_sky_transmittance(nebel_cloud_workspace *workspace, double width, size_t n,
-                                                   const double (*places)[3], size_t place_stride, float *parts);
+NEBEL_API nebel_result nebel_compute_cloud_sky_transmittance(nebel_cloud_workspace *workspace, double width, size_t n,
+                                                             const double (*places)[3], size_t place_stride,
+                                                             float *parts);
 
 /* What part of its light the air has along a ray, under clouds and between them. */
 typedef struct nebel_air_shadow {
@@ -471,11 +477,12 @@ typedef struct nebel_air_shadow {
 } nebel_air_shadow;
 
 /* Along n rays up to t_max or the ground, as means over pieces: of sunlight what comes through clouds on the way to the sun, of
- * the sky's light what comes through straight from above, by their shares in clear air. Strides in bytes. Nothing tells an error:
+ * the sky's light what comes through straight from above, by their shares in clear air. Strides in bytes, 0: packed. Nothing tells an error:
  * docs/clouds.md, "Air under clouds", has what closed clouds let through beside what air has before a wall, 0.339 and 0.345,
  * and what is left out. Errors: ARGUMENT. */
-nebel_result nebel_trace_cloud_shadow_on_air(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays,
-                                             size_t ray_stride, nebel_air_shadow *shades, size_t shade_stride);
+NEBEL_API nebel_result nebel_trace_cloud_shadow_on_air(nebel_cloud_workspace *workspace, size_t n,
+                                                       const nebel_ray *rays, size_t ray_stride,
+                                                       nebel_air_shadow *shades, size_t shade_stride);
 
 /* What part of the sun's and of the sky's light fog has along a ray. */
 typedef struct nebel_fog_shadow {
@@ -487,8 +494,8 @@ typedef struct nebel_fog_shadow {
 
 /* Along a ray from `begin` on, where fog begins, up to t_max or the ground, as means over pieces, which are longer the farther they
  * are from there and from the end. What comes through is that of nebel_trace_cloud_shadow_on_air. spread as of nebel_trace_clouds. Errors: ARGUMENT. */
-nebel_result nebel_trace_cloud_shadow_on_fog(nebel_cloud_workspace *workspace, const nebel_ray *ray, double begin,
-                                             double spread, nebel_fog_shadow *shade);
+NEBEL_API nebel_result nebel_trace_cloud_shadow_on_fog(nebel_cloud_workspace *workspace, const nebel_ray *ray,
+                                                       double begin, double spread, nebel_fog_shadow *shade);
 
 #ifdef __cplusplus
 }

@@ -31,13 +31,13 @@ typedef struct nebel_cpu_renderer_desc {
 
 /* Builds the acceleration structure over the meshes of `scene`, which must outlive the renderer, as must nothing else:
  * the lighting, whose snapshot has the fog, is retained. lighting NULL: no fog. Errors: ARGUMENT, VALUE, MEMORY, UNSUPPORTED. */
-nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_lighting *lighting,
-                                       const nebel_cpu_renderer_desc *desc, nebel_renderer **renderer);
-void nebel_destroy_renderer(nebel_renderer *renderer);
+NEBEL_API nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_lighting *lighting,
+                                                 const nebel_cpu_renderer_desc *desc, nebel_renderer **renderer);
+NEBEL_API void nebel_destroy_renderer(nebel_renderer *renderer);
 
 /* The fog of the frames from now on, and its light, for what moves. The lighting is retained; NULL: no fog. Not while a frame
  * is rendered. Errors: ARGUMENT. */
-nebel_result nebel_set_renderer_lighting(nebel_renderer *renderer, nebel_lighting *lighting);
+NEBEL_API nebel_result nebel_set_renderer_lighting(nebel_renderer *renderer, nebel_lighting *lighting);
 
 /* Where the fog of cells is computed. */
 typedef enum nebel_cell_stage {
@@ -50,7 +50,8 @@ typedef enum nebel_cell_stage {
  * Classic: where no surface is there is no fog, and sunlight comes through undimmed. Of a frame, `error` is then 0. Of
  * an orthographic camera all rays begin in its plane; of a panorama each ray is its own axis of depth. The cells must
  * outlive the frames; NULL: the snapshot's fog again. Not while a frame is rendered. Errors: ARGUMENT, MEMORY. */
-nebel_result nebel_set_renderer_cells(nebel_renderer *renderer, const nebel_cells *cells, nebel_cell_stage stage);
+NEBEL_API nebel_result nebel_set_renderer_cells(nebel_renderer *renderer, const nebel_cells *cells,
+                                                nebel_cell_stage stage);
 
 /* How fog gets onto a picture: the one list, of the CPU and of OpenGL. All but EXACT fog surfaces alone; where no
  * surface is there is no fog. */
@@ -75,12 +76,12 @@ typedef enum nebel_method {
 } nebel_method;
 
 /* The word of `nebel render --method`; NULL: there is no such method. Any thread. */
-const char *nebel_method_name(nebel_method method);
+NEBEL_API const char *nebel_method_name(nebel_method method);
 
 /* 1: the method imitates hardware of its time, LINEAR to D3D9 but FIVE_TAP and TWO_PASS's kin VERTEX and ADDITIVE. What such
  * hardware stores in its frame buffer is blended: colors in sRGB, at most 1. `color` of a frame is linear light again; what
  * the hardware shows is nebel_encode_srgb of it, without a tone curve. `in_scattering` is what is added to stored colors. Any thread. */
-int nebel_method_blends_stored(nebel_method method);
+NEBEL_API int nebel_method_blends_stored(nebel_method method);
 
 /* What methods need; what a method does not need is not read. */
 typedef struct nebel_method_desc {
@@ -101,7 +102,8 @@ typedef struct nebel_method_desc {
  * factors and D3D9 nothing dims it. Of all but EXACT the frame's `error` is 0. Of an orthographic camera all rays begin
  * in its plane; of a panorama each ray is its own axis of depth. Not while a frame is rendered. Errors: ARGUMENT
  * (another method, or without what it needs), VALUE, MEMORY; the method is then as it was. */
-nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method method, const nebel_method_desc *desc);
+NEBEL_API nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method method,
+                                                 const nebel_method_desc *desc);
 
 /* Called from one thread at a time with 0 <= done <= total; return nonzero to stop the frame. */
 typedef int (*nebel_progress_fn)(size_t done, size_t total, void *user);
@@ -150,23 +152,24 @@ typedef struct nebel_frame {
 } nebel_frame;
 
 /* Renders. Uses OpenMP with the renderer's number of threads. One frame at a time per renderer.
- * Errors: ARGUMENT, VALUE, MEMORY, UNBOUNDED, LIMIT (stopped by progress). */
-nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc *desc, const nebel_frame *frame);
+ * Errors: ARGUMENT, VALUE, MEMORY, UNBOUNDED, CANCELLED (by progress). */
+NEBEL_API nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc *desc,
+                                          const nebel_frame *frame);
 
 /* Exposure (stops; 0 leaves the light as it is), a filmic tone curve for each channel and the sRGB transfer function; n
  * pixels of 3 floats, out may be in. Black stays 0, middle grey 0.18 stays 0.18, 1 comes out as 0.70 before the
  * transfer function, the limit is 1. Within 2e-6 of the exact curve; NaN and negative light give 0. Any thread. */
-void nebel_tone_map(size_t n, const float *linear, double exposure, float *srgb);
+NEBEL_API void nebel_tone_map(size_t n, const float *linear, double exposure, float *srgb);
 
 /* The same without the tone curve: what frame buffers of classic hardware show. Light above 1 is 1. */
-void nebel_encode_srgb(size_t n, const float *linear, double exposure, float *srgb);
+NEBEL_API void nebel_encode_srgb(size_t n, const float *linear, double exposure, float *srgb);
 
 /* Runs parts on threads of OpenMP: for the `run` of descriptions of scenes and of air. `user` is a const int *, how many
  * threads there are, 1 to 1024; NULL: as many as processors. Any thread. */
-void nebel_parallel_for_openmp(size_t parts, void (*part)(void *data, size_t i), void *data, void *user);
+NEBEL_API void nebel_parallel_for_openmp(size_t parts, void (*part)(void *data, size_t i), void *data, void *user);
 
 /* The Embree version this build uses, "Embree 3.13.5". Never NULL. */
-const char *nebel_cpu_libraries(void);
+NEBEL_API const char *nebel_cpu_libraries(void);
 
 #ifdef __cplusplus
 }

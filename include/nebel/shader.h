@@ -171,7 +171,7 @@ typedef enum nebel_shader_dialect {
 } nebel_shader_dialect;
 
 /* The text for a dialect, zero-terminated; lives for ever. NULL for an unknown number. Any thread. */
-const char *nebel_get_shader_source(nebel_shader_dialect dialect);
+NEBEL_API const char *nebel_get_shader_source(nebel_shader_dialect dialect);
 
 #define NEBEL_BLOCK_TEXELS 1024  /* what the uniform block holds: 16 KiB, which every OpenGL ES 3.0 has */
 #define NEBEL_TEXTURE_WIDTH 1024 /* words in a row of the texture */
@@ -187,8 +187,8 @@ typedef struct nebel_texel_f32 {
  * least that. Same lighting and eye, same words. O(volumes and their parts). Any thread. Errors: ARGUMENT; LIMIT when
  * capacity is too small (not for words NULL and capacity 0, which only asks) or when more than 2^24 words would be
  * needed. */
-nebel_result nebel_pack_fog(const nebel_lighting *lighting, const double eye[3], nebel_texel_f32 *words,
-                            size_t capacity, size_t *count);
+NEBEL_API nebel_result nebel_pack_fog(const nebel_lighting *lighting, const double eye[3], nebel_texel_f32 *words,
+                                      size_t capacity, size_t *count);
 
 /* Four integers of a grid's voxels: a uvec4. */
 typedef struct nebel_texel_u32 {
@@ -202,19 +202,20 @@ typedef struct nebel_texel_u32 {
  * when nebel_is_same_voxels denies. O(voxels). Any thread. Errors: ARGUMENT; MEMORY; LIMIT when capacity is too small (not for
  * texels NULL and capacity 0, which only asks) or when more than 2^24 texels (256 MiB) would be needed, for which
  * nebel_pack_fog answers LIMIT, too. */
-nebel_result nebel_pack_voxels(const nebel_lighting *lighting, nebel_texel_u32 *texels, size_t capacity, size_t *count);
+NEBEL_API nebel_result nebel_pack_voxels(const nebel_lighting *lighting, nebel_texel_u32 *texels, size_t capacity,
+                                         size_t *count);
 
 /* Whether nebel_pack_voxels makes the same of both: not where the sun moves, nor in sunlight where the largest extinction of a grid's
  * volume passes a power of two. O(volumes) where they share their grids. Any thread. */
-int nebel_is_same_voxels(const nebel_lighting *a, const nebel_lighting *b);
+NEBEL_API int nebel_is_same_voxels(const nebel_lighting *a, const nebel_lighting *b);
 
 /* Packs the lattice of light that is scattered more than once. *count receives the number of words needed, 0 where
  * the lighting has no diffusion or lights no fog; they are written when `capacity` is at least that: three a node, seven
  * where fog has colour. They do not depend on the eye. O(nodes). Any thread. Errors: ARGUMENT; LIMIT when capacity is
  * too small (not for words NULL and capacity 0, which only asks) or when more than 2^24 words (256 MiB) would be needed,
  * for which nebel_pack_fog answers LIMIT, too. */
-nebel_result nebel_pack_diffusion(const nebel_lighting *lighting, nebel_texel_f32 *words, size_t capacity,
-                                  size_t *count);
+NEBEL_API nebel_result nebel_pack_diffusion(const nebel_lighting *lighting, nebel_texel_f32 *words, size_t capacity,
+                                            size_t *count);
 
 /* Packs what a lighting's environment (nebel/light.h) is to the fog that it lights, and where `surfaces` is not 0
  * what nebel_evaluate_environment and nebel_evaluate_environment_diffuse of the text want. *count receives the number of words
@@ -223,17 +224,17 @@ nebel_result nebel_pack_diffusion(const nebel_lighting *lighting, nebel_texel_f3
  * for surfaces, and one for each of its pixels. They do not depend on the eye: pack again when nebel_is_same_environment
  * denies. O(words). Any thread. Errors: ARGUMENT; LIMIT when capacity is too small (not for words NULL and capacity 0,
  * which only asks) or when more than 2^24 words (256 MiB) would be needed, for which nebel_pack_fog answers LIMIT, too. */
-nebel_result nebel_pack_environment(const nebel_lighting *lighting, int surfaces, nebel_texel_f32 *words,
-                                    size_t capacity, size_t *count);
+NEBEL_API nebel_result nebel_pack_environment(const nebel_lighting *lighting, int surfaces, nebel_texel_f32 *words,
+                                              size_t capacity, size_t *count);
 
 /* Whether nebel_pack_environment makes the same of both. O(phase functions). Any thread. */
-int nebel_is_same_environment(const nebel_lighting *a, const nebel_lighting *b);
+NEBEL_API int nebel_is_same_environment(const nebel_lighting *a, const nebel_lighting *b);
 
 /* What the fog and its lights have, as a mask for NEBEL_FEATURES: the text leaves out the shapes, profiles and walks that it does not
  * name, and a driver makes a smaller and faster program. Fog that has more than the shader was compiled for gives wrong
  * answers; masks of several lightings may be joined with |. NULL gives everything. O(volumes and their parts). Any
  * thread. */
-uint32_t nebel_pack_features(const nebel_lighting *lighting);
+NEBEL_API uint32_t nebel_pack_features(const nebel_lighting *lighting);
 
 /* The feature of fog whose volumes are of different light: rays may have to be walked, from event to event. */
 #define NEBEL_FEATURE_MIXED 512u
@@ -266,7 +267,8 @@ uint32_t nebel_pack_features(const nebel_lighting *lighting);
  * is at least that: 5,000 to 10,000 for each kind of air that scatters, from space three times as many, where rays may end
  * within the air six times. The words stay while eye and sun do, however the camera turns. O(words). Any thread. Errors:
  * ARGUMENT; LIMIT when capacity is too small (not for words NULL and capacity 0, which only asks). */
-nebel_result nebel_pack_sky_view(const nebel_sky_view *view, nebel_texel_f32 *words, size_t capacity, size_t *count);
+NEBEL_API nebel_result nebel_pack_sky_view(const nebel_sky_view *view, nebel_texel_f32 *words, size_t capacity,
+                                           size_t *count);
 
 /* ---- views ----------------------------------------------------------------------------------- */
 
@@ -331,7 +333,7 @@ typedef struct nebel_rays {
  * of clip_from_eye. Parallel rays go along -z of eye space, others to where w is positive in clip space. `depth` NULL:
  * {0}. O(1). Any thread. Errors: ARGUMENT (a number that is not finite, a matrix that cannot be inverted, one whose
  * rays neither meet in a point nor are parallel with constant w; a size, a range, a kind that is none). */
-nebel_result nebel_compute_view_rays(const nebel_view *view, const nebel_depth_desc *depth, nebel_rays *rays);
+NEBEL_API nebel_result nebel_compute_view_rays(const nebel_view *view, const nebel_depth_desc *depth, nebel_rays *rays);
 
 /* How well floats hold fog in a view: what they move changes transmittance, and light relative to the brighter of 1 and
  * the brightest source, by at most `error` a pixel or more beside outlines. The lengths are those of the volume that is
@@ -351,7 +353,8 @@ typedef struct nebel_view_error {
 
 /* Bounds by how much places in floats change the fog of a view. Errors: as nebel_compute_view_rays. Any thread. O(volumes and
  * their parts, and the square of the planes of one). */
-nebel_result nebel_find_view_error(const nebel_snapshot *snapshot, const nebel_view *view, nebel_view_error *error);
+NEBEL_API nebel_result nebel_find_view_error(const nebel_snapshot *snapshot, const nebel_view *view,
+                                             nebel_view_error *error);
 
 /* ---- tiles ----------------------------------------------------------------------------------- */
 
@@ -362,8 +365,8 @@ nebel_result nebel_find_view_error(const nebel_snapshot *snapshot, const nebel_v
  * when capacity is at least that; with less the result is LIMIT, without a message. `view` must be the one of the eye
  * that the fog was packed for. O(volumes + entries). Any thread. Errors: ARGUMENT (a matrix that cannot be inverted or
  * is not finite), MEMORY, LIMIT as nebel_pack_fog. */
-nebel_result nebel_bin_volumes(const nebel_snapshot *snapshot, const nebel_view *view, uint32_t tile_size,
-                               uint32_t *entries, size_t capacity, size_t *count);
+NEBEL_API nebel_result nebel_bin_volumes(const nebel_snapshot *snapshot, const nebel_view *view, uint32_t tile_size,
+                                         uint32_t *entries, size_t capacity, size_t *count);
 
 #ifdef __cplusplus
 }

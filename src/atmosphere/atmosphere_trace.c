@@ -373,6 +373,8 @@ nebel_result nebel_trace_atmosphere(const nebel_atmosphere *atmosphere, const ne
     if (atmosphere == NULL || (n > 0 && (rays == NULL || transfers == NULL))) return NEBEL_ERROR_ARGUMENT;
     if (!nb_air_resolve_sun(sun, &resolved)) return NEBEL_ERROR_ARGUMENT;
     double unit[3];
+    ray_stride = nb_stride_of(ray_stride, sizeof *rays);
+    transfer_stride = nb_stride_of(transfer_stride, sizeof *transfers);
     for (size_t i = 0; i < n; i++)
         if (!nb_air_is_ray(nb_stride_from(rays, ray_stride, i), unit)) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
@@ -409,6 +411,8 @@ nebel_result nebel_compute_atmosphere_irradiance(const nebel_atmosphere *atmosph
     nebel_sun resolved;
     if (atmosphere == NULL || (n > 0 && (places == NULL || irradiances == NULL))) return NEBEL_ERROR_ARGUMENT;
     if (!nb_air_resolve_sun(sun, &resolved)) return NEBEL_ERROR_ARGUMENT;
+    place_stride = nb_stride_of(place_stride, sizeof *places);
+    irradiance_stride = nb_stride_of(irradiance_stride, sizeof *irradiances);
     for (size_t i = 0; i < n; i++)
         if (!nb_air_is_place(nb_stride_from(places, place_stride, i))) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++)

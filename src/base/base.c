@@ -99,14 +99,28 @@ int nb_grow(const nebel_allocator *allocator, void **array, size_t size, size_t 
     return 1;
 }
 
+static void write_message(const nebel_log *log, nebel_log_level level, nebel_result result, const char *format,
+                          va_list arguments)
+{
+    if (log == NULL || log->write == NULL) return;
+    char message[1024];
+    vsnprintf(message, sizeof message, format, arguments);
+    log->write(level, result, message, log->user);
+}
+
 nebel_result nb_fail(const nebel_log *log, nebel_result result, const char *format, ...)
 {
-    if (log == NULL || log->write == NULL) return result;
-    char message[1024];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(message, sizeof message, format, arguments);
+    write_message(log, NEBEL_LOG_ERROR, result, format, arguments);
     va_end(arguments);
-    log->write(result, message, log->user);
     return result;
+}
+
+void nb_log_message(const nebel_log *log, nebel_log_level level, nebel_result result, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    write_message(log, level, result, format, arguments);
+    va_end(arguments);
 }

@@ -41,4 +41,8 @@ int nb_grow(const nebel_allocator *allocator, void **array, size_t size, size_t 
 /* Hands a message to the caller's log and returns `result`, so that an error path is one line. */
 nebel_result nb_fail(const nebel_log *log, nebel_result result, const char *format, ...) NB_PRINTF(3, 4);
 
+/* Any message. */
+void nb_log_message(const nebel_log *log, nebel_log_level level, nebel_result result, const char *format, ...)
+    NB_PRINTF(4, 5);
+
 #endif

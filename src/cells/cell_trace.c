@@ -265,8 +265,8 @@ nebel_result nebel_compute_cell_fog(const nebel_cells *cells, const nebel_cell_v
     if (cells == NULL || view == NULL || (n > 0 && (points == NULL || fog == NULL))) return NEBEL_ERROR_ARGUMENT;
     const nebel_result result = set_view(cells, view, &way);
     if (result != NEBEL_OK) return result;
-    if (point_stride == 0) point_stride = sizeof *points;
-    if (fog_stride == 0) fog_stride = sizeof *fog;
+    point_stride = nb_stride_of(point_stride, sizeof *points);
+    fog_stride = nb_stride_of(fog_stride, sizeof *fog);
     const nb_memory_span from = {(uintptr_t)points, sizeof *points, point_stride};
     const nb_memory_span to = {(uintptr_t)fog, sizeof *fog, fog_stride};
     if (!are_streams(&from, &to, n)) return NEBEL_ERROR_ARGUMENT;

@@ -33,10 +33,10 @@ typedef struct nb_cell_note {
     size_t cell;
 } nb_cell_note;
 
-static void pass_on(nebel_result result, const char *message, void *user)
+static void pass_on(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     const nb_cell_note *about = user;
-    nb_fail(about->log, result, "cell %zu: %s", about->cell, message);
+    nb_log_message(about->log, level, result, "cell %zu: %s", about->cell, message);
 }
 
 static nebel_result check_cell(const nebel_log *log, const nebel_cell *cell)

@@ -131,6 +131,8 @@ nebel_result nebel_trace_cloud_shadow_on_air(nebel_cloud_workspace *workspace, s
                                              size_t ray_stride, nebel_air_shadow *shades, size_t shade_stride)
 {
     if (workspace == NULL || (n > 0 && (rays == NULL || shades == NULL))) return NEBEL_ERROR_ARGUMENT;
+    ray_stride = nb_stride_of(ray_stride, sizeof *rays);
+    shade_stride = nb_stride_of(shade_stride, sizeof *shades);
     for (size_t i = 0; i < n; i++) {
         const nebel_ray *ray = nb_stride_from(rays, ray_stride, i);
         double unit[3];
@@ -149,6 +151,7 @@ nebel_result nebel_compute_cloud_sun_transmittance(nebel_cloud_workspace *worksp
     const nebel_cloud_lighting *view = workspace->view;
     const nebel_clouds *clouds = view->clouds;
     const double *sun = view->sun.direction, least = fmax(width, 1e-3 * (view->high - view->low));
+    place_stride = nb_stride_of(place_stride, sizeof *places);
     for (size_t i = 0; i < n; i++) {
         const double *place = nb_stride_from(places, place_stride, i);
         double from[3], pieces[2][2];
@@ -170,6 +173,7 @@ nebel_result nebel_compute_cloud_sky_transmittance(nebel_cloud_workspace *worksp
     if (workspace == NULL || (n > 0 && (places == NULL || parts == NULL)) || !(width >= 0 && width <= NEBEL_MAX_LENGTH))
         return NEBEL_ERROR_ARGUMENT;
     const nebel_clouds *clouds = workspace->view->clouds;
+    place_stride = nb_stride_of(place_stride, sizeof *places);
     for (size_t i = 0; i < n; i++) {
         const double *place = nb_stride_from(places, place_stride, i);
         double from[3];

@@ -682,9 +682,10 @@ typedef struct nb_cloud_rays {
     nebel_cloud_workspace *workspace;
     size_t n, next;
     const nebel_ray *rays;
-    const double *spreads;
+    double pixel_spread;
+    const double *pixel_spreads; /* of each ray; NULL: the same for all */
     nebel_cloud_transfer *nodes;
-    size_t ray_stride, spread_stride, node_stride;
+    size_t ray_stride, node_stride;
 } nb_cloud_rays;
 
 static const nebel_ray *ray_at(const nb_cloud_rays *rays, size_t i)
@@ -694,7 +695,7 @@ static const nebel_ray *ray_at(const nb_cloud_rays *rays, size_t i)
 
 static double spread_at(const nb_cloud_rays *rays, size_t i)
 {
-    return *(const double *)nb_stride_from(rays->spreads, rays->spread_stride, i);
+    return rays->pixel_spreads != NULL ? rays->pixel_spreads[i] : rays->pixel_spread;
 }
 
 static void begin_next(nb_cloud_rays *rays, nb_cloud_walk *walk, nb_cloud_ray_group *party)
@@ -778,18 +779,18 @@ static void trace(nb_cloud_rays *rays)
 /* ---- the face -------------------------------------------------------------------------------- */
 
 nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
-                                const double *spreads, size_t spread_stride, nebel_cloud_transfer *nodes,
+                                double pixel_spread, const double *pixel_spreads, nebel_cloud_transfer *nodes,
                                 size_t node_stride)
 {
     nb_cloud_rays all = {.workspace = workspace,
                          .n = n,
                          .rays = rays,
-                         .spreads = spreads,
+                         .pixel_spread = pixel_spread,
+                         .pixel_spreads = pixel_spreads,
                          .nodes = nodes,
-                         .ray_stride = ray_stride,
-                         .spread_stride = spread_stride,
-                         .node_stride = node_stride};
-    if (workspace == NULL || (n > 0 && (rays == NULL || spreads == NULL || nodes == NULL))) return NEBEL_ERROR_ARGUMENT;
+                         .ray_stride = nb_stride_of(ray_stride, sizeof *rays),
+                         .node_stride = nb_stride_of(node_stride, sizeof *nodes)};
+    if (workspace == NULL || (n > 0 && (rays == NULL || nodes == NULL))) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
         double unit[3];
         if (!nb_air_is_ray(ray_at(&all, i), unit) || !(spread_at(&all, i) >= 0 && spread_at(&all, i) <= 10))

@@ -543,6 +543,7 @@ nebel_result nebel_compute_cloud_extinction(const nebel_clouds *clouds, double t
     if (clouds == NULL || (n > 0 && (places == NULL || extinction == NULL)) || !(fabs(time) <= 1e12) ||
         !(width >= 0 && width <= NEBEL_MAX_LENGTH))
         return NEBEL_ERROR_ARGUMENT;
+    place_stride = nb_stride_of(place_stride, sizeof *places);
     for (size_t i = 0; i < n; i++) {
         if (!nb_air_is_place(nb_stride_from(places, place_stride, i))) return NEBEL_ERROR_ARGUMENT;
         extinction[i] = 0;

@@ -149,9 +149,8 @@ static nebel_result trace_pixels(const nb_frame *frame, const int is_asked[NB_CL
         clouds->spreads[count] = air->pixel / (double)clouds->rays.length[lane];
         lanes[count++] = lane;
     }
-    const nebel_result result =
-        nebel_trace_clouds(clouds->workspace, count, clouds->asked, sizeof *clouds->asked, clouds->spreads,
-                           sizeof *clouds->spreads, clouds->found, sizeof *clouds->found);
+    const nebel_result result = nebel_trace_clouds(clouds->workspace, count, clouds->asked, sizeof *clouds->asked, 0,
+                                                   clouds->spreads, clouds->found, sizeof *clouds->found);
     for (uint32_t k = 0; k < count && result == NEBEL_OK; k++) {
         nb_cloud_eclipse(air->worlds, air->count, &clouds->asked[k], air->to_sun, air->sun_radius, &clouds->found[k]);
         clouds->nodes[lanes[k]] = clouds->found[k];

@@ -209,7 +209,7 @@ static void finish_part(nb_frame_progress *state, nebel_result result)
     if (result == NEBEL_OK && state->result == NEBEL_OK && state->desc->progress != NULL &&
         (state->done % state->step == 0 || state->done == state->total) &&
         state->desc->progress(state->done, state->total, state->desc->progress_user) != 0) {
-        result = NEBEL_ERROR_LIMIT;
+        result = NEBEL_ERROR_CANCELLED;
     }
     if (result == NEBEL_OK || state->result != NEBEL_OK) return;
     state->result = result;
@@ -288,7 +288,7 @@ nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc
     nb_frame_progress state = {.desc = desc, .total = parts, .step = (parts + 99) / 100};
     render_regions(&made, regions, &state);
     free_frame(&made);
-    if (state.result == NEBEL_ERROR_LIMIT) return nb_fail(&renderer->log, state.result, "frame: stopped");
+    if (state.result == NEBEL_ERROR_CANCELLED) return nb_fail(&renderer->log, state.result, "frame: stopped");
     if (state.result != NEBEL_OK) {
         return nb_fail(&renderer->log, state.result, "frame: fog along a ray: %s", nebel_result_text(state.result));
     }

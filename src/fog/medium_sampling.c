@@ -127,6 +127,8 @@ nebel_result nebel_sample_medium(const nebel_snapshot *snapshot, size_t n, const
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (n > 0 && (places == NULL || matter == NULL))
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "places and matter: must not be NULL");
+    place_stride = nb_stride_of(place_stride, sizeof *places);
+    matter_stride = nb_stride_of(matter_stride, sizeof *matter);
     for (size_t i = 0; i < n; i++) {
         const nebel_sample_point *place = nb_stride_from(places, place_stride, i);
         const char *fault = fault_of_place(place);

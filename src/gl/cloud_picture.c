@@ -232,7 +232,7 @@ static nebel_result trace_rays(const nb_cloud_picture *picture, nb_cloud_part *p
                                const nebel_ray *rays, const double *spreads, nebel_cloud_transfer *nodes)
 {
     const nebel_result result =
-        nebel_trace_clouds(part->workspace, count, rays, sizeof *rays, spreads, sizeof *spreads, nodes, sizeof *nodes);
+        nebel_trace_clouds(part->workspace, count, rays, sizeof *rays, 0, spreads, nodes, sizeof *nodes);
     for (uint32_t i = 0; i < count && result == NEBEL_OK; i++)
         nb_cloud_eclipse(picture->worlds, picture->world_count, &rays[i], picture->to_sun, picture->disc, &nodes[i]);
     return result;

@@ -30,11 +30,10 @@ static nebel_result find_changes(const nebel_scene_data *scene, nebel_cloud_work
 static int is_diffuse(const nebel_log *log, const nebel_lighting *fog)
 {
     if ((nebel_pack_features(fog) & NEBEL_FEATURE_DIFFUSION) == 0) return 0;
-    (void)nb_fail(
-        log, NEBEL_OK,
-        "warning: frame: all fog has the sun and the sky of the scene's origin, however far it is and whatever "
-        "clouds are over it: OpenGL lights fog by its place where light is scattered once. The CPU renderer "
-        "(--device cpu) does it with \"diffusion\", too");
+    nb_log_message(log, NEBEL_LOG_WARNING, NEBEL_OK,
+                   "frame: all fog has the sun and the sky of the scene's origin, however far it is and whatever "
+                   "clouds are over it: OpenGL lights fog by its place where light is scattered once. The CPU renderer "
+                   "(--device cpu) does it with \"diffusion\", too");
     return 1;
 }
 

@@ -677,7 +677,7 @@ nebel_result nb_gl_frame_ask(const nb_gl_frame *f)
 {
     const nebel_gl_frame_desc *const desc = f->desc;
     if (desc->progress == NULL || desc->progress(f->done, f->samples, desc->progress_user) == 0) return NEBEL_OK;
-    return nb_fail(&f->renderer->log, NEBEL_ERROR_LIMIT, "frame: stopped");
+    return nb_fail(&f->renderer->log, NEBEL_ERROR_CANCELLED, "frame: stopped");
 }
 
 /* Waits for the sample first, so that progress is that of the work. */

@@ -38,7 +38,7 @@ typedef struct nb_gl_frame {
 /* Moves a camera of parallel rays up to what it sees. Returns how far [m]. */
 double nb_gl_frame_go_near(const nebel_gl_renderer *renderer, nebel_camera *camera, const nebel_gl_frame_desc *desc);
 
-/* LIMIT where progress, which is told the samples that are done, stops the frame. */
+/* CANCELLED where progress, which is told the samples that are done, stops the frame. */
 nebel_result nb_gl_frame_ask(const nb_gl_frame *f);
 
 /* Whether the frame has some: fog, or air; particles. */

@@ -185,13 +185,13 @@ void nb_renderer_judge_particles(nebel_gl_renderer *r)
     r->has_judged_particles = 1;
     const int lamps = dim_lamps(r), sun = shade_sunlit_fog(r);
     if (!lamps && !sun) return;
-    (void)nb_fail(&r->log, NEBEL_OK,
-                  "warning: frame: what is in the shadow of particles is too bright: OpenGL lets them take no light "
-                  "%s. The CPU renderer "
-                  "(--device cpu) does, and OpenGL where they are volumes among the fog",
-                  !lamps ? "of the sun from fog"
-                  : sun  ? "of lamps, nor of the sun from fog"
-                         : "of lamps");
+    nb_log_message(&r->log, NEBEL_LOG_WARNING, NEBEL_OK,
+                   "frame: what is in the shadow of particles is too bright: OpenGL lets them take no light "
+                   "%s. The CPU renderer "
+                   "(--device cpu) does, and OpenGL where they are volumes among the fog",
+                   !lamps ? "of the sun from fog"
+                   : sun  ? "of lamps, nor of the sun from fog"
+                          : "of lamps");
 }
 
 /* ---- results --------------------------------------------------------------------------------- */

@@ -228,10 +228,10 @@ typedef struct nb_slice_owner {
     const nb_codec *codec;
 } nb_slice_owner;
 
-static void tell_file(nebel_result result, const char *message, void *user)
+static void tell_file(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     const nb_codec *codec = ((const nb_slice_owner *)user)->codec;
-    nb_fail(&codec->log, result, "%s: %s", codec->name, message);
+    nb_log_message(&codec->log, level, result, "%s: %s", codec->name, message);
 }
 
 static nebel_result make_grid(const nb_codec *codec, const nebel_grid_file *file, const nb_voxels *voxels,

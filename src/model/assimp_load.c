@@ -131,19 +131,18 @@ static void note_left_out(const nb_assimp *in)
     const nb_model_load *load = in->load;
     const char *file = load->source->file;
     if (in->left_out_faces > 0)
-        nb_model_fail(load, NEBEL_OK, "%llu points and lines of \"%s\" are left out; only triangles are drawn",
+        nb_model_note(load, "%llu points and lines of \"%s\" are left out; only triangles are drawn",
                       (unsigned long long)in->left_out_faces, file);
     if (in->left_out_triangles > 0)
-        nb_model_fail(load, NEBEL_OK,
-                      "%llu triangles of \"%s\" are left out; their corners are not numbers or do not exist",
+        nb_model_note(load, "%llu triangles of \"%s\" are left out; their corners are not numbers or do not exist",
                       (unsigned long long)in->left_out_triangles, file);
     if (in->left_out_masks > 0)
-        nb_model_fail(load, NEBEL_OK,
+        nb_model_note(load,
                       "%llu meshes of \"%s\" are drawn without holes; they have an alpha mask, but no "
                       "texture coordinates to place it",
                       (unsigned long long)in->left_out_masks, file);
     if (in->left_out_clear > 0)
-        nb_model_fail(load, NEBEL_OK, "%llu meshes of \"%s\" are left out; their alpha is below the cutoff everywhere",
+        nb_model_note(load, "%llu meshes of \"%s\" are left out; their alpha is below the cutoff everywhere",
                       (unsigned long long)in->left_out_clear, file);
 }
 
@@ -166,7 +165,7 @@ static nebel_result convert_points(nb_assimp *in)
     const nebel_result result = walk(in);
     if (result != NEBEL_OK) return result;
     if (in->left_out_points > 0)
-        nb_model_fail(load, NEBEL_OK, "%llu vertices of \"%s\" are left out; they are not numbers",
+        nb_model_note(load, "%llu vertices of \"%s\" are left out; they are not numbers",
                       (unsigned long long)in->left_out_points, load->source->file);
     if (load->points->count > 0) return NEBEL_OK;
     return nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no vertex", load->source->file);
@@ -176,11 +175,10 @@ static nebel_result convert_points(nb_assimp *in)
 static void note_refusal(const nb_assimp *in)
 {
     if (in->made.fault[0] != '\0')
-        nb_model_fail(in->load, NEBEL_OK, "\"%s\" is read as far as it goes: %s", in->load->source->file,
-                      in->made.fault);
+        nb_model_note(in->load, "\"%s\" is read as far as it goes: %s", in->load->source->file, in->made.fault);
     if (in->files.refusal != NB_REFUSAL_NONE)
-        nb_model_fail(in->load, NEBEL_OK, "\"%s\" is read without \"%s\", which it names: it %s",
-                      in->load->source->file, in->files.refused, nb_model_files_refusal_text(in->files.refusal));
+        nb_model_note(in->load, "\"%s\" is read without \"%s\", which it names: it %s", in->load->source->file,
+                      in->files.refused, nb_model_files_refusal_text(in->files.refusal));
 }
 
 static nebel_result take_scene(nb_assimp *in)

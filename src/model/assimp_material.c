@@ -146,7 +146,7 @@ static nebel_result read_picture(nb_assimp *in, const char *path, nebel_texture 
     if (result == NEBEL_ERROR_MEMORY)
         return nb_model_fail(in->load, result, "out of memory for the texture \"%s\"", path);
     if (is_full) return nb_model_fail(in->load, result, "%s", note.text);
-    if (result != NEBEL_OK) nb_model_fail(in->load, NEBEL_OK, "%s; the plain colour is used instead", note.text);
+    if (result != NEBEL_OK) nb_model_note(in->load, "%s; the plain colour is used instead", note.text);
     return NEBEL_OK;
 }
 

@@ -310,9 +310,10 @@ static bool take_gltf_value(nb_json *json, const nb_json_node *value, void *user
     return !nb_json_has_key(parent, "meshes") || take_gltf_mesh(json, value, data);
 }
 
-static void keep_fault(nebel_result result, const char *message, void *user)
+static void keep_fault(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     nb_gltf_data *data = user;
+    (void)level;
     if (result == NEBEL_ERROR_FORMAT)
         snprintf(data->fault, sizeof data->fault, "%s", message);
     else
@@ -341,7 +342,7 @@ nebel_result nb_gltf_read_data(nb_gltf_data *data)
     bool is_packed = false;
     for (size_t i = 0; i < data->view_count; i++) is_packed = is_packed || data->views[i].is_packed;
     if (data->requires_meshopt && !is_packed)
-        nb_model_fail(data->load, NEBEL_OK, "\"%s\" requires \"" MESHOPT "\", but nothing in it is compressed",
+        nb_model_note(data->load, "\"%s\" requires \"" MESHOPT "\", but nothing in it is compressed",
                       data->load->source->file);
     for (size_t i = 0; i < data->attribute_count; i++)
         if (data->attributes[i] < data->accessor_count) data->accessors[data->attributes[i]].is_attribute = true;

@@ -16,10 +16,22 @@ nebel_result nb_model_fail(const nb_model_load *load, nebel_result result, const
     return nb_fail(&load->log, result, "%s: %s", load->source->where, message);
 }
 
-static void keep_note(nebel_result result, const char *message, void *user)
+void nb_model_note(const nb_model_load *load, const char *format, ...)
+{
+    char message[768];
+    const char *where = load->source->where;
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(message, sizeof message, format, arguments);
+    va_end(arguments);
+    nb_log_message(&load->log, NEBEL_LOG_INFO, NEBEL_OK, "%s%s%s", where != NULL ? where : "",
+                   where != NULL ? ": " : "", message);
+}
+
+static void keep_note(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     nb_note *note = user;
-    (void)result;
+    (void)level, (void)result;
     snprintf(note->text, sizeof note->text, "%s", message);
 }
 

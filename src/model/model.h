@@ -123,6 +123,9 @@ nebel_result nb_model_refuse_triangles(const nb_model_load *load);
 /* Logs "FILE:LINE:COLUMN: models[0].file: message" and returns the result. */
 nebel_result nb_model_fail(const nb_model_load *load, nebel_result result, const char *format, ...) NB_PRINTF(3, 4);
 
+/* The same of what is left out: no error. */
+void nb_model_note(const nb_model_load *load, const char *format, ...) NB_PRINTF(2, 3);
+
 /* A log that keeps the last message, so that it can be passed on with the model's place before it. */
 typedef struct nb_note {
     char text[512];

@@ -98,7 +98,10 @@ static nb_receipt take_message(nb_receiver *in, const nb_wire_frame *frame)
     for (char *at = text; *at != '\0'; at++)
         if ((unsigned char)*at < 0x20 || *at == 0x7F) *at = '?';
     /* Memory there is limited, which is said in other words. */
-    if (frame->code != NEBEL_ERROR_MEMORY) nb_model_fail(in->load, (nebel_result)frame->code, "%s", text);
+    if (frame->code == NEBEL_OK)
+        nb_model_note(in->load, "%s", text);
+    else if (frame->code != NEBEL_ERROR_MEMORY)
+        nb_model_fail(in->load, (nebel_result)frame->code, "%s", text);
     return NB_RECEIPT_WHOLE;
 }
 

@@ -70,10 +70,11 @@ static void put_frame(nb_wire_type type, int32_t code, uint64_t size)
     put(&frame, sizeof frame);
 }
 
-static void put_message(nebel_result result, const char *message, void *user)
+static void put_message(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     answer *out = user;
     const size_t size = strlen(message);
+    (void)level; /* errors have a result, and all else is a note */
     if (out->messages++ >= NB_WIRE_MAX_MESSAGES) return;
     put_frame(NB_WIRE_MESSAGE, (int32_t)result, size);
     put(message, size);
@@ -168,7 +169,7 @@ static void tell_heard(answer *out, const char *file)
     char note[HEARD_SIZE + 600];
     for (unsigned i = 0; i < out->heard_count; i++) {
         snprintf(note, sizeof note, "\"%.500s\" may not be as it was meant: %s", file, out->heard[i]);
-        put_message(NEBEL_OK, note, out);
+        put_message(NEBEL_LOG_INFO, NEBEL_OK, note, out);
     }
 }
 

@@ -447,8 +447,8 @@ nebel_result nebel_trace_textured_planet(const nebel_textured_planet *layers, co
     nb_shell_ray s;
     if (layers == NULL || view == NULL || (n > 0 && (rays == NULL || hits == NULL))) return NEBEL_ERROR_ARGUMENT;
     if (!set_view(layers, view, &s)) return NEBEL_ERROR_ARGUMENT;
-    if (ray_stride == 0) ray_stride = sizeof *rays;
-    if (hit_stride == 0) hit_stride = sizeof *hits;
+    ray_stride = nb_stride_of(ray_stride, sizeof *rays);
+    hit_stride = nb_stride_of(hit_stride, sizeof *hits);
     for (size_t i = 0; i < n; i++) {
         if (!set_ray(nb_stride_from(rays, ray_stride, i), &s)) return NEBEL_ERROR_ARGUMENT;
         look(&s, nb_stride_to(hits, hit_stride, i));

@@ -21,14 +21,14 @@ typedef struct nodes_reader {
 
 /* ---- messages -------------------------------------------------------------------------------- */
 
-static void pass_on(nebel_result result, const char *message, void *user)
+static void pass_on(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     const nodes_reader *nodes = user;
     const nebel_log *log = &nodes->in->scene->log;
     if (nodes->name[0] != '\0')
-        nb_fail(log, result, "%s: node \"%s\": %s", nodes->model->where, nodes->name, message);
+        nb_log_message(log, level, result, "%s: node \"%s\": %s", nodes->model->where, nodes->name, message);
     else
-        nb_fail(log, result, "%s: %s", nodes->model->where, message);
+        nb_log_message(log, level, result, "%s: %s", nodes->model->where, message);
 }
 
 static const nb_json_node *find_member(const nb_json *json, const nb_json_node *object, const char *key)

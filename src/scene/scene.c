@@ -149,10 +149,10 @@ static bool take_scene_value(nb_json *json, const nb_json_node *value, void *use
     return true;
 }
 
-void nb_keys_read_keep_message(nebel_result result, const char *message, void *user)
+void nb_keys_read_keep_message(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     nb_scene_reader *in = user;
-    (void)result;
+    (void)level, (void)result;
     snprintf(in->core_message, sizeof in->core_message, "%s", message);
 }
 

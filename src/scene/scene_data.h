@@ -239,7 +239,7 @@ bool nb_keys_read_try(nb_scene_reader *in, const nb_json_node *node, const char 
                       const nebel_volume_desc *volume);
 
 /* For logs of the core: keeps the message in the reader, which is `user`. */
-void nb_keys_read_keep_message(nebel_result result, const char *message, void *user);
+void nb_keys_read_keep_message(nebel_log_level level, nebel_result result, const char *message, void *user);
 
 /* Words of the file, in the order of their enumerations. */
 extern const char *const nb_projection_names[3], *const nb_coordinate_names[NEBEL_COORDINATE_COUNT],

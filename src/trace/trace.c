@@ -292,6 +292,8 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
     if (transfer_stride % _Alignof(nebel_transfer) != 0)
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "transfers: stride %zu: must be a multiple of %zu",
                        transfer_stride, _Alignof(nebel_transfer));
+    ray_stride = nb_stride_of(ray_stride, sizeof *rays);
+    transfer_stride = nb_stride_of(transfer_stride, sizeof *transfers);
     const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, desc->failed_ray);
     if (valid != NEBEL_OK) return valid;
     if (desc->precision != NEBEL_PRECISION_DOUBLE && desc->precision != NEBEL_PRECISION_FLOAT)
@@ -339,11 +341,6 @@ static const char *fault_of_strides(const nebel_ray_planes *rays, const nebel_tr
     return fits ? NULL : "a stride must be a multiple of the size of its numbers";
 }
 
-static void set_stride(size_t *stride, size_t packed)
-{
-    if (*stride == 0) *stride = packed;
-}
-
 nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
                                 const nebel_ray_planes *rays, const nebel_transfer_planes *transfers)
 {
@@ -354,12 +351,13 @@ nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trac
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "planes: %s", fault);
     nebel_ray_planes from = *rays;
     nebel_transfer_planes to = *transfers;
-    set_stride(&from.offset_stride, sizeof(float));
-    set_stride(&from.direction_stride, from.direction_double[0] != NULL ? sizeof(double) : sizeof(float));
-    set_stride(&from.t_max_stride, sizeof(float));
-    set_stride(&to.transmittance_stride, sizeof(float));
-    set_stride(&to.in_scattering_stride, sizeof(float));
-    set_stride(&to.error_stride, sizeof(float));
+    from.offset_stride = nb_stride_of(from.offset_stride, sizeof(float));
+    from.direction_stride =
+        nb_stride_of(from.direction_stride, from.direction_double[0] != NULL ? sizeof(double) : sizeof(float));
+    from.t_max_stride = nb_stride_of(from.t_max_stride, sizeof(float));
+    to.transmittance_stride = nb_stride_of(to.transmittance_stride, sizeof(float));
+    to.in_scattering_stride = nb_stride_of(to.in_scattering_stride, sizeof(float));
+    to.error_stride = nb_stride_of(to.error_stride, sizeof(float));
     fault = fault_of_strides(&from, &to);
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "planes: %s", fault);
     const int by_groups = wants_groups(&to);
@@ -383,6 +381,7 @@ nebel_result nebel_invert_transmittance(const nebel_snapshot *snapshot, double t
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (n > 0 && distances == NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "distances: must not be NULL");
+    ray_stride = nb_stride_of(ray_stride, sizeof *rays);
     const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, NULL);
     if (valid != NEBEL_OK) return valid;
     if (!(transmittance > 0 && transmittance < 1))

@@ -69,8 +69,8 @@ nebel_result nebel_compute_segment_transmittance(const nebel_snapshot *snapshot,
                                                  const nebel_segments *segments, float *out, size_t out_stride)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (segments == NULL || (n > 0 && (segments->from == NULL || segments->to == NULL || out == NULL)))
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segments: from, to and out must not be NULL");
+    if (segments == NULL || (n > 0 && (segments->to == NULL || out == NULL)))
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segments: to and out must not be NULL");
     if ((segments->from_stride | segments->to_stride | out_stride) % sizeof(float) != 0)
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segments: strides must be multiples of %zu",
                        sizeof(float));
@@ -84,9 +84,12 @@ nebel_result nebel_compute_segment_transmittance(const nebel_snapshot *snapshot,
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
                        nebel_isa_name(isa));
     if (n == 0) return NEBEL_OK;
+    static const float at_origin[3] = {0, 0, 0};
     nebel_segments s = *segments;
-    if (s.to_stride == 0) s.to_stride = 3 * sizeof(float);
-    const size_t stride = out_stride == 0 ? sizeof(float) : out_stride;
+    s.from_stride = s.from != NULL ? nb_stride_of(s.from_stride, 3 * sizeof(float)) : 0;
+    s.to_stride = nb_stride_of(s.to_stride, 3 * sizeof(float));
+    if (s.from == NULL) s.from = at_origin; /* again and again */
+    const size_t stride = nb_stride_of(out_stride, sizeof(float));
     nb_fog_box boxes[NB_FOG_BOXES];
     if (!nb_boxes_list(snapshot, s.origin, channel, s.ignore_distances, boxes))
         return trace_segments(snapshot, isa, channel, n, &s, out, stride);

@@ -15,7 +15,7 @@
 
 static nebel_result fail_memory(const nb_document *draft)
 {
-    draft->log.write(NEBEL_ERROR_MEMORY, "out of memory for the scene", draft->log.user);
+    draft->log.write(NEBEL_LOG_ERROR, NEBEL_ERROR_MEMORY, "out of memory for the scene", draft->log.user);
     return NEBEL_ERROR_MEMORY;
 }
 
@@ -440,7 +440,7 @@ static nebel_result load(const char *path, const nebel_scene_desc *desc, nebel_s
     if (stat(path, &status) != 0 || S_ISREG(status.st_mode) || S_ISDIR(status.st_mode))
         return nebel_load_scene(path, desc, scene);
     *scene = NULL;
-    if (desc->log.write != NULL) desc->log.write(NEBEL_ERROR_FILE, message, desc->log.user);
+    if (desc->log.write != NULL) desc->log.write(NEBEL_LOG_ERROR, NEBEL_ERROR_FILE, message, desc->log.user);
     return NEBEL_ERROR_FILE;
 }
 

@@ -13,7 +13,7 @@ static nebel_result fail(const nebel_log *log, const char *words)
 {
     char message[600];
     (void)snprintf(message, sizeof message, "the driver does not take a shader of the window: %.500s", words);
-    log->write(NEBEL_ERROR_UNSUPPORTED, message, log->user);
+    log->write(NEBEL_LOG_ERROR, NEBEL_ERROR_UNSUPPORTED, message, log->user);
     return NEBEL_ERROR_UNSUPPORTED;
 }
 

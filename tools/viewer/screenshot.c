@@ -42,7 +42,7 @@ int nb_picture_write(const char *path, uint32_t width, uint32_t height, const ne
         result = nebel_write_image(path, &desc, &image);
         nb_interrupt_release();
     } else {
-        log->write(result, "out of memory for the picture", log->user);
+        log->write(NEBEL_LOG_ERROR, result, "out of memory for the picture", log->user);
     }
     free(rgba);
     free(rgb);

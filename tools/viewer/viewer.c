@@ -69,16 +69,16 @@ typedef struct viewer {
  */
 
 /* Where the fine picture was given up the library says "stopped", which is no news, nor is it that the CPU has to draw. */
-static void listen(nebel_result result, const char *message, void *user)
+static void listen(nebel_log_level level, nebel_result result, const char *message, void *user)
 {
     viewer *const all = user;
-    if (result == NEBEL_ERROR_LIMIT && all->stage.was_stopped) return;
+    if (result == NEBEL_ERROR_CANCELLED && all->stage.was_stopped) return;
     if (result == NEBEL_ERROR_UNSUPPORTED && all->is_asking) {
         (void)snprintf(all->refusal, sizeof all->refusal, "%s", message);
         return;
     }
     (void)snprintf(all->message, sizeof all->message, "%s", message);
-    all->is_fault = 1;
+    all->is_fault = level == NEBEL_LOG_ERROR;
     nb_report_message("%s", message);
 }
 

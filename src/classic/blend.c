@@ -1,5 +1,5 @@
 /* Transparent surfaces in fog, in double, from the one formula text. */
-#include <nebel/nebel.h>
+#include <nebel/classic.h>
 
 #define NB_DOUBLE
 #include "formulas/prelude.h"
