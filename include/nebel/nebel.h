@@ -47,7 +47,7 @@
 
 /* Marks what shared libraries give away; all else in them is hidden. */
 #if defined(_WIN32) && defined(NEBEL_BUILDING_SHARED)
-#define NEBEL_API __declspec(dllexport)
+#define NEBEL_API __attribute__((dllexport))
 #elif defined(__GNUC__) && !defined(_WIN32)
 #define NEBEL_API __attribute__((visibility("default")))
 #else

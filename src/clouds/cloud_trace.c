@@ -790,12 +790,11 @@ nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, cons
                          .nodes = nodes,
                          .ray_stride = nb_stride_of(ray_stride, sizeof *rays),
                          .node_stride = nb_stride_of(node_stride, sizeof *nodes)};
+    double unit[3];
     if (workspace == NULL || (n > 0 && (rays == NULL || nodes == NULL))) return NEBEL_ERROR_ARGUMENT;
-    for (size_t i = 0; i < n; i++) {
-        double unit[3];
+    for (size_t i = 0; i < n; i++)
         if (!nb_air_is_ray(ray_at(&all, i), unit) || !(spread_at(&all, i) >= 0 && spread_at(&all, i) <= 10))
             return NEBEL_ERROR_ARGUMENT;
-    }
     trace(&all);
     return NEBEL_OK;
 }
