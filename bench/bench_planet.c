@@ -61,12 +61,12 @@ static double run_tables(void *user)
     int threads = 2;
     nebel_atmosphere_desc air = *nebel_lookup_atmosphere("earth");
     nebel_sky_view_desc desc = {
-        .sun = sun, .position = {0, 1.7, 0}, .run = nebel_parallel_for_openmp, .run_user = &threads};
+        .sun = sun, .position = {0, 1.7, 0}, .host.parallel = {nebel_parallel_for_openmp, &threads}};
     nebel_atmosphere *made;
     nebel_sky_view *view;
     (void)user;
-    air.run = nebel_parallel_for_openmp;
-    air.run_user = &threads;
+    air.host.parallel.run = nebel_parallel_for_openmp;
+    air.host.parallel.user = &threads;
     const double start = nb_clock_cpu();
     if (nebel_create_atmosphere(&air, &made) != NEBEL_OK) return -1;
     desc.atmosphere = made;

@@ -21,7 +21,7 @@ enum { PATHS = 4 };
 
 typedef struct nb_darkroom {
     uint32_t width, height;
-    nebel_scene_desc host;
+    nebel_host host;
     nebel_snapshot *fog;
     nebel_intrinsics camera;
     nebel_photograph photograph;

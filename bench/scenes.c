@@ -157,7 +157,7 @@ static nebel_lighting *light_fog(nb_bench_fog kind, const nebel_scene_data *scen
     memcpy(desc.environment.radiance, scene->ambient, sizeof desc.environment.radiance);
     memcpy(desc.sun.direction, scene->sun_direction, sizeof desc.sun.direction);
     memcpy(desc.sun.irradiance, scene->sun_irradiance, sizeof desc.sun.irradiance);
-    if (kind == NB_FOG_NONE || nebel_create_fog(&(nebel_fog_desc){.allocator = *allocator}, &fog) != NEBEL_OK)
+    if (kind == NB_FOG_NONE || nebel_create_fog(&(nebel_fog_desc){.host.allocator = *allocator}, &fog) != NEBEL_OK)
         return NULL;
     nebel_volume_desc volume = volume_of(kind);
     if (kind == NB_FOG_CLOUD) volume.density.grid = nb_cloud_make();

@@ -35,7 +35,7 @@ int main(void)
     nebel_lighting *const lighting = light_fog(snapshot);
     nebel_gl *passes = NULL;
     if (!window) return glfwGetError(&why), host_refuse("embed_glfw", why);
-    if (!lighting || nebel_create_gl(&(nebel_gl_desc){.log = host_log}, &passes) != NEBEL_OK) return 1;
+    if (!lighting || nebel_create_gl(&(nebel_gl_desc){.host.log = host_log}, &passes) != NEBEL_OK) return 1;
 
     host_say_compiling("embed_glfw");
     engine host = engine_open_textures();

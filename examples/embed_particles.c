@@ -65,10 +65,10 @@ int main(void)
     nebel_lighting *lighting = NULL;
     nebel_gl *passes = NULL;
     if (!window) return glfwGetError(&why), host_refuse("embed_particles", why);
-    if (nebel_create_fog(&(nebel_fog_desc){.log = host_log}, &fog) != NEBEL_OK ||
+    if (nebel_create_fog(&(nebel_fog_desc){.host.log = host_log}, &fog) != NEBEL_OK ||
         nebel_add_volume(fog, &mist, NULL) != NEBEL_OK || nebel_commit_fog(fog, &snapshot) != NEBEL_OK ||
         nebel_create_lighting(snapshot, NULL, &lighting) != NEBEL_OK ||
-        nebel_create_gl(&(nebel_gl_desc){.log = host_log}, &passes) != NEBEL_OK)
+        nebel_create_gl(&(nebel_gl_desc){.host.log = host_log}, &passes) != NEBEL_OK)
         return 1;
 
     host_say_compiling("embed_particles");

@@ -24,7 +24,7 @@ static inline nebel_snapshot *make_fog(nebel_fog **fog)
                                     .extinction = {.4, .8, 1.2},
                                     .emission = {.7, .35, .1}};
     nebel_snapshot *snapshot = NULL;
-    if (nebel_create_fog(&(nebel_fog_desc){.log = host_log}, fog) == NEBEL_OK &&
+    if (nebel_create_fog(&(nebel_fog_desc){.host.log = host_log}, fog) == NEBEL_OK &&
         nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK && nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
         nebel_commit_fog(*fog, &snapshot);
     return snapshot;

@@ -34,13 +34,12 @@ static void try_depth(const char *path, const nebel_depth_source *source)
 {
     witness seen = {0};
     nebel_depth_map map;
-    const nebel_scene_desc desc = {.allocator = {witness_allocate, witness_release, &seen},
-                                   .log = {witness_message, &seen}};
-    const nebel_result result = nebel_read_depth(path, source, &desc, &map);
+    const nebel_host host = {.allocator = {witness_allocate, witness_release, &seen}, .log = {witness_message, &seen}};
+    const nebel_result result = nebel_read_depth(path, source, &host, &map);
     demand((result == NEBEL_OK) == (map.depth != NULL));
     nebel_fill_depth(&map);
     for (size_t i = 0; result == NEBEL_OK && i < (size_t)map.width * map.height; i++) demand(map.depth[i] >= 0);
-    nebel_free_depth(&desc, &map);
+    nebel_free_depth(&host, &map);
     check_end(&seen, result);
 }
 
@@ -48,9 +47,8 @@ static void try_camera(const char *path)
 {
     witness seen = {0};
     nebel_intrinsics camera;
-    const nebel_scene_desc desc = {.allocator = {witness_allocate, witness_release, &seen},
-                                   .log = {witness_message, &seen}};
-    const nebel_result result = nebel_read_intrinsics(path, &desc, &camera);
+    const nebel_host host = {.allocator = {witness_allocate, witness_release, &seen}, .log = {witness_message, &seen}};
+    const nebel_result result = nebel_read_intrinsics(path, &host, &camera);
     demand((result == NEBEL_OK) == (camera.fx > 0));
     demand(isfinite(camera.fx) && isfinite(camera.fy) && isfinite(camera.cx) && isfinite(camera.cy));
     demand(camera.baseline >= 0);
@@ -62,13 +60,12 @@ static void try_photograph(const char *path)
     witness seen = {0};
     double airlight[3] = {0};
     nebel_photograph photograph;
-    const nebel_scene_desc desc = {.allocator = {witness_allocate, witness_release, &seen},
-                                   .log = {witness_message, &seen}};
-    nebel_result result = nebel_read_photograph(path, &desc, &photograph);
+    const nebel_host host = {.allocator = {witness_allocate, witness_release, &seen}, .log = {witness_message, &seen}};
+    nebel_result result = nebel_read_photograph(path, &host, &photograph);
     demand((result == NEBEL_OK) == (photograph.pixels != NULL));
-    if (result == NEBEL_OK) result = nebel_estimate_airlight(&desc, &photograph, airlight);
+    if (result == NEBEL_OK) result = nebel_estimate_airlight(&host, &photograph, airlight);
     for (int c = 0; c < 3; c++) demand(airlight[c] >= 0);
-    nebel_free_photograph(&desc, &photograph);
+    nebel_free_photograph(&host, &photograph);
     check_end(&seen, result);
 }
 

@@ -70,9 +70,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (name[0] == '\0') demand(atexit(remove_model) == 0);
     write_model(data, size);
     /* A second of preparation: noise that takes longer is refused. */
-    const nebel_scene_desc desc = {.allocator = {witness_allocate, witness_release, &seen},
-                                   .log = {count_message, &seen},
-                                   .memory = (uint64_t)16 << 20};
+    const nebel_scene_desc desc = {
+        .host = {.allocator = {witness_allocate, witness_release, &seen}, .log = {count_message, &seen}},
+        .memory = (uint64_t)16 << 20};
     snprintf(text, sizeof text,
              "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"%s\", \"position\": [1, 2, 3], \"scale\": 0.5, "
              "\"rotation\": [0, 1, 0, 1]}]}",

@@ -9,7 +9,7 @@
 static void make_grid(const nebel_allocator *allocator, const nb_voxels *voxels)
 {
     nebel_grid *grid = NULL;
-    nebel_grid_desc desc = {.allocator = *allocator, .type = voxels->type, .voxels = voxels->data};
+    nebel_grid_desc desc = {.host.allocator = *allocator, .type = voxels->type, .voxels = voxels->data};
     for (int i = 0; i < 3; i++) desc.size[i] = voxels->size[i];
     const nebel_result result = nebel_create_grid(&desc, &grid);
     if (result != NEBEL_OK && result != NEBEL_ERROR_VALUE && result != NEBEL_ERROR_MEMORY) abort();

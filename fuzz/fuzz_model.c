@@ -45,7 +45,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     snprintf(name, sizeof name, "%s/model.%s", folder, formats[data[0] % (sizeof formats / sizeof *formats)]);
     write_model(name, data + 1, size - 1);
     snprintf(text, sizeof text, "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"%s\"}]}", name);
-    const nebel_scene_desc desc = {.log = {count_message, &errors}};
+    const nebel_scene_desc desc = {.host.log = {count_message, &errors}};
     nebel_result result = nebel_parse_scene(text, strlen(text), "fuzz.json", &desc, &scene);
     if (result == NEBEL_OK) result = nebel_load_scene_models(scene);
     if (result == NEBEL_ERROR_FILE && size > 1) abort(); /* the reader is there, and so is the file */

@@ -27,8 +27,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
                                   .type = (nebel_voxel_type)(data[0] % 3),
                                   .filter = (nebel_grid_filter)(data[1] % 2),
                                   .size = {data[2] % 33, data[3] % 33, data[4] % 33}};
-    const nebel_scene_desc desc = {.allocator = {witness_allocate, witness_release, &seen},
-                                   .log = {witness_message, &seen}};
+    const nebel_scene_desc desc = {
+        .host = {.allocator = {witness_allocate, witness_release, &seen}, .log = {witness_message, &seen}}};
     const nebel_result result = nebel_load_grid(&file, &desc, &grid);
     demand((result == NEBEL_OK) == (grid != NULL) && (result == NEBEL_OK) == (seen.messages == 0));
     nebel_release_grid(grid);

@@ -52,8 +52,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     witness seen = {.max_bytes = (size_t)1 << 30};
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.allocator = {witness_allocate, witness_release, &seen},
-                                   .log = {witness_message, &seen}};
+    const nebel_scene_desc desc = {
+        .host = {.allocator = {witness_allocate, witness_release, &seen}, .log = {witness_message, &seen}}};
     const nebel_result result = nebel_parse_scene((const char *)data, size, "fuzz.json", &desc, &scene);
     if ((result == NEBEL_OK) != (scene != NULL)) abort();
     if ((result == NEBEL_OK) != (seen.messages == 0)) abort();

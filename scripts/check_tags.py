@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Checks that a name leads to one place: every tag of a structure, union or enumeration, and every name of a type, is defined in one file
 of include/, src/, tools/ and bench/, the files of src/ have names of their own, and so have the static functions and variables of a room,
-which may be compiled as one unit. Prints every name with two places and exits 1 where there is one.
+which may be compiled as one unit. What the caller gives an object has one place, too: nebel_host, first member of its description.
+Prints every fault and exits 1 where there is one.
 """
 
 import collections
@@ -26,6 +27,9 @@ INCLUDE = re.compile(r'^ *# *include "(?:\w+/)?(\w+\.h)"', re.M)
 
 DIRECTIVE = re.compile(r"^#(?:[^\n]*\\\n)*[^\n]*", re.M)
 STATIC = re.compile(r"^(?:[A-Z_]+ )?(?:static|NB_ALWAYS_INLINE)\b[^;={(]*?\b(\w+)(?:\[[^\]]*\])*(?:\(| =|;)", re.M)
+STRUCT = re.compile(r"^typedef struct (\w+) \{\n(.*?)^\}", re.M | re.S)
+HOST = re.compile(r"^ *nebel_(?:allocator|log|parallel|host) \w+;", re.M)
+
 STATIC_STRUCT = re.compile(r"^static [^;={(]*\{[^}]*^\} (\w+)(?:\[[^\]]*\])*(?: =|;)", re.M)
 
 
@@ -54,6 +58,15 @@ def places_in_rooms():
     return places
 
 
+def host_faults():
+    """Structures of public headers with an allocator, a log or threads of their own, or whose host is not the first member."""
+    for path in sorted((ROOT / "include").rglob("*.h")):
+        for name, members in STRUCT.findall(COMMENT.sub("", path.read_text())):
+            given = [line.strip() for line in HOST.findall(members)]
+            if name != "nebel_host" and given and (given != ["nebel_host host;"] or not members.startswith("    nebel_host host;")):
+                yield f"{path.relative_to(ROOT)}: {name}: `nebel_host host;` must be its first member, in place of {', '.join(given)}"
+
+
 def main():
     places = collections.defaultdict(set)
     files = collections.defaultdict(set)
@@ -69,7 +82,7 @@ def main():
                     places[tag].add(name)
     statics = places_in_rooms()
     faults = [f"{name}: {', '.join(sorted(where))}" for table in (places, files, statics)
-              for name, where in sorted(table.items()) if len(where) > 1]
+              for name, where in sorted(table.items()) if len(where) > 1] + list(host_faults())
     counts = f"{len(places)} types, {len(files)} files, {len(statics)} static names, {len(faults)} faults"
     print("\n".join(faults + [f"check_tags: {counts}"]))
     return 1 if faults else 0

@@ -20,7 +20,7 @@ static inline nebel_cells *create(const nebel_cells_desc *desc)
     fog_messages messages = {0};
     nebel_cells_desc logged = *desc;
     nebel_cells *cells = NULL;
-    logged.log = fog_messages_log(&messages);
+    logged.host.log = fog_messages_log(&messages);
     if (nebel_create_cells(&logged, &cells) != NEBEL_OK) fail_msg("%s", messages.text);
     return cells;
 }

@@ -30,7 +30,7 @@ static inline nebel_scene *load(const char *members, nebel_result *result, journ
 {
     char text[1000];
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.log = {remember, kept}};
+    const nebel_scene_desc desc = {.host.log = {remember, kept}};
     *kept = (journal){0};
     snprintf(text, sizeof text, "{\"nebel\": 1, \"fog\": [], \"models\": [{%s}]}", members);
     if (nebel_parse_scene(text, strlen(text), in_folder("scene.json"), &desc, &scene) != NEBEL_OK)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Writes the calls of tests/test_null.c and tests/test_null_gl.c: each public function with NULL for all of its pointers, and for
-each in turn while the others are good.
+each in turn while the others are good; and each that takes a host with an allocator that has one of its two functions.
 
     tests/null_calls.py INCLUDE_FOLDER OUTPUT HEADER...
 
@@ -20,7 +20,7 @@ INPUTS = ["cell", "cells_desc", "cell_view", "cell_point", "factor_desc", "d3d9_
           "segments", "pixels", "transfer", "particle", "nebula_desc", "sample_point", "atmosphere_desc", "sky_view_desc", "ground_planes",
           "cpu_renderer_desc", "method_desc", "frame_desc", "frame", "scene_desc", "planet", "scene_model", "camera_key", "sun_key", "volume_key",
           "scene_noise", "image", "image_desc", "movie_desc", "grid_file", "view", "depth_desc", "camera", "gl_desc", "gl_pass", "gl_classic_desc",
-          "gl_renderer_desc", "gl_frame_desc", "gl_planes", "photograph", "intrinsics", "depth_source"]
+          "gl_renderer_desc", "host", "gl_frame_desc", "gl_planes", "photograph", "intrinsics", "depth_source"]
 OUTPUTS = ["cell_fog", "cell_segment", "factor_desc", "d3d9_fog", "curve", "vertex_desc", "cloud_layer", "cloud_transfer", "air_shadow",
            "fog_shadow", "planet_map", "shell_hits", "droplet_properties", "volume_id", "bounds", "transfer", "particle", "medium_properties",
            "scatterer", "majorant_segment", "atmosphere_desc", "irradiance", "sun", "environment", "scene_noise", "image", "rays", "view_error", "texel_f32", "texel_u32",
@@ -33,6 +33,9 @@ VALUES = {"nebel_isa": "NEBEL_ISA_DEFAULT", "nebel_method": "NEBEL_METHOD_VERTEX
           "nebel_result": "NEBEL_OK"}
 NAMED = {"pixel_spread": ".5", "transmittance": ".5", "f": ".5", "chance": ".5", "tile_size": "16", "capacity": "64", "size": "2", "n": "1", "count": "1",
          "output_count": "1", "room": "1", "parts": "1", "width": "1", "height": "1", "thickness": "1e5", "scale": "1"}
+
+# These make nothing, and read the host's log alone.
+LOG_ALONE = {"nebel_resolve_atmosphere", "nebel_get_planet_map_size", "nebel_generate_planet_map"}
 
 
 def declarations(text):
@@ -114,16 +117,38 @@ def calls(result, name, parameters):
         yield f"    {macro}({name}({words}));"
 
 
+def hosted_types(folder):
+    """Structures that begin with a host, and the host itself; each with what leads to the host."""
+    texts = (path.read_text(encoding="utf-8") for path in folder.glob("*.h"))
+    found = {name: ".host" for text in texts for name in re.findall(r"^typedef struct (\w+) \{\n    nebel_host host;", text, re.M)}
+    return found | {"nebel_host": ""}
+
+
+def half_host_calls(hosted, result, name, parameters):
+    """With a host whose allocator has no second function, in a copy named `half` of what is good."""
+    for i, parameter in enumerate(parameters):
+        pointer = re.match(r"const (nebel_\w+) \*\w+$", parameter)
+        if not pointer or pointer[1] not in hosted or name in LOG_ALONE:
+            continue
+        words = ", ".join("&half" if k == i else good_value(other)[0] for k, other in enumerate(parameters))
+        macro = "CHECK_HALF" if result == "nebel_result" else "RUN"
+        yield f"""    {{
+        {pointer[1]} half = good_{pointer[1].removeprefix("nebel_")};
+        half{hosted[pointer[1]]}.allocator = (nebel_allocator){{.allocate = allocate_nothing}};
+        {macro}({name}({words}));
+    }}"""
+
+
 def main():
     folder, output, headers = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3:]
-    lines = []
+    lines, tests, hosted = [], [], hosted_types(folder)
     for header in headers:
-        lines += [f"static void null_in_{header}(void **state)", "{", "    (void)state;"]
-        for declaration in declarations((folder / f"{header}.h").read_text(encoding="utf-8")):
-            lines += calls(*declaration)
-        lines += ["}", ""]
-    tests = ", ".join(f"cmocka_unit_test(null_in_{header})" for header in headers)
-    output.write_text("\n".join([*lines, f"#define NULL_TESTS {tests}", ""]), encoding="utf-8")
+        declared = list(declarations((folder / f"{header}.h").read_text(encoding="utf-8")))
+        for test, body in ((f"null_in_{header}", [line for each in declared for line in calls(*each)]),
+                           (f"half_hosts_in_{header}", [line for each in declared for line in half_host_calls(hosted, *each)])):
+            lines += [f"static void {test}(void **state)", "{", "    (void)state;", *body, "}", ""]
+            tests.append(f"cmocka_unit_test({test})")
+    output.write_text("\n".join([*lines, f"#define NULL_TESTS {', '.join(tests)}", ""]), encoding="utf-8")
 
 
 if __name__ == "__main__":

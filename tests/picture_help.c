@@ -74,7 +74,7 @@ static void render_cpu(const nebel_scene_data *scene, nebel_lighting *fog, const
                        picture_pair *pair)
 {
     nebel_renderer *renderer = NULL;
-    const nebel_cpu_renderer_desc desc = {.log = {write_message, NULL}};
+    const nebel_cpu_renderer_desc desc = {.host.log = {write_message, NULL}};
     const nebel_frame_desc frame = {.camera = *camera,
                                     .width = pair->width,
                                     .height = pair->height,
@@ -90,7 +90,7 @@ static void render_gl(const nebel_scene_data *scene, nebel_lighting *fog, const 
                       const nebel_camera *camera, uint32_t samples, picture_pair *pair)
 {
     nebel_gl_renderer *renderer = NULL;
-    const nebel_gl_renderer_desc desc = {.log = {count_message, &pair->messages}};
+    const nebel_gl_renderer_desc desc = {.host.log = {count_message, &pair->messages}};
     const nebel_gl_frame_desc frame = {.camera = *camera,
                                        .width = pair->width,
                                        .height = pair->height,
@@ -349,7 +349,7 @@ static void write_picture(const picture_report *report, const picture_pair *pair
     const size_t count = 3 * (size_t)pair->width * pair->height;
     for (size_t i = 0; i < count; i++) samples[i] = fminf(fmaxf(samples[i], 0), 1);
     snprintf(path, sizeof path, "%s/%s", report->folder, file);
-    assert_int_equal(nebel_write_image(path, &(nebel_scene_desc){0}, &image), NEBEL_OK);
+    assert_int_equal(nebel_write_image(path, &(nebel_host){0}, &image), NEBEL_OK);
     fprintf(report->page, "<td><img src=\"%s\" alt=\"%s\">\n", file, file);
 }
 

@@ -48,7 +48,7 @@ typedef struct draft {
 static inline draft open_draft(const char *text)
 {
     static journal kept; /* as long as the scene lives */
-    const nebel_scene_desc desc = {.log = {remember, &kept}};
+    const nebel_scene_desc desc = {.host.log = {remember, &kept}};
     draft d = {0};
     write_file(text);
     if (nebel_load_scene(file_path(), &desc, &d.scene) != NEBEL_OK) fail_msg("%s", kept.last);

@@ -46,11 +46,16 @@ static inline void metered_release(void *memory, void *user)
     free(memory);
 }
 
-static inline nebel_scene_desc metered_desc(meter *m, journal *kept)
+static inline nebel_host metered_host(meter *m, journal *kept)
 {
     *m = (meter){.fail_at = 1L << 40};
     *kept = (journal){0};
-    return (nebel_scene_desc){.allocator = {metered_allocate, metered_release, m}, .log = {remember, kept}};
+    return (nebel_host){.allocator = {metered_allocate, metered_release, m}, .log = {remember, kept}};
+}
+
+static inline nebel_scene_desc metered_desc(meter *m, journal *kept)
+{
+    return (nebel_scene_desc){.host = metered_host(m, kept)};
 }
 
 /* Takes the mark ` out of a text; its line and column go to `place` as "LINE:COLUMN", "" where there is none. */
@@ -79,7 +84,7 @@ static inline nebel_scene *parse_good(const char *text)
 {
     static journal kept;
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.log = {remember, &kept}};
+    const nebel_scene_desc desc = {.host.log = {remember, &kept}};
     if (nebel_parse_scene(text, strlen(text), "test.json", &desc, &scene) != NEBEL_OK) fail_msg("%s", kept.last);
     return scene;
 }

@@ -38,7 +38,7 @@ int main(void)
     for (const char *at = input; at < input + size;) {
         const char *name = at, *text = name + strlen(name) + 1;
         nebel_scene *scene = NULL;
-        const nebel_scene_desc desc = {.log = {say, NULL}, .memory = (uint64_t)1 << 50}; /* limits one by one */
+        const nebel_scene_desc desc = {.host.log = {say, NULL}, .memory = (uint64_t)1 << 50}; /* limits one by one */
         if (text >= input + size) return 1;
         if (nebel_parse_scene(text, strlen(text), name, &desc, &scene) == NEBEL_OK) printf("good\n");
         nebel_destroy_scene(scene);

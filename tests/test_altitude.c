@@ -451,7 +451,7 @@ static void test_bad_numbers(void **state)
     bad[5].below = (nebel_below)2;
     for (int i = 0; i < 6; i++) {
         fog_messages messages = {0};
-        const nebel_fog_desc desc = {.log = fog_messages_log(&messages)};
+        const nebel_fog_desc desc = {.host.log = fog_messages_log(&messages)};
         const nebel_volume_desc volume = fog_of(&bad[i], 1, 0);
         nebel_fog *fog = NULL;
         assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);

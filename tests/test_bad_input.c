@@ -13,7 +13,8 @@
 static nebel_fog *make_fog(fog_memory *memory, fog_messages *messages)
 {
     nebel_fog *fog = NULL;
-    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(memory), .log = fog_messages_log(messages)};
+    const nebel_fog_desc desc = {
+        .host = {.allocator = fog_memory_allocator(memory), .log = fog_messages_log(messages)}};
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     return fog;
 }
@@ -322,11 +323,11 @@ static void test_wrong_fog_is_refused(void **unused)
     fog_memory memory = {0};
     const nebel_log log = fog_messages_log(&messages);
     const nebel_allocator whole = fog_memory_allocator(&memory);
-    const nebel_fog_desc wrong[] = {{.log = log, .allocator = {.allocate = whole.allocate}},
-                                    {.log = log, .allocator = {.release = whole.release}},
-                                    {.log = log, .max_opacity = -1},
-                                    {.log = log, .max_opacity = NOT_A_NUMBER},
-                                    {.log = log, .max_opacity = ENDLESS}};
+    const nebel_fog_desc wrong[] = {{.host = {.log = log, .allocator = {.allocate = whole.allocate}}},
+                                    {.host = {.log = log, .allocator = {.release = whole.release}}},
+                                    {.host.log = log, .max_opacity = -1},
+                                    {.host.log = log, .max_opacity = NOT_A_NUMBER},
+                                    {.host.log = log, .max_opacity = ENDLESS}};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         nebel_fog *fog = (nebel_fog *)&memory;
         assert_int_equal(nebel_create_fog(&wrong[i], &fog), i < 2 ? NEBEL_ERROR_ARGUMENT : NEBEL_ERROR_VALUE);
@@ -429,7 +430,7 @@ static void test_wrong_rays_are_refused_by_number_and_name(void **unused)
     (void)unused;
     enum { COUNT = 40 };
     fog_messages messages = {0};
-    const nebel_fog_desc desc = {.log = fog_messages_log(&messages)};
+    const nebel_fog_desc desc = {.host.log = fog_messages_log(&messages)};
     nebel_snapshot *const snapshot = fog_commit(&desc, &(nebel_volume_desc){.extinction = {1, 1, 1}}, 1);
     for (size_t i = 0; i < sizeof bad_rays / sizeof bad_rays[0]; i++)
         for (size_t place = 0; place < COUNT; place += 13) {
@@ -479,7 +480,7 @@ static void test_wrong_queries_are_refused(void **unused)
 {
     (void)unused;
     fog_messages messages = {0};
-    const nebel_fog_desc fog = {.log = fog_messages_log(&messages)};
+    const nebel_fog_desc fog = {.host.log = fog_messages_log(&messages)};
     nebel_snapshot *const snapshot = fog_commit(&fog, &(nebel_volume_desc){.extinction = {1, 1, 1}}, 1);
     const nebel_ray ray = {{0, 0, 0}, {0, 0, 1}, 1};
     nebel_transfer transfer;
@@ -518,7 +519,7 @@ static void test_instruction_sets_that_are_not_here_are_unsupported(void **unuse
 {
     (void)unused;
     fog_messages messages = {0};
-    const nebel_fog_desc fog = {.log = fog_messages_log(&messages)};
+    const nebel_fog_desc fog = {.host.log = fog_messages_log(&messages)};
     nebel_snapshot *const snapshot = fog_commit(&fog, &(nebel_volume_desc){.extinction = {1, 1, 1}}, 1);
     const nebel_ray ray = {{0, 0, 0}, {0, 0, 1}, 1};
     const float point[3] = {0, 0, 0};
@@ -593,7 +594,7 @@ static void test_light_without_end_is_an_error_of_that_ray(void **unused)
     for (size_t i = 0; i < sizeof endless_cases / sizeof endless_cases[0]; i++) {
         const endless_case *const c = &endless_cases[i];
         fog_messages messages = {0};
-        const nebel_fog_desc fog = {.log = fog_messages_log(&messages)};
+        const nebel_fog_desc fog = {.host.log = fog_messages_log(&messages)};
         nebel_snapshot *const snapshot = fog_commit(&fog, c->volumes, 2);
         for (int precision = 0; precision < 2; precision++)
             for (size_t place = 0; place < 20; place += 7) {

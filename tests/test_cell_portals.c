@@ -305,8 +305,8 @@ static void refuse(const nebel_cells_desc *desc, nebel_result result, size_t cel
     size_t failed_cell = 7, failed_portal = 7;
     nebel_cells_desc logged = *desc;
     nebel_cells *cells = (nebel_cells *)&messages;
-    logged.log = fog_messages_log(&messages);
-    logged.allocator = fog_memory_allocator(&memory);
+    logged.host.log = fog_messages_log(&messages);
+    logged.host.allocator = fog_memory_allocator(&memory);
     logged.failed_cell = &failed_cell;
     logged.failed_portal = &failed_portal;
     assert_int_equal(nebel_create_cells(&logged, &cells), result);
@@ -400,7 +400,7 @@ static void test_descriptions_that_are_none(void **state)
     desc.portal_count = 1;
     refuse(&desc, NEBEL_ERROR_ARGUMENT, SIZE_MAX, SIZE_MAX, "cells: portals is NULL");
     desc = good;
-    desc.allocator = (nebel_allocator){.allocate = fog_memory_allocate};
+    desc.host.allocator = (nebel_allocator){.allocate = fog_memory_allocate};
     assert_int_equal(nebel_create_cells(&desc, &cells), NEBEL_ERROR_ARGUMENT);
     assert_null(cells);
     desc = good;
@@ -424,7 +424,7 @@ static void test_memory_runs_out(void **state)
         nebel_result result = NEBEL_ERROR_MEMORY;
         for (size_t fail = 1; result != NEBEL_OK && fail < 100; fail++) {
             fog_memory memory = {.fail_first = fail, .fail_count = 1000};
-            nebel_cells_desc desc = {.cells = rooms, .cell_count = 3, .allocator = fog_memory_allocator(&memory)};
+            nebel_cells_desc desc = {.cells = rooms, .cell_count = 3, .host.allocator = fog_memory_allocator(&memory)};
             nebel_cells *cells = NULL;
             if (walls) {
                 desc.portals = &portal;

@@ -555,7 +555,7 @@ static void test_streams_that_share_bytes_are_refused(void **unused)
     (void)unused;
     fog_messages messages = {0};
     const nebel_volume_desc box = box_of(-5, -5, -5, 5, 5, 5, 1);
-    nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, &box, 1);
+    nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){.host.log = fog_messages_log(&messages)}, &box, 1);
     static unsigned char memory[4096], before[4096];
     unsigned char *const m = memory + 1024;
     const refusal refusals[] = {
@@ -620,7 +620,7 @@ static void test_descriptions_that_are_none_are_refused(void **unused)
     (void)unused;
     fog_messages messages = {0};
     const nebel_volume_desc box = box_of(-5, -5, -5, 5, 5, 5, 1);
-    nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, &box, 1);
+    nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){.host.log = fog_messages_log(&messages)}, &box, 1);
     const float point[3] = {0};
     float out[4];
     const double nan_color[3] = {0, 0, (double)NAN}, minus[3] = {-1, 0, 0}, beyond[3] = {0, 1e39, 0};

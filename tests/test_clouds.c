@@ -623,7 +623,7 @@ static void test_clouds_need_air(void **state)
     nebel_clouds *clouds;
     char said[200] = "";
     assert_int_equal(nebel_create_atmosphere(nebel_lookup_atmosphere("moon"), &moon), NEBEL_OK);
-    nebel_clouds_desc desc = {.atmosphere = moon, .layer_count = 1, .log = {keep_text, said}};
+    nebel_clouds_desc desc = {.atmosphere = moon, .layer_count = 1, .host.log = {keep_text, said}};
     assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_ERROR_VALUE);
     assert_string_equal(said, "clouds: need air, and the planet has none");
     desc.layer_count = 0;
@@ -692,11 +692,11 @@ static void test_bad_calls_are_refused(void **state)
     nebel_cloud_transfer nodes;
     float number;
     char said[200] = "";
-    const nebel_cloud_lighting_desc unknown = {.clouds = clouds, .isa = (nebel_isa)77, .log = {keep_text, said}};
+    const nebel_cloud_lighting_desc unknown = {.clouds = clouds, .isa = (nebel_isa)77, .host.log = {keep_text, said}};
     assert_int_equal(nebel_create_cloud_lighting(&unknown, &other), NEBEL_ERROR_UNSUPPORTED);
     assert_string_equal(said, "clouds: instruction set unknown: not available here");
     const nebel_cloud_lighting_desc no_sun = {
-        .clouds = clouds, .sun.irradiance = {0, none, 0}, .log = {keep_text, said}};
+        .clouds = clouds, .sun.irradiance = {0, none, 0}, .host.log = {keep_text, said}};
     assert_int_equal(nebel_create_cloud_lighting(&no_sun, &other), NEBEL_ERROR_ARGUMENT);
     assert_non_null(strstr(said, "clouds: view: sun"));
     assert_int_equal(nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.clouds = clouds, .time = none}, &other),
@@ -735,11 +735,11 @@ static void test_without_memory(void **state)
         nebel_cloud_lighting *view = NULL;
         nebel_cloud_workspace *workspace = NULL;
         const nebel_allocator scarce = {scarce_allocate, scarce_release, &left};
-        result = nebel_create_clouds(&(nebel_clouds_desc){.atmosphere = air, .layer_count = 1, .allocator = scarce},
-                                     &clouds);
+        result = nebel_create_clouds(
+            &(nebel_clouds_desc){.atmosphere = air, .layer_count = 1, .host.allocator = scarce}, &clouds);
         if (result == NEBEL_OK)
-            result =
-                nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.clouds = clouds, .allocator = scarce}, &view);
+            result = nebel_create_cloud_lighting(
+                &(nebel_cloud_lighting_desc){.clouds = clouds, .host.allocator = scarce}, &view);
         if (result == NEBEL_OK) result = nebel_create_cloud_workspace(view, &workspace);
         assert_true(result == NEBEL_OK || result == NEBEL_ERROR_MEMORY);
         nebel_destroy_cloud_workspace(workspace);

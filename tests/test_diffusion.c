@@ -567,7 +567,7 @@ static void test_bad_descriptions(void **unused)
 static void assert_refused(const nebel_volume_desc *volume, double max_opacity, const char *word)
 {
     fog_messages said = {0};
-    const nebel_fog_desc desc = {.log = fog_messages_log(&said), .max_opacity = max_opacity};
+    const nebel_fog_desc desc = {.host.log = fog_messages_log(&said), .max_opacity = max_opacity};
     const nebel_lighting_desc lights = {.sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}},
                                         .diffusion = &by_default};
     nebel_snapshot *snapshot = fog_commit(&desc, volume, 1);
@@ -701,7 +701,8 @@ static void test_memory_runs_out(void **unused)
                                         .lights = &green,
                                         .light_count = 1,
                                         .diffusion = &few};
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.allocator = fog_memory_allocator(&memory)}, &volume, 1);
+    nebel_snapshot *snapshot =
+        fog_commit(&(nebel_fog_desc){.host.allocator = fog_memory_allocator(&memory)}, &volume, 1);
     const size_t live = memory.live;
     size_t tries = 0;
     while (result == NEBEL_ERROR_MEMORY) {

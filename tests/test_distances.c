@@ -124,7 +124,7 @@ static void test_wrong_distances_are_refused(void **unused)
                                {(double)NAN, 0}, {0, (double)NAN}, {1e16, 0}, {0, 1e16}};
     fog_messages messages = {0};
     nebel_fog *fog = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.host.log = fog_messages_log(&messages)}, &fog), NEBEL_OK);
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         const nebel_volume_desc desc = ADD(1, wrong[i][0], wrong[i][1]);
         assert_int_equal(nebel_add_volume(fog, &desc, NULL), NEBEL_ERROR_VALUE);

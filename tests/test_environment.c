@@ -446,7 +446,7 @@ static void what_is_no_map_is_refused(void **state)
     assert_int_equal(nebel_create_environment_map(NULL, &map), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_create_environment_map(&desc, NULL), NEBEL_ERROR_ARGUMENT);
     desc = (nebel_environment_map_desc){
-        .allocator = {.allocate = fog_memory_allocate}, .width = 8, .height = 4, .pixels = pixels};
+        .host.allocator = {.allocate = fog_memory_allocate}, .width = 8, .height = 4, .pixels = pixels};
     assert_int_equal(nebel_create_environment_map(&desc, &map), NEBEL_ERROR_ARGUMENT);
     assert_null(map);
 }
@@ -487,14 +487,15 @@ static void memory_may_be_out(void **state)
     for (size_t fail = 1;; fail += step) {
         fog_memory memory = {.fail_first = fail, .fail_count = 1};
         const nebel_allocator allocator = {fog_memory_allocate, fog_memory_release, &memory};
-        const nebel_environment_map_desc desc = {.allocator = allocator, .width = 8, .height = 4, .pixels = pixels};
+        const nebel_environment_map_desc desc = {
+            .host.allocator = allocator, .width = 8, .height = 4, .pixels = pixels};
         nebel_lighting_desc lights = {.environment = {.type = NEBEL_ENVIRONMENT_MAP}};
         nebel_fog *fog = NULL;
         nebel_snapshot *snapshot = NULL;
         nebel_lighting *lighting = NULL;
         const nebel_volume_desc volume = {.extinction = {1, 1, 1}, .albedo = {1, 1, 1}, .phase = phases[2]};
         nebel_result result = nebel_create_environment_map(&desc, &lights.environment.map);
-        if (result == NEBEL_OK) result = nebel_create_fog(&(nebel_fog_desc){.allocator = allocator}, &fog);
+        if (result == NEBEL_OK) result = nebel_create_fog(&(nebel_fog_desc){.host.allocator = allocator}, &fog);
         if (result == NEBEL_OK) result = nebel_add_volume(fog, &volume, NULL);
         if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
         if (result == NEBEL_OK) result = nebel_create_lighting(snapshot, &lights, &lighting);

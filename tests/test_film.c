@@ -82,10 +82,10 @@ static void read_as_png(int number, unsigned char *bytes)
     const nebel_image image = make_picture(number);
     nebel_image back;
     snprintf(path, sizeof path, "%s/picture.png", folder);
-    assert_int_equal(nebel_write_image(path, &(nebel_scene_desc){0}, &image), NEBEL_OK);
-    assert_int_equal(nebel_read_image(path, &(nebel_scene_desc){0}, &back), NEBEL_OK);
+    assert_int_equal(nebel_write_image(path, &(nebel_host){0}, &image), NEBEL_OK);
+    assert_int_equal(nebel_read_image(path, &(nebel_host){0}, &back), NEBEL_OK);
     for (int i = 0; i < WIDTH * HEIGHT * 3; i++) bytes[i] = (unsigned char)lrintf(255 * back.samples[i]);
-    nebel_free_image(&(nebel_scene_desc){0}, &back);
+    nebel_free_image(&(nebel_host){0}, &back);
     free(image.samples);
     assert_int_equal(remove(path), 0);
 }
@@ -178,7 +178,7 @@ static void nothing_is_left_of_what_was_given_up(void **test)
     nebel_movie *film;
     journal kept = {0};
     const nebel_image image = make_picture(0);
-    const nebel_movie_desc desc = {.log = {remember, &kept}};
+    const nebel_movie_desc desc = {.host.log = {remember, &kept}};
     (void)test;
     assert_int_equal(nebel_create_movie(in_folder("film.webp"), &desc, &film), NEBEL_OK);
     assert_int_equal(nebel_finish_movie(film), NEBEL_ERROR_ARGUMENT);
@@ -199,7 +199,7 @@ static void full_disks_leave_the_old_file(void **test)
     journal kept = {0};
     struct stat before, after;
     const char *path = in_folder("film.webp");
-    const nebel_movie_desc desc = {.log = {remember, &kept}, .quality = 100};
+    const nebel_movie_desc desc = {.host.log = {remember, &kept}, .quality = 100};
     struct rlimit all, little = {.rlim_cur = 500};
     (void)test;
     assert_int_equal(make_film(path, &desc, 2), NEBEL_OK);
@@ -228,7 +228,7 @@ static void streams_that_take_nothing_stop_it_at_once(void **test)
     int ends[2];
     char name[40];
     const nebel_image image = {1, 1, 3, names, black};
-    const nebel_movie_desc desc = {.log = {remember, &kept}};
+    const nebel_movie_desc desc = {.host.log = {remember, &kept}};
     (void)test;
     assert_int_equal(pipe(ends), 0);
     snprintf(name, sizeof name, "/dev/fd/%d", ends[1]);
@@ -256,7 +256,8 @@ static void sides_have_a_limit(void **test)
     meter m = {.fail_at = 1L << 40};
     nebel_movie *film;
     nebel_image wide = {16384, 1, 3, names, calloc(16384 * 3, sizeof(float))};
-    const nebel_movie_desc desc = {.log = {remember, &kept}, .allocator = {metered_allocate, metered_release, &m}};
+    const nebel_movie_desc desc = {
+        .host = {.log = {remember, &kept}, .allocator = {metered_allocate, metered_release, &m}}};
     (void)test;
     assert_int_equal(nebel_create_movie(in_folder("film.webp"), &desc, &film), NEBEL_OK);
     assert_int_equal(nebel_add_movie_frame(film, &wide), NEBEL_ERROR_LIMIT);
@@ -277,8 +278,9 @@ static void a_finished_film_takes_no_more(void **test)
     journal kept = {0};
     const nebel_image image = make_picture(0);
     (void)test;
-    assert_int_equal(nebel_create_movie(in_folder("film.webp"), &(nebel_movie_desc){.log = {remember, &kept}}, &film),
-                     NEBEL_OK);
+    assert_int_equal(
+        nebel_create_movie(in_folder("film.webp"), &(nebel_movie_desc){.host.log = {remember, &kept}}, &film),
+        NEBEL_OK);
     assert_int_equal(nebel_add_movie_frame(film, &image), NEBEL_OK);
     assert_int_equal(nebel_finish_movie(film), NEBEL_OK);
     assert_int_equal(nebel_add_movie_frame(film, &image), NEBEL_ERROR_ARGUMENT);
@@ -309,7 +311,7 @@ static void refusals_say_why(void **test)
         nebel_movie *film = (nebel_movie *)&kept;
         kept = (journal){0};
         const nebel_movie_desc desc = {
-            .log = {remember, &kept}, .frames_per_second = cases[i].rate, .quality = cases[i].quality};
+            .host.log = {remember, &kept}, .frames_per_second = cases[i].rate, .quality = cases[i].quality};
         assert_int_equal(nebel_create_movie(in_folder(cases[i].name), &desc, &film), cases[i].result);
         assert_null(film);
         if (strstr(kept.last, cases[i].words) == NULL) fail_msg("case %zu says: %s", i, kept.last);

@@ -99,7 +99,8 @@ typedef struct bench {
 
 static nebel_fog *make_fog(bench *b)
 {
-    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&b->memory), .log = fog_messages_log(&b->messages)};
+    const nebel_fog_desc desc = {
+        .host = {.allocator = fog_memory_allocator(&b->memory), .log = fog_messages_log(&b->messages)}};
     nebel_fog *fog = NULL;
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     return fog;
@@ -153,7 +154,8 @@ static size_t fail_each_in_fog(act *perform, act *undo, const nebel_volume_desc 
 
 static nebel_result create(bench *b)
 {
-    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&b->memory), .log = fog_messages_log(&b->messages)};
+    const nebel_fog_desc desc = {
+        .host = {.allocator = fog_memory_allocator(&b->memory), .log = fog_messages_log(&b->messages)}};
     nebel_fog *fog = (nebel_fog *)&desc;
     const nebel_result result = nebel_create_fog(&desc, &fog);
     if (result != NEBEL_OK) assert_null(fog);
@@ -411,7 +413,8 @@ static void test_a_snapshot_outlives_changes_and_the_fog(void **unused)
     fog_memory memory = {0};
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.allocator = fog_memory_allocator(&memory)}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.host.allocator = fog_memory_allocator(&memory)}, &fog),
+                     NEBEL_OK);
     nebel_volume_id ids[KINDS];
     for (int i = 0; i < KINDS; i++) ids[i] = must_add(fog, &kinds[i]);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);

@@ -48,7 +48,7 @@ static void write_picture(const char *name)
     static const float white[3] = {1, 1, 1};
     static const char *const channels[] = {"R", "G", "B"};
     const nebel_image image = {1, 1, 3, channels, (float *)white};
-    assert_int_equal(nebel_write_image(in_folder(name), &(nebel_scene_desc){0}, &image), NEBEL_OK);
+    assert_int_equal(nebel_write_image(in_folder(name), &(nebel_host){0}, &image), NEBEL_OK);
 }
 
 static nebel_scene *load_file(const char *name)

@@ -215,7 +215,7 @@ static void test_binary_files(void **state)
     nebel_scene *scene = parse_good(model);
     assert_int_equal(nebel_get_scene_data(scene)->volume_count, 1);
     nebel_destroy_scene(scene);
-    const nebel_scene_desc silent = {.log = {NULL, NULL}};
+    const nebel_scene_desc silent = {.host.log = {NULL, NULL}};
     for (size_t cut = 0; cut < 20; cut++) { /* said when the model is loaded */
         write_file(GLB, file, cut);
         assert_int_equal(nebel_parse_scene(model, strlen(model), "test.json", &silent, &scene), NEBEL_OK);

@@ -276,7 +276,7 @@ static void test_what_is_not_decoded_in_process(void **state)
     static const char scene_text[] = "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"a.gltf\"}]}";
     journal kept = {0};
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.log = {remember, &kept}, .models_in_process = 1};
+    const nebel_scene_desc desc = {.host.log = {remember, &kept}, .models_in_process = 1};
     write_gltf("\"EXT_meshopt_compression\"", FLOATS("a.bin"));
     assert_int_equal(nebel_parse_scene(scene_text, sizeof scene_text - 1, in_folder("s.json"), &desc, &scene),
                      NEBEL_OK);

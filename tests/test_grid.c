@@ -660,7 +660,7 @@ static void bad_grids_are_refused(void **test)
         {{.size = {2, 2, 2}, .voxels = endless}, NEBEL_ERROR_VALUE, "voxel 1, 0, 1 has the density inf"},
         {{.size = {2, 2, 2}, .voxels = huge}, NEBEL_ERROR_VALUE, "must be within 0 and 1e+09"},
         {{.size = {2, 2, 2}, .voxels = bytes, .type = NEBEL_VOXEL_UINT8, .offset = -.1}, NEBEL_ERROR_VALUE, "-0.1"},
-        {{.size = {2, 2, 2}, .voxels = good, .allocator = {.user = NULL, .allocate = fog_memory_allocate}},
+        {{.size = {2, 2, 2}, .voxels = good, .host.allocator = {.user = NULL, .allocate = fog_memory_allocate}},
          NEBEL_ERROR_ARGUMENT,
          "both functions or neither"},
     };
@@ -668,7 +668,7 @@ static void bad_grids_are_refused(void **test)
         fog_messages messages = {0};
         nebel_grid_desc desc = cases[i].desc;
         nebel_grid *grid = (nebel_grid *)&messages;
-        desc.log = fog_messages_log(&messages);
+        desc.host.log = fog_messages_log(&messages);
         assert_int_equal(nebel_create_grid(&desc, &grid), cases[i].result);
         assert_null(grid);
         assert_int_equal(messages.count, 1);
@@ -685,7 +685,7 @@ static void volumes_need_a_box_and_a_grid(void **test)
     nebel_fog *fog = NULL;
     const float voxel = 1;
     nebel_grid *grid = make_grid((int[]){1, 1, 1}, NEBEL_VOXEL_FLOAT, NEBEL_GRID_FILTER_LINEAR, &voxel);
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.host.log = fog_messages_log(&messages)}, &fog), NEBEL_OK);
     nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX, .max = {1, 1, 1}},
                            .density = {.type = NEBEL_DENSITY_GRID},
                            .extinction = {1, 1, 1}};
@@ -723,7 +723,7 @@ static nebel_result live_and_die(const nebel_allocator *allocator, double albedo
     nebel_snapshot *snapshot = NULL;
     nebel_lighting *lit[2] = {NULL, NULL};
     nebel_volume_id id;
-    const nebel_grid_desc desc = {.allocator = *allocator, .size = {2, 2, 2}, .voxels = voxels};
+    const nebel_grid_desc desc = {.host.allocator = *allocator, .size = {2, 2, 2}, .voxels = voxels};
     nebel_result result = nebel_create_grid(&desc, &grid);
     if (result != NEBEL_OK) return result;
     nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX, .max = {1, 1, 1}},
@@ -731,7 +731,7 @@ static nebel_result live_and_die(const nebel_allocator *allocator, double albedo
                            .extinction = {1, 1, 1},
                            .albedo = {albedo, albedo, albedo}};
     nebel_lighting_desc sky = {.sun = {{.2, 1, .3}, {1, 1, 1}}};
-    result = nebel_create_fog(&(nebel_fog_desc){.allocator = *allocator}, &fog);
+    result = nebel_create_fog(&(nebel_fog_desc){.host.allocator = *allocator}, &fog);
     if (result == NEBEL_OK) result = nebel_add_volume(fog, &v, &id);
     if (result == NEBEL_OK) result = nebel_update_volume(fog, id, &v);
     for (int i = 0; i < 2 && result == NEBEL_OK; i++) {

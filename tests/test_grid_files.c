@@ -64,7 +64,7 @@ static nebel_grid *load(const nebel_grid_file *file)
 {
     journal kept = {0};
     nebel_grid *grid = NULL;
-    if (nebel_load_grid(file, &(nebel_scene_desc){.log = {remember, &kept}}, &grid) != NEBEL_OK)
+    if (nebel_load_grid(file, &(nebel_scene_desc){.host.log = {remember, &kept}}, &grid) != NEBEL_OK)
         fail_msg("%s", kept.last);
     return grid;
 }
@@ -133,7 +133,7 @@ static nebel_result read_nanovdb(const void *data, size_t size, const char *name
     meter m;
     nb_voxels voxels;
     const nebel_scene_desc desc = metered_desc(&m, kept);
-    const nb_codec codec = {.allocator = desc.allocator, .log = desc.log, .name = "x.nvdb"};
+    const nb_codec codec = {.allocator = desc.host.allocator, .log = desc.host.log, .name = "x.nvdb"};
     const nb_bytes bytes = {(unsigned char *)data, size, size};
     const nebel_result result = nb_nanovdb_read(&codec, &bytes, name, &voxels);
     if (result == NEBEL_OK) nb_release(&codec.allocator, voxels.data);
@@ -323,7 +323,7 @@ static void scenes_say_what_is_wrong(void **state)
                  "{\"nebel\": 1, \"fog\": [{\"shape\": {\"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1]}, "
                  "\"extinction\": 1, \"density\": {%s}}]}",
                  cases[i].density);
-        const nebel_scene_desc desc = {.log = {remember, &kept}};
+        const nebel_scene_desc desc = {.host.log = {remember, &kept}};
         const nebel_result result = nebel_parse_scene(text, strlen(text), in_folder("scene.json"), &desc, &scene);
         assert_int_not_equal(result, NEBEL_OK);
         assert_int_equal(kept.count, 1);
@@ -491,7 +491,7 @@ static void copies_are_saved(void **state)
     journal kept = {0};
     nebel_scene *scene = NULL, *again = NULL;
     const char *path = in_folder("copies.json");
-    const nebel_scene_desc desc = {.log = {remember, &kept}};
+    const nebel_scene_desc desc = {.host.log = {remember, &kept}};
     write_bytes("copies.json", WEDGE, strlen(WEDGE));
     assert_int_equal(nebel_load_scene(path, &desc, &scene), NEBEL_OK);
     const nebel_scene_data *before = nebel_get_scene_data(scene);

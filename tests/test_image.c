@@ -56,8 +56,8 @@ static size_t file_count(void)
 static nebel_result write_image(const char *path, const nebel_image *image, journal *kept)
 {
     meter m;
-    const nebel_scene_desc desc = metered_desc(&m, kept);
-    const nebel_result result = nebel_write_image(path, &desc, image);
+    const nebel_host host = metered_host(&m, kept);
+    const nebel_result result = nebel_write_image(path, &host, image);
     assert_int_equal(m.live, 0);
     return result;
 }
@@ -67,8 +67,8 @@ static nebel_result check_path(const char *path, journal *kept)
 {
     meter m;
     const size_t files = file_count();
-    const nebel_scene_desc desc = metered_desc(&m, kept);
-    const nebel_result result = nebel_check_image_path(path, &desc);
+    const nebel_host host = metered_host(&m, kept);
+    const nebel_result result = nebel_check_image_path(path, &host);
     assert_int_equal(m.live, 0);
     assert_int_equal(file_count(), files);
     assert_int_equal(kept->count, result != NEBEL_OK);
@@ -78,12 +78,12 @@ static nebel_result check_path(const char *path, journal *kept)
 static nebel_result read_image(const char *path, nebel_image *image, journal *kept)
 {
     *kept = (journal){0};
-    return nebel_read_image(path, &(nebel_scene_desc){.log = {remember, kept}}, image);
+    return nebel_read_image(path, &(nebel_host){.log = {remember, kept}}, image);
 }
 
 static void free_image(nebel_image *image)
 {
-    nebel_free_image(&(nebel_scene_desc){0}, image);
+    nebel_free_image(&(nebel_host){0}, image);
 }
 
 static void write_bytes(const char *path, const void *data, size_t size)
@@ -475,7 +475,7 @@ static void test_what_is_no_picture(void **state)
     assert_non_null(strstr(kept.last, "neither a PNG nor an OpenEXR picture"));
     unlink(in_folder("text"));
     assert_int_equal(read_image(in_folder("none"), &image, &kept), NEBEL_ERROR_FILE);
-    const nebel_scene_desc half = {.allocator = {.allocate = metered_allocate}, .log = {remember, &kept}};
+    const nebel_host half = {.allocator = {.allocate = metered_allocate}, .log = {remember, &kept}};
     assert_int_equal(nebel_read_image(in_folder("none"), &half, &image), NEBEL_ERROR_ARGUMENT);
     assert_string_equal(kept.last, "an allocator needs both its functions; one is NULL");
     assert_int_equal(read_image(folder, &image, &kept), NEBEL_ERROR_FILE);
@@ -704,9 +704,9 @@ static void test_every_failing_allocation_is_survived(void **state)
         for (long k = 0; result != NEBEL_OK; k++) {
             meter m;
             journal kept;
-            const nebel_scene_desc desc = metered_desc(&m, &kept);
+            const nebel_host host = metered_host(&m, &kept);
             m.fail_at = k;
-            result = nebel_write_image(paths[i], &desc, &image);
+            result = nebel_write_image(paths[i], &host, &image);
             if (result != NEBEL_OK) assert_int_equal(result, NEBEL_ERROR_MEMORY);
             assert_int_equal(m.live, 0);
             assert_true(k < 500);
@@ -715,10 +715,10 @@ static void test_every_failing_allocation_is_survived(void **state)
         for (long k = 0; result != NEBEL_OK; k++) {
             meter m;
             journal kept;
-            const nebel_scene_desc desc = metered_desc(&m, &kept);
+            const nebel_host host = metered_host(&m, &kept);
             m.fail_at = k;
-            result = nebel_read_image(paths[i], &desc, &back);
-            nebel_free_image(&desc, &back);
+            result = nebel_read_image(paths[i], &host, &back);
+            nebel_free_image(&host, &back);
             assert_int_equal(m.live, 0);
             assert_true(k < 500);
         }

@@ -398,7 +398,7 @@ static void lamps_are_checked(void **state)
     wrong[11].outer_angle = 181;
     (void)state;
     fog_messages messages = {0};
-    nebel_snapshot *empty = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, NULL, 0);
+    nebel_snapshot *empty = fog_commit(&(nebel_fog_desc){.host.log = fog_messages_log(&messages)}, NULL, 0);
     nebel_lighting *made = NULL;
     for (int i = 0; i < 12; i++) {
         const nebel_light both[] = {right, wrong[i]};
@@ -423,7 +423,7 @@ static void lost_memory_is_survived(void **state)
     const nebel_ray_visibility pieces = {first, NULL};
     const nebel_ray ray = {{0, 0.2, -1}, {0, 0, 1}, HUGE_VAL};
     fog_memory memory = {0};
-    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory)};
+    const nebel_fog_desc desc = {.host.allocator = fog_memory_allocator(&memory)};
     const nebel_lighting_desc lights = {.lights = &lamp, .light_count = 1};
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;

@@ -374,11 +374,12 @@ static void faults_say_the_number(void **state)
     char said[200] = "";
     nebel_textured_planet *layers;
     const nebel_log log = {keep_text, said};
-    assert_int_equal(nebel_create_textured_planet(&(nebel_textured_planet_desc){.radius = .5, .log = log}, &layers),
-                     NEBEL_ERROR_VALUE);
+    assert_int_equal(
+        nebel_create_textured_planet(&(nebel_textured_planet_desc){.radius = .5, .host.log = log}, &layers),
+        NEBEL_ERROR_VALUE);
     assert_string_equal(said, "planet: radius: is 0.5; must be within 1 and 1e+12");
     nebel_textured_planet_desc desc = {
-        .cloud_shell_count = 2, .cloud_shells = {{.gain = 1}, {.height = -1}}, .log = log};
+        .cloud_shell_count = 2, .cloud_shells = {{.gain = 1}, {.height = -1}}, .host.log = log};
     assert_int_equal(nebel_create_textured_planet(&desc, &layers), NEBEL_ERROR_VALUE);
     assert_string_equal(said, "planet: clouds[1]: height: is -1; must be more than 0, at most 1e12");
     assert_null(layers);
@@ -447,7 +448,7 @@ static void memory_that_runs_out_is_told(void **state)
     nebel_textured_planet *layers = NULL;
     for (int most = 0;; most++) {
         int left = most;
-        nebel_textured_planet_desc desc = {.allocator = {scarce_allocate, scarce_release, &left},
+        nebel_textured_planet_desc desc = {.host.allocator = {scarce_allocate, scarce_release, &left},
                                            .color_map = {COLUMNS, ROWS, 3, ground[0][0]},
                                            .cloud_shell_count = 1};
         desc.cloud_shells[0].coverage_map = (nebel_planet_map){COLUMNS, ROWS, 1, clouds[0]};

@@ -31,7 +31,7 @@ static nebel_environment_map *make_map(nebel_allocator allocator)
     nebel_environment_map *map = NULL;
     for (int i = 0; i < NUMBERS; i++) pixels[i] = (float)(i % 13) * .1f;
     const nebel_environment_map_desc desc = {
-        .allocator = allocator, .width = 2 * HEIGHT, .height = HEIGHT, .pixels = pixels};
+        .host.allocator = allocator, .width = 2 * HEIGHT, .height = HEIGHT, .pixels = pixels};
     assert_int_equal(nebel_create_environment_map(&desc, &map), NEBEL_OK);
     return map;
 }
@@ -43,7 +43,7 @@ static nebel_grid *make_grid(nebel_allocator allocator, uint64_t seed)
     nebel_grid *grid = NULL;
     for (int i = 0; i < SIDE * SIDE * SIDE; i++) voxels[i] = (float)dice(&seed, 0, 1);
     const nebel_grid_desc desc = {
-        .allocator = allocator, .size = {SIDE, SIDE, SIDE}, .voxels = voxels, .filter = NEBEL_GRID_FILTER_LINEAR};
+        .host.allocator = allocator, .size = {SIDE, SIDE, SIDE}, .voxels = voxels, .filter = NEBEL_GRID_FILTER_LINEAR};
     assert_int_equal(nebel_create_grid(&desc, &grid), NEBEL_OK);
     return grid;
 }
@@ -108,8 +108,8 @@ static void what_is_no_lighting_is_refused(void **state)
     const nebel_allocator whole = fog_memory_allocator(&memory);
     nebel_environment_map *map = make_map((nebel_allocator){0});
     const refusal wrong[] = {
-        {{.allocator = {.allocate = whole.allocate}}, NEBEL_ERROR_ARGUMENT, "allocator"},
-        {{.allocator = {.release = whole.release}}, NEBEL_ERROR_ARGUMENT, "allocator"},
+        {{.host.allocator = {.allocate = whole.allocate}}, NEBEL_ERROR_ARGUMENT, "allocator"},
+        {{.host.allocator = {.release = whole.release}}, NEBEL_ERROR_ARGUMENT, "allocator"},
         {{.light_count = 1}, NEBEL_ERROR_ARGUMENT, "lights"},
         {{.sun = {.irradiance = {1, 1, 1}}}, NEBEL_ERROR_VALUE, "sun direction"},
         {{.sun = {{0, nan, 0}, {1, 1, 1}}}, NEBEL_ERROR_VALUE, "sun direction"},
@@ -132,7 +132,7 @@ static void what_is_no_lighting_is_refused(void **state)
         {{.diffusion = &high}, NEBEL_ERROR_VALUE, "diffusion: ground_height"},
         {{.diffusion = &white}, NEBEL_ERROR_VALUE, "diffusion: ground_albedo"},
     };
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, &ball, 1);
+    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.host.log = fog_messages_log(&messages)}, &ball, 1);
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) expect_refused(snapshot, &messages, &wrong[i]);
     assert_int_equal(memory.calls, 0);
     nebel_release_snapshot(snapshot);
@@ -144,7 +144,7 @@ static void without_a_place_or_a_snapshot_there_is_none(void **state)
     (void)state;
     fog_messages messages = {0};
     nebel_lighting *made = (nebel_lighting *)&messages;
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, &ball, 1);
+    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.host.log = fog_messages_log(&messages)}, &ball, 1);
     assert_int_equal(nebel_create_lighting(NULL, NULL, &made), NEBEL_ERROR_ARGUMENT);
     assert_null(made);
     assert_int_equal(nebel_create_lighting(NULL, NULL, NULL), NEBEL_ERROR_ARGUMENT);
@@ -161,8 +161,8 @@ static void what_diffusion_cannot_do_is_said_to_the_lightings_log(void **state)
 {
     (void)state;
     fog_messages of_fog = {0}, of_lights = {0};
-    const nebel_fog_desc desc = {.log = fog_messages_log(&of_fog), .max_opacity = .5};
-    const refusal r = {{.log = fog_messages_log(&of_lights), .sun = noon, .diffusion = &few_cells},
+    const nebel_fog_desc desc = {.host.log = fog_messages_log(&of_fog), .max_opacity = .5};
+    const refusal r = {{.host.log = fog_messages_log(&of_lights), .sun = noon, .diffusion = &few_cells},
                        NEBEL_ERROR_UNSUPPORTED,
                        "max_opacity"};
     nebel_snapshot *snapshot = fog_commit(&desc, &ball, 1);
@@ -176,7 +176,7 @@ static void a_lighting_of_another_snapshot_is_refused(void **state)
 {
     (void)state;
     fog_messages messages = {0};
-    const nebel_fog_desc desc = {.log = fog_messages_log(&messages)};
+    const nebel_fog_desc desc = {.host.log = fog_messages_log(&messages)};
     const nebel_lighting_desc lights = {.sun = noon, .environment = dusk};
     nebel_snapshot *snapshot = fog_commit(&desc, &ball, 1), *twin = fog_commit(&desc, &ball, 1);
     nebel_lighting *lighting = light_fog(twin, &lights);
@@ -220,13 +220,13 @@ static void give_back(int order, int with_map)
     nebel_environment_map *map = with_map ? make_map(allocator) : NULL;
     nebel_grid *grid = with_map ? NULL : make_grid(allocator, 1);
     const nebel_volume_desc cloud = cloud_of(grid);
-    nebel_lighting_desc lights = {.allocator = fog_memory_allocator(&of_lights),
+    nebel_lighting_desc lights = {.host.allocator = fog_memory_allocator(&of_lights),
                                   .sun = noon,
                                   .environment = dusk,
                                   .lights = lamps,
                                   .light_count = 2};
     if (with_map) lights.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .map = map};
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.allocator = allocator}, with_map ? &ball : &cloud, 1);
+    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.host.allocator = allocator}, with_map ? &ball : &cloud, 1);
     nebel_lighting *lighting = light_fog(snapshot, &lights);
     const answers before = ask(lighting);
     int left[] = {0, 1, 2, 3}, lightings = with_map ? 1 : 2;
@@ -264,7 +264,7 @@ static void what_serves_again_lives_on(void **state)
     const nebel_allocator allocator = fog_memory_allocator(&memory);
     nebel_grid *grid = make_grid(allocator, 1);
     const nebel_volume_desc cloud = cloud_of(grid);
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.allocator = allocator}, &cloud, 1);
+    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.host.allocator = allocator}, &cloud, 1);
     nebel_lighting_desc lights = {.sun = noon, .environment = dusk};
     nebel_lighting *first = light_fog(snapshot, &lights);
     const answers before = ask(first);
@@ -324,9 +324,9 @@ static void lost_memory_is_survived(void **state)
             .lights = lamps,
             .light_count = 2,
             .diffusion = is_diffuse ? &few_cells : NULL};
-        const nebel_fog_desc desc = {.allocator = allocator, .log = fog_messages_log(&messages)};
+        const nebel_fog_desc desc = {.host = {.allocator = allocator, .log = fog_messages_log(&messages)}};
         if (is_diffuse) lights.light_count = 0; /* test_diffusion.c has lights */
-        if (has_own) lights.allocator = fog_memory_allocator(&own);
+        if (has_own) lights.host.allocator = fog_memory_allocator(&own);
         nebel_snapshot *snapshot = fog_commit(&desc, is_cloud ? &cloud : &ball, 1);
         const size_t one = fail_each(snapshot, lights, has_own ? &own : &memory, 1);
         const size_t all = is_diffuse ? 0 : fail_each(snapshot, lights, has_own ? &own : &memory, 1000);

@@ -104,7 +104,8 @@ static void test_a_million_volumes_are_found_by_every_ray(void **unused)
     fog_memory memory = {0};
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.allocator = fog_memory_allocator(&memory)}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.host.allocator = fog_memory_allocator(&memory)}, &fog),
+                     NEBEL_OK);
     const double start = seconds();
     for (size_t i = 0; i < volume_count; i++) {
         const nebel_volume_desc desc = describe(&balls[i]);

@@ -31,7 +31,8 @@ static const char quad_obj[] = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
 static nebel_result load_by(const char *reader, int in_process, const char *file, journal *kept, nebel_scene **scene)
 {
     char text[1000];
-    const nebel_scene_desc desc = {.log = {remember, kept}, .model_reader = reader, .models_in_process = in_process};
+    const nebel_scene_desc desc = {
+        .host.log = {remember, kept}, .model_reader = reader, .models_in_process = in_process};
     *kept = (journal){0};
     snprintf(text, sizeof text, "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"%s\"}]}", file);
     if (nebel_parse_scene(text, strlen(text), in_folder("scene.json"), &desc, scene) != NEBEL_OK)

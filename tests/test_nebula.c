@@ -297,7 +297,7 @@ static void test_a_crowd_may_be_cut_anywhere(void **unused)
 static void expect(nebel_result result, nebel_nebula_desc desc)
 {
     fog_messages messages = {0};
-    desc.log = fog_messages_log(&messages);
+    desc.host.log = fog_messages_log(&messages);
     assert_int_equal(nebel_generate_nebula(&desc, particles), result);
     assert_int_equal(messages.count, 1);
 }
@@ -320,7 +320,7 @@ static void test_refuses_what_is_not_a_nebula(void **unused)
     expect(NEBEL_ERROR_VALUE, desc);
     desc = a_nebula(), desc.turbulence_scale = NEBEL_MIN_LENGTH / 2;
     expect(NEBEL_ERROR_VALUE, desc);
-    desc = a_nebula(), desc.allocator.release = fog_memory_release;
+    desc = a_nebula(), desc.host.allocator.release = fog_memory_release;
     expect(NEBEL_ERROR_ARGUMENT, desc);
     desc = a_nebula(), desc.absorption[1] = -1;
     expect(NEBEL_ERROR_VALUE, desc);
@@ -340,7 +340,7 @@ static void test_memory_may_fail(void **unused)
         fog_memory memory = {.fail_first = k, .fail_count = 1};
         nebel_nebula_desc desc = a_nebula();
         desc.count = 3;
-        desc.allocator = fog_memory_allocator(&memory);
+        desc.host.allocator = fog_memory_allocator(&memory);
         const nebel_result result = nebel_generate_nebula(&desc, particles);
         assert_int_equal(memory.live, 0);
         if (memory.fail_first > 0) {

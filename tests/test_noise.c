@@ -171,14 +171,14 @@ static void bad_numbers_are_refused(void **test)
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         fog_messages messages = {0};
         nebel_grid *grid = (nebel_grid *)&messages;
-        cases[i].desc.log = fog_messages_log(&messages);
+        cases[i].desc.host.log = fog_messages_log(&messages);
         assert_int_equal(nebel_create_noise_grid(&cases[i].desc, &grid), cases[i].result);
         assert_null(grid);
         if (strstr(messages.text, cases[i].word) == NULL) fail_msg("case %zu says: %s", i, messages.text);
     }
     nebel_grid *grid = NULL;
     const nebel_noise_desc half = {
-        .size = {8, 8, 8}, .frequency = {1, 1, 1}, .allocator = {.release = fog_memory_release}};
+        .size = {8, 8, 8}, .frequency = {1, 1, 1}, .host.allocator = {.release = fog_memory_release}};
     assert_int_equal(nebel_create_noise_grid(&half, &grid), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_create_noise_grid(NULL, NULL), NEBEL_ERROR_ARGUMENT);
 }

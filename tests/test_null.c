@@ -1,6 +1,7 @@
 /* No public function of the core, of scenes and of the CPU renderer crashes on NULL: each is called with NULL for all of its
  * pointers, and for each in turn while the others are good (null_calls.py). It returns, and says OK or ARGUMENT where it has a
- * result, or FILE where a path is good: there is nothing at it. */
+ * result, or FILE where a path is good: there is nothing at it. Each that takes a host says ARGUMENT where its allocator has one
+ * function of two. */
 #include "scene_help.h"
 
 #include <nebel/classic.h>
@@ -16,6 +17,7 @@
 /* ---- good arguments -------------------------------------------------------------------------- */
 
 static const nebel_log good_log = {.write = NULL};
+static const nebel_host good_host = {.log.write = NULL};
 static const double vector[3] = {0, 1, 0}, places[1][3] = {{0, 1500, 0}};
 static const double matrix[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 static const double numbers[1] = {1}, *const directions[3] = {numbers, numbers, numbers};
@@ -66,7 +68,7 @@ static const nebel_cpu_renderer_desc good_cpu_renderer_desc = {.thread_count = 1
 static const nebel_method_desc good_method_desc = {.factor = &good_factor_desc};
 static const nebel_frame_desc good_frame_desc = {
     .camera = {.look_at = {0, 0, -1}, .up = {0, 1, 0}, .vertical_fov = 50}, .width = 1, .height = 1, .samples = 1};
-static const nebel_scene_desc good_scene_desc = {.log = {NULL, NULL}};
+static const nebel_scene_desc good_scene_desc = {.memory = 0};
 static const nebel_scene_model good_scene_model = {.model_index = 0};
 static const char *const channels[] = {"R", "G", "B"};
 static const nebel_image_desc good_image_desc = {
@@ -274,7 +276,20 @@ static void check(const char *call, nebel_result result)
     free_fresh();
 }
 
+static void *allocate_nothing(size_t size, void *user)
+{
+    (void)size;
+    (void)user;
+    return NULL;
+}
+
+static void check_half(const char *call, nebel_result result)
+{
+    if (result != NEBEL_ERROR_ARGUMENT) fail_msg("%s with half an allocator: %s", call, nebel_result_text(result));
+}
+
 #define TRY(call) check(#call, call)
+#define CHECK_HALF(call) check_half(#call, call)
 #define RUN(call) ((void)(call))
 
 #include NB_NULL_CALLS_cpu

@@ -12,10 +12,10 @@ static const float floats[4] = {1, 1, 1, 1};
 static const nebel_log good_log = {.write = NULL};
 static const nebel_particle good_particle = {.radius = 1};
 static const nebel_camera good_camera = {.look_at = {0, 0, -1}, .up = {0, 1, 0}, .vertical_fov = 50};
-static const nebel_gl_desc good_gl_desc = {.log = {NULL, NULL}};
+static const nebel_gl_desc good_gl_desc = {.host.log = {NULL, NULL}};
 static const nebel_gl_pass good_gl_pass = {.output = NEBEL_GL_OUTPUT_SPLIT};
 static const nebel_gl_classic_desc good_gl_classic_desc = {.kind = NEBEL_GL_CLASSIC_FOG_COORD};
-static const nebel_gl_renderer_desc good_gl_renderer_desc = {.log = {NULL, NULL}};
+static const nebel_gl_renderer_desc good_gl_renderer_desc = {.host.log = {NULL, NULL}};
 static const nebel_gl_frame_desc good_gl_frame_desc = {
     .camera = {.look_at = {0, 0, -1}, .up = {0, 1, 0}, .vertical_fov = 50}, .width = 1, .height = 1, .samples = 1};
 static const nebel_view good_view = {.eye_from_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
@@ -85,7 +85,20 @@ static void check(const char *call, nebel_result result)
     pass_expect_no_errors();
 }
 
+static void *allocate_nothing(size_t size, void *user)
+{
+    (void)size;
+    (void)user;
+    return NULL;
+}
+
+static void check_half(const char *call, nebel_result result)
+{
+    if (result != NEBEL_ERROR_ARGUMENT) fail_msg("%s with half an allocator: %s", call, nebel_result_text(result));
+}
+
 #define TRY(call) check(#call, call)
+#define CHECK_HALF(call) check_half(#call, call)
 #define RUN(call) ((void)(call))
 
 #include NB_NULL_CALLS_gl

@@ -142,7 +142,7 @@ static void test_the_limit_can_be_changed(void **unused)
     (void)unused;
     nebel_fog *made = NULL;
     fog_messages messages = {0};
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, &made), NEBEL_OK);
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.host.log = fog_messages_log(&messages)}, &made), NEBEL_OK);
     assert_int_equal(nebel_add_volume(made, &box, NULL), NEBEL_OK);
     const double limits[] = {.5, .75, 1, 0};
     for (int i = 0; i < 4; i++) {

@@ -449,7 +449,7 @@ static int draw_without_fog_coordinates(void)
     nebel_gl_classic *classic = NULL;
     if (!nb_gl_open(&context, NB_GL_COMPATIBILITY)) return 2;
     if (epoxy_gl_version() != 13 || epoxy_has_gl_extension("GL_EXT_fog_coord")) return 3;
-    const nebel_gl_classic_desc desc = {.log = fog_messages_log(&messages)};
+    const nebel_gl_classic_desc desc = {.host.log = fog_messages_log(&messages)};
     if (nebel_create_gl_classic(&desc, &classic) != NEBEL_OK) return 4;
     if (nebel_gl_get_classic_method(classic) != NEBEL_GL_CLASSIC_TWO_PASS) return 5;
     if (messages.count != 1 || strstr(messages.text, "two passes") == NULL) return 6;
@@ -491,7 +491,7 @@ static void test_without_a_context_nothing_is_made(void **state)
     fog_messages messages = {0};
     classic_open(&context, NB_GL_COMPATIBILITY);
     pass_close(&context);
-    const nebel_gl_classic_desc desc = {.log = fog_messages_log(&messages)};
+    const nebel_gl_classic_desc desc = {.host.log = fog_messages_log(&messages)};
     assert_int_equal(nebel_create_gl_classic(&desc, &classic), NEBEL_ERROR_UNSUPPORTED);
     assert_true(classic == NULL && messages.count == 1);
 }
@@ -506,8 +506,8 @@ static void test_descriptions_that_are_none_are_refused(void **state)
     nebel_gl_classic *classic = NULL;
     const nebel_gl_classic_desc kind = {.kind = NEBEL_GL_CLASSIC_COUNT}, negative = {.coordinate_end = -1},
                                 endless = {.coordinate_end = HUGE_VAL},
-                                full = {.allocator = fog_memory_allocator(&memory)},
-                                half = {.allocator = {fog_memory_allocate, NULL, NULL}};
+                                full = {.host.allocator = fog_memory_allocator(&memory)},
+                                half = {.host.allocator = {fog_memory_allocate, NULL, NULL}};
     classic_open(&context, NB_GL_COMPATIBILITY);
     assert_int_equal(nebel_create_gl_classic(NULL, &classic), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_create_gl_classic(&kind, NULL), NEBEL_ERROR_ARGUMENT);

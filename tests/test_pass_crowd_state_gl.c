@@ -42,7 +42,7 @@ static void open_stage(stage *s, nb_gl_language language)
     s->fog = crowd_commit(&c);
     s->depth = pass_depth_texture(WIDTH, HEIGHT, picture.stored);
     for (int i = 0; i < 2; i++) s->targets[i] = pass_color_texture(WIDTH, HEIGHT, 4, NULL);
-    const nebel_gl_desc desc = {.log = fog_messages_log(&messages)};
+    const nebel_gl_desc desc = {.host.log = fog_messages_log(&messages)};
     assert_int_equal(nebel_create_gl(&desc, &s->gl), NEBEL_OK);
     assert_int_equal(nebel_gl_set_fog(s->gl, s->fog, &picture.view), NEBEL_OK);
 }

@@ -49,7 +49,7 @@ static void test_several_samples(void **state)
     nebel_lighting *const fog = make_fog();
     const unsigned depth = make_depth(), target = pass_color_texture(WIDTH, HEIGHT, 4, NULL),
                    second = pass_color_texture(WIDTH, HEIGHT, 4, NULL), framebuffer = pass_framebuffer(target, second);
-    const nebel_gl_desc desc = {.log = fog_messages_log(&messages)};
+    const nebel_gl_desc desc = {.host.log = fog_messages_log(&messages)};
     const nebel_gl_pass pass = {.output = NEBEL_GL_OUTPUT_SPLIT, .depth_texture = depth, .samples = SAMPLES};
     messages.count = 0;
     assert_int_equal(nebel_create_gl(&desc, &gl), NEBEL_OK);
@@ -74,7 +74,7 @@ static void check_frames(const nebel_scene_data *scene, const nebel_particle *pa
     nb_gl context;
     nebel_gl_renderer *renderer = NULL;
     nebel_lighting *const fog = make_fog();
-    const nebel_gl_renderer_desc desc = {.log = fog_messages_log(&messages)};
+    const nebel_gl_renderer_desc desc = {.host.log = fog_messages_log(&messages)};
     const nebel_gl_frame_desc frame = {
         .camera = test_camera(pass_eye[0], pass_eye[1], pass_eye[2], pass_eye[0], pass_eye[1], pass_eye[2] - 6),
         .width = WIDTH,

@@ -22,7 +22,7 @@ static size_t draw(nebel_lighting *fog, const pass_picture *picture, nb_gl_langu
     const int width = (int)picture->view.width, height = (int)picture->view.height;
     pass_open(&context, language);
     const int objects = pass_count_objects();
-    assert_int_equal(nebel_create_gl(&(nebel_gl_desc){.log = fog_messages_log(&messages)}, &gl), NEBEL_OK);
+    assert_int_equal(nebel_create_gl(&(nebel_gl_desc){.host.log = fog_messages_log(&messages)}, &gl), NEBEL_OK);
     const unsigned depth = pass_depth_texture(width, height, picture->stored);
     const unsigned targets[] = {pass_color_texture(width, height, 4, NULL), pass_color_texture(width, height, 4, NULL)};
     const unsigned framebuffer = pass_framebuffer(targets[0], targets[1]);

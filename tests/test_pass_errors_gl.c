@@ -29,8 +29,8 @@ static const range usual = {-1, 0};
 
 static nebel_gl_desc desc_of(fog_memory *memory)
 {
-    nebel_gl_desc desc = {.log = fog_messages_log(&messages)};
-    if (memory != NULL) desc.allocator = fog_memory_allocator(memory);
+    nebel_gl_desc desc = {.host.log = fog_messages_log(&messages)};
+    if (memory != NULL) desc.host.allocator = fog_memory_allocator(memory);
     return desc;
 }
 

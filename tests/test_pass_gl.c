@@ -85,7 +85,7 @@ static stage open_stage(nb_gl_language language)
     stage s;
     pass_open(&s.context, language);
     s.objects = pass_count_objects();
-    assert_int_equal(nebel_create_gl(&(nebel_gl_desc){.log = {write_message, NULL}}, &s.gl), NEBEL_OK);
+    assert_int_equal(nebel_create_gl(&(nebel_gl_desc){.host.log = {write_message, NULL}}, &s.gl), NEBEL_OK);
     return s;
 }
 

@@ -79,7 +79,7 @@ static void write_npy(const char *path, const char *type, size_t size, const voi
     write_bytes(path, bytes, 128 + size * COUNT);
 }
 
-static void write_depth_files(const nebel_scene_desc *host)
+static void write_depth_files(const nebel_host *host)
 {
     static const char *const z[] = {"Z"};
     static float floats[COUNT];
@@ -116,7 +116,7 @@ static int make_files(void **state)
         nebel_pixel_type type;
     } pictures[] = {
         {"rgb8.png", NEBEL_PIXEL_RGB8}, {"rgba16.png", NEBEL_PIXEL_RGBA16}, {"rgb.exr", NEBEL_PIXEL_RGB_FLOAT}};
-    const nebel_scene_desc host = {.log = {.write = NULL}};
+    const nebel_host host = {.log = {.write = NULL}};
     (void)state;
     if (mkdtemp(folder) == NULL) return 1;
     for (size_t i = 0; i < 3; i++) {
@@ -157,24 +157,24 @@ static void check_depth(const nebel_depth_map *map)
 }
 
 /* Whatever comes is whole, and goes again; an error leaves nothing. */
-static nebel_result read_file(const char *path, content what, const char *format, const nebel_scene_desc *desc)
+static nebel_result read_file(const char *path, content what, const char *format, const nebel_host *host)
 {
     nebel_photograph photograph;
     nebel_depth_map map;
     nebel_intrinsics camera;
     nebel_result result;
     if (what == PICTURE) {
-        result = nebel_read_photograph(path, desc, &photograph);
+        result = nebel_read_photograph(path, host, &photograph);
         assert_true((result == NEBEL_OK) == (photograph.pixels != NULL));
-        nebel_free_photograph(desc, &photograph);
+        nebel_free_photograph(host, &photograph);
     } else if (what == DEPTH) {
-        result = nebel_read_depth(path, &(nebel_depth_source){.format = format}, desc, &map);
+        result = nebel_read_depth(path, &(nebel_depth_source){.format = format}, host, &map);
         assert_true((result == NEBEL_OK) == (map.depth != NULL));
         if (result == NEBEL_OK) check_depth(&map);
         nebel_fill_depth(&map);
-        nebel_free_depth(desc, &map);
+        nebel_free_depth(host, &map);
     } else {
-        result = nebel_read_intrinsics(path, desc, &camera);
+        result = nebel_read_intrinsics(path, host, &camera);
         assert_true((result == NEBEL_OK) == (camera.fx > 0 && camera.fx < HUGE_VAL));
     }
     return result;
@@ -184,7 +184,7 @@ static void test_pictures_come_back_as_they_were(void **state)
 {
     (void)state;
     static float pixels[4 * COUNT];
-    const nebel_scene_desc host = {.log = {.write = NULL}};
+    const nebel_host host = {.log = {.write = NULL}};
     for (nebel_pixel_type type = NEBEL_PIXEL_RGBA8; type < NEBEL_PIXEL_COUNT; type++) {
         nebel_photograph photograph, back;
         char record[NEBEL_MAX_RECORD + 1];
@@ -211,7 +211,7 @@ static void test_records_of_gray(void **state)
     (void)state;
     char record[NEBEL_MAX_RECORD + 1];
     const char *const path = in_folder("out.png");
-    const nebel_scene_desc host = {.log = {.write = NULL}};
+    const nebel_host host = {.log = {.write = NULL}};
     const float half = 0.5f;
     float light[3] = {0};
     const nebel_photograph photograph = {1, 1, NEBEL_PIXEL_RGB_FLOAT, light};
@@ -229,9 +229,8 @@ static void test_every_kind_of_camera_file(void **state)
     for (size_t i = 0; i < FILES; i++) {
         nebel_intrinsics camera;
         if (files[i].content != CAMERA) continue;
-        assert_int_equal(
-            nebel_read_intrinsics(in_folder(files[i].name), &(nebel_scene_desc){.log = {NULL, NULL}}, &camera),
-            NEBEL_OK);
+        assert_int_equal(nebel_read_intrinsics(in_folder(files[i].name), &(nebel_host){.log = {NULL, NULL}}, &camera),
+                         NEBEL_OK);
         assert_true(camera.fx == 9.5 && camera.fy == 8 && camera.cx == 7 && camera.cy == 6);
         assert_true(camera.baseline == (strcmp(files[i].name, "cv.yml") == 0 ? 0 : .5));
     }
@@ -245,9 +244,9 @@ static void test_every_failing_allocation_is_survived(void **state)
         for (long k = 0; result != NEBEL_OK; k++) {
             meter m;
             journal kept;
-            const nebel_scene_desc desc = metered_desc(&m, &kept);
+            const nebel_host host = metered_host(&m, &kept);
             m.fail_at = k;
-            result = read_file(in_folder(files[i].name), files[i].content, files[i].format, &desc);
+            result = read_file(in_folder(files[i].name), files[i].content, files[i].format, &host);
             if (result != NEBEL_OK) assert_int_equal(result, NEBEL_ERROR_MEMORY);
             assert_true(result == NEBEL_OK || kept.count > 0);
             assert_int_equal(m.live, 0);
@@ -266,13 +265,13 @@ static void test_damaged_files_are_errors_or_pictures(void **state)
         for (size_t round = 0; round < rounds; round++) {
             meter m;
             journal kept;
-            const nebel_scene_desc desc = metered_desc(&m, &kept);
+            const nebel_host host = metered_host(&m, &kept);
             const uint32_t early = (uint32_t)(size < 200 ? size : 200);
             memcpy(bytes, whole, size);
             for (uint32_t n = roll(4); n < 4; n++)
                 bytes[roll(n == 0 ? (uint32_t)size : early)] = (unsigned char)roll(256);
             write_bytes(in_folder("damaged"), bytes, roll(3) == 0 ? roll((uint32_t)size) : size);
-            const nebel_result result = read_file(in_folder("damaged"), files[i].content, files[i].format, &desc);
+            const nebel_result result = read_file(in_folder("damaged"), files[i].content, files[i].format, &host);
             assert_true(result == NEBEL_OK || kept.count > 0);
             assert_int_equal(m.live, 0);
         }
@@ -335,8 +334,7 @@ static void test_airlight_of_any_size_is_found(void **state)
         const int width = sizes[s][0], height = sizes[s][1];
         for (int i = 0; i < 3 * width * height; i++) rgb[i] = (unsigned char)roll(i % 600 < 300 ? 256 : 90);
         const nebel_photograph photograph = {(uint32_t)width, (uint32_t)height, NEBEL_PIXEL_RGB8, rgb};
-        assert_int_equal(nebel_estimate_airlight(&(nebel_scene_desc){.log = {NULL, NULL}}, &photograph, airlight),
-                         NEBEL_OK);
+        assert_int_equal(nebel_estimate_airlight(&(nebel_host){.log = {NULL, NULL}}, &photograph, airlight), NEBEL_OK);
         const size_t wanted = find_airlight(rgb, width, height, all);
         for (size_t c = 0; c < 3; c++) assert_true(fabs(airlight[c] * 255 - rgb[3 * wanted + c]) < 1e-9);
     }
@@ -358,17 +356,17 @@ static void test_depth_that_is_no_depth(void **state)
                  {{.scale = 1e10}, NEBEL_ERROR_ARGUMENT},
                  {{.format = "kitti", .scale = 2}, NEBEL_ERROR_ARGUMENT},
                  {{.format = "cityscapes", .measure = NEBEL_MEASURE_RADIAL}, NEBEL_ERROR_ARGUMENT}};
-    const nebel_scene_desc desc = {.log = {NULL, NULL}};
+    const nebel_host host = {.log = {NULL, NULL}};
     const char *const path = in_folder("out.png");
     nebel_depth_map map;
-    assert_int_equal(nebel_write_gray(path, &desc, 2, 2, values, NULL), NEBEL_OK);
+    assert_int_equal(nebel_write_gray(path, &host, 2, 2, values, NULL), NEBEL_OK);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        assert_int_equal(nebel_read_depth(path, &cases[i].source, &desc, &map), cases[i].result);
-        nebel_free_depth(&desc, &map);
+        assert_int_equal(nebel_read_depth(path, &cases[i].source, &host, &map), cases[i].result);
+        nebel_free_depth(&host, &map);
     }
     const nebel_photograph photograph = {2, 2, NEBEL_PIXEL_RGB16, (unsigned char *)color};
-    assert_int_equal(nebel_write_photograph(path, &desc, &photograph, NULL), NEBEL_OK);
-    assert_int_equal(nebel_read_depth(path, &cases[0].source, &desc, &map), NEBEL_ERROR_UNSUPPORTED);
+    assert_int_equal(nebel_write_photograph(path, &host, &photograph, NULL), NEBEL_OK);
+    assert_int_equal(nebel_read_depth(path, &cases[0].source, &host, &map), NEBEL_ERROR_UNSUPPORTED);
 }
 
 /* Light above 1 is no less than stored color; a number that is none has no light. */
@@ -378,19 +376,19 @@ static void test_airlight_of_light_is_that_of_the_haze(void **state)
     enum { ACROSS = 48, DOWN = 32 };
     static float light[4 * ACROSS * DOWN];
     static const float haze[3] = {4.5f, 3.75f, 3.25f};
-    const nebel_scene_desc desc = {.log = {NULL, NULL}};
+    const nebel_host host = {.log = {NULL, NULL}};
     nebel_photograph photograph = {ACROSS, DOWN, NEBEL_PIXEL_RGBA_FLOAT, (unsigned char *)light};
     double airlight[3];
     for (int i = 0; i < ACROSS * DOWN; i++)
         for (int c = 0; c < 3; c++)
             light[4 * i + c] = i % ACROSS >= 20 && i / ACROSS < 24 ? haze[c] : .01f * (float)roll(300);
     light[0] = NAN;
-    assert_int_equal(nebel_estimate_airlight(&desc, &photograph, airlight), NEBEL_OK);
+    assert_int_equal(nebel_estimate_airlight(&host, &photograph, airlight), NEBEL_OK);
     for (int c = 0; c < 3; c++) assert_true((float)airlight[c] == haze[c]);
     photograph.type = NEBEL_PIXEL_RGBA_HALF;
-    assert_int_equal(nebel_estimate_airlight(&desc, &photograph, airlight), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_estimate_airlight(&host, &photograph, airlight), NEBEL_ERROR_ARGUMENT);
     photograph = (nebel_photograph){ACROSS, 0, NEBEL_PIXEL_RGBA_FLOAT, (unsigned char *)light};
-    assert_int_equal(nebel_estimate_airlight(&desc, &photograph, airlight), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_estimate_airlight(&host, &photograph, airlight), NEBEL_ERROR_ARGUMENT);
 }
 
 /* ---- rays ------------------------------------------------------------------------------------ */

@@ -270,7 +270,7 @@ static void threads_and_frames_change_nothing(void **state)
     assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &(nebel_gl_renderer_desc){0}, &renderer), NEBEL_OK);
     draw(renderer, 0, once);
     nebel_destroy_gl_renderer(renderer);
-    const nebel_gl_renderer_desc threaded = {.run = nebel_parallel_for_openmp};
+    const nebel_gl_renderer_desc threaded = {.host.parallel.run = nebel_parallel_for_openmp};
     assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &threaded, &renderer), NEBEL_OK);
     draw(renderer, 7, later);
     draw(renderer, 0, again);
@@ -327,7 +327,7 @@ static void frames_stop_amid_clouds(void **state)
     make_world(.5, 0, &w);
     nebel_lighting *const fog = planet_fog(w.scene.sun_direction);
     pass_open(&context, NB_GL_330);
-    const nebel_gl_renderer_desc desc = {.allocator = {allocate, release, &m}};
+    const nebel_gl_renderer_desc desc = {.host.allocator = {allocate, release, &m}};
     assert_int_equal(nebel_create_gl_renderer(&w.scene, fog, &desc, &renderer), NEBEL_OK);
     nebel_gl_frame_desc frame = small;
     frame.camera = planet_camera(300, .4);
@@ -377,7 +377,7 @@ static void the_processor_must_be_asked(void **state)
     world w;
     make_world(.5, 0, &w);
     pass_open(&context, NB_GL_330);
-    const nebel_gl_renderer_desc desc = {.log = {keep, said}};
+    const nebel_gl_renderer_desc desc = {.host.log = {keep, said}};
     assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &desc, &renderer), NEBEL_OK);
     nebel_gl_frame_desc frame = small;
     frame.camera = planet_camera(300, .4);
@@ -406,7 +406,7 @@ static void memory_that_runs_out_is_told(void **state)
     w.scene.mesh_count = 1; /* whose light has a table */
     nebel_lighting *const fog = planet_fog(w.scene.sun_direction);
     pass_open(&context, NB_GL_330);
-    const nebel_gl_renderer_desc desc = {.allocator = {allocate, release, &m}};
+    const nebel_gl_renderer_desc desc = {.host.allocator = {allocate, release, &m}};
     assert_int_equal(nebel_create_gl_renderer(&w.scene, fog, &desc, &renderer), NEBEL_OK);
     nebel_gl_frame_desc frame = small;
     frame.camera = planet_camera(300, .4);

@@ -283,7 +283,7 @@ static void diffusion_is_warned_of_once(void **state)
     for (int is_diffuse = 0; is_diffuse < 2; is_diffuse++) {
         int warnings = 0;
         nebel_gl_renderer *renderer = NULL;
-        const nebel_gl_renderer_desc desc = {.log = {count_warnings, &warnings}};
+        const nebel_gl_renderer_desc desc = {.host.log = {count_warnings, &warnings}};
         const nebel_gl_frame_desc frame = {.camera = turned_camera(&s, .5), .width = 8, .height = 8, .samples = 1};
         nebel_lighting *const fog = make_ball(&s, .5, &none, is_diffuse ? DIFFUSE : 0);
         assert_int_equal(nebel_create_gl_renderer(&s.scene, fog, &desc, &renderer), NEBEL_OK);

@@ -34,8 +34,8 @@ typedef struct stage {
 
 static nebel_result create(stage *s, fog_memory *memory)
 {
-    nebel_gl_renderer_desc desc = {.log = fog_messages_log(&messages)};
-    if (memory != NULL) desc.allocator = fog_memory_allocator(memory);
+    nebel_gl_renderer_desc desc = {.host.log = fog_messages_log(&messages)};
+    if (memory != NULL) desc.host.allocator = fog_memory_allocator(memory);
     return nebel_create_gl_renderer(&s->ball.scene, s->fog, &desc, &s->renderer);
 }
 
@@ -156,7 +156,7 @@ static void test_contexts_that_are_not_enough(void **state)
     (void)state;
     static stage s;
     const nebel_scene_data empty = {0};
-    nebel_gl_renderer_desc desc = {.log = fog_messages_log(&messages)};
+    nebel_gl_renderer_desc desc = {.host.log = fog_messages_log(&messages)};
     messages.count = 0;
     expect_message(nebel_create_gl_renderer(&empty, NULL, &desc, &s.renderer), NEBEL_ERROR_UNSUPPORTED,
                    "no context is current");

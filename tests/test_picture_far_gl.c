@@ -121,7 +121,7 @@ static void test_far_fog_is_right_or_refused(void **state)
     nb_gl context;
     picture_pair pair = picture_make(SIDE, SIDE);
     size_t wrong = 0, right = 0, refused = 0;
-    const nebel_gl_renderer_desc desc = {.log = fog_messages_log(&messages)};
+    const nebel_gl_renderer_desc desc = {.host.log = fog_messages_log(&messages)};
     pass_open(&context, NB_GL_330);
     assert_int_equal(nebel_create_gl_renderer(&empty, NULL, &desc, &opengl), NEBEL_OK);
     for (int shape = 0; shape < SHAPES; shape++)

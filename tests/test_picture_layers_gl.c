@@ -269,9 +269,9 @@ static void open_stage(stage *s)
             .camera = camera_from(1, 3, 8, NEBEL_PROJECTION_PERSPECTIVE, 45), .width = 24, .height = 16, .samples = 1}};
     make_world(2, &s->w);
     pass_open(&s->context, NB_GL_330);
-    assert_int_equal(
-        nebel_create_gl_renderer(&s->w.scene, NULL, &(nebel_gl_renderer_desc){.log = {keep, s->said}}, &s->renderer),
-        NEBEL_OK);
+    assert_int_equal(nebel_create_gl_renderer(&s->w.scene, NULL, &(nebel_gl_renderer_desc){.host.log = {keep, s->said}},
+                                              &s->renderer),
+                     NEBEL_OK);
 }
 
 static void close_stage(stage *s)

@@ -204,7 +204,7 @@ static void the_table_stays_while_the_camera_turns(void **state)
     world w;
     make_world("toy", 30, &w);
     pass_open(&context, NB_GL_330);
-    const nebel_gl_renderer_desc desc = {.allocator = {count_large, release, &tables}};
+    const nebel_gl_renderer_desc desc = {.host.allocator = {count_large, release, &tables}};
     assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &desc, &renderer), NEBEL_OK);
     nebel_gl_frame_desc frame = {.camera = planet_camera(20, 0), .width = 8, .height = 8, .samples = 1};
     assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
@@ -245,7 +245,7 @@ static void what_is_not_drawn_is_refused_by_name(void **state)
     world w;
     make_world("toy", 30, &w);
     pass_open(&context, NB_GL_330);
-    const nebel_gl_renderer_desc desc = {.log = {keep, said}};
+    const nebel_gl_renderer_desc desc = {.host.log = {keep, said}};
     assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &desc, &renderer), NEBEL_OK);
     nebel_gl_frame_desc frame = {.camera = planet_camera(20, 0), .width = 8, .height = 8, .samples = 1};
     frame.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;

@@ -315,7 +315,7 @@ static void bad_calls_are_refused(void **state)
 {
     (void)state;
     fog_messages messages = {0};
-    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, NULL, 0);
+    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.host.log = fog_messages_log(&messages)}, NULL, 0);
     const nebel_sample_point good = {{0, 0, 0}, 0},
                              bad[] = {{{(double)NAN, 0, 0}, 0}, {{0, 1e16, 0}, 0}, {{0, 0, 0}, (double)NAN}};
     const nebel_ray ray = {.direction = {0, 0, 1}}, still = {.direction = {0, 0, 0}},

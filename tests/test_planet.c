@@ -693,8 +693,8 @@ static void parts_may_come_in_any_order(void **state)
     int calls = 0;
     nebel_atmosphere_desc desc = *nebel_lookup_atmosphere("mars");
     nebel_atmosphere *forwards = make(&desc);
-    desc.run = run_backwards;
-    desc.run_user = &calls;
+    desc.host.parallel.run = run_backwards;
+    desc.host.parallel.user = &calls;
     nebel_atmosphere *backwards = make(&desc);
     const nb_scattering_table *a = &forwards->scatter, *b = &backwards->scatter;
     assert_true(calls > 0);
@@ -760,7 +760,7 @@ static void memory_may_run_out(void **state)
     for (int calls = 0;; calls++) {
         int left = calls;
         nebel_atmosphere *atmosphere = NULL;
-        const nebel_atmosphere_desc desc = {.allocator = {scarce_allocate, scarce_release, &left}};
+        const nebel_atmosphere_desc desc = {.host.allocator = {scarce_allocate, scarce_release, &left}};
         const nebel_result result = nebel_create_atmosphere(&desc, &atmosphere);
         nebel_destroy_atmosphere(atmosphere);
         if (result == NEBEL_OK) break;

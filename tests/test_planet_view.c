@@ -377,8 +377,8 @@ static void order_of_work_changes_nothing(void **state)
     static bundle a, b;
     uint32_t seed = 4;
     assert_int_equal(nebel_create_sky_view(&desc, &one), NEBEL_OK);
-    desc.run = run_backwards;
-    desc.run_user = &runs;
+    desc.host.parallel.run = run_backwards;
+    desc.host.parallel.user = &runs;
     assert_int_equal(nebel_create_sky_view(&desc, &other), NEBEL_OK);
     assert_true(runs > 0);
     aim(&a, nebel_lookup_atmosphere("toy"), 3, &seed);
@@ -453,7 +453,8 @@ static void bad_calls_are_refused(void **state)
     assert_int_equal(nebel_create_sky_view(NULL, &view), NEBEL_ERROR_ARGUMENT);
     for (int calls = 0; calls < 3; calls++) {
         int left = calls;
-        const nebel_sky_view_desc desc = {.atmosphere = air, .allocator = {scarce_allocate, scarce_release, &left}};
+        const nebel_sky_view_desc desc = {.atmosphere = air,
+                                          .host.allocator = {scarce_allocate, scarce_release, &left}};
         assert_int_equal(nebel_create_sky_view(&desc, &view), NEBEL_ERROR_MEMORY);
         assert_null(view);
     }

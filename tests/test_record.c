@@ -97,17 +97,17 @@ static void test_rows_make_the_same_file(void **state)
     const nebel_image image = {WIDTH, HEIGHT, 4, names, samples};
     for (size_t i = 0; i < 2; i++) {
         const char *whole = numbered("whole", i), *rows = numbered("rows", i);
-        assert_int_equal(nebel_write_image(whole, &(nebel_scene_desc){0}, &image), NEBEL_OK);
+        assert_int_equal(nebel_write_image(whole, &(nebel_host){0}, &image), NEBEL_OK);
         for (uint32_t step = 64; step <= 256; step += 64) {
             const nebel_image_desc desc = desc_of(NULL);
             assert_int_equal(write_rows(rows, &desc, step), NEBEL_OK);
             assert_same_files(whole, rows);
         }
         nebel_image back;
-        assert_int_equal(nebel_read_image(rows, &(nebel_scene_desc){0}, &back), NEBEL_OK);
+        assert_int_equal(nebel_read_image(rows, &(nebel_host){0}, &back), NEBEL_OK);
         assert_int_equal(back.height, HEIGHT);
         if (i == 1) assert_memory_equal(back.samples, samples, sizeof(float) * WIDTH * HEIGHT * 4);
-        nebel_free_image(&(nebel_scene_desc){0}, &back);
+        nebel_free_image(&(nebel_host){0}, &back);
         assert_int_equal(remove(whole), 0);
         assert_int_equal(remove(rows), 0);
     }
@@ -147,7 +147,7 @@ static void test_memory_that_is_out(void **state)
         for (int most = 0; result != NEBEL_OK; most++) {
             int left = most;
             nebel_image_desc desc = desc_of(record);
-            desc.allocator = (nebel_allocator){scarce_allocate, scarce_release, &left};
+            desc.host.allocator = (nebel_allocator){scarce_allocate, scarce_release, &left};
             result = write_rows(path, &desc, 128);
             if (result != NEBEL_OK) assert_int_equal(result, NEBEL_ERROR_MEMORY);
             assert_true(most < 1000);
@@ -257,7 +257,7 @@ static void try_changed_bytes(const char *path, size_t first)
     size_t size, lost = 0;
     unsigned char *bytes = read_file(path, &size);
     nebel_image before, after;
-    assert_int_equal(nebel_read_image(path, &(nebel_scene_desc){0}, &before), NEBEL_OK);
+    assert_int_equal(nebel_read_image(path, &(nebel_host){0}, &before), NEBEL_OK);
     for (int i = 0; i < 300; i++) {
         const size_t at = first + (size_t)(dice(&seed, 0, 1) * (double)(size - first));
         const unsigned char was = bytes[at];
@@ -267,13 +267,13 @@ static void try_changed_bytes(const char *path, size_t first)
         assert_int_equal(nebel_read_record(path, found), NEBEL_OK);
         lost += strcmp(found, record) != 0;
         if (strcmp(found, record) != 0) continue;
-        assert_int_equal(nebel_read_image(path, &(nebel_scene_desc){0}, &after), NEBEL_OK);
+        assert_int_equal(nebel_read_image(path, &(nebel_host){0}, &after), NEBEL_OK);
         assert_memory_equal(before.samples, after.samples,
                             sizeof(float) * before.width * before.height * before.channel_count);
-        nebel_free_image(&(nebel_scene_desc){0}, &after);
+        nebel_free_image(&(nebel_host){0}, &after);
     }
     assert_true(lost > 280); /* a few bits are padding */
-    nebel_free_image(&(nebel_scene_desc){0}, &before);
+    nebel_free_image(&(nebel_host){0}, &before);
     free(bytes);
 }
 

@@ -47,7 +47,7 @@ static void compare(const char *name, const char *path)
     nebel_snapshot *fog = NULL;
     nebel_lighting *lighting = NULL;
     nebel_renderer *renderer = NULL;
-    assert_int_equal(nebel_load_scene(path, &(nebel_scene_desc){.log = {0}}, &scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene(path, &(nebel_scene_desc){.host.log = {0}}, &scene), NEBEL_OK);
     assert_int_equal(nebel_load_scene_models(scene), NEBEL_OK);
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
     assert_int_equal(nebel_create_scene_lighting(scene, fog, 0, NULL, &lighting), NEBEL_OK);

@@ -25,7 +25,7 @@ static void assert_not_created(const nebel_scene_data *scene, const nebel_cpu_re
 {
     test_log log = {0};
     nebel_cpu_renderer_desc logged = *desc;
-    logged.log = (nebel_log){write_log, &log};
+    logged.host.log = (nebel_log){write_log, &log};
     nebel_renderer *renderer = (nebel_renderer *)&log;
     assert_int_equal(nebel_create_cpu_renderer(scene, NULL, &logged, &renderer), expected);
     assert_null(renderer);
@@ -52,7 +52,8 @@ static void test_bad_renderer_descriptions(void **state)
     assert_not_created(&scene, &(nebel_cpu_renderer_desc){.thread_count = -1}, NEBEL_ERROR_ARGUMENT);
     assert_not_created(&scene, &(nebel_cpu_renderer_desc){.thread_count = 1000000}, NEBEL_ERROR_ARGUMENT);
     assert_not_created(&scene, &(nebel_cpu_renderer_desc){.isa = (nebel_isa)99}, NEBEL_ERROR_UNSUPPORTED);
-    assert_not_created(&scene, &(nebel_cpu_renderer_desc){.allocator = {.allocate = no_memory}}, NEBEL_ERROR_ARGUMENT);
+    assert_not_created(&scene, &(nebel_cpu_renderer_desc){.host.allocator = {.allocate = no_memory}},
+                       NEBEL_ERROR_ARGUMENT);
     nebel_destroy_renderer(NULL);
 }
 
@@ -97,7 +98,7 @@ static void assert_bad_frame(const nebel_scene_data *scene, const nebel_frame_de
 {
     test_log log = {0};
     nebel_renderer *renderer = NULL;
-    const nebel_cpu_renderer_desc desc = {.thread_count = 1, .log = {write_log, &log}};
+    const nebel_cpu_renderer_desc desc = {.thread_count = 1, .host.log = {write_log, &log}};
     assert_int_equal(nebel_create_cpu_renderer(scene, NULL, &desc, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, frame, &(nebel_frame){0}), NEBEL_ERROR_VALUE);
     assert_int_equal(log.messages, 1);
@@ -207,7 +208,7 @@ static void test_light_without_end_is_an_error(void **state)
     nebel_lighting *fog = test_fog(1, &(nebel_volume_desc){.emission = {1, 1, 1}});
     test_log log = {0};
     nebel_renderer *renderer = NULL;
-    const nebel_cpu_renderer_desc desc = {.thread_count = 2, .log = {write_log, &log}};
+    const nebel_cpu_renderer_desc desc = {.thread_count = 2, .host.log = {write_log, &log}};
     assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &desc, &renderer), NEBEL_OK);
     const nebel_frame_desc frame = good_frame();
     assert_int_equal(nebel_render_frame(renderer, &frame, &(nebel_frame){0}), NEBEL_ERROR_UNBOUNDED);
@@ -284,7 +285,7 @@ static void test_every_allocation_may_fail(void **state)
     for (; result != NEBEL_OK && k < 100; k++) {
         test_memory memory = {.countdown = k};
         const nebel_cpu_renderer_desc desc = {.thread_count = 1,
-                                              .allocator = {counted_allocate, counted_release, &memory}};
+                                              .host.allocator = {counted_allocate, counted_release, &memory}};
         nebel_renderer *renderer = NULL;
         result = nebel_create_cpu_renderer(&ball.scene, NULL, &desc, &renderer);
         if (result == NEBEL_OK) result = nebel_render_frame(renderer, &frame, &(nebel_frame){0});

@@ -19,7 +19,7 @@ static void write_gray(const char *name, uint32_t side)
 static nebel_scene *open_scene(const char *text, uint64_t memory, int in_process, journal *kept)
 {
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.log = {remember, kept}, .memory = memory, .models_in_process = in_process};
+    const nebel_scene_desc desc = {.host.log = {remember, kept}, .memory = memory, .models_in_process = in_process};
     *kept = (journal){0};
     if (nebel_parse_scene(text, strlen(text), in_folder("scene.json"), &desc, &scene) != NEBEL_OK)
         fail_msg("%s", kept->last);

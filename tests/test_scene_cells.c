@@ -256,7 +256,7 @@ static void test_only_what_changes_is_written(void **state)
     make_file();
     write_text(before);
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.log = {NULL, NULL}};
+    const nebel_scene_desc desc = {.host.log = {NULL, NULL}};
     assert_int_equal(nebel_load_scene(path, &desc, &scene), NEBEL_OK);
     const nebel_scene_data *was = nebel_get_scene_data(scene);
     nebel_scene_data now = *was;
@@ -298,7 +298,7 @@ static void test_names_and_portals_are_written(void **state)
     make_file();
     write_text(given);
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.log = {NULL, NULL}};
+    const nebel_scene_desc desc = {.host.log = {NULL, NULL}};
     assert_int_equal(nebel_load_scene(path, &desc, &scene), NEBEL_OK);
     const nebel_scene_data *was = nebel_get_scene_data(scene);
     nebel_scene_data now = *was;

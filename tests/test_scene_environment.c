@@ -37,7 +37,7 @@ static void write_picture(const char *name, uint32_t width, uint32_t height, uin
     for (size_t i = 0; i < size; i++) samples[i] = (float)(i % count + 1) / 8;
     samples[size / 2] = one;
     const nebel_image image = {width, height, count, channels, samples};
-    assert_int_equal(nebel_write_image(path_of(name), &(nebel_scene_desc){0}, &image), NEBEL_OK);
+    assert_int_equal(nebel_write_image(path_of(name), &(nebel_host){0}, &image), NEBEL_OK);
     free(samples);
 }
 
@@ -50,7 +50,7 @@ static nebel_result load(const char *text, journal *kept, nebel_scene **scene)
 {
     *kept = (journal){0};
     write_text("scene.json", text);
-    return nebel_load_scene(path_of("scene.json"), &(nebel_scene_desc){.log = {remember, kept}}, scene);
+    return nebel_load_scene(path_of("scene.json"), &(nebel_scene_desc){.host.log = {remember, kept}}, scene);
 }
 
 static nebel_scene *load_good(const char *text)
@@ -173,7 +173,7 @@ static void expect_saved(const char *before, const nebel_scene_data *was, const 
     static char bytes[4096];
     journal kept = {0};
     write_text("scene.json", before);
-    if (nebel_save_scene(path_of("scene.json"), &(nebel_scene_desc){.log = {remember, &kept}}, was, now, NULL) !=
+    if (nebel_save_scene(path_of("scene.json"), &(nebel_scene_desc){.host.log = {remember, &kept}}, was, now, NULL) !=
         NEBEL_OK)
         fail_msg("%s", kept.last);
     FILE *file = fopen(path_of("scene.json"), "rb");
@@ -232,7 +232,7 @@ static void new_maps_are_not_saved(void **state)
     nebel_scene *scene = load_good(before);
     nebel_scene_data now = *nebel_get_scene_data(scene);
     now.environment.type = NEBEL_ENVIRONMENT_MAP;
-    assert_int_equal(nebel_save_scene(path_of("scene.json"), &(nebel_scene_desc){.log = {remember, &kept}},
+    assert_int_equal(nebel_save_scene(path_of("scene.json"), &(nebel_scene_desc){.host.log = {remember, &kept}},
                                       nebel_get_scene_data(scene), &now, NULL),
                      NEBEL_ERROR_ARGUMENT);
     nebel_destroy_scene(scene);
@@ -271,7 +271,7 @@ static void a_panorama_becomes_the_sky(void **state)
                     "\"source\": [2, 0, 0]}"),
            first);
     const nebel_image image = {WIDTH, HEIGHT, 3, names, first};
-    assert_int_equal(nebel_write_image(path_of("sky.exr"), &(nebel_scene_desc){0}, &image), NEBEL_OK);
+    assert_int_equal(nebel_write_image(path_of("sky.exr"), &(nebel_host){0}, &image), NEBEL_OK);
     render(PANORAMA("{\"type\": \"environment\", \"file\": \"sky.exr\"}", ""), again);
     for (int i = 0; i < 3 * WIDTH * HEIGHT; i++) assert_true(fabsf(first[i] - again[i]) < 1e-5F);
     assert_true(first[0] < first[3 * WIDTH * HEIGHT / 2]);
@@ -300,7 +300,7 @@ static void white_stays_white(void **state)
     (void)state;
     for (int i = 0; i < 3 * WIDTH * HEIGHT; i++) white[i] = 0.5F;
     const nebel_image image = {WIDTH, HEIGHT, 3, names, white};
-    assert_int_equal(nebel_write_image(path_of("white.exr"), &(nebel_scene_desc){0}, &image), NEBEL_OK);
+    assert_int_equal(nebel_write_image(path_of("white.exr"), &(nebel_host){0}, &image), NEBEL_OK);
     for (int i = 0; i < 3; i++) {
         render(scenes[i], color);
         for (int k = 0; k < 3 * WIDTH * HEIGHT; k++) assert_true(fabsf(color[k] - 0.5F) < 2e-6F);

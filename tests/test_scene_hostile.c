@@ -254,7 +254,7 @@ static void test_relative_paths_start_at_the_scene(void **state)
     fputs("{\"nebel\": 1, \"fog\": [],\n\"models\": [{\"file\": \"there/is.none\"}]}", file);
     fclose(file);
     nebel_scene *scene;
-    const nebel_scene_desc desc = {.log = {remember, &kept}};
+    const nebel_scene_desc desc = {.host.log = {remember, &kept}};
     assert_int_equal(nebel_load_scene(path, &desc, &scene), NEBEL_OK);
     assert_int_equal(nebel_load_scene_models(scene), NEBEL_ERROR_FILE);
     snprintf(expected, sizeof expected,

@@ -90,7 +90,7 @@ static void write_picture(const char *name, uint32_t channels, float value)
     float samples[2 * 3];
     for (int i = 0; i < 6; i++) samples[i] = value;
     const nebel_image image = {2, 1, channels, channels == 1 ? grey : colors, samples};
-    assert_int_equal(nebel_write_image(in_folder(name), &(nebel_scene_desc){.log = {0}}, &image), NEBEL_OK);
+    assert_int_equal(nebel_write_image(in_folder(name), &(nebel_host){.log = {0}}, &image), NEBEL_OK);
 }
 
 static nebel_result load(const char *members, nebel_scene **scene)
@@ -99,7 +99,7 @@ static nebel_result load(const char *members, nebel_scene **scene)
     assert_non_null(file);
     (void)fprintf(file, "{\"nebel\": 1, \"fog\": [], \"planet\": {\"model\": \"textured\", %s}}", members);
     assert_int_equal(fclose(file), 0);
-    return nebel_load_scene(in_folder("scene.json"), &(nebel_scene_desc){.log = {0}}, scene);
+    return nebel_load_scene(in_folder("scene.json"), &(nebel_scene_desc){.host.log = {0}}, scene);
 }
 
 static void test_maps_come_from_pictures(void **state)

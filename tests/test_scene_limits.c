@@ -124,7 +124,7 @@ static void test_groups_have_a_depth(void **state)
         char text[4000], wanted[40];
         journal kept = {0};
         nebel_scene *scene;
-        const nebel_scene_desc desc = {.log = {remember, &kept}};
+        const nebel_scene_desc desc = {.host.log = {remember, &kept}};
         char *at = text + sprintf(text, "{\"nebel\": 1, \"fog\": [{\"extinction\": 1, \"shape\": ");
         for (int i = 0; i < depth; i++) at += sprintf(at, "{\"type\": \"union\", \"shapes\": [");
         const long column = at - text + 1;
@@ -172,7 +172,7 @@ static void test_what_is_too_much_in_all(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         journal kept = {0};
         nebel_scene *scene = NULL;
-        const nebel_scene_desc desc = {.log = {remember, &kept}, .memory = cases[i].memory};
+        const nebel_scene_desc desc = {.host.log = {remember, &kept}, .memory = cases[i].memory};
         assert_int_equal(nebel_parse_scene(cases[i].text, strlen(cases[i].text), "a", &desc, &scene), LIMIT);
         if (kept.count != 1 || strstr(kept.last, cases[i].wanted) == NULL) fail_msg("%s", kept.last);
     }

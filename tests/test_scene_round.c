@@ -681,7 +681,7 @@ static void check_file(const char *name)
     char copy[64] = "/tmp/nebel_round_XXXXXX";
     journal kept = {0};
     nebel_scene *again = NULL;
-    const nebel_scene_desc desc = {.log = {remember, &kept}};
+    const nebel_scene_desc desc = {.host.log = {remember, &kept}};
     where = name;
     const int file = mkstemp(copy);
     assert_true(file >= 0);

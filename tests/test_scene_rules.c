@@ -414,7 +414,7 @@ static void test_text_has_a_largest_size(void **state)
     (void)state;
     journal kept = {0};
     nebel_scene *scene;
-    const nebel_scene_desc desc = {.log = {remember, &kept}};
+    const nebel_scene_desc desc = {.host.log = {remember, &kept}};
     assert_int_equal(nebel_parse_scene("{}", ((size_t)1 << 30) + 1, "a.json", &desc, &scene), NEBEL_ERROR_LIMIT);
     assert_string_equal(kept.last, "a.json: larger than 1073741824 bytes, the most that is read");
 }
@@ -482,7 +482,7 @@ static void test_arguments_are_checked(void **state)
 {
     (void)state;
     nebel_scene *scene = (nebel_scene *)state;
-    const nebel_scene_desc half = {.allocator = {.allocate = metered_allocate}};
+    const nebel_scene_desc half = {.host.allocator = {.allocate = metered_allocate}};
     assert_int_equal(nebel_parse_scene(NULL, 3, "a", &(nebel_scene_desc){0}, &scene), NEBEL_ERROR_ARGUMENT);
     assert_null(scene);
     assert_int_equal(nebel_parse_scene("{}", 2, NULL, &(nebel_scene_desc){0}, &scene), NEBEL_ERROR_ARGUMENT);

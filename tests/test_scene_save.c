@@ -257,7 +257,8 @@ static void test_a_table_comes(void **state)
     d.data.classic_curve = NEBEL_CURVE_TABLE;
     d.data.classic_table = table;
     assert_int_equal(save(&d, &kept), NEBEL_OK);
-    assert_int_equal(nebel_load_scene(file_path(), &(nebel_scene_desc){.log = {remember, &kept}}, &scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene(file_path(), &(nebel_scene_desc){.host.log = {remember, &kept}}, &scene),
+                     NEBEL_OK);
     const nebel_scene_data *data = nebel_get_scene_data(scene);
     assert_int_equal(data->classic_curve, NEBEL_CURVE_TABLE);
     assert_memory_equal(data->classic_table, table, sizeof table);

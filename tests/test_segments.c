@@ -265,7 +265,7 @@ static void test_segments_beyond_the_limits_are_refused_by_number(void **unused)
 {
     (void)unused;
     fog_messages messages = {0};
-    const nebel_fog_desc fog = {.log = fog_messages_log(&messages)};
+    const nebel_fog_desc fog = {.host.log = fog_messages_log(&messages)};
     nebel_snapshot *const snapshot = fog_commit(&fog, &(nebel_volume_desc){.extinction = {1, 1, 1}}, 1);
     uint64_t state = 12;
     points from = random_points(&state, 15);

@@ -31,7 +31,7 @@ static nebel_lighting *commit(const nebel_environment *sky, size_t count, const 
                                          .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = g[i]}};
     }
     const nebel_lighting_desc lights = {.environment = *sky};
-    return fog_commit_lit(&(nebel_fog_desc){.log = log}, volumes, count, &lights);
+    return fog_commit_lit(&(nebel_fog_desc){.host.log = log}, volumes, count, &lights);
 }
 
 static nebel_texel_f32 *pack(const nebel_lighting *lighting, int surfaces, size_t *count)

@@ -159,7 +159,8 @@ static void test_bad_input(void **state)
     (void)state;
     fog_memory memory = {0};
     fog_messages messages = {0};
-    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages)};
+    const nebel_fog_desc desc = {
+        .host = {.allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages)}};
     random_fog_make(&fog, RANDOM_FOG_PARTS, 1);
     nebel_lighting *lighting = fog_commit_lit(&desc, fog.volumes, fog.count, NULL);
     const double eye[3] = {0, 0, 0}, nowhere[3] = {0, (double)NAN, 0}, far[3] = {2e15, 0, 0};
@@ -201,7 +202,7 @@ static nebel_lighting *boxes_of(nebel_grid *const *grids, size_t count, nebel_lo
         v[i] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .max = {1 + (double)i, 1, 1}},
                                    .density = {.type = NEBEL_DENSITY_GRID, .grid = grids[i]},
                                    .extinction = {1, 1, 1}};
-    return fog_commit_lit(&(nebel_fog_desc){.log = log}, v, count, NULL);
+    return fog_commit_lit(&(nebel_fog_desc){.host.log = log}, v, count, NULL);
 }
 
 static float float_of(uint32_t bits)

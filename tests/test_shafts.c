@@ -718,7 +718,8 @@ static size_t lose_memory(const pillars *p)
     nebel_result result = NEBEL_ERROR_MEMORY;
     for (size_t k = 1; result == NEBEL_ERROR_MEMORY; k++) {
         const nebel_cpu_renderer_desc desc = {
-            .allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages), .thread_count = 1};
+            .host = {.allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages)},
+            .thread_count = 1};
         nebel_renderer *renderer = NULL;
         memory.fail_first = 0;
         assert_int_equal(nebel_create_cpu_renderer(&p->scene, p->fog, &desc, &renderer), NEBEL_OK);

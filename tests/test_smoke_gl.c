@@ -124,7 +124,7 @@ static void write_message(nebel_log_level level, nebel_result result, const char
 static nebel_scene *parse(const char *text)
 {
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.log = {write_message, NULL}};
+    const nebel_scene_desc desc = {.host.log = {write_message, NULL}};
     assert_int_equal(nebel_parse_scene(text, strlen(text), "smoke.json", &desc, &scene), NEBEL_OK);
     return scene;
 }

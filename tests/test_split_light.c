@@ -524,7 +524,7 @@ static void lost_memory_is_survived(void **state)
     aim_at_volumes(&rays);
     for (size_t in_a_row = 1; in_a_row <= 1000; in_a_row *= 1000) {
         fog_memory memory = {.live = 0};
-        const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory)};
+        const nebel_fog_desc desc = {.host.allocator = fog_memory_allocator(&memory)};
         nebel_lighting *lighting = fog_commit_lit(&desc, volumes, 3, &lights);
         const size_t live = memory.live;
         nebel_result result = NEBEL_ERROR_MEMORY;

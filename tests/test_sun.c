@@ -664,7 +664,8 @@ static void expect_no_loss(const nebel_volume_desc volumes[CROWD])
     const nebel_ray ray = {{0, 0.2, -1}, {0, 0, 1}, HUGE_VAL};
     fog_memory memory = {0};
     fog_messages messages = {0};
-    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages)};
+    const nebel_fog_desc desc = {
+        .host = {.allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages)}};
     const nebel_lighting_desc lights = {.sun = {.direction = {0.3, 1, 0.2}, .irradiance = {1, 1, 1}}};
     nebel_snapshot *snapshot = fog_commit(&desc, volumes, CROWD);
     nebel_lighting *lighting = light_fog(snapshot, &lights);

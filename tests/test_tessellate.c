@@ -665,7 +665,7 @@ static void test_bad_input(void **state)
     assert_refused(fog, &d, &good, NEBEL_ERROR_VALUE);
     d = desc, d.eye[0] = (double)INFINITY;
     assert_refused(fog, &d, &good, NEBEL_ERROR_VALUE);
-    d = desc, d.allocator.allocate = no_memory_after;
+    d = desc, d.host.allocator.allocate = no_memory_after;
     assert_refused(fog, &d, &good, NEBEL_ERROR_ARGUMENT);
     for (int k = 0; k < 3; k++) {
         const float was = g.positions[8][k];
@@ -715,7 +715,7 @@ static void test_no_proof_of_voxels_nor_above_a_ball(void **state)
     volumes[1].density = (nebel_density){.type = NEBEL_DENSITY_ALTITUDE, .radius = 100, .scale_height = 1};
     for (int i = 0; i < 2; i++) {
         fog_messages messages = {0};
-        nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, &volumes[i], 1);
+        nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){.host.log = fog_messages_log(&messages)}, &volumes[i], 1);
         assert_refused(fog, &(nebel_tessellation_desc){.eye = {4, 3, 8}}, &good, NEBEL_ERROR_UNSUPPORTED);
         assert_non_null(strstr(messages.text, i == 0 ? "proven of a grid" : "proven of fog above a ball"));
         nebel_release_snapshot(fog);
@@ -736,7 +736,7 @@ static void test_memory_ends(void **state)
         int left = allowed;
         nebel_tessellation *t = NULL;
         const nebel_tessellation_desc desc = {
-            .allocator = {no_memory_after, release, &left}, .eye = {4, 3, 8}, .max_depth = 6};
+            .host.allocator = {no_memory_after, release, &left}, .eye = {4, 3, 8}, .max_depth = 6};
         const nebel_result result = nebel_tessellate(fog, &desc, &triangles, &t);
         worked = result == NEBEL_OK;
         if (!worked) assert_int_equal(result, NEBEL_ERROR_MEMORY);

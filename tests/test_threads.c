@@ -88,7 +88,7 @@ static void query_with_threads(random_fog *fog, uint64_t seed)
     pthread_t threads[THREADS];
     random_fog_make(fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), 300 + seed);
     const question q = make_question(fog);
-    const nebel_fog_desc desc = {.allocator = {allocate, release, NULL}};
+    const nebel_fog_desc desc = {.host.allocator = {allocate, release, NULL}};
     const nebel_lighting_desc lights = {.environment = {.radiance = {.1, .2, .3}}};
     nebel_lighting *const lighting = fog_commit_lit(&desc, fog->volumes, fog->count, &lights);
     memset(&alone, 0, sizeof alone);
@@ -119,7 +119,7 @@ static void *edit(void *user)
 {
     size_t *const count = user;
     nebel_fog *fog = NULL;
-    if (nebel_create_fog(&(nebel_fog_desc){.allocator = {allocate, release, NULL}}, &fog) != NEBEL_OK) return NULL;
+    if (nebel_create_fog(&(nebel_fog_desc){.host.allocator = {allocate, release, NULL}}, &fog) != NEBEL_OK) return NULL;
     for (int i = 0; i < 300; i++) {
         const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {i, 0, 0}, .radius = 1}};
         nebel_volume_id id;

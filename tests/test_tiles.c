@@ -342,7 +342,8 @@ static void test_bad_input(void **state)
     (void)state;
     fog_memory memory = {0};
     fog_messages messages = {0};
-    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages)};
+    const nebel_fog_desc desc = {
+        .host = {.allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages)}};
     const nebel_volume_desc box = box_of(0, 0, -5, 1);
     nebel_snapshot *snapshot = fog_commit(&desc, &box, 1);
     nebel_view view = straight_view(100, 60);

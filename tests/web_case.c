@@ -22,7 +22,7 @@ static void require(nebel_result result)
 
 static nebel_scene *load(const char *path)
 {
-    const nebel_scene_desc desc = {.log = {print_message, NULL}};
+    const nebel_scene_desc desc = {.host.log = {print_message, NULL}};
     nebel_scene *scene = NULL;
     require(nebel_load_scene(path, &desc, &scene));
     return scene;

@@ -244,14 +244,14 @@ static int write_difference(const nb_sample_pair *both, const nb_compare_options
 {
     static const char *const names[] = {"R", "G", "B"};
     const size_t pixels = pixels_of(both);
-    const nebel_scene_desc desc = {.log = nb_report_log(listener)};
+    const nebel_host host = {.log = nb_report_log(listener)};
     nebel_image image = {
         .width = both->images[0].width, .height = both->images[0].height, .channel_count = 3, .channel_names = names};
     image.samples = pixels <= SIZE_MAX / (3 * sizeof(float)) ? malloc(pixels * 3 * sizeof(float)) : NULL;
     if (image.samples == NULL) return nb_report_failure("compare: %s: out of memory", wanted->output);
     paint(both, wanted, image.samples);
     nb_interrupt_hold();
-    const nebel_result result = nebel_write_image(wanted->output, &desc, &image);
+    const nebel_result result = nebel_write_image(wanted->output, &host, &image);
     nb_interrupt_release();
     free(image.samples);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(listener, wanted->output, result);
@@ -275,9 +275,9 @@ static int read_settings(nb_arguments *arguments, nb_compare_options *wanted)
 
 static int read_pictures(const nb_compare_options *wanted, nb_sample_pair *both, nb_report_listener *listener)
 {
-    const nebel_scene_desc desc = {.log = nb_report_log(listener)};
+    const nebel_host host = {.log = nb_report_log(listener)};
     for (int i = 0; i < 2; i++) {
-        const nebel_result result = nebel_read_image(wanted->paths[i], &desc, &both->images[i]);
+        const nebel_result result = nebel_read_image(wanted->paths[i], &host, &both->images[i]);
         if (result != NEBEL_OK) return nb_report_result(listener, wanted->paths[i], result);
     }
     const nebel_image *const a = &both->images[0], *const b = &both->images[1];
@@ -319,7 +319,7 @@ static int run(int count, char **words)
     if (status >= 0) return status;
     status = compare(&wanted, &both);
     for (int i = 0; i < 2; i++) {
-        nebel_free_image(&(nebel_scene_desc){0}, &both.images[i]);
+        nebel_free_image(&(nebel_host){0}, &both.images[i]);
         free(both.channels[i]);
     }
     return status;

@@ -446,7 +446,7 @@ static int make_cells(nb_render_state *all)
                                  wanted->scene);
     note_other_fog(scene, wanted);
     nebel_cells_desc desc = *scene->cells;
-    desc.log = nb_report_log(&all->listener);
+    desc.host.log = nb_report_log(&all->listener);
     const nebel_result result = nebel_create_cells(&desc, &all->cells);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
@@ -558,7 +558,7 @@ static int tessellate(nb_render_state *all)
 static int open_renderer(nb_render_state *all)
 {
     nebel_cpu_renderer_desc desc = all->wanted->renderer;
-    desc.log = nb_report_log(&all->listener);
+    desc.host.log = nb_report_log(&all->listener);
     const nebel_result result =
         nebel_create_cpu_renderer(surfaces_of(all), all->loaded.lighting, &desc, &all->renderer);
     return result == NEBEL_OK ? choose_method(all) : nb_report_result(&all->listener, all->wanted->scene, result);

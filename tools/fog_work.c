@@ -15,7 +15,7 @@ typedef struct work {
     const nb_fog_shared *shared;
     const nb_fog_files *files;
     nb_report_listener *listener;
-    nebel_scene_desc host;
+    nebel_host host;
     nebel_photograph photograph;
     nebel_depth_map depth;
     nebel_intrinsics camera;
@@ -176,7 +176,7 @@ static int make_fog(work *w)
         volume.extinction[c] = wanted->extinction;
         volume.source[c] = is_light ? w->tale->airlight[c] : decode(w->tale->airlight[c]);
     }
-    nebel_result result = nebel_create_fog(&(nebel_fog_desc){.log = w->host.log}, &fog);
+    nebel_result result = nebel_create_fog(&(nebel_fog_desc){.host.log = w->host.log}, &fog);
     if (result == NEBEL_OK) result = nebel_add_volume(fog, &volume, NULL);
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, &w->own_fog);
     nebel_destroy_fog(fog);

@@ -397,7 +397,7 @@ static nebel_result create_classic(nb_fixed_work *w)
         [NEBEL_GL_METHOD_TWO_PASS] = NEBEL_GL_CLASSIC_TWO_PASS,
         [NEBEL_GL_METHOD_ALPHA] = NEBEL_GL_CLASSIC_ALPHA,
     };
-    const nebel_gl_classic_desc desc = {.log = w->fixed->log, .kind = kinds[w->desc->method]};
+    const nebel_gl_classic_desc desc = {.host.log = w->fixed->log, .kind = kinds[w->desc->method]};
     return nebel_create_gl_classic(&desc, &w->classic);
 }
 

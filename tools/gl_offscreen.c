@@ -40,8 +40,9 @@ static void note_driver(const nb_gl_offscreen *painter, nebel_method method)
 int nb_gl_painter_open(nb_gl_offscreen *painter, const char *name, const nb_load_result *loaded,
                        const nebel_scene_data *scene, nebel_method method, nb_report_listener *listener)
 {
-    const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener), .run = nebel_parallel_for_openmp};
-    *painter = (nb_gl_offscreen){.loaded = loaded, .scene = scene, .log = desc.log};
+    const nebel_gl_renderer_desc desc = {
+        .host = {.log = nb_report_log(listener), .parallel.run = nebel_parallel_for_openmp}};
+    *painter = (nb_gl_offscreen){.loaded = loaded, .scene = scene, .log = desc.host.log};
     const int fixed = is_of_fixed(method) && suits_fixed(scene);
     painter->is_fixed = fixed && nb_gl_context_open(&painter->context, NB_GL_API_FIXED) == 0;
     if (!painter->is_fixed && nb_gl_context_open_any(&painter->context) != 0) {

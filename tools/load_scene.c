@@ -55,8 +55,7 @@ static int finish(const char *path, nebel_result done, nb_report_listener *liste
 int nb_load_file(const char *path, int with_models, nb_report_listener *listener, nb_load_result *result)
 {
     *result = (nb_load_result){0};
-    const nebel_scene_desc desc = {.log = nb_report_log(listener),
-                                   .run = nebel_parallel_for_openmp,
+    const nebel_scene_desc desc = {.host = {.log = nb_report_log(listener), .parallel.run = nebel_parallel_for_openmp},
                                    .model_reader = nb_reader_path(),
                                    .memory = nb_reader_memory()};
     nebel_result done = nebel_load_scene(path, &desc, &result->scene);

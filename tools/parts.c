@@ -87,10 +87,10 @@ void nb_parallel_unlock(int lock)
 
 static int read_part(const nb_parts *parts, uint32_t part, nebel_image *image)
 {
-    const nebel_scene_desc desc = {.log = nb_report_log(parts->listener)};
+    const nebel_host host = {.log = nb_report_log(parts->listener)};
     char *const name = nb_parallel_name(parts, part);
     if (name == NULL) return NB_FAILED;
-    const nebel_result result = nebel_read_image(name, &desc, image);
+    const nebel_result result = nebel_read_image(name, &host, image);
     const int status = result == NEBEL_OK ? NB_DONE : nb_report_result(parts->listener, name, result);
     free(name);
     return status;
@@ -98,7 +98,7 @@ static int read_part(const nb_parts *parts, uint32_t part, nebel_image *image)
 
 static void free_part(nebel_image *image)
 {
-    nebel_free_image(&(nebel_scene_desc){0}, image);
+    nebel_free_image(&(nebel_host){0}, image);
 }
 
 /* A picture in the making. */
@@ -143,7 +143,7 @@ static int add_part(const nb_parts *parts, uint32_t part, joining *joint)
 int nb_parallel_join_picture(const nb_parts *parts, uint32_t width, uint32_t height, const char *record)
 {
     joining joint = {
-        .desc = {.log = nb_report_log(parts->listener), .width = width, .height = height, .record = record}};
+        .desc = {.host.log = nb_report_log(parts->listener), .width = width, .height = height, .record = record}};
     nb_interrupt_hold(); /* as long as the temporary file is there */
     int status = begin_picture(parts, &joint);
     for (uint32_t i = 1; i < parts->count && status == NB_DONE && !nb_interrupt_is_requested(); i++)

@@ -127,8 +127,9 @@ int nb_render_out_spare(const nb_render_out *out, const nebel_scene_data *conten
 
 static nebel_movie_desc film_desc(const nb_render_out *out)
 {
-    return (nebel_movie_desc){
-        .log = nb_report_log(out->listener), .frames_per_second = out->wanted->fps, .quality = out->wanted->quality};
+    return (nebel_movie_desc){.host.log = nb_report_log(out->listener),
+                              .frames_per_second = out->wanted->fps,
+                              .quality = out->wanted->quality};
 }
 
 int nb_render_out_open(nb_render_out *out)
@@ -315,7 +316,7 @@ static int write_file(const nb_render_out *out, const nb_render_item *item, cons
 {
     char record[NEBEL_MAX_RECORD + 1];
     record_item(out, item, record);
-    const nebel_image_desc desc = {.log = nb_report_log(out->listener),
+    const nebel_image_desc desc = {.host.log = nb_report_log(out->listener),
                                    .width = image->width,
                                    .height = image->height,
                                    .channel_count = image->channel_count,

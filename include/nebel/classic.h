@@ -284,7 +284,7 @@ NEBEL_API nebel_blend nebel_blend_surface(nebel_blend_mode mode, const double co
  *
  * {0}: the eye at the origin, red, 1/255. */
 typedef struct nebel_tessellation_desc {
-    nebel_allocator allocator;
+    nebel_host host;
     double eye[3];        /* m, in the coordinates of the fog; at most 1e15 */
     int channel;          /* whose factor: 0 red, 1 green, 2 blue */
     double max_error;     /* of the error of the factor, > 0; 0: 1/255 */
@@ -411,8 +411,7 @@ typedef enum nebel_cell_span {
 /* Cells must not overlap. Lengths below 1e-6 of the extent of all cells, or 1e-12 of their largest coordinate, count as
  * nothing: cells that near touch, and cells that overlap as little do not. */
 typedef struct nebel_cells_desc {
-    nebel_allocator allocator;
-    nebel_log log;
+    nebel_host host;
     const nebel_cell *cells; /* 1 to NEBEL_MAX_CELLS */
     size_t cell_count;
     const nebel_portal *portals; /* the only ways from cell to cell, all else being walls; NULL: there are no walls, and

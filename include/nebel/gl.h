@@ -59,8 +59,7 @@ typedef enum nebel_gl_storage {
 } nebel_gl_storage;
 
 typedef struct nebel_gl_desc {
-    nebel_allocator allocator;
-    nebel_log log;
+    nebel_host host;
     nebel_gl_storage storage;
 } nebel_gl_desc;
 
@@ -148,7 +147,7 @@ NEBEL_API nebel_result nebel_gl_get_fog_resources(const nebel_gl *gl, nebel_gl_f
  * into the state in which the engine's own draw call makes fog of it, and back.
  *
  *     nebel_gl_classic *classic = NULL;
- *     nebel_create_gl_classic(&(nebel_gl_classic_desc){.log = log}, &classic);    // in the engine's context
+ *     nebel_create_gl_classic(&(nebel_gl_classic_desc){.host.log = log}, &classic);    // in the engine's context
  *     method = nebel_gl_get_classic_method(classic);          // TWO_PASS where the context lacks fog coordinates
  *
  *     // The stream follows from the method: feed refuses another one.
@@ -220,8 +219,7 @@ typedef enum nebel_gl_classic_kind {
 typedef struct nebel_gl_classic nebel_gl_classic;
 
 typedef struct nebel_gl_classic_desc {
-    nebel_allocator allocator;
-    nebel_log log;
+    nebel_host host;
     nebel_gl_classic_kind kind; /* wanted */
     double coordinate_end;      /* FOG_COORD: as in nebel_vertex_desc, > 0; 0: 100 */
 } nebel_gl_classic_desc;
@@ -300,14 +298,10 @@ NEBEL_API const char *nebel_gl_classic_shader_source(void);
 typedef struct nebel_gl_renderer nebel_gl_renderer;
 
 typedef struct nebel_gl_renderer_desc {
-    nebel_allocator allocator;
-    nebel_log log;
+    nebel_host host; /* threads make tables of air and trace clouds */
     /* Texels of a side of each of the sun's four shadow maps, and of eight more where it lights fog, 64 to 16384; 0: 2048.
      * The six of a point or spot light have a quarter of it, less where they would take more than 128 MiB together, but 64. */
     uint32_t shadow_map_size;
-    /* For threads that make tables of air and trace clouds; NULL: one part after the other. */
-    nebel_parallel_for_fn run;
-    void *run_user;
 } nebel_gl_renderer_desc;
 
 /* Copies meshes and textures of `scene` to the graphics processor; they are not read again. Light, lamps, background and

@@ -51,14 +51,12 @@ typedef struct nebel_environment_map nebel_environment_map;
 #define NEBEL_MAX_ENVIRONMENT_WIDTH 4096
 
 typedef struct nebel_environment_map_desc {
-    nebel_allocator allocator;
-    nebel_log log;
+    nebel_host host;
     size_t width, height; /* 2 to NEBEL_MAX_ENVIRONMENT_WIDTH, and half of that */
     const float *pixels;  /* radiance, 0 to 1e9: RGB, width * height of them, the top row first; copied */
 } nebel_environment_map_desc;
 
-/* Makes an environment map in *map, with one owner; on an error *map is NULL. The allocator must be usable as long as the map, or
- * a snapshot that it lights, lives. Cost: some 0.1 s, 1 s for the largest. Any thread. Errors: ARGUMENT, VALUE (a pixel
+/* Makes an environment map in *map, with one owner; on an error *map is NULL. Cost: some 0.1 s, 1 s for the largest. Any thread. Errors: ARGUMENT, VALUE (a pixel
  * out of range, another shape), LIMIT, MEMORY. */
 NEBEL_API nebel_result nebel_create_environment_map(const nebel_environment_map_desc *desc,
                                                     nebel_environment_map **map);
@@ -161,8 +159,7 @@ typedef enum nebel_light_group {
 } nebel_light_group;
 
 typedef struct nebel_lighting_desc {
-    nebel_allocator allocator;     /* all zero: that of the snapshot; usable as long as the lighting lives */
-    nebel_log log;                 /* all zero: that of the snapshot */
+    nebel_host host;               /* allocator and log all zero: those of the snapshot */
     nebel_sun sun;                 /* all zero: none */
     nebel_environment environment; /* all zero: dark */
     const nebel_light *lights;     /* light_count of them; copied */

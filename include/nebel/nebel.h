@@ -91,9 +91,8 @@ NEBEL_API const char *nebel_result_text(nebel_result result);
 
 /* ---- memory, messages, processors ------------------------------------------------------------ */
 
-/* Memory from the caller. Both functions or neither (NULL: malloc and free). `allocate` returns memory aligned for any
- * object, or NULL; `release` takes what `allocate` gave, never NULL. They are called from the thread that called nebel.
- */
+/* Memory. Both functions or neither (NULL: malloc and free). `allocate` returns memory aligned for any object, or NULL;
+ * `release` takes what `allocate` gave, never NULL. They are called from the thread that called nebel. */
 typedef struct nebel_allocator {
     void *(*allocate)(size_t size, void *user);
     void (*release)(void *memory, void *user);
@@ -114,6 +113,22 @@ typedef struct nebel_log {
     void *user;
 } nebel_log;
 
+/* Calls part(data, i) once for each i < parts, in any order and by any threads, and returns when all are done. */
+typedef void (*nebel_parallel_for_fn)(size_t parts, void (*part)(void *data, size_t i), void *data, void *user);
+
+typedef struct nebel_parallel {
+    nebel_parallel_for_fn run; /* NULL: one part after the other */
+    void *user;
+} nebel_parallel;
+
+/* What the program that nebel is part of gives an object: first member of every description of one. All of it must be
+ * usable as long as the object, or one that was made from it, lives. Results do not depend on it. */
+typedef struct nebel_host {
+    nebel_allocator allocator;
+    nebel_log log;
+    nebel_parallel parallel; /* where work is long and its parts are independent, as a function says */
+} nebel_host;
+
 /* Instruction sets, for float queries. DEFAULT takes the best one this processor has. */
 typedef enum nebel_isa {
     NEBEL_ISA_DEFAULT = 0,
@@ -128,8 +143,7 @@ typedef enum nebel_isa {
 /* 1 when this build and this processor can run `isa`, else 0. Any thread. */
 NEBEL_API int nebel_isa_available(nebel_isa isa);
 
-/* The name as the command line takes it: "scalar", "sse2", "avx2", "avx512", "neon"; "default" for DEFAULT, "unknown" for
- * unknown numbers. Any thread. */
+/* "default", "scalar", "sse2", "avx2", "avx512" or "neon"; "unknown" for unknown numbers. Any thread. */
 NEBEL_API const char *nebel_isa_name(nebel_isa isa);
 
 /* ---- describing fog -------------------------------------------------------------------------- */
@@ -203,9 +217,8 @@ typedef enum nebel_voxel_type {
 } nebel_voxel_type;
 
 typedef enum nebel_grid_filter {
-    NEBEL_GRID_FILTER_LINEAR =
-        0,                    /* trilinear between the middles of voxels; level from the outermost middles outwards */
-    NEBEL_GRID_FILTER_NEAREST /* each voxel is of one density */
+    NEBEL_GRID_FILTER_LINEAR = 0, /* trilinear between the middles of voxels; level beyond the outermost middles */
+    NEBEL_GRID_FILTER_NEAREST     /* each voxel is of one density */
 } nebel_grid_filter;
 
 #define NEBEL_MAX_GRID_SIZE 4096         /* voxels along an axis */
@@ -215,8 +228,7 @@ typedef enum nebel_grid_filter {
  * value of a voxel is that of the middle of its part. A voxel of the index i of OpenVDB, whose value is at i, goes from
  * i - 1/2 to i + 1/2 in index space; that of a 3D texture of size n from i / n to (i + 1) / n. */
 typedef struct nebel_grid_desc {
-    nebel_allocator allocator;
-    nebel_log log;
+    nebel_host host;
     size_t size[3]; /* voxels along x, y and z of the box, 1 to NEBEL_MAX_GRID_SIZE */
     nebel_voxel_type type;
     const void *voxels; /* size[0] * size[1] * size[2] of them, x fastest, then y; copied */
@@ -226,18 +238,16 @@ typedef struct nebel_grid_desc {
     const char *name; /* what it is called; NULL: nothing; copied. Means nothing to nebel but in nebel/scene.h */
 } nebel_grid_desc;
 
-/* Makes a grid in *grid, with one owner; on an error *grid is NULL. The allocator must be usable as long as the grid
- * lives. Memory: the voxels and 16 bytes for each block of 8 x 8 x 8. Cost: linear in the voxels. Any thread.
- * Errors: ARGUMENT, VALUE (NaN, infinite or negative density), LIMIT, MEMORY. */
+/* Makes a grid in *grid, with one owner; on an error *grid is NULL. Memory: the voxels and 16 bytes for each block of
+ * 8 x 8 x 8. Cost: linear in the voxels. Any thread. Errors: ARGUMENT, VALUE (NaN, infinite or negative density), LIMIT, MEMORY. */
 NEBEL_API nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid);
 
-/* Noise: a grid that is made, for wisps and clouds. Simplex noise with `cells` across the box, whose waves are two cells
- * long, in `octaves` each of half the size and `gain` times the weight of the one before; octaves whose cells would be smaller than two voxels
- * are left out, so that voxels have all there is of it. Of the sum, 0 to 1, what is above 1 - coverage is density, again
- * 0 to 1 and in steps of 1 / 65535. The same everywhere for the same numbers. */
+/* Noise: a grid that is made, for wisps and clouds. Simplex noise with `frequency` cells across the box, whose waves are two
+ * cells long, in `octaves` each of half the size and `gain` times the weight of the one before; octaves whose cells would be
+ * smaller than two voxels are left out. Of the sum, 0 to 1, what is above 1 - coverage is density, again 0 to 1 and in steps
+ * of 1 / 65535. The same everywhere for the same numbers. */
 typedef struct nebel_noise_desc {
-    nebel_allocator allocator;
-    nebel_log log;
+    nebel_host host;
     size_t size[3];      /* voxels, as in nebel_grid_desc */
     double frequency[3]; /* of the first octave along each axis of the box, > 0, of two voxels each at least */
     int octaves;         /* 1 to 16; 0: 1 */
@@ -323,7 +333,7 @@ typedef struct nebel_density {
     nebel_grid *grid;      /* grid: not NULL; a volume becomes one more owner of it */
 } nebel_density;
 
-/* What part of the light that fog scatters goes into which direction. The cosine of the angle by which light is turned
+/* Where the light goes that fog scatters. The cosine of the angle by which light is turned
  * is +1 straight on: an eye that looks at the sun through fog sees light at +1. */
 typedef enum nebel_phase_type {
     NEBEL_PHASE_ISOTROPIC = 0,     /* into all directions alike */
@@ -365,8 +375,7 @@ typedef struct nebel_volume_desc {
     nebel_density density;
     double extinction[3]; /* 1/m, 0 to 1e9, where the density is 1 */
     double source[3];     /* radiance of opaque fog, 0 to 1e9: alone it gives source * (1 - transmittance) */
-    double
-        albedo[3]; /* 0..1: of what light it meets it scatters so much, see nebel/light.h; not together with source */
+    double albedo[3];     /* 0..1: what part of the light that it takes it scatters; not together with source */
     nebel_phase phase;  /* where light is scattered to; makes no difference to light that is the same from everywhere */
     double emission[3]; /* radiance per metre, 0 to 1e9, where the density is 1 */
     double start, cutoff; /* m along a ray from where it starts, >= 0: the volume acts between them alone, whatever its
@@ -452,8 +461,7 @@ typedef struct nebel_lighting nebel_lighting; /* see nebel/light.h */
 typedef uint64_t nebel_volume_id;             /* 0 is never one */
 
 typedef struct nebel_fog_desc {
-    nebel_allocator allocator;
-    nebel_log log;
+    nebel_host host;
     double max_opacity; /* 0 to 1; 0: 1. See nebel_set_max_opacity */
 } nebel_fog_desc;
 
@@ -469,8 +477,7 @@ NEBEL_API void nebel_destroy_fog(nebel_fog *fog);
  * MEMORY. */
 NEBEL_API nebel_result nebel_add_volume(nebel_fog *fog, const nebel_volume_desc *desc, nebel_volume_id *id);
 
-/* Replaces the description of a volume, which keeps its id. Cost and errors as nebel_add_volume; an unknown id is
- * ARGUMENT. */
+/* Replaces the description of a volume, which keeps its id. Cost and errors as nebel_add_volume; unknown id: ARGUMENT. */
 NEBEL_API nebel_result nebel_update_volume(nebel_fog *fog, nebel_volume_id id, const nebel_volume_desc *desc);
 
 /* Removes a volume. Cost O(1). An id that is unknown or was removed is ARGUMENT. */
@@ -489,8 +496,7 @@ NEBEL_API nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapsho
 /* One more owner of the snapshot; any thread. Returns its argument. */
 NEBEL_API nebel_snapshot *nebel_retain_snapshot(nebel_snapshot *snapshot);
 
-/* One owner less; the last one frees it, through the fog's allocator (which must still be usable). Any thread. NULL is
- * fine. */
+/* One owner less; the last one frees it. Any thread. NULL is fine. */
 NEBEL_API void nebel_release_snapshot(nebel_snapshot *snapshot);
 
 /* How many volumes the snapshot holds. */
@@ -669,10 +675,9 @@ typedef struct nebel_ray_planes {
     double origin[3];       /* m */
     const float *offset[3]; /* m, from `origin` to where a ray starts; NULL: all start at `origin` */
     size_t offset_stride;
-    double direction[3];             /* of all rays, any length but 0; not read where one of the next two is given */
-    const float *direction_float[3]; /* of each ray, any length but 0; NULL: see `direction` */
-    const double
-        *direction_double[3]; /* the same, for fog so far away that a float's rounding of the way there shows */
+    double direction[3];               /* of all rays, any length but 0; not read where one of the next two is given */
+    const float *direction_float[3];   /* of each ray, any length but 0; NULL: see `direction` */
+    const double *direction_double[3]; /* the same, for fog so far that a float's rounding of the way there shows */
     size_t direction_stride;
     const float *t_max; /* m, >= 0; INFINITY is legal; NULL: rays without end. 0 masks a ray: nothing is asked, and its
                            other numbers may be anything */
@@ -721,8 +726,7 @@ typedef struct nebel_segments {
     size_t from_stride;
     const float *to;
     size_t to_stride;     /* 0: 12 */
-    int ignore_distances; /* see nebel_trace_desc; 0: `start` and `cutoff` of volumes count from where a segment starts
-                           */
+    int ignore_distances; /* see nebel_trace_desc; 0: `start` and `cutoff` count from where a segment starts */
 } nebel_segments;
 
 /* The transmittance of one colour channel over each segment, in float throughout: out[i] within 0..1, out_stride in
@@ -735,9 +739,8 @@ NEBEL_API nebel_result nebel_compute_segment_transmittance(const nebel_snapshot 
 /* ---- pixels in, pixels out: fog over a finished picture -------------------------------------- */
 
 typedef enum nebel_pixel_depth {
-    NEBEL_PIXEL_DEPTH_AXIAL =
-        0,                   /* how many times the pixel's way at depth 1: for a camera, the distance along its axis */
-    NEBEL_PIXEL_DEPTH_RADIAL /* m along the pixel's ray */
+    NEBEL_PIXEL_DEPTH_AXIAL = 0, /* how many times the pixel's way at depth 1: for a camera, along its axis */
+    NEBEL_PIXEL_DEPTH_RADIAL     /* m along the pixel's ray */
 } nebel_pixel_depth;
 
 /* What the samples of a picture are. Floats hold light, 1 is white; whole numbers are 0 to 1 as 0 to the largest. Numbers of

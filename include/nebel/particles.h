@@ -40,8 +40,7 @@ typedef struct nebel_particle {
 NEBEL_API nebel_volume_desc nebel_volume_from_particle(const nebel_particle *particle);
 
 typedef struct nebel_nebula_desc {
-    nebel_allocator allocator;
-    nebel_log log;
+    nebel_host host;
     nebel_shape shape;     /* particles start inside of it; bounded */
     nebel_density density; /* how many of them are there */
     /* 0: the density thins particles out; 1: it dims them, and they are equally many everywhere; between 0 and 1

@@ -1,7 +1,7 @@
 /* nebel/photograph.h: photographs and rendered pictures that exist, how far away everything in them is, and the cameras that
  * took them: all that nebel_apply_fog_to_pixels wants to put fog into them.
  *
- *     const nebel_scene_desc host = {0};
+ *     const nebel_host host = {0};
  *     nebel_photograph photograph;
  *     nebel_depth_map map;
  *     nebel_intrinsics camera;
@@ -10,13 +10,12 @@
  *     nebel_read_depth("street_disparity.png", &(nebel_depth_source){.format = "cityscapes", .camera = &camera}, &host, &map);
  *
  *     nebel_pixels pixels = {.width = map.width, .height = map.height, .depth = map.depth, .depth_type = map.type,
- *                            .type = photograph.type, .srgb = 1, .color = photograph.pixels, .out = photograph.pixels};
+ *                            .type = photograph.type, .srgb = 1, .color = photograph.pixels, .output = photograph.pixels};
  *     nebel_aim_pixels(&pixels, &camera, NULL);
- *     nebel_apply_fog_to_pixels(fog, NEBEL_ISA_DEFAULT, &pixels);
+ *     nebel_apply_fog_to_pixels(snapshot, NEBEL_ISA_DEFAULT, &pixels);
  *     nebel_write_photograph("street_foggy.png", &host, &photograph, NULL);
  *
- * Of nebel_scene_desc `allocator` and `log` are read. Messages begin with the file. All functions are thread safe. Link with
- * libnebel_scene and libnebel.
+ * Messages begin with the file. All functions are thread safe. Link with libnebel_scene and libnebel.
  */
 #ifndef NEBEL_PHOTOGRAPH_H
 #define NEBEL_PHOTOGRAPH_H
@@ -40,18 +39,17 @@ typedef struct nebel_photograph {
 /* Reads a PNG of 8 or 16 bits, a JPEG or an OpenEXR picture; the first bytes of the file say which. The channels R, G, B and
  * A of OpenEXR are read, or Y alone. Free the photograph with nebel_free_photograph and the same allocator. After an error the
  * photograph is empty. Errors: ARGUMENT, FILE, FORMAT, LIMIT, UNSUPPORTED (among them fewer than 8 bits, CMYK), MEMORY. */
-NEBEL_API nebel_result nebel_read_photograph(const char *path, const nebel_scene_desc *desc,
-                                             nebel_photograph *photograph);
-NEBEL_API void nebel_free_photograph(const nebel_scene_desc *desc, nebel_photograph *photograph);
+NEBEL_API nebel_result nebel_read_photograph(const char *path, const nebel_host *host, nebel_photograph *photograph);
+NEBEL_API void nebel_free_photograph(const nebel_host *host, nebel_photograph *photograph);
 
 /* Writes whole numbers to a .png in sRGB with the bits of the photograph, floats to an .exr. The file is replaced as by
  * nebel_write_image. `record` is that of nebel_image_desc: what the picture was made from, for nebel_read_record; NULL: none.
  * Errors: ARGUMENT, FILE, FORMAT (another ending, or one that does not fit the numbers), LIMIT, MEMORY. */
-NEBEL_API nebel_result nebel_write_photograph(const char *path, const nebel_scene_desc *desc,
+NEBEL_API nebel_result nebel_write_photograph(const char *path, const nebel_host *host,
                                               const nebel_photograph *photograph, const char *record);
 
 /* Writes one number per pixel, 0 to 1, to a gray, linear PNG of 16 bits. Values outside are clamped. Errors: as above. */
-NEBEL_API nebel_result nebel_write_gray(const char *path, const nebel_scene_desc *desc, uint32_t width, uint32_t height,
+NEBEL_API nebel_result nebel_write_gray(const char *path, const nebel_host *host, uint32_t width, uint32_t height,
                                         const float *values, const char *record);
 
 /* Estimates the color of endless fog from the dark channel of a photograph: 0 to 1 as the photograph stores it, or light if it
@@ -61,7 +59,7 @@ NEBEL_API nebel_result nebel_write_gray(const char *path, const nebel_scene_desc
  * Sources: He, Sun and Tang, "Single image haze removal using dark channel prior" (2009), with the brightest candidate;
  * Sakaridis, Dai and Van Gool, "Semantic foggy scene understanding with synthetic data" (2018), with the median.
  * Errors: ARGUMENT, MEMORY. Any thread. O(pixels). */
-NEBEL_API nebel_result nebel_estimate_airlight(const nebel_scene_desc *desc, const nebel_photograph *photograph,
+NEBEL_API nebel_result nebel_estimate_airlight(const nebel_host *host, const nebel_photograph *photograph,
                                                double airlight[3]);
 
 /* ---- cameras --------------------------------------------------------------------------------- */
@@ -82,8 +80,7 @@ typedef struct nebel_intrinsics {
  *     numbers                  fx fy cx cy, then the baseline if it is known; or a matrix of 3 x 3 or 4 x 4
  *
  * Errors: ARGUMENT, FILE, FORMAT, VALUE (focal lengths that are not 1e-6 to 1e9, numbers that are not finite), LIMIT, MEMORY. */
-NEBEL_API nebel_result nebel_read_intrinsics(const char *path, const nebel_scene_desc *desc,
-                                             nebel_intrinsics *intrinsics);
+NEBEL_API nebel_result nebel_read_intrinsics(const char *path, const nebel_host *host, nebel_intrinsics *intrinsics);
 
 /* Computes the intrinsics of a camera that sees `degrees`, 0 < degrees < 180, from the left edge of the picture to the right
  * one. Pixels are square, and the axis meets the middle of the picture. */
@@ -149,9 +146,9 @@ typedef struct nebel_depth_map {
  * Unknown are the numbers that the format calls invalid; floats that are NaN or negative; and the float 0, unless the measure is
  * INVERSE. Floats from 1e9 m on are infinite. Free the map with nebel_free_depth and the same allocator. After an error the map
  * is empty. Errors: ARGUMENT, FILE, FORMAT, VALUE (all pixels are unknown; a baseline is missing), LIMIT, UNSUPPORTED, MEMORY. */
-NEBEL_API nebel_result nebel_read_depth(const char *path, const nebel_depth_source *source,
-                                        const nebel_scene_desc *desc, nebel_depth_map *map);
-NEBEL_API void nebel_free_depth(const nebel_scene_desc *desc, nebel_depth_map *map);
+NEBEL_API nebel_result nebel_read_depth(const char *path, const nebel_depth_source *source, const nebel_host *host,
+                                        nebel_depth_map *map);
+NEBEL_API void nebel_free_depth(const nebel_host *host, nebel_depth_map *map);
 
 /* Replaces unknown depth by the larger of the nearest known depths to the left and to the right, or by the only one. Rows without
  * any known depth are filled from the rows above and below in the same way. Source: the development kit of KITTI stereo fills

@@ -56,10 +56,8 @@ typedef enum nebel_atmosphere_quality {
     NEBEL_ATMOSPHERE_QUALITY_COUNT
 } nebel_atmosphere_quality;
 
-/* Calls part(data, i) once for each i < parts, in any order and by any threads, and returns when all are done. */
-typedef void (*nebel_parallel_for_fn)(size_t parts, void (*part)(void *data, size_t i), void *data, void *user);
-
 typedef struct nebel_atmosphere_desc {
+    nebel_host host;
     double ground_point[3]; /* where the ground is above (y) the planet's centre: m. {0}: the origin */
     double radius;          /* of the ground: m, 1 to 1e12; 0: 6.36e6 */
     double thickness;       /* of the air: m, at most 1e12, at least radius / 1e6; 0: 1e5 */
@@ -67,10 +65,6 @@ typedef struct nebel_atmosphere_desc {
     uint32_t component_count; /* 0: the Earth's air, see nebel_lookup_atmosphere */
     double ground_albedo[3];  /* what the ground gives back to the air, 0 to 1; {0}: black, presets have their own */
     nebel_atmosphere_quality quality;
-    nebel_parallel_for_fn run; /* for threads that make the table; NULL: one part after the other */
-    void *run_user;
-    nebel_allocator allocator; /* {0}: malloc and free */
-    nebel_log log;
 } nebel_atmosphere_desc;
 
 /* Known airs: "earth" (constants of the demonstration of Hillaire, A Scalable and Production Ready Sky and Atmosphere
@@ -124,14 +118,11 @@ NEBEL_API nebel_result nebel_compute_atmosphere_irradiance(const nebel_atmospher
 typedef struct nebel_sky_view nebel_sky_view;
 
 typedef struct nebel_sky_view_desc {
+    nebel_host host;
     const nebel_atmosphere *atmosphere; /* must outlive the view */
     nebel_sun sun;
-    double position[3];        /* m; below the ground counts as on it */
-    int has_ray_ends;          /* 0: rays go to the ground or the end of the air, t_max is not read */
-    nebel_parallel_for_fn run; /* for threads; NULL: one part after the other */
-    void *run_user;
-    nebel_allocator allocator;
-    nebel_log log;
+    double position[3]; /* m; below the ground counts as on it */
+    int has_ray_ends;   /* 0: rays go to the ground or the end of the air, t_max is not read */
 } nebel_sky_view_desc;
 
 /* Makes the table. Errors: ARGUMENT (NULL, a sun or a place that is not in order), MEMORY; *view is then NULL. The same
@@ -198,11 +189,11 @@ typedef enum nebel_planet_map_type {
 } nebel_planet_map_type;
 
 typedef struct nebel_planet_map_desc {
+    nebel_host host; /* its log alone: the memory is the caller's */
     nebel_planet_map_type type;
     size_t width, height; /* 0: 1024 x 512 */
     uint32_t seed;
     double coverage; /* how much is cloud, or land: 0 to 1; 0: 0.5 */
-    nebel_log log;
 } nebel_planet_map_desc;
 
 /* The size that such a map has, in map->width, height and channels; map->texels stays. Errors: ARGUMENT, VALUE. */
@@ -242,6 +233,7 @@ typedef struct nebel_atmosphere_shell {
 } nebel_atmosphere_shell;
 
 typedef struct nebel_textured_planet_desc {
+    nebel_host host;
     double center[3];
     double radius;              /* of the ground: m, 1 to 1e12; 0: 6.36e6 */
     double rotation[4];         /* quaternion x y z w of the planet, whose axis is y without; {0}: none */
@@ -252,8 +244,6 @@ typedef struct nebel_textured_planet_desc {
     nebel_cloud_shell cloud_shells[NEBEL_MAX_CLOUD_SHELLS];
     uint32_t cloud_shell_count;
     nebel_atmosphere_shell atmosphere;
-    nebel_allocator allocator; /* {0}: malloc and free */
-    nebel_log log;
 } nebel_textured_planet_desc;
 
 typedef struct nebel_textured_planet nebel_textured_planet;
@@ -365,11 +355,10 @@ typedef struct nebel_cloud_layer {
 } nebel_cloud_layer;
 
 typedef struct nebel_clouds_desc {
+    nebel_host host;
     const nebel_atmosphere *atmosphere; /* must outlive the clouds */
     nebel_cloud_layer layers[NEBEL_MAX_CLOUD_LAYERS];
     uint32_t layer_count;
-    nebel_allocator allocator; /* {0}: malloc and free */
-    nebel_log log;
 } nebel_clouds_desc;
 
 typedef struct nebel_clouds nebel_clouds;
@@ -405,13 +394,12 @@ NEBEL_API nebel_result nebel_cloud_phase(const nebel_clouds *clouds, uint32_t la
 typedef struct nebel_cloud_lighting nebel_cloud_lighting;
 
 typedef struct nebel_cloud_lighting_desc {
+    nebel_host host;
     const nebel_clouds *clouds; /* must outlive the view */
     nebel_sun sun;              /* irradiance {0}: dark */
     double time;                /* within -1e12 and 1e12 */
     double tolerance;           /* of transmittance, of each piece of a ray; 0: NEBEL_DEFAULT_TOLERANCE */
     nebel_isa isa;              /* the same bits for every one; DEFAULT: the best of this processor */
-    nebel_allocator allocator;
-    nebel_log log;
 } nebel_cloud_lighting_desc;
 
 /* Errors: ARGUMENT, VALUE (time, tolerance), UNSUPPORTED (isa not available), MEMORY; *view is then NULL. Any

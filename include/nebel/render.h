@@ -23,8 +23,7 @@ extern "C" {
 typedef struct nebel_renderer nebel_renderer;
 
 typedef struct nebel_cpu_renderer_desc {
-    nebel_allocator allocator;
-    nebel_log log;
+    nebel_host host;
     nebel_isa isa;    /* for fog and for Embree; DEFAULT: the best of this processor */
     int thread_count; /* 0: all */
 } nebel_cpu_renderer_desc;

@@ -46,13 +46,13 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
 {
     if (atmosphere == NULL) return NEBEL_ERROR_ARGUMENT;
     *atmosphere = NULL;
-    if (desc == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL || !nb_allocator_is_valid(&desc->host.allocator)) return NEBEL_ERROR_ARGUMENT;
     const nebel_atmosphere_desc whole = nb_atmosphere_resolve(desc);
     nebel_result result = nb_atmosphere_check(&whole);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&whole.allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&whole.host.allocator);
     nebel_atmosphere *made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&whole.log, NEBEL_ERROR_MEMORY, "atmosphere: out of memory");
+    if (made == NULL) return nb_fail(&whole.host.log, NEBEL_ERROR_MEMORY, "atmosphere: out of memory");
     made->allocator = allocator;
     made->airs.radius = whole.radius;
     made->airs.top = whole.radius + whole.thickness;
@@ -63,9 +63,8 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
     nb_sphere_center_below(whole.ground_point, whole.radius, made->center);
     made->rule = nb_gauss_rule_make(NB_MAX_RULE);
     made->gather = nb_gather_choose(NEBEL_ISA_DEFAULT);
-    const nb_parallel parts = {whole.run, whole.run_user};
     nb_air_components_smooth(&made->airs, nb_scatter_orders(&made->airs, whole.quality), &made->smooth);
-    result = nb_scattering_table_make(&allocator, &parts, &made->airs, &made->smooth, whole.quality,
+    result = nb_scattering_table_make(&allocator, &whole.host.parallel, &made->airs, &made->smooth, whole.quality,
                                       whole.ground_albedo, &made->scatter, &made->stray);
     made->share_off = (made->scatter.orders == NB_MOMENTS ? 0.02 : 0.1) + made->scatter.missing;
     if (result == NEBEL_OK) {
@@ -73,7 +72,7 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
         return NEBEL_OK;
     }
     nebel_destroy_atmosphere(made);
-    return nb_fail(&whole.log, result, "atmosphere: out of memory");
+    return nb_fail(&whole.host.log, result, "atmosphere: out of memory");
 }
 
 void nebel_destroy_atmosphere(nebel_atmosphere *atmosphere)

@@ -85,7 +85,7 @@ static nebel_result check_air(const nb_atmosphere_subject *of, const nebel_atmos
 nebel_result nb_atmosphere_check(const nebel_atmosphere_desc *desc)
 {
     static const meaning at_least = {" m", " (a millionth of the radius)", ""};
-    nb_atmosphere_subject of = {&desc->log, ""};
+    nb_atmosphere_subject of = {&desc->host.log, ""};
     nebel_result result =
         check_all(&of, "ground_point", desc->ground_point, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH, &length_meaning);
     if (result == NEBEL_OK) result = check(&of, "radius", desc->radius, 1, 1e12, &length_meaning);

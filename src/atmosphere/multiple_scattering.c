@@ -460,7 +460,7 @@ typedef struct nb_scattering_rounds {
 } nb_scattering_rounds;
 
 /* What air and ground make of sunlight, or of all light of the sealed table. */
-static void scatter_again(nb_table_builder *maker, const nb_parallel *parts, int first, nb_scattering_table *made)
+static void scatter_again(nb_table_builder *maker, const nebel_parallel *parts, int first, nb_scattering_table *made)
 {
     maker->first = first;
     maker->next = made;
@@ -469,7 +469,7 @@ static void scatter_again(nb_table_builder *maker, const nb_parallel *parts, int
 }
 
 /* Rounds from the first table on, until little may be missing or so many are done. Returns how many those are. */
-static int run_cycle(nb_table_builder *maker, const nb_parallel *parts, nb_scattering_rounds *rounds, int done)
+static int run_cycle(nb_table_builder *maker, const nebel_parallel *parts, nb_scattering_rounds *rounds, int done)
 {
     const nb_table_resolution *effort = maker->effort;
     nb_scattering_table *sum = &rounds->sum;
@@ -514,7 +514,7 @@ static void stray_at_height(void *data, size_t height)
 }
 
 /* Makes scratch of a table. */
-static void bend_sunlight(nb_table_builder *maker, const nb_parallel *parts, const nb_air_components *airs,
+static void bend_sunlight(nb_table_builder *maker, const nebel_parallel *parts, const nb_air_components *airs,
                           nb_scattering_table *table, nb_stray *stray)
 {
     nb_straying straying = {maker, airs, table, stray};
@@ -527,7 +527,7 @@ static void bend_sunlight(nb_table_builder *maker, const nb_parallel *parts, con
 }
 
 /* Each cycle begins where the one before leads. */
-static void sum_orders(nb_table_builder *maker, const nb_parallel *parts, const nb_air_components *airs,
+static void sum_orders(nb_table_builder *maker, const nebel_parallel *parts, const nb_air_components *airs,
                        nb_scattering_rounds *rounds, nb_stray *stray)
 {
     const int most = deepest(maker->airs) > HOPELESS ? FEW_ROUNDS : MOST_ROUNDS;
@@ -545,7 +545,7 @@ static void sum_orders(nb_table_builder *maker, const nb_parallel *parts, const 
     maker->radiance = radiance;
 }
 
-static void find_stray(nb_table_builder *maker, const nb_parallel *parts, const nb_air_components *airs,
+static void find_stray(nb_table_builder *maker, const nebel_parallel *parts, const nb_air_components *airs,
                        nb_scattering_rounds *rounds, nb_stray *stray)
 {
     nb_straying straying = {maker, airs, &rounds->sum, stray};
@@ -595,7 +595,7 @@ static void free_rounds(const nebel_allocator *allocator, nb_scattering_rounds *
     for (int i = 0; i <= NB_MAX_ROUNDS; i++) nb_scattering_table_free(allocator, &rounds->tables[i]);
 }
 
-nebel_result nb_scattering_table_make(const nebel_allocator *allocator, const nb_parallel *parts,
+nebel_result nb_scattering_table_make(const nebel_allocator *allocator, const nebel_parallel *parts,
                                       const nb_air_components *airs, const nb_air_components *smooth,
                                       nebel_atmosphere_quality quality, const double albedo[3],
                                       nb_scattering_table *scatter, nb_stray *stray)

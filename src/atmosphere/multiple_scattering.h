@@ -32,7 +32,7 @@ void nb_scattering_table_look_up_ground(const nb_scattering_table *scatter, doub
 int nb_scatter_orders(const nb_air_components *airs, nebel_atmosphere_quality quality);
 
 /* Makes the table, and what strays from it; `albedo` is the ground's; smooth: nb_air_components_smooth of the airs. Errors: MEMORY. */
-nebel_result nb_scattering_table_make(const nebel_allocator *allocator, const nb_parallel *parts,
+nebel_result nb_scattering_table_make(const nebel_allocator *allocator, const nebel_parallel *parts,
                                       const nb_air_components *airs, const nb_air_components *smooth,
                                       nebel_atmosphere_quality quality, const double albedo[3],
                                       nb_scattering_table *scatter, nb_stray *stray);

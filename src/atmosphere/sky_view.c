@@ -289,7 +289,7 @@ static void estimate_row(void *data, size_t number)
     }
 }
 
-static void estimate(nebel_sky_view *view, const nb_parallel *parts)
+static void estimate(nebel_sky_view *view, const nebel_parallel *parts)
 {
     nb_estimates estimates = {.view = view};
     nb_parallel_for(parts, NB_VIEW_ROWS, measure_row, &estimates);
@@ -381,18 +381,18 @@ nebel_result nebel_create_sky_view(const nebel_sky_view_desc *desc, nebel_sky_vi
     nebel_sun sun;
     if (view == NULL) return NEBEL_ERROR_ARGUMENT;
     *view = NULL;
-    if (desc == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL || !nb_allocator_is_valid(&desc->host.allocator)) return NEBEL_ERROR_ARGUMENT;
     if (desc->atmosphere == NULL)
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "air view: atmosphere: is NULL; make one first");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "air view: atmosphere: is NULL; make one first");
     if (!nb_air_resolve_sun(&desc->sun, &sun))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "air view: %s", nb_air_sun_fault);
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "air view: %s", nb_air_sun_fault);
     if (!nb_air_is_place(desc->position))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT,
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT,
                        "air view: position: is (%g, %g, %g); each must be within -1e15 and 1e15", desc->position[0],
                        desc->position[1], desc->position[2]);
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_sky_view *made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "air: out of memory");
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "air: out of memory");
     made->allocator = allocator;
     made->atmosphere = desc->atmosphere;
     made->sun = sun;
@@ -400,12 +400,11 @@ nebel_result nebel_create_sky_view(const nebel_sky_view_desc *desc, nebel_sky_vi
     set_up(made, desc);
     if (allocate(made) != NEBEL_OK) {
         nebel_destroy_sky_view(made);
-        return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "air: out of memory");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "air: out of memory");
     }
-    const nb_parallel parts = {desc->run, desc->run_user};
     if (!nb_air_components_are_empty(&made->atmosphere->airs)) {
-        nb_parallel_for(&parts, NB_VIEW_ROWS, fill_row, made);
-        estimate(made, &parts);
+        nb_parallel_for(&desc->host.parallel, NB_VIEW_ROWS, fill_row, made);
+        estimate(made, &desc->host.parallel);
         made->brightest = brightest_of(made);
     }
     set_sunlight(made);

@@ -2,14 +2,9 @@
 #ifndef NB_BASE_PARALLEL_H
 #define NB_BASE_PARALLEL_H
 
-#include <nebel/planet.h>
+#include <nebel/nebel.h>
 
-typedef struct nb_parallel {
-    nebel_parallel_for_fn run; /* NULL: one part after the other */
-    void *user;
-} nb_parallel;
-
-static inline void nb_parallel_for(const nb_parallel *parts, size_t count, void (*part)(void *data, size_t i),
+static inline void nb_parallel_for(const nebel_parallel *parts, size_t count, void (*part)(void *data, size_t i),
                                    void *data)
 {
     if (parts->run != NULL) {

@@ -173,11 +173,11 @@ static nebel_result check_overlaps(nebel_cells *cells, const nebel_cells_desc *d
 {
     double(*planes)[4] = nb_allocate(&cells->allocator, 2 * (size_t)NEBEL_MAX_SHAPE_PLANES, sizeof *planes);
     nebel_result result = NEBEL_OK;
-    if (planes == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "cells: out of memory");
+    if (planes == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "cells: out of memory");
     for (size_t b = 1; b < cells->cell_count && result == NEBEL_OK; b++)
         for (size_t a = 0; a < b && result == NEBEL_OK; a++)
             if (overlap(cells, &cells->cells[a], &cells->cells[b], planes)) {
-                result = nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+                result = nb_fail(&desc->host.log, NEBEL_ERROR_VALUE,
                                  "cell %zu: overlaps cell %zu; cells may touch, but share no place", b, a);
                 if (desc->failed_cell != NULL) *desc->failed_cell = b;
             }
@@ -188,9 +188,9 @@ static nebel_result check_overlaps(nebel_cells *cells, const nebel_cells_desc *d
 static nebel_result set_cells(nebel_cells *cells, const nebel_cells_desc *desc)
 {
     cells->cells = nb_allocate_zero(&cells->allocator, desc->cell_count, sizeof *cells->cells);
-    if (cells->cells == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "cells: out of memory");
+    if (cells->cells == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "cells: out of memory");
     for (size_t i = 0; i < desc->cell_count; i++) {
-        nb_cell_note about = {&desc->log, i};
+        nb_cell_note about = {&desc->host.log, i};
         const nebel_log log = {pass_on, &about};
         const nebel_result result = set_cell(cells, &log, &desc->cells[i], &cells->cells[i]);
         if (result != NEBEL_OK) {
@@ -207,10 +207,10 @@ static nebel_result set_portals(nebel_cells *cells, const nebel_cells_desc *desc
 {
     if (!cells->has_walls) {
         if (nb_cells_derive_portals(cells) == NEBEL_OK) return NEBEL_OK;
-        return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "cells: out of memory for portals");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "cells: out of memory for portals");
     }
     for (size_t i = 0; i < desc->portal_count; i++) {
-        const nebel_result result = nb_cells_add_portal(cells, &desc->log, i, &desc->portals[i]);
+        const nebel_result result = nb_cells_add_portal(cells, &desc->host.log, i, &desc->portals[i]);
         if (result == NEBEL_OK) continue;
         if (desc->failed_portal != NULL) *desc->failed_portal = i;
         return result;
@@ -220,8 +220,8 @@ static nebel_result set_portals(nebel_cells *cells, const nebel_cells_desc *desc
 
 static nebel_result check_desc(const nebel_cells_desc *desc)
 {
-    const nebel_log *log = &desc->log;
-    if (!nb_allocator_is_valid(&desc->allocator))
+    const nebel_log *log = &desc->host.log;
+    if (!nb_allocator_is_valid(&desc->host.allocator))
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "cells: the allocator needs allocate and release, or neither");
     if (desc->cells == NULL || desc->cell_count == 0)
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "cells: there are none; at least one is needed");
@@ -245,9 +245,9 @@ nebel_result nebel_create_cells(const nebel_cells_desc *desc, nebel_cells **cell
     if (desc->failed_portal != NULL) *desc->failed_portal = SIZE_MAX;
     nebel_result result = check_desc(desc);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_cells *made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "cells: out of memory");
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "cells: out of memory");
     made->allocator = allocator;
     made->model = desc->model;
     made->span = desc->span;

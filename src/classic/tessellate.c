@@ -382,7 +382,7 @@ static nebel_result take(mesh *m, const nebel_triangles *given)
 
 static const char *tessellation_fault(const nebel_tessellation_desc *desc, const nebel_triangles *given)
 {
-    if (!nb_allocator_is_valid(&desc->allocator)) return "the allocator needs both functions or neither";
+    if (!nb_allocator_is_valid(&desc->host.allocator)) return "the allocator needs both functions or neither";
     if (desc->channel < 0 || desc->channel > 2) return "channel is none of 0, 1, 2";
     if (desc->max_depth > 48) return "max_depth is more than 48";
     if (given->position_stride != 0 && given->position_stride < 12) return "position_stride is less than 12";
@@ -466,7 +466,7 @@ nebel_result nebel_tessellate(const nebel_snapshot *snapshot, const nebel_tessel
     if (fault != NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "tessellation: %s", fault);
     if (!are_values(desc, triangles))
         return nb_fail(log, NEBEL_ERROR_VALUE, "tessellation: bound, eye and origin must be finite, the bound >= 0");
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     mesh *const m = nb_allocate_zero(&allocator, 1, sizeof *m);
     if (m == NULL) return nb_fail(log, NEBEL_ERROR_MEMORY, "tessellation: out of memory");
     m->allocator = allocator;

@@ -8,17 +8,18 @@
 static nebel_result check(const nebel_cloud_lighting_desc *desc, nebel_sun *sun, const nb_cloud_kernel **kernel)
 {
     if (desc->clouds == NULL)
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "clouds: view: clouds: is NULL; make some first");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "clouds: view: clouds: is NULL; make some first");
     if (!nb_air_resolve_sun(&desc->sun, sun))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "clouds: view: %s", nb_air_sun_fault);
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "clouds: view: %s", nb_air_sun_fault);
     if (!(fabs(desc->time) <= 1e12))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "clouds: time is %g; must be within -1e12 and 1e12", desc->time);
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "clouds: time is %g; must be within -1e12 and 1e12",
+                       desc->time);
     if (!(desc->tolerance >= 0 && desc->tolerance <= 1))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "clouds: tolerance is %g; must be within 0 and 1",
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "clouds: tolerance is %g; must be within 0 and 1",
                        desc->tolerance);
     *kernel = nb_cloud_kernel_choose(desc->isa);
     if (*kernel == NULL)
-        return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED, "clouds: instruction set %s: not available here",
+        return nb_fail(&desc->host.log, NEBEL_ERROR_UNSUPPORTED, "clouds: instruction set %s: not available here",
                        nebel_isa_name(desc->isa));
     return NEBEL_OK;
 }
@@ -46,14 +47,14 @@ nebel_result nebel_create_cloud_lighting(const nebel_cloud_lighting_desc *desc, 
     const nb_cloud_kernel *kernel;
     if (view == NULL) return NEBEL_ERROR_ARGUMENT;
     *view = NULL;
-    if (desc == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL || !nb_allocator_is_valid(&desc->host.allocator)) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = check(desc, &sun, &kernel);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_cloud_lighting *made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
     made->allocator = allocator;
-    made->log = desc->log;
+    made->log = desc->host.log;
     made->clouds = desc->clouds;
     made->kernel = kernel;
     made->sun = sun;
@@ -65,7 +66,7 @@ nebel_result nebel_create_cloud_lighting(const nebel_cloud_lighting_desc *desc, 
         return NEBEL_OK;
     }
     nebel_destroy_cloud_lighting(made);
-    return nb_fail(&desc->log, result, "clouds: out of memory");
+    return nb_fail(&desc->host.log, result, "clouds: out of memory");
 }
 
 void nebel_destroy_cloud_lighting(nebel_cloud_lighting *view)

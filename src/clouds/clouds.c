@@ -455,23 +455,23 @@ static nebel_result check(const nebel_clouds_desc *desc, nebel_cloud_layer *laye
 {
     const nb_air_components *airs = &desc->atmosphere->airs;
     if (desc->layer_count > NEBEL_MAX_CLOUD_LAYERS)
-        return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "clouds: %u layers; at most %d are possible",
+        return nb_fail(&desc->host.log, NEBEL_ERROR_LIMIT, "clouds: %u layers; at most %d are possible",
                        (unsigned)desc->layer_count, NEBEL_MAX_CLOUD_LAYERS);
     if (desc->layer_count > 0 && nb_air_components_are_empty(airs))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "clouds: need air, and the planet has none");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "clouds: need air, and the planet has none");
     for (uint32_t i = 0; i < desc->layer_count; i++) {
         const nebel_result result =
-            nebel_resolve_cloud_layer(airs->top - airs->radius, &desc->layers[i], &desc->log, &layers[i]);
+            nebel_resolve_cloud_layer(airs->top - airs->radius, &desc->layers[i], &desc->host.log, &layers[i]);
         if (result != NEBEL_OK) return result;
         /* Larger ones do not change over the planet but by what is left of rounding. */
         if (layers[i].cell_size > NEBEL_MAX_CLOUD_CELL_RADII * airs->radius)
-            return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+            return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE,
                            "clouds: layers[%u] size: is %g; must be at most %g (4 radii)", (unsigned)i,
                            layers[i].cell_size, NEBEL_MAX_CLOUD_CELL_RADII * airs->radius);
         for (uint32_t k = 0; k < i; k++)
             if (overlap(&layers[k], &layers[i]))
                 return nb_fail(
-                    &desc->log, NEBEL_ERROR_VALUE,
+                    &desc->host.log, NEBEL_ERROR_VALUE,
                     "clouds: layers[%u] (%g to %g m) and layers[%u] (%g to %g m) overlap; give each heights of its own",
                     (unsigned)k, layers[k].base, layers[k].top, (unsigned)i, layers[i].base, layers[i].top);
     }
@@ -483,14 +483,14 @@ nebel_result nebel_create_clouds(const nebel_clouds_desc *desc, nebel_clouds **c
     nebel_cloud_layer layers[NEBEL_MAX_CLOUD_LAYERS];
     if (clouds == NULL) return NEBEL_ERROR_ARGUMENT;
     *clouds = NULL;
-    if (desc == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL || !nb_allocator_is_valid(&desc->host.allocator)) return NEBEL_ERROR_ARGUMENT;
     if (desc->atmosphere == NULL)
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "clouds: atmosphere: is NULL; make one first");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "clouds: atmosphere: is NULL; make one first");
     nebel_result result = check(desc, layers);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_clouds *made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
     made->allocator = allocator;
     made->atmosphere = desc->atmosphere;
     made->kernel = nb_cloud_kernel_choose(NEBEL_ISA_DEFAULT);
@@ -504,7 +504,7 @@ nebel_result nebel_create_clouds(const nebel_clouds_desc *desc, nebel_clouds **c
         return NEBEL_OK;
     }
     nebel_destroy_clouds(made);
-    return nb_fail(&desc->log, result, "clouds: out of memory");
+    return nb_fail(&desc->host.log, result, "clouds: out of memory");
 }
 
 void nebel_destroy_clouds(nebel_clouds *clouds)

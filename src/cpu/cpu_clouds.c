@@ -25,8 +25,7 @@ nebel_result nb_cpu_clouds_set(nb_frame *frame, const nebel_frame_desc *desc)
                                             .time = desc->time,
                                             .tolerance = fmin(1, desc->tolerance),
                                             .isa = renderer->fog_isa,
-                                            .allocator = renderer->allocator,
-                                            .log = renderer->log};
+                                            .host = {.allocator = renderer->allocator, .log = renderer->log}};
     nebel_result result = nebel_create_cloud_lighting(&view, &frame->cloud_view);
     for (int i = 0; i < renderer->threads && result == NEBEL_OK; i++)
         result = nebel_create_cloud_workspace(frame->cloud_view, &renderer->scratch[i].clouds.workspace);

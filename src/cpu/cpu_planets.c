@@ -31,10 +31,7 @@ nebel_result nb_cpu_planets_set(nb_air_frame *air, const nebel_scene_data *scene
                                 int threads)
 {
     nebel_sky_view_desc desc = {.sun = nb_surface_lighting_sun(scene),
-                                .run = nebel_parallel_for_openmp,
-                                .run_user = &threads,
-                                .allocator = *allocator,
-                                .log = *log};
+                                .host = {*allocator, *log, {nebel_parallel_for_openmp, &threads}}};
     nebel_result result = NEBEL_OK;
     air->allocator = allocator;
     air->count = nb_planets_set(air->worlds, scene, position);

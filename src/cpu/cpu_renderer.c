@@ -13,16 +13,17 @@ const char *nebel_cpu_libraries(void)
 
 static nebel_result check(const nebel_scene_data *scene, const nebel_cpu_renderer_desc *desc)
 {
-    if (scene == NULL) return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "renderer: scene is NULL");
-    if (!nb_allocator_is_valid(&desc->allocator)) {
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "renderer: the allocator needs both functions or neither");
+    if (scene == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "renderer: scene is NULL");
+    if (!nb_allocator_is_valid(&desc->host.allocator)) {
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT,
+                       "renderer: the allocator needs both functions or neither");
     }
     if (desc->thread_count < 0 || desc->thread_count > MOST_THREADS) {
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "renderer: %d threads; 0 (all) to %d are possible",
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "renderer: %d threads; 0 (all) to %d are possible",
                        desc->thread_count, MOST_THREADS);
     }
     if (desc->isa != NEBEL_ISA_DEFAULT && !nebel_isa_available(desc->isa)) {
-        return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED, "renderer: instruction set %s is not available here",
+        return nb_fail(&desc->host.log, NEBEL_ERROR_UNSUPPORTED, "renderer: instruction set %s is not available here",
                        nebel_isa_name(desc->isa));
     }
     return NEBEL_OK;
@@ -78,11 +79,11 @@ nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_ligh
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = check(scene, desc);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_renderer *made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "renderer: out of memory");
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "renderer: out of memory");
     made->allocator = made->geometry.allocator = allocator;
-    made->log = made->geometry.log = desc->log;
+    made->log = made->geometry.log = desc->host.log;
     made->scene = scene;
     made->lighting = nebel_retain_lighting(lighting);
     made->fog = nebel_get_lighting_snapshot(lighting);
@@ -93,7 +94,7 @@ nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_ligh
     if (result != NEBEL_OK) {
         if (result == NEBEL_ERROR_MEMORY)
             nb_fail(
-                &desc->log, result,
+                &desc->host.log, result,
                 "renderer: out of memory; free some, raise its limit (ulimit -v), or use fewer triangles or threads");
         nebel_destroy_renderer(made);
         return result;

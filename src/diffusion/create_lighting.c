@@ -39,8 +39,7 @@ static nebel_result solve_level_diffusion(const nebel_lighting *lighting, nb_dif
 {
     nebel_snapshot *level = NULL;
     nebel_lighting *lit = NULL;
-    const nebel_lighting_desc desc = {.allocator = lighting->allocator,
-                                      .log = lighting->log,
+    const nebel_lighting_desc desc = {.host = {.allocator = lighting->allocator, .log = lighting->log},
                                       .sun = nebel_get_lighting_sun(lighting),
                                       .environment = lighting->environment,
                                       .diffusion = &lighting->diffusion_desc,
@@ -74,7 +73,7 @@ nebel_result nebel_create_lighting(nebel_snapshot *snapshot, const nebel_lightin
     if (made != NULL) *made = NULL;
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (desc == NULL) desc = &dark;
-    const nebel_log *log = desc->log.write != NULL ? &desc->log : &snapshot->log;
+    const nebel_log *log = desc->host.log.write != NULL ? &desc->host.log : &snapshot->log;
     if (made == NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "lighting: the place for it must not be NULL");
     nebel_result result = nb_check_lighting(log, desc);
     if (result != NEBEL_OK) return result;

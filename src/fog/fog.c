@@ -26,15 +26,15 @@ nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog)
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
     *fog = NULL;
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (!nb_allocator_is_valid(&desc->allocator))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "allocator: needs allocate and release, or neither");
-    const nebel_result result = check_opacity(&desc->log, desc->max_opacity);
+    if (!nb_allocator_is_valid(&desc->host.allocator))
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "allocator: needs allocate and release, or neither");
+    const nebel_result result = check_opacity(&desc->host.log, desc->max_opacity);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_fog *made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "fog: out of memory");
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "fog: out of memory");
     made->allocator = allocator;
-    made->log = desc->log;
+    made->log = desc->host.log;
     made->max_opacity = desc->max_opacity;
     *fog = made;
     return NEBEL_OK;

@@ -6,6 +6,7 @@
 
 #include "aerial/cloud_eclipse.h"
 #include "aerial/cloud_compose.h"
+#include "base/parallel.h"
 #include "math/vector.h"
 
 #include <string.h>
@@ -59,10 +60,7 @@ static void do_part(void *data, size_t i)
 static nebel_result do_round(job *j)
 {
     nebel_result result = NEBEL_OK;
-    if (j->clouds->run != NULL)
-        j->clouds->run(NB_CLOUD_PARTS, do_part, j, j->clouds->run_user);
-    else
-        for (size_t i = 0; i < NB_CLOUD_PARTS; i++) do_part(j, i);
+    nb_parallel_for(&j->clouds->parallel, NB_CLOUD_PARTS, do_part, j);
     for (size_t i = 0; i < NB_CLOUD_PARTS && result == NEBEL_OK; i++) result = j->clouds->parts[i].result;
     return result;
 }
@@ -141,7 +139,7 @@ nebel_result nb_cloud_picture_set(nb_gl_clouds *clouds, const nebel_clouds *of, 
                                   const nebel_log *log)
 {
     const nebel_cloud_lighting_desc desc = {
-        .clouds = of, .sun = *sun, .time = time, .allocator = clouds->allocator, .log = *log};
+        .clouds = of, .sun = *sun, .time = time, .host = {.allocator = clouds->allocator, .log = *log}};
     if (is_same_lighting(&clouds->of, &desc)) return NEBEL_OK;
     forget(clouds);
     const nebel_result result = nebel_create_cloud_lighting(&desc, &clouds->view);

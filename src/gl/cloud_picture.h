@@ -49,8 +49,7 @@ typedef struct nb_cloud_pixel {
 
 typedef struct nb_gl_clouds {
     nebel_allocator allocator;
-    nebel_parallel_for_fn run; /* NULL: one part after the other */
-    void *run_user;
+    nebel_parallel parallel;
     nebel_cloud_lighting_desc of; /* what the view is made of; no clouds: of nothing */
     nebel_cloud_lighting *view;
     nb_cloud_part parts[NB_CLOUD_PARTS];

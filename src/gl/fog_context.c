@@ -6,7 +6,7 @@ static nebel_result make_empty_fog(nebel_gl *gl)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    const nebel_fog_desc desc = {.allocator = gl->allocator, .log = gl->log};
+    const nebel_fog_desc desc = {.host = {.allocator = gl->allocator, .log = gl->log}};
     nebel_result result = nebel_create_fog(&desc, &fog);
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
     if (result == NEBEL_OK) result = nebel_create_lighting(snapshot, NULL, &gl->empty);
@@ -33,8 +33,8 @@ nebel_result nebel_create_gl(const nebel_gl_desc *desc, nebel_gl **gl)
     if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
     *gl = NULL;
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
-    const nebel_log *const log = &desc->log;
-    if (!nb_allocator_is_valid(&desc->allocator)) {
+    const nebel_log *const log = &desc->host.log;
+    if (!nb_allocator_is_valid(&desc->host.allocator)) {
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "nebel_create_gl: the allocator needs both functions or neither");
     }
     if ((unsigned)desc->storage > NEBEL_GL_STORAGE_TEXTURE) {
@@ -43,7 +43,7 @@ nebel_result nebel_create_gl(const nebel_gl_desc *desc, nebel_gl **gl)
     nb_context context;
     nebel_result result = nb_context_read(log, &context);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_gl *const made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(log, NEBEL_ERROR_MEMORY, "nebel_create_gl: out of memory");
     made->allocator = allocator;

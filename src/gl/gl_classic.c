@@ -77,11 +77,11 @@ static void choose_kind(nebel_gl_classic *classic)
 
 static nebel_result check_desc(const nebel_gl_classic_desc *desc)
 {
-    if (!nb_allocator_is_valid(&desc->allocator) || (unsigned)desc->kind >= NEBEL_GL_CLASSIC_COUNT)
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT,
+    if (!nb_allocator_is_valid(&desc->host.allocator) || (unsigned)desc->kind >= NEBEL_GL_CLASSIC_COUNT)
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT,
                        "nebel_create_gl_classic: there is no such kind, or the allocator has one function of two");
     if (!(desc->coordinate_end >= 0 && desc->coordinate_end < HUGE_VAL))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE,
                        "nebel_create_gl_classic: coordinate_end %g must be finite and not negative",
                        desc->coordinate_end);
     return NEBEL_OK;
@@ -94,14 +94,14 @@ nebel_result nebel_create_gl_classic(const nebel_gl_classic_desc *desc, nebel_gl
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = check_desc(desc);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_gl_classic *const made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "nebel_create_gl_classic: out of memory");
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "nebel_create_gl_classic: out of memory");
     made->allocator = allocator;
-    made->log = desc->log;
+    made->log = desc->host.log;
     made->kind = desc->kind;
     made->coordinate_end = desc->coordinate_end > 0 ? (float)desc->coordinate_end : 100;
-    result = read_context(&desc->log, made);
+    result = read_context(&desc->host.log, made);
     if (result != NEBEL_OK) {
         nb_release(&allocator, made);
         return result;

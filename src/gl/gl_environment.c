@@ -39,7 +39,7 @@ nebel_result nb_environment_show(nb_environment *e, const nebel_allocator *alloc
     nebel_snapshot *empty = NULL;
     nebel_lighting *lighting = NULL;
     const nebel_lighting_desc desc = {.environment = *light};
-    nebel_result result = nebel_create_fog(&(nebel_fog_desc){.allocator = *allocator, .log = *log}, &fog);
+    nebel_result result = nebel_create_fog(&(nebel_fog_desc){.host = {.allocator = *allocator, .log = *log}}, &fog);
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, &empty);
     if (result == NEBEL_OK) result = nebel_create_lighting(empty, &desc, &lighting);
     if (result == NEBEL_OK) result = nb_environment_set(e, allocator, log, context, lighting, 1);

@@ -70,7 +70,7 @@ nebel_result nb_particles_commit(const nb_particles *particles, const nebel_allo
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    const nebel_fog_desc desc = {.allocator = *allocator, .log = *log};
+    const nebel_fog_desc desc = {.host = {.allocator = *allocator, .log = *log}};
     nebel_result result = nebel_create_fog(&desc, &fog);
     for (size_t i = 0; i < particles->count && result == NEBEL_OK; i++) {
         const nebel_volume_desc volume = nebel_volume_from_particle(&particles->list[i]);

@@ -58,7 +58,7 @@ static nebel_result make_views(nb_gl_air *air, nebel_sky_view_desc desc, int cou
         if (result == NEBEL_OK) air->count = i + 1;
     }
     if (result != NEBEL_ERROR_ARGUMENT) return result;
-    return nb_fail(&desc.log, NEBEL_ERROR_VALUE,
+    return nb_fail(&desc.host.log, NEBEL_ERROR_VALUE,
                    "the planet's air: the camera or the sun is at no place that it knows");
 }
 
@@ -153,10 +153,7 @@ nebel_result nb_gl_planets_set(nb_gl_air *air, const nebel_allocator *allocator,
     const nebel_sky_view_desc desc = {.sun = nb_surface_lighting_sun(scene),
                                       .position = {eye[0], eye[1], eye[2]},
                                       .has_ray_ends = ends || count > 1,
-                                      .run = air->run,
-                                      .run_user = air->run_user,
-                                      .allocator = *allocator,
-                                      .log = *log};
+                                      .host = {*allocator, *log, air->parallel}};
     glBindTexture(GL_TEXTURE_2D, air->texture);
     if (is_same_air(air, &desc, worlds, count, is_lit)) return NEBEL_OK;
     forget_views(air);

@@ -7,8 +7,7 @@
 #include "aerial/planets.h"
 
 typedef struct nb_gl_air {
-    nebel_parallel_for_fn run; /* for threads; NULL: none */
-    void *run_user;
+    nebel_parallel parallel;
     unsigned texture;                                 /* all tables, in OpenGL; 0: not made yet */
     nebel_sky_view_desc of;                           /* what they are made of, but for the planet */
     const nebel_atmosphere *made[NEBEL_MAX_PLANETS];  /* the same */

@@ -9,9 +9,9 @@ enum { USUAL_SHADOW_SIZE = 2048, LEAST_SHADOW_SIZE = 64, MOST_SHADOW_SIZE = 1638
 
 static nebel_result check_renderer(const nebel_scene_data *scene, const nebel_gl_renderer_desc *desc)
 {
-    const nebel_log *const log = &desc->log;
+    const nebel_log *const log = &desc->host.log;
     if (scene == NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "OpenGL renderer: scene is NULL");
-    if (!nb_allocator_is_valid(&desc->allocator)) {
+    if (!nb_allocator_is_valid(&desc->host.allocator)) {
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "OpenGL renderer: the allocator needs both functions or neither");
     }
     if (desc->shadow_map_size != 0 &&
@@ -44,7 +44,7 @@ static nebel_result make_renderer_objects(nebel_gl_renderer *r)
 
 static nebel_result make_renderer(nebel_gl_renderer *r)
 {
-    const nebel_gl_desc desc = {.allocator = r->allocator, .log = r->log};
+    const nebel_gl_desc desc = {.host = {.allocator = r->allocator, .log = r->log}};
     nb_scene_state state;
     nebel_result result = nebel_create_gl(&desc, &r->eye_fog);
     if (result == NEBEL_OK) result = nebel_create_gl(&desc, &r->sun_fog);
@@ -66,16 +66,15 @@ nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_light
     *renderer = NULL;
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = check_renderer(scene, desc);
-    if (result == NEBEL_OK) result = nb_context_read(&desc->log, &context);
-    if (result == NEBEL_OK) result = check_context(&context, &desc->log);
+    if (result == NEBEL_OK) result = nb_context_read(&desc->host.log, &context);
+    if (result == NEBEL_OK) result = check_context(&context, &desc->host.log);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_gl_renderer *const made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory");
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory");
     made->allocator = made->meshes.allocator = made->clouds.allocator = allocator;
-    made->clouds.run = made->air.run = desc->run;
-    made->clouds.run_user = made->air.run_user = desc->run_user;
-    made->log = made->meshes.log = desc->log;
+    made->clouds.parallel = made->air.parallel = desc->host.parallel;
+    made->log = made->meshes.log = desc->host.log;
     made->scene = scene;
     made->context = context;
     const uint32_t size = desc->shadow_map_size != 0 ? desc->shadow_map_size : USUAL_SHADOW_SIZE;

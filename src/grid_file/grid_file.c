@@ -238,8 +238,7 @@ static nebel_result make_grid(const nb_codec *codec, const nebel_grid_file *file
                               nebel_grid **grid)
 {
     nb_slice_owner user = {codec};
-    nebel_grid_desc desc = {.allocator = codec->allocator,
-                            .log = {tell_file, &user},
+    nebel_grid_desc desc = {.host = {.allocator = codec->allocator, .log = {tell_file, &user}},
                             .type = voxels->type,
                             .voxels = voxels->data,
                             .filter = file->filter,
@@ -254,10 +253,10 @@ nebel_result nb_voxels_load(const nebel_grid_file *file, const nebel_scene_desc 
     *bytes = 0;
     if (grid != NULL) *grid = NULL;
     if (file == NULL || desc == NULL || grid == NULL || file->path == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (!nb_allocator_is_valid(&desc->allocator))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
-    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator),
-                            .log = desc->log,
+    if (!nb_allocator_is_valid(&desc->host.allocator))
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
+    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->host.allocator),
+                            .log = desc->host.log,
                             .name = file->path,
                             .room = desc->memory};
     nb_voxels voxels = {.data = NULL};

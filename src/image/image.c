@@ -9,11 +9,11 @@ enum { MAX_NAME = 255 };
 
 /* ---- reading --------------------------------------------------------------------------------- */
 
-nebel_result nb_codec_prepare(const nebel_scene_desc *desc, const char *name, nb_codec *codec)
+nebel_result nb_codec_prepare(const nebel_host *host, const char *name, nb_codec *codec)
 {
-    if (!nb_allocator_is_valid(&desc->allocator))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
-    *codec = (nb_codec){.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = name};
+    if (!nb_allocator_is_valid(&host->allocator))
+        return nb_fail(&host->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
+    *codec = (nb_codec){.allocator = nb_resolve_allocator(&host->allocator), .log = host->log, .name = name};
     return NEBEL_OK;
 }
 
@@ -41,20 +41,20 @@ nebel_result nb_image_read(const nb_codec *codec, nebel_image *image)
     return read_image(codec, image);
 }
 
-nebel_result nebel_read_image(const char *path, const nebel_scene_desc *desc, nebel_image *image)
+nebel_result nebel_read_image(const char *path, const nebel_host *host, nebel_image *image)
 {
     if (image != NULL) *image = (nebel_image){0};
-    if (path == NULL || desc == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (path == NULL || host == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
     nb_codec codec;
-    const nebel_result result = nb_codec_prepare(desc, path, &codec);
+    const nebel_result result = nb_codec_prepare(host, path, &codec);
     if (result != NEBEL_OK) return result;
     return read_image(&codec, image);
 }
 
-void nebel_free_image(const nebel_scene_desc *desc, nebel_image *image)
+void nebel_free_image(const nebel_host *host, nebel_image *image)
 {
-    if (desc == NULL || image == NULL || !nb_allocator_is_valid(&desc->allocator)) return;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    if (host == NULL || image == NULL || !nb_allocator_is_valid(&host->allocator)) return;
+    const nebel_allocator allocator = nb_resolve_allocator(&host->allocator);
     nb_image_release(&allocator, image);
 }
 
@@ -102,11 +102,11 @@ nebel_result nb_codec_fail_ending(const nb_codec *codec)
                    codec->name);
 }
 
-nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *desc)
+nebel_result nebel_check_image_path(const char *path, const nebel_host *host)
 {
-    if (path == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (path == NULL || host == NULL) return NEBEL_ERROR_ARGUMENT;
     nb_codec codec;
-    const nebel_result result = nb_codec_prepare(desc, path, &codec);
+    const nebel_result result = nb_codec_prepare(host, path, &codec);
     if (result != NEBEL_OK) return result;
     if (nebel_get_image_format(path) == NEBEL_IMAGE_NONE) return nb_codec_fail_ending(&codec);
     return nb_file_try(&codec.allocator, &codec.log, path);

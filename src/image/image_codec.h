@@ -81,7 +81,7 @@ nebel_result nb_image_check(const nb_codec *codec, const nebel_image *image);
 int nb_image_channel(const nebel_image *image, const char *name);
 
 /* Who asks, of the caller's own; the allocator has both functions or none. Errors: ARGUMENT. */
-nebel_result nb_codec_prepare(const nebel_scene_desc *desc, const char *name, nb_codec *codec);
+nebel_result nb_codec_prepare(const nebel_host *host, const char *name, nb_codec *codec);
 
 /* The largest picture file: 8 GiB where sizes have 64 bits. */
 #define NB_FILE_LIMIT (SIZE_MAX >> 31)

@@ -58,9 +58,8 @@ nebel_result nebel_create_image_writer(const char *path, const nebel_image_desc 
 {
     if (writer != NULL) *writer = NULL;
     if (path == NULL || desc == NULL || writer == NULL) return NEBEL_ERROR_ARGUMENT;
-    const nebel_scene_desc asking = {.allocator = desc->allocator, .log = desc->log};
     nb_codec codec;
-    nebel_result result = nb_codec_prepare(&asking, path, &codec);
+    nebel_result result = nb_codec_prepare(&desc->host, path, &codec);
     if (result != NEBEL_OK) return result;
     const nb_picture_plan plan = {desc->width, desc->height, desc->channel_count, desc->channel_names, desc->record};
     result = check_plan(&codec, &plan);
@@ -68,7 +67,7 @@ nebel_result nebel_create_image_writer(const char *path, const nebel_image_desc 
     const nebel_image_format format = nebel_get_image_format(path);
     if (format == NEBEL_IMAGE_NONE) return nb_codec_fail_ending(&codec);
     nebel_image_writer *made = nb_allocate_zero(&codec.allocator, 1, sizeof *made + strlen(path) + 1);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
     *made = (nebel_image_writer){.codec = codec, .format = format, .plan = plan};
     made->codec.name = strcpy((char *)(made + 1), path);
     result = nb_sink_open(&codec.allocator, &codec.log, path, &made->sink);
@@ -128,14 +127,13 @@ void nebel_destroy_image_writer(nebel_image_writer *writer)
     nb_release(&allocator, writer);
 }
 
-nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, const nebel_image *image)
+nebel_result nebel_write_image(const char *path, const nebel_host *host, const nebel_image *image)
 {
-    if (path == NULL || desc == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (path == NULL || host == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
     if (image->samples == NULL)
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "%s: the picture cannot be written: its samples are NULL",
+        return nb_fail(&host->log, NEBEL_ERROR_ARGUMENT, "%s: the picture cannot be written: its samples are NULL",
                        path);
-    const nebel_image_desc plan = {.allocator = desc->allocator,
-                                   .log = desc->log,
+    const nebel_image_desc plan = {.host = *host,
                                    .width = image->width,
                                    .height = image->height,
                                    .channel_count = image->channel_count,

@@ -30,19 +30,19 @@ int nebel_is_movie_path(const char *path)
 static nebel_result check_desc(const nb_codec *codec, const nebel_movie_desc *desc)
 {
     const double rate = desc->frames_per_second;
-    if (!nb_allocator_is_valid(&desc->allocator))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
+    if (!nb_allocator_is_valid(&desc->host.allocator))
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
     if (rate != 0 && !(rate >= 1 && rate <= NEBEL_MAX_MOVIE_RATE))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "%s: %g pictures a second; must be 1 to %d", codec->name, rate,
-                       NEBEL_MAX_MOVIE_RATE);
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "%s: %g pictures a second; must be 1 to %d", codec->name,
+                       rate, NEBEL_MAX_MOVIE_RATE);
     if (desc->quality < 0 || desc->quality > 100)
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "%s: a quality of %d; must be 1 to 100", codec->name,
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "%s: a quality of %d; must be 1 to 100", codec->name,
                        desc->quality);
     if (!nebel_is_movie_path(codec->name))
-        return nb_fail(&desc->log, NEBEL_ERROR_FORMAT, "%s: unknown film format; the name must end in .webp",
+        return nb_fail(&desc->host.log, NEBEL_ERROR_FORMAT, "%s: unknown film format; the name must end in .webp",
                        codec->name);
     if (!nb_webp_is_built())
-        return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED,
+        return nb_fail(&desc->host.log, NEBEL_ERROR_UNSUPPORTED,
                        "%s: this nebel was built without WebP; build it with libwebp (Debian: libwebp-dev), or write "
                        "numbered PNG pictures",
                        codec->name);
@@ -53,12 +53,13 @@ nebel_result nebel_create_movie(const char *path, const nebel_movie_desc *desc, 
 {
     if (film != NULL) *film = NULL;
     if (path == NULL || desc == NULL || film == NULL) return NEBEL_ERROR_ARGUMENT;
-    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
+    const nb_codec codec = {
+        .allocator = nb_resolve_allocator(&desc->host.allocator), .log = desc->host.log, .name = path};
     nebel_result result = check_desc(&codec, desc);
     if (result == NEBEL_OK) result = nb_file_try_room(&codec.allocator, &codec.log, path, LEAST_ROOM);
     if (result != NEBEL_OK) return result;
     nebel_movie *made = nb_allocate_zero(&codec.allocator, 1, sizeof *made + strlen(path) + 1);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
     made->path = strcpy((char *)(made + 1), path);
     made->codec = codec;
     made->codec.name = made->path;

@@ -539,16 +539,16 @@ void nb_environment_map_most(const nebel_environment_map *map, double most[3])
 
 static nebel_result check_desc(const nebel_environment_map_desc *desc)
 {
-    if (!nb_allocator_is_valid(&desc->allocator))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT,
+    if (!nb_allocator_is_valid(&desc->host.allocator))
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT,
                        "environment map: the allocator needs both functions or neither");
     if (desc->pixels == NULL)
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "environment map: pixels must not be NULL");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "environment map: pixels must not be NULL");
     if (desc->width < 2 || desc->width > NEBEL_MAX_ENVIRONMENT_WIDTH)
-        return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "environment map: is %zu pixels wide; must be 2 to %d",
+        return nb_fail(&desc->host.log, NEBEL_ERROR_LIMIT, "environment map: is %zu pixels wide; must be 2 to %d",
                        desc->width, NEBEL_MAX_ENVIRONMENT_WIDTH);
     if (desc->width == 2 * desc->height) return NEBEL_OK;
-    return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+    return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE,
                    "environment map: is %zu x %zu pixels; must be twice as wide as high, 360 by 180 degrees",
                    desc->width, desc->height);
 }
@@ -558,7 +558,7 @@ static nebel_result copy_pixels(const nebel_environment_map_desc *desc, nebel_en
     for (size_t i = 0; i < 3 * map->width * map->height; i++) {
         const double value = (double)desc->pixels[i];
         if (!(value >= 0 && value <= NEBEL_MAX_AMOUNT))
-            return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+            return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE,
                            "environment map: pixel %zu, %zu from the top left has %g; must be within 0 and %g",
                            i / 3 % map->width, i / 3 / map->width, value, NEBEL_MAX_AMOUNT);
         map->pixels[i] = desc->pixels[i];
@@ -595,12 +595,12 @@ nebel_result nebel_create_environment_map(const nebel_environment_map_desc *desc
     if (map != NULL) *map = NULL;
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
     if (map == NULL)
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "environment map: the place for it must not be NULL");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "environment map: the place for it must not be NULL");
     nebel_result result = check_desc(desc);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_environment_map *made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "environment map: out of memory");
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "environment map: out of memory");
     made->allocator = allocator;
     atomic_init(&made->owners, 1);
     atomic_flag_clear(&made->lock);
@@ -611,7 +611,7 @@ nebel_result nebel_create_environment_map(const nebel_environment_map_desc *desc
     const int got = made->pixels != NULL && made->terms != NULL;
     result = got ? copy_pixels(desc, made) : NEBEL_ERROR_MEMORY;
     if (result == NEBEL_OK && !prepare(made)) result = NEBEL_ERROR_MEMORY;
-    if (result == NEBEL_ERROR_MEMORY) (void)nb_fail(&desc->log, result, "environment map: out of memory");
+    if (result == NEBEL_ERROR_MEMORY) (void)nb_fail(&desc->host.log, result, "environment map: out of memory");
     if (result != NEBEL_OK)
         free_map(made);
     else

@@ -40,7 +40,7 @@ static nebel_result check_sun(const nebel_log *log, const nebel_sun *sun)
 
 nebel_result nb_check_lighting(const nebel_log *log, const nebel_lighting_desc *desc)
 {
-    if (!nb_allocator_is_valid(&desc->allocator))
+    if (!nb_allocator_is_valid(&desc->host.allocator))
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "allocator: needs allocate and release, or neither");
     if (desc->light_count > 0 && desc->lights == NULL)
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "lights: must not be NULL");
@@ -257,11 +257,11 @@ void nb_free_lighting(nebel_lighting *lighting)
 static nebel_lighting *open_lighting(nebel_snapshot *snapshot, const nebel_lighting_desc *desc)
 {
     const nebel_allocator allocator =
-        desc->allocator.allocate != NULL ? nb_resolve_allocator(&desc->allocator) : snapshot->allocator;
+        desc->host.allocator.allocate != NULL ? nb_resolve_allocator(&desc->host.allocator) : snapshot->allocator;
     nebel_lighting *lighting = nb_allocate_zero(&allocator, 1, sizeof *lighting);
     if (lighting == NULL) return NULL;
     lighting->allocator = allocator;
-    lighting->log = desc->log.write != NULL ? desc->log : snapshot->log;
+    lighting->log = desc->host.log.write != NULL ? desc->host.log : snapshot->log;
     lighting->snapshot = nebel_retain_snapshot(snapshot);
     lighting->environment = desc->environment;
     if (desc->environment.type == NEBEL_ENVIRONMENT_MAP)

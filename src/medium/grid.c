@@ -17,10 +17,11 @@ static nebel_result check_size(const nebel_grid_desc *desc, size_t *count)
     *count = 1;
     for (int i = 0; i < 3; i++) {
         if (desc->size[i] < 1 || desc->size[i] > NEBEL_MAX_GRID_SIZE)
-            return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "grid: %zu x %zu x %zu voxels; must be 1 to %d on each axis",
-                           desc->size[0], desc->size[1], desc->size[2], NEBEL_MAX_GRID_SIZE);
+            return nb_fail(&desc->host.log, NEBEL_ERROR_LIMIT,
+                           "grid: %zu x %zu x %zu voxels; must be 1 to %d on each axis", desc->size[0], desc->size[1],
+                           desc->size[2], NEBEL_MAX_GRID_SIZE);
         if (*count > NEBEL_MAX_GRID_VOXELS / desc->size[i])
-            return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "grid: %zu x %zu x %zu voxels; at most %d in all",
+            return nb_fail(&desc->host.log, NEBEL_ERROR_LIMIT, "grid: %zu x %zu x %zu voxels; at most %d in all",
                            desc->size[0], desc->size[1], desc->size[2], NEBEL_MAX_GRID_VOXELS);
         *count *= desc->size[i];
     }
@@ -29,15 +30,15 @@ static nebel_result check_size(const nebel_grid_desc *desc, size_t *count)
 
 static nebel_result check_desc(const nebel_grid_desc *desc, size_t *count)
 {
-    if (!nb_allocator_is_valid(&desc->allocator))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "grid: the allocator needs both functions or neither");
-    if (desc->voxels == NULL) return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "grid: voxels must not be NULL");
+    if (!nb_allocator_is_valid(&desc->host.allocator))
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "grid: the allocator needs both functions or neither");
+    if (desc->voxels == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "grid: voxels must not be NULL");
     if (desc->type != NEBEL_VOXEL_FLOAT && desc->type != NEBEL_VOXEL_UINT8 && desc->type != NEBEL_VOXEL_UINT16)
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "grid: voxel type %d is unknown", (int)desc->type);
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "grid: voxel type %d is unknown", (int)desc->type);
     if (desc->filter != NEBEL_GRID_FILTER_LINEAR && desc->filter != NEBEL_GRID_FILTER_NEAREST)
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "grid: filter %d is unknown", (int)desc->filter);
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "grid: filter %d is unknown", (int)desc->filter);
     if (!isfinite(desc->scale) || !isfinite(desc->offset))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "grid: scale and offset must be finite");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "grid: scale and offset must be finite");
     return check_size(desc, count);
 }
 
@@ -176,10 +177,10 @@ static nebel_result fill_grid(const nebel_grid_desc *desc, nebel_grid *grid, siz
     const char *name = desc->name != NULL ? desc->name : "";
     grid->name = nb_allocate(&grid->allocator, strlen(name) + 1, 1);
     if (grid->name == NULL || !allocate_grid(grid, count))
-        return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "grid: out of memory");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "grid: out of memory");
     memcpy(grid->name, name, strlen(name) + 1);
     memcpy(grid->voxels, desc->voxels, grid->bytes);
-    const nebel_result result = check_voxels(&desc->log, grid, count);
+    const nebel_result result = check_voxels(&desc->host.log, grid, count);
     if (result != NEBEL_OK) return result;
     grid->hash = hash_bytes(grid->voxels, grid->bytes);
     measure_bricks(grid);
@@ -192,12 +193,12 @@ nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid)
     size_t count = 0;
     if (grid != NULL) *grid = NULL;
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (grid == NULL) return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "grid: the place for it must not be NULL");
+    if (grid == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "grid: the place for it must not be NULL");
     nebel_result result = check_desc(desc, &count);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_grid *made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "grid: out of memory");
+    if (made == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "grid: out of memory");
     made->allocator = allocator;
     atomic_init(&made->owners, 1);
     made->type = desc->type;

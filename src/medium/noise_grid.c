@@ -208,14 +208,15 @@ static void fill(const nebel_noise_desc *desc, point *points, uint16_t *voxels)
 
 static nebel_result bad_noise(const nebel_noise_desc *desc, const char *what, double value, const char *range)
 {
-    return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "noise: %s is %g; must be %s", what, value, range);
+    return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "noise: %s is %g; must be %s", what, value, range);
 }
 
 static nebel_result check_noise_axis(const nebel_noise_desc *desc, int i)
 {
     if (desc->size[i] < 1 || desc->size[i] > NEBEL_MAX_GRID_SIZE)
-        return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "noise: %zu x %zu x %zu voxels; must be 1 to %d on each axis",
-                       desc->size[0], desc->size[1], desc->size[2], NEBEL_MAX_GRID_SIZE);
+        return nb_fail(&desc->host.log, NEBEL_ERROR_LIMIT,
+                       "noise: %zu x %zu x %zu voxels; must be 1 to %d on each axis", desc->size[0], desc->size[1],
+                       desc->size[2], NEBEL_MAX_GRID_SIZE);
     if (!(desc->frequency[i] > 0 && 2 * desc->frequency[i] <= (double)desc->size[i]))
         return bad_noise(desc, "cells", desc->frequency[i], "more than 0, and of two voxels each at least");
     if (!(fabs(desc->offset[i]) <= NEBEL_MAX_NOISE_OFFSET))
@@ -227,8 +228,8 @@ static nebel_result check_noise_axis(const nebel_noise_desc *desc, int i)
 
 static nebel_result check(const nebel_noise_desc *desc)
 {
-    if (!nb_allocator_is_valid(&desc->allocator))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "noise: the allocator needs both functions or neither");
+    if (!nb_allocator_is_valid(&desc->host.allocator))
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "noise: the allocator needs both functions or neither");
     for (int i = 0; i < 3; i++) {
         const nebel_result result = check_noise_axis(desc, i);
         if (result != NEBEL_OK) return result;
@@ -247,10 +248,10 @@ nebel_result nebel_create_noise_grid(const nebel_noise_desc *desc, nebel_grid **
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = check(desc);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     const size_t *size = desc->size;
     if (size[0] * size[1] > NEBEL_MAX_NOISE_VOXELS / size[2])
-        return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "noise: %zu x %zu x %zu voxels; at most %d in all", size[0],
+        return nb_fail(&desc->host.log, NEBEL_ERROR_LIMIT, "noise: %zu x %zu x %zu voxels; at most %d in all", size[0],
                        size[1], size[2], NEBEL_MAX_NOISE_VOXELS);
     uint16_t *voxels = nb_allocate(&allocator, size[0] * size[1] * size[2], sizeof *voxels);
     point *points = nb_allocate_zero(&allocator, CACHED_POINTS, sizeof *points);
@@ -259,10 +260,9 @@ nebel_result nebel_create_noise_grid(const nebel_noise_desc *desc, nebel_grid **
     nb_release(&allocator, points);
     if (!is_filled) {
         nb_release(&allocator, voxels);
-        return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "noise: out of memory");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "noise: out of memory");
     }
-    result = nebel_create_grid(&(nebel_grid_desc){.allocator = desc->allocator,
-                                                  .log = desc->log,
+    result = nebel_create_grid(&(nebel_grid_desc){.host = desc->host,
                                                   .size = {size[0], size[1], size[2]},
                                                   .type = NEBEL_VOXEL_UINT16,
                                                   .voxels = voxels,

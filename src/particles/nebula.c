@@ -53,15 +53,16 @@ nebel_volume_desc nebel_volume_from_particle(const nebel_particle *particle)
 /* What each particle has of it must be what a volume may have. */
 static nebel_result check_amounts(const nebel_nebula_desc *desc)
 {
-    const nebel_result result = nb_check_color(&desc->log, "nebula: absorption", desc->absorption, NEBEL_MAX_AMOUNT);
+    const nebel_result result =
+        nb_check_color(&desc->host.log, "nebula: absorption", desc->absorption, NEBEL_MAX_AMOUNT);
     if (result != NEBEL_OK) return result;
     for (size_t i = 0; i < desc->color_count; i++)
         for (int c = 0; c < 3; c++)
             if (!(desc->colors[i][c] >= 0 && desc->colors[i][c] * desc->emission[c] <= NEBEL_MAX_AMOUNT))
-                return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+                return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE,
                                "nebula: color %zu must not be negative, and emission times it at most %g", i,
                                NEBEL_MAX_AMOUNT);
-    return nb_check_color(&desc->log, "nebula: emission", desc->emission, NEBEL_MAX_AMOUNT);
+    return nb_check_color(&desc->host.log, "nebula: emission", desc->emission, NEBEL_MAX_AMOUNT);
 }
 
 /* That of a gaussian is a third of the radius. */
@@ -75,20 +76,21 @@ static nebel_result check_lengths(const nebel_nebula_desc *desc)
 {
     const int default_size = desc->radius_range[0] == 0 && desc->radius_range[1] == 0;
     if (!default_size && !(is_radius(desc, desc->radius_range[0]) && is_radius(desc, desc->radius_range[1])))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE,
                        "nebula: sizes are %g to %g m; they must be from %g (a gaussian: 3 times that) to %g m",
                        desc->radius_range[0], desc->radius_range[1], NEBEL_MIN_LENGTH, NEBEL_MAX_LENGTH);
     if (!(desc->radius_range[0] <= desc->radius_range[1]))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: sizes are %g to %g m; the smaller must come first",
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "nebula: sizes are %g to %g m; the smaller must come first",
                        desc->radius_range[0], desc->radius_range[1]);
     if (!(desc->dimming >= 0 && desc->dimming <= 1))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: dimming is %g; it must be from 0 to 1", desc->dimming);
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "nebula: dimming is %g; it must be from 0 to 1",
+                       desc->dimming);
     if (!(desc->turbulence >= 0 && desc->turbulence <= NEBEL_MAX_LENGTH))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: turbulence is %g m; it must be from 0 to %g",
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "nebula: turbulence is %g m; it must be from 0 to %g",
                        desc->turbulence, NEBEL_MAX_LENGTH);
     const double eddy = desc->turbulence_scale;
     if (!(eddy == 0 || (eddy >= NEBEL_MIN_LENGTH && eddy <= NEBEL_MAX_LENGTH)))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE,
                        "nebula: turbulence_scale is %g m; it must be 0, or from %g to %g", eddy, NEBEL_MIN_LENGTH,
                        NEBEL_MAX_LENGTH);
     return NEBEL_OK;
@@ -96,11 +98,12 @@ static nebel_result check_lengths(const nebel_nebula_desc *desc)
 
 static nebel_result check_desc(const nebel_nebula_desc *desc)
 {
-    if (!nb_allocator_is_valid(&desc->allocator))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT,
+    if (!nb_allocator_is_valid(&desc->host.allocator))
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT,
                        "nebula: the allocator needs allocate and release, or neither");
     if (desc->profile < 0 || desc->profile >= NEBEL_PARTICLE_PROFILE_COUNT)
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: %d is no profile of a particle", (int)desc->profile);
+        return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "nebula: %d is no profile of a particle",
+                       (int)desc->profile);
     const nebel_result result = check_lengths(desc);
     return result == NEBEL_OK ? check_amounts(desc) : result;
 }
@@ -116,12 +119,12 @@ static double find_extent(const double low[3], const double high[3])
 static nebel_result open_shape(nb_nebula_state *made, double *extent)
 {
     const nebel_volume_desc body = {.shape = made->desc->shape, .density = made->desc->density};
-    const nebel_result result = nb_volume_resolve(&made->allocator, &made->desc->log, &body, &made->volume);
+    const nebel_result result = nb_volume_resolve(&made->allocator, &made->desc->host.log, &body, &made->volume);
     if (result != NEBEL_OK) return result;
     *extent = find_extent(made->volume.low, made->volume.high);
     if (isfinite(*extent)) return NEBEL_OK;
     nb_volume_free(&made->allocator, &made->volume);
-    return nb_fail(&made->desc->log, NEBEL_ERROR_VALUE,
+    return nb_fail(&made->desc->host.log, NEBEL_ERROR_VALUE,
                    "nebula: its shape has no bounds; particles need a place to be in");
 }
 
@@ -131,7 +134,7 @@ static nebel_result measure_points(const nebel_nebula_desc *desc, double *extent
     for (size_t i = 0; i < desc->count; i++)
         for (int k = 0; k < 3; k++) {
             if (!isfinite(desc->points[i][k]))
-                return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: point %zu is not finite", i);
+                return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "nebula: point %zu is not finite", i);
             low[k] = fmin(low[k], desc->points[i][k]);
             high[k] = fmax(high[k], desc->points[i][k]);
         }
@@ -143,7 +146,7 @@ static nebel_result open_cloud(const nebel_nebula_desc *desc, nb_nebula_state *m
 {
     double extent = 0;
     *made = (nb_nebula_state){.desc = desc,
-                              .allocator = nb_resolve_allocator(&desc->allocator),
+                              .allocator = nb_resolve_allocator(&desc->host.allocator),
                               .size = {desc->radius_range[0], desc->radius_range[1]},
                               .eddy = desc->turbulence_scale};
     const nebel_result result = desc->points != NULL ? measure_points(desc, &extent) : open_shape(made, &extent);
@@ -247,7 +250,7 @@ nebel_result nebel_generate_nebula(const nebel_nebula_desc *desc, nebel_particle
     for (size_t i = 0; i < desc->count && result == NEBEL_OK; i++) {
         if (!make_particle(&from, i, &particles[i]))
             result = nb_fail(
-                &desc->log, NEBEL_ERROR_VALUE,
+                &desc->host.log, NEBEL_ERROR_VALUE,
                 "nebula: no place for particle %zu in %d tries; its shape is empty or thin, or its density nearly 0", i,
                 MOST_TRIES);
     }

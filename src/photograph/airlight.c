@@ -176,13 +176,12 @@ static void choose(const sampler *from, const uint16_t *dark, size_t count, uint
     for (size_t c = 0; c < 3; c++) airlight[c] = sample_of(from, i, c);
 }
 
-nebel_result nebel_estimate_airlight(const nebel_scene_desc *desc, const nebel_photograph *photograph,
-                                     double airlight[3])
+nebel_result nebel_estimate_airlight(const nebel_host *host, const nebel_photograph *photograph, double airlight[3])
 {
     nb_codec codec;
     sampler from;
-    if (desc == NULL || photograph == NULL || airlight == NULL) return NEBEL_ERROR_ARGUMENT;
-    nebel_result result = nb_codec_prepare(desc, "airlight", &codec);
+    if (host == NULL || photograph == NULL || airlight == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = nb_codec_prepare(host, "airlight", &codec);
     if (result != NEBEL_OK) return result;
     const size_t width = photograph->width, height = photograph->height, count = width * height;
     if (photograph->pixels == NULL || count == 0 || !make_sampler(photograph, &from))

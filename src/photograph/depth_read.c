@@ -275,25 +275,25 @@ static nebel_result read_map(const nb_codec *codec, const nebel_depth_source *so
     return result;
 }
 
-nebel_result nebel_read_depth(const char *path, const nebel_depth_source *source, const nebel_scene_desc *desc,
+nebel_result nebel_read_depth(const char *path, const nebel_depth_source *source, const nebel_host *host,
                               nebel_depth_map *map)
 {
     nb_codec codec;
     if (map != NULL) *map = (nebel_depth_map){0};
-    if (path == NULL || source == NULL || desc == NULL || map == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (path == NULL || source == NULL || host == NULL || map == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_depth_format *format =
         source->format != NULL ? nebel_find_depth_format(source->format) : nebel_depth_format_at(0);
-    nebel_result result = nb_codec_prepare(desc, path, &codec);
+    nebel_result result = nb_codec_prepare(host, path, &codec);
     if (result == NEBEL_OK) result = check_source(&codec, source, format);
     if (result == NEBEL_OK) result = read_map(&codec, source, format, map);
-    if (result != NEBEL_OK) nebel_free_depth(desc, map);
+    if (result != NEBEL_OK) nebel_free_depth(host, map);
     return result;
 }
 
-void nebel_free_depth(const nebel_scene_desc *desc, nebel_depth_map *map)
+void nebel_free_depth(const nebel_host *host, nebel_depth_map *map)
 {
-    if (desc == NULL || map == NULL || !nb_allocator_is_valid(&desc->allocator)) return;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    if (host == NULL || map == NULL || !nb_allocator_is_valid(&host->allocator)) return;
+    const nebel_allocator allocator = nb_resolve_allocator(&host->allocator);
     nb_release(&allocator, map->depth);
     *map = (nebel_depth_map){0};
 }

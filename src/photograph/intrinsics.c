@@ -220,14 +220,14 @@ static nebel_result read_checked(const nb_codec *codec, const nb_bytes *bytes, n
     return result;
 }
 
-nebel_result nebel_read_intrinsics(const char *path, const nebel_scene_desc *desc, nebel_intrinsics *intrinsics)
+nebel_result nebel_read_intrinsics(const char *path, const nebel_host *host, nebel_intrinsics *intrinsics)
 {
     nb_codec codec;
     nb_bytes bytes;
     nebel_intrinsics camera = {0};
     if (intrinsics != NULL) *intrinsics = (nebel_intrinsics){0};
-    if (path == NULL || desc == NULL || intrinsics == NULL) return NEBEL_ERROR_ARGUMENT;
-    nebel_result result = nb_codec_prepare(desc, path, &codec);
+    if (path == NULL || host == NULL || intrinsics == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = nb_codec_prepare(host, path, &codec);
     if (result == NEBEL_OK)
         result = nb_file_read(&codec.allocator, &codec.log, NULL, "camera", path, FILE_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;

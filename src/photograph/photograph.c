@@ -89,13 +89,13 @@ static nebel_result decode(const nb_codec *codec, const nb_bytes *bytes, nebel_p
     return result == NEBEL_OK ? take_stored(&stored, photograph) : result;
 }
 
-nebel_result nebel_read_photograph(const char *path, const nebel_scene_desc *desc, nebel_photograph *photograph)
+nebel_result nebel_read_photograph(const char *path, const nebel_host *host, nebel_photograph *photograph)
 {
     nb_codec codec;
     nb_bytes bytes;
     if (photograph != NULL) *photograph = (nebel_photograph){0};
-    if (path == NULL || desc == NULL || photograph == NULL) return NEBEL_ERROR_ARGUMENT;
-    nebel_result result = nb_codec_prepare(desc, path, &codec);
+    if (path == NULL || host == NULL || photograph == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = nb_codec_prepare(host, path, &codec);
     if (result == NEBEL_OK)
         result = nb_file_read(&codec.allocator, &codec.log, NULL, "picture", path, NB_FILE_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
@@ -104,10 +104,10 @@ nebel_result nebel_read_photograph(const char *path, const nebel_scene_desc *des
     return result;
 }
 
-void nebel_free_photograph(const nebel_scene_desc *desc, nebel_photograph *photograph)
+void nebel_free_photograph(const nebel_host *host, nebel_photograph *photograph)
 {
-    if (desc == NULL || photograph == NULL || !nb_allocator_is_valid(&desc->allocator)) return;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    if (host == NULL || photograph == NULL || !nb_allocator_is_valid(&host->allocator)) return;
+    const nebel_allocator allocator = nb_resolve_allocator(&host->allocator);
     nb_release(&allocator, photograph->pixels);
     *photograph = (nebel_photograph){0};
 }
@@ -129,8 +129,7 @@ static nebel_result write_stored(const nb_codec *codec, const nb_stored *stored,
 static nebel_result write_light(const nb_codec *codec, const nebel_photograph *photograph, const char *record)
 {
     static const char *const names[] = {"R", "G", "B", "A"};
-    const nebel_image_desc desc = {.allocator = codec->allocator,
-                                   .log = codec->log,
+    const nebel_image_desc desc = {.host = {.allocator = codec->allocator, .log = codec->log},
                                    .width = photograph->width,
                                    .height = photograph->height,
                                    .channel_count = photograph->type == NEBEL_PIXEL_RGB_FLOAT ? 3 : 4,
@@ -166,12 +165,12 @@ static nebel_result check(const nb_codec *codec, uint32_t width, uint32_t height
     return result == NEBEL_OK ? nb_record_check(codec, record) : result;
 }
 
-nebel_result nebel_write_photograph(const char *path, const nebel_scene_desc *desc, const nebel_photograph *photograph,
+nebel_result nebel_write_photograph(const char *path, const nebel_host *host, const nebel_photograph *photograph,
                                     const char *record)
 {
     nb_codec codec;
-    if (path == NULL || desc == NULL || photograph == NULL) return NEBEL_ERROR_ARGUMENT;
-    nebel_result result = nb_codec_prepare(desc, path, &codec);
+    if (path == NULL || host == NULL || photograph == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = nb_codec_prepare(host, path, &codec);
     if (result == NEBEL_OK) result = check(&codec, photograph->width, photograph->height, photograph->pixels, record);
     return result == NEBEL_OK ? write_as(&codec, photograph, record) : result;
 }
@@ -194,12 +193,12 @@ static nebel_result write_gray_png(const nb_codec *codec, uint32_t width, uint32
     return result;
 }
 
-nebel_result nebel_write_gray(const char *path, const nebel_scene_desc *desc, uint32_t width, uint32_t height,
+nebel_result nebel_write_gray(const char *path, const nebel_host *host, uint32_t width, uint32_t height,
                               const float *values, const char *record)
 {
     nb_codec codec;
-    if (path == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
-    nebel_result result = nb_codec_prepare(desc, path, &codec);
+    if (path == NULL || host == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = nb_codec_prepare(host, path, &codec);
     if (result == NEBEL_OK) result = check(&codec, width, height, values, record);
     if (result == NEBEL_OK && nebel_get_image_format(path) != NEBEL_IMAGE_PNG)
         result = nb_fail(&codec.log, NEBEL_ERROR_FORMAT, "%s: gray is written as .png; name it so", path);

@@ -183,7 +183,7 @@ nebel_result nebel_get_planet_map_size(const nebel_planet_map_desc *desc, nebel_
 {
     if (desc == NULL || map == NULL) return NEBEL_ERROR_ARGUMENT;
     const char *fault = find_fault(desc);
-    if (fault != NULL) return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "map: %s", fault);
+    if (fault != NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "map: %s", fault);
     const nebel_planet_map_desc whole = resolve(desc);
     map->width = whole.width;
     map->height = whole.height;

@@ -146,7 +146,7 @@ static nebel_result check_ball(const nb_textured_subject *of, const nebel_textur
 
 static nebel_result check(const nebel_textured_planet_desc *desc)
 {
-    nb_textured_subject of = {&desc->log, ""};
+    nb_textured_subject of = {&desc->host.log, ""};
     nebel_result result = check_ball(&of, desc);
     if (result == NEBEL_OK && !desc->atmosphere.is_disabled) result = check_air(&of, &desc->atmosphere);
     for (uint32_t i = 0; result == NEBEL_OK && i < desc->cloud_shell_count; i++) {
@@ -197,26 +197,26 @@ static nebel_result make_maps(nebel_textured_planet *layers)
     nebel_textured_planet_desc *const desc = &layers->desc;
     const nebel_planet_map_desc ground = {
         .type = NEBEL_PLANET_MAP_GROUND, .seed = desc->seed, .coverage = desc->land_coverage};
-    nebel_result result = make_map(&desc->allocator, &desc->color_map, &ground, &layers->ground);
+    nebel_result result = make_map(&desc->host.allocator, &desc->color_map, &ground, &layers->ground);
     desc->color_map = nb_planet_map_level(&layers->ground, 0);
     for (uint32_t i = 0; i < desc->cloud_shell_count && result == NEBEL_OK; i++)
-        result = make_shell(&desc->allocator, &desc->cloud_shells[i], &layers->shells[i]);
+        result = make_shell(&desc->host.allocator, &desc->cloud_shells[i], &layers->shells[i]);
     return result;
 }
 
 nebel_result nebel_create_textured_planet(const nebel_textured_planet_desc *desc, nebel_textured_planet **layers)
 {
     if (layers != NULL) *layers = NULL;
-    if (desc == NULL || layers == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL || layers == NULL || !nb_allocator_is_valid(&desc->host.allocator)) return NEBEL_ERROR_ARGUMENT;
     const nebel_textured_planet_desc whole = resolve(desc);
     nebel_result result = check(&whole);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&whole.allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&whole.host.allocator);
     nebel_textured_planet *made = nb_allocate_zero(&allocator, 1, sizeof *made);
-    if (made == NULL) return nb_fail(&whole.log, NEBEL_ERROR_MEMORY, "planet: out of memory");
+    if (made == NULL) return nb_fail(&whole.host.log, NEBEL_ERROR_MEMORY, "planet: out of memory");
     made->desc = whole;
-    made->desc.allocator = allocator;
-    made->desc.log = (nebel_log){.write = NULL};
+    made->desc.host.allocator = allocator;
+    made->desc.host.log = (nebel_log){.write = NULL};
     nb_quaternion_axes(whole.rotation, made->frame);
     result = make_maps(made);
     if (result == NEBEL_OK) {
@@ -224,13 +224,13 @@ nebel_result nebel_create_textured_planet(const nebel_textured_planet_desc *desc
         return NEBEL_OK;
     }
     nebel_destroy_textured_planet(made);
-    return nb_fail(&whole.log, result, "planet: out of memory");
+    return nb_fail(&whole.host.log, result, "planet: out of memory");
 }
 
 void nebel_destroy_textured_planet(nebel_textured_planet *layers)
 {
     if (layers == NULL) return;
-    const nebel_allocator allocator = layers->desc.allocator;
+    const nebel_allocator allocator = layers->desc.host.allocator;
     nb_planet_map_free(&allocator, &layers->ground);
     for (uint32_t i = 0; i < NEBEL_MAX_CLOUD_SHELLS; i++) {
         nb_planet_map_free(&allocator, &layers->shells[i].map);

@@ -6,11 +6,11 @@
 /* What would be written is read as well: whatever is wrong with it is found before the file is. */
 static nebel_result write_text(const char *path, const nebel_scene_desc *desc, const nb_bytes *bytes)
 {
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_scene *scene = NULL;
     const nebel_result result = nebel_parse_scene((const char *)bytes->data, bytes->size, path, desc, &scene);
     nebel_destroy_scene(scene);
-    return result == NEBEL_OK ? nb_file_write(&allocator, &desc->log, path, bytes) : result;
+    return result == NEBEL_OK ? nb_file_write(&allocator, &desc->host.log, path, bytes) : result;
 }
 
 static nebel_result save_text(const char *path, const nebel_scene_desc *desc, nb_key_patch *save)
@@ -21,7 +21,7 @@ static nebel_result save_text(const char *path, const nebel_scene_desc *desc, nb
     nebel_destroy_scene(scene);
     if (result != NEBEL_OK || (save->edit.count == 0 && !save->edit.out_of_memory)) return result;
     if (!nb_json_patch_apply(&save->edit, &bytes))
-        return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
+        return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
     result = write_text(path, desc, &bytes);
     nb_release(&save->edit.arena.allocator, bytes.data);
     return result;
@@ -46,7 +46,7 @@ static nebel_result save_file(const char *path, const nebel_scene_desc *desc, nb
 {
     const nebel_allocator *allocator = &save->edit.arena.allocator;
     nb_bytes bytes;
-    nebel_result result = nb_file_read(allocator, &desc->log, NULL, "scene", path, NB_SCENE_TEXT_LIMIT, &bytes);
+    nebel_result result = nb_file_read(allocator, &desc->host.log, NULL, "scene", path, NB_SCENE_TEXT_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
     save->edit.text = (const char *)bytes.data;
     save->edit.size = bytes.size;
@@ -61,9 +61,10 @@ static nebel_result save_file(const char *path, const nebel_scene_desc *desc, nb
 nebel_result nebel_save_scene(const char *path, const nebel_scene_desc *desc, const nebel_scene_data *before,
                               const nebel_scene_data *changed, const size_t *sources)
 {
-    if (path == NULL || desc == NULL || before == NULL || changed == NULL || !nb_allocator_is_valid(&desc->allocator))
+    if (path == NULL || desc == NULL || before == NULL || changed == NULL ||
+        !nb_allocator_is_valid(&desc->host.allocator))
         return NEBEL_ERROR_ARGUMENT;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nb_key_patch save = {.before = before,
                          .changed = changed,
                          .sources = sources,
@@ -71,9 +72,9 @@ nebel_result nebel_save_scene(const char *path, const nebel_scene_desc *desc, co
                          .edit = {.arena = {.allocator = allocator}}};
     nebel_result result = NEBEL_ERROR_MEMORY;
     if (save.targets == NULL)
-        nb_fail(&desc->log, result, "%s: out of memory", path);
+        nb_fail(&desc->host.log, result, "%s: out of memory", path);
     else if (!find_targets(&save))
-        result = nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT,
+        result = nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT,
                          "%s: what volumes were must ascend, and name volumes that there were", path);
     else
         result = save_file(path, desc, &save);

@@ -54,8 +54,7 @@ static nebel_result keep_colors(const nb_codec *codec, nebel_image *image)
 static nebel_result make_environment_map(const nb_codec *codec, const nebel_image *image, nebel_environment_map **map)
 {
     nb_note note = {""};
-    const nebel_environment_map_desc desc = {.allocator = codec->allocator,
-                                             .log = nb_note_log(&note),
+    const nebel_environment_map_desc desc = {.host = {.allocator = codec->allocator, .log = nb_note_log(&note)},
                                              .width = image->width,
                                              .height = image->height,
                                              .pixels = image->samples};

@@ -190,8 +190,8 @@ static bool try_cells(nb_scene_reader *in, const nb_json_node *node, const nb_js
     size_t cell, portal;
     nebel_cells *cells = NULL;
     nebel_cells_desc tried = *desc;
-    tried.allocator = in->scene->allocator;
-    tried.log = (nebel_log){nb_keys_read_keep_message, in};
+    tried.host.allocator = in->scene->allocator;
+    tried.host.log = (nebel_log){nb_keys_read_keep_message, in};
     tried.failed_cell = &cell;
     tried.failed_portal = &portal;
     in->core_message[0] = '\0';

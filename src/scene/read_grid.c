@@ -102,8 +102,8 @@ bool nb_keys_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_dens
     nb_json *json = in->json;
     nebel_grid_file file = {.filter = NEBEL_GRID_FILTER_LINEAR};
     nb_note note = {""};
-    const nebel_scene_desc desc = {
-        .allocator = in->scene->allocator, .log = nb_note_log(&note), .memory = nb_scene_room(in->scene)};
+    const nebel_scene_desc desc = {.host = {.allocator = in->scene->allocator, .log = nb_note_log(&note)},
+                                   .memory = nb_scene_room(in->scene)};
     if (!names_file(json, node) || !nb_key_value_members(json, node, &grid_keys[kind_of(json, node)], found) ||
         !read_grid_file(in, found, &file))
         return false;

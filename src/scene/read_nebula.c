@@ -150,8 +150,8 @@ static bool try_nebula(nb_scene_reader *in, const nb_json_node *node, const nebe
     static const char subject[] = "nebula: ";
     nebel_nebula_desc empty = *nebula;
     empty.count = 0;
-    empty.allocator = in->scene->allocator;
-    empty.log = (nebel_log){nb_keys_read_keep_message, in};
+    empty.host.allocator = in->scene->allocator;
+    empty.host.log = (nebel_log){nb_keys_read_keep_message, in};
     in->core_message[0] = '\0';
     const nebel_result result = nebel_generate_nebula(&empty, NULL);
     if (result == NEBEL_OK) return true;

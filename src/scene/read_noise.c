@@ -82,7 +82,7 @@ bool nb_keys_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_den
 {
     nb_json *json = in->json;
     nb_note note = {""};
-    nebel_scene_noise noise = {.desc = {.allocator = in->scene->allocator, .log = nb_note_log(&note)}};
+    nebel_scene_noise noise = {.desc = {.host = {.allocator = in->scene->allocator, .log = nb_note_log(&note)}}};
     if (!nb_keys_read_noise_numbers(json, node, &noise)) return false;
     /* That of the scene's own file has been counted. */
     if (in->node != NULL && !nb_scene_charge_noise(in, node)) return false;

@@ -194,9 +194,9 @@ static bool try_planet(nb_scene_reader *in, const nb_json_node *node, bool has_c
 {
     static const char subject[] = "atmosphere: ",
                       advice[] = "; these components are the preset's: give \"components\" that go with the other keys";
-    planet->atmosphere_desc.log = (nebel_log){nb_keys_read_keep_message, in};
+    planet->atmosphere_desc.host.log = (nebel_log){nb_keys_read_keep_message, in};
     const nebel_result result = nebel_resolve_atmosphere(&planet->atmosphere_desc, &planet->atmosphere_desc);
-    planet->atmosphere_desc.log = (nebel_log){NULL, NULL};
+    planet->atmosphere_desc.host.log = (nebel_log){NULL, NULL};
     if (result == NEBEL_OK) return true;
     const char *message = in->core_message;
     if (strncmp(message, subject, sizeof subject - 1) == 0) message += sizeof subject - 1;

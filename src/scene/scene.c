@@ -190,7 +190,7 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
     nb_json json;
     nb_scene_reader in = {
         .json = &json, .scene = scene, .save = save, .space = NB_SPACE_OURS, .ball = nb_find_sphere(NULL, NULL)};
-    const nebel_fog_desc fog = {.allocator = scene->allocator, .log = {nb_keys_read_keep_message, &in}};
+    const nebel_fog_desc fog = {.host = {.allocator = scene->allocator, .log = {nb_keys_read_keep_message, &in}}};
     nb_json_desc desc = {.text = text,
                          .size = size,
                          .name = name,
@@ -223,13 +223,12 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
 
 static nebel_scene *create_scene(const nebel_scene_desc *desc)
 {
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
     nebel_scene *scene = nb_allocate_zero(&allocator, 1, sizeof *scene);
     if (scene == NULL) return NULL;
     scene->allocator = scene->arena.allocator = allocator;
-    scene->log = desc->log;
-    scene->run = desc->run;
-    scene->run_user = desc->run_user;
+    scene->log = desc->host.log;
+    scene->parallel = desc->host.parallel;
     scene->budget.most = desc->memory;
     scene->reader.in_process = desc->models_in_process != 0;
     scene->reader.program = nb_model_default_program();
@@ -249,9 +248,10 @@ static nebel_result check_arguments(const char *name, const void *text, size_t s
     if (scene != NULL) *scene = NULL;
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
     if (name == NULL || scene == NULL || (text == NULL && size > 0))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "a scene needs a text, a name and a place to go; one is NULL");
-    if (!nb_allocator_is_valid(&desc->allocator))
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT,
+                       "a scene needs a text, a name and a place to go; one is NULL");
+    if (!nb_allocator_is_valid(&desc->host.allocator))
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
     return NEBEL_OK;
 }
 
@@ -261,10 +261,10 @@ nebel_result nb_scene_parse(const char *text, size_t size, const char *name, con
     nebel_result result = check_arguments(name, text, size, desc, scene);
     if (result != NEBEL_OK) return result;
     if (size > NB_SCENE_TEXT_LIMIT)
-        return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "%s: larger than %zu bytes, the most that is read", name,
+        return nb_fail(&desc->host.log, NEBEL_ERROR_LIMIT, "%s: larger than %zu bytes, the most that is read", name,
                        NB_SCENE_TEXT_LIMIT);
     nebel_scene *fresh = create_scene(desc);
-    if (fresh == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", name);
+    if (fresh == NULL) return nb_fail(&desc->host.log, NEBEL_ERROR_MEMORY, "%s: out of memory", name);
     result = read_scene(fresh, text, size, name, save);
     if (result == NEBEL_OK)
         *scene = fresh;
@@ -284,8 +284,8 @@ nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, ne
     nb_bytes bytes;
     nebel_result result = check_arguments(path, path, 0, desc, scene);
     if (result != NEBEL_OK) return result;
-    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
-    result = nb_file_read_stream(&allocator, &desc->log, "scene", path, NB_SCENE_TEXT_LIMIT, &bytes);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->host.allocator);
+    result = nb_file_read_stream(&allocator, &desc->host.log, "scene", path, NB_SCENE_TEXT_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
     result = nebel_parse_scene((const char *)bytes.data, bytes.size, path, desc, scene);
     nb_release(&allocator, bytes.data);
@@ -311,8 +311,8 @@ static nebel_result generate_particles(const nebel_scene *scene, nebel_particle 
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < scene->data.nebula_count && result == NEBEL_OK; i++) {
         nebel_nebula_desc desc = scene->nebulae[i];
-        desc.allocator = scene->allocator;
-        desc.log = scene->log;
+        desc.host.allocator = scene->allocator;
+        desc.host.log = scene->log;
         result = nebel_generate_nebula(&desc, particles);
         particles += desc.count;
     }
@@ -404,7 +404,7 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
 {
     if (scene == NULL || snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_fog *fog = NULL;
-    nebel_fog_desc desc = {.allocator = scene->allocator, .log = scene->log};
+    nebel_fog_desc desc = {.host = {.allocator = scene->allocator, .log = scene->log}};
     *snapshot = NULL;
     if (!nb_scene_is_frame(scene, frame)) return NEBEL_ERROR_VALUE;
     desc.max_opacity = scene->data.max_opacity;
@@ -442,8 +442,7 @@ nebel_result nebel_create_scene_lighting(const nebel_scene *scene, nebel_snapsho
                                          const nebel_lighting *previous, nebel_lighting **made)
 {
     if (scene == NULL || snapshot == NULL || made == NULL) return NEBEL_ERROR_ARGUMENT;
-    nebel_lighting_desc desc = {.allocator = scene->allocator,
-                                .log = scene->log,
+    nebel_lighting_desc desc = {.host = {.allocator = scene->allocator, .log = scene->log},
                                 .lights = scene->data.lights,
                                 .light_count = scene->data.light_count,
                                 .diffusion = scene->data.diffusion,

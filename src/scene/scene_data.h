@@ -25,8 +25,7 @@ struct nebel_scene {
     nebel_log log;
     nb_scene_budget budget;
     nb_model_reader reader;
-    nebel_parallel_for_fn run; /* NULL: none */
-    void *run_user;
+    nebel_parallel parallel;
     nb_arena arena;
     const char *folder;  /* of the file, ending in a slash; "" is the current one */
     nb_file_units space; /* of the file's numbers */

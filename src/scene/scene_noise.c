@@ -106,8 +106,8 @@ nebel_result nebel_get_scene_grid(const nebel_scene *scene, nebel_grid *grid, do
     }
     nb_file_units_convert_noise(&scene->space, &noise);
     nebel_noise_desc desc = noise.desc;
-    desc.allocator = scene->allocator;
-    desc.log = scene->log;
+    desc.host.allocator = scene->allocator;
+    desc.host.log = scene->log;
     desc.name = nebel_get_grid_name(grid);
     for (int k = 0; k < 3; k++) desc.offset[k] = noise.velocity[k] * frame;
     desc.time = noise.evolution * frame;
@@ -193,8 +193,8 @@ static nebel_result make_noise(const nebel_scene *scene, const char *words, nebe
     nb_release(&scene->allocator, whole);
     if (result != NEBEL_OK) return result;
     nb_file_units_convert_noise(&scene->space, &noise);
-    noise.desc.allocator = scene->allocator;
-    noise.desc.log = scene->log;
+    noise.desc.host.allocator = scene->allocator;
+    noise.desc.host.log = scene->log;
     noise.desc.name = words;
     return nebel_create_noise_grid(&noise.desc, grid);
 }

@@ -70,8 +70,10 @@ static nebel_result make_sky_map(nebel_scene *scene, const nebel_planet *planet,
                 pixels[3 * (row * SKY_WIDTH + i % (SKY_WIDTH * WITHIN) / WITHIN) + c] +=
                     (float)(radiance(looks, planet, scene->data.sun_direction, i, c) / (WITHIN * WITHIN));
     }
-    const nebel_environment_map_desc desc = {
-        .allocator = scene->allocator, .log = scene->log, .width = SKY_WIDTH, .height = SKY_HEIGHT, .pixels = pixels};
+    const nebel_environment_map_desc desc = {.host = {.allocator = scene->allocator, .log = scene->log},
+                                             .width = SKY_WIDTH,
+                                             .height = SKY_HEIGHT,
+                                             .pixels = pixels};
     if (looks != NULL && pixels != NULL) result = nebel_create_environment_map(&desc, map);
     nb_release(&scene->allocator, looks);
     nb_release(&scene->allocator, pixels);
@@ -82,12 +84,8 @@ static nebel_result make_sky_map(nebel_scene *scene, const nebel_planet *planet,
 static nebel_result set_environment(nebel_scene *scene, const nebel_planet *planet, const nebel_sun *sun)
 {
     nebel_sky_view *view;
-    const nebel_sky_view_desc desc = {.atmosphere = planet->atmosphere,
-                                      .sun = *sun,
-                                      .run = scene->run,
-                                      .run_user = scene->run_user,
-                                      .allocator = scene->allocator,
-                                      .log = scene->log};
+    const nebel_sky_view_desc desc = {
+        .atmosphere = planet->atmosphere, .sun = *sun, .host = {scene->allocator, scene->log, scene->parallel}};
     nebel_result result = nebel_create_sky_view(&desc, &view);
     if (result != NEBEL_OK) return result;
     nebel_environment_map *map = NULL;
@@ -134,10 +132,7 @@ static nebel_result set_air(nebel_scene *scene, size_t number)
 {
     nebel_planet *planet = &scene->planets[number];
     nebel_atmosphere_desc desc = planet->atmosphere_desc;
-    desc.run = scene->run;
-    desc.run_user = scene->run_user;
-    desc.allocator = scene->allocator;
-    desc.log = scene->log;
+    desc.host = (nebel_host){scene->allocator, scene->log, scene->parallel};
     const nebel_result result = nebel_create_atmosphere(&desc, &scene->atmospheres[number]);
     planet->atmosphere = scene->atmospheres[number];
     return result;
@@ -149,8 +144,7 @@ static nebel_result set_clouds(nebel_scene *scene)
     nebel_planet *planet = scene->planets;
     nebel_clouds_desc desc = {.atmosphere = planet->atmosphere,
                               .layer_count = planet->cloud_layer_count,
-                              .allocator = scene->allocator,
-                              .log = scene->log};
+                              .host = {.allocator = scene->allocator, .log = scene->log}};
     if (planet->cloud_layer_count == 0) return NEBEL_OK;
     memcpy(desc.layers, planet->cloud_layers, sizeof desc.layers);
     const nebel_result result = nebel_create_clouds(&desc, &scene->clouds);
@@ -164,8 +158,7 @@ static nebel_result shade_origin(const nebel_scene *scene, double frame, float *
     const nebel_cloud_lighting_desc desc = {.clouds = scene->clouds,
                                             .sun = nb_surface_lighting_sun(&scene->data),
                                             .time = frame,
-                                            .allocator = scene->allocator,
-                                            .log = scene->log};
+                                            .host = {.allocator = scene->allocator, .log = scene->log}};
     nebel_cloud_lighting *view;
     nebel_cloud_workspace *workspace = NULL;
     nebel_result result = nebel_create_cloud_lighting(&desc, &view);
@@ -204,8 +197,8 @@ nebel_result nebel_find_scene_sunlight(const nebel_scene *scene, double frame, n
 static nebel_result load_layers(nebel_scene *scene)
 {
     nebel_textured_planet_desc desc = scene->planets->textured_desc;
-    desc.allocator = scene->allocator;
-    desc.log = scene->log;
+    desc.host.allocator = scene->allocator;
+    desc.host.log = scene->log;
     if (scene->layers != NULL) return NEBEL_OK;
     const nebel_result result = nebel_create_textured_planet(&desc, &scene->layers);
     scene->planets->textured = scene->layers;

@@ -110,14 +110,14 @@ static nebel_result find_fog_light(const nb_document *draft, const nb_document_s
 /* Also where it fails the fog is the caller's. */
 static nebel_result create_fog(const nb_document *draft, const nb_document_state *edition, nebel_fog **fog)
 {
-    return nebel_create_fog(&(nebel_fog_desc){.log = draft->log, .max_opacity = edition->max_opacity}, fog);
+    return nebel_create_fog(&(nebel_fog_desc){.host.log = draft->log, .max_opacity = edition->max_opacity}, fog);
 }
 
 /* The edition's light, for fog of the draft. */
 static nebel_result light_fog(const nb_document *draft, const nb_document_state *edition, nebel_snapshot *snapshot,
                               nebel_lighting **made)
 {
-    nebel_lighting_desc desc = {.log = draft->log,
+    nebel_lighting_desc desc = {.host.log = draft->log,
                                 .lights = edition->lamps,
                                 .light_count = edition->lamp_count,
                                 .diffusion = nebel_get_scene_data(draft->file)->diffusion,
@@ -193,7 +193,7 @@ static nebel_result make_cells(nb_document *draft, const nb_document_state *edit
     nebel_cells_desc desc = edition->cells_desc;
     nebel_cells *cells = NULL;
     if (edition->cells == NULL) return NEBEL_OK;
-    desc.log = draft->log;
+    desc.host.log = draft->log;
     const nebel_result result = nebel_create_cells(&desc, &cells);
     if (result != NEBEL_OK) return result;
     nebel_destroy_cells(draft->cells);
@@ -287,7 +287,7 @@ static nebel_result scatter_nebula(const nb_document *draft, const nb_document_s
                                    nebel_particle *particles)
 {
     nebel_nebula_desc desc = edition->nebulae[index];
-    desc.log = draft->log;
+    desc.host.log = draft->log;
     const nebel_transform *const from = &nebel_get_scene_data(draft->scene)->nebula_transforms[index];
     if (desc.points == NULL || memcmp(from, &edition->nebula_places[index], sizeof *from) == 0)
         return nebel_generate_nebula(&desc, particles);
@@ -440,14 +440,16 @@ static nebel_result load(const char *path, const nebel_scene_desc *desc, nebel_s
     if (stat(path, &status) != 0 || S_ISREG(status.st_mode) || S_ISDIR(status.st_mode))
         return nebel_load_scene(path, desc, scene);
     *scene = NULL;
-    if (desc->log.write != NULL) desc->log.write(NEBEL_LOG_ERROR, NEBEL_ERROR_FILE, message, desc->log.user);
+    if (desc->host.log.write != NULL)
+        desc->host.log.write(NEBEL_LOG_ERROR, NEBEL_ERROR_FILE, message, desc->host.log.user);
     return NEBEL_ERROR_FILE;
 }
 
 nebel_result nb_document_open(const char *path, double frame, const nebel_log *log, nb_document *draft)
 {
-    const nebel_scene_desc desc = {
-        .log = *log, .run = nebel_parallel_for_openmp, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
+    const nebel_scene_desc desc = {.host = {.log = *log, .parallel.run = nebel_parallel_for_openmp},
+                                   .model_reader = nb_reader_path(),
+                                   .memory = nb_reader_memory()};
     *draft = (nb_document){.log = *log, .frame = frame};
     nebel_result result = load(path, &desc, &draft->scene);
     if (result == NEBEL_OK) result = nebel_load_scene_models(draft->scene);
@@ -683,7 +685,8 @@ static nebel_result use_written(nb_document *draft, int has_moved)
 /* The file is read again, without its models, so that `written` is what it says. */
 static nebel_result read_back(nb_document *draft, const char *path)
 {
-    const nebel_scene_desc desc = {.log = draft->log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
+    const nebel_scene_desc desc = {
+        .host.log = draft->log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
     const int has_moved = !nb_document_state_has_same_sources(&draft->now, &draft->written);
     nebel_scene *fresh = NULL;
     nb_document_state written;
@@ -706,7 +709,7 @@ static nebel_result read_back(nb_document *draft, const char *path)
 nebel_result nb_document_try_file(const char *path, const nebel_log *log)
 {
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.log = *log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
+    const nebel_scene_desc desc = {.host.log = *log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
     const nebel_result result = load(path, &desc, &scene);
     nebel_destroy_scene(scene);
     return result;
@@ -714,7 +717,8 @@ nebel_result nb_document_try_file(const char *path, const nebel_log *log)
 
 nebel_result nb_document_save(nb_document *draft, const char *path, int with_camera)
 {
-    const nebel_scene_desc desc = {.log = draft->log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
+    const nebel_scene_desc desc = {
+        .host.log = draft->log, .model_reader = nb_reader_path(), .memory = nb_reader_memory()};
     nebel_scene_data before = *nebel_get_scene_data(draft->file);
     /* Those of the contents are as the scene is now. */
     before.planets = draft->written.planets;

@@ -26,7 +26,7 @@ static const char copy_text[] = "uniform sampler2D plane_texture, color_texture;
 
 nebel_result nb_gl_preview_open(const nebel_scene_data *scene, const nebel_log *log, nb_gl_preview *stage)
 {
-    const nebel_gl_renderer_desc desc = {.log = *log};
+    const nebel_gl_renderer_desc desc = {.host.log = *log};
     nebel_result result = nebel_create_gl_renderer(scene, NULL, &desc, &stage->renderer);
     if (result == NEBEL_OK) result = nb_program_make(copy_text, log, &stage->program);
     if (result != NEBEL_OK) {

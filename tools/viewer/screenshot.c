@@ -34,12 +34,12 @@ int nb_picture_write(const char *path, uint32_t width, uint32_t height, const ne
     nebel_result result = NEBEL_ERROR_MEMORY;
     if (rgba != NULL && rgb != NULL) {
         const nebel_image image = {width, height, 3, names, rgb};
-        const nebel_scene_desc desc = {.log = *log};
+        const nebel_host host = {.log = *log};
         glBindFramebuffer(GL_READ_FRAMEBUFFER, 0);
         glReadPixels(0, 0, (GLsizei)width, (GLsizei)height, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
         turn_over(width, height, rgba, rgb);
         nb_interrupt_hold();
-        result = nebel_write_image(path, &desc, &image);
+        result = nebel_write_image(path, &host, &image);
         nb_interrupt_release();
     } else {
         log->write(NEBEL_LOG_ERROR, result, "out of memory for the picture", log->user);

@@ -612,7 +612,7 @@ static nebel_result make_cells(viewer *all, nebel_cells **cells)
     *cells = NULL;
     if (!is_of_cells(all->look.method)) return NEBEL_OK;
     nebel_cells_desc desc = all->draft.good.cells_desc;
-    desc.log = all->log;
+    desc.host.log = all->log;
     return nebel_create_cells(&desc, cells);
 }
 
