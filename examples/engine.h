@@ -1,5 +1,6 @@
 /* A small OpenGL 3.3 engine that knows nothing of fog: a sky, the ground, some boxes and a camera that turns around
- * them. It stands for yours in embed_glfw.c and embed_sdl.c. */
+ * them. It stands for yours in embed_glfw.c, embed_sdl.c and
+ * embed_particles.c. */
 #ifndef ENGINE_H
 #define ENGINE_H
 

@@ -43,8 +43,8 @@ static inline void even_make(double extinction, double sun_cosine, even *e)
                                                 .coverage = 1,
                                                 .extinction = extinction,
                                                 .cell_size = 1e5,
-                                                .erosion = NEBEL_CLOUD_NONE,
-                                                .patchiness = NEBEL_CLOUD_NONE,
+                                                .erosion = NEBEL_ZERO,
+                                                .patchiness = NEBEL_ZERO,
                                                 .droplet_diameter = DIAMETER,
                                                 .seed = 1}}};
     assert_int_equal(nebel_create_clouds(&desc, &e->clouds), NEBEL_OK);

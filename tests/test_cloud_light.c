@@ -203,7 +203,7 @@ static void test_light_of_flat_heaps(void **state)
         nebel_cloud_layer layer;
         double height;
     } cases[] = {
-        {{.cell_size = 5e4, .coverage = .6, .erosion = NEBEL_CLOUD_NONE}, 1e6},
+        {{.cell_size = 5e4, .coverage = .6, .erosion = NEBEL_ZERO}, 1e6},
         {{.cell_size = 5e4, .coverage = .6}, 1e6},
         {{.cell_size = 1e4, .coverage = .6}, 1e5},
         {{.base = 900, .top = 1200, .extinction = .2, .coverage = .6}, 2e4},
@@ -248,7 +248,7 @@ static void test_light_as_pixels_grow(void **state)
 {
     (void)state;
     nebel_clouds *clouds =
-        make(1, (const nebel_cloud_layer[]){{.cell_size = 5e4, .coverage = .9, .erosion = NEBEL_CLOUD_NONE}});
+        make(1, (const nebel_cloud_layer[]){{.cell_size = 5e4, .coverage = .9, .erosion = NEBEL_ZERO}});
     nebel_cloud_workspace *workspace;
     nebel_cloud_lighting *view = view_of(clouds, 0, &workspace);
     double jump = 0, off = 0;

@@ -698,7 +698,7 @@ static void test_bad_calls_are_refused(void **state)
     const nebel_cloud_lighting_desc no_sun = {
         .clouds = clouds, .sun.irradiance = {0, none, 0}, .host.log = {keep_text, said}};
     assert_int_equal(nebel_create_cloud_lighting(&no_sun, &other), NEBEL_ERROR_ARGUMENT);
-    assert_non_null(strstr(said, "clouds: view: sun"));
+    assert_non_null(strstr(said, "cloud lighting: sun"));
     assert_int_equal(nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.clouds = clouds, .time = none}, &other),
                      NEBEL_ERROR_VALUE);
     assert_int_equal(

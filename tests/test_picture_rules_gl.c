@@ -389,7 +389,7 @@ static void check_frames(nebel_gl_renderer *renderer, const test_stage *s)
     assert_int_equal(nebel_gl_get_textures(renderer, &textures), NEBEL_ERROR_ARGUMENT);
     desc = frame_of(s, 1);
     desc.width = 1u << 30;
-    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_CANCELLED);
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_LIMIT);
     desc.width = 0;
     assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_VALUE);
     desc = frame_of(s, 5000);

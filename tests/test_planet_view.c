@@ -464,6 +464,9 @@ static void bad_calls_are_refused(void **state)
     assert_int_equal(nebel_create_sky_view(&(nebel_sky_view_desc){.atmosphere = air}, &view), NEBEL_OK);
     assert_int_equal(nebel_trace_sky_view(view, 1, directions, NULL, &(nebel_transfer_planes){.error = NULL}),
                      NEBEL_ERROR_ARGUMENT);
+    const double *const ahead[3] = {x, x, x};
+    const nebel_transfer_planes apart = {.error = &distance, .error_stride = 8};
+    assert_int_equal(nebel_trace_sky_view(view, 1, ahead, NULL, &apart), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace_ground(view, 1, directions, &(nebel_ground_planes){.distance = &distance}),
                      NEBEL_ERROR_ARGUMENT);
     nebel_destroy_sky_view(view);

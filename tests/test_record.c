@@ -296,7 +296,7 @@ static nebel_result make_film(const char *path, uint32_t count, const char *with
 {
     nebel_movie *film = NULL;
     nebel_result result = nebel_create_movie(path, &(nebel_movie_desc){.quality = 100}, &film);
-    if (result == NEBEL_OK && with != NULL) result = nebel_set_film_record(film, with);
+    if (result == NEBEL_OK && with != NULL) result = nebel_set_movie_record(film, with);
     for (uint32_t i = 0; i < count && result == NEBEL_OK; i++) {
         const nebel_image image = {31, 17, 4, names, samples + 1000 * i};
         result = nebel_add_movie_frame(film, &image);

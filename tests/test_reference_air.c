@@ -362,8 +362,8 @@ static void even_clouds_lose_nothing(void **state)
     const nebel_cloud_layer stratus = {.type = NEBEL_CLOUD_STRATUS,
                                        .coverage = 1,
                                        .extinction = .008,
-                                       .erosion = NEBEL_CLOUD_NONE,
-                                       .patchiness = NEBEL_CLOUD_NONE};
+                                       .erosion = NEBEL_ZERO,
+                                       .patchiness = NEBEL_ZERO};
     nebel_atmosphere_desc air = bare;
     set_rgb(air.ground_albedo, 1);
     globe g;

@@ -59,7 +59,7 @@ static void test_everything_they_may_say(void **state)
     assert_number(layer->coverage, .25);
     assert_number(layer->extinction, 5e-3);
     assert_number(layer->cell_size, 3000);
-    assert_number(layer->erosion, NEBEL_CLOUD_NONE);
+    assert_number(layer->erosion, NEBEL_ZERO);
     assert_number(layer->patchiness, 1);
     assert_number(layer->droplet_diameter, 12);
     assert_int_equal(layer->seed, 7);

@@ -290,8 +290,8 @@ static void change_cloud(const nebel_planet *planet, nebel_cloud_layer *layer)
     layer->coverage /= 2;
     layer->extinction /= 2;
     layer->cell_size *= 2;
-    layer->erosion = layer->erosion == NEBEL_CLOUD_NONE ? .5 : NEBEL_CLOUD_NONE;
-    layer->patchiness = layer->patchiness == NEBEL_CLOUD_NONE ? .25 : NEBEL_CLOUD_NONE;
+    layer->erosion = layer->erosion == NEBEL_ZERO ? .5 : NEBEL_ZERO;
+    layer->patchiness = layer->patchiness == NEBEL_ZERO ? .25 : NEBEL_ZERO;
     layer->droplet_diameter = 30;
     layer->wind[0] += 5;
     layer->wind[1] -= 7;

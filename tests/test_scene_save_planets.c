@@ -24,7 +24,7 @@ static void test_layers_of_no_coverage_are_passed_over(void **state)
                                   "{ /* thin */ \"type\": \"cirrus\" }"));
     assert_int_equal(planets[0].cloud_layer_count, 2);
     planets[0].cloud_layers[0].top = 2500;
-    planets[0].cloud_layers[1].erosion = NEBEL_CLOUD_NONE;
+    planets[0].cloud_layers[1].erosion = NEBEL_ZERO;
     planets[0].cloud_layers[1].extinction = .002;
     check_saved(&d, CLOUDS("{\"coverage\": 0}, {\"top\": 250}, {\"type\": \"cirrus\", \"coverage\": 0}, "
                            "{ /* thin */ \"type\": \"cirrus\", \"extinction\": 0.02, \"erosion\": 0 }"));

@@ -180,7 +180,7 @@ int nb_parallel_join_film(const nb_parts *parts, const nebel_movie_desc *desc, c
     nb_interrupt_hold();
     nebel_result result = nebel_create_movie(parts->file, desc, &film);
     nb_interrupt_release();
-    if (result == NEBEL_OK) result = nebel_set_film_record(film, record);
+    if (result == NEBEL_OK) result = nebel_set_movie_record(film, record);
     int status = result == NEBEL_OK ? add_frames(parts, film) : nb_report_result(parts->listener, parts->file, result);
     if (status == NB_DONE && !nb_interrupt_is_requested()) {
         nb_interrupt_hold();

@@ -411,7 +411,7 @@ int nb_render_out_finish(nb_render_out *out)
     if (out->film == NULL) return NB_DONE;
     char record[NEBEL_MAX_RECORD + 1];
     record_file(out, out->wanted->first_frame, record);
-    nebel_result result = out->has_base ? nebel_set_film_record(out->film, record) : NEBEL_OK;
+    nebel_result result = out->has_base ? nebel_set_movie_record(out->film, record) : NEBEL_OK;
     nb_interrupt_hold();
     if (result == NEBEL_OK) result = nebel_finish_movie(out->film);
     nb_interrupt_release();

@@ -169,12 +169,12 @@ typedef enum nebel_curve_type {
 
 typedef struct nebel_curve {
     nebel_curve_type type;
-    double scale;       /* 1/m, >= 0; 0: 0.03 for EXP, 0.04 for EXP2, else 0.05 */
+    double scale;       /* k [1/m], >= 0; 0: 0.03 for EXP, 0.04 for EXP2, else 0.05 */
     const float *table; /* TABLE: NEBEL_CURVE_ENTRIES weights, 0 to 1 */
 } nebel_curve;
 
 /* Checks a curve and puts its default in; *resolved may be *curve. Any thread. Errors: ARGUMENT (NULL, an unknown type,
- * no table), VALUE (a k that is negative or not finite). */
+ * no table), VALUE (a scale that is negative or not finite). */
 NEBEL_API nebel_result nebel_resolve_curve(const nebel_curve *curve, nebel_curve *resolved);
 
 /* The amount of a resolved curve as its formula gives it, not clamped; s [m], 0 where it is negative or a NaN. Any
@@ -238,11 +238,11 @@ typedef struct nebel_vertex_desc {
 NEBEL_API nebel_result nebel_resolve_vertex_desc(const nebel_vertex_desc *desc, nebel_vertex_desc *resolved);
 
 /* What fog does between the eye and each of n vertices, written to `output_count` streams at once. In float; through
- * boxes of constant density f is what nebel_compute_segment_transmittance gives, to the bit, and the fastest. A byte is 255 times
- * the number, rounded to nearest, halves upwards. A vertex that holds a NaN or an infinity gets f = 1 and no light; of
- * one more than 1e18 m away only the range of f is sure. Streams may lie in each other, as the members of a structure
- * do, but no two of them, nor an output and the positions, may share a byte; where arrays lie in each other their
- * strides must be the same. Without state; any thread. Same bits for every isa and for every way of splitting the
+ * boxes of constant density f is what nebel_compute_segment_transmittance gives, to the bit, and the fastest. A byte is
+ * 255 times the number, rounded to nearest, halves upwards. A vertex that holds a NaN or an infinity gets f = 1 and no
+ * light; of one more than 1e18 m away only the range of f is sure. Streams may lie in each other, as the members of a
+ * structure do, but no two of them, nor an output and the positions, may share a byte; where arrays lie in each other
+ * their strides must be the same. Without state; any thread. Same bits for every isa and for every way of splitting the
  * vertices into calls. Errors: ARGUMENT (NULL, an unknown format, a stride that is too short, streams that share bytes,
  * an eye or origin that is not finite or more than 1e15 m away, curves as above), VALUE, UNSUPPORTED (isa not
  * available), MEMORY (scratch for very many volumes on one ray). Nothing has been written when the error is one of the
@@ -287,7 +287,7 @@ typedef struct nebel_tessellation_desc {
     nebel_host host;
     double eye[3];        /* m, in the coordinates of the fog; at most 1e15 */
     int channel;          /* whose factor: 0 red, 1 green, 2 blue */
-    double max_error;     /* of the error of the factor, > 0; 0: 1/255 */
+    double max_error;     /* the bound of the factor's error, > 0; 0: 1/255 */
     unsigned max_depth;   /* how often a triangle may be halved, at most 48; 0: 20 */
     size_t max_triangles; /* no triangle is halved for its error where there are so many; 0: 2^18 */
 } nebel_tessellation_desc;
@@ -301,14 +301,14 @@ typedef struct nebel_triangles {
     size_t triangle_count;
 } nebel_triangles;
 
-/* The same surface in more triangles. Vertices of the input come first, in their order; vertex vertex_count_before + i
+/* The same surface in more triangles. Vertices of the input come first, in their order; vertex input_vertex_count + i
  * lies half-way between the two of parents[i], which come before it: what else vertices have, normals and texture
  * coordinates, is the mean of both, in the same order. */
 typedef struct nebel_tessellation {
     size_t vertex_count, triangle_count;
     const float (*positions)[3]; /* m from the same origin */
     const uint32_t *indices;     /* three for each triangle, turned as those of the input */
-    size_t input_vertex_count;   /* of the input */
+    size_t input_vertex_count;   /* how many of the vertices are those of the input */
     const uint32_t (*parents)[2];
     size_t added_triangles;
     double error;               /* proven bound of what is left, of all triangles; at most 1 */
@@ -319,12 +319,12 @@ typedef struct nebel_tessellation {
 /* Splits triangles until |f - L| <= bound everywhere on each, where f is the exact transmittance between the eye and
  * the place, and L is linear between the exact f of the three corners. The bound is proven by interval arithmetic, not
  * sampled: it holds for every place of every triangle but for the rounding of double, for which 1e-6 is counted; a
- * bound below that cannot be met. What the factors of the vertices are off by themselves (nebel_compute_vertex_fog) comes on
- * top.
+ * bound below that cannot be met. What the factors of the vertices are off by themselves (nebel_compute_vertex_fog)
+ * comes on top.
  *
  * Where a sharp edge of the fog crosses a triangle the error falls with the size of the triangle alone, and at the
  * silhouette of a round volume with its square root: `max_depth` and `max_triangles` end that. Then the result is OK,
- * over_count says how many triangles are left, and error how much.
+ * unresolved_count says how many triangles are left, and error how much.
  *
  * Edges are halved at their middle, for all triangles that share them: there are no T-junctions, also where vertices at
  * one place differ in their index, but none is looked for between meshes of different calls. What neighbours need may
@@ -332,9 +332,9 @@ typedef struct nebel_tessellation {
  * were. Triangles without area are triangles like others.
  *
  * The fog: any but soft edges of cylinders, cones, capsules and convex bodies of more than 32 planes, and volumes that
- * have, together with those that exclude or replace their fog where both may be, more than 8 leaves. Any
- * thread. *tessellation is NULL on an error: ARGUMENT (NULL, a stride below 12, an index that is too large, a channel
- * or allocator that is none, a depth above 48), VALUE (a bound that is negative or not finite, an eye or origin that is
+ * have, together with those that exclude or replace their fog where both may be, more than 8 leaves. Any thread.
+ * *tessellation is NULL on an error: ARGUMENT (NULL, a stride below 12, an index that is too large, a channel or
+ * allocator that is none, a depth above 48), VALUE (a bound that is negative or not finite, an eye or origin that is
  * not finite or more than 1e15 m away, a vertex of a triangle that is not finite, or farther than 5e5 m from the eye
  * along an axis), UNSUPPORTED (fog without a proof), LIMIT (2^32 - 1 vertices or edges), MEMORY. */
 NEBEL_API nebel_result nebel_tessellate(const nebel_snapshot *snapshot, const nebel_tessellation_desc *desc,
@@ -480,8 +480,8 @@ typedef struct nebel_cell_segment {
  * The way goes straight from the eye to the point. With portals given it begins in the eye's cell and ends where it
  * leaves a cell other than through a portal: behind that wall there is no fog, as there is none for an eye outside all
  * cells. Without, fog is wherever cells are, and an eye outside sees it through their faces. Cells behind the eye do
- * nothing. An eye in a portal is in the cell that it looks into. With DEPTH and FAITHFUL a point that is not in front
- * of the eye (Z <= 0) has no fog; with FAITHFUL a plane that is seen edge-on (C = 0) is met where the ray crosses it,
+ * nothing. An eye in a portal is in the cell that it looks into. With DEPTH and PRINTED a point that is not in front
+ * of the eye (Z <= 0) has no fog; with PRINTED a plane that is seen edge-on (C = 0) is met where the ray crosses it,
  * and Z is kept between 0 and the point's Zmax. A way that runs in a face belongs to one of the two cells, by the rule
  * of docs/scene-file.md. A point that is not finite has no fog. Any thread. Errors: ARGUMENT (NULL, an eye that is not
  * finite, a forward that has no direction, a stride shorter than its elements, points and fog that share bytes). */

@@ -97,14 +97,14 @@ typedef enum nebel_gl_output {
  * Mesa's llvmpipe ends loops early: where a tile lists so many volumes that this may matter, the fog is drawn in several
  * passes, and waits for each, to draw no more than it takes. With an occlusion query of the host's under way, of any kind, it
  * cannot know: all 256 passes are drawn then, for the same picture, and the query counts them, too. Where that does not suffice, or several samples of a pixel or the air of a planet keep it
- * from that, the log is told once, with NEBEL_OK; see docs/shaders.md. */
+ * from that, the log gets one warning; see docs/shaders.md. */
 typedef struct nebel_gl_pass {
     nebel_gl_output output;
     unsigned depth_texture; /* two-dimensional; a depth format, or the first component of a float format */
     unsigned color_texture; /* COMPOSE only; not the target */
     uint32_t samples; /* of the depth texture, and of the colour texture in COMPOSE: 0 or 1: no multisampling; else
                          both are multisampled with so many. COMPOSE gives the mean of what the samples see, SPLIT
-                         the means of both; BLEND and BLEND_GREY want a target of as many samples, and blend each
+                         the means of both; BLEND and BLEND_GRAY want a target of as many samples, and blend each
                          of them by itself. OpenGL only */
     nebel_depth_desc depth; /* {0}: OpenGL's own */
     uint32_t x, y;          /* lower left pixel of the picture, in the textures and in the target alike */
@@ -150,7 +150,7 @@ NEBEL_API nebel_result nebel_gl_get_fog_resources(const nebel_gl *gl, nebel_gl_f
  *     nebel_create_gl_classic(&(nebel_gl_classic_desc){.host.log = log}, &classic);    // in the engine's context
  *     method = nebel_gl_get_classic_method(classic);          // TWO_PASS where the context lacks fog coordinates
  *
- *     // The stream follows from the method: feed refuses another one.
+ *     // The stream follows from the method: nebel_gl_bind_classic_stream refuses another one.
  *     // FOG_COORD, one pass: the mesh as ever, within
  *     const nebel_vertex_output fog = {NEBEL_VERTEX_COORDINATE, &mesh[0].fog, sizeof *mesh};
  *     nebel_compute_vertex_fog(snapshot, NULL, count, &points, &fog, 1);
@@ -167,8 +167,8 @@ NEBEL_API nebel_result nebel_gl_get_fog_resources(const nebel_gl *gl, nebel_gl_f
  *     draw_positions(mesh);
  *     nebel_gl_end_classic_fog(classic);
  *
- * Between begin and end any number of meshes may be drawn, each after a feed of its own. A program that draws between
- * glBegin and glEnd feeds nothing: it calls glFogCoordf(coordinate) or glColor4ubv(color) before each vertex.
+ * Between begin and end any number of meshes may be drawn, each after a nebel_gl_bind_classic_stream of its own. A program that draws between
+ * glBegin and glEnd binds none: it calls glFogCoordf(coordinate) or glColor4ubv(color) before each vertex.
  *
  * What the methods draw, with P what the surface looks like, a the amount of fog, L the light that fog adds:
  *
@@ -205,7 +205,7 @@ NEBEL_API nebel_result nebel_gl_get_fog_resources(const nebel_gl *gl, nebel_gl_f
  * DEPTH_TEST, stencil, culling, polygon offset, programs and matrices are those of the engine.
  *
  * Contexts from OpenGL 1.1 and OpenGL ES 3.0. Core profiles from 3.3. Every function wants the context current that
- * nebel_create_gl_classic was called in, and no error pending. Threads as in nebel/gl.h.
+ * nebel_create_gl_classic was called in, and no error pending. Threads as above.
  */
 
 typedef enum nebel_gl_classic_kind {
@@ -225,7 +225,7 @@ typedef struct nebel_gl_classic_desc {
 } nebel_gl_classic_desc;
 
 /* Asks the current context what it can. Where FOG_COORD is wanted and neither OpenGL 1.4 nor GL_EXT_fog_coord is there
- * the method is TWO_PASS, and the log is told so. On an error *classic is NULL. Errors: ARGUMENT, VALUE (coordinate_end
+ * the method is TWO_PASS, and the log gets a warning. On an error *classic is NULL. Errors: ARGUMENT, VALUE (coordinate_end
  * is negative or not finite), MEMORY, UNSUPPORTED (no current context, or one that is too old). */
 NEBEL_API nebel_result nebel_create_gl_classic(const nebel_gl_classic_desc *desc, nebel_gl_classic **classic);
 
@@ -267,7 +267,7 @@ NEBEL_API const char *nebel_gl_classic_shader_source(void);
 /* A scene in OpenGL: the picture of the CPU renderer (nebel/render.h), drawn by OpenGL 3.3 core or OpenGL ES 3.0.
  *
  *     nebel_gl_renderer *renderer = NULL;
- *     nebel_create_gl_renderer(scene_data, fog, &(nebel_gl_renderer_desc){0}, &renderer);    // in a current context
+ *     nebel_create_gl_renderer(scene_data, lighting, &(nebel_gl_renderer_desc){0}, &renderer);    // in a current context
  *
  *     nebel_gl_render_frame(renderer, &(nebel_gl_frame_desc){.camera = camera, .width = 1280, .height = 720});
  *     nebel_gl_get_textures(renderer, &textures);      // to show it, or
@@ -284,11 +284,11 @@ NEBEL_API const char *nebel_gl_classic_shader_source(void);
  *
  * A planet with air (`planets` of the scene, one) is drawn as by the CPU; its table is made anew in a frame whose eye or
  * sun is another than in the one before, which takes 50 to 230 ms. Its atmosphere must live as long as the renderer:
- * another one at the same address would be taken for the first. So must the layers of one that has them, whose shells are
+ * another one at the same address would be taken for the first. So must a textured planet, whose shells are
  * surfaces of which a part is seen: each costs the fog and the particles of a frame once more.
  *
- * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
- * what nebel/gl.h lists it changes, while it runs, texture units 7 to 15, and TEXTURE_2D_ARRAY of units 10, 11, 12 and 14; both
+ * Contexts, threads and errors as above. Every function leaves the state of the context as it found it; beside
+ * what is listed there it changes, while it runs, texture units 7 to 15, and TEXTURE_2D_ARRAY of units 10, 11, 12 and 14; both
  * framebuffers; the bindings ARRAY_BUFFER and PIXEL_PACK_BUFFER; the parameters PACK_*; CLAMP_READ_COLOR; the depth
  * function, mask and range; POLYGON_OFFSET_FILL, PRIMITIVE_RESTART_FIXED_INDEX, DEPTH_CLAMP, the provoking vertex and
  * the clip control, where they exist. Conditional rendering must not be under way: pictures would be missing within a
@@ -335,7 +335,7 @@ typedef enum nebel_gl_method {
     NEBEL_GL_METHOD_FIVE_TAP,  /* each particle is a disc through its middle, across the view: all of it or nothing, by
                                   the classic comparison of depth at five places. Of a panorama depth is distance */
     NEBEL_GL_METHOD_VERTEX, /* fog at the vertices of surfaces, by nebel_compute_vertex_fog, interpolated over triangles:
-                                  what fog coordinates, a second pass and alpha polygons draw (nebel/gl.h). It
+                                  what fog coordinates, a second pass and alpha polygons draw (above). It
                                   has one transmittance, that of red. Where no surface is there is no fog. Rays of
                                   an orthographic camera begin in its plane, for CELLS, too */
     NEBEL_GL_METHOD_ADDITIVE, /* the same, but fog only adds its light, and transmittance is 1 */
@@ -388,7 +388,7 @@ typedef struct nebel_gl_frame_desc {
                                         goes there; both 0: 0 and 1000 */
     int particles_leave_sun; /* 0: sunlight on surfaces is attenuated by all particles on its way, as on the CPU,
                                   exactly, by the lists of particles along it; for a new eye or sun O(particles) more,
-                                  some microseconds each. Not where `fog` excludes, replaces or limits what particles
+                                  some microseconds each. Not where the renderer's fog excludes, replaces or limits what particles
                                   do. Nonzero: sunlight passes particles by: for many of them and an eye that moves */
     double time;             /* as in nebel_frame_desc */
     int clouds_by_processor; /* 0: a planet with clouds of volume is refused. Nonzero: the processor walks through them along
@@ -398,7 +398,7 @@ typedef struct nebel_gl_frame_desc {
 
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not, or without what it
  * needs), VALUE (a camera, light or time as for nebel_render_frame; taps that are not finite or negative; a factor as for
- * nebel_resolve_factor), LIMIT (a picture, or a map of layers, too large for this context; fog or triangles that floats do not hold in this view; more than 4,096 lamps), CANCELLED (by progress),
+ * nebel_resolve_factor), LIMIT (a picture, or a map of a textured planet, too large for this context; fog or triangles that floats do not hold in this view; more than 4,096 lamps), CANCELLED (by progress),
  * MEMORY, UNSUPPORTED (more than one sample, or a textured planet, where OpenGL ES cannot blend floats; a planet with
  * clouds of volume where the processor may not walk through them, by another method than EXACT, or, if it has air, in an
  * orthographic view or with particles; a shader that the driver does not take; the context is another one, or lost). The first panorama copies the triangles of all

@@ -110,7 +110,7 @@ NEBEL_API void nebel_evaluate_environment_diffuse(const nebel_environment *envir
 /* ==== light that is scattered more than once ====================================================== */
 
 /* Light that fog scatters more than once, so that white fog is white and smoke is dark: a model, where all else is exact.
- * docs/multiple-scattering.md has the model and its errors. It is part of a lighting (below), of all its lights.
+ * docs/multiple-scattering.md has the model and its errors. It belongs to a lighting (below) and holds for all of its lights.
  *
  * What is scattered once stays as exact as it is. Ambient light, which without it nothing dims, is dimmed by what fog and ground
  * take from it. Light of point and spot lights is scattered again, and so is what fog emits, which without it nothing scatters.
@@ -140,6 +140,7 @@ typedef struct nebel_diffusion_desc {
 
 /* Fog says what scatters light, a lighting what light there is:
  *
+ *     // of the first program in nebel.h, with .albedo = {.9, .9, .9} in place of .source
  *     nebel_lighting *lighting = NULL;
  *     nebel_create_lighting(now, &(nebel_lighting_desc){
  *         .sun = {.direction = {0, 1, 0}, .irradiance = {3, 3, 3}}, .environment = {.radiance = {.2, .3, .4}}}, &lighting);
@@ -154,7 +155,7 @@ typedef struct nebel_diffusion_desc {
 typedef enum nebel_light_group {
     NEBEL_LIGHT_GROUP_SUN = 0,
     NEBEL_LIGHT_GROUP_ENVIRONMENT,
-    NEBEL_LIGHT_GROUP_LOCAL, /* point and spot lights, emission and source of fog */
+    NEBEL_LIGHT_GROUP_LOCAL, /* point and spot lights; of in-scattering emission and source of fog, too */
     NEBEL_LIGHT_GROUP_COUNT
 } nebel_light_group;
 
@@ -196,7 +197,7 @@ NEBEL_API nebel_snapshot *nebel_get_lighting_snapshot(const nebel_lighting *ligh
 /* The sun as it was given, its direction of length 1; all zero where there is none. Any thread. */
 NEBEL_API nebel_sun nebel_get_lighting_sun(const nebel_lighting *lighting);
 
-/* The environment as it was given; its map lives as long as the lighting. Any thread. */
+/* The environment as it was given; the lighting is an owner of its map. Any thread. */
 NEBEL_API nebel_environment nebel_get_lighting_environment(const nebel_lighting *lighting);
 
 /* How many point and spot lights there are, and themselves in *lights (NULL: not wanted), as they were given, for as long as

@@ -27,17 +27,16 @@
  *     nebel_destroy_fog(fog);
  *
  * nebel does NOT open windows, create graphics contexts, decode images, read files, start threads, print, exit or keep
- * global state. Scene files and models live in nebel/scene.h, the CPU renderer in nebel/render.h.
+ * global state. Lights are in nebel/light.h; scene files and models in scene.h, renderers in render.h and gl.h.
  *
- * Conventions: metres, right-handed coordinates, linear Rec. 709 RGB. A description that is
- * all zero is valid; a zero member means the default named beside it. Functions return NEBEL_OK (0) or a negative
- * nebel_result; what went wrong, where and how to mend it goes to the log callback. Without a callback nebel is silent.
- * NULL where something is needed gives ARGUMENT. Functions without a result then do nothing, or return what stands for
- * nothing: 0, "", NULL, a structure of zeros, the default camera, a sun without light, a fog factor of 1, NaN of phase
- * functions.
+ * Conventions: metres, right-handed coordinates, linear Rec. 709 RGB. A member of a description that is 0 means the default
+ * named beside it (NEBEL_ZERO is 0 where it says so); sizes, counts and pointers without a default must be given. Functions
+ * return NEBEL_OK (0) or a negative nebel_result. What went wrong, where and how to mend it goes to the object's log, if it has
+ * one. NULL where something is needed gives ARGUMENT alone; functions without a result then do nothing, or return what stands
+ * for nothing: 0, "", NULL, a structure of zeros, the default camera, a sun without light, a fog factor of 1, NaN.
  *
- * Threads: different fogs may be used from different threads at once. One fog belongs to one thread at a time. A
- * snapshot never changes and may be queried by any number of threads.
+ * Threads: different fogs may be used from different threads at once. One fog belongs to one thread at a time. A snapshot
+ * never changes and may be queried by any number of threads, each of which may call its host's allocator and log.
  */
 #ifndef NEBEL_NEBEL_H
 #define NEBEL_NEBEL_H
@@ -92,7 +91,7 @@ NEBEL_API const char *nebel_result_text(nebel_result result);
 /* ---- memory, messages, processors ------------------------------------------------------------ */
 
 /* Memory. Both functions or neither (NULL: malloc and free). `allocate` returns memory aligned for any object, or NULL;
- * `release` takes what `allocate` gave, never NULL. They are called from the thread that called nebel. */
+ * `release` takes what `allocate` gave, never NULL. Both are called from the threads that call nebel or run its parts. */
 typedef struct nebel_allocator {
     void *(*allocate)(size_t size, void *user);
     void (*release)(void *memory, void *user);
@@ -102,7 +101,7 @@ typedef struct nebel_allocator {
 typedef enum nebel_log_level {
     NEBEL_LOG_ERROR = 0, /* the call fails with `result` */
     NEBEL_LOG_WARNING,   /* it goes on, but not as well as it should; `result` is NEBEL_OK */
-    NEBEL_LOG_INFO       /* the same, in a way that is worth knowing */
+    NEBEL_LOG_INFO       /* nothing is wrong, something is worth knowing; `result` is NEBEL_OK */
 } nebel_log_level;
 
 /* Messages to the caller: what, where and how to mend it, one line without a newline, valid during the call only. */
@@ -126,7 +125,8 @@ typedef struct nebel_parallel {
 typedef struct nebel_host {
     nebel_allocator allocator;
     nebel_log log;
-    nebel_parallel parallel; /* where work is long and its parts are independent, as a function says */
+    nebel_parallel
+        parallel; /* read for air, sky views, scenes and OpenGL renderers; others compute in the calling thread */
 } nebel_host;
 
 /* Instruction sets, for float queries. DEFAULT takes the best one this processor has. */
@@ -148,8 +148,7 @@ NEBEL_API const char *nebel_isa_name(nebel_isa isa);
 
 /* ---- describing fog -------------------------------------------------------------------------- */
 
-/* The numbers that descriptions may hold: squares of lengths stay finite and normal, and so does the arithmetic in
- * float. */
+/* The numbers that descriptions may hold: squares of lengths stay finite and normal, and arithmetic in float does. */
 #define NEBEL_MIN_LENGTH 1e-15     /* m: of what must be > 0 */
 #define NEBEL_MAX_LENGTH 1e15      /* m: of lengths, and on each axis of the distance of places from the origin */
 #define NEBEL_MIN_SCALE 1e-9       /* of a transform's factors, whatever their sign */
@@ -157,6 +156,7 @@ NEBEL_API const char *nebel_isa_name(nebel_isa isa);
 #define NEBEL_MIN_DIRECTION 1e-150 /* the least length of a normal or quaternion, which need not have length 1 */
 #define NEBEL_MAX_DIRECTION 1e150  /* the largest */
 #define NEBEL_MAX_AMOUNT 1e9       /* of extinction [1/m], radiance and emission [radiance per metre] */
+#define NEBEL_ZERO (-1.)           /* 0, for members of which 0 means a default */
 
 typedef enum nebel_shape_type {
     NEBEL_SHAPE_WORLD = 0,    /* everywhere */
@@ -499,7 +499,7 @@ NEBEL_API nebel_snapshot *nebel_retain_snapshot(nebel_snapshot *snapshot);
 /* One owner less; the last one frees it. Any thread. NULL is fine. */
 NEBEL_API void nebel_release_snapshot(nebel_snapshot *snapshot);
 
-/* How many volumes the snapshot holds. */
+/* How many volumes the snapshot holds. Any thread. */
 NEBEL_API size_t nebel_get_volume_count(const nebel_snapshot *snapshot);
 
 /* The most that all fog together hides, > 0 to 1; 1: no limit, also of NULL. Any thread. */
@@ -710,7 +710,7 @@ typedef struct nebel_transfer_planes {
 
 /* What the fog does along each of n rays, as nebel_trace in float does: the same rays give the same bits of
  * transmittance and in-scattering, and with in-scattering wanted the same error. Of desc (NULL: the same as all zero)
- * `isa`, `tolerance`, `failed_ray`, `ignore_distances`, `sun_visibility` and `light_visibility` are read. rays and transfers must not overlap. Same
+ * `lighting`, `isa`, `tolerance`, `failed_ray`, `ignore_max_opacity`, `ignore_distances`, `sun_visibility` and `light_visibility` are read. rays and transfers must not overlap. Same
  * bits for every isa and for every way of splitting the rays into calls; a few hundred rays are enough for a call to be
  * worth it. Any thread. Errors as nebel_trace. */
 NEBEL_API nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,

@@ -6,7 +6,7 @@
  *     const nebel_sun sun = {.direction = {0.6, 0.3, 0}, .irradiance = {1, 1, 1}};
  *     const nebel_ray ray = {{0, 1.7, 0}, {1, 0.1, 0}, INFINITY};
  *     nebel_transfer transfer;
- *     nebel_trace_atmosphere(air, &sun, 1, &ray, 0, &light, 0);          // light.in_scattering is the sky
+ *     nebel_trace_atmosphere(air, &sun, 1, &ray, 0, &transfer, 0);       // transfer.in_scattering is the sky
  *
  * The planet is a ball; its air is up to NEBEL_MAX_COMPONENTS kinds of it over each other, each of which thins out with height,
  * or is a layer, and ends where the atmosphere does. Light that was scattered once comes from quadrature with the exact
@@ -16,7 +16,7 @@
  *
  * Places are those of the scene, y up. Units are metres. Nothing here calls a graphics interface.
  *
- * Strides are in bytes. 0 with n > 1: the same ray or place for all, and of results the same one is written each time.
+ * Strides are in bytes; 0: packed.
  */
 #ifndef NEBEL_PLANET_H
 #define NEBEL_PLANET_H
@@ -68,31 +68,31 @@ typedef struct nebel_atmosphere_desc {
 } nebel_atmosphere_desc;
 
 /* Known airs: "earth" (constants of the demonstration of Hillaire, A Scalable and Production Ready Sky and Atmosphere
- * Rendering Technique, 2020), "mars", "toy", a ball of 1 km in the Earth's colours, and "moon", which has no air: one kind of it that
- * does nothing to light. NULL where there is none of that name. Any thread. */
+ * Rendering Technique, 2020), "mars", "toy", a ball of 1 km in the Earth's colours, and "moon", which has no air: one
+ * kind of it that does nothing to light. NULL where there is none of that name. Any thread. */
 NEBEL_API const nebel_atmosphere_desc *nebel_lookup_atmosphere(const char *name);
 
-/* Writes the description with every default in its place. desc may be resolved. Errors: ARGUMENT, VALUE (a number out of range;
- * the description's log says which); *resolved is then untouched. Any thread. */
+/* Writes the description with every default in its place. desc may be resolved. Errors: ARGUMENT, VALUE (a number out
+ * of range; the description's log says which); *resolved is then untouched. Any thread. */
 NEBEL_API nebel_result nebel_resolve_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere_desc *resolved);
 
 /* ---- atmospheres ----------------------------------------------------------------------------- */
 
 typedef struct nebel_atmosphere nebel_atmosphere;
 
-/* Makes an atmosphere that does not change any more, with its table: the same bits however `run` splits the work. Free
- * it with nebel_destroy_atmosphere. Errors: ARGUMENT (NULL), VALUE (a number out of range; the log says which), MEMORY;
- * *atmosphere is then NULL. Any thread. */
+/* Makes an atmosphere that does not change any more, with its table: the same bits however `host.parallel` splits the
+ * work. Free it with nebel_destroy_atmosphere. Errors: ARGUMENT (NULL), VALUE (a number out of range; the log says
+ * which), MEMORY; *atmosphere is then NULL. Any thread. */
 NEBEL_API nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere **atmosphere);
 
 /* NULL is fine. */
 NEBEL_API void nebel_destroy_atmosphere(nebel_atmosphere *atmosphere);
 
 /* What the air does along each of n rays, up to t_max, the ground or the end of the air, whichever comes first. A place
- * below the ground counts as that on it straight above, the centre as that at y, here and below. The light of the ground
- * itself is not in it. Strides are in bytes. sun NULL: no light. `error` is what the quality promises: see
- * docs/planet.md. Any thread. Errors: ARGUMENT (NULL, a sun or a ray that is NaN, infinite where it must not be, of no
- * direction, of negative t_max); then no transfers are written. */
+ * below the ground counts as the ground straight above it, the planet's centre as its top (+y): so everywhere in this
+ * header. The light of the ground itself is not in it. Strides are in bytes. sun NULL: no light. `error` is what the
+ * quality promises: see docs/planet.md. Any thread. Errors: ARGUMENT (NULL, a sun or a ray that is NaN, infinite where
+ * it must not be, of no direction, of negative t_max); then no transfers are written. */
 NEBEL_API nebel_result nebel_trace_atmosphere(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
                                               const nebel_ray *rays, size_t ray_stride, nebel_transfer *transfers,
                                               size_t transfer_stride);
@@ -103,18 +103,18 @@ typedef struct nebel_irradiance {
     double sky[3]; /* irradiance on level ground below the place, of all that the air scatters; above the air, too */
 } nebel_irradiance;
 
-/* The light at each of n places; strides in bytes, 0: packed. Nothing tells an error: the sun's part is as exact as the optical depth, the
- * sky's as the table of the quality, both in docs/planet.md, "How far off", whose rays down have this light behind them.
- * Any thread. Errors: ARGUMENT; then no lights are written. */
+/* The light at each of n places; strides in bytes, 0: packed. Nothing tells an error: the sun's part is as exact as the
+ * optical depth, the sky's as the table of the quality, both in docs/planet.md, "How far off", whose rays down have
+ * this light behind them. Any thread. Errors: ARGUMENT; then no lights are written. */
 NEBEL_API nebel_result nebel_compute_atmosphere_irradiance(const nebel_atmosphere *atmosphere, const nebel_sun *sun,
                                                            size_t n, const double (*places)[3], size_t place_stride,
                                                            nebel_irradiance *irradiances, size_t irradiance_stride);
 
 /* ---- many rays from one place ---------------------------------------------------------------- */
 
-/* What the air does to all rays from one place, from a table over their direction and, where they may end within the air,
- * how far they go. The table ends at the horizon on both sides, and keeps phase functions apart, so that neither is smoothed.
- * A ray takes some 0.1 us. */
+/* What the air does to all rays from one place, from a table over their direction and, where they may end within the
+ * air, how far they go. The table ends at the horizon on both sides, and keeps phase functions apart, so that neither
+ * is smoothed. A ray takes some 0.1 us. */
 typedef struct nebel_sky_view nebel_sky_view;
 
 typedef struct nebel_sky_view_desc {
@@ -126,16 +126,17 @@ typedef struct nebel_sky_view_desc {
 } nebel_sky_view_desc;
 
 /* Makes the table. Errors: ARGUMENT (NULL, a sun or a place that is not in order), MEMORY; *view is then NULL. The same
- * bits however `run` splits the work. */
+ * bits however `host.parallel` splits the work. Any thread. */
 NEBEL_API nebel_result nebel_create_sky_view(const nebel_sky_view_desc *desc, nebel_sky_view **view);
 
 /* NULL is fine. */
 NEBEL_API void nebel_destroy_sky_view(nebel_sky_view *view);
 
-/* What nebel_trace_atmosphere says of n rays from the view's place, from the table. Planes have no gaps: strides of `lights` are
- * not read, its planes of three are given all or none. t_max NULL: to the ground or the end of the air; one that is NaN or negative counts as 0. A direction may be of any
- * length from 1e-150 to 1e150; those of none meet no air. `error` adds what the table misses, estimated from its own differences, to what
- * nebel_trace_atmosphere tells. Any thread. Errors: ARGUMENT (NULL, a component of the direction too). */
+/* What nebel_trace_atmosphere says of n rays from the view's place, from the table. Planes have no gaps, those of three
+ * are given all or none, and `group` is not written. t_max NULL: to the ground or the end of the air; one that is NaN
+ * or negative counts as 0. A direction may be of any length from 1e-150 to 1e150; those of none meet no air. `error`
+ * adds what the table misses, estimated from its own differences, to what nebel_trace_atmosphere tells. Any thread.
+ * Errors: ARGUMENT (NULL, a component of the direction too; strides that are neither 0 nor 4). */
 NEBEL_API nebel_result nebel_trace_sky_view(const nebel_sky_view *view, size_t n, const double *const direction[3],
                                             const float *t_max, const nebel_transfer_planes *transfers);
 
@@ -162,7 +163,7 @@ NEBEL_API nebel_result nebel_trace_ground(const nebel_sky_view *view, size_t n, 
  *     nebel_shell_hits hits;
  *     nebel_trace_textured_planet(planet, &view, 1, &ray, 0, &hits, 0);
  *
- * The look is that of technique E of the OpenGL 3.3 era: cheap, and right only as a picture. planet.h has air as it is.
+ * The look is that of technique E of the OpenGL 3.3 era: cheap, and right only as a picture. The first part of this header has air as it is.
  * What is generated here, clouds, their detail and the ground, is made on the ball in space, so that no map has a seam
  * where its columns meet, nor a star at the poles.
  *
@@ -173,8 +174,8 @@ NEBEL_API nebel_result nebel_trace_ground(const nebel_sky_view *view, size_t n, 
 
 #define NEBEL_MAX_PLANET_MAP_SIZE 16384
 
-/* A picture. Around a ball its first row is at the north pole, and its columns go east from longitude -180. Longitude 0 is where x is
- * largest, 90 east where z is least. {0}: none. */
+/* A picture. Around a ball its first row is at the north pole, and its columns go east from longitude -180. Longitude 0
+ * is where x is largest, 90 east where z is least. {0}: none. */
 typedef struct nebel_planet_map {
     size_t width, height; /* 1 to NEBEL_MAX_PLANET_MAP_SIZE */
     int channels;         /* 1, or 3: linear red, green and blue */
@@ -248,13 +249,13 @@ typedef struct nebel_textured_planet_desc {
 
 typedef struct nebel_textured_planet nebel_textured_planet;
 
-/* Makes a planet that does not change any more; maps are copied. Free it with nebel_destroy_textured_planet. Errors: ARGUMENT
- * (NULL), VALUE (a number out of range; the log says which), MEMORY; *layers is then NULL. Any thread. */
+/* Makes a planet that does not change any more; maps are copied. Free it with nebel_destroy_textured_planet. Errors:
+ * ARGUMENT (NULL), VALUE (a number out of range; the log says which), MEMORY; *planet is then NULL. Any thread. */
 NEBEL_API nebel_result nebel_create_textured_planet(const nebel_textured_planet_desc *desc,
-                                                    nebel_textured_planet **layers);
+                                                    nebel_textured_planet **planet);
 
 /* NULL is fine. */
-NEBEL_API void nebel_destroy_textured_planet(nebel_textured_planet *layers);
+NEBEL_API void nebel_destroy_textured_planet(nebel_textured_planet *planet);
 
 /* ---- what a ray meets ------------------------------------------------------------------------ */
 
@@ -280,23 +281,24 @@ typedef struct nebel_shell_hits {
     nebel_shell_hit hits[NEBEL_MAX_CLOUD_SHELLS + 2];
 } nebel_shell_hits;
 
-/* What each of n rays meets up to its t_max. Strides are in bytes. Any thread. Errors: ARGUMENT (NULL, a view or a ray
+/* What each of n rays meets up to its t_max. Strides are in bytes. Any thread. Errors: ARGUMENT (NULL, a query or a ray
  * that is NaN, infinite where it must not be, from more than 1e15 m away, of no direction, of negative t_max). */
-NEBEL_API nebel_result nebel_trace_textured_planet(const nebel_textured_planet *layers,
-                                                   const nebel_textured_planet_query *view, size_t n,
+NEBEL_API nebel_result nebel_trace_textured_planet(const nebel_textured_planet *planet,
+                                                   const nebel_textured_planet_query *query, size_t n,
                                                    const nebel_ray *rays, size_t ray_stride, nebel_shell_hits *hits,
                                                    size_t hit_stride);
 
 /* ---- for those who draw it themselves ---------------------------------------------------------- */
 
-/* What a planet is made of: where the description had zeros stands what they stood for, and the maps are the planet's own,
- * generated ones, too, which live as long as it does. A shell whose detail is {0} takes that from its map. NULL: NULL. */
-NEBEL_API const nebel_textured_planet_desc *nebel_get_textured_planet_desc(const nebel_textured_planet *layers);
+/* What a planet is made of: where the description had zeros stands what they stood for, and the maps are the planet's
+ * own, generated ones, too, which live as long as it does. A shell whose detail is {0} takes that from its map. NULL:
+ * NULL. */
+NEBEL_API const nebel_textured_planet_desc *nebel_get_textured_planet_desc(const nebel_textured_planet *planet);
 
-/* Maps are read between texels and between levels, so that what is small in a picture is averaged. Level 0 is the map; each
- * next one is half as wide and high, rounded down to 1 at the least, and its texels are means of those that they cover.
- * `map` is one of that description. Any thread. Errors: ARGUMENT (NULL, another map, no such level). */
-NEBEL_API nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *layers, const nebel_planet_map *map,
+/* Maps are read between texels and between levels, so that what is small in a picture is averaged. Level 0 is the map;
+ * each next one is half as wide and high, rounded down to 1 at the least, and its texels are means of those that they
+ * cover. `map` is one of that description. Any thread. Errors: ARGUMENT (NULL, another map, no such level). */
+NEBEL_API nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *planet, const nebel_planet_map *map,
                                                 uint32_t level, nebel_planet_map *coarser);
 
 /* ==== clouds with volume ========================================================================== */
@@ -304,10 +306,13 @@ NEBEL_API nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *lay
 /* Clouds with volume around a planet: shells of drops or ice between two heights, lit by the sun and the sky.
  *
  *     nebel_clouds *clouds = NULL;
+ *     nebel_cloud_lighting *lighting = NULL;
+ *     nebel_cloud_workspace *workspace = NULL;
+ *     nebel_cloud_transfer nodes;
  *     nebel_create_clouds(&(nebel_clouds_desc){.atmosphere = air, .layer_count = 1}, &clouds); // cumulus
- *     nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.clouds = clouds, .sun = sun}, &view);
- *     nebel_create_cloud_workspace(view, &workspace);                                          // one per thread
- *     nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0.001}, 0, &nodes, 0);
+ *     nebel_create_cloud_lighting(&(nebel_cloud_lighting_desc){.clouds = clouds, .sun = sun}, &lighting);
+ *     nebel_create_cloud_workspace(lighting, &workspace);                                      // one per thread
+ *     nebel_trace_clouds(workspace, 1, &ray, 0, 0.001, NULL, &nodes, 0);
  *
  * The extinction of a layer at a place is one formula of the place, the same from everywhere (docs/clouds.md): noise in
  * three dimensions in the planet's axes, so that there is no seam and no pole; who looks from afar gets its mean over
@@ -316,7 +321,7 @@ NEBEL_API nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *lay
  *
  * Units are metres; places are those of the scene, y up. Nothing here calls a graphics interface.
  *
- * Strides are in bytes. 0 with n > 1: the same ray or place for all, and of results the same one is written each time.
+ * Strides are in bytes; 0: packed.
  */
 
 #define NEBEL_MAX_CLOUD_LAYERS 4
@@ -325,7 +330,6 @@ NEBEL_API nebel_result nebel_get_planet_map_mip(const nebel_textured_planet *lay
 #define NEBEL_MAX_FOG_SHADOW_SEGMENTS 32
 #define NEBEL_MAX_CLOUD_THICKNESS_RATIO 1e6 /* of the air's thickness to a layer's */
 #define NEBEL_MAX_CLOUD_CELL_RADII 4.       /* of the planet to a layer's size */
-#define NEBEL_CLOUD_NONE (-1.)              /* where 0 would mean the number of the kind */
 
 /* What a layer looks like, and its numbers where none are given. */
 typedef enum nebel_cloud_type {
@@ -345,8 +349,8 @@ typedef struct nebel_cloud_layer {
     /* m, of the largest cells: half of the distance from one to the next; 1e-3 to 1e9, at most NEBEL_MAX_CLOUD_CELL_RADII
      * of the planet's radius. */
     double cell_size;
-    double erosion;          /* how deep Worley noise cuts into them, to 1; NEBEL_CLOUD_NONE: not at all */
-    double patchiness;       /* variation of the coverage over ten cells and more, to 1, or NEBEL_CLOUD_NONE */
+    double erosion;          /* how deep Worley noise cuts into them, to 1; NEBEL_ZERO: not at all */
+    double patchiness;       /* variation of the coverage over ten cells and more, to 1; NEBEL_ZERO: none */
     double droplet_diameter; /* um, twice the effective radius of the droplets: 4 to 50 */
     uint32_t seed;           /* of the noise */
     /* m per unit of time, within 1e12, along x and z at the point of the ground above the centre: the shell rotates. */
@@ -363,28 +367,30 @@ typedef struct nebel_clouds_desc {
 
 typedef struct nebel_clouds nebel_clouds;
 
-/* Writes a layer with every number in its place, for air of that thickness, in m. desc may be resolved. Errors: ARGUMENT,
- * VALUE (a number out of range; the log says which); *resolved is then untouched. Any thread. */
+/* Writes a layer with every number in its place, for air of that thickness, in m. desc may be resolved. Errors:
+ * ARGUMENT, VALUE (a number out of range; the log, which may be NULL, says which one of the layer); *resolved is then
+ * untouched. Any thread. */
 NEBEL_API nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer *desc, const nebel_log *log,
                                                  nebel_cloud_layer *resolved);
 
-/* Makes clouds that do not change any more. Free them with nebel_destroy_clouds. Errors: ARGUMENT (NULL), VALUE (a number
- * out of range, layers around a planet without air; the log says which), LIMIT (layers), MEMORY; *clouds is then NULL. Any
- * thread. */
+/* Makes clouds that do not change any more. Free them with nebel_destroy_clouds. Errors: ARGUMENT (NULL), VALUE (a
+ * number out of range, layers around a planet without air; the log says which), LIMIT (layers), MEMORY; *clouds is then
+ * NULL. Any thread. */
 NEBEL_API nebel_result nebel_create_clouds(const nebel_clouds_desc *desc, nebel_clouds **clouds);
 
 /* NULL is fine. */
 NEBEL_API void nebel_destroy_clouds(nebel_clouds *clouds);
 
-/* Extinction of all layers at n places, 1/m, as a mean over about `width` metres (0: as it is). Stride in bytes, 0: packed. time:
- * in the units of the wind, within -1e12 and 1e12. Any thread. Errors: ARGUMENT. */
+/* Extinction of all layers at n places, 1/m, as a mean over about `width` metres (0: as it is). Stride in bytes, 0:
+ * packed. time: in the units of the wind, within -1e12 and 1e12. Any thread. Errors: ARGUMENT. */
 NEBEL_API nebel_result nebel_compute_cloud_extinction(const nebel_clouds *clouds, double time, double width, size_t n,
                                                       const double (*places)[3], size_t place_stride,
                                                       float *extinction);
 
-/* The phase function of a layer's droplets, 1/sr for red, green and blue (light of 680, 550 and 440 nm), at n cosines within -1 and 1 of the
- * angle by which light is turned. Cumulus and stratus: Mie's theory for water, sizes of a gamma distribution with an effective
- * variance of 0.1, by a table; cirrus: NEBEL_PHASE_DROPLETS. docs/clouds.md says how far off. Any thread. Errors: ARGUMENT. */
+/* The phase function of a layer's droplets, 1/sr for red, green and blue (light of 680, 550 and 440 nm), at n cosines
+ * within -1 and 1 of the angle by which light is turned. Cumulus and stratus: Mie's theory for water, sizes of a gamma
+ * distribution with an effective variance of 0.1, by a table; cirrus: NEBEL_PHASE_DROPLETS. docs/clouds.md says how far
+ * off. Any thread. Errors: ARGUMENT. */
 NEBEL_API nebel_result nebel_cloud_phase(const nebel_clouds *clouds, uint32_t layer, size_t n, const double *cosines,
                                          double (*phases)[3]);
 
@@ -395,35 +401,36 @@ typedef struct nebel_cloud_lighting nebel_cloud_lighting;
 
 typedef struct nebel_cloud_lighting_desc {
     nebel_host host;
-    const nebel_clouds *clouds; /* must outlive the view */
+    const nebel_clouds *clouds; /* must outlive the lighting */
     nebel_sun sun;              /* irradiance {0}: dark */
     double time;                /* within -1e12 and 1e12 */
     double tolerance;           /* of transmittance, of each piece of a ray; 0: NEBEL_DEFAULT_TOLERANCE */
     nebel_isa isa;              /* the same bits for every one; DEFAULT: the best of this processor */
 } nebel_cloud_lighting_desc;
 
-/* Errors: ARGUMENT, VALUE (time, tolerance), UNSUPPORTED (isa not available), MEMORY; *view is then NULL. Any
+/* Errors: ARGUMENT, VALUE (time, tolerance), UNSUPPORTED (isa not available), MEMORY; *lighting is then NULL. Any
  * thread. */
-NEBEL_API nebel_result nebel_create_cloud_lighting(const nebel_cloud_lighting_desc *desc, nebel_cloud_lighting **view);
+NEBEL_API nebel_result nebel_create_cloud_lighting(const nebel_cloud_lighting_desc *desc,
+                                                   nebel_cloud_lighting **lighting);
 
 /* NULL is fine. */
-NEBEL_API void nebel_destroy_cloud_lighting(nebel_cloud_lighting *view);
+NEBEL_API void nebel_destroy_cloud_lighting(nebel_cloud_lighting *lighting);
 
-/* What was found so far of shadows in a view, which must outlive it: some 20 MB and 6 for each layer. Results do not hang on it.
- * One thread at a time. */
+/* What was found so far of shadows in a cloud lighting, which must outlive it: some 20 MB and 6 for each layer. Results
+ * do not depend on it. One thread at a time. */
 typedef struct nebel_cloud_workspace nebel_cloud_workspace;
 
-/* With the view's allocator. Errors: ARGUMENT, MEMORY; *workspace is then NULL. */
-NEBEL_API nebel_result nebel_create_cloud_workspace(const nebel_cloud_lighting *view,
+/* With the lighting's allocator. Errors: ARGUMENT, MEMORY; *workspace is then NULL. Any thread. */
+NEBEL_API nebel_result nebel_create_cloud_workspace(const nebel_cloud_lighting *lighting,
                                                     nebel_cloud_workspace **workspace);
 
 /* NULL is fine. */
 NEBEL_API void nebel_destroy_cloud_workspace(nebel_cloud_workspace *workspace);
 
-/* What clouds do along a ray up to some places of it. Between two of them transmittance is in between. Together with the air, which leaves
- * A up to each place and has the light L (nebel_trace_atmosphere to each t): from place to place the light of both grows by the mean of A at
- * both times what in_scattering grows by, and by the mean of transmittance times what L grows by; before the first it is L, behind the
- * last L grows times the last transmittance. */
+/* What clouds do along a ray up to some places of it. Between two of them transmittance is in between. Together with
+ * the air, which leaves A up to each place and has the light L (nebel_trace_atmosphere to each t): from place to place
+ * the light of both grows by the mean of A at both times what in_scattering grows by, and by the mean of transmittance
+ * times what L grows by; before the first it is L, behind the last L grows times the last transmittance. */
 typedef struct nebel_cloud_transfer {
     uint32_t count;                                /* 0: no cloud; else the first is where they begin */
     float t[NEBEL_MAX_CLOUD_NODES];                /* m, ascending */
@@ -434,24 +441,27 @@ typedef struct nebel_cloud_transfer {
     uint32_t density_queries;
 } nebel_cloud_transfer;
 
-/* Along n rays up to t_max or the ground. pixel_spread: width of a ray's pixel per metre of the way, 0 to 10: what is narrower is
- * seen as a mean; pixel_spreads: one for each ray instead, NULL: the same for all. Strides in bytes, 0: packed. Sixteen rays and more at once take half as long as one by one, and
- * have the same bits. One thread per workspace. Errors: ARGUMENT (NULL, a ray or spread not in order); then nothing is written. */
+/* Along n rays up to t_max or the ground. pixel_spread: width of a ray's pixel per metre of the way, 0 to 10: what is
+ * narrower is seen as a mean; pixel_spreads: one for each ray instead, NULL: the same for all. Strides in bytes, 0:
+ * packed. Sixteen rays and more at once take half as long as one by one, and have the same bits. One thread per
+ * workspace. Errors: ARGUMENT (NULL, a ray or spread not in order); then nothing is written. */
 NEBEL_API nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays,
                                           size_t ray_stride, double pixel_spread, const double *pixel_spreads,
                                           nebel_cloud_transfer *nodes, size_t node_stride);
 
 /* What part of the sun's light comes through clouds to n places, straight or scattered on the way; width as of
- * nebel_compute_cloud_extinction. Nothing tells an error: of even layers it is within 0.01, but 0.025 where the sun is less than four
- * degrees high (docs/clouds.md, "Light of clouds", has the tables); of cumulus the mean over the ground is within 0.02, and that of
- * one place is not known. Errors: ARGUMENT. */
+ * nebel_compute_cloud_extinction. Nothing tells an error: of even layers it is within 0.01, but 0.025 where the sun is
+ * less than four degrees high (docs/clouds.md, "Light of clouds", has the tables); of cumulus the mean over the ground
+ * is within 0.02, and that of one place is not known. Stride in bytes, 0: packed. One thread per workspace. Errors:
+ * ARGUMENT. */
 NEBEL_API nebel_result nebel_compute_cloud_sun_transmittance(nebel_cloud_workspace *workspace, double width, size_t n,
                                                              const double (*places)[3], size_t place_stride,
                                                              float *parts);
 
-/* What part of the sky's light comes through clouds to n places, straight or scattered: that of straight above, as a mean
- * over as wide a place as is far above, or width where that is more. Nothing tells an error: docs/clouds.md, "Clouds in
- * pictures", has how far it is from columns under closed clouds, 4 %; that gaps are seen aslant, too, is left out. Errors: ARGUMENT. */
+/* What part of the sky's light comes through clouds to n places, straight or scattered: that of straight above, as a
+ * mean over as wide a place as is far above, or width where that is more. Nothing tells an error: docs/clouds.md,
+ * "Clouds in pictures", has how far it is from columns under closed clouds, 4 %; that gaps are seen aslant, too, is
+ * left out. Stride in bytes, 0: packed. One thread per workspace. Errors: ARGUMENT. */
 NEBEL_API nebel_result nebel_compute_cloud_sky_transmittance(nebel_cloud_workspace *workspace, double width, size_t n,
                                                              const double (*places)[3], size_t place_stride,
                                                              float *parts);
@@ -464,10 +474,10 @@ typedef struct nebel_air_shadow {
     float transmittance[NEBEL_MAX_AIR_SHADOW_SEGMENTS][3]; /* of what clear air has there, 0 to 1 */
 } nebel_air_shadow;
 
-/* Along n rays up to t_max or the ground, as means over pieces: of sunlight what comes through clouds on the way to the sun, of
- * the sky's light what comes through straight from above, by their shares in clear air. Strides in bytes, 0: packed. Nothing tells an error:
- * docs/clouds.md, "Air under clouds", has what closed clouds let through beside what air has before a wall, 0.339 and 0.345,
- * and what is left out. Errors: ARGUMENT. */
+/* Along n rays up to t_max or the ground, as means over pieces: of sunlight what comes through clouds on the way to the
+ * sun, of the sky's light what comes through straight from above, by their shares in clear air. Strides in bytes, 0:
+ * packed. Nothing tells an error: docs/clouds.md, "Air under clouds", has what closed clouds let through beside what
+ * air has before a wall, 0.339 and 0.345, and what is left out. One thread per workspace. Errors: ARGUMENT. */
 NEBEL_API nebel_result nebel_trace_cloud_shadow_on_air(nebel_cloud_workspace *workspace, size_t n,
                                                        const nebel_ray *rays, size_t ray_stride,
                                                        nebel_air_shadow *shades, size_t shade_stride);
@@ -480,8 +490,9 @@ typedef struct nebel_fog_shadow {
     float error[NEBEL_MAX_FOG_SHADOW_SEGMENTS]; /* of either: what a mean over twice the width differs by */
 } nebel_fog_shadow;
 
-/* Along a ray from `begin` on, where fog begins, up to t_max or the ground, as means over pieces, which are longer the farther they
- * are from there and from the end. What comes through is that of nebel_trace_cloud_shadow_on_air. spread as of nebel_trace_clouds. Errors: ARGUMENT. */
+/* Along a ray from `begin` on, where fog begins, up to t_max or the ground, as means over pieces, which are longer the
+ * farther they are from there and from the end. What comes through is that of nebel_trace_cloud_shadow_on_air. `spread`
+ * is the `pixel_spread` of nebel_trace_clouds. One thread per workspace. Errors: ARGUMENT. */
 NEBEL_API nebel_result nebel_trace_cloud_shadow_on_fog(nebel_cloud_workspace *workspace, const nebel_ray *ray,
                                                        double begin, double spread, nebel_fog_shadow *shade);
 

@@ -1,7 +1,7 @@
 /* The nebel CPU renderer: surfaces by Embree, fog by nebel, one picture.
  *
  *     nebel_renderer *renderer = NULL;
- *     nebel_create_cpu_renderer(scene_data, fog, &(nebel_cpu_renderer_desc){0}, &renderer);
+ *     nebel_create_cpu_renderer(scene_data, lighting, &(nebel_cpu_renderer_desc){0}, &renderer);
  *     nebel_render_frame(renderer, &(nebel_frame_desc){.camera = camera, .width = 1280, .height = 720}, &frame);
  *
  * Lambert surfaces lit by the sun and the scene's lamps (ray-traced shadows; their light is attenuated by all fog on
@@ -25,17 +25,18 @@ typedef struct nebel_renderer nebel_renderer;
 typedef struct nebel_cpu_renderer_desc {
     nebel_host host;
     nebel_isa isa;    /* for fog and for Embree; DEFAULT: the best of this processor */
-    int thread_count; /* 0: all */
+    int thread_count; /* of OpenMP, which does what host.parallel does elsewhere; 0: all */
 } nebel_cpu_renderer_desc;
 
 /* Builds the acceleration structure over the meshes of `scene`, which must outlive the renderer, as must nothing else:
- * the lighting, whose snapshot has the fog, is retained. lighting NULL: no fog. Errors: ARGUMENT, VALUE, MEMORY, UNSUPPORTED. */
+ * the lighting, whose snapshot has the fog, is retained. lighting NULL: no fog. Errors: ARGUMENT, VALUE, MEMORY,
+ * UNSUPPORTED. */
 NEBEL_API nebel_result nebel_create_cpu_renderer(const nebel_scene_data *scene, nebel_lighting *lighting,
                                                  const nebel_cpu_renderer_desc *desc, nebel_renderer **renderer);
 NEBEL_API void nebel_destroy_renderer(nebel_renderer *renderer);
 
-/* The fog of the frames from now on, and its light, for what moves. The lighting is retained; NULL: no fog. Not while a frame
- * is rendered. Errors: ARGUMENT. */
+/* The fog of the frames from now on, and its light, for what moves. The lighting is retained; NULL: no fog. Not while a
+ * frame is rendered. Errors: ARGUMENT. */
 NEBEL_API nebel_result nebel_set_renderer_lighting(nebel_renderer *renderer, nebel_lighting *lighting);
 
 /* Where the fog of cells is computed. */
@@ -45,10 +46,10 @@ typedef enum nebel_cell_stage {
     NEBEL_CELL_STAGE_COUNT
 } nebel_cell_stage;
 
-/* Fogs surfaces by cells from now on, in place of the snapshot's fog: an alpha polygon of nebel_compute_cell_fog over each.
- * Classic: where no surface is there is no fog, and sunlight comes through undimmed. Of a frame, `error` is then 0. Of
- * an orthographic camera all rays begin in its plane; of a panorama each ray is its own axis of depth. The cells must
- * outlive the frames; NULL: the snapshot's fog again. Not while a frame is rendered. Errors: ARGUMENT, MEMORY. */
+/* Fogs surfaces by cells from now on, in place of the snapshot's fog: an alpha polygon of nebel_compute_cell_fog over
+ * each. Classic: where no surface is there is no fog, and sunlight comes through undimmed. Of a frame, `error` is then
+ * 0. Of an orthographic camera all rays begin in its plane; of a panorama each ray is its own axis of depth. The cells
+ * must outlive the frames; NULL: the snapshot's fog again. Not while a frame is rendered. Errors: ARGUMENT, MEMORY. */
 NEBEL_API nebel_result nebel_set_renderer_cells(nebel_renderer *renderer, const nebel_cells *cells,
                                                 nebel_cell_stage stage);
 
@@ -77,9 +78,10 @@ typedef enum nebel_method {
 /* The word of `nebel render --method`; NULL: there is no such method. Any thread. */
 NEBEL_API const char *nebel_method_name(nebel_method method);
 
-/* 1: the method imitates hardware of its time, LINEAR to D3D9 but FIVE_TAP and TWO_PASS's kin VERTEX and ADDITIVE. What such
- * hardware stores in its frame buffer is blended: colors in sRGB, at most 1. `color` of a frame is linear light again; what
- * the hardware shows is nebel_encode_srgb of it, without a tone curve. `in_scattering` is what is added to stored colors. Any thread. */
+/* 1: the method imitates hardware of its time: LINEAR, EXP, EXP2, FOG_COORD, TWO_PASS, ALPHA and D3D9. What such
+ * hardware stores in its frame buffer is blended: colors in sRGB, at most 1. `color` of a frame is linear light again;
+ * what the hardware shows is nebel_encode_srgb of it, without a tone curve. `in_scattering` is what is added to stored
+ * colors. Any thread. */
 NEBEL_API int nebel_method_blends_stored(nebel_method method);
 
 /* What methods need; what a method does not need is not read. */
@@ -122,11 +124,11 @@ typedef struct nebel_frame_desc {
     double tolerance;       /* as in nebel_trace_desc */
     nebel_progress_fn progress;
     void *progress_user;
-    /* Of REFERENCE: how often light is scattered or reflected at most. 1 is what EXACT shows; 0: until paths end by
+    /* Of PATH: how often light is scattered or reflected at most. 1 is what EXACT shows; 0: until paths end by
      * themselves, at most 10000 times. Other seeds give independent pictures. */
     uint32_t bounces, seed;
-    /* Within 1e12: what a planet's layers have turned by, in the unit of its days, and its clouds have moved by, in that of its
-     * winds; frames in scenes. */
+    /* Within 1e12: what a textured planet has turned by, in the unit of its rotation_period, and clouds have moved by, in that
+     * of their winds; frames in scenes. */
     double time;
     /* The part of the picture that is rendered, for pictures in bands or tiles; all 0: the whole. `left` and `top` are multiples of
      * NEBEL_WINDOW_STEP, and so are `width` and `height` unless the window ends with the picture. Pixels are those of the whole picture, bit for bit. */
@@ -136,8 +138,8 @@ typedef struct nebel_frame_desc {
     uint32_t first_sample, sample_count;
 } nebel_frame_desc;
 
-/* One frame in linear light. Every plane is caller memory, width * height pixels (of the window, where there is one), top row
- * first, or NULL when not wanted. */
+/* One frame in linear light. Every plane is caller memory, width * height pixels (of the window, where there is one),
+ * top row first, or NULL when not wanted. */
 typedef struct nebel_frame {
     float *color;         /* 3: transmittance * surface + in_scattering */
     float *transmittance; /* 3: mean over the samples */
@@ -145,7 +147,7 @@ typedef struct nebel_frame {
     float *depth;         /* 1: distance from the camera [m], mean over the samples that hit; INFINITY where none did */
     float *normal;        /* 3: mean of the world-space shading normals; 0 where nothing is hit */
     float *error;         /* 1: largest error bound of the samples */
-    /* 3: of color, with REFERENCE and 2 samples or more. What differs within a pixel counts as chance, though samples
+    /* 3: of color, with PATH and 2 samples or more. What differs within a pixel counts as chance, though samples
      * are spread evenly there. Other methods leave it as it is. */
     float *standard_error;
 } nebel_frame;
@@ -160,11 +162,11 @@ NEBEL_API nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_
  * transfer function, the limit is 1. Within 2e-6 of the exact curve; NaN and negative light give 0. Any thread. */
 NEBEL_API void nebel_tone_map(size_t n, const float *linear, double exposure, float *srgb);
 
-/* The same without the tone curve: what frame buffers of classic hardware show. Light above 1 is 1. */
+/* The same without the tone curve: what frame buffers of classic hardware show. Light above 1 is 1. Any thread. */
 NEBEL_API void nebel_encode_srgb(size_t n, const float *linear, double exposure, float *srgb);
 
-/* Runs parts on threads of OpenMP: for the `run` of descriptions of scenes and of air. `user` is a const int *, how many
- * threads there are, 1 to 1024; NULL: as many as processors. Any thread. */
+/* Runs parts on threads of OpenMP: for nebel_parallel.run. `user` is a const int *, how many threads there
+ * are, 1 to 1024; NULL: as many as processors. Any thread. */
 NEBEL_API void nebel_parallel_for_openmp(size_t parts, void (*part)(void *data, size_t i), void *data, void *user);
 
 /* The Embree version this build uses, "Embree 3.13.5". Never NULL. */

@@ -2,10 +2,14 @@
  *
  *     nebel_scene *scene = NULL;
  *     if (nebel_load_scene("mist.json", &(nebel_scene_desc){0}, &scene) != NEBEL_OK) ...;   // the log said why
- *     nebel_snapshot *fog = NULL;
+ *     nebel_snapshot *snapshot = NULL;
  *     nebel_lighting *lighting = NULL;
- *     nebel_commit_scene_fog(scene, &fog);
- *     nebel_create_scene_lighting(scene, fog, 0, NULL, &lighting);
+ *     nebel_commit_scene_fog(scene, &snapshot);
+ *     nebel_create_scene_lighting(scene, snapshot, 0, NULL, &lighting);    // what renderers take
+ *     ...
+ *     nebel_release_lighting(lighting);
+ *     nebel_release_snapshot(snapshot);
+ *     nebel_destroy_scene(scene);
  *
  * Reads and checks the JSON of docs/scene-file.md, loads models through Assimp, 16-bit PNG height maps, and reads and
  * writes PNG and OpenEXR pictures. Link with libnebel_scene and libnebel.
@@ -176,7 +180,7 @@ typedef struct nebel_scene_data {
     const float *classic_table;           /* of NEBEL_CURVE_ENTRIES, for the curve TABLE */
     const nebel_d3d9_fog *classic_d3d9;   /* switched on. NULL: none */
 
-    size_t planet_count;         /* at most NEBEL_MAX_PLANETS; of the model LAYERS: 1 */
+    size_t planet_count;         /* at most NEBEL_MAX_PLANETS; of the model TEXTURED: 1 */
     const nebel_planet *planets; /* the sky of the first one is that of the scene's origin */
 
     const nebel_diffusion_desc *diffusion; /* the section "multiple_scattering"; NULL: none */
@@ -212,9 +216,9 @@ typedef struct nebel_scene_desc {
 
 #define NEBEL_DEFAULT_SCENE_MEMORY ((uint64_t)4 << 30)
 
-/* Reads and checks a scene file: a regular one, or what is open already (/dev/stdin, /dev/fd/3). Models named in it are not loaded
- * yet. "-" is a file name like any other.
- * On an error *scene is NULL. Errors: ARGUMENT, FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY. */
+/* Reads and checks a scene file: a regular one, or what is open already (/dev/stdin, /dev/fd/3). Models named in it are
+ * not loaded yet. "-" is a file name like any other. On an error *scene is NULL. Errors: ARGUMENT, FILE, FORMAT, LIMIT,
+ * UNSUPPORTED, MEMORY. */
 NEBEL_API nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, nebel_scene **scene);
 
 /* The same from memory. `name` stands for the file in messages; relative paths in the scene start at its folder. The
@@ -222,31 +226,34 @@ NEBEL_API nebel_result nebel_load_scene(const char *path, const nebel_scene_desc
 NEBEL_API nebel_result nebel_parse_scene(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
                                          nebel_scene **scene);
 
-/* Loads the models and height fields that the scene names. Each model is read by nebel-read-model (nebel_scene_desc), which
- * takes some 5 ms more than reading it here. Idempotent. Not thread safe against readers of the same
- * scene. Errors: FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY; the scene stays usable without models. */
+/* Loads the models and height fields that the scene names. Each model is read by nebel-read-model (nebel_scene_desc),
+ * which takes some 5 ms more than reading it here. Idempotent. Not thread safe against readers of the same scene.
+ * Errors: FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY; the scene stays usable without models. */
 NEBEL_API nebel_result nebel_load_scene_models(nebel_scene *scene);
 
-/* Makes the scene's planets: their layers, or their air. Fog of snapshots from now on is lit by what the first one's air, and the shadows of
- * others, leave of the sun at the scene's origin and, where the file has no ambient light, by the first one's sky there: `environment` becomes a map of it. Without this call, and for the light of
- * fog before it, there is no air. Idempotent. Some 0.25 s a planet with air on one thread, 1 s with quality "precise". Not thread safe against readers of
- * the same scene. Errors: MEMORY; there is no air then. */
+/* Makes the scene's planets: textured ones, or their air. Fog of snapshots from now on is lit by what the first one's
+ * air, and the shadows of others, leave of the sun at the scene's origin and, where the file has no ambient light, by
+ * the first one's sky there: `environment` becomes a map of it. Without this call, and for the light of fog before it,
+ * there is no air. Idempotent. Some 0.25 s a planet with air on one thread, 1 s with quality "precise". Not thread safe
+ * against readers of the same scene. Errors: MEMORY; there is no air then. */
 NEBEL_API nebel_result nebel_load_scene_planets(nebel_scene *scene);
 
-/* Gives planets other numbers, once nebel_load_scene_planets has made them: as many planets as the contents have, of which airs count but for
- * their profiles, the ground's albedo and the sun's diameter; of layers of clouds all but kind, seed and weather; of layers day, coverage, the shell of
- * air, and shells of clouds but for seeds and maps. All else stays. What was made is made anew, at the same cost, with the light at the scene's origin;
- * the atmospheres, clouds and layers of before are gone. On an error all stays as it was. Not thread safe against readers of the same scene, nor
- * while a frame of it is rendered; renderers are to be made anew. Errors: ARGUMENT, VALUE (a number out of range; the log says which), MEMORY. */
+/* Gives planets other numbers, once nebel_load_scene_planets has made them: as many planets as the scene's data have,
+ * of which components count but for their profiles, the ground's albedo and the sun's diameter; of layers of clouds all
+ * but type, seed and weather_map; of textured planets rotation_period, land_coverage, the shell of air, and shells of
+ * clouds but for seeds and maps. All else stays. What was made is made anew, at the same cost, with the light at the
+ * scene's origin; the atmospheres, clouds and textured planets of before are gone. On an error all stays as it was. Not
+ * thread safe against readers of the same scene, nor while a frame of it is rendered; renderers are to be made anew.
+ * Errors: ARGUMENT, VALUE (a number out of range; the log says which), MEMORY. */
 NEBEL_API nebel_result nebel_update_scene_planets(nebel_scene *scene, const nebel_planet *planets);
 
-/* Loads models again, placed and coloured as `models` says; those of the file that are not among them are left out.
- * Contents have meshes and textures of these then, and what they pointed to before is gone, as nodes with fog are where
- * they were. Where that fails all stays as it was. O(what their files hold). Thread safety and errors: as above;
+/* Loads models again, placed and coloured as `models` says; those of the file that are not among them are left out. The
+ * scene's data have meshes and textures of these then, and what they pointed to before is gone, as nodes with fog are
+ * where they were. Where that fails all stays as it was. O(what their files hold). Thread safety and errors: as above;
  * ARGUMENT (a source that the file has not). */
 NEBEL_API nebel_result nebel_reload_scene_models(nebel_scene *scene, const nebel_scene_model *models, size_t count);
 
-/* The contents; lives as long as the scene (mesh pointers change with nebel_load_scene_models). Never NULL. */
+/* The scene's data; lives as long as the scene (mesh pointers change with nebel_load_scene_models). Never NULL. */
 NEBEL_API const nebel_scene_data *nebel_get_scene_data(const nebel_scene *scene);
 
 /* The camera at a frame: standing, turning or between its keys (smooth cubic through the keys, still before the first
@@ -256,49 +263,50 @@ NEBEL_API nebel_camera nebel_get_scene_camera(const nebel_scene *scene, double f
 /* The same of any 1 or more keys. */
 NEBEL_API nebel_camera nebel_interpolate_camera(const nebel_camera_key *keys, size_t count, double frame);
 
-/* The sun at a frame: standing, or between its keys, on a cubic through their directions, made unit ones, and within the
- * range of their irradiances; still before the first and after the last. Without a sun one of no light. */
+/* The sun at a frame: standing, or between its keys, on a cubic through their directions, made unit ones, and within
+ * the range of their irradiances; still before the first and after the last. Without a sun one of no light. */
 NEBEL_API nebel_sun nebel_get_scene_sun(const nebel_scene *scene, double frame);
 
 /* The same of any 1 or more keys. */
 NEBEL_API nebel_sun nebel_interpolate_sun(const nebel_sun_key *keys, size_t count, double frame);
 
-/* Lights the scene by the sun of a frame, where it has keys: the sun of the contents becomes that, and what the air of a
- * planet leaves of it at the scene's origin, with the sky there, is made anew (0.1 s), as far as nebel_load_scene_planets has
- * made it before. Frames and snapshots from now on have that light. Not thread safe against readers of the same scene, nor
- * while a frame of it is rendered. Errors: ARGUMENT (NULL), VALUE (a frame beyond 1e12), MEMORY; the sky is then as it was. */
+/* Lights the scene by the sun of a frame, where it has keys: the sun of the scene's data becomes that, and what the air
+ * of a planet leaves of it at the scene's origin, with the sky there, is made anew (0.1 s), as far as
+ * nebel_load_scene_planets has made it before. Frames and snapshots from now on have that light. Not thread safe
+ * against readers of the same scene, nor while a frame of it is rendered. Errors: ARGUMENT (NULL), VALUE (a frame
+ * beyond 1e12), MEMORY; the sky is then as it was. */
 NEBEL_API nebel_result nebel_set_scene_frame(nebel_scene *scene, double frame);
 
-/* The same by any sun, also in a scene without one; NULL: none. Errors: as above; ARGUMENT also for a sun with numbers that are not
- * finite, without a direction, or of less than no light. */
+/* The same by any sun, also in a scene without one; NULL: none. Errors: as above; ARGUMENT also for a sun with numbers
+ * that are not finite, without a direction, or of less than no light. */
 NEBEL_API nebel_result nebel_set_scene_sun(nebel_scene *scene, const nebel_sun *sun);
 
-/* The light of the sun that fog of a snapshot has: of the sun of the contents what the planets' air, their shadows and, as
- * the wind has moved them until the frame, their clouds leave at the scene's origin. Without a sun one of no light. Where
- * there are clouds, some 10 ms. Errors: ARGUMENT, MEMORY, VALUE (a frame beyond 1e12); *sunlight is then
+/* The light of the sun that fog of a snapshot has: of the sun of the scene's data what the planets' air, their shadows
+ * and, as the wind has moved them until the frame, their clouds leave at the scene's origin. Without a sun one of no
+ * light. Where there are clouds, some 10 ms. Errors: ARGUMENT, MEMORY, VALUE (a frame beyond 1e12); *sunlight is then
  * untouched. */
 NEBEL_API nebel_result nebel_find_scene_sunlight(const nebel_scene *scene, double frame, nebel_sun *sunlight);
 
-/* The same, and the ambient light that it has: that of the contents, of which clouds dim a planet's own sky by its intensity. On an
- * error both are untouched. */
+/* The same, and the ambient light that it has: that of the scene's data, of which clouds dim a planet's own sky by its
+ * intensity. On an error both are untouched. */
 NEBEL_API nebel_result nebel_find_scene_light(const nebel_scene *scene, double frame, nebel_sun *sunlight,
                                               nebel_environment *ambient);
 
-/* The particles of all nebulae, contents->particle_count of them, one nebula after the other. Free them before the
+/* The particles of all nebulae, particle_count of the scene's data, one nebula after the other. Free them before the
  * scene. Errors: ARGUMENT, MEMORY, VALUE (a nebula in whose shape no place is found). */
 NEBEL_API nebel_result nebel_generate_scene_particles(const nebel_scene *scene, nebel_particle **particles);
 NEBEL_API void nebel_free_scene_particles(const nebel_scene *scene, nebel_particle *particles); /* NULL is fine */
 
 /* A volume at a frame: at its first key before, at its last after, between them on a cubic through the keys on which no
- * number leaves its range. Noise is that of frame 0. Its arrays are the scene's. index < contents->volume_count. */
+ * number leaves its range. Noise is that of frame 0. Its arrays are the scene's. index < volume_count. */
 NEBEL_API nebel_volume_desc nebel_get_scene_volume(const nebel_scene *scene, size_t index, double frame);
 
 /* The same of any 1 or more keys of one volume. */
 NEBEL_API nebel_volume_desc nebel_interpolate_volume(const nebel_volume_key *keys, size_t count, double frame);
 
 /* What the grid of a volume is at a frame, with one more owner, who releases it: noise that moves is made anew, at the
- * cost of nebel_create_noise_grid; any other grid is itself. `grid` NULL: NULL. On an error *at is NULL. Errors: LIMIT, VALUE
- * (drifted too far), MEMORY. */
+ * cost of nebel_create_noise_grid; any other grid is itself. `grid` NULL: NULL. On an error *at is NULL. Errors: LIMIT,
+ * VALUE (drifted too far), MEMORY. */
 NEBEL_API nebel_result nebel_get_scene_grid(const nebel_scene *scene, nebel_grid *grid, double frame, nebel_grid **at);
 
 /* What a scene file says of noise. */
@@ -308,12 +316,14 @@ typedef struct nebel_scene_noise {
 } nebel_scene_noise;
 
 /* Whether a grid is noise of the scene, or of nebel_update_scene_noise; then *noise is what the file says of it, along
- * our axes (y up) and with the defaults of what it leaves out. Its name tells. 0 also where memory is out. Any thread. */
+ * our axes (y up) and with the defaults of what it leaves out. Its name tells. 0 also where memory is out. Any thread.
+ */
 NEBEL_API int nebel_get_scene_noise(const nebel_scene *scene, const nebel_grid *grid, nebel_scene_noise *noise);
 
-/* Such a grid with other numbers, in *changed with one owner; on an error *changed is NULL. Host, offset, time
- * and name of *noise do not count. It moves with nebel_get_scene_grid, and nebel_save_scene writes it. Cost: that of nebel_create_noise_grid. Any thread. Errors: ARGUMENT (no such grid),
- * FORMAT (out of range), VALUE (cells of less than two voxels), LIMIT, MEMORY. */
+/* Such a grid with other numbers, in *changed with one owner; on an error *changed is NULL. Host, offset, time and name
+ * of *noise do not count. It moves with nebel_get_scene_grid, and nebel_save_scene writes it. Cost: that of
+ * nebel_create_noise_grid. Any thread. Errors: ARGUMENT (no such grid), FORMAT (out of range), VALUE (cells of less
+ * than two voxels), LIMIT, MEMORY. */
 NEBEL_API nebel_result nebel_update_scene_noise(const nebel_scene *scene, const nebel_grid *grid,
                                                 const nebel_scene_noise *noise, nebel_grid **changed);
 
@@ -325,12 +335,12 @@ typedef enum nebel_volume_origin {
     NEBEL_VOLUME_FROM_NODE   /* a node of a model */
 } nebel_volume_origin;
 
-/* index < contents->volume_count. */
+/* index < volume_count. */
 NEBEL_API nebel_volume_origin nebel_get_volume_origin(const nebel_scene *scene, size_t index);
 
-/* Light that fog scatters more than once, of lightings from now on: what the section "multiple_scattering" says, in place
- * of it. NULL: none; the description is copied. Not thread safe against readers of the same scene. Errors: ARGUMENT; LIMIT
- * where the scene may not take so much, which leaves it as it is. */
+/* Light that fog scatters more than once, of lightings from now on: what the section "multiple_scattering" says, in
+ * place of it. NULL: none; the description is copied. Not thread safe against readers of the same scene. Errors:
+ * ARGUMENT; LIMIT where the scene may not take so much, which leaves it as it is. */
 NEBEL_API nebel_result nebel_set_scene_diffusion(nebel_scene *scene, const nebel_diffusion_desc *desc);
 
 /* Counts what the host itself is about to take for the scene, such as pictures, as nebel_scene_desc.memory does. `what`
@@ -345,17 +355,18 @@ NEBEL_API nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, doubl
 /* The same at frame 0. */
 NEBEL_API nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot);
 
-/* The same at a frame with other noise: each noise of the scene gets a seed made of `seed` and its own, so that seeds give
- * independent fog and the same seed the same. Makes every noise anew, at the cost of nebel_create_noise_grid. Any thread. */
+/* The same at a frame with other noise: each noise of the scene gets a seed made of `seed` and its own, so that seeds
+ * give independent fog and the same seed the same. Makes every noise anew, at the cost of nebel_create_noise_grid. Any
+ * thread. */
 NEBEL_API nebel_result nebel_commit_scene_fog_anew(const nebel_scene *scene, double frame, uint32_t seed,
                                                    nebel_snapshot **snapshot);
 
 /* The same without the particles, for renderers that draw those in another way. */
 NEBEL_API nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot);
 
-/* The scene's lights at a frame for a snapshot of its fog: the sun and the sky as they are at the scene's origin, under its
- * planet's air and clouds. `previous` as in nebel_lighting_desc. Any thread, as long as nothing changes the scene. On an error
- * *made is NULL. Errors: ARGUMENT, VALUE, and those of nebel_create_lighting. */
+/* The scene's lights at a frame for a snapshot of its fog: the sun and the sky as they are at the scene's origin, under
+ * its planet's air and clouds. `previous` as in nebel_lighting_desc. Any thread, as long as nothing changes the scene.
+ * On an error *made is NULL. Errors: ARGUMENT, VALUE, and those of nebel_create_lighting. */
 NEBEL_API nebel_result nebel_create_scene_lighting(const nebel_scene *scene, nebel_snapshot *snapshot, double frame,
                                                    const nebel_lighting *previous, nebel_lighting **made);
 
@@ -363,15 +374,16 @@ NEBEL_API nebel_result nebel_create_scene_lighting(const nebel_scene *scene, neb
 NEBEL_API void nebel_destroy_scene(nebel_scene *scene);
 
 /* Writes changes back into a scene file. `before` is what nebel_get_scene_data gave for this file; `changed` is a copy
- * of it with other numbers in the camera and its motion, the background, the sun, the ambient light (of the map that the file names, or of none), max_opacity, the
- * classic fog, noise (by nebel_update_scene_noise), the nebulae (points by their place alone) and their names, the cells with their names, portals, model,
- * span and grouping (as many cells, each of the same kind), the models (fewer may be left, in their order), the lamps (as many, each of the same
- * type), the planets (as far as nebel_update_scene_planets takes them), and with
- * other names, numbers or kinds of volumes of origin WRITTEN or MOVING. The sun and the section "classic" may come and
- * go. Its volumes may be others: sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or
- * NEBEL_NEW_VOLUME; volumes of `before` that are missing leave the file, as long as they are of origin WRITTEN or
- * MOVING. sources NULL: the same volumes. changed->volume_entries is as long as changed->volumes; of a volume with keys
- * `base` counts and not what stands in `volumes`. NULL: keys and contrast are as they were.
+ * of it with other numbers in the camera and its motion, the background, the sun, the ambient light (of the map that
+ * the file names, or of none), max_opacity, the classic fog, noise (by nebel_update_scene_noise), the nebulae (points
+ * by their place alone) and their names, the cells with their names, portals, model, span and grouping (as many cells,
+ * each of the same kind), the models (fewer may be left, in their order), the lamps (as many, each of the same type),
+ * the planets (as far as nebel_update_scene_planets takes them), and with other names, numbers or kinds of volumes of
+ * origin STATIC or ANIMATED. The sun and the section "classic" may come and go. Its volumes may be others: sources[i]
+ * is the place in `before` of what is changed->volumes[i] now, ascending, or NEBEL_NEW_VOLUME; volumes of `before` that
+ * are missing leave the file, as long as they are of origin STATIC or ANIMATED. sources NULL: the same volumes.
+ * changed->volume_tracks is as long as changed->volumes; of a volume with keys `base` counts and not what stands in
+ * `volumes`. NULL: keys and contrast are as they were.
  *
  * What differs between the two is written in its place, in the file's own unit, axes and words (a visibility stays a
  * visibility, where the fog is not of extinction 0), with 15 digits; a key that is missing is added, one that has
@@ -395,8 +407,8 @@ typedef struct nebel_image {
 } nebel_image;
 
 /* Reads a PNG (8 or 16 bit; 0..1, values as stored) or EXR (scan lines or tiles, half, float or uint channels, sorted
- * as R, G, B, A, then the others by name). Free with nebel_free_image and the same allocator. Errors: FILE, FORMAT,
- * LIMIT, UNSUPPORTED, MEMORY. */
+ * as R, G, B, A, then the others by name). The host must not be NULL, here and below. Free with nebel_free_image and the
+ * same allocator. Errors: ARGUMENT, FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY. */
 NEBEL_API nebel_result nebel_read_image(const char *path, const nebel_host *host, nebel_image *image);
 NEBEL_API void nebel_free_image(const nebel_host *host, nebel_image *image);
 
@@ -412,13 +424,13 @@ typedef enum nebel_image_format {
 NEBEL_API nebel_image_format nebel_get_image_format(const char *path);
 
 /* Regular files are written to a temporary name beside the target and renamed, so that on an error nothing of the
- * target has changed and no temporary file is left. /dev/null is written directly; /dev/stdout, /dev/stderr
- * and /dev/fd/N are written on from where they stand; other devices, pipes and sockets are refused. Where a limit of the size of files may be met, ignore SIGXFSZ.
- * Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
+ * target has changed and no temporary file is left. /dev/null is written directly; /dev/stdout, /dev/stderr and
+ * /dev/fd/N are written on from where they stand; other devices, pipes and sockets are refused. Where a limit of the
+ * size of files may be met, ignore SIGXFSZ. Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
 NEBEL_API nebel_result nebel_write_image(const char *path, const nebel_host *host, const nebel_image *image);
 
-/* The same from the top down, a few rows at a time, in memory for those alone; with a record of what the picture was made from, where that is
- * wanted. One thread at a time. */
+/* The same from the top down, a few rows at a time, in memory for those alone; with a record of what the picture was
+ * made from, where that is wanted. One thread at a time. */
 typedef struct nebel_image_writer nebel_image_writer;
 
 enum { NEBEL_MAX_RECORD = 127 };
@@ -443,9 +455,9 @@ NEBEL_API nebel_result nebel_finish_image(nebel_image_writer *writer);
 /* What was not finished is given up, without a trace. NULL is fine. */
 NEBEL_API void nebel_destroy_image_writer(nebel_image_writer *writer);
 
-/* Reads the record of a picture or a film. "" if there is no such file, if it has no record or if it is not whole: it ends before
- * what its headers say, or a checksum is wrong. PNG has checksums of everything, OpenEXR of the pixels that it compresses, WebP has none.
- * Thread safe. Errors: ARGUMENT. */
+/* Reads the record of a picture or a film. "" if there is no such file, if it has no record or if it is not whole: it
+ * ends before what its headers say, or a checksum is wrong. PNG has checksums of everything, OpenEXR of the pixels that
+ * it compresses, WebP has none. Thread safe. Errors: ARGUMENT. */
 NEBEL_API nebel_result nebel_read_record(const char *path, char record[NEBEL_MAX_RECORD + 1]);
 
 /* Whether nebel_write_image is likely to succeed at `path`, to be asked before the work: the ending is known, and a
@@ -472,22 +484,24 @@ typedef struct nebel_movie_desc {
 NEBEL_API int nebel_is_movie_path(const char *path);
 
 /* Nothing is at `path` before the film is finished, but whether it can be written is tried, as by
- * nebel_check_image_path. Errors: ARGUMENT, VALUE, FORMAT (unknown ending), FILE, MEMORY, UNSUPPORTED (built without). */
-NEBEL_API nebel_result nebel_create_movie(const char *path, const nebel_movie_desc *desc, nebel_movie **film);
+ * nebel_check_image_path. Errors: ARGUMENT, VALUE, FORMAT (unknown ending), FILE, MEMORY, UNSUPPORTED (built without).
+ */
+NEBEL_API nebel_result nebel_create_movie(const char *path, const nebel_movie_desc *desc, nebel_movie **movie);
 
 /* Channels R, G, B in 0..1, already in sRGB, become the bytes that nebel_write_image gives a PNG. All pictures of a
  * film have one size, at most 16383 x 16383. On an error the film is as it was. Errors: ARGUMENT, LIMIT, MEMORY. */
-NEBEL_API nebel_result nebel_add_movie_frame(nebel_movie *film, const nebel_image *image);
+NEBEL_API nebel_result nebel_add_movie_frame(nebel_movie *movie, const nebel_image *image);
 
 /* The record that the file will have, as that of nebel_image_desc; it is copied. Errors: ARGUMENT. */
-NEBEL_API nebel_result nebel_set_film_record(nebel_movie *film, const char *record);
+NEBEL_API nebel_result nebel_set_movie_record(nebel_movie *movie, const char *record);
 
-/* Writes the file, once, as nebel_write_image does: as a whole or not at all. Pictures that
- * follow each other and are equal, or nearly so below a quality of 100, become one that lasts longer. Errors: ARGUMENT (no pictures), FILE, MEMORY. */
-NEBEL_API nebel_result nebel_finish_movie(nebel_movie *film);
+/* Writes the file, once, as nebel_write_image does: as a whole or not at all. Pictures that follow each other and are
+ * equal, or nearly so below a quality of 100, become one that lasts longer. Errors: ARGUMENT (no pictures), FILE,
+ * MEMORY. */
+NEBEL_API nebel_result nebel_finish_movie(nebel_movie *movie);
 
 /* A film that was not finished is given up, without a trace. NULL is fine. */
-NEBEL_API void nebel_destroy_movie(nebel_movie *film);
+NEBEL_API void nebel_destroy_movie(nebel_movie *movie);
 
 /* ---- grids ----------------------------------------------------------------------------------- */
 
@@ -514,7 +528,7 @@ typedef struct nebel_grid_file {
  * (NaN, infinite or negative voxels), LIMIT, UNSUPPORTED, MEMORY. */
 NEBEL_API nebel_result nebel_load_grid(const nebel_grid_file *file, const nebel_scene_desc *desc, nebel_grid **grid);
 
-/* What this build of libnebel_scene has: "Assimp 5.2.5, libpng 1.6.39, OpenEXR 3.1.5, yajl 2.1.0". Never NULL. */
+/* What this build of libnebel_scene has: "Assimp 5.2.5, libpng 1.6.39, OpenEXR 3.1.5, yajl 2.1.0". Never NULL. Any thread. */
 NEBEL_API const char *nebel_scene_libraries(void);
 
 #ifdef __cplusplus

@@ -23,7 +23,7 @@
  *         unit length, t_max in metres, 1e18 or more for an endless ray. All volumes, exact overlap, any number.
  *     nebel_transfer nebel_trace_list(vec3 origin, vec3 direction, float t_max, int first, int count);
  *         The same for the volumes NEBEL_TILE_ENTRY(first) ... NEBEL_TILE_ENTRY(first + count - 1) alone, ascending: see
- *         nebel_tiles.
+ *         nebel_bin_volumes.
  *     vec3 nebel_transmit(vec3 origin, vec3 direction, float t_max);
  *     vec3 nebel_transmit_list(vec3 origin, vec3 direction, float t_max, int first, int count);
  *         Transmittance alone.
@@ -94,7 +94,7 @@
  *     float nebel_compare_taps(float depth, float center, vec4 corners, nebel_depth_taps taps);
  *         What to multiply a particle's colour by: `brightness`, or 0 where it is hidden. Depths are in metres along
  *         the camera's axis: the particle's, and those of the opaque picture at the pixel and `offset` away along both
- *         diagonals; below 0 nothing is there and `background_depth` counts. Drawn where they differ by more than `edge_threshold`, and
+ *         diagonals; below 0 nothing is there and `nothing` counts. Drawn where they differ by more than `edge`, and
  *         where none is nearer than depth - margin.
  *     float nebel_five_taps(vec2 place, float depth, nebel_depth_taps taps);
  *         The same with depths from NEBEL_OPAQUE_DEPTH(place), which the host defines before the text; else the
@@ -183,10 +183,10 @@ typedef struct nebel_texel_f32 {
     float v[4];
 } nebel_texel_f32;
 
-/* Packs the fog of a lighting, and its lights, for an eye [m]. *count receives the number of words needed; they are written when `capacity` is at
- * least that. Same lighting and eye, same words. O(volumes and their parts). Any thread. Errors: ARGUMENT; LIMIT when
- * capacity is too small (not for words NULL and capacity 0, which only asks) or when more than 2^24 words would be
- * needed. */
+/* Packs the fog of a lighting, and its lights, for an eye [m]; for fog without lights nebel_create_lighting(snapshot,
+ * NULL, &lighting) makes a lighting. *count receives the number of words needed; they are written when `capacity` is at least that. Same lighting and eye, same words. O(volumes and their parts). Any thread.
+ * Errors: ARGUMENT; LIMIT when capacity is too small (not for words NULL and capacity 0, which only asks) or when more
+ * than 2^24 words would be needed. */
 NEBEL_API nebel_result nebel_pack_fog(const nebel_lighting *lighting, const double eye[3], nebel_texel_f32 *words,
                                       size_t capacity, size_t *count);
 
@@ -195,45 +195,46 @@ typedef struct nebel_texel_u32 {
     uint32_t v[4];
 } nebel_texel_u32;
 
-/* Packs the voxels of a lighting's fog. *count receives the number of texels needed, 0 where there is no grid; they
- * are written when `capacity` is at least that. A cube of 8 x 8 x 8 voxels takes one texel where all are equal, else
- * 513: each voxel in 65,536 steps between the least and the most of its cube. Where the sun lights fog each grid has
- * besides how much of it lies before the sun, which takes up to 2^23 texels. They do not depend on the eye: pack again
- * when nebel_is_same_voxels denies. O(voxels). Any thread. Errors: ARGUMENT; MEMORY; LIMIT when capacity is too small (not for
- * texels NULL and capacity 0, which only asks) or when more than 2^24 texels (256 MiB) would be needed, for which
+/* Packs the voxels of a lighting's fog. *count receives the number of texels needed, 0 where there is no grid; they are
+ * written when `capacity` is at least that. A cube of 8 x 8 x 8 voxels takes one texel where all are equal, else 513:
+ * each voxel in 65,536 steps between the least and the most of its cube. Where the sun lights fog each grid has besides
+ * how much of it lies before the sun, which takes up to 2^23 texels. They do not depend on the eye: pack again when
+ * nebel_is_same_voxels denies. O(voxels). Any thread. Errors: ARGUMENT; MEMORY; LIMIT when capacity is too small (not
+ * for texels NULL and capacity 0, which only asks) or when more than 2^24 texels (256 MiB) would be needed, for which
  * nebel_pack_fog answers LIMIT, too. */
 NEBEL_API nebel_result nebel_pack_voxels(const nebel_lighting *lighting, nebel_texel_u32 *texels, size_t capacity,
                                          size_t *count);
 
-/* Whether nebel_pack_voxels makes the same of both: not where the sun moves, nor in sunlight where the largest extinction of a grid's
- * volume passes a power of two. O(volumes) where they share their grids. Any thread. */
+/* Whether nebel_pack_voxels makes the same of both: not where the sun moves, nor in sunlight where the largest
+ * extinction of a grid's volume passes a power of two. O(volumes) where they share their grids. Any thread. */
 NEBEL_API int nebel_is_same_voxels(const nebel_lighting *a, const nebel_lighting *b);
 
-/* Packs the lattice of light that is scattered more than once. *count receives the number of words needed, 0 where
- * the lighting has no diffusion or lights no fog; they are written when `capacity` is at least that: three a node, seven
+/* Packs the lattice of light that is scattered more than once. *count receives the number of words needed, 0 where the
+ * lighting has no diffusion or lights no fog; they are written when `capacity` is at least that: three a node, seven
  * where fog has colour. They do not depend on the eye. O(nodes). Any thread. Errors: ARGUMENT; LIMIT when capacity is
- * too small (not for words NULL and capacity 0, which only asks) or when more than 2^24 words (256 MiB) would be needed,
- * for which nebel_pack_fog answers LIMIT, too. */
+ * too small (not for words NULL and capacity 0, which only asks) or when more than 2^24 words (256 MiB) would be
+ * needed, for which nebel_pack_fog answers LIMIT, too. */
 NEBEL_API nebel_result nebel_pack_diffusion(const nebel_lighting *lighting, nebel_texel_f32 *words, size_t capacity,
                                             size_t *count);
 
-/* Packs what a lighting's environment (nebel/light.h) is to the fog that it lights, and where `surfaces` is not 0
- * what nebel_evaluate_environment and nebel_evaluate_environment_diffuse of the text want. *count receives the number of words
- * needed, 0 where no fog scatters light by direction and surfaces are not asked for; they are written when `capacity` is
- * at least that. A gradient takes 4, and 127 for each phase function; a map up to 524,289 (8 MiB) for each, the same once
- * for surfaces, and one for each of its pixels. They do not depend on the eye: pack again when nebel_is_same_environment
- * denies. O(words). Any thread. Errors: ARGUMENT; LIMIT when capacity is too small (not for words NULL and capacity 0,
- * which only asks) or when more than 2^24 words (256 MiB) would be needed, for which nebel_pack_fog answers LIMIT, too. */
+/* Packs what a lighting's environment (nebel/light.h) is to the fog that it lights, and where `surfaces` is not 0 what
+ * nebel_evaluate_environment and nebel_evaluate_environment_diffuse of the text want. *count receives the number of
+ * words needed, 0 where no fog scatters light by direction and surfaces are not asked for; they are written when
+ * `capacity` is at least that. A gradient takes 4, and 127 for each phase function; a map up to 524,289 (8 MiB) for
+ * each, the same once for surfaces, and one for each of its pixels. They do not depend on the eye: pack again when
+ * nebel_is_same_environment denies. O(words). Any thread. Errors: ARGUMENT; LIMIT when capacity is too small (not for
+ * words NULL and capacity 0, which only asks) or when more than 2^24 words (256 MiB) would be needed, for which
+ * nebel_pack_fog answers LIMIT, too. */
 NEBEL_API nebel_result nebel_pack_environment(const nebel_lighting *lighting, int surfaces, nebel_texel_f32 *words,
                                               size_t capacity, size_t *count);
 
 /* Whether nebel_pack_environment makes the same of both. O(phase functions). Any thread. */
 NEBEL_API int nebel_is_same_environment(const nebel_lighting *a, const nebel_lighting *b);
 
-/* What the fog and its lights have, as a mask for NEBEL_FEATURES: the text leaves out the shapes, profiles and walks that it does not
- * name, and a driver makes a smaller and faster program. Fog that has more than the shader was compiled for gives wrong
- * answers; masks of several lightings may be joined with |. NULL gives everything. O(volumes and their parts). Any
- * thread. */
+/* What the fog and its lights have, as a mask for NEBEL_FEATURES: the text leaves out the shapes, profiles and walks
+ * that it does not name, and a driver makes a smaller and faster program. Fog that has more than the shader was
+ * compiled for gives wrong answers; masks of several lightings may be joined with |. NULL gives everything. O(volumes
+ * and their parts). Any thread. */
 NEBEL_API uint32_t nebel_pack_features(const nebel_lighting *lighting);
 
 /* The feature of fog whose volumes are of different light: rays may have to be walked, from event to event. */
@@ -263,10 +264,11 @@ NEBEL_API uint32_t nebel_pack_features(const nebel_lighting *lighting);
 #define NEBEL_FEATURE_ENVIRONMENT 8388608u
 
 /* Packs the table of a view of a planet's air (nebel/planet.h), for the place that it was made for: all that the text's
- * nebel_trace_atmosphere and nebel_trace_ground want. *count receives the number of words needed; they are written when `capacity`
- * is at least that: 5,000 to 10,000 for each kind of air that scatters, from space three times as many, where rays may end
- * within the air six times. The words stay while eye and sun do, however the camera turns. O(words). Any thread. Errors:
- * ARGUMENT; LIMIT when capacity is too small (not for words NULL and capacity 0, which only asks). */
+ * nebel_trace_atmosphere and nebel_trace_ground want. *count receives the number of words needed; they are written when
+ * `capacity` is at least that: 5,000 to 10,000 for each kind of air that scatters, from space three times as many,
+ * where rays may end within the air six times. The words stay while eye and sun do, however the camera turns. O(words).
+ * Any thread. Errors: ARGUMENT; LIMIT when capacity is too small (not for words NULL and capacity 0, which only asks).
+ */
 NEBEL_API nebel_result nebel_pack_sky_view(const nebel_sky_view *view, nebel_texel_f32 *words, size_t capacity,
                                            size_t *count);
 
@@ -294,9 +296,9 @@ typedef enum nebel_depth_encoding {
 /* Which depth says that nothing was hit, so that the ray has no end. */
 typedef enum nebel_background_depth {
     NEBEL_BACKGROUND_DEPTH_FAR =
-        0, /* WINDOW, LOGARITHM: the farther end of the range, whichever that is; AXIS, DISTANCE: 0 or less,
+        0, /* WINDOW, LOGARITHMIC: the farther end of the range, whichever that is; AXIAL, RADIAL: 0 or less,
                           1e18 or more, NaN */
-    NEBEL_BACKGROUND_DEPTH_VALUE, /* sky_depth alone, compared as float */
+    NEBEL_BACKGROUND_DEPTH_VALUE, /* background_depth alone, compared as float */
     NEBEL_BACKGROUND_DEPTH_NONE   /* no depth: the farther end of the range is a wall */
 } nebel_background_depth;
 
@@ -313,7 +315,7 @@ typedef struct nebel_depth_desc {
     nebel_depth_encoding encoding;
     int zero_to_one;           /* nonzero: clip z reaches from 0 to 1 (glClipControl, Vulkan, Direct3D), not from -1 */
     double range[2];           /* what glDepthRange was given, apart; both 0: 0 and 1 */
-    double log_scale, log_far; /* LOGARITHM: c [1/m] and far [m], > 0; log_scale 0: 1 */
+    double log_scale, log_far; /* LOGARITHMIC: c [1/m] and far [m], > 0; log_scale 0: 1 */
     nebel_background_depth background;
     double background_depth;
     nebel_ray_start ray_start;
@@ -351,8 +353,8 @@ typedef struct nebel_view_error {
                                   volumes */
 } nebel_view_error;
 
-/* Bounds by how much places in floats change the fog of a view. Errors: as nebel_compute_view_rays. Any thread. O(volumes and
- * their parts, and the square of the planes of one). */
+/* Bounds by how much places in floats change the fog of a view. Errors: as nebel_compute_view_rays. Any thread.
+ * O(volumes and their parts, and the square of the planes of one). */
 NEBEL_API nebel_result nebel_find_view_error(const nebel_snapshot *snapshot, const nebel_view *view,
                                              nebel_view_error *error);
 

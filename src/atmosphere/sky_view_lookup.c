@@ -57,10 +57,20 @@ static int has_directions(const double *const direction[3])
     return direction != NULL && direction[0] != NULL && direction[1] != NULL && direction[2] != NULL;
 }
 
+/* The kernels write whole vectors. */
+static int is_packed(const nebel_transfer_planes *planes)
+{
+    const size_t strides[] = {planes->transmittance_stride, planes->in_scattering_stride, planes->error_stride};
+    for (int i = 0; i < 3; i++)
+        if (strides[i] != 0 && strides[i] != sizeof(float)) return 0;
+    return 1;
+}
+
 nebel_result nebel_trace_sky_view(const nebel_sky_view *view, size_t n, const double *const direction[3],
                                   const float *t_max, const nebel_transfer_planes *transfers)
 {
-    if (view == NULL || !has_directions(direction) || transfers == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (view == NULL || !has_directions(direction) || transfers == NULL || !is_packed(transfers))
+        return NEBEL_ERROR_ARGUMENT;
     const nb_sky_view_table table = table_of(view);
     const nb_sky_view_job job = {.table = &table,
                                  .count = n,

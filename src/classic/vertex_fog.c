@@ -254,7 +254,12 @@ nebel_result nebel_compute_vertex_fog(const nebel_snapshot *snapshot, const nebe
     if (lighting == NULL) return NEBEL_ERROR_ARGUMENT;
     call c = {.snapshot = snapshot, .lighting = lighting, .vertices = *vertices};
     const nebel_result result = nebel_resolve_vertex_desc(desc != NULL ? desc : &none, &c.desc);
-    if (result != NEBEL_OK) return nb_fail(&snapshot->log, result, "vertices: the description is not valid");
+    if (result == NEBEL_ERROR_VALUE)
+        return nb_fail(&snapshot->log, result,
+                       "vertices: color and coordinate_end must be finite floats and not negative");
+    if (result != NEBEL_OK)
+        return nb_fail(&snapshot->log, result,
+                       "vertices: channel must be 0, 1 or 2, isa and curve one of theirs, and TABLE needs a table");
     const char *fault = vertex_fog_fault(&c, n, outputs, output_count);
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "vertices: %s", fault);
     c.level = nb_isa_select(c.desc.isa);

@@ -8,9 +8,9 @@
 static nebel_result check(const nebel_cloud_lighting_desc *desc, nebel_sun *sun, const nb_cloud_kernel **kernel)
 {
     if (desc->clouds == NULL)
-        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "clouds: view: clouds: is NULL; make some first");
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "cloud lighting: clouds: is NULL; make some first");
     if (!nb_air_resolve_sun(&desc->sun, sun))
-        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "clouds: view: %s", nb_air_sun_fault);
+        return nb_fail(&desc->host.log, NEBEL_ERROR_ARGUMENT, "cloud lighting: %s", nb_air_sun_fault);
     if (!(fabs(desc->time) <= 1e12))
         return nb_fail(&desc->host.log, NEBEL_ERROR_VALUE, "clouds: time is %g; must be within -1e12 and 1e12",
                        desc->time);

@@ -228,7 +228,7 @@ static nebel_cloud_layer resolve(double thickness, const nebel_cloud_layer *desc
 
 static int is_part(double number)
 {
-    return number == NEBEL_CLOUD_NONE || (number >= 0 && number <= 1);
+    return number == NEBEL_ZERO || (number >= 0 && number <= 1);
 }
 
 static nebel_result refuse(const nebel_log *log, const char *what, double number, const char *unit, const char *wanted)
@@ -288,7 +288,10 @@ static nebel_result check_looks(const nebel_cloud_layer *layer, const nebel_log 
 nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer *desc, const nebel_log *log,
                                        nebel_cloud_layer *resolved)
 {
-    if (desc == NULL || resolved == NULL || !(thickness > 0)) return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL || resolved == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (!(thickness > 0))
+        return nb_fail(log, NEBEL_ERROR_ARGUMENT, "cloud layer: thickness of the air: is %g; must be more than 0",
+                       thickness);
     if ((int)desc->type < 0 || desc->type >= NEBEL_CLOUD_TYPE_COUNT)
         return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: type: is unknown");
     const nebel_cloud_layer whole = resolve(thickness, desc);

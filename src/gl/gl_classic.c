@@ -63,16 +63,16 @@ static nebel_result read_context(const nebel_log *log, nebel_gl_classic *classic
     return classic->is_fixed && classic->version < 33 ? NEBEL_OK : nb_context_read(log, &classic->context);
 }
 
-/* The log hears of the fall-back; the call succeeds. */
 static void choose_kind(nebel_gl_classic *classic)
 {
     const int has_coordinates = !classic->is_fixed || has_since(classic, 14, "GL_EXT_fog_coord");
     if (classic->kind != NEBEL_GL_CLASSIC_FOG_COORD || has_coordinates) return;
     classic->kind = NEBEL_GL_CLASSIC_TWO_PASS;
-    (void)nb_fail(&classic->log, NEBEL_ERROR_UNSUPPORTED,
-                  "nebel_create_gl_classic: OpenGL %d.%d (%s) has no fog coordinates (OpenGL 1.4 or GL_EXT_fog_coord); "
-                  "fog is drawn in two passes instead",
-                  classic->version / 10, classic->version % 10, (const char *)glGetString(GL_RENDERER));
+    nb_log_message(
+        &classic->log, NEBEL_LOG_WARNING, NEBEL_OK,
+        "nebel_create_gl_classic: OpenGL %d.%d (%s) has no fog coordinates (OpenGL 1.4 or GL_EXT_fog_coord); "
+        "fog is drawn in two passes instead",
+        classic->version / 10, classic->version % 10, (const char *)glGetString(GL_RENDERER));
 }
 
 static nebel_result check_desc(const nebel_gl_classic_desc *desc)

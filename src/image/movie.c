@@ -108,7 +108,7 @@ nebel_result nebel_add_movie_frame(nebel_movie *film, const nebel_image *image)
     return result;
 }
 
-nebel_result nebel_set_film_record(nebel_movie *film, const char *record)
+nebel_result nebel_set_movie_record(nebel_movie *film, const char *record)
 {
     if (film == NULL || record == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_result result = nb_record_check(&film->codec, record);

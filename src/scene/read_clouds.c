@@ -30,7 +30,7 @@ static const nb_key_set cloud_keys = {cloud_key_names, CLOUD_KEY_COUNT, NB_BIT(C
 static bool read_part(nb_json *json, const nb_json_node *node, double *value)
 {
     if (!nb_key_value_number(json, node, &nb_range_fraction, value)) return false;
-    if (node != NULL && *value == 0) *value = NEBEL_CLOUD_NONE;
+    if (node != NULL && *value == 0) *value = NEBEL_ZERO;
     return true;
 }
 

@@ -89,8 +89,8 @@ static void restore_cloud(const nb_file_units *space, double thickness, nebel_cl
     layer->top /= space->unit;
     layer->cell_size /= space->unit;
     layer->extinction *= space->unit;
-    if (layer->erosion == NEBEL_CLOUD_NONE) layer->erosion = 0;
-    if (layer->patchiness == NEBEL_CLOUD_NONE) layer->patchiness = 0;
+    if (layer->erosion == NEBEL_ZERO) layer->erosion = 0;
+    if (layer->patchiness == NEBEL_ZERO) layer->patchiness = 0;
     for (int i = 0; i < 2; i++) layer->wind[i] /= i == 1 && space->z_up ? -space->unit : space->unit;
 }
 

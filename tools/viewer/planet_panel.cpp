@@ -98,7 +98,7 @@ bool slide_part(nebel_cloud_layer *layer, const nebel_cloud_layer &shown, Member
 {
     double part = fmax(0, shown.*member);
     if (!slide(name, &part, 0, 1, "%.2f", false, help)) return false;
-    layer->*member = part > 0 ? fmin(1, part) : NEBEL_CLOUD_NONE;
+    layer->*member = part > 0 ? fmin(1, part) : NEBEL_ZERO;
     return true;
 }
 
