@@ -21,7 +21,7 @@ typedef struct nb_cloud_air_rays {
 static inline void nb_cloud_compose_ask(const nebel_cloud_transfer *nodes, const double direction[3],
                                         nb_aerial_nodes *haze, nb_cloud_air_rays *rays)
 {
-    rays->transfers.error = NULL;
+    rays->transfers = (nebel_transfer_planes){.error = NULL};
     for (int c = 0; c < 3; c++) {
         for (uint32_t k = 0; k < nodes->count; k++) rays->along[c][k] = direction[c];
         rays->direction[c] = rays->along[c];
