@@ -328,7 +328,7 @@ static void builds_without_webp_say_so(void **test)
     (void)test;
     assert_non_null(strstr(nebel_scene_libraries(), "no WebP"));
     assert_int_equal(make_film(in_folder("a.webp"), &(nebel_movie_desc){0}, COUNT), NEBEL_ERROR_UNSUPPORTED);
-    const nebel_movie_desc desc = {.log = {remember, &kept}};
+    const nebel_movie_desc desc = {.host.log = {remember, &kept}};
     assert_int_equal(nebel_create_movie(in_folder("a.webp"), &desc, &film), NEBEL_ERROR_UNSUPPORTED);
     assert_non_null(strstr(kept.last, "build it with libwebp"));
     assert_int_equal(file_count(), 0);
