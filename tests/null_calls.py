@@ -117,6 +117,23 @@ def calls(result, name, parameters):
         yield f"    {macro}({name}({words}));"
 
 
+HALF_HOSTS = """\
+static void *allocate_nothing(size_t size, void *user)
+{
+    (void)size;
+    (void)user;
+    return NULL;
+}
+
+static void check_half(const char *call, nebel_result result)
+{
+    if (result != NEBEL_ERROR_ARGUMENT) fail_msg("%s with half an allocator: %s", call, nebel_result_text(result));
+}
+
+#define CHECK_HALF(call) check_half(#call, call)
+"""
+
+
 def hosted_types(folder):
     """Structures that begin with a host, and the host itself; each with what leads to the host."""
     texts = (path.read_text(encoding="utf-8") for path in folder.glob("*.h"))
@@ -141,7 +158,7 @@ def half_host_calls(hosted, result, name, parameters):
 
 def main():
     folder, output, headers = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3:]
-    lines, tests, hosted = [], [], hosted_types(folder)
+    lines, tests, hosted = [HALF_HOSTS], [], hosted_types(folder)
     for header in headers:
         declared = list(declarations((folder / f"{header}.h").read_text(encoding="utf-8")))
         for test, body in ((f"null_in_{header}", [line for each in declared for line in calls(*each)]),

@@ -85,20 +85,7 @@ static void check(const char *call, nebel_result result)
     pass_expect_no_errors();
 }
 
-static void *allocate_nothing(size_t size, void *user)
-{
-    (void)size;
-    (void)user;
-    return NULL;
-}
-
-static void check_half(const char *call, nebel_result result)
-{
-    if (result != NEBEL_ERROR_ARGUMENT) fail_msg("%s with half an allocator: %s", call, nebel_result_text(result));
-}
-
 #define TRY(call) check(#call, call)
-#define CHECK_HALF(call) check_half(#call, call)
 #define RUN(call) ((void)(call))
 
 #include NB_NULL_CALLS_gl

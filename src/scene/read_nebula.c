@@ -126,12 +126,12 @@ static bool keep_nebula(nb_scene_reader *in, const nb_json_node *node, const neb
 
 static bool check_nebula_kind(nb_json *json, const nb_json_node *node, const nb_json_node *const *found)
 {
-    static const int strewn[] = {NEBULA_SHAPE, NEBULA_DENSITY, NEBULA_COUNT, NEBULA_DIMMING};
+    static const int generated[] = {NEBULA_SHAPE, NEBULA_DENSITY, NEBULA_COUNT, NEBULA_DIMMING};
     if (found[NEBULA_POINTS] == NULL && found[NEBULA_SHAPE] == NULL)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is nowhere; a nebula has \"shape\" or \"points\"");
-    for (size_t i = 0; i < sizeof strewn / sizeof *strewn && found[NEBULA_POINTS] != NULL; i++)
-        if (found[strewn[i]] != NULL)
-            return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[strewn[i]],
+    for (size_t i = 0; i < sizeof generated / sizeof *generated && found[NEBULA_POINTS] != NULL; i++)
+        if (found[generated[i]] != NULL)
+            return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[generated[i]],
                                     "does not go with \"points\", of which each is a particle");
     return true;
 }
