@@ -72,7 +72,7 @@ static nebel_snapshot *commit(int count, int power)
     return snapshot;
 }
 
-/* Balls that sun or lamps light: all over each other, or scattered so that a ray meets some thirty. */
+/* Balls that sun or point lights light: all over each other, or scattered so that a ray meets some thirty. */
 static nebel_volume_desc lit_ball(int i, int count, int is_scattered)
 {
     const double x = fmod(.6180339887 * i, 1), y = fmod(.7548776662 * i, 1), z = fmod(.5698402910 * i, 1);
@@ -85,15 +85,15 @@ static nebel_volume_desc lit_ball(int i, int count, int is_scattered)
                                .albedo = {1, .9, .8}};
 }
 
-static nebel_lighting *commit_lit(int count, int is_scattered, int lamps)
+static nebel_lighting *commit_lit(int count, int is_scattered, int lights)
 {
     const nebel_light around[2] = {{.position = {3, 5, -18}, .intensity = {40, 40, 30}, .radius = .2},
                                    {.position = {-4, -1, -23}, .intensity = {30, 40, 40}, .radius = .2}};
-    nebel_lighting_desc desc = {.sun = {.direction = {.6, .64, .48}}, .lights = around, .light_count = (size_t)lamps};
+    nebel_lighting_desc desc = {.sun = {.direction = {.6, .64, .48}}, .lights = around, .light_count = (size_t)lights};
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
     nebel_lighting *lighting = NULL;
-    for (int c = 0; c < 3 && lamps == 0; c++) desc.sun.irradiance[c] = 1;
+    for (int c = 0; c < 3 && lights == 0; c++) desc.sun.irradiance[c] = 1;
     nebel_result result = nebel_create_fog(&(nebel_fog_desc){0}, &fog);
     for (int i = 0; i < count && result == NEBEL_OK; i++) {
         const nebel_volume_desc volume = lit_ball(i, count, is_scattered);
@@ -107,9 +107,9 @@ static nebel_lighting *commit_lit(int count, int is_scattered, int lamps)
 }
 
 /* A lit crowd beside the same rays through it without light. */
-static int add_crowd(nb_figures *figures, int count, int is_scattered, int lamps, int quick)
+static int add_crowd(nb_figures *figures, int count, int is_scattered, int lights, int quick)
 {
-    nebel_lighting *const lighting = commit_lit(count, is_scattered, lamps);
+    nebel_lighting *const lighting = commit_lit(count, is_scattered, lights);
     nb_question lit = {.fog = nebel_get_lighting_snapshot(lighting),
                        .lighting = lighting,
                        .precision = NEBEL_PRECISION_FLOAT,
@@ -126,7 +126,7 @@ static int add_crowd(nb_figures *figures, int count, int is_scattered, int lamps
                         .floor_name = "transmittance alone",
                         .floor = 1e6 * contests[0].seconds};
     (void)snprintf(figure.name, sizeof figure.name, "crowd: %d %s, %s", count,
-                   is_scattered ? "scattered" : "in one place", lamps > 0 ? "two lamps" : "sun");
+                   is_scattered ? "scattered" : "in one place", lights > 0 ? "two point lights" : "sun");
     nb_figures_add(figures, &figure);
     return 0;
 }
@@ -134,9 +134,9 @@ static int add_crowd(nb_figures *figures, int count, int is_scattered, int lamps
 static int add_crowds(nb_figures *figures, int quick)
 {
     int fault = 0;
-    for (int lamps = 0; lamps <= 2 && fault == 0; lamps += 2) {
-        for (int n = 10; n <= (quick ? 40 : 320) && fault == 0; n *= 2) fault = add_crowd(figures, n, 0, lamps, quick);
-        if (fault == 0) fault = add_crowd(figures, quick ? 100 : 1000, 1, lamps, quick);
+    for (int lights = 0; lights <= 2 && fault == 0; lights += 2) {
+        for (int n = 10; n <= (quick ? 40 : 320) && fault == 0; n *= 2) fault = add_crowd(figures, n, 0, lights, quick);
+        if (fault == 0) fault = add_crowd(figures, quick ? 100 : 1000, 1, lights, quick);
     }
     return fault;
 }

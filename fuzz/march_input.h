@@ -11,7 +11,7 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { MOST_WRITTEN = 5, MOST_VOLUMES = 14, MOST_RAYS = 3, MOST_LAMPS = 2, MOST_PARTS = 3, PLANES = 8, MOST_CELLS = 4 };
+enum { MOST_WRITTEN = 5, MOST_VOLUMES = 14, MOST_RAYS = 3, MAX_LIGHTS = 2, MOST_PARTS = 3, PLANES = 8, MOST_CELLS = 4 };
 
 typedef struct input {
     const uint8_t *data;
@@ -20,10 +20,10 @@ typedef struct input {
 
 /* The volumes point into it. */
 typedef struct march_input {
-    nebel_lighting_desc lighting; /* its lights are `lamps` */
-    size_t count, lamp_count, ray_count;
+    nebel_lighting_desc lighting; /* its lights are `point_lights` */
+    size_t count, light_count, ray_count;
     nebel_volume_desc volumes[MOST_VOLUMES];
-    nebel_light lamps[MOST_LAMPS];
+    nebel_light lights[MAX_LIGHTS];
     nebel_ray rays[MOST_RAYS];
     nebel_shape parts[MOST_WRITTEN][MOST_PARTS], inner[MOST_WRITTEN][MOST_PARTS];
     nebel_plane planes[MOST_WRITTEN * (1 + 2 * MOST_PARTS)][PLANES];
@@ -231,19 +231,19 @@ static inline void take_lights(input *in, march_input *fog)
         take_direction(in, fog->lighting.sun.direction);
         for (int c = 0; c < 3; c++) fog->lighting.sun.irradiance[c] = take(in) / 16.0;
     }
-    fog->lamp_count = (which & 4) != 0 ? 1 + take(in) % MOST_LAMPS : 0;
-    for (size_t i = 0; i < fog->lamp_count; i++) {
-        nebel_light *lamp = &fog->lamps[i];
-        *lamp =
+    fog->light_count = (which & 4) != 0 ? 1 + take(in) % MAX_LIGHTS : 0;
+    for (size_t i = 0; i < fog->light_count; i++) {
+        nebel_light *light = &fog->lights[i];
+        *light =
             (nebel_light){.type = take(in) % 2 == 0 ? NEBEL_LIGHT_POINT : NEBEL_LIGHT_SPOT, .radius = take_size(in)};
-        take_places(in, lamp->position);
-        take_direction(in, lamp->direction);
-        lamp->inner_angle = take(in) / 2.0;
-        lamp->outer_angle = lamp->inner_angle + 1 + take(in) / 8.0;
-        for (int c = 0; c < 3; c++) lamp->intensity[c] = take(in) / 16.0;
+        take_places(in, light->position);
+        take_direction(in, light->direction);
+        light->inner_angle = take(in) / 2.0;
+        light->outer_angle = light->inner_angle + 1 + take(in) / 8.0;
+        for (int c = 0; c < 3; c++) light->intensity[c] = take(in) / 16.0;
     }
-    fog->lighting.lights = fog->lamps;
-    fog->lighting.light_count = fog->lamp_count;
+    fog->lighting.lights = fog->lights;
+    fog->lighting.light_count = fog->light_count;
 }
 
 static inline void take_ray(input *in, march_input *fog)

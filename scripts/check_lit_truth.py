@@ -16,7 +16,7 @@ import subprocess
 import sys
 
 EACH = 3480  # rays of a process: ten seeds of 18 kinds of fog and two kinds of light, with ten rays each, four of crowds
-ROW = re.compile(r"^(\w[\w ]*?) +(sun|lamps)((?: +[\d.]+){11})$")
+ROW = re.compile(r"^(\w[\w ]*?) +(sun|lights)((?: +[\d.]+){11})$")
 
 
 def run(program, seed, rays):

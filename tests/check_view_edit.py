@@ -423,11 +423,11 @@ class SceneTest(ViewTest):
         self.assertTrue(self.same(viewer.take_picture(), self.draw_like("none.png", "--device", "gl"), ROUNDING_TOGETHER))
         viewer.end()
 
-    def test_lamps_shine_elsewhere(self):
-        lamps = [{"type": "point", "position": [0, 1, 1], "intensity": [4, 2, 1]},
+    def test_lights_shine_elsewhere(self):
+        lights = [{"type": "point", "position": [0, 1, 1], "intensity": [4, 2, 1]},
                  {"type": "spot", "name": "stage", "position": [2, 2, 2], "intensity": 9, "direction": [-1, -1, -1], "outer_angle": 40}]
         fog = {"shape": {"type": "box", "min": [-3, -3, -3], "max": [3, 3, 3]}, "extinction": 0.2, "albedo": 0.9}
-        self.scene = self.write_scene("scene.json", [fog], lights=lamps, models=[{"file": "triangle.obj"}],
+        self.scene = self.write_scene("scene.json", [fog], lights=lights, models=[{"file": "triangle.obj"}],
                                       camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
         viewer = self.open("--size", TALL, *SMALL_CONTROLS)
         first = viewer.take_picture()
@@ -446,7 +446,7 @@ class SceneTest(ViewTest):
         viewer.key("c")
         by_cpu = viewer.take_picture()
         saved = viewer.save()["lights"]
-        self.assertEqual(saved[0], {**lamps[0], "position": [1.5, 1, 1], "intensity": [8, 4, 2], "radius": 0.5})
+        self.assertEqual(saved[0], {**lights[0], "position": [1.5, 1, 1], "intensity": [8, 4, 2], "radius": 0.5})
         self.assertEqual((saved[1]["inner_angle"], saved[1]["name"]), (40, "stage"), "no further than the outer one")
         self.assertAlmostEqual(saved[1]["direction"][1], math.sin(math.radians(30)), 12)
         self.assertTrue(self.same(drawn, self.draw_like("gl.png", "--device", "gl", "--size", TALL), ROUNDING_TOGETHER))

@@ -19,7 +19,7 @@ WEB_CASE = pathlib.Path(os.environ["NEBEL_BUILD"]) / "tests" / "web_case"
 EXAMPLES = SOURCE / "examples" / "scenes"
 FEATURE_COUNT = 25
 
-# One scene for each kind of walk: mixed volumes, lamps, voxels with light scattered more than once, sunlit height fog, soft edges.
+# One scene for each kind of walk: mixed volumes, lights, voxels with light scattered more than once, sunlit height fog, soft edges.
 PICTURES = ("forty-volumes", "street-lamps", "cloud", "sun-shafts", "soft-edges")
 SIZE = ("20", "11")
 

@@ -1,5 +1,5 @@
-/* Crowds for tests in OpenGL: many volumes in one place, in sunlight and among lamps. On Mesa's llvmpipe their rays take many
- * times the turns of loops that a fragment has there. */
+/* Crowds for tests in OpenGL: many volumes in one place, in sunlight and among point lights. On Mesa's llvmpipe their
+ * rays take many times the turns of loops that a fragment has there. */
 #ifndef CROWD_HELP_H
 #define CROWD_HELP_H
 
@@ -13,9 +13,9 @@ enum { CROWD_MOST = 1000 };
 /* Volumes around one place before the eye, which is inside of some, and what lights them. */
 typedef struct crowd {
     nebel_volume_desc volumes[CROWD_MOST + 1];
-    size_t count, lamp_count;
+    size_t count, light_count;
     nebel_sun sun;
-    nebel_light lamps[2];
+    nebel_light lights[2];
 } crowd;
 
 static inline nebel_volume_desc *crowd_add(crowd *c, nebel_shape shape)
@@ -88,20 +88,20 @@ static inline void crowd_set_sun(crowd *c)
     c->sun = (nebel_sun){{.4, .8, .3}, {3, 2.5, 2}};
 }
 
-static inline void crowd_set_lamps(crowd *c)
+static inline void crowd_set_lights(crowd *c)
 {
     crowd_set_albedo(c);
-    c->lamp_count = 2;
+    c->light_count = 2;
     for (int i = 0; i < 2; i++) {
-        c->lamps[i] = (nebel_light){.intensity = {20 - 5 * i, 15, 10 + 5 * i}, .radius = .1};
-        for (int k = 0; k < 3; k++) c->lamps[i].position[k] = pass_eye[k] + (k == 2 ? -4 - 5 * i : 1 - 2 * i);
+        c->lights[i] = (nebel_light){.intensity = {20 - 5 * i, 15, 10 + 5 * i}, .radius = .1};
+        for (int k = 0; k < 3; k++) c->lights[i].position[k] = pass_eye[k] + (k == 2 ? -4 - 5 * i : 1 - 2 * i);
     }
 }
 
 /* The only owner of its snapshot. */
 static inline nebel_lighting *crowd_commit(const crowd *c)
 {
-    const nebel_lighting_desc lights = {.sun = c->sun, .lights = c->lamps, .light_count = c->lamp_count};
+    const nebel_lighting_desc lights = {.sun = c->sun, .lights = c->lights, .light_count = c->light_count};
     return fog_light(&lights, c->volumes, c->count);
 }
 

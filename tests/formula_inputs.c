@@ -430,17 +430,17 @@ static void draw_phase(nb_formula_dice *dice, long double *in)
     for (int i = 0; i < 3; ++i) in[9 + i] /= length;
 }
 
-/* ---- lamps ----------------------------------------------------------------------------------- */
+/* ---- point lights ----------------------------------------------------------------------------------- */
 
 /* Distances whose differences are exact. */
-static void draw_lamp(nb_formula_dice *dice, nb_formula formula, long double *in)
+static void draw_light(nb_formula_dice *dice, nb_formula formula, long double *in)
 {
-    if (formula == NB_FORMULA_lamp_fluence) {
+    if (formula == NB_FORMULA_light_fluence) {
         in[0] = decade(dice, -8, 12);
         in[1] = decade(dice, -6, 2);
         return;
     }
-    if (formula == NB_FORMULA_lamp_cone) {
+    if (formula == NB_FORMULA_light_cone) {
         in[1] = between(dice, -1, 0.9L);
         in[2] = decade(dice, 0, 2);
         in[0] = between(dice, in[1], 1);
@@ -486,8 +486,8 @@ void nb_formula_draw(nb_formula_dice *dice, nb_formula formula, nb_formula_digit
         draw_integral(dice, formula, digits, in);
     } else if (formula >= NB_FORMULA_phase_lobe && formula <= NB_FORMULA_turn_ahead) {
         draw_phase(dice, in);
-    } else if (formula >= NB_FORMULA_lamp_fluence && formula <= NB_FORMULA_swing_rate) {
-        draw_lamp(dice, formula, in);
+    } else if (formula >= NB_FORMULA_light_fluence && formula <= NB_FORMULA_swing_rate) {
+        draw_light(dice, formula, in);
     } else {
         draw_value(dice, formula, in);
     }

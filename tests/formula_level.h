@@ -54,8 +54,8 @@ enum { NB_FORMULA_INPUTS = 16, NB_FORMULA_OUTPUTS = 4 };
     X(phase_lobe, of_real(nb_phase_lobe(r0, r1, r2, r3, nb_turn_between(v6, v9))))                                     \
     X(turn_cosine, of_real(nb_turn_between(v6, v9).cosine))                                                            \
     X(turn_ahead, of_real(nb_turn_between(v6, v9).ahead))                                                              \
-    X(lamp_fluence, of_wide(nb_light_fluence(a0, a1)))                                                                 \
-    X(lamp_cone, of_real(nb_light_cone(r0, r1, r2)))                                                                   \
+    X(light_fluence, of_wide(nb_light_fluence(a0, a1)))                                                                \
+    X(light_cone, of_real(nb_light_cone(r0, r1, r2)))                                                                  \
     X(swing_end, of_wide(nb_swing_between(a0, a1, a2, a3).end))                                                        \
     X(swing_place, of_wide(nb_swing_place(nb_swing_between(a0, a1, a2, a3), a4)))                                      \
     X(swing_rate, of_wide(nb_swing_rate(nb_swing_between(a0, a1, a2, a3), a4)))

@@ -1,5 +1,5 @@
-/* Sunlit and lamplit fog of which most light comes from a small part of the ray, which steps of any length may pass over. The values
- * are from quadrature in optical depth, made without nebel. */
+/* Sunlit and point-lit fog of which most light comes from a small part of the ray, which steps of any length may pass
+ * over. The values are from quadrature in optical depth, made without nebel. */
 #ifndef LIT_CASES_H
 #define LIT_CASES_H
 
@@ -10,8 +10,8 @@
 typedef struct lit_case {
     const char *name;
     nebel_volume_desc volume;
-    nebel_sun sun;    /* of one colour; none: the lamp */
-    nebel_light lamp; /* the same */
+    nebel_sun sun;           /* of one colour; none: the point light */
+    nebel_light point_light; /* the same */
     nebel_ray ray;
     double right; /* radiance, to six digits */
     double tolerance;
@@ -32,23 +32,23 @@ static const nebel_shape lit_cut_ball[] = {
     {.type = NEBEL_SHAPE_HALF_SPACE, .point = {0, 0.69, 0}, .normal = {0.1827, 0.7308, -0.6577}}};
 
 static const lit_case lit_cases[] = {
-    {"lamplit skin of an opaque ball",
+    {"point-lit skin of an opaque ball",
      {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, -1, 0}, .radius = 1},
       .extinction = LIT_GRAY(500),
       .albedo = LIT_GRAY(0.9)},
-     .lamp = {.position = {1, 2, 3}, .intensity = LIT_GRAY(100)},
+     .point_light = {.position = {1, 2, 3}, .intensity = LIT_GRAY(100)},
      .ray = {{0, 3, 8}, {-0.851919, -3.5, -7.37258}, HUGE_VAL},
      .right = 0.0138474},
-    {"lamplit skin of a dense half space",
+    {"point-lit skin of a dense half space",
      {.shape = LIT_HALF_SPACE, .extinction = LIT_GRAY(1000), .albedo = LIT_GRAY(1)},
-     .lamp = {.position = {0, 1, 0}, .intensity = LIT_GRAY(10)},
+     .point_light = {.position = {0, 1, 0}, .intensity = LIT_GRAY(10)},
      .ray = {{0, 5, 0}, {0, -1, 0}, HUGE_VAL},
      .right = 0.397490},
-    {"lamplit skin of a denser ball",
+    {"point-lit skin of a denser ball",
      {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, -100, 0}, .radius = 100},
       .extinction = LIT_GRAY(1e5),
       .albedo = LIT_GRAY(1)},
-     .lamp = {.position = {0, 1, 0}, .intensity = LIT_GRAY(10)},
+     .point_light = {.position = {0, 1, 0}, .intensity = LIT_GRAY(10)},
      .ray = {{0, 5, 0}, {0, -1, 0}, HUGE_VAL},
      .right = 0.397884},
     {"half space in low sun",
@@ -60,7 +60,7 @@ static const lit_case lit_cases[] = {
      {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-1, -1, -1}, .max = {1, 0, 1}},
       .extinction = LIT_GRAY(300),
       .albedo = LIT_GRAY(1)},
-     .lamp = {.position = {20, 0.4, 0}, .intensity = LIT_GRAY(400)},
+     .point_light = {.position = {20, 0.4, 0}, .intensity = LIT_GRAY(400)},
      .ray = {{0, 5, 0}, {0, -1, 0}, HUGE_VAL},
      .right = 0.00155991},
     {"the same of the sun",
@@ -78,12 +78,12 @@ static const lit_case lit_cases[] = {
      .sun = {{0.6, 0.8, 0}, LIT_GRAY(3)},
      .ray = {{1.28, 4.47, 5}, {-0.30725143, -0.71399379, -0.62913387}, HUGE_VAL},
      .right = 0.0353103},
-    {"through a lamp's center",
+    {"through a point light's center",
      {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 100},
       .extinction = LIT_GRAY(1e-5),
       .albedo = LIT_GRAY(1),
       .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.6}},
-     .lamp = {.intensity = LIT_GRAY(1e6)},
+     .point_light = {.intensity = LIT_GRAY(1e6)},
      .ray = {{1.7767116663701477, -1.193014723079912, 4.518850686302743},
              {-0.35534233327402953, 0.2386029446159824, -0.9037701372605487},
              HUGE_VAL},
@@ -101,7 +101,8 @@ static const lit_case lit_cases[] = {
       .density = {.type = NEBEL_DENSITY_HEIGHT, .base = -1, .scale_height = 0.0117037},
       .extinction = LIT_GRAY(0.0559355),
       .albedo = LIT_GRAY(1)},
-     .lamp = {.position = {4.431659122665204, 0.0018495523022357856, 5.8790028233358047}, .intensity = LIT_GRAY(100)},
+     .point_light = {.position = {4.431659122665204, 0.0018495523022357856, 5.8790028233358047},
+                     .intensity = LIT_GRAY(100)},
      .ray = {{0.54347717654788141, 4.5935905822423626, 0.47292021904311099},
              {0.013280766414853463, -0.71585708322138086, 0.69812051799471631},
              HUGE_VAL},
@@ -118,28 +119,28 @@ static const lit_case lit_cases[] = {
              {-0.16156734091721905, -0.9867939065911532, -0.011566341837837538},
              HUGE_VAL},
      .right = 0.117086705},
-    {"the same in lamplight",
+    {"the same in light of point lights",
      {.shape = {.type = NEBEL_SHAPE_HALF_SPACE,
                 .point = {0.043727053540297545, -0.08118920456591822, 0.0013248601215495315},
                 .normal = {-0.38328130186150844, 0.8525745309680302, 0.3552634413896124}},
       .density = {.type = NEBEL_DENSITY_HEIGHT, .base = -0.08864509136571357, .scale_height = 0.034945545538534926},
       .extinction = LIT_GRAY(186664.2725005074),
       .albedo = LIT_GRAY(0.9)},
-     .lamp = {.position = {-0.7358032998230815, 0.044924904270824545, -0.11355863531623242},
-              .intensity = LIT_GRAY(0.13194580690628488)},
+     .point_light = {.position = {-0.7358032998230815, 0.044924904270824545, -0.11355863531623242},
+                     .intensity = LIT_GRAY(0.13194580690628488)},
      .ray = {{0.3036247085743811, 0.549514621139114, -0.594819848212661},
              {-0.2673434038927895, -0.49842815534285195, 0.8246798641633847},
              10.485935298702293},
      .right = 0.000132050979},
-    {"height fog that a lamp outside lights behind most of it",
+    {"height fog that a point light outside lights behind most of it",
      {.shape = {.type = NEBEL_SHAPE_HALF_SPACE,
                 .point = {-0.20526333777035183, -0.3571261863093753, 0.3988659928572781},
                 .normal = {0.7941781996413727, -0.3513159988277254, -0.4958407568787237}},
       .density = {.type = NEBEL_DENSITY_HEIGHT, .base = -0.32066953946309384, .scale_height = 0.044675059980476335},
       .extinction = LIT_GRAY(0.13600894158370677),
       .albedo = LIT_GRAY(0.9)},
-     .lamp = {.position = {-0.3234988415264247, -1.4228247123941369, -0.9328285060679556},
-              .intensity = LIT_GRAY(5360.051051541452)},
+     .point_light = {.position = {-0.3234988415264247, -1.4228247123941369, -0.9328285060679556},
+                     .intensity = LIT_GRAY(5360.051051541452)},
      .ray = {{-2.995716443505167, -0.40370681545135423, 1.02981463170381},
              {0.9762792319725352, 0.08710550343213139, -0.19822081750147175},
              21.134590626784984},
@@ -149,7 +150,7 @@ static const lit_case lit_cases[] = {
       .density = {.type = NEBEL_DENSITY_GAUSSIAN, .sigma = 0.59},
       .extinction = LIT_GRAY(0.001),
       .albedo = LIT_GRAY(1)},
-     .lamp = {.position = {0, 2.19, 0}, .intensity = LIT_GRAY(25)},
+     .point_light = {.position = {0, 2.19, 0}, .intensity = LIT_GRAY(25)},
      .ray = {{10.76, -1.47, 12.42}, {-0.5687533786137285, -0.02550983553415296, -0.8221124269870205}, HUGE_VAL},
      .right = 9.18e-9},
 };

@@ -14,8 +14,8 @@ typedef struct lit_scene {
     size_t volume_count;
     double ambient[3];
     nebel_sun sun; /* irradiance 0: none */
-    const nebel_light *lamps;
-    size_t lamp_count;
+    const nebel_light *lights;
+    size_t light_count;
     const float *voxels; /* of all grids, x fastest */
     int size[3], is_nearest;
 } lit_scene;

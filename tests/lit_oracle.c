@@ -6,8 +6,8 @@
 
 /* ---- light ----------------------------------------------------------------------------------- */
 
-/* Which light is integrated: a lamp by its number, or one of these. OWN is what needs no way to a light: emission, sources
- * and ambient light. */
+/* Which light is integrated: a point light by its number, or one of these. OWN is what needs no way to a light:
+ * emission, sources and ambient light. */
 enum { SUN = -1, OWN = -2 };
 
 static const double degree = 3.141592653589793 / 180;
@@ -18,19 +18,19 @@ static double smoothed(double cosine, double outer, double inner)
     return s * s * (3 - 2 * s);
 }
 
-static double radius_of(const nebel_light *lamp)
+static double radius_of(const nebel_light *light)
 {
-    return lamp->radius > 0 ? lamp->radius : 1e-3;
+    return light->radius > 0 ? light->radius : 1e-3;
 }
 
-/* What arrives of a lamp without fog, at a place from which it is seen in the direction `towards`. */
-static double fluence_of(const nebel_light *lamp, double distance, const double towards[3])
+/* What arrives of a point light without fog, at a place from which it is seen in the direction `towards`. */
+static double fluence_of(const nebel_light *light, double distance, const double towards[3])
 {
-    const double radius = radius_of(lamp), square = fmax(distance * distance, radius * radius);
+    const double radius = radius_of(light), square = fmax(distance * distance, radius * radius);
     const double fluence = 2 / (square * (1 + sqrt(fmax(0, 1 - radius * radius / square))));
-    if (lamp->type != NEBEL_LIGHT_SPOT) return fluence;
-    const double cosine = -lit_dot(towards, lamp->direction) / sqrt(lit_dot(lamp->direction, lamp->direction));
-    return fluence * smoothed(cosine, cos(lamp->outer_angle * degree), cos(lamp->inner_angle * degree));
+    if (light->type != NEBEL_LIGHT_SPOT) return fluence;
+    const double cosine = -lit_dot(towards, light->direction) / sqrt(lit_dot(light->direction, light->direction));
+    return fluence * smoothed(cosine, cos(light->outer_angle * degree), cos(light->inner_angle * degree));
 }
 
 /* What arrives of a light at t, and from where. */
@@ -39,16 +39,16 @@ static void look_at_light(const lit_fog *fog, int light, const lit_line *l, doub
 {
     lit_line way;
     double depth[3], end = HUGE_VAL, fluence = 1;
-    const nebel_light *lamp = light >= 0 ? &fog->scene->lamps[light] : NULL;
+    const nebel_light *point_light = light >= 0 ? &fog->scene->lights[light] : NULL;
     for (int k = 0; k < 3; k++) {
         way.o[k] = l->o[k] + t * l->d[k];
-        way.d[k] = lamp != NULL ? lamp->position[k] - way.o[k] : fog->scene->sun.direction[k];
+        way.d[k] = point_light != NULL ? point_light->position[k] - way.o[k] : fog->scene->sun.direction[k];
     }
     const double length = sqrt(lit_dot(way.d, way.d));
     for (int k = 0; k < 3; k++) towards[k] = way.d[k] = way.d[k] / length;
-    if (lamp != NULL) fluence = fluence_of(lamp, length, towards);
-    if (lamp != NULL) end = fmax(length - lamp->radius, 0);
-    const double *power = lamp != NULL ? lamp->intensity : fog->scene->sun.irradiance;
+    if (point_light != NULL) fluence = fluence_of(point_light, length, towards);
+    if (point_light != NULL) end = fmax(length - point_light->radius, 0);
+    const double *power = point_light != NULL ? point_light->intensity : fog->scene->sun.irradiance;
     memset(arriving, 0, 3 * sizeof arriving[0]);
     if (!(fluence > 0)) return;
     lit_fog_depth(fog, &way, end, depth);
@@ -194,13 +194,13 @@ static void refine(walk *w, double a, double b, const part *whole, double allowe
 
 /* ---- panels ---------------------------------------------------------------------------------- */
 
-/* Where the ray crosses the cone of all directions at an angle from the lamp's axis. */
-static void cut_cone(const nebel_light *lamp, double angle, const lit_line *l, lit_cuts *cuts)
+/* Where the ray crosses the cone of all directions at an angle from the point light's axis. */
+static void cut_cone(const nebel_light *light, double angle, const lit_line *l, lit_cuts *cuts)
 {
     double p[3];
-    const double cosine = cos(angle * degree), share = cosine * cosine * lit_dot(lamp->direction, lamp->direction);
-    for (int k = 0; k < 3; k++) p[k] = l->o[k] - lamp->position[k];
-    const double x = lit_dot(p, lamp->direction), y = lit_dot(l->d, lamp->direction);
+    const double cosine = cos(angle * degree), share = cosine * cosine * lit_dot(light->direction, light->direction);
+    for (int k = 0; k < 3; k++) p[k] = l->o[k] - light->position[k];
+    const double x = lit_dot(p, light->direction), y = lit_dot(l->d, light->direction);
     const double a = y * y - share, b = x * y - share * lit_dot(p, l->d), c = x * x - share * lit_dot(p, p);
     const double square = b * b - a * c;
     if (!(square >= 0)) return;
@@ -209,18 +209,18 @@ static void cut_cone(const nebel_light *lamp, double angle, const lit_line *l, l
     lit_add_cut(cuts, c / sum);
 }
 
-static void cut_at_lamp(const nebel_light *lamp, const lit_line *l, lit_cuts *cuts)
+static void cut_at_light(const nebel_light *light, const lit_line *l, lit_cuts *cuts)
 {
     double p[3];
-    for (int k = 0; k < 3; k++) p[k] = lamp->position[k] - l->o[k];
-    const double nearest = lit_dot(p, l->d), radius = radius_of(lamp);
+    for (int k = 0; k < 3; k++) p[k] = light->position[k] - l->o[k];
+    const double nearest = lit_dot(p, l->d), radius = radius_of(light);
     const double square = radius * radius - (lit_dot(p, p) - nearest * nearest);
     lit_add_cut(cuts, nearest);
     if (square > 0) lit_add_cut(cuts, nearest - sqrt(square));
     if (square > 0) lit_add_cut(cuts, nearest + sqrt(square));
-    if (lamp->type != NEBEL_LIGHT_SPOT) return;
-    cut_cone(lamp, lamp->outer_angle, l, cuts);
-    cut_cone(lamp, lamp->inner_angle, l, cuts);
+    if (light->type != NEBEL_LIGHT_SPOT) return;
+    cut_cone(light, light->outer_angle, l, cuts);
+    cut_cone(light, light->inner_angle, l, cuts);
 }
 
 /* Panels that become shorter by a factor towards an end, where light may be in a skin of any depth. */
@@ -265,7 +265,7 @@ static void cut_piece(const walk *w, double a, double b, lit_cuts *cuts)
     static lit_cuts inner;
     inner.count = 0;
     for (size_t i = 0; i < w->there.count; i++) lit_fog_cut(w->fog, w->there.volumes[i], w->ray, a, b, &inner);
-    if (w->light >= 0) cut_at_lamp(&w->fog->scene->lamps[w->light], w->ray, &inner);
+    if (w->light >= 0) cut_at_light(&w->fog->scene->lights[w->light], w->ray, &inner);
     add_panels(w, a, b, &inner);
     lit_add_cut(&inner, b);
     lit_sort(inner.at, inner.count);
@@ -361,7 +361,7 @@ int lit_oracle_trace(const lit_fog *fog, const nebel_ray *ray, lit_effort effort
     *truth = (lit_truth){.uncertainty = 0};
     lit_fog_map(fog, &l, ray->t_max, &m);
     const int is_sunlit = scene->sun.irradiance[0] + scene->sun.irradiance[1] + scene->sun.irradiance[2] > 0;
-    for (int light = OWN; light < (int)scene->lamp_count; light++) {
+    for (int light = OWN; light < (int)scene->light_count; light++) {
         if ((light == OWN && !has_own_light(scene)) || (light == SUN && !is_sunlit)) continue;
         walk w = {.fog = fog, .ray = &l, .light = light, .effort = effort, .ray_length = foggy_length(fog, &m)};
         if (!add_light(&w, &m, truth)) return 0;

@@ -1,5 +1,5 @@
-/* What the sun, lamps, ambient light and fog itself should add along rays, by brute force in double. No code and no formula
- * file of the library is used but for phase functions, which have tests of their own. */
+/* What the sun, point lights, ambient light and fog itself should add along rays, by brute force in double. No code
+ * and no formula file of the library is used but for phase functions, which have tests of their own. */
 #ifndef LIT_ORACLE_H
 #define LIT_ORACLE_H
 

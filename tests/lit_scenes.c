@@ -61,16 +61,16 @@ static void draw_sun(uint64_t *dices, nebel_sun *sun)
     for (int c = 0; c < 3; c++) sun->irradiance[c] = 3 - c;
 }
 
-static void draw_lamp(uint64_t *dices, nebel_light *lamp)
+static void draw_point_light(uint64_t *dices, nebel_light *point_light)
 {
-    *lamp = (nebel_light){.type = one_of(dices, 3) ? NEBEL_LIGHT_SPOT : NEBEL_LIGHT_POINT,
-                          .radius = one_of(dices, 2) ? 0 : dice(dices, 0.01, 1)};
-    lamp->outer_angle = dice(dices, 5, one_of(dices, 4) ? 180 : 80);
-    lamp->inner_angle = lamp->outer_angle * (one_of(dices, 4) ? 1 : dice(dices, 0, 1));
+    *point_light = (nebel_light){.type = one_of(dices, 3) ? NEBEL_LIGHT_SPOT : NEBEL_LIGHT_POINT,
+                                 .radius = one_of(dices, 2) ? 0 : dice(dices, 0.01, 1)};
+    point_light->outer_angle = dice(dices, 5, one_of(dices, 4) ? 180 : 80);
+    point_light->inner_angle = point_light->outer_angle * (one_of(dices, 4) ? 1 : dice(dices, 0, 1));
     for (int k = 0; k < 3; k++) {
-        lamp->position[k] = dice(dices, -20, 20);
-        lamp->direction[k] = dice(dices, -1, 1) - lamp->position[k] * 0.05;
-        lamp->intensity[k] = 300 - 50 * k;
+        point_light->position[k] = dice(dices, -20, 20);
+        point_light->direction[k] = dice(dices, -1, 1) - point_light->position[k] * 0.05;
+        point_light->intensity[k] = 300 - 50 * k;
     }
 }
 
@@ -238,7 +238,7 @@ void lit_draw_fog(lit_draw *draw, lit_kind kind, lit_source source, uint64_t see
     uint64_t dices = seed * 7919 + (uint64_t)kind * 104729 + (uint64_t)source;
     draw->grid = NULL;
     draw->scene = (lit_scene){.volumes = draw->volumes,
-                              .lamps = draw->lamps,
+                              .lights = draw->lights,
                               .voxels = draw->voxels,
                               .size = {LIT_SIDE, LIT_SIDE, LIT_SIDE},
                               .sun = {.direction = {0, 1, 0}}};
@@ -249,8 +249,8 @@ void lit_draw_fog(lit_draw *draw, lit_kind kind, lit_source source, uint64_t see
         draw_sun(&dices, &draw->scene.sun);
         return;
     }
-    draw->scene.lamp_count = one_of(&dices, 4) ? 2 : 1;
-    for (size_t i = 0; i < draw->scene.lamp_count; i++) draw_lamp(&dices, &draw->lamps[i]);
+    draw->scene.light_count = one_of(&dices, 4) ? 2 : 1;
+    for (size_t i = 0; i < draw->scene.light_count; i++) draw_point_light(&dices, &draw->lights[i]);
 }
 
 /* ---- rays and snapshots ---------------------------------------------------------------------- */
@@ -284,7 +284,7 @@ void lit_draw_rays(uint64_t seed, nebel_ray rays[LIT_RAYS_EACH])
 nebel_lighting *lit_draw_commit(const lit_draw *draw)
 {
     const lit_scene *s = &draw->scene;
-    nebel_lighting_desc lights = {.sun = s->sun, .lights = s->lamps, .light_count = s->lamp_count};
+    nebel_lighting_desc lights = {.sun = s->sun, .lights = s->lights, .light_count = s->light_count};
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
     nebel_lighting *lighting = NULL;

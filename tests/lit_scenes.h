@@ -33,9 +33,9 @@ typedef enum lit_kind {
 extern const char *const lit_kind_names[LIT_KIND_COUNT];
 
 /* What the lights of a scene are. */
-typedef enum lit_source { LIT_BY_SUN, LIT_BY_LAMPS, LIT_SOURCE_COUNT } lit_source;
+typedef enum lit_source { LIT_BY_SUN, LIT_BY_LIGHTS, LIT_SOURCE_COUNT } lit_source;
 
-enum { LIT_RAYS_EACH = 10, LIT_CROWD = 80, LIT_SIDE = 7, LIT_MAX_LAMPS = 2 };
+enum { LIT_RAYS_EACH = 10, LIT_CROWD = 80, LIT_SIDE = 7, LIT_MAX_LIGHTS = 2 };
 
 /* The members point into the struct: fill it where it stays, do not copy it. */
 typedef struct lit_draw {
@@ -43,7 +43,7 @@ typedef struct lit_draw {
     random_fog random;
     nebel_volume_desc volumes[LIT_CROWD];
     size_t count;
-    nebel_light lamps[LIT_MAX_LAMPS];
+    nebel_light lights[LIT_MAX_LIGHTS];
     float voxels[LIT_SIDE * LIT_SIDE * LIT_SIDE];
     nebel_grid *grid;
 } lit_draw;

@@ -426,19 +426,20 @@ static void test_same_bits_for_every_isa_and_split(void **unused)
 
 /* ---- own light ------------------------------------------------------------------------------- */
 
-/* A ball of fog that scatters all light, in the dark, with a lamp or a fire in its middle. */
-static nebel_lighting *commit_glowing(double g, const nebel_light *lamp, const nebel_volume_desc *fire)
+/* A ball of fog that scatters all light, in the dark, with a point light or a fire in its middle. */
+static nebel_lighting *commit_glowing(double g, const nebel_light *point_light, const nebel_volume_desc *fire)
 {
     nebel_volume_desc volumes[2] = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1},
                                      .extinction = {5, 5, 5},
                                      .albedo = {1, 1, 1},
                                      .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = g}}};
-    const nebel_lighting_desc lights = {.lights = lamp, .light_count = lamp != NULL, .diffusion = &by_default};
+    const nebel_lighting_desc lights = {
+        .lights = point_light, .light_count = point_light != NULL, .diffusion = &by_default};
     if (fire != NULL) volumes[1] = *fire;
     return fog_light(&lights, volumes, fire != NULL ? 2 : 1);
 }
 
-/* What goes out along z, W/sr: radiance over the ball's area. Straight light of a lamp is no fog's. */
+/* What goes out along z, W/sr: radiance over the ball's area. Straight light of a point light is no fog's. */
 static void find_intensity(const nebel_lighting *lighting, double intensity[3])
 {
     enum { SIDE = 40, SMALL_SIDE = 20 };
@@ -617,10 +618,11 @@ static void test_random_fog(void **unused)
         random_fog_make(&fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), seed);
         random_fog_light(&fog, &numbers);
         const nebel_diffusion_desc few = {.max_cells = 1000, .has_ground = seed % 3 == 0, .ground_albedo = {.5, .5, 1}};
-        const nebel_light lamp = {.position = {.1, .2, .3}, .intensity = {3, 2, 1}, .radius = (double)(seed % 3)};
+        const nebel_light point_light = {
+            .position = {.1, .2, .3}, .intensity = {3, 2, 1}, .radius = (double)(seed % 3)};
         const nebel_lighting_desc lights = {
             .sun = {.direction = {.3, (double)(seed % 7) / 3 - 1, -.2}, .irradiance = {3, 2, 1}},
-            .lights = &lamp,
+            .lights = &point_light,
             .light_count = seed % 2 == 0,
             .diffusion = &few};
         nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, fog.volumes, fog.count);
@@ -665,8 +667,8 @@ static void test_far_away(void **unused)
     }
 }
 
-/* Lamps at the limits of places, of light and of size. */
-static void test_lamps_far_away(void **unused)
+/* Point lights at the limits of places, of light and of size. */
+static void test_lights_far_away(void **unused)
 {
     (void)unused;
     static const nebel_light far[] = {
@@ -742,7 +744,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(test_white_fog_keeps_own_light),
                                        cmocka_unit_test(test_own_light_of_several_colours_adds),
                                        cmocka_unit_test(test_fog_before_the_lattice_dims),
-                                       cmocka_unit_test(test_lamps_far_away),
+                                       cmocka_unit_test(test_lights_far_away),
                                        cmocka_unit_test(test_cells_do_not_matter_much),
                                        cmocka_unit_test(test_bodies_in_height_fog),
                                        cmocka_unit_test(test_bad_descriptions),

@@ -19,8 +19,8 @@ typedef struct trial {
     double coverage;           /* of a grid */
     double darkness;           /* 1 - albedo */
     int sky;                   /* of `skies` */
-    const nebel_light *lamps;
-    size_t lamp_count;
+    const nebel_light *lights;
+    size_t light_count;
     double emission; /* of a ball amid the fog that scatters nothing */
 } trial;
 
@@ -251,68 +251,68 @@ static const nebel_light street[] = {{.position = {-.8, -.6, -.5}, .intensity = 
 
 /* The same in own light. */
 static const trial glowing[] = {
-    {.name = "lamp in a ball, depth 10",
+    {.name = "point light in a ball, depth 10",
      .shape = BALL,
      .extinction = 5,
      .most_off = .2,
      .most_rms = .55,
-     .lamps = bulb,
-     .lamp_count = 1},
-    {.name = "lamp in a ball, depth 4, g .85",
+     .lights = bulb,
+     .light_count = 1},
+    {.name = "point light in a ball, depth 4, g .85",
      .shape = BALL,
      .extinction = 2,
      .g = .85,
      .most_off = .25,
      .most_rms = .9,
-     .lamps = bulb,
-     .lamp_count = 1},
-    {.name = "lamp in a ball, depth 2",
+     .lights = bulb,
+     .light_count = 1},
+    {.name = "point light in a ball, depth 2",
      .shape = BALL,
      .extinction = 1,
      .most_off = .12,
      .most_rms = .4,
-     .lamps = bulb,
-     .lamp_count = 1},
-    {.name = "lamp beside a ball, depth 10",
+     .lights = bulb,
+     .light_count = 1},
+    {.name = "point light beside a ball, depth 10",
      .shape = BALL,
      .extinction = 5,
      .most_off = .1,
      .most_rms = .2,
-     .lamps = outside,
-     .lamp_count = 1},
-    {.name = "lamp beside a box, depth 6, g .85",
+     .lights = outside,
+     .light_count = 1},
+    {.name = "point light beside a box, depth 6, g .85",
      .shape = BOX,
      .extinction = 5,
      .g = .85,
      .most_off = .15,
      .most_rms = .45,
-     .lamps = outside,
-     .lamp_count = 1},
+     .lights = outside,
+     .light_count = 1},
     {.name = "spot into a box, depth 6, g .85",
      .shape = BOX,
      .extinction = 5,
      .g = .85,
      .most_off = .2,
      .most_rms = .6,
-     .lamps = beam,
-     .lamp_count = 1},
-    {.name = "three lamps in height fog, depth 2, g .85",
+     .lights = beam,
+     .light_count = 1},
+    {.name = "three point lights in height fog, depth 2, g .85",
      .shape = {.type = NEBEL_SHAPE_WORLD},
      .density = HAZE,
      .extinction = 5,
      .g = .85,
      .most_off = .15,
      .most_rms = .5,
-     .lamps = street,
-     .lamp_count = 3},
-    {.name = "three lamps in height fog, depth 8",
+     .lights = street,
+     .light_count = 3},
+    {.name = "three point lights in height fog, depth 8",
      .shape = {.type = NEBEL_SHAPE_WORLD},
      .density = HAZE,
      .extinction = 20,
      .most_off = .3,
      .most_rms = .5,
-     .lamps = street,
-     .lamp_count = 3},
+     .lights = street,
+     .light_count = 3},
     {.name = "fire in a ball, depth 10",
      .shape = BALL,
      .extinction = 5,
@@ -370,7 +370,7 @@ static int has_sun(const trial *t)
 
 static int is_own(const trial *t)
 {
-    return t->lamp_count > 0 || t->emission > 0;
+    return t->light_count > 0 || t->emission > 0;
 }
 
 static nebel_lighting *commit(const trial *t, int is_diffuse)
@@ -389,8 +389,8 @@ static nebel_lighting *commit(const trial *t, int is_diffuse)
     const nebel_lighting_desc lights = {
         .sun = {.direction = {t->sun[0], t->sun[1], t->sun[2]}, .irradiance = {sunlight, sunlight, sunlight}},
         .environment = skies[t->sky],
-        .lights = t->lamps,
-        .light_count = t->lamp_count,
+        .lights = t->lights,
+        .light_count = t->light_count,
         .diffusion = is_diffuse ? &diffusion : NULL};
     nebel_lighting *lighting = fog_light(&lights, (nebel_volume_desc[]){volume, fire}, t->emission > 0 ? 2 : 1);
     nebel_release_grid(volume.density.grid);
@@ -420,8 +420,8 @@ static void take(const trial *t, nebel_method method, int is_diffuse, shot *out)
                               .environment = skies[t->sky],
                               .meshes = &ground,
                               .mesh_count = is_endless ? 1 : 0,
-                              .lights = t->lamps,
-                              .light_count = t->lamp_count};
+                              .lights = t->lights,
+                              .light_count = t->light_count};
     const double length = sqrt(t->sun[0] * t->sun[0] + t->sun[1] * t->sun[1] + t->sun[2] * t->sun[2]);
     for (int c = 0; c < 3 && has_sun(t); c++) scene.sun_direction[c] = t->sun[c] / length;
     memcpy(scene.ambient, skies[t->sky].radiance, sizeof scene.ambient);
@@ -497,13 +497,13 @@ static void judge_trial(const trial *t)
     assert_true(has_sun(t) || is_own(t) ? single.off < -.4 : single.rms > 2 * many.rms);
 }
 
-/* The first in its table of a body and a profile in sunlight, or of a sky and of lamps or fire. */
+/* The first in its table of a body and a profile in sunlight, or of a sky and of point lights or fire. */
 static int is_first_of_kind(const trial *table, int i)
 {
     const trial *const t = &table[i];
     for (const trial *other = table; other < t; other++) {
         const int same_fog = other->shape.type == t->shape.type && other->density.type == t->density.type;
-        const int same_light = other->sky == t->sky && (other->lamp_count > 0) == (t->lamp_count > 0);
+        const int same_light = other->sky == t->sky && (other->light_count > 0) == (t->light_count > 0);
         if (has_sun(t) ? same_fog : same_light) return 0;
     }
     return 1;
@@ -527,7 +527,7 @@ static void test_ambient_light_is_dimmed_as_in_the_reference(void **unused)
     judge_trials(skylit, SKYLIT);
 }
 
-/* Paths find lamps in fog less often than the sun or the sky. */
+/* Paths find point lights in fog less often than the sun or the sky. */
 static void test_own_light_is_as_bright_as_the_reference(void **unused)
 {
     (void)unused;
@@ -542,7 +542,7 @@ int main(int argc, char **argv)
         samples *= 16;
         print_trials("white fog", "light of one scattering", trials, TRIALS);
         print_trials("ambient light alone", "undimmed", skylit, SKYLIT);
-        print_trials("lamps and what is emitted, alone", "without it", glowing, GLOWING);
+        print_trials("point lights and what is emitted, alone", "without it", glowing, GLOWING);
         return 0;
     }
     samples = (uint32_t)nb_test_count(SAMPLES);

@@ -698,8 +698,8 @@ static void volumes_need_a_box_and_a_grid(void **test)
     assert_non_null(strstr(messages.text, "needs a box"));
     nebel_snapshot *snapshot = NULL;
     size_t words;
-    const nebel_light lamp = {.intensity = {1, 1, 1}};
-    nebel_lighting_desc sky = {.sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}}, .lights = &lamp};
+    const nebel_light light = {.intensity = {1, 1, 1}};
+    nebel_lighting_desc sky = {.sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}}, .lights = &light};
     v.shape = (nebel_shape){.type = NEBEL_SHAPE_BOX, .max = {1, 1, 1}};
     v.albedo[0] = 1;
     assert_int_equal(nebel_add_volume(fog, &v, NULL), NEBEL_OK);

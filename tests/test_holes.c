@@ -90,11 +90,11 @@ static void the_reference_has_the_same_holes(void **state)
     test_picture_free(&reference);
 }
 
-/* Lamps, too. */
-static void lamps_shine_through_holes(void **state)
+/* Point lights, too. */
+static void lights_shine_through_holes(void **state)
 {
     static test_card card;
-    const nebel_light lamp = {.position = {.5, 4, .25}, .intensity = {10, 10, 10}};
+    const nebel_light light = {.position = {.5, 4, .25}, .intensity = {10, 10, 10}};
     const nebel_camera camera = camera_above();
     test_picture picture = test_picture_make(SIZE, SIZE);
     size_t dark = 0, lit = 0;
@@ -102,11 +102,11 @@ static void lamps_shine_through_holes(void **state)
     test_card_make(&card, 1);
     card.scene.has_sun = 0;
     card.scene.light_count = 1;
-    card.scene.lights = &lamp;
+    card.scene.lights = &light;
     test_render(&card.scene, NULL, &(nebel_cpu_renderer_desc){0}, &camera, 1, &picture);
     for (uint32_t y = 0; y < SIZE; y++)
         for (uint32_t x = 0; x < SIZE; x++) {
-            const double middle[2] = {.5 * (at(x) + lamp.position[0]), .5 * (at(y) + lamp.position[2])};
+            const double middle[2] = {.5 * (at(x) + light.position[0]), .5 * (at(y) + light.position[2])};
             const double shade = test_card_alpha(&card, middle[0], middle[1]);
             if (test_depth(&picture, x, y) < 4 || fabs(shade) < .01 || fabs(fabs(middle[0]) - 2) < 1e-3 ||
                 fabs(fabs(middle[1]) - 2) < 1e-3)
@@ -275,7 +275,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(holes_are_where_alpha_is_low), cmocka_unit_test(the_reference_has_the_same_holes),
-        cmocka_unit_test(lamps_shine_through_holes),    cmocka_unit_test(a_line_is_cut_where_alpha_passes_the_cutoff),
+        cmocka_unit_test(lights_shine_through_holes),   cmocka_unit_test(a_line_is_cut_where_alpha_passes_the_cutoff),
         cmocka_unit_test(odd_masks_are_refused),        cmocka_unit_test(odd_coordinates_are_survived),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

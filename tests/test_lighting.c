@@ -10,13 +10,13 @@ enum { RAYS = 16 };
 static const nebel_sun noon = {{.2, 1, .3}, {3, 2, 1}};
 static const nebel_environment dusk = {
     .type = NEBEL_ENVIRONMENT_GRADIENT, .zenith = {.2, .3, .4}, .horizon = {.4, .3, .2}, .ground = {.1, .1, .1}};
-static const nebel_light lamps[2] = {{.position = {1, 5, -3}, .intensity = {30, 20, 10}, .radius = .1},
-                                     {.type = NEBEL_LIGHT_SPOT,
-                                      .position = {-3, 6, -9},
-                                      .intensity = {10, 20, 30},
-                                      .direction = {.3, -1, .1},
-                                      .inner_angle = 20,
-                                      .outer_angle = 50}};
+static const nebel_light point_lights[2] = {{.position = {1, 5, -3}, .intensity = {30, 20, 10}, .radius = .1},
+                                            {.type = NEBEL_LIGHT_SPOT,
+                                             .position = {-3, 6, -9},
+                                             .intensity = {10, 20, 30},
+                                             .direction = {.3, -1, .1},
+                                             .inner_angle = 20,
+                                             .outer_angle = 50}};
 static const nebel_diffusion_desc few_cells = {.max_cells = 600, .has_ground = 1, .ground_albedo = {.1, .2, .3}};
 
 static const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 2, -8}, .radius = 6},
@@ -100,7 +100,7 @@ static void what_is_no_lighting_is_refused(void **state)
 {
     (void)state;
     const double nan = (double)NAN;
-    static const nebel_light no_lamp[] = {{.intensity = {1, 1, 1}}, {.intensity = {-1, 0, 0}}};
+    static const nebel_light no_light[] = {{.intensity = {1, 1, 1}}, {.intensity = {-1, 0, 0}}};
     static const nebel_diffusion_desc few = {.max_cells = 1}, high = {.has_ground = 1, .ground_height = HUGE_VAL},
                                       white = {.has_ground = 1, .ground_albedo = {0, 0, 1.5}};
     fog_messages messages = {0};
@@ -127,7 +127,7 @@ static void what_is_no_lighting_is_refused(void **state)
         {{.environment = {.type = NEBEL_ENVIRONMENT_MAP, .map = map, .rotation = nan}}, NEBEL_ERROR_VALUE, "rotation"},
         {{.environment = {.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = -1}}, NEBEL_ERROR_VALUE, "intensity"},
         {{.environment = {.type = NEBEL_ENVIRONMENT_COUNT}}, NEBEL_ERROR_ARGUMENT, "environment"},
-        {{.lights = no_lamp, .light_count = 2}, NEBEL_ERROR_VALUE, "1: intensity"},
+        {{.lights = no_light, .light_count = 2}, NEBEL_ERROR_VALUE, "1: intensity"},
         {{.diffusion = &few}, NEBEL_ERROR_VALUE, "diffusion: max_cells"},
         {{.diffusion = &high}, NEBEL_ERROR_VALUE, "diffusion: ground_height"},
         {{.diffusion = &white}, NEBEL_ERROR_VALUE, "diffusion: ground_albedo"},
@@ -223,7 +223,7 @@ static void give_back(int order, int with_map)
     nebel_lighting_desc lights = {.host.allocator = fog_memory_allocator(&of_lights),
                                   .sun = noon,
                                   .environment = dusk,
-                                  .lights = lamps,
+                                  .lights = point_lights,
                                   .light_count = 2};
     if (with_map) lights.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .map = map};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.host.allocator = allocator}, with_map ? &ball : &cloud, 1);
@@ -321,7 +321,7 @@ static void lost_memory_is_survived(void **state)
         nebel_lighting_desc lights = {
             .sun = noon,
             .environment = is_cloud ? dusk : (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .map = map},
-            .lights = lamps,
+            .lights = point_lights,
             .light_count = 2,
             .diffusion = is_diffuse ? &few_cells : NULL};
         const nebel_fog_desc desc = {.host = {.allocator = allocator, .log = fog_messages_log(&messages)}};
@@ -379,7 +379,7 @@ static void previous_changes_no_bit(void **state)
         {.environment = {.type = NEBEL_ENVIRONMENT_MAP, .map = map}},
         {.sun = noon, .environment = {.type = NEBEL_ENVIRONMENT_MAP, .map = map, .rotation = 30, .intensity = 2}},
         {.sun = noon, .environment = {.type = NEBEL_ENVIRONMENT_MAP, .map = other_map}},
-        {.sun = noon, .lights = lamps, .light_count = 2}};
+        {.sun = noon, .lights = point_lights, .light_count = 2}};
     enum { FOGS = sizeof fogs / sizeof *fogs, SKIES = sizeof skies / sizeof *skies };
     nebel_snapshot *snapshots[FOGS];
     nebel_lighting *lightings[FOGS][SKIES];
@@ -440,7 +440,7 @@ static void a_lighting_tells_what_it_was_given(void **state)
 {
     (void)state;
     nebel_environment_map *map = make_map((nebel_allocator){0});
-    nebel_light given[2] = {lamps[0], lamps[1]};
+    nebel_light given[2] = {point_lights[0], point_lights[1]};
     nebel_diffusion_desc diffusion = few_cells;
     const nebel_lighting_desc lights = {
         .sun = {{0, 5, 0}, {3, 2, 1}},
@@ -461,7 +461,7 @@ static void a_lighting_tells_what_it_was_given(void **state)
     const nebel_light *told = NULL;
     assert_int_equal(nebel_get_lighting_lights(lighting, &told), 2);
     assert_int_equal(nebel_get_lighting_lights(lighting, NULL), 2);
-    assert_memory_equal(told, lamps, sizeof lamps);
+    assert_memory_equal(told, point_lights, sizeof point_lights);
     const nebel_diffusion_desc *of_light = nebel_get_lighting_diffusion(lighting);
     assert_non_null(of_light);
     assert_int_equal(of_light->max_cells, few_cells.max_cells);
@@ -483,7 +483,7 @@ static void a_lighting_of_nothing_tells_of_nothing(void **state)
     for (int i = 0; i < LIGHTINGS; i++) {
         const nebel_sun sun = nebel_get_lighting_sun(dark[i]);
         const nebel_environment sky = nebel_get_lighting_environment(dark[i]);
-        const nebel_light *told = lamps;
+        const nebel_light *told = point_lights;
         nebel_bounds bounds;
         assert_memory_equal(&sun, &none, sizeof sun);
         assert_true(sky.type == NEBEL_ENVIRONMENT_CONSTANT && sky.radiance[0] == 0 && sky.map == NULL);
@@ -548,7 +548,7 @@ static void bounds_are_of_fog_that_a_group_lights(void **state)
     const nebel_lighting_desc lights[NEBEL_LIGHT_GROUP_COUNT] = {
         [NEBEL_LIGHT_GROUP_SUN] = {.sun = noon},
         [NEBEL_LIGHT_GROUP_ENVIRONMENT] = {.environment = dusk},
-        [NEBEL_LIGHT_GROUP_LOCAL] = {.lights = lamps, .light_count = 1}};
+        [NEBEL_LIGHT_GROUP_LOCAL] = {.lights = point_lights, .light_count = 1}};
     for (int is_endless = 0; is_endless < 2; is_endless++) {
         if (is_endless) volumes[1] = (nebel_volume_desc){.extinction = {1, 1, 1}, .albedo = {0, 0, 1}};
         nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, 2);

@@ -6,8 +6,8 @@
 
 static nebel_lighting *commit_case(const lit_case *c)
 {
-    const size_t lamp_count = c->lamp.intensity[0] > 0 ? 1 : 0;
-    const nebel_lighting_desc lights = {.sun = c->sun, .lights = &c->lamp, .light_count = lamp_count};
+    const size_t light_count = c->point_light.intensity[0] > 0 ? 1 : 0;
+    const nebel_lighting_desc lights = {.sun = c->sun, .lights = &c->point_light, .light_count = light_count};
     return fog_light(&lights, &c->volume, 1);
 }
 

@@ -1,5 +1,5 @@
-/* Sunlight and lamplight in many bodies over each other, of all profiles, against brute force: the midpoint rule over
- * nebel_sample_medium, with transmittances of nebel_trace, which know nothing of light. */
+/* Sunlight and light of point lights in many bodies over each other, of all profiles, against brute force: the
+ * midpoint rule over nebel_sample_medium, with transmittances of nebel_trace, which know nothing of light. */
 #include "unit.h"
 
 #include "fog_help.h"
@@ -23,8 +23,8 @@ typedef struct crowd {
     nebel_volume_desc bodies[BODIES];
     size_t count;
     nebel_sun sun;
-    nebel_light lamp;
-    int has_lamp;
+    nebel_light light;
+    int has_light;
 } crowd;
 
 static void choose_shape(nebel_volume_desc *v, int kind, uint64_t *numbers)
@@ -76,7 +76,7 @@ static void choose_density(nebel_volume_desc *v, int kind, uint64_t *numbers)
 static void make_crowd(crowd *made, size_t count, int mixed, int light, uint64_t seed)
 {
     uint64_t numbers = seed;
-    *made = (crowd){.count = count, .has_lamp = light > 0};
+    *made = (crowd){.count = count, .has_light = light > 0};
     for (size_t i = 0; i < count; i++) {
         nebel_volume_desc *v = &made->bodies[i];
         *v = (nebel_volume_desc){.albedo = {1, 0.9, 0.5}};
@@ -93,7 +93,7 @@ static void make_crowd(crowd *made, size_t count, int mixed, int light, uint64_t
         made->bodies[6].start = 9;
         made->bodies[7].cutoff = 11;
     }
-    made->lamp = (nebel_light){.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
+    made->light = (nebel_light){.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
     if (light == 2) {
         const nebel_light spot = {.type = NEBEL_LIGHT_SPOT,
                                   .position = {2, 6, 1},
@@ -102,7 +102,7 @@ static void make_crowd(crowd *made, size_t count, int mixed, int light, uint64_t
                                   .direction = {-0.2, -1, 0},
                                   .inner_angle = 10,
                                   .outer_angle = 35};
-        made->lamp = spot;
+        made->light = spot;
     }
     if (light == 0) {
         made->sun = (nebel_sun){.irradiance = {3, 2, 1}};
@@ -112,7 +112,7 @@ static void make_crowd(crowd *made, size_t count, int mixed, int light, uint64_t
 
 static nebel_lighting *commit_crowd(const crowd *of)
 {
-    const nebel_lighting_desc lights = {.sun = of->sun, .lights = &of->lamp, .light_count = (size_t)of->has_lamp};
+    const nebel_lighting_desc lights = {.sun = of->sun, .lights = &of->light, .light_count = (size_t)of->has_light};
     return fog_light(&lights, of->bodies, of->count);
 }
 
@@ -136,19 +136,19 @@ typedef struct arrival {
 
 static arrival light_arrives(const crowd *of, const double p[3])
 {
-    const nebel_light *lamp = &of->lamp;
+    const nebel_light *light = &of->light;
     arrival a = {.distance = HUGE_VAL, .fluence = 1};
     memcpy(a.towards, sun_direction, sizeof sun_direction);
-    if (!of->has_lamp) return a;
-    for (int k = 0; k < 3; k++) a.towards[k] = lamp->position[k] - p[k];
-    const double apart = sqrt(dot(a.towards, a.towards)), sine = fmin(lamp->radius / apart, 1);
+    if (!of->has_light) return a;
+    for (int k = 0; k < 3; k++) a.towards[k] = light->position[k] - p[k];
+    const double apart = sqrt(dot(a.towards, a.towards)), sine = fmin(light->radius / apart, 1);
     for (int k = 0; k < 3; k++) a.towards[k] /= apart;
-    a.distance = fmax(apart - lamp->radius, 0);
-    a.fluence = 2 * (1 - sqrt(1 - sine * sine)) / (lamp->radius * lamp->radius);
-    if (lamp->type != NEBEL_LIGHT_SPOT) return a;
-    const double degree = acos(-1) / 180, edge = cos(lamp->outer_angle * degree);
-    const double cosine = -dot(a.towards, lamp->direction) / sqrt(dot(lamp->direction, lamp->direction));
-    const double s = fmin(fmax((cosine - edge) / (cos(lamp->inner_angle * degree) - edge), 0), 1);
+    a.distance = fmax(apart - light->radius, 0);
+    a.fluence = 2 * (1 - sqrt(1 - sine * sine)) / (light->radius * light->radius);
+    if (light->type != NEBEL_LIGHT_SPOT) return a;
+    const double degree = acos(-1) / 180, edge = cos(light->outer_angle * degree);
+    const double cosine = -dot(a.towards, light->direction) / sqrt(dot(light->direction, light->direction));
+    const double s = fmin(fmax((cosine - edge) / (cos(light->inner_angle * degree) - edge), 0), 1);
     a.fluence *= s * s * (3 - 2 * s);
     return a;
 }
@@ -205,7 +205,7 @@ static forced light_by_force(const crowd *of, const nebel_snapshot *snapshot, co
         const int shines = dark == NULL || t < (double)dark[0] || t >= (double)dark[1];
         for (int c = 0; c < 3; c++) {
             const double glow = (all[c] - some[c]) * phase_value(0, 0) + some[c] * forward;
-            const double source = of->has_lamp ? of->lamp.intensity[c] : of->sun.irradiance[c];
+            const double source = of->has_light ? of->light.intensity[c] : of->sun.irradiance[c];
             const double light = glow * shines * source * from.fluence * step;
             sum.light[c] += light * seen.transmittance[c] * lit.transmittance[c];
             sum.off[c] += 0.5 * fabs(light - before[c]) * seen.transmittance[c] * lit.transmittance[c];
@@ -292,7 +292,7 @@ static void sunlight_is_what_brute_force_finds(void **state)
     expect_brute_force(BODIES, 1, 0, 1);
 }
 
-static void lamplight_is_what_brute_force_finds(void **state)
+static void point_light_is_what_brute_force_finds(void **state)
 {
     (void)state;
     expect_brute_force(12, 0, 1, 0);
@@ -341,13 +341,13 @@ static void light_falls_through_slits(void **state)
     expect_light_through_slits(7, 0.04);
 }
 
-/* More than 64 media are no crowd where lamps light two phase functions: those on the way to a lamp are looked for in
- * the tree. What light never passes changes nothing. */
+/* More than 64 media are no crowd where point lights light two phase functions: those on the way to a point light are
+ * looked for in the tree. What light never passes changes nothing. */
 static void bodies_far_away_change_nothing(void **state)
 {
     (void)state;
-    static const nebel_light lamp = {.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
-    const nebel_lighting_desc lights = {.lights = &lamp, .light_count = 1};
+    static const nebel_light light = {.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
+    const nebel_lighting_desc lights = {.lights = &light, .light_count = 1};
     enum { MANY = 70 };
     nebel_volume_desc bodies[MANY];
     nebel_lighting *fog[2];
@@ -378,7 +378,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sunlight_is_what_brute_force_finds),
-        cmocka_unit_test(lamplight_is_what_brute_force_finds),
+        cmocka_unit_test(point_light_is_what_brute_force_finds),
         cmocka_unit_test(light_falls_through_slits),
         cmocka_unit_test(bodies_far_away_change_nothing),
     };

@@ -90,7 +90,7 @@ static void print_case(lit_kind kind, lit_source source, uint64_t seed, int i, w
 {
     print_message("%s, %s, seed %llu, ray %d, %s: %.9g %.9g %.9g, not %.9g %.9g %.9g (+- %.1e); T %.9g, not %.9g; "
                   "error %.3g\n",
-                  lit_kind_names[kind], source == LIT_BY_LAMPS ? "lamps" : "sun", (unsigned long long)seed, i,
+                  lit_kind_names[kind], source == LIT_BY_LIGHTS ? "point lights" : "sun", (unsigned long long)seed, i,
                   way_names[way], transfer->in_scattering[0], transfer->in_scattering[1], transfer->in_scattering[2],
                   is->in_scattering[0], is->in_scattering[1], is->in_scattering[2], is->uncertainty,
                   transfer->transmittance[0], is->transmittance[0], transfer->error);
@@ -212,7 +212,7 @@ static size_t print_tallies(void)
     for (int kind = 0; kind < LIT_KIND_COUNT; kind++)
         for (int source = 0; source < LIT_SOURCE_COUNT; source++) {
             const tally *t = tallies[kind][source], *b = &bits[kind][source];
-            print_message("%-12s %-5s", lit_kind_names[kind], source == LIT_BY_LAMPS ? "lamps" : "sun");
+            print_message("%-12s %-5s", lit_kind_names[kind], source == LIT_BY_LIGHTS ? "point lights" : "sun");
             for (int way = 0; way < ASK_COUNT; way++) print_tally(&t[way]);
             print_message(" %9zu %10zu\n", b->rays, b->wrong);
             rays += t[0].rays;
@@ -236,12 +236,12 @@ static const struct {
     lit_source source;
     uint64_t seed;
 } found[] = {
-    {LIT_KIND_ELLIPSOID, LIT_BY_SUN, 777000011},     /* null rules that fall from degree to degree by chance */
-    {LIT_KIND_EXCLUDED, LIT_BY_SUN, 777000160},      /* the way to the sun passes where surfaces of two bodies cross */
-    {LIT_KIND_EXCLUDED, LIT_BY_SUN, 777000693},      /* it runs along the face of a soft box */
-    {LIT_KIND_EXCLUDED, LIT_BY_SUN, 20001579},       /* the way to the sun leaves a capsule where mantle and cap meet */
-    {LIT_KIND_SMALL_CROWD, LIT_BY_LAMPS, 777000485}, /* the edge of a hard cone, where a step begins */
-    {LIT_KIND_CROWD, LIT_BY_LAMPS, 365},             /* light in a fifth of a step, most of it hidden */
+    {LIT_KIND_ELLIPSOID, LIT_BY_SUN, 777000011}, /* null rules that fall from degree to degree by chance */
+    {LIT_KIND_EXCLUDED, LIT_BY_SUN, 777000160},  /* the way to the sun passes where surfaces of two bodies cross */
+    {LIT_KIND_EXCLUDED, LIT_BY_SUN, 777000693},  /* it runs along the face of a soft box */
+    {LIT_KIND_EXCLUDED, LIT_BY_SUN, 20001579},   /* the way to the sun leaves a capsule where mantle and cap meet */
+    {LIT_KIND_SMALL_CROWD, LIT_BY_LIGHTS, 777000485}, /* the edge of a hard cone, where a step begins */
+    {LIT_KIND_CROWD, LIT_BY_LIGHTS, 365},             /* light in a fifth of a step, most of it hidden */
 };
 
 static void errors_of_lit_fog_are_never_too_small(void **state)

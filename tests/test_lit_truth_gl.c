@@ -91,7 +91,7 @@ static void judge(const lit_fog *lit, lit_kind kind, lit_source source, uint64_t
     if (off <= 1. / 255) return;
     t->wrong++;
     print_message("%s, %s, seed %llu, ray %d: %.6g %.6g %.6g, not %.6g %.6g %.6g; T %.6g, not %.6g\n",
-                  lit_kind_names[kind], source == LIT_BY_LAMPS ? "lamps" : "sun", (unsigned long long)seed, i,
+                  lit_kind_names[kind], source == LIT_BY_LIGHTS ? "point lights" : "sun", (unsigned long long)seed, i,
                   (double)answers[VECTOR * i].in_scattering[0], (double)answers[VECTOR * i].in_scattering[1],
                   (double)answers[VECTOR * i].in_scattering[2], is->in_scattering[0], is->in_scattering[1],
                   is->in_scattering[2], (double)answers[VECTOR * i].transmittance[0], is->transmittance[0]);
@@ -165,8 +165,8 @@ static size_t print_tallies(void)
             if (n == 0) continue;
             qsort(t->off, n, sizeof t->off[0], ascending);
             print_message("%-12s %-5s %9zu %5zu %5zu %5zu %9.1e %9.1e %9.1e\n", lit_kind_names[kind],
-                          source == LIT_BY_LAMPS ? "lamps" : "sun", t->rays, t->wrong, t->ill, t->cut, t->off[n / 2],
-                          t->off[n * 99 / 100], t->worst);
+                          source == LIT_BY_LIGHTS ? "point lights" : "sun", t->rays, t->wrong, t->ill, t->cut,
+                          t->off[n / 2], t->off[n * 99 / 100], t->worst);
             rays_in_all += t->rays;
             wrong += t->wrong;
         }

@@ -1,5 +1,5 @@
 /* Crowds in OpenGL and on the CPU: many volumes in one place, one of which excludes or replaces others, in sunlight, and
- * among lamps. On Mesa's llvmpipe their rays take many times the turns of loops that a fragment has there. */
+ * among point lights. On Mesa's llvmpipe their rays take many times the turns of loops that a fragment has there. */
 #include <math.h>
 #include <stdio.h>
 
@@ -159,14 +159,14 @@ static void test_even_boxes(void **state)
     }
 }
 
-static void test_balls_among_lamps(void **state)
+static void test_balls_among_lights(void **state)
 {
     (void)state;
     static crowd c;
     c = (crowd){.count = 0};
     crowd_add_balls(&c, 40, 4);
-    crowd_set_lamps(&c);
-    check(&c, "balls and two lamps", NB_GL_330, 1);
+    crowd_set_lights(&c);
+    check(&c, "balls and two point lights", NB_GL_330, 1);
 }
 
 int main(void)
@@ -174,7 +174,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_balls_with_a_hole), cmocka_unit_test(test_empty_hole),
         cmocka_unit_test(test_balls_in_sunlight), cmocka_unit_test(test_few_uneven_in_sunlight),
-        cmocka_unit_test(test_even_boxes),        cmocka_unit_test(test_balls_among_lamps),
+        cmocka_unit_test(test_even_boxes),        cmocka_unit_test(test_balls_among_lights),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

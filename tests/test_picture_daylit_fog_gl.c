@@ -99,7 +99,7 @@ static nebel_camera turned_camera(const worlds *s, double angle)
 }
 
 /* Light of their own that balls may have. */
-enum { GLOW = 1, LAMP = 2, DIFFUSE = 4 };
+enum { GLOW = 1, LIGHT = 2, DIFFUSE = 4 };
 
 /* Lit as the scene's origin is, as programs do it. */
 static nebel_lighting *make_ball(const worlds *s, double angle, const nebel_environment *sky, int own)
@@ -112,14 +112,14 @@ static nebel_lighting *make_ball(const worlds *s, double angle, const nebel_envi
                               .extinction = {.02, .03, .04},
                               .albedo = {.9, .8, .7},
                               .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .3}};
-    nebel_light lamp = {.position = {0, 80, -70}, .intensity = {300, 200, 100}, .radius = 1};
+    nebel_light point_light = {.position = {0, 80, -70}, .intensity = {300, 200, 100}, .radius = 1};
     turn(s->planets[0].atmosphere_desc.radius, angle, ball.shape.center);
-    memcpy(lamp.position, ball.shape.center, sizeof lamp.position);
+    memcpy(point_light.position, ball.shape.center, sizeof point_light.position);
     for (int c = 0; c < 3 && (own & GLOW) != 0; c++) ball.emission[c] = .002 * (c + 1);
     assert_int_equal(nebel_compute_atmosphere_irradiance(s->atmospheres[0], &s->sun, 1, origin, 0, &light, 0),
                      NEBEL_OK);
     memcpy(lights.sun.irradiance, light.sun, sizeof light.sun);
-    if ((own & LAMP) != 0) lights.lights = &lamp, lights.light_count = 1;
+    if ((own & LIGHT) != 0) lights.lights = &point_light, lights.light_count = 1;
     if ((own & DIFFUSE) != 0) lights.diffusion = &diffusion;
     return fog_light(&lights, &ball, 1);
 }
@@ -160,8 +160,8 @@ static void balls_have_the_light_of_their_place(void **state)
         {"behind the terminator", 110, {0, 1, 0}, 0, .002, 0, 0},
         {"red before the terminator", 88, {0, 1, 0}, .005, .5, 0, 0},
         {"all around, before the terminator", 88, {0, 1, 0}, 0, 0, 0, 1},
-        {"by night, with light of its own", 110, {0, 1, 0}, .005, 1, GLOW | LAMP, 0},
-        {"at dusk, with light of its own", 91, {0, 1, 0}, .005, 1, GLOW | LAMP, 0},
+        {"by night, with light of its own", 110, {0, 1, 0}, .005, 1, GLOW | LIGHT, 0},
+        {"at dusk, with light of its own", 91, {0, 1, 0}, .005, 1, GLOW | LIGHT, 0},
     };
     nb_gl context;
     pass_open(&context, NB_GL_330);

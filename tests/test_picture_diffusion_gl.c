@@ -53,7 +53,7 @@ typedef struct trial {
     nebel_projection projection;
     double far;      /* where all is, along x [m] */
     int is_overcast; /* a coloured gradient in place of sun and even light */
-    int is_night;    /* two lamps in place of both */
+    int is_night;    /* two point lights in place of both */
 } trial;
 
 static const trial trials[] = {
@@ -113,7 +113,7 @@ static const trial trials[] = {
                   .density = {.type = NEBEL_DENSITY_HEIGHT, .base = -2, .scale_height = 1}}},
      .diffusion = {.max_cells = 2048, .has_ground = 1, .ground_height = -2, .ground_albedo = {.1, .3, .1}},
      .is_overcast = 1},
-    {.name = "lamps in coloured droplets",
+    {.name = "point lights in coloured droplets",
      .count = 1,
      .volumes = {{.shape = BALL,
                   .extinction = {1, 1.2, 1.5},
@@ -121,7 +121,7 @@ static const trial trials[] = {
                   .phase = {.type = NEBEL_PHASE_DROPLETS, .diameter = 16}}},
      .diffusion = {.max_cells = 2048},
      .is_night = 1},
-    {.name = "lamps and fire in height fog",
+    {.name = "point lights and fire in height fog",
      .count = 2,
      .volumes = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {-.5, -1, 0}, .radius = .5}, .emission = {3, 1, .2}},
                  {.extinction = {.8, .8, .8},
@@ -131,14 +131,14 @@ static const trial trials[] = {
      .is_night = 1},
 };
 
-static const nebel_light lamps[] = {{.position = {.5, .3, .4}, .intensity = {4, 3, 1}, .radius = .1},
-                                    {.type = NEBEL_LIGHT_SPOT,
-                                     .position = {-1.5, 1.6, .5},
-                                     .intensity = {2, 3, 4},
-                                     .radius = .1,
-                                     .direction = {1, -1, 0},
-                                     .inner_angle = 20,
-                                     .outer_angle = 40}};
+static const nebel_light point_lights[] = {{.position = {.5, .3, .4}, .intensity = {4, 3, 1}, .radius = .1},
+                                           {.type = NEBEL_LIGHT_SPOT,
+                                            .position = {-1.5, 1.6, .5},
+                                            .intensity = {2, 3, 4},
+                                            .radius = .1,
+                                            .direction = {1, -1, 0},
+                                            .inner_angle = 20,
+                                            .outer_angle = 40}};
 
 static const nebel_environment overcast = {
     .type = NEBEL_ENVIRONMENT_GRADIENT, .zenith = {.9, 1, 1.2}, .horizon = {.5, .4, .3}, .ground = {.1, .1, 0}};
@@ -148,7 +148,7 @@ static nebel_lighting *commit(const trial *t)
     nebel_volume_desc volumes[MOST_VOLUMES];
     nebel_lighting_desc lights = {.diffusion = &t->diffusion};
     if (t->is_overcast) lights.environment = overcast;
-    if (t->is_night) lights.lights = lamps, lights.light_count = sizeof lamps / sizeof *lamps;
+    if (t->is_night) lights.lights = point_lights, lights.light_count = sizeof point_lights / sizeof *point_lights;
     if (!t->is_overcast && !t->is_night) {
         lights.environment = (nebel_environment){.radiance = {.1, .1, .12}};
         lights.sun = (nebel_sun){.direction = {1, .6, .5}, .irradiance = {3, 2.8, 2.5}};

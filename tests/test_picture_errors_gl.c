@@ -258,19 +258,19 @@ static void expect_said(stage *s, double x, double y, const char *word)
     nebel_release_lighting(fog);
 }
 
-/* Fog under particles, beside them and above; a lamp. */
+/* Fog under particles, beside them and above; a point light. */
 static void test_shadows_of_particles_are_missed(void **state)
 {
     (void)state;
     static stage s;
-    const nebel_light lamp = {.position = {0, 3, 0}, .intensity = {1, 1, 1}};
+    const nebel_light light = {.position = {0, 3, 0}, .intensity = {1, 1, 1}};
     start_with_renderer(&s, NB_GL_330);
     expect_said(&s, 0, -2, "light of the sun from fog");
     expect_said(&s, 9, -2, NULL);
     expect_said(&s, 0, 2, NULL);
-    s.ball.scene.lights = &lamp;
+    s.ball.scene.lights = &light;
     s.ball.scene.light_count = 1;
-    expect_said(&s, 9, -2, "light of lamps");
+    expect_said(&s, 9, -2, "light of point lights");
     for (int i = 0; i < PARTICLES; i++) memset(s.particles[i].extinction, 0, sizeof s.particles[i].extinction);
     assert_int_equal(nebel_set_gl_renderer_particles(s.renderer, s.particles, PARTICLES), NEBEL_OK);
     expect_said(&s, 0, -2, NULL);

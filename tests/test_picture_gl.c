@@ -189,30 +189,31 @@ static nebel_scene_data scene_around(const double middle[3], nebel_mesh meshes[4
     return (nebel_scene_data){.background = {.3, .4, .5}, .ambient = {1, 1, 1}, .mesh_count = 4, .meshes = meshes};
 }
 
-/* With lamps it scatters light; sun NULL: there is none. */
-static nebel_lighting *commit(random_fog *random, const nebel_sun *sun, size_t lamp_count, const nebel_light *lamps)
+/* With point lights it scatters light; sun NULL: there is none. */
+static nebel_lighting *commit(random_fog *random, const nebel_sun *sun, size_t light_count,
+                              const nebel_light *point_lights)
 {
     uint64_t numbers = random->seed;
     nebel_lighting_desc lights = random_fog_lights(random);
     if (sun != NULL) lights.sun = *sun;
-    lights.lights = lamps;
-    lights.light_count = lamp_count;
-    if (lamp_count > 0) random_fog_light(random, &numbers);
+    lights.lights = point_lights;
+    lights.light_count = light_count;
+    if (light_count > 0) random_fog_light(random, &numbers);
     return fog_light(&lights, random->volumes, random->count);
 }
 
-/* Every fourth scene has lamps: a ball beside the boxes and a spot between them. Mesa's software ends the
+/* Every fourth scene has point lights: a ball beside the boxes and a spot between them. Mesa's software ends the
  * loops of very many volumes in their light, and of those that cover others in that of both. */
-static size_t place_lamps(const random_fog *fog, int number, nebel_light lamps[2])
+static size_t place_lights(const random_fog *fog, int number, nebel_light lights[2])
 {
     static const double places[2][3] = {{6, 5, 3}, {-1, 2, -2}};
     for (int i = 0; i < 2; i++) {
-        lamps[i] = (nebel_light){.intensity = {20, 15, 10}, .radius = .1 * i, .direction = {1, -2, -1}};
-        for (int k = 0; k < 3; k++) lamps[i].position[k] = fog->shift[k] + places[i][k];
+        lights[i] = (nebel_light){.intensity = {20, 15, 10}, .radius = .1 * i, .direction = {1, -2, -1}};
+        for (int k = 0; k < 3; k++) lights[i].position[k] = fog->shift[k] + places[i][k];
     }
-    lamps[1].type = NEBEL_LIGHT_SPOT;
-    lamps[1].inner_angle = 20;
-    lamps[1].outer_angle = 50;
+    lights[1].type = NEBEL_LIGHT_SPOT;
+    lights[1].inner_angle = 20;
+    lights[1].outer_angle = 50;
     if (number % 4 != 1 || fog->kind == RANDOM_FOG_MANY) return 0;
     return fog->kind == RANDOM_FOG_EXCLUDE ? 1 : 2;
 }
@@ -239,12 +240,12 @@ static picture_difference check_random(random_fog *random, const nebel_sun *sun,
     nebel_mesh meshes[4];
     char name[64];
     nb_gl context;
-    nebel_light lamps[2];
-    const size_t lamp_count = sun != NULL ? 0 : place_lamps(random, number, lamps);
-    nebel_lighting *const fog = commit(random, sun, lamp_count, lamps);
+    nebel_light lights[2];
+    const size_t light_count = sun != NULL ? 0 : place_lights(random, number, lights);
+    nebel_lighting *const fog = commit(random, sun, light_count, lights);
     nebel_scene_data scene = scene_around(random->shift, meshes, positions);
-    scene.light_count = lamp_count;
-    scene.lights = lamps;
+    scene.light_count = light_count;
+    scene.lights = lights;
     scene.has_sun = sun != NULL;
     for (int k = 0; k < 3 && sun != NULL; k++) {
         scene.sun_direction[k] = sun->direction[k];

@@ -290,13 +290,13 @@ static void draw_in_odd_state(nb_gl_language language, nebel_gl_method method, i
 {
     static test_stage s;
     static odd_snapshot before, after;
-    static const nebel_light lamp = {.position = {1, 2, 1}, .intensity = {3, 2, 1}};
+    static const nebel_light light = {.position = {1, 2, 1}, .intensity = {3, 2, 1}};
     const int desktop = language == NB_GL_330;
     nb_gl context;
     odd o;
     set_stage(&s, (double[3]){0, 0, 0});
     s.ball.scene.light_count = 1;
-    s.ball.scene.lights = &lamp;
+    s.ball.scene.lights = &light;
     pass_open(&context, language);
     if (odd_state >= 0) odd_set(&o, desktop, odd_state);
     if (odd_state >= 0 && desktop) glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);

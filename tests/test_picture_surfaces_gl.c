@@ -1,5 +1,5 @@
-/* Light on surfaces is that of the CPU: thin cards, round and flat surfaces, under a sun and among lamps, with what they
- * shade. The argument `all` tries more. (The demo scenes are in test_picture_gl.c.) */
+/* Light on surfaces is that of the CPU: thin cards, round and flat surfaces, under a sun and among point lights, with
+ * what they shade. The argument `all` tries more. (The demo scenes are in test_picture_gl.c.) */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -437,7 +437,7 @@ typedef struct stage {
     float balls[BALLS][BALL_VERTICES][3];
     uint32_t ball_indices[3 * BALL_TRIANGLES];
     nebel_mesh meshes[MESHES];
-    nebel_light lamps[2];
+    nebel_light lights[2];
     nebel_scene_data scene;
 } stage;
 
@@ -501,7 +501,7 @@ static nebel_mesh ball_of(stage *s, int number, uint64_t *numbers)
                         .texture = -1};
 }
 
-/* Odd ones have the sun alone, and those that two divides the lamps; those that four divides have both. */
+/* Odd ones have the sun alone, and those that two divides the point lights; those that four divides have both. */
 static void set_stage(stage *s, int number)
 {
     static const float floor[4][3] = {{-6, -.5f, -6}, {-6, -.5f, 6}, {6, -.5f, 6}, {6, -.5f, -6}};
@@ -512,12 +512,12 @@ static void set_stage(stage *s, int number)
     memcpy(s->floor, floor, sizeof floor);
     s->meshes[CARDS + BALLS] = card_of(s->floor, NULL);
     for (int i = 0; i < 2; i++) {
-        s->lamps[i] = (nebel_light){.type = i == 0 ? NEBEL_LIGHT_POINT : NEBEL_LIGHT_SPOT,
-                                    .position = {dice(&numbers, -3, 3), 4, dice(&numbers, -3, 3)},
-                                    .intensity = {12, 10, 8},
-                                    .direction = {0, -1, .1},
-                                    .inner_angle = 30,
-                                    .outer_angle = 60};
+        s->lights[i] = (nebel_light){.type = i == 0 ? NEBEL_LIGHT_POINT : NEBEL_LIGHT_SPOT,
+                                     .position = {dice(&numbers, -3, 3), 4, dice(&numbers, -3, 3)},
+                                     .intensity = {12, 10, 8},
+                                     .direction = {0, -1, .1},
+                                     .inner_angle = 30,
+                                     .outer_angle = 60};
     }
     s->scene =
         (nebel_scene_data){.ambient = {.1, .12, .15},
@@ -527,7 +527,7 @@ static void set_stage(stage *s, int number)
                            .sun_direction = {dice(&numbers, -1, 1), dice(&numbers, .2, 1), dice(&numbers, -1, 1)},
                            .sun_irradiance = {4, 3, 2},
                            .light_count = number % 2 == 0 ? 2 : 0,
-                           .lights = s->lamps};
+                           .lights = s->lights};
 }
 
 static void add(picture_light *all, const picture_light *d)

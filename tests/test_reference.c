@@ -327,9 +327,9 @@ static estimate measure_flux(const layer *l, int above, uint32_t paths)
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, &fog, 1);
     static nb_single_ray lone;
     static const nb_geometry nothing;
-    static const nebel_scene_data no_lamps;
+    static const nebel_scene_data no_lights;
     const nb_path_scene world = {.media.fog = snapshot,
-                                 .scene = &no_lamps,
+                                 .scene = &no_lights,
                                  .geometry = &nothing,
                                  .to_sun = {sqrt(1 - l->sun * l->sun), l->sun, 0},
                                  .sun = {1 / l->sun, 0, 0},

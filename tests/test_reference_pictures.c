@@ -1,7 +1,7 @@
-/* Example scenes with shafts, lamps and voxels, the exact method at its default tolerance against the reference at one
- * bounce: the root of the mean square of their difference as it is shown. Two pictures of the reference, of other
- * chances, stand in for one without noise: the mean product of the differences from each is that square, without bias.
- * The first argument says how many times more samples than in passing, at most 4096 in all. */
+/* Example scenes with shafts, point lights and voxels, the exact method at its default tolerance against the reference
+ * at one bounce: the root of the mean square of their difference as it is shown. Two pictures of the reference, of
+ * other chances, stand in for one without noise: the mean product of the differences from each is that square, without
+ * bias. The first argument says how many times more samples than in passing, at most 4096 in all. */
 #include "unit.h"
 
 #include <nebel/render.h>
@@ -77,7 +77,7 @@ static void compare(const char *name, const char *path)
 
 EXAMPLE(shafts, "sun-shafts")
 EXAMPLE(leaves, "foliage")
-EXAMPLE(lamps, "street-lamps")
+EXAMPLE(lights, "street-lamps")
 EXAMPLE(voxels, "smoke")
 EXAMPLE(wisps, "wisps")
 
@@ -85,7 +85,7 @@ int main(int count, char **words)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shafts_are_those_of_the_reference), cmocka_unit_test(leaves_are_those_of_the_reference),
-        cmocka_unit_test(lamps_are_those_of_the_reference),  cmocka_unit_test(voxels_are_those_of_the_reference),
+        cmocka_unit_test(lights_are_those_of_the_reference), cmocka_unit_test(voxels_are_those_of_the_reference),
         cmocka_unit_test(wisps_are_those_of_the_reference),
     };
     if (count > 1) samples *= (uint32_t)strtoul(words[1], NULL, 10);

@@ -9,7 +9,7 @@ enum {
     PIXELS = WIDTH * HEIGHT,
     MOST_VOLUMES = 4,
     MOST_MESHES = 3,
-    MOST_LAMPS = 2
+    MAX_LIGHTS = 2
 };
 
 static uint32_t samples = 128, pictures = 1;
@@ -21,7 +21,7 @@ typedef struct trial {
     size_t volume_count;
     nebel_volume_desc volumes[MOST_VOLUMES];
     nebel_mesh meshes[MOST_MESHES];
-    nebel_light lamps[MOST_LAMPS];
+    nebel_light lights[MAX_LIGHTS];
 } trial;
 
 static void set_rgb(double rgb[3], double r, double g, double b)
@@ -191,23 +191,23 @@ static trial cloud_of_voxels(void)
     return t;
 }
 
-static void add_lamps(trial *t)
+static void add_lights(trial *t)
 {
     t->scene.light_count = 2;
-    t->lamps[0] = (nebel_light){.position = {-1, 1.5, 1}, .intensity = {4, 3, 2}, .radius = .05};
-    t->lamps[1] = (nebel_light){.type = NEBEL_LIGHT_SPOT,
-                                .position = {2, 4, 0},
-                                .intensity = {5, 10, 15},
-                                .direction = {-1, -3, .5},
-                                .inner_angle = 15,
-                                .outer_angle = 40};
+    t->lights[0] = (nebel_light){.position = {-1, 1.5, 1}, .intensity = {4, 3, 2}, .radius = .05};
+    t->lights[1] = (nebel_light){.type = NEBEL_LIGHT_SPOT,
+                                 .position = {2, 4, 0},
+                                 .intensity = {5, 10, 15},
+                                 .direction = {-1, -3, .5},
+                                 .inner_angle = 15,
+                                 .outer_angle = 40};
 }
 
-/* Two fogs through each other, one of them with a lamp within. */
-static trial lamps_in_fog(void)
+/* Two fogs through each other, one of them with a point light within. */
+static trial lights_in_fog(void)
 {
-    trial t = start("lamps");
-    add_lamps(&t);
+    trial t = start("point lights");
+    add_lights(&t);
     t.scene.has_sun = 0;
     set_rgb(t.scene.sun_irradiance, 0, 0, 0);
     add_mesh(&t, test_ground());
@@ -220,21 +220,21 @@ static trial lamps_in_fog(void)
 }
 
 /* The column's shadows are in fog. */
-static trial lamps_behind_a_column(void)
+static trial lights_behind_a_column(void)
 {
-    trial t = lamps_in_fog();
+    trial t = lights_in_fog();
     t.name = "column";
-    t.lamps[0].position[0] = -2;
+    t.lights[0].position[0] = -2;
     add_mesh(&t, barrel.mesh);
     return t;
 }
 
 /* Fog takes its colour, and the surfaces their shadows. */
-static trial lamps_on_surfaces(void)
+static trial lights_on_surfaces(void)
 {
     trial t = start("shadows");
-    add_lamps(&t);
-    t.lamps[0].position[0] = -3;
+    add_lights(&t);
+    t.lights[0].position[0] = -3;
     add_mesh(&t, test_ground());
     add_mesh(&t, barrel.mesh);
     add(&t, .05, 0)->shape = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .radius = 6};
@@ -285,7 +285,7 @@ static void take(const trial *t, nebel_method method, uint32_t seed, float *colo
     nebel_lighting_desc lights = {
         .sun.direction = {t->scene.sun_direction[0], t->scene.sun_direction[1], t->scene.sun_direction[2]},
         .environment = t->scene.environment,
-        .lights = t->lamps,
+        .lights = t->lights,
         .light_count = t->scene.light_count};
     memcpy(lights.sun.irradiance, t->scene.sun_irradiance, sizeof lights.sun.irradiance);
     if (lights.environment.type == NEBEL_ENVIRONMENT_CONSTANT)
@@ -293,7 +293,7 @@ static void take(const trial *t, nebel_method method, uint32_t seed, float *colo
     nebel_lighting *fog = fog_commit_lit(&(nebel_fog_desc){0}, t->volumes, t->volume_count, &lights);
     nebel_scene_data scene = t->scene;
     scene.meshes = t->meshes;
-    scene.lights = t->lamps;
+    scene.lights = t->lights;
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){.thread_count = 0}, &renderer),
                      NEBEL_OK);
@@ -370,9 +370,9 @@ TRIAL(distances)
 TRIAL(against_the_sun)
 TRIAL(panorama)
 TRIAL(cloud_of_voxels)
-TRIAL(lamps_in_fog)
-TRIAL(lamps_behind_a_column)
-TRIAL(lamps_on_surfaces)
+TRIAL(lights_in_fog)
+TRIAL(lights_behind_a_column)
+TRIAL(lights_on_surfaces)
 TRIAL(gradient)
 TRIAL(environment)
 
@@ -390,9 +390,9 @@ int main(int count, char **words)
         cmocka_unit_test(against_the_sun_agrees),
         cmocka_unit_test(panorama_agrees),
         cmocka_unit_test(cloud_of_voxels_agrees),
-        cmocka_unit_test(lamps_in_fog_agrees),
-        cmocka_unit_test(lamps_behind_a_column_agrees),
-        cmocka_unit_test(lamps_on_surfaces_agrees),
+        cmocka_unit_test(lights_in_fog_agrees),
+        cmocka_unit_test(lights_behind_a_column_agrees),
+        cmocka_unit_test(lights_on_surfaces_agrees),
         cmocka_unit_test(gradient_agrees),
         cmocka_unit_test(environment_agrees),
     };

@@ -454,7 +454,7 @@ static void fog_in_the_dark_is_as_exact(void **state)
     nebel_release_lighting(snapshot);
 }
 
-/* A ball of black fog 5 m over the ground, in the sun and beside a lamp. */
+/* A ball of black fog 5 m over the ground, in the sun and beside a point light. */
 static nebel_lighting *black_ball(const double shift[3])
 {
     const nebel_volume_desc ball = {
@@ -467,7 +467,7 @@ static nebel_lighting *black_ball(const double shift[3])
 static test_picture render_shadow(const double shift[3], const nebel_mesh *mesh)
 {
     const double to_sun[3] = {.48, .6, -.64};
-    nebel_light lamp = {.position = {shift[0] + 6, shift[1] + 7, shift[2] - 8}, .intensity = {300, 300, 300}};
+    nebel_light light = {.position = {shift[0] + 6, shift[1] + 7, shift[2] - 8}, .intensity = {300, 300, 300}};
     nebel_camera camera = planet_camera(14, -1);
     world w;
     make_world("moon", to_sun, &w);
@@ -479,7 +479,7 @@ static test_picture render_shadow(const double shift[3], const nebel_mesh *mesh)
     assert_int_equal(nebel_create_atmosphere(&w.planet.atmosphere_desc, &w.atmosphere), NEBEL_OK);
     w.planet.atmosphere = w.atmosphere;
     w.scene.light_count = 1;
-    w.scene.lights = &lamp;
+    w.scene.lights = &light;
     w.scene.mesh_count = mesh != NULL;
     w.scene.meshes = mesh;
     nebel_lighting *fog = black_ball(shift);

@@ -32,7 +32,7 @@ typedef struct change {
     nebel_d3d9_fog device;
     float table[NEBEL_CURVE_ENTRIES];
     nebel_scene_model models[MOST];
-    nebel_light lamps[MOST];
+    nebel_light lights[MOST];
     nebel_planet planets[NEBEL_MAX_PLANETS];
     nebel_camera_key camera_keys[MOST];
     char names[3 * MOST][32];
@@ -253,21 +253,21 @@ static void change_models(change *c)
     c->data.models = c->models;
 }
 
-static void change_lamps(change *c)
+static void change_lights(change *c)
 {
     for (size_t i = 0; i < c->data.light_count; i++) {
-        nebel_light *lamp = &c->lamps[i];
-        *lamp = c->data.lights[i];
-        nb_file_units_convert_place(&half, lamp->position);
-        dim(lamp->intensity);
-        lamp->radius = lamp->radius > 0 ? 2 * lamp->radius : .25;
-        if (lamp->type != NEBEL_LIGHT_SPOT) continue;
-        const double direction[3] = {lamp->direction[1], lamp->direction[2], lamp->direction[0]};
-        memcpy(lamp->direction, direction, sizeof direction);
-        lamp->outer_angle = (lamp->outer_angle + 180) / 2;
-        lamp->inner_angle = (lamp->inner_angle + 1) / 2;
+        nebel_light *light = &c->lights[i];
+        *light = c->data.lights[i];
+        nb_file_units_convert_place(&half, light->position);
+        dim(light->intensity);
+        light->radius = light->radius > 0 ? 2 * light->radius : .25;
+        if (light->type != NEBEL_LIGHT_SPOT) continue;
+        const double direction[3] = {light->direction[1], light->direction[2], light->direction[0]};
+        memcpy(light->direction, direction, sizeof direction);
+        light->outer_angle = (light->outer_angle + 180) / 2;
+        light->inner_angle = (light->inner_angle + 1) / 2;
     }
-    c->data.lights = c->lamps;
+    c->data.lights = c->lights;
 }
 
 static void change_air(nebel_atmosphere_component *air)
@@ -338,7 +338,7 @@ static void change_all(change *c)
     change_classic(c);
     change_camera(c);
     change_models(c);
-    change_lamps(c);
+    change_lights(c);
     change_planets(c);
     dim(data->background);
     dim(data->ambient);
@@ -544,7 +544,7 @@ static void same_models(const nebel_scene_data *a, const nebel_scene_data *b)
 }
 
 /* Directions are made unit ones, which rounds all their numbers alike. */
-static void same_lamps(const nebel_scene_data *a, const nebel_scene_data *b)
+static void same_lights(const nebel_scene_data *a, const nebel_scene_data *b)
 {
     WHOLE(a->light_count, b->light_count);
     for (size_t i = 0; i < a->light_count; i++) {
@@ -644,7 +644,7 @@ static void same_data(const nebel_scene_data *a, const nebel_scene_data *b)
     same_nebulae(a, b);
     same_cells(a, b);
     same_models(a, b);
-    same_lamps(a, b);
+    same_lights(a, b);
     same_planets(a, b);
     WHOLE(a->classic == NULL, b->classic == NULL);
     if (a->classic == NULL) return;

@@ -700,15 +700,15 @@ static void test_what_is_refused(void **state)
 static void test_another_file_is_refused(void **state)
 {
     (void)state;
-#define LAMP(type, more)                                                                                               \
+#define LIGHT(type, more)                                                                                              \
     "\"lights\": [{\"type\": \"" type "\", \"position\": [0, 9, 0], \"intensity\": 5" more "}], \"fog\": []"
 #define MODEL(name) "\"models\": [{\"file\": \"" name "\"}], \"fog\": []"
     static const struct {
         const char *before, *now, *message;
     } cases[] = {
-        {SCENE(LAMP("point", "")), SCENE(LAMP("spot", ", \"direction\": [0, -1, 0], \"outer_angle\": 30")),
-         "another lamp"},
-        {SCENE(LAMP("point", "")), SCENE("\"fog\": []"), "has 0 lamps where 1 were"},
+        {SCENE(LIGHT("point", "")), SCENE(LIGHT("spot", ", \"direction\": [0, -1, 0], \"outer_angle\": 30")),
+         "another light"},
+        {SCENE(LIGHT("point", "")), SCENE("\"fog\": []"), "has 0 lights where 1 were"},
         {SCENE(MODEL("a.obj")), SCENE(MODEL("b.obj")), "another model"},
         {SCENE(MODEL("a.obj")), SCENE("\"fog\": []"), "has 0 models where 1 were"},
         {SCENE("\"ambient\": 1, \"fog\": []"),

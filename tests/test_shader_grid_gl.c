@@ -220,34 +220,35 @@ static void test_sunlit_dense_voxels(void **unused)
     nb_gl_close(&t.gl);
 }
 
-/* ---- lamps ----------------------------------------------------------------------------------- */
+/* ---- point lights ----------------------------------------------------------------------------------- */
 
 /* A ball in the puff and a spot beside it that shines through it. */
-static nebel_lighting *commit_lamplit(const nebel_volume_desc *volumes, size_t count)
+static nebel_lighting *commit_point_lit(const nebel_volume_desc *volumes, size_t count)
 {
-    const nebel_light lamps[2] = {{.position = {1, -.5, .8}, .intensity = {9, 6, 3}, .radius = .1},
-                                  {.type = NEBEL_LIGHT_SPOT,
-                                   .position = {-9, 3, 2},
-                                   .intensity = {200, 250, 300},
-                                   .direction = {9, -2.5, -2},
-                                   .inner_angle = 20,
-                                   .outer_angle = 40}};
-    const nebel_lighting_desc lights = {.environment = {.radiance = {.1, .12, .15}}, .lights = lamps, .light_count = 2};
+    const nebel_light point_lights[2] = {{.position = {1, -.5, .8}, .intensity = {9, 6, 3}, .radius = .1},
+                                         {.type = NEBEL_LIGHT_SPOT,
+                                          .position = {-9, 3, 2},
+                                          .intensity = {200, 250, 300},
+                                          .direction = {9, -2.5, -2},
+                                          .inner_angle = 20,
+                                          .outer_angle = 40}};
+    const nebel_lighting_desc lights = {
+        .environment = {.radiance = {.1, .12, .15}}, .lights = point_lights, .light_count = 2};
     return fog_light(&lights, volumes, count);
 }
 
-static void test_lamplit_puff(void **unused)
+static void test_point_lit_puff(void **unused)
 {
     (void)unused;
     for (int i = 0; i < (tries_all ? 4 : 2); i++) {
         nebel_grid *grid = make_puff(i % 2 == 0 ? NEBEL_GRID_FILTER_LINEAR : NEBEL_GRID_FILTER_NEAREST);
         const nebel_volume_desc volumes[] = {cloud_of(grid, i < 2 ? 2 : .4),
                                              {.extinction = {.02, .02, .03}, .albedo = {.9, .9, .9}}};
-        nebel_lighting *lighting = commit_lamplit(volumes, i == 0 ? 1 : 2);
+        nebel_lighting *lighting = commit_point_lit(volumes, i == 0 ? 1 : 2);
         const double *eye = i == 0 ? amid : before;
         camera_rays(eye, origin, (uint64_t)i);
         keep_rays(tries_all ? RAYS : 192, eye);
-        trace_packed(lighting, eye, 1, i % 2 == 0 ? "lamplit puff" : "lamplit puff of nearest voxels",
+        trace_packed(lighting, eye, 1, i % 2 == 0 ? "point-lit puff" : "point-lit puff of nearest voxels",
                      i % 2 == 0 ? NB_GL_300ES : NB_GL_330);
         nebel_release_lighting(lighting);
         nebel_release_grid(grid);
@@ -260,7 +261,7 @@ int main(int argc, char **argv)
     tries_all = argc > 1;
     if (argc > 2) cmocka_set_test_filter(argv[2]);
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_grids),
-                                       cmocka_unit_test(test_lamplit_puff),
+                                       cmocka_unit_test(test_point_lit_puff),
                                        cmocka_unit_test(test_sunlit_puff),
                                        cmocka_unit_test(test_sunlit_dense_voxels),
                                        cmocka_unit_test(test_sunlit_noise_among_others),

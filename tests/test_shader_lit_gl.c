@@ -23,7 +23,7 @@ static nebel_lighting *commit_case(const lit_case *c, int beside_voxels)
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;
     const nebel_lighting_desc lights = {
-        .sun = c->sun, .lights = &c->lamp, .light_count = c->lamp.intensity[0] > 0 ? 1 : 0};
+        .sun = c->sun, .lights = &c->point_light, .light_count = c->point_light.intensity[0] > 0 ? 1 : 0};
     assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &made), NEBEL_OK);
     assert_int_equal(nebel_add_volume(made, &c->volume, NULL), NEBEL_OK);
     nebel_grid *const grid = beside_voxels ? add_voxels(made) : NULL;
@@ -36,12 +36,12 @@ static nebel_lighting *commit_case(const lit_case *c, int beside_voxels)
 }
 
 /* One program of what all of them need. */
-static void open_cases(tracer *t, int is_lamplit, int beside_voxels)
+static void open_cases(tracer *t, int is_point_lit, int beside_voxels)
 {
     char defines[128];
     uint32_t features = 0;
     for (size_t i = 0; i < LIT_CASES; i++) {
-        if ((lit_cases[i].lamp.intensity[0] > 0) != is_lamplit) continue;
+        if ((lit_cases[i].point_light.intensity[0] > 0) != is_point_lit) continue;
         nebel_lighting *lighting = commit_case(&lit_cases[i], beside_voxels);
         features |= nebel_pack_features(lighting);
         nebel_release_lighting(lighting);
@@ -70,14 +70,14 @@ static int is_skin_of_floats(const lit_case *c)
 }
 
 /* Within 1/255 of it, and a thousandth of the tolerance that is packed. */
-static int try_cases(int is_lamplit, int beside_voxels)
+static int try_cases(int is_point_lit, int beside_voxels)
 {
     int wrong = 0;
     tracer t;
-    open_cases(&t, is_lamplit, beside_voxels);
+    open_cases(&t, is_point_lit, beside_voxels);
     for (size_t i = 0; i < LIT_CASES; i++) {
         const lit_case *c = &lit_cases[i];
-        if ((c->lamp.intensity[0] > 0) != is_lamplit || !is_skin_of_floats(c)) continue;
+        if ((c->point_light.intensity[0] > 0) != is_point_lit || !is_skin_of_floats(c)) continue;
         const double light = trace_case(&t, c, beside_voxels), off = fabs(light - c->right);
         print_message("%s%s: %g for %g, off by %.1e, %.1e of it\n", c->name, beside_voxels ? ", beside voxels" : "",
                       light, c->right, off, off / c->right);
@@ -93,15 +93,15 @@ static void sunlight_of_small_places_is_found(void **state)
     assert_int_equal(try_cases(0, 0), 0);
 }
 
-static void lamplight_of_small_places_is_found_beside_voxels(void **state)
+static void point_light_of_small_places_is_found_beside_voxels(void **state)
 {
     (void)state;
     assert_int_equal(try_cases(1, 1), 0);
 }
 
-/* Ever lower lamps, whose light falls off ever faster than what is seen, against nebel_trace in double: within 1/255 of it and a
- * tenth of the step of a picture of bytes. */
-static void grazing_lamplight_is_found_beside_voxels(void **state)
+/* Ever lower point lights, whose light falls off ever faster than what is seen, against nebel_trace in double: within
+ * 1/255 of it and a tenth of the step of a picture of bytes. */
+static void grazing_point_light_is_found_beside_voxels(void **state)
 {
     (void)state;
     int wrong = 0;
@@ -112,7 +112,7 @@ static void grazing_lamplight_is_found_beside_voxels(void **state)
         lit_case c = {.volume = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-1, -1, -1}, .max = {1, 0, 1}},
                                  .extinction = LIT_GRAY(300),
                                  .albedo = LIT_GRAY(1)},
-                      .lamp = {.position = {far, .4, 0}, .intensity = LIT_GRAY(far * far * 100)},
+                      .point_light = {.position = {far, .4, 0}, .intensity = LIT_GRAY(far * far * 100)},
                       .ray = {{0, 5, 0}, {0, -1, 0}, HUGE_VAL}};
         nebel_lighting *lighting = commit_case(&c, 1);
         fog_trace(lighting, precise, 1, &c.ray, transfers);
@@ -129,7 +129,7 @@ static void grazing_lamplight_is_found_beside_voxels(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(sunlight_of_small_places_is_found),
-                                       cmocka_unit_test(lamplight_of_small_places_is_found_beside_voxels),
-                                       cmocka_unit_test(grazing_lamplight_is_found_beside_voxels)};
+                                       cmocka_unit_test(point_light_of_small_places_is_found_beside_voxels),
+                                       cmocka_unit_test(grazing_point_light_is_found_beside_voxels)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* What Embree sees of the sun and of lamps from a place. */
+/* What Embree sees of the sun and of point lights from a place. */
 #ifndef TEST_SHADOWS_H
 #define TEST_SHADOWS_H
 
@@ -28,21 +28,21 @@ static inline int is_in_shadow(const nb_geometry *geometry, const float place[3]
     return is_hidden(geometry, place, sun, INFINITY);
 }
 
-/* Of the lamp, relative to the place; its length. */
-static inline double way_to_lamp(const nb_geometry *geometry, const float place[3], const nebel_light *lamp,
-                                 double way[3])
+/* Of the point light, relative to the place; its length. */
+static inline double way_to_light(const nb_geometry *geometry, const float place[3], const nebel_light *light,
+                                  double way[3])
 {
-    for (int i = 0; i < 3; i++) way[i] = lamp->position[i] - geometry->origin[i] - (double)place[i];
+    for (int i = 0; i < 3; i++) way[i] = light->position[i] - geometry->origin[i] - (double)place[i];
     const double distance = nb_vector_length(way);
     nb_vector_make_unit(way);
     return distance;
 }
 
-static inline int is_in_shadow_of_lamp(const nb_geometry *geometry, const float place[3], const nebel_light *lamp)
+static inline int is_in_shadow_of_light(const nb_geometry *geometry, const float place[3], const nebel_light *light)
 {
     double way[3];
-    const double distance = way_to_lamp(geometry, place, lamp, way);
-    return distance > lamp->radius && is_hidden(geometry, place, way, (float)(distance - lamp->radius));
+    const double distance = way_to_light(geometry, place, light, way);
+    return distance > light->radius && is_hidden(geometry, place, way, (float)(distance - light->radius));
 }
 
 #endif

@@ -1,5 +1,5 @@
-/* Shadows of surfaces in fog that the sun or lamps light: ends against Embree's visibility, light against closed forms
- * and fine steps. */
+/* Shadows of surfaces in fog that the sun or point lights light: ends against Embree's visibility, light against
+ * closed forms and fine steps. */
 #include "test_shadows.h"
 
 #include "cpu/cpu_renderer.h"
@@ -83,9 +83,9 @@ static float shadow_at(const nebel_ray_visibility *lit, int ray, float t)
     return dark;
 }
 
-/* `lamp` NULL: the sun. */
+/* `point_light` NULL: the sun. */
 static void compare_places(trial *run, const nb_geometry *geometry, const nebel_ray_visibility *lit,
-                           const double sun[3], const nebel_light *lamp, int ray, uint64_t *numbers)
+                           const double sun[3], const nebel_light *light, int ray, uint64_t *numbers)
 {
     const float skipped = (float)run->view.advance * run->rays.length[ray],
                 far = fminf(run->distance[ray], skipped + 60);
@@ -95,7 +95,7 @@ static void compare_places(trial *run, const nb_geometry *geometry, const nebel_
         if (isnan(expected)) continue;
         for (int i = 0; i < 3; i++) place[i] = run->rays.start[i][ray] + (t - skipped) * run->rays.unit[i][ray];
         const int dark =
-            lamp != NULL ? is_in_shadow_of_lamp(geometry, place, lamp) : is_in_shadow(geometry, place, sun);
+            light != NULL ? is_in_shadow_of_light(geometry, place, light) : is_in_shadow(geometry, place, sun);
         run->shadows += (size_t)dark;
         run->wrong += dark != (expected > 0);
     }
@@ -350,24 +350,24 @@ static void ends_among_leaves_are_those_of_visibility(void **state)
     end_trial(&run);
 }
 
-enum { LAMPS = 4 };
+enum { LIGHTS = 4 };
 
-static nebel_lighting *lamplit_fog(const nebel_volume_desc *volume, size_t count, const nebel_light *lamps)
+static nebel_lighting *point_lit_fog(const nebel_volume_desc *volume, size_t count, const nebel_light *point_lights)
 {
-    const nebel_lighting_desc lights = {.lights = lamps, .light_count = count};
+    const nebel_lighting_desc lights = {.lights = point_lights, .light_count = count};
     return fog_commit_lit(&(nebel_fog_desc){0}, volume, 1, &lights);
 }
 
-/* Lamps among the triangles; the larger ones have some of them within their radius, wholly or in part. */
-static void draw_lamps(uint64_t *numbers, nebel_light *lamps)
+/* Point lights among the triangles; the larger ones have some of them within their radius, wholly or in part. */
+static void draw_lights(uint64_t *numbers, nebel_light *lights)
 {
-    for (int i = 0; i < LAMPS; i++) {
-        lamps[i] = (nebel_light){.intensity = {1, 1, 1}, .radius = i > 0 ? pow(10, dice(numbers, -2, 0.5)) : 0};
-        for (int c = 0; c < 3; c++) lamps[i].position[c] = dice(numbers, -10, 10);
+    for (int i = 0; i < LIGHTS; i++) {
+        lights[i] = (nebel_light){.intensity = {1, 1, 1}, .radius = i > 0 ? pow(10, dice(numbers, -2, 0.5)) : 0};
+        for (int c = 0; c < 3; c++) lights[i].position[c] = dice(numbers, -10, 10);
     }
 }
 
-static void ends_of_lamplight_are_those_of_visibility(void **state)
+static void ends_of_point_light_are_those_of_visibility(void **state)
 {
     static float positions[3 * TRIANGLES][3];
     static holed h;
@@ -376,15 +376,15 @@ static void ends_of_lamplight_are_those_of_visibility(void **state)
     (void)state;
     for (uint64_t seed = 0; seed < 12; seed++) {
         uint64_t numbers = 37 * seed + 5;
-        nebel_light lamps[LAMPS];
+        nebel_light lights[LIGHTS];
         draw_triangles(&numbers, positions);
-        draw_lamps(&numbers, lamps);
+        draw_lights(&numbers, lights);
         positions[5][1] = NAN;
         set_holed(&h, seed, positions);
         const nebel_volume_desc volume = {.extinction = {1, 1, 1}, .albedo = {1, 1, 1}};
-        nebel_lighting *fog = lamplit_fog(&volume, LAMPS, lamps);
+        nebel_lighting *fog = point_lit_fog(&volume, LIGHTS, lights);
         nebel_camera camera = trial_camera(seed);
-        if (seed == 4) memcpy(camera.look_at, lamps[1].position, sizeof camera.look_at);
+        if (seed == 4) memcpy(camera.look_at, lights[1].position, sizeof camera.look_at);
         nb_geometry geometry = place_triangles(&h.scene, &camera, &run.view);
         assert_int_equal(nb_shadow_tree_set_lights(&run.tree, &geometry, 1), NEBEL_OK);
         nb_region_points points;
@@ -397,10 +397,10 @@ static void ends_of_lamplight_are_those_of_visibility(void **state)
                                                   run.view.advance, run.distance),
                              NEBEL_OK);
             run.boundaries += shafts.shafts.boundary_count;
-            for (int l = 0; l < LAMPS; l++)
+            for (int l = 0; l < LIGHTS; l++)
                 for (int i = 0; i < NB_BATCH; i++) {
                     expect_rising(&shafts.pieces[l], i);
-                    compare_places(&run, &geometry, &shafts.pieces[l], NULL, &lamps[l], i, &numbers);
+                    compare_places(&run, &geometry, &shafts.pieces[l], NULL, &lights[l], i, &numbers);
                 }
         }
         nb_shadow_tree_free(&run.tree, &geometry.allocator);
@@ -580,42 +580,42 @@ static void shafts_are_those_of_small_steps(void **state)
     test_picture_free(&picture);
 }
 
-/* Lamps between the pillars in even fog; one has a bulb of triangles around it, one shines down. */
-static void set_lamplit_pillars(pillars *p, nebel_light lamps[2])
+/* Point lights between the pillars in even fog; one has a bulb of triangles around it, one shines down. */
+static void set_point_lit_pillars(pillars *p, nebel_light lights[2])
 {
     const nebel_volume_desc volume = {.extinction = {.05, .05, .05}, .albedo = {1, 1, 1}};
     set_pillars(p);
     nebel_release_lighting(p->fog);
-    lamps[0] = (nebel_light){.position = {0.5, 5.2, 1}, .intensity = {50, 100, 150}, .radius = 0.3};
-    lamps[1] = (nebel_light){.type = NEBEL_LIGHT_SPOT,
-                             .position = {-7, 8, 6},
-                             .intensity = {80, 120, 20},
-                             .radius = 0.2,
-                             .direction = {0.3, -1, -0.6},
-                             .inner_angle = 30,
-                             .outer_angle = 50};
-    p->fog = lamplit_fog(&volume, 2, lamps);
+    lights[0] = (nebel_light){.position = {0.5, 5.2, 1}, .intensity = {50, 100, 150}, .radius = 0.3};
+    lights[1] = (nebel_light){.type = NEBEL_LIGHT_SPOT,
+                              .position = {-7, 8, 6},
+                              .intensity = {80, 120, 20},
+                              .radius = 0.2,
+                              .direction = {0.3, -1, -0.6},
+                              .inner_angle = 30,
+                              .outer_angle = 50};
+    p->fog = point_lit_fog(&volume, 2, lights);
 }
 
-/* What the lamp brings to a place, of intensity 1 on its axis, in even fog; see formulas/point_light.inc. */
-static double lamp_fluence(const nb_geometry *geometry, const float place[3], const nebel_light *lamp)
+/* What the point light brings to a place, of intensity 1 on its axis, in even fog; see formulas/point_light.inc. */
+static double light_fluence(const nb_geometry *geometry, const float place[3], const nebel_light *light)
 {
     double way[3], axis[3];
-    const double distance = way_to_lamp(geometry, place, lamp, way), outside = fmax(distance, lamp->radius);
-    const double share = lamp->radius / outside, clear = outside - lamp->radius;
+    const double distance = way_to_light(geometry, place, light, way), outside = fmax(distance, light->radius);
+    const double share = light->radius / outside, clear = outside - light->radius;
     double fluence = 2 / (outside * outside * (1 + sqrt(1 - share * share))) * exp(-.05 * clear);
-    if (lamp->type == NEBEL_LIGHT_SPOT) {
-        memcpy(axis, lamp->direction, sizeof axis);
+    if (light->type == NEBEL_LIGHT_SPOT) {
+        memcpy(axis, light->direction, sizeof axis);
         nb_vector_make_unit(axis);
-        const double edge = cos(lamp->outer_angle * test_pi / 180), inner = cos(lamp->inner_angle * test_pi / 180);
+        const double edge = cos(light->outer_angle * test_pi / 180), inner = cos(light->inner_angle * test_pi / 180);
         const double s = fmin(fmax((-nb_vector_dot(way, axis) - edge) / (inner - edge), 0), 1);
         fluence *= s * s * (3 - 2 * s);
     }
-    return is_in_shadow_of_lamp(geometry, place, lamp) ? 0 : fluence;
+    return is_in_shadow_of_light(geometry, place, light) ? 0 : fluence;
 }
 
-static double stepped_lamplight(const nb_geometry *geometry, const float from[3], const float way[3], double begin,
-                                double end, const nebel_light *lamps)
+static double stepped_point_light(const nb_geometry *geometry, const float from[3], const float way[3], double begin,
+                                  double end, const nebel_light *lights)
 {
     const double s = 0.05, h = (end - begin) / STEPS;
     double sum = 0;
@@ -624,20 +624,20 @@ static double stepped_lamplight(const nb_geometry *geometry, const float from[3]
         float place[3];
         for (int c = 0; c < 3; c++) place[c] = from[c] + (float)t * way[c];
         for (int l = 0; l < 2; l++)
-            sum += lamp_fluence(geometry, place, &lamps[l]) * lamps[l].intensity[1] * s * exp(-s * t) * h;
+            sum += light_fluence(geometry, place, &lights[l]) * lights[l].intensity[1] * s * exp(-s * t) * h;
     }
     return sum / (4 * test_pi);
 }
 
 /* Also says that shadows are there: without them a tenth of the pixels is off by far more. */
-static void lamp_shafts_are_those_of_small_steps(void **state)
+static void light_shafts_are_those_of_small_steps(void **state)
 {
     pillars p;
-    nebel_light lamps[2];
+    nebel_light lights[2];
     test_picture picture = test_picture_make(SIDE, SIDE);
     nebel_renderer *renderer = NULL;
     (void)state;
-    set_lamplit_pillars(&p, lamps);
+    set_point_lit_pillars(&p, lights);
     assert_int_equal(nebel_create_cpu_renderer(&p.scene, p.fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
     const nebel_frame_desc frame = {.camera = p.camera, .width = SIDE, .height = SIDE, .samples = 1};
     assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
@@ -661,8 +661,8 @@ static void lamp_shafts_are_those_of_small_steps(void **state)
                 way[c] = rays.unit[c][i];
             }
             const double length = fmin((double)test_depth(&picture, x, y), 200);
-            const double light = stepped_lamplight(&renderer->geometry, from, way, 0, fmin(length, 50), lamps) +
-                                 stepped_lamplight(&renderer->geometry, from, way, fmin(length, 50), length, lamps);
+            const double light = stepped_point_light(&renderer->geometry, from, way, 0, fmin(length, 50), lights) +
+                                 stepped_point_light(&renderer->geometry, from, way, fmin(length, 50), length, lights);
             const double off = fabs((double)test_in_scattering(&picture, x, y)[1] - light);
             worst = fmax(worst, off);
             square += off * off;
@@ -690,13 +690,13 @@ static void lamp_shafts_are_those_of_small_steps(void **state)
 static void threads_give_the_same_shafts(void **state)
 {
     pillars p;
-    nebel_light lamps[2];
+    nebel_light lights[2];
     test_picture one = test_picture_make(2 * NB_REGION + 5, NB_REGION + 3),
                  three = test_picture_make(one.width, one.height);
     (void)state;
-    for (int lamplit = 0; lamplit < 2; lamplit++) {
-        if (lamplit)
-            set_lamplit_pillars(&p, lamps);
+    for (int point_lit = 0; point_lit < 2; point_lit++) {
+        if (point_lit)
+            set_point_lit_pillars(&p, lights);
         else
             set_pillars(&p);
         test_render(&p.scene, p.fog, &(nebel_cpu_renderer_desc){.thread_count = 1}, &p.camera, 2, &one);
@@ -739,13 +739,13 @@ static size_t lose_memory(const pillars *p)
 static void lost_memory_is_told(void **state)
 {
     pillars p;
-    nebel_light lamps[2];
+    nebel_light lights[2];
     (void)state;
     set_pillars(&p);
     assert_true(lose_memory(&p) >= 10); /* the tree's eight, shadows, and what boundaries are made in */
     nebel_release_lighting(p.fog);
-    set_lamplit_pillars(&p, lamps);
-    assert_true(lose_memory(&p) >= 12); /* and the lamps' pieces, and their numbers */
+    set_point_lit_pillars(&p, lights);
+    assert_true(lose_memory(&p) >= 12); /* and the point lights' pieces, and their numbers */
     nebel_release_lighting(p.fog);
 }
 
@@ -757,10 +757,10 @@ int main(void)
         cmocka_unit_test(ends_before_surfaces_are_those_of_visibility),
         cmocka_unit_test(ends_before_hills_are_those_of_visibility),
         cmocka_unit_test(ends_among_leaves_are_those_of_visibility),
-        cmocka_unit_test(ends_of_lamplight_are_those_of_visibility),
+        cmocka_unit_test(ends_of_point_light_are_those_of_visibility),
         cmocka_unit_test(the_shadow_of_a_box_is_cut_out),
         cmocka_unit_test(shafts_are_those_of_small_steps),
-        cmocka_unit_test(lamp_shafts_are_those_of_small_steps),
+        cmocka_unit_test(light_shafts_are_those_of_small_steps),
         cmocka_unit_test(threads_give_the_same_shafts),
         cmocka_unit_test(lost_memory_is_told),
     };

@@ -1,5 +1,5 @@
 /* Bodies so dense that only a skin of them is lit, in shaders against nebel_trace in double: of any shape and size, lit by the sun and by
- * lamps, seen from outside and from within. */
+ * point lights, seen from outside and from within. */
 #include "shader_help.h"
 
 enum { EACH = 32 };
@@ -7,7 +7,7 @@ enum { EACH = 32 };
 typedef enum eye_place { OUTSIDE, WITHIN, EYE_PLACES } eye_place;
 
 static const char *const eye_names[EYE_PLACES] = {"from outside", "from within"};
-static const char *const light_names[2] = {"sun", "lamps"};
+static const char *const light_names[2] = {"sun", "point lights"};
 
 static const nebel_shape_type types[] = {NEBEL_SHAPE_SPHERE,     NEBEL_SHAPE_ELLIPSOID, NEBEL_SHAPE_BOX,
                                          NEBEL_SHAPE_HALF_SPACE, NEBEL_SHAPE_CONVEX,    NEBEL_SHAPE_CYLINDER,
@@ -19,7 +19,7 @@ static const char *const type_names[TYPES] = {"ball",     "ellipsoid", "box",  "
 /* A body's radius is that of a ball around it. A skin's depth is extinction times radius. */
 typedef struct skin {
     double radius, depth, center[3], eye[3];
-    int by_lamps, kind, is_turned;
+    int by_lights, kind, is_turned;
     eye_place place;
 } skin;
 
@@ -30,10 +30,10 @@ static void turn_any(uint64_t *state, double size, double v[3])
     for (int k = 0; k < 3; k++) v[k] *= size / sqrt(length);
 }
 
-static skin draw_skin(uint64_t seed, int by_lamps, int kind, eye_place place)
+static skin draw_skin(uint64_t seed, int by_lights, int kind, eye_place place)
 {
     uint64_t state = seed;
-    skin s = {.by_lamps = by_lamps, .place = place, .kind = kind, .is_turned = seed % 3 == 0};
+    skin s = {.by_lights = by_lights, .place = place, .kind = kind, .is_turned = seed % 3 == 0};
     s.radius = pow(10, dice(&state, -3, 4));
     s.depth = fmin(pow(10, dice(&state, 3, 8)), .99 * NEBEL_MAX_AMOUNT * s.radius);
     turn_any(&state, s.radius * dice(&state, 0, 50), s.center);
@@ -96,21 +96,21 @@ static nebel_shape shape_of(const skin *s, uint64_t *state)
     return shape;
 }
 
-/* Lamps shine on the surface about as brightly as the sun; for an eye within one is near it. */
-static void place_lamps(const skin *s, uint64_t *state, nebel_light lamps[2])
+/* Point lights shine on the surface about as brightly as the sun; for an eye within one is near it. */
+static void place_lights(const skin *s, uint64_t *state, nebel_light lights[2])
 {
-    lamps[0] = (nebel_light){.type = NEBEL_LIGHT_POINT};
-    lamps[1] = (nebel_light){.type = NEBEL_LIGHT_SPOT, .inner_angle = 20, .outer_angle = 60};
+    lights[0] = (nebel_light){.type = NEBEL_LIGHT_POINT};
+    lights[1] = (nebel_light){.type = NEBEL_LIGHT_SPOT, .inner_angle = 20, .outer_angle = 60};
     for (int i = 0; i < 2; i++) {
         double away = s->radius * dice(state, 1.3, 6);
-        turn_any(state, away, lamps[i].position);
-        if (s->place == WITHIN && i == 0) turn_any(state, away = 2 * s->radius / s->depth, lamps[i].position);
+        turn_any(state, away, lights[i].position);
+        if (s->place == WITHIN && i == 0) turn_any(state, away = 2 * s->radius / s->depth, lights[i].position);
         for (int k = 0; k < 3; k++) {
-            lamps[i].direction[k] = -lamps[i].position[k];
-            lamps[i].position[k] += s->place == WITHIN && i == 0 ? s->eye[k] : s->center[k];
-            lamps[i].intensity[k] = fmin(3 * away * away, NEBEL_MAX_AMOUNT);
+            lights[i].direction[k] = -lights[i].position[k];
+            lights[i].position[k] += s->place == WITHIN && i == 0 ? s->eye[k] : s->center[k];
+            lights[i].intensity[k] = fmin(3 * away * away, NEBEL_MAX_AMOUNT);
         }
-        lamps[i].radius = fmax(1e-3, .02 * away);
+        lights[i].radius = fmax(1e-3, .02 * away);
     }
 }
 
@@ -123,11 +123,11 @@ static nebel_lighting *commit_skin(const skin *s, uint64_t seed)
                                 .albedo = {.9, .9, .8},
                                 .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .4}};
     nebel_sun sun = {.irradiance = {3, 3, 2}};
-    nebel_light lamps[2];
-    nebel_lighting_desc lights = {.lights = lamps};
+    nebel_light point_lights[2];
+    nebel_lighting_desc lights = {.lights = point_lights};
     turn_any(&state, 1, sun.direction);
-    if (s->by_lamps) {
-        place_lamps(s, &state, lamps);
+    if (s->by_lights) {
+        place_lights(s, &state, point_lights);
         lights.light_count = 2;
     } else {
         lights.sun = sun;
@@ -165,22 +165,22 @@ static void judge(const skin *s, const nebel_lighting *lighting, uint64_t seed)
             ill++;
             continue;
         }
-        double *most = &worst[s->kind][s->by_lamps][s->place];
-        tried[s->kind][s->by_lamps][s->place]++;
+        double *most = &worst[s->kind][s->by_lights][s->place];
+        tried[s->kind][s->by_lights][s->place]++;
         *most = fmax(*most, off);
         if (off <= 1. / 255) continue;
         wrong++;
         print_message("%s, %s, %s, seed %llu, ray %d, radius %g, depth %g: off by %g: light %g for %g\n",
-                      type_names[s->kind], light_names[s->by_lamps], eye_names[s->place], (unsigned long long)seed, i,
+                      type_names[s->kind], light_names[s->by_lights], eye_names[s->place], (unsigned long long)seed, i,
                       s->radius, s->depth, off, (double)answers[i].in_scattering[0], is[0]);
     }
 }
 
-static unsigned features_of_all(int by_lamps)
+static unsigned features_of_all(int by_lights)
 {
     unsigned features = 0;
     for (int kind = 0; kind < TYPES; kind++) {
-        const skin like = {.by_lamps = by_lamps, .radius = 1, .depth = 1e3, .kind = kind, .is_turned = 1};
+        const skin like = {.by_lights = by_lights, .radius = 1, .depth = 1e3, .kind = kind, .is_turned = 1};
         nebel_lighting *lighting = commit_skin(&like, 1);
         features |= (unsigned)nebel_pack_features(lighting);
         nebel_release_lighting(lighting);
@@ -188,16 +188,16 @@ static unsigned features_of_all(int by_lamps)
     return features;
 }
 
-static void try_light(int by_lamps, int seeds)
+static void try_light(int by_lights, int seeds)
 {
     char defines[128];
     tracer t;
     snprintf(defines, sizeof defines, "#define NEBEL_FEATURES_LITERAL\n#define NEBEL_FEATURES %u\n",
-             features_of_all(by_lamps));
+             features_of_all(by_lights));
     open_tracer(&t, NB_GL_330, BLOCK, defines, trace_body);
     for (int i = 0; i < seeds; i++) {
         const uint64_t seed = (uint64_t)i + 1;
-        const skin s = draw_skin(seed, by_lamps, i / EYE_PLACES % TYPES, (eye_place)(i % EYE_PLACES));
+        const skin s = draw_skin(seed, by_lights, i / EYE_PLACES % TYPES, (eye_place)(i % EYE_PLACES));
         nebel_lighting *lighting = commit_skin(&s, seed);
         strew_rays(&s, seed);
         pack_and_upload(&t, lighting, s.eye);
@@ -211,11 +211,11 @@ static void try_light(int by_lamps, int seeds)
 static void test_lit_skins(void **unused)
 {
     (void)unused;
-    for (int by_lamps = 0; by_lamps < 2; by_lamps++) try_light(by_lamps, (int)nb_test_count(96));
+    for (int by_lights = 0; by_lights < 2; by_lights++) try_light(by_lights, (int)nb_test_count(96));
     for (int i = 0; i < TYPES * 4; i++) {
-        const int kind = i / 4, by_lamps = i / 2 % 2, place = i % 2;
-        print_message("%s, %s, %s: %zu rays, worst %.1e\n", type_names[kind], light_names[by_lamps], eye_names[place],
-                      tried[kind][by_lamps][place], worst[kind][by_lamps][place]);
+        const int kind = i / 4, by_lights = i / 2 % 2, place = i % 2;
+        print_message("%s, %s, %s: %zu rays, worst %.1e\n", type_names[kind], light_names[by_lights], eye_names[place],
+                      tried[kind][by_lights][place], worst[kind][by_lights][place]);
     }
     print_message("off by more than 1/255: %zu, and %zu where the ray's own rounding matters as much\n", wrong, ill);
     assert_int_equal(wrong, 0);

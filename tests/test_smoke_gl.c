@@ -54,7 +54,7 @@ static const smoke smokes[] = {
              "\"camera\":{\"position\":[3,1,2],\"look_at\":[0,1,0]}," SUN "\"fog\":[{" BOX
              "\"extinction\":0.2,\"albedo\":0.9}]}",
      .projection = NEBEL_PROJECTION_PANORAMA},
-    {.name = "lamps",
+    {.name = "point lights",
      .text =
          "{\"nebel\":1," CAMERA
          "\"lights\":[{\"type\":\"point\",\"position\":[-1.5,2.5,2],\"intensity\":[9,8,6],\"radius\":0.1},"

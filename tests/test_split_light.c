@@ -11,13 +11,13 @@ static const nebel_sun suns[2] = {{{.3, .8, .2}, {1, 2, 3}}, {{.3, .8, .2}, {4, 
 static const nebel_environment sky = {
     .type = NEBEL_ENVIRONMENT_GRADIENT, .zenith = {.2, .3, .4}, .horizon = {.4, .3, .2}, .ground = {.1, .1, .1}};
 
-static const nebel_light lamps[2] = {{.position = {1, 5, -3}, .intensity = {30, 20, 10}, .radius = .1},
-                                     {.type = NEBEL_LIGHT_SPOT,
-                                      .position = {-3, 6, -9},
-                                      .intensity = {10, 20, 30},
-                                      .direction = {.3, -1, .1},
-                                      .inner_angle = 20,
-                                      .outer_angle = 50}};
+static const nebel_light point_lights[2] = {{.position = {1, 5, -3}, .intensity = {30, 20, 10}, .radius = .1},
+                                            {.type = NEBEL_LIGHT_SPOT,
+                                             .position = {-3, 6, -9},
+                                             .intensity = {10, 20, 30},
+                                             .direction = {.3, -1, .1},
+                                             .inner_angle = 20,
+                                             .outer_angle = 50}};
 
 static const nebel_diffusion_desc few_cells = {.max_cells = 1000};
 
@@ -35,7 +35,7 @@ static const nebel_volume_desc volumes[] = {{.shape = {.type = NEBEL_SHAPE_SPHER
 
 static nebel_lighting_desc all_lights(void)
 {
-    return (nebel_lighting_desc){.sun = suns[0], .environment = sky, .lights = lamps, .light_count = 2};
+    return (nebel_lighting_desc){.sun = suns[0], .environment = sky, .lights = point_lights, .light_count = 2};
 }
 
 /* ---- rays in planes, light by groups --------------------------------------------------------- */
@@ -350,7 +350,7 @@ static void groups_of_crowds(void **state)
     }
 }
 
-/* Surfaces hide rays from the sun, and from one of the lamps. */
+/* Surfaces hide rays from the sun, and from one of the point lights. */
 static void groups_in_shadows_of_surfaces(void **state)
 {
     (void)state;
@@ -361,12 +361,12 @@ static void groups_in_shadows_of_surfaces(void **state)
     for (uint32_t i = 0; i <= RAYS; i++) first[i] = 4 * i;
     for (int i = 0; i < RAYS; i++)
         for (int k = 0; k < 4; k++) boundaries[4 * i + k] = (float)(5 + k * (2 + .1 * i));
-    const nebel_ray_visibility pieces = {first, boundaries}, by_lamps[] = {pieces, {none, NULL}};
+    const nebel_ray_visibility pieces = {first, boundaries}, by_lights[] = {pieces, {none, NULL}};
     nebel_trace_desc desc = fine;
     aim_at_volumes(&rays);
     desc.sun_visibility = &pieces;
     expect_groups(volumes, 3, &lights, desc, &rays);
-    desc.light_visibility = by_lamps;
+    desc.light_visibility = by_lights;
     expect_groups(volumes, 3, &lights, desc, &rays);
 }
 

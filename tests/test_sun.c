@@ -452,17 +452,18 @@ typedef struct arrival {
     double towards[3], distance, fluence;
 } arrival;
 
-/* The sun's where `lamp` is NULL. A lamp is a ball that shines alike from everywhere: radiance 1 / (pi r^2) times its solid angle. */
-static arrival light_arrives(const nebel_light *lamp, const double p[3])
+/* The sun's where `point_light` is NULL. A point light is a ball that shines alike from everywhere: radiance 1 / (pi
+ * r^2) times its solid angle. */
+static arrival light_arrives(const nebel_light *light, const double p[3])
 {
     arrival a = {.distance = 1e9, .fluence = 1};
     memcpy(a.towards, sun_of_balls, sizeof sun_of_balls);
-    if (lamp == NULL) return a;
-    for (int k = 0; k < 3; k++) a.towards[k] = lamp->position[k] - p[k];
-    const double apart = sqrt(dot(a.towards, a.towards)), sine = fmin(lamp->radius / apart, 1);
+    if (light == NULL) return a;
+    for (int k = 0; k < 3; k++) a.towards[k] = light->position[k] - p[k];
+    const double apart = sqrt(dot(a.towards, a.towards)), sine = fmin(light->radius / apart, 1);
     for (int k = 0; k < 3; k++) a.towards[k] /= apart;
-    a.distance = fmax(apart - lamp->radius, 0);
-    a.fluence = 2 * (1 - sqrt(1 - sine * sine)) / (lamp->radius * lamp->radius);
+    a.distance = fmax(apart - light->radius, 0);
+    a.fluence = 2 * (1 - sqrt(1 - sine * sine)) / (light->radius * light->radius);
     return a;
 }
 
@@ -472,17 +473,17 @@ typedef struct forced {
 } forced;
 
 /* The midpoint rule in `count` steps, every optical depth by chords: isotropic, of one channel. */
-static forced light_by_force(const nebel_volume_desc *balls, size_t ball_count, const nebel_light *lamp,
+static forced light_by_force(const nebel_volume_desc *balls, size_t ball_count, const nebel_light *light,
                              const nebel_ray *ray, int c, int count)
 {
-    const double step = ray->t_max / count, scale = (lamp != NULL ? lamp->intensity[c] : 1) * step / (4 * acos(-1));
+    const double step = ray->t_max / count, scale = (light != NULL ? light->intensity[c] : 1) * step / (4 * acos(-1));
     double before = 0;
     forced sum = {0, 0};
     for (int i = 0; i < count; i++) {
         const double t = (i + 0.5) * step;
         double depth = 0, glow = 0, p[3];
         for (int k = 0; k < 3; k++) p[k] = ray->origin[k] + t * ray->direction[k];
-        const arrival from = light_arrives(lamp, p);
+        const arrival from = light_arrives(light, p);
         for (size_t k = 0; k < ball_count; k++) {
             const nebel_volume_desc *v = &balls[k];
             const nebel_shape *ball = &v->shape;
@@ -523,7 +524,7 @@ static void strew_rays(nebel_ray *rays, int count, uint64_t *numbers)
 }
 
 /* `most`: what the light may be off by at a tolerance of 1e-5. */
-static void expect_brute_force(nebel_sun sun, const nebel_light *lamp, size_t count, double thick, double most)
+static void expect_brute_force(nebel_sun sun, const nebel_light *light, size_t count, double thick, double most)
 {
     static nebel_volume_desc balls[MOST_BALLS];
     uint64_t numbers = 31 + count;
@@ -531,14 +532,14 @@ static void expect_brute_force(nebel_sun sun, const nebel_light *lamp, size_t co
     nebel_transfer transfers[RAYS];
     forced fine[BALL_RAYS];
     double off[BALL_RAYS];
-    const nebel_lighting_desc lights = {.sun = sun, .lights = lamp, .light_count = lamp != NULL};
+    const nebel_lighting_desc lights = {.sun = sun, .lights = light, .light_count = light != NULL};
     const int forced_rays = (int)nb_test_count(BALL_RAYS);
     const size_t ray_count = count > 20 ? nb_test_count(RAYS) : RAYS;
     strew_balls(balls, count, thick, &numbers);
     strew_rays(rays, RAYS, &numbers);
     for (int i = 0; i < forced_rays; i++) {
-        fine[i] = light_by_force(balls, count, lamp, &rays[i], i % 3, HALVES);
-        const double halved = light_by_force(balls, count, lamp, &rays[i], i % 3, HALVES / 2).light;
+        fine[i] = light_by_force(balls, count, light, &rays[i], i % 3, HALVES);
+        const double halved = light_by_force(balls, count, light, &rays[i], i % 3, HALVES / 2).light;
         off[i] = fabs(fine[i].light - halved) + fine[i].jumps;
         assert_true(fine[i].light > 50 * most && off[i] < most / 2);
     }
@@ -570,7 +571,7 @@ static void many_balls_are_what_brute_force_finds(void **state)
 
 /* So bright and so thick that rounding of transmittance is more light than the tolerance: steps that were halved for it
  * came to thousands. */
-static void many_balls_around_lamps_are_what_brute_force_finds(void **state)
+static void many_balls_around_lights_are_what_brute_force_finds(void **state)
 {
     const nebel_light dim = {.position = {3, 4, -2}, .intensity = {40, 40, 40}, .radius = 0.2};
     const nebel_light bright = {.position = {-4, 3, 3}, .intensity = {2000, 2000, 2000}, .radius = 0.2};
@@ -720,7 +721,7 @@ int main(void)
         cmocka_unit_test(pieces_are_the_same_in_any_set_and_split),
         cmocka_unit_test(closed_forms_are_what_marches_find),
         cmocka_unit_test(many_balls_are_what_brute_force_finds),
-        cmocka_unit_test(many_balls_around_lamps_are_what_brute_force_finds),
+        cmocka_unit_test(many_balls_around_lights_are_what_brute_force_finds),
         cmocka_unit_test(suns_are_checked),
         cmocka_unit_test(sunlit_fog_is_bounded),
         cmocka_unit_test(endless_fog_is_answered),

@@ -29,7 +29,7 @@
 #include <string.h>
 #include <unistd.h>
 
-static const char about[] = "Renders SCENE (JSON): models lit by the sun, lamps and the ambient light, in\n"
+static const char about[] = "Renders SCENE (JSON): models lit by the sun, lights and the ambient light, in\n"
                             "exact fog.\n"
                             "\n"
                             "A picture appears under its name when it is complete: it is written beside its\n"

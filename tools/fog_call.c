@@ -71,7 +71,8 @@ const nb_option nb_fog_options[NB_FOG_OPTIONS] = {
                  "keep\nthem without fog."},
     [SKY] = {"sky", 0, "WAY",
              "Pixels that are infinitely far: far (default), keep\nthem without fog, or at so many meters."},
-    [SCENE] = {"scene", 0, "FILE", "In place of --visibility: the fog, sun and lamps of\na scene, seen by its camera."},
+    [SCENE] = {"scene", 0, "FILE",
+               "In place of --visibility: the fog, sun and lights of\na scene, seen by its camera."},
     [FRAME] = {"frame", 0, "N",
                "With --scene: the frame of its camera, fog and sun, 0\nto 1000000, or name: the last number in what "
                "the last\n"

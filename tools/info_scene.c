@@ -123,7 +123,7 @@ static void print_light(const nebel_scene_data *scene)
             (void)printf("sun: %zu keys, frames %g to %g\n", scene->sun_key_count, scene->sun_keys[0].frame,
                          scene->sun_keys[scene->sun_key_count - 1].frame);
     }
-    if (scene->light_count > 0) (void)printf("lamps: %zu\n", scene->light_count);
+    if (scene->light_count > 0) (void)printf("lights: %zu\n", scene->light_count);
     print_ambient(scene);
     if (scene->shows_ambient)
         (void)printf("\nbackground: ambient");
@@ -359,7 +359,7 @@ static void warn_of_scene(const nebel_scene_data *scene, double visibility)
     const char *const dark = nb_find_dark_planet(scene);
     if (dark != NULL) (void)printf("warning: %s\n", dark);
     if (scene->mesh_count > 0 && !is_lit(scene))
-        (void)printf("warning: no sun, no lamps and no ambient light: the models are black\n");
+        (void)printf("warning: no sun, no lights and no ambient light: the models are black\n");
 }
 
 int nb_info_print_scene(const char *path)

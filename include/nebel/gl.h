@@ -275,12 +275,12 @@ NEBEL_API const char *nebel_gl_classic_shader_source(void);
  *
  *     nebel_destroy_gl_renderer(renderer);
  *
- * Surfaces, light and fog are those of nebel/render.h: Lambert surfaces lit by the sun and the scene's lamps, which are
- * attenuated by all fog on their way, and by the ambient radiance; colour = transmittance * surface + in-scattering.
- * Both renderers look through the same points of each pixel. The sun's shadows, on surfaces and in fog, come from
- * maps fitted to what is seen, those of lamps from six maps around each, so their edges are a texel of the map wide.
- * Particles dim the sun, not lamps. Panoramas are no resampled views: each pixel has its own ray, which meets
- * surfaces, fog and particles exactly. Link with libnebel_gl and libnebel.
+ * Surfaces, light and fog are those of nebel/render.h: Lambert surfaces lit by the sun and the scene's point lights,
+ * which are attenuated by all fog on their way, and by the ambient radiance; colour = transmittance * surface +
+ * in-scattering. Both renderers look through the same points of each pixel. The sun's shadows, on surfaces and in fog,
+ * come from maps fitted to what is seen, those of point lights from six maps around each, so their edges are a texel of
+ * the map wide. Particles dim the sun, not point lights. Panoramas are no resampled views: each pixel has its own ray,
+ * which meets surfaces, fog and particles exactly. Link with libnebel_gl and libnebel.
  *
  * A planet with air (`planets` of the scene, one) is drawn as by the CPU; its table is made anew in a frame whose eye or
  * sun is another than in the one before, which takes 50 to 230 ms. Its atmosphere must live as long as the renderer:
@@ -304,13 +304,13 @@ typedef struct nebel_gl_renderer_desc {
     uint32_t shadow_map_size;
 } nebel_gl_renderer_desc;
 
-/* Copies meshes and textures of `scene` to the graphics processor; they are not read again. Light, lamps, background and
- * ambient are read anew for each frame, so `scene` must outlive the renderer. The maps around a lamp are drawn when it
- * is new or has moved. Where lamps are more than there is room for, GL_MAX_ARRAY_TEXTURE_LAYERS or 1,365, those that are
- * brightest at the eye cast shadows. The lighting, whose snapshot has the fog, is retained; NULL: no fog.
- * On an error *renderer is NULL. O(vertices + triangles + texels). Errors: ARGUMENT and VALUE as nebel_create_cpu_renderer,
- * MEMORY, LIMIT (a texture larger than GL_MAX_TEXTURE_SIZE), UNSUPPORTED (no current context, or one that is too old or
- * cannot draw into textures of floats). */
+/* Copies meshes and textures of `scene` to the graphics processor; they are not read again. Light, point lights,
+ * background and ambient are read anew for each frame, so `scene` must outlive the renderer. The maps around a point
+ * light are drawn when it is new or has moved. Where point lights are more than there is room for,
+ * GL_MAX_ARRAY_TEXTURE_LAYERS or 1,365, those that are brightest at the eye cast shadows. The lighting, whose snapshot
+ * has the fog, is retained; NULL: no fog. On an error *renderer is NULL. O(vertices + triangles + texels). Errors:
+ * ARGUMENT and VALUE as nebel_create_cpu_renderer, MEMORY, LIMIT (a texture larger than GL_MAX_TEXTURE_SIZE),
+ * UNSUPPORTED (no current context, or one that is too old or cannot draw into textures of floats). */
 NEBEL_API nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_lighting *lighting,
                                                 const nebel_gl_renderer_desc *desc, nebel_gl_renderer **renderer);
 
@@ -398,7 +398,8 @@ typedef struct nebel_gl_frame_desc {
 
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not, or without what it
  * needs), VALUE (a camera, light or time as for nebel_render_frame; taps that are not finite or negative; a factor as for
- * nebel_resolve_factor), LIMIT (a picture, or a map of a textured planet, too large for this context; fog or triangles that floats do not hold in this view; more than 4,096 lamps), CANCELLED (by progress),
+ * nebel_resolve_factor), LIMIT (a picture, or a map of a textured planet, too large for this context; fog or triangles
+ * that floats do not hold in this view; more than 4,096 point lights), CANCELLED (by progress),
  * MEMORY, UNSUPPORTED (more than one sample, or a textured planet, where OpenGL ES cannot blend floats; a planet with
  * clouds of volume where the processor may not walk through them, by another method than EXACT, or, if it has air, in an
  * orthographic view or with particles; a shader that the driver does not take; the context is another one, or lost). The first panorama copies the triangles of all

@@ -4,10 +4,10 @@
  *     nebel_create_cpu_renderer(scene_data, lighting, &(nebel_cpu_renderer_desc){0}, &renderer);
  *     nebel_render_frame(renderer, &(nebel_frame_desc){.camera = camera, .width = 1280, .height = 720}, &frame);
  *
- * Lambert surfaces lit by the sun and the scene's lamps (ray-traced shadows; their light is attenuated by all fog on
- * its way) and by the ambient radiance; transmittance and in-scattering from nebel_trace in float. On planets with air, fog far from the
- * origin that scatters has the scene's sun and the fog's ambient light as they are at its place (docs/planet.md). The same
- * picture, bit for bit, for every thread count. Link with libnebel_cpu and libnebel.
+ * Lambert surfaces lit by the sun and the scene's point lights (ray-traced shadows; their light is attenuated by all
+ * fog on its way) and by the ambient radiance; transmittance and in-scattering from nebel_trace in float. On planets
+ * with air, fog far from the origin that scatters has the scene's sun and the fog's ambient light as they are at its
+ * place (docs/planet.md). The same picture, bit for bit, for every thread count. Link with libnebel_cpu and libnebel.
  */
 #ifndef NEBEL_RENDER_H
 #define NEBEL_RENDER_H

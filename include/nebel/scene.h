@@ -377,13 +377,13 @@ NEBEL_API void nebel_destroy_scene(nebel_scene *scene);
  * of it with other numbers in the camera and its motion, the background, the sun, the ambient light (of the map that
  * the file names, or of none), max_opacity, the classic fog, noise (by nebel_update_scene_noise), the nebulae (points
  * by their place alone) and their names, the cells with their names, portals, model, span and grouping (as many cells,
- * each of the same kind), the models (fewer may be left, in their order), the lamps (as many, each of the same type),
- * the planets (as far as nebel_update_scene_planets takes them), and with other names, numbers or kinds of volumes of
- * origin STATIC or ANIMATED. The sun and the section "classic" may come and go. Its volumes may be others: sources[i]
- * is the place in `before` of what is changed->volumes[i] now, ascending, or NEBEL_NEW_VOLUME; volumes of `before` that
- * are missing leave the file, as long as they are of origin STATIC or ANIMATED. sources NULL: the same volumes.
- * changed->volume_tracks is as long as changed->volumes; of a volume with keys `base` counts and not what stands in
- * `volumes`. NULL: keys and contrast are as they were.
+ * each of the same kind), the models (fewer may be left, in their order), the point lights (as many, each of the same
+ * type), the planets (as far as nebel_update_scene_planets takes them), and with other names, numbers or kinds of
+ * volumes of origin STATIC or ANIMATED. The sun and the section "classic" may come and go. Its volumes may be others:
+ * sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or NEBEL_NEW_VOLUME; volumes of
+ * `before` that are missing leave the file, as long as they are of origin STATIC or ANIMATED. sources NULL: the same
+ * volumes. changed->volume_tracks is as long as changed->volumes; of a volume with keys `base` counts and not what
+ * stands in `volumes`. NULL: keys and contrast are as they were.
  *
  * What differs between the two is written in its place, in the file's own unit, axes and words (a visibility stays a
  * visibility, where the fog is not of extinction 0), with 15 digits; a key that is missing is added, one that has

@@ -35,8 +35,8 @@
  * Point and spot lights are packed with the fog that they light, and in-scattering has their light, attenuated by all
  * fog on its way. Where surfaces keep it away the host says, where it defines before the text
  *
- *     NEBEL_LIGHT_VISIBILITY(lamp, origin, direction, t, end)
- *         A vec2: what share of the light of number `lamp`, in the order of the lighting, reaches the ray from t
+ *     NEBEL_LIGHT_VISIBILITY(light, origin, direction, t, end)
+ *         A vec2: what share of the light of number `light`, in the order of the lighting, reaches the ray from t
  *         on, and up to where on the ray that holds, more than t and at most `end` (which may be 1e18). Looked up in a
  *         shadow map, say; all but 0 and 1 is soft shadow.
  *
@@ -252,7 +252,7 @@ NEBEL_API uint32_t nebel_pack_features(const nebel_lighting *lighting);
 /* The feature of fog that has grids: the text needs NEBEL_VOXELS, or NEBEL_VOXEL_TEXEL, defined before it. */
 #define NEBEL_FEATURE_GRID 1048576u
 
-/* The feature of fog that lamps light, which transmittance has no need of. */
+/* The feature of fog that point lights light, which transmittance has no need of. */
 #define NEBEL_FEATURE_LIGHTS 2097152u
 
 /* The feature of fog whose light is scattered more than once (nebel/light.h), which transmittance has no need of:

@@ -85,11 +85,11 @@ static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebe
         *sunlit = (nebel_ray_visibility){scratch->shafts.first, scratch->shafts.boundaries};
         trace->sun_visibility = sunlit;
     }
-    if (frame->has_lamp_shafts && result == NEBEL_OK) {
-        result =
-            nb_light_shafts_find(&scratch->lamp_shafts, &renderer->allocator, &renderer->lamp_tree, renderer->lighting,
-                                 &frame->lamplit_box, &scratch->rays, frame->view.advance, scratch->distance);
-        trace->light_visibility = scratch->lamp_shafts.pieces;
+    if (frame->has_light_shafts && result == NEBEL_OK) {
+        result = nb_light_shafts_find(&scratch->light_shafts, &renderer->allocator, &renderer->light_tree,
+                                      renderer->lighting, &frame->lights_box, &scratch->rays, frame->view.advance,
+                                      scratch->distance);
+        trace->light_visibility = scratch->light_shafts.pieces;
     }
     return result;
 }
@@ -235,10 +235,10 @@ static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
     return result;
 }
 
-/* What fog leaves of a lamp's light where it is lit at all. */
-static nebel_result trace_lamp_fog(const nb_frame *frame, const nb_ray_starts *starts, nb_scratch *scratch)
+/* What fog leaves of a point light's light where it is lit at all. */
+static nebel_result trace_light_fog(const nb_frame *frame, const nb_ray_starts *starts, nb_scratch *scratch)
 {
-    nb_shadow_rays *ways = &scratch->lamp;
+    nb_shadow_rays *ways = &scratch->light;
     nebel_ray_planes rays = {.t_max = ways->reach};
     nebel_transfer_planes transfers = {.error = NULL};
     for (int c = 0; c < 3; c++) {
@@ -253,11 +253,11 @@ static nebel_result trace_lamp_fog(const nb_frame *frame, const nb_ray_starts *s
     return nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &transfers);
 }
 
-static void add_lamp(const nebel_light *lamp, int is_dimmed, nb_scratch *scratch)
+static void add_light(const nebel_light *light, int is_dimmed, nb_scratch *scratch)
 {
-    const nb_shadow_rays *ways = &scratch->lamp;
+    const nb_shadow_rays *ways = &scratch->light;
     for (int c = 0; c < 3; c++) {
-        const float intensity = (float)lamp->intensity[c];
+        const float intensity = (float)light->intensity[c];
         for (int i = 0; i < NB_BATCH; i++) {
             if (!ways->lit[i]) continue;
             const float left = is_dimmed ? scratch->light_transmittance[c][i] : 1;
@@ -273,8 +273,8 @@ static int is_lit_anywhere(const nb_shadow_rays *ways)
     return lit;
 }
 
-/* Lamp by lamp, to samples->color. */
-static nebel_result add_lamplight(const nb_frame *frame, nb_scratch *scratch)
+/* Point light by point light, to samples->color. */
+static nebel_result add_point_lights(const nb_frame *frame, nb_scratch *scratch)
 {
     const nebel_renderer *renderer = frame->renderer;
     const nb_geometry *geometry = &renderer->geometry;
@@ -282,12 +282,12 @@ static nebel_result add_lamplight(const nb_frame *frame, nb_scratch *scratch)
     const int is_dimmed = dims_sun(renderer);
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < renderer->scene->light_count && result == NEBEL_OK; i++) {
-        const nebel_light *lamp = &renderer->scene->lights[i];
-        nb_shadow_rays_set(lamp, &starts, &scratch->hits, &scratch->points, &scratch->lamp);
-        nb_shadow_rays_shadow(geometry->scene, &scratch->points, &scratch->lamp, &scratch->packets);
-        if (!is_lit_anywhere(&scratch->lamp)) continue;
-        if (is_dimmed) result = trace_lamp_fog(frame, &starts, scratch);
-        add_lamp(lamp, is_dimmed, scratch);
+        const nebel_light *light = &renderer->scene->lights[i];
+        nb_shadow_rays_set(light, &starts, &scratch->hits, &scratch->points, &scratch->light);
+        nb_shadow_rays_shadow(geometry->scene, &scratch->points, &scratch->light, &scratch->packets);
+        if (!is_lit_anywhere(&scratch->light)) continue;
+        if (is_dimmed) result = trace_light_fog(frame, &starts, scratch);
+        add_light(light, is_dimmed, scratch);
     }
     return result;
 }
@@ -423,7 +423,7 @@ static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
     }
     nebel_result result = frame->cloud_view != NULL ? nb_cpu_clouds_shade_sky(frame, scratch) : NEBEL_OK;
     if (result == NEBEL_OK) result = set_sunlight(frame, scratch);
-    return result == NEBEL_OK ? add_lamplight(frame, scratch) : result;
+    return result == NEBEL_OK ? add_point_lights(frame, scratch) : result;
 }
 
 static void find_ground(const nb_frame *frame, nb_scratch *scratch)

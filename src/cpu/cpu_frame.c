@@ -78,7 +78,7 @@ static nb_lit_box lit_box_of(const nb_geometry *geometry, const nebel_bounds *bo
     return box;
 }
 
-/* Surfaces between the sun or lamps and fog that they light. */
+/* Surfaces between the sun or point lights and fog that they light. */
 static nebel_result set_shafts(nb_frame *frame)
 {
     nebel_renderer *renderer = frame->renderer;
@@ -88,15 +88,15 @@ static nebel_result set_shafts(nb_frame *frame)
     nebel_result result = NEBEL_OK;
     const nebel_lighting *lighting = nb_fog_irradiance_is(&frame->air) ? frame->air.daylit : renderer->lighting;
     frame->has_shafts = may && nebel_get_lit_bounds(lighting, NEBEL_LIGHT_GROUP_SUN, &by_sun);
-    frame->has_lamp_shafts = may && nebel_get_lit_bounds(lighting, NEBEL_LIGHT_GROUP_LOCAL, &by_lights);
+    frame->has_light_shafts = may && nebel_get_lit_bounds(lighting, NEBEL_LIGHT_GROUP_LOCAL, &by_lights);
     if (frame->has_shafts) {
         frame->sunlit_box = lit_box_of(geometry, &by_sun);
         result = nb_sun_cells_set(&renderer->sun_cells, geometry, nebel_get_lighting_sun(lighting).direction);
         frame->eye = nb_sun_shafts_eye(&renderer->sun_cells, geometry, &frame->view);
     }
-    if (frame->has_lamp_shafts && result == NEBEL_OK) {
-        frame->lamplit_box = lit_box_of(geometry, &by_lights);
-        result = nb_shadow_tree_set_lights(&renderer->lamp_tree, geometry, renderer->threads);
+    if (frame->has_light_shafts && result == NEBEL_OK) {
+        frame->lights_box = lit_box_of(geometry, &by_lights);
+        result = nb_shadow_tree_set_lights(&renderer->light_tree, geometry, renderer->threads);
     }
     if (result == NEBEL_OK) return NEBEL_OK;
     return nb_fail(&renderer->log, result, "frame: out of memory for the shadows that surfaces cast into fog");

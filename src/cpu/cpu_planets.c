@@ -136,7 +136,7 @@ int nb_cpu_planets_sees_ground(const nb_cpu_planets_scratch *scratch)
     return any;
 }
 
-/* The ground is not lifted: no surface hides fog and lamps from it there. */
+/* The ground is not lifted: no surface hides fog and point lights from it there. */
 static void set_ground_starts(const double position[3], const nb_ray_batch *rays, const nb_surface_batch *points,
                               nb_cpu_planets_scratch *scratch)
 {

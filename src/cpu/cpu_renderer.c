@@ -56,7 +56,7 @@ static nebel_result allocate_scratch(nebel_renderer *renderer)
     renderer->scratch = (nb_scratch *)((char *)renderer->scratch_memory + skip);
     for (int i = 0; i < renderer->threads; i++) {
         renderer->scratch[i].shafts = (nb_sun_shafts){.shadows = NULL};
-        renderer->scratch[i].lamp_shafts = (nb_light_shafts){.numbers = NULL};
+        renderer->scratch[i].light_shafts = (nb_light_shafts){.numbers = NULL};
         renderer->scratch[i].clouds.workspace = NULL;
         renderer->scratch[i].air.is_kept = 0;
     }
@@ -266,10 +266,10 @@ void nebel_destroy_renderer(nebel_renderer *renderer)
     const nebel_allocator allocator = renderer->allocator;
     nb_geometry_free(&renderer->geometry);
     nb_sun_cells_free(&renderer->sun_cells, &allocator);
-    nb_shadow_tree_free(&renderer->lamp_tree, &allocator);
+    nb_shadow_tree_free(&renderer->light_tree, &allocator);
     for (int i = 0; i < renderer->threads && renderer->scratch != NULL; i++) {
         nb_sun_shafts_free(&renderer->scratch[i].shafts, &allocator);
-        nb_light_shafts_free(&renderer->scratch[i].lamp_shafts, &allocator);
+        nb_light_shafts_free(&renderer->scratch[i].light_shafts, &allocator);
     }
     nebel_release_lighting(renderer->lighting);
     nb_release(&allocator, renderer->scratch_memory);

@@ -85,8 +85,8 @@ typedef struct nb_scratch {
     float light_transmittance[3][NB_BATCH]; /* of the way to a light */
     uint32_t hit_counts[NB_PIXELS];         /* samples of a pixel that met a surface */
     nb_sun_shafts shafts;
-    nb_light_shafts lamp_shafts;
-    nb_shadow_rays lamp;
+    nb_light_shafts light_shafts;
+    nb_shadow_rays light;
     nb_cpu_planets_scratch air;
     nb_shell_scratch shells;
     nb_cloud_scratch clouds;
@@ -117,8 +117,8 @@ struct nebel_renderer {
     nebel_isa fog_isa;
     int threads;
     nb_geometry geometry;
-    nb_sun_cells sun_cells;   /* for the last frame with fog that the sun lights */
-    nb_shadow_tree lamp_tree; /* the same of lamps */
+    nb_sun_cells sun_cells;    /* for the last frame with fog that the sun lights */
+    nb_shadow_tree light_tree; /* the same of point lights */
     nb_srgb_table table;
     void *scratch_memory;
     nb_scratch *scratch; /* one per thread */
@@ -135,8 +135,8 @@ typedef struct nb_frame {
     int has_shafts; /* surfaces cast shadows into fog that the sun lights, which is in */
     nb_lit_box sunlit_box;
     nb_eye_visibility eye; /* in sunlight or not */
-    int has_lamp_shafts;   /* the same of lamps */
-    nb_lit_box lamplit_box;
+    int has_light_shafts;  /* the same of point lights */
+    nb_lit_box lights_box;
     uint32_t width, height, samples;
     uint32_t first_sample, sample_count; /* those of the samples that are rendered */
     nebel_window window;                 /* of the picture that is rendered; the planes are as large */

@@ -21,7 +21,7 @@ typedef struct nb_surface_batch {
     _Alignas(64) int lit[NB_BATCH], away[NB_BATCH];
 } nb_surface_batch;
 
-/* Where rays to lights begin, for fog and lamps: `origin` + `offset`. */
+/* Where rays to lights begin, for fog and point lights: `origin` + `offset`. */
 typedef struct nb_ray_starts {
     double origin[3];
     const float *offset[3];

@@ -8,11 +8,11 @@
 /* ---- places ---------------------------------------------------------------------------------- */
 
 /* The part of its light that a spot sends off its axis. */
-static double spot_falloff(const nebel_light *lamp, const double direction[3])
+static double spot_falloff(const nebel_light *light, const double direction[3])
 {
-    if (lamp->type != NEBEL_LIGHT_SPOT) return 1;
-    const double outer = cos(lamp->outer_angle * (PI / 180)), inner = cos(lamp->inner_angle * (PI / 180));
-    double axis[3] = {lamp->direction[0], lamp->direction[1], lamp->direction[2]};
+    if (light->type != NEBEL_LIGHT_SPOT) return 1;
+    const double outer = cos(light->outer_angle * (PI / 180)), inner = cos(light->inner_angle * (PI / 180));
+    double axis[3] = {light->direction[0], light->direction[1], light->direction[2]};
     (void)nb_vector_make_unit(axis);
     const double cosine = -nb_vector_dot(axis, direction);
     if (cosine >= inner) return 1;
@@ -21,30 +21,30 @@ static double spot_falloff(const nebel_light *lamp, const double direction[3])
     return s * s * (3 - 2 * s);
 }
 
-nb_sampled_light nb_light_sight_from(const nebel_light *lamp, const double place[3])
+nb_sampled_light nb_light_sight_from(const nebel_light *light, const double place[3])
 {
     nb_sampled_light sight;
-    for (int i = 0; i < 3; i++) sight.direction[i] = lamp->position[i] - place[i];
-    const double distance = nb_vector_length(sight.direction), radius = nb_light_radius(lamp->radius);
+    for (int i = 0; i < 3; i++) sight.direction[i] = light->position[i] - place[i];
+    const double distance = nb_vector_length(sight.direction), radius = nb_light_radius(light->radius);
     for (int i = 0; i < 3 && distance > 0; i++) sight.direction[i] /= distance;
     const double nearest = fmax(distance, radius), part = radius / nearest;
-    sight.reach = fmax(distance - lamp->radius, 0);
+    sight.reach = fmax(distance - light->radius, 0);
     sight.shadowed = fmax(distance - radius, 0);
-    sight.beam = spot_falloff(lamp, sight.direction) / (nearest * nearest);
+    sight.beam = spot_falloff(light, sight.direction) / (nearest * nearest);
     sight.fluence = sight.beam * 2 / (1 + sqrt(1 - part * part));
     return sight;
 }
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
-nb_light_pass nb_passing_of(const nebel_light *lamp, const nebel_ray *ray)
+nb_light_pass nb_passing_of(const nebel_light *light, const nebel_ray *ray)
 {
-    double to_lamp[3], aside[3];
-    for (int i = 0; i < 3; i++) to_lamp[i] = lamp->position[i] - ray->origin[i];
-    nb_light_pass p = {.start = -nb_vector_dot(to_lamp, ray->direction), .t_max = ray->t_max};
-    for (int i = 0; i < 3; i++) aside[i] = to_lamp[i] + p.start * ray->direction[i];
-    p.aside = fmax(nb_vector_length(aside), nb_light_radius(lamp->radius));
-    /* One angle between two places; as the difference of two it would be lost to rounding far from the lamp. */
+    double to_light[3], aside[3];
+    for (int i = 0; i < 3; i++) to_light[i] = light->position[i] - ray->origin[i];
+    nb_light_pass p = {.start = -nb_vector_dot(to_light, ray->direction), .t_max = ray->t_max};
+    for (int i = 0; i < 3; i++) aside[i] = to_light[i] + p.start * ray->direction[i];
+    p.aside = fmax(nb_vector_length(aside), nb_light_radius(light->radius));
+    /* One angle between two places; as the difference of two it would be lost to rounding far from the point light. */
     p.angle = atan2(p.aside * p.t_max, p.aside * p.aside + p.start * (p.start + p.t_max));
     return p;
 }
@@ -64,15 +64,15 @@ double nb_passing_density(const nb_light_pass *p, double t)
 
 /* ---- one of many ----------------------------------------------------------------------------- */
 
-double nb_light_weight_at(const nebel_light *lamp, const nebel_ray *ray)
+double nb_light_weight_at(const nebel_light *light, const nebel_ray *ray)
 {
-    return nb_vector_largest(lamp->intensity) * nb_light_sight_from(lamp, ray->origin).fluence;
+    return nb_vector_largest(light->intensity) * nb_light_sight_from(light, ray->origin).fluence;
 }
 
-double nb_light_weight_along(const nebel_light *lamp, const nebel_ray *ray)
+double nb_light_weight_along(const nebel_light *light, const nebel_ray *ray)
 {
-    const nb_light_pass passing = nb_passing_of(lamp, ray);
-    return nb_vector_largest(lamp->intensity) * passing.angle / passing.aside;
+    const nb_light_pass passing = nb_passing_of(light, ray);
+    return nb_vector_largest(light->intensity) * passing.angle / passing.aside;
 }
 
 double nb_lights_sum(const nebel_scene_data *scene, nb_light_weigh *weigh, const nebel_ray *ray)

@@ -7,13 +7,14 @@
 
 #include <math.h>
 
-/* What keeps a lamp's light off a ray meets the flat triangle between both. Those of a packet, relative to the lamp;
- * normals have length 1, or 0 where the ray passes through the lamp, and point out of the triangle's sides. */
+/* What keeps a point light's light off a ray meets the flat triangle between both. Those of a packet, relative to the
+ * point light;
+ * normals have length 1, or 0 where the ray passes through the point light, and point out of the triangle's sides. */
 typedef struct nb_flats {
     float low[3][NB_PACKET], high[3][NB_PACKET];
     float across[3][NB_PACKET]; /* normal of the triangle */
     float near[3][NB_PACKET], far[3][NB_PACKET], beyond[3][NB_PACKET];
-    float height[NB_PACKET]; /* m, of the ray from the lamp */
+    float height[NB_PACKET]; /* m, of the ray from the point light */
 } nb_flats;
 
 typedef struct nb_light_place {
@@ -23,10 +24,10 @@ typedef struct nb_light_place {
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
-NB_CLONES static void move_rays(const nb_light_place *lamp, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
+NB_CLONES static void move_rays(const nb_light_place *light, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
 {
     for (int c = 0; c < 3; c++) {
-        const double place = lamp->place[c];
+        const double place = light->place[c];
         NB_SIMD
         for (int i = 0; i < NB_PACKET; i++) {
             packet->start[c][i] = (float)((double)rays->start[c][first + i] - place);
@@ -53,8 +54,8 @@ NB_ALWAYS_INLINE float most_above_zero(double x, double y)
     return (float)(most > 0 ? most : 0);
 }
 
-/* Rays of which nothing is asked get a box that meets none. The foot of the lamp on the ray keeps digits that a
- * product of places far from the lamp would lose. */
+/* Rays of which nothing is asked get a box that meets none. The foot of the point light on the ray keeps digits that a
+ * product of places far from the point light would lose. */
 NB_CLONES static void set_flats(const nb_shaft_rays *rays, nb_flats *flats)
 {
     NB_SIMD
@@ -96,17 +97,17 @@ NB_CLONES static void set_flats(const nb_shaft_rays *rays, nb_flats *flats)
 
 /* ---- boxes ----------------------------------------------------------------------------------- */
 
-/* A child's box relative to a lamp. */
+/* A child's box relative to a point light. */
 typedef struct nb_light_box {
     float low[3], high[3], middle[3], half[3];
     float slack; /* what rounding may do to its distance from a plane */
 } nb_light_box;
 
-NB_ALWAYS_INLINE nb_light_box node_box_of(const nb_shadow_node *node, int child, const nb_light_place *lamp)
+NB_ALWAYS_INLINE nb_light_box node_box_of(const nb_shadow_node *node, int child, const nb_light_place *light)
 {
     nb_light_box box = {.slack = 0};
     for (int c = 0; c < 3; c++) {
-        const float low = node->low[c][child], high = node->high[c][child], place = (float)lamp->place[c];
+        const float low = node->low[c][child], high = node->high[c][child], place = (float)light->place[c];
         const float margin = 1e-6f * (fabsf(low) + fabsf(high) + fabsf(place));
         box.low[c] = low - place - margin;
         box.high[c] = high - place + margin;
@@ -122,7 +123,7 @@ NB_ALWAYS_INLINE float size_of(float x)
     return x < 0 ? -x : x;
 }
 
-/* How far a place relative to the lamp is before a plane through that. */
+/* How far a place relative to the point light is before a plane through that. */
 NB_ALWAYS_INLINE float before_plane(const float place[3], const float (*normal)[NB_PACKET], int i)
 {
     return place[0] * normal[0][i] + place[1] * normal[1][i] + place[2] * normal[2][i];
@@ -157,8 +158,8 @@ NB_ALWAYS_INLINE int meets_flats(const nb_light_box *box, const nb_flats *flats)
     return any;
 }
 
-/* Whether the triangle, relative to the lamp, may meet any of the flat triangles: the same of its corners. It costs far
- * less than to cut out the shadow. */
+/* Whether the triangle, relative to the point light, may meet any of the flat triangles: the same of its corners. It
+ * costs far less than to cut out the shadow. */
 NB_ALWAYS_INLINE int may_meet(const float (*corner)[3], float slack, const nb_flats *flats)
 {
     int some[NB_PACKET], any = 0;
@@ -183,9 +184,9 @@ NB_ALWAYS_INLINE int may_meet(const float (*corner)[3], float slack, const nb_fl
 
 /* ---- shadows --------------------------------------------------------------------------------- */
 
-/* Where a triangle's plane, of this unit normal and so far from a lamp, is within the lamp's radius, its shadow has a
- * hole: places p with distance |p| < radius (normal . p), a cone. Of the line that is an interval, or what is beyond
- * its ends, of which only one is on the shadow's side of the plane. */
+/* Where a triangle's plane, of this unit normal and so far from a point light, is within the point light's radius, its
+ * shadow has a hole: places p with distance |p| < radius (normal . p), a cone. Of the line that is an interval, or what
+ * is beyond its ends, of which only one is on the shadow's side of the plane. */
 typedef struct nb_hole {
     double normal[3], distance2, radius2;
 } nb_hole;
@@ -218,28 +219,28 @@ static void cut_hole(const nb_hole *hole, const nb_shaft_rays *rays, int i, nb_s
 }
 
 NB_ALWAYS_INLINE int add_interval(nb_sun_shafts *shafts, const nebel_allocator *allocator,
-                                  const nb_masked_occluder *sheet, const nb_masked_triangle_light *lamp,
+                                  const nb_masked_occluder *sheet, const nb_masked_triangle_light *light,
                                   const nb_shaft_interval *found, nb_shaft_rays *rays)
 {
     int fresh[NB_PACKET];
-    if (sheet != NULL) return nb_masked_triangle_cast(sheet, lamp, shafts, allocator, found, rays);
+    if (sheet != NULL) return nb_masked_triangle_cast(sheet, light, shafts, allocator, found, rays);
     return !nb_extend(found, rays, fresh) || nb_replace(shafts, allocator, found, fresh, rays);
 }
 
-/* What of a triangle a lamp sees: the planes through its edges, and its own. */
+/* What of a triangle a point light sees: the planes through its edges, and its own. */
 typedef struct nb_seen_caster {
     nb_prism pyramid;
     nb_hole hole;
 } nb_seen_caster;
 
-/* Returns 0 where the lamp is in the triangle's plane. Triangles with a common edge get the same plane there, to the
- * bit. */
-NB_ALWAYS_INLINE int see(const nb_occluder *caster, const nb_light_place *lamp, nb_seen_caster *seen)
+/* Returns 0 where the point light is in the triangle's plane. Triangles with a common edge get the same plane there,
+ * to the bit. */
+NB_ALWAYS_INLINE int see(const nb_occluder *caster, const nb_light_place *light, nb_seen_caster *seen)
 {
     static const double here[3] = {0, 0, 0};
     double corner[3][3], way[2][3];
     for (int k = 0; k < 3; k++)
-        for (int c = 0; c < 3; c++) corner[k][c] = (double)caster->corner[k][c] - lamp->place[c];
+        for (int c = 0; c < 3; c++) corner[k][c] = (double)caster->corner[k][c] - light->place[c];
     for (int k = 0; k < 2; k++)
         for (int c = 0; c < 3; c++) way[k][c] = (double)caster->corner[k + 1][c] - (double)caster->corner[0][c];
     double *normal = seen->hole.normal;
@@ -256,12 +257,12 @@ NB_ALWAYS_INLINE int see(const nb_occluder *caster, const nb_light_place *lamp, 
     for (int c = 0; c < 3; c++) normal[c] *= side;
     nb_shadow_plane(normal, corner[0], seen->pyramid.planes[3]);
     seen->hole.distance2 = apart * apart;
-    seen->hole.radius2 = lamp->radius * lamp->radius;
+    seen->hole.radius2 = light->radius * light->radius;
     return 1;
 }
 
 NB_ALWAYS_INLINE int cast(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                          size_t number, const nb_light_place *lamp, const nb_flats *flats, nb_shaft_rays *rays)
+                          size_t number, const nb_light_place *light, const nb_flats *flats, nb_shaft_rays *rays)
 {
     const nb_occluder *caster = &tree->casters[number];
     const nb_masked_occluder *sheet = nb_shadow_tree_sheet(tree, number);
@@ -270,12 +271,12 @@ NB_ALWAYS_INLINE int cast(nb_sun_shafts *shafts, const nebel_allocator *allocato
     float corner[3][3], slack = 0;
     for (int k = 0; k < 3; k++)
         for (int c = 0; c < 3; c++) {
-            const float at = caster->corner[k][c], place = (float)lamp->place[c];
+            const float at = caster->corner[k][c], place = (float)light->place[c];
             corner[k][c] = at - place;
             slack += 1e-6f * (fabsf(at) + fabsf(place));
         }
-    if (!may_meet((const float(*)[3])corner, slack, flats) || !see(caster, lamp, &seen)) return 1;
-    const nb_masked_triangle_light view = {lamp->place, seen.hole.normal, sqrt(seen.hole.distance2)};
+    if (!may_meet((const float(*)[3])corner, slack, flats) || !see(caster, light, &seen)) return 1;
+    const nb_masked_triangle_light view = {light->place, seen.hole.normal, sqrt(seen.hole.distance2)};
     nb_cross_prism(&seen.pyramid, rays, &found);
     if (seen.hole.distance2 >= seen.hole.radius2) return add_interval(shafts, allocator, sheet, &view, &found, rays);
     for (int i = 0; i < NB_PACKET; i++) cut_hole(&seen.hole, rays, i, &found, &rest);
@@ -291,8 +292,8 @@ typedef struct nb_light_visit {
 enum { LIGHT_VISITS = NB_SHADOW_LEVELS * NB_SHADOW_FAN };
 
 /* Returns 0 when memory is out. */
-NB_CLONES static int walk_to_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                                  const nb_light_place *lamp, const nb_flats *flats, nb_shaft_rays *rays)
+NB_CLONES static int walk_to_light(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                                   const nb_light_place *light, const nb_flats *flats, nb_shaft_rays *rays)
 {
     nb_light_visit visits[LIGHT_VISITS];
     int count = 1;
@@ -301,19 +302,19 @@ NB_CLONES static int walk_to_lamp(nb_sun_shafts *shafts, const nebel_allocator *
         const nb_light_visit visit = visits[--count];
         const size_t first = visit.number * NB_SHADOW_FAN;
         for (size_t k = 0; k < NB_SHADOW_FAN && visit.level >= 0; k++) {
-            const nb_light_box box = node_box_of(&tree->levels[visit.level][visit.number], (int)k, lamp);
+            const nb_light_box box = node_box_of(&tree->levels[visit.level][visit.number], (int)k, light);
             if (meets_flats(&box, flats)) visits[count++] = (nb_light_visit){visit.level - 1, first + k};
         }
         for (size_t k = first; k < first + NB_SHADOW_FAN && k < tree->count && visit.level < 0; k++)
-            if (!cast(shafts, allocator, tree, k, lamp, flats, rays)) return 0;
+            if (!cast(shafts, allocator, tree, k, light, flats, rays)) return 0;
     }
     return 1;
 }
 
-/* ---- lamps ----------------------------------------------------------------------------------- */
+/* ---- point lights ----------------------------------------------------------------------------------- */
 
 static int find_light_packet(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                             const nb_light_place *lamp, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
+                             const nb_light_place *light, const nb_ray_batch *rays, int first, nb_shaft_rays *packet)
 {
     nb_flats flats;
     for (int i = 0; i < NB_PACKET; i++) {
@@ -321,15 +322,15 @@ static int find_light_packet(nb_sun_shafts *shafts, const nebel_allocator *alloc
         packet->leave[i] = -HUGE_VALF;
         packet->kept[i] = 0;
     }
-    move_rays(lamp, rays, first, packet);
+    move_rays(light, rays, first, packet);
     set_flats(packet, &flats);
     shafts->shadow_count = 0;
-    return walk_to_lamp(shafts, allocator, tree, lamp, &flats, packet);
+    return walk_to_light(shafts, allocator, tree, light, &flats, packet);
 }
 
-static int find_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                     const nb_light_place *lamp, const float *from, const float *to, const nb_ray_batch *rays,
-                     double advance, uint32_t *numbers)
+static int find_light(nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                      const nb_light_place *light, const float *from, const float *to, const nb_ray_batch *rays,
+                      double advance, uint32_t *numbers)
 {
     for (int p = 0; p < NB_BATCH; p += NB_PACKET) {
         for (int i = 0; i < NB_PACKET; i++) numbers[p + i] = (uint32_t)shafts->boundary_count;
@@ -339,7 +340,7 @@ static int find_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, co
             packet.from[i] = from[p + i];
             packet.to[i] = to[p + i];
         }
-        if (!find_light_packet(shafts, allocator, tree, lamp, rays, p, &packet) ||
+        if (!find_light_packet(shafts, allocator, tree, light, rays, p, &packet) ||
             !nb_sun_shafts_finish(shafts, allocator, &packet, rays->length + p, advance, numbers + p))
             return 0;
     }
@@ -347,12 +348,12 @@ static int find_lamp(nb_sun_shafts *shafts, const nebel_allocator *allocator, co
     return 1;
 }
 
-static int reserve_pieces(nb_light_shafts *shafts, const nebel_allocator *allocator, size_t lamps)
+static int reserve_pieces(nb_light_shafts *shafts, const nebel_allocator *allocator, size_t lights)
 {
     void *numbers = shafts->numbers, *pieces = shafts->pieces;
     const int grown =
-        nb_grow(allocator, &numbers, sizeof *shafts->numbers, 0, &shafts->number_capacity, lamps * (NB_BATCH + 1)) &&
-        nb_grow(allocator, &pieces, sizeof *shafts->pieces, 0, &shafts->piece_capacity, lamps);
+        nb_grow(allocator, &numbers, sizeof *shafts->numbers, 0, &shafts->number_capacity, lights * (NB_BATCH + 1)) &&
+        nb_grow(allocator, &pieces, sizeof *shafts->pieces, 0, &shafts->piece_capacity, lights);
     shafts->numbers = numbers;
     shafts->pieces = pieces;
     return grown;
@@ -360,9 +361,9 @@ static int reserve_pieces(nb_light_shafts *shafts, const nebel_allocator *alloca
 
 static nb_light_place place_light(const nebel_light *light, const double origin[3])
 {
-    nb_light_place lamp = {.radius = nb_light_radius(light->radius)};
-    for (int c = 0; c < 3; c++) lamp.place[c] = light->position[c] - origin[c];
-    return lamp;
+    nb_light_place point_light = {.radius = nb_light_radius(light->radius)};
+    for (int c = 0; c < 3; c++) point_light.place[c] = light->position[c] - origin[c];
+    return point_light;
 }
 
 nebel_result nb_light_shafts_find(nb_light_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
@@ -376,9 +377,9 @@ nebel_result nb_light_shafts_find(nb_light_shafts *shafts, const nebel_allocator
     nb_sun_shafts_clip(box, rays, advance, distance, from, to);
     shafts->shafts.boundary_count = 0;
     for (size_t i = 0; i < count; i++) {
-        const nb_light_place lamp = place_light(&lights[i], tree->origin);
+        const nb_light_place light = place_light(&lights[i], tree->origin);
         uint32_t *numbers = shafts->numbers + i * (NB_BATCH + 1);
-        if (!find_lamp(&shafts->shafts, allocator, tree, &lamp, from, to, rays, advance, numbers))
+        if (!find_light(&shafts->shafts, allocator, tree, &light, from, to, rays, advance, numbers))
             return NEBEL_ERROR_MEMORY;
         shafts->pieces[i].offsets = numbers;
     }

@@ -9,19 +9,19 @@ typedef struct nb_masked_triangle_lines {
 } nb_masked_triangle_lines;
 
 /* Of one end of the stretches, its places in texels. */
-NB_ALWAYS_INLINE void look_up(const nb_masked_occluder *sheet, const nb_masked_triangle_light *lamp,
+NB_ALWAYS_INLINE void look_up(const nb_masked_occluder *sheet, const nb_masked_triangle_light *light,
                               const nb_shaft_rays *rays, const float *t, double (*texel)[NB_PACKET], double *farness)
 {
     const nb_masked_occluder s = *sheet;
-    const double none[3] = {0, 0, 0}, distance = lamp != NULL ? lamp->distance : 1;
-    const double *place = lamp != NULL ? lamp->place : none, *normal = lamp != NULL ? lamp->normal : none;
-    const int is_lamp = lamp != NULL;
+    const double none[3] = {0, 0, 0}, distance = light != NULL ? light->distance : 1;
+    const double *place = light != NULL ? light->place : none, *normal = light != NULL ? light->normal : none;
+    const int is_light = light != NULL;
     NB_SIMD
     for (int i = 0; i < NB_PACKET; i++) {
         double way[3];
         for (int c = 0; c < 3; c++) way[c] = (double)rays->start[c][i] + (double)t[i] * (double)rays->way[c][i];
         const double ahead = normal[0] * way[0] + normal[1] * way[1] + normal[2] * way[2];
-        farness[i] = is_lamp ? ahead / distance : 1;
+        farness[i] = is_light ? ahead / distance : 1;
         for (int c = 0; c < 3; c++) way[c] = way[c] / farness[i] + place[c] - s.place[c];
         for (int k = 0; k < 2; k++)
             texel[k][i] = s.at[k] + (s.slope[k][0] * way[0] + s.slope[k][1] * way[1] + s.slope[k][2] * way[2]);
@@ -29,7 +29,7 @@ NB_ALWAYS_INLINE void look_up(const nb_masked_occluder *sheet, const nb_masked_t
 }
 
 /* Stretches that are in a shadow that is known are not asked for. Returns whether any is. */
-NB_CLONES static int look_up_ends(const nb_masked_occluder *sheet, const nb_masked_triangle_light *lamp,
+NB_CLONES static int look_up_ends(const nb_masked_occluder *sheet, const nb_masked_triangle_light *light,
                                   const nb_shaft_interval *found, const nb_shaft_rays *rays,
                                   nb_masked_triangle_lines *lines)
 {
@@ -41,8 +41,8 @@ NB_CLONES static int look_up_ends(const nb_masked_occluder *sheet, const nb_mask
         any |= lines->lines.is_asked[i];
     }
     if (!any) return 0;
-    look_up(sheet, lamp, rays, found->enter, lines->lines.from, lines->near);
-    look_up(sheet, lamp, rays, found->leave, lines->lines.to, lines->far);
+    look_up(sheet, light, rays, found->enter, lines->lines.from, lines->near);
+    look_up(sheet, light, rays, found->leave, lines->lines.to, lines->far);
     return 1;
 }
 
@@ -71,13 +71,13 @@ static float place_on_ray(double s, float enter, float leave, double near, doubl
     return s >= 1 ? leave : (float)((double)enter + part * ((double)leave - (double)enter));
 }
 
-int nb_masked_triangle_cast(const nb_masked_occluder *sheet, const nb_masked_triangle_light *lamp,
+int nb_masked_triangle_cast(const nb_masked_occluder *sheet, const nb_masked_triangle_light *light,
                             nb_sun_shafts *shafts, const nebel_allocator *allocator, const nb_shaft_interval *found,
                             nb_shaft_rays *rays)
 {
     nb_masked_triangle_lines lines;
     nb_alpha_mask_walk walk;
-    if (!look_up_ends(sheet, lamp, found, rays, &lines)) return 1;
+    if (!look_up_ends(sheet, light, found, rays, &lines)) return 1;
     nb_alpha_mask_begin(&walk, sheet->mask, &lines.lines);
     do {
         for (uint32_t i = 0; i < walk.count; i++) {

@@ -111,20 +111,20 @@ static nebel_result add_sunlight(path *p, const double origin[3], double share)
     return add_arriving(p, origin, world->to_sun, HUGE_VAL, HUGE_VAL, world->sun, left * share);
 }
 
-/* ---- lamps ----------------------------------------------------------------------------------- */
+/* ---- point lights ----------------------------------------------------------------------------------- */
 
-/* A ray along which fog may be lit by lamps. */
+/* A ray along which fog may be lit by point lights. */
 typedef struct lit_ray {
     nb_tracker track; /* as far as there may be fog */
-    double sum;       /* what all lamps weigh along it; 0: none lights it */
+    double sum;       /* what all point lights weigh along it; 0: none lights it */
 } lit_ray;
 
-/* A lamp that was chosen for a place, as often as its probability says. */
-typedef struct chosen_lamp {
-    const nebel_light *lamp; /* NULL: none shines there */
+/* A point light that was chosen for a place, as often as its probability says. */
+typedef struct chosen_light {
+    const nebel_light *light; /* NULL: none shines there */
     nb_sampled_light sight;
     double probability;
-} chosen_lamp;
+} chosen_light;
 
 static lit_ray light_ray(const nb_path_scene *world, const nb_tracker *track)
 {
@@ -135,26 +135,27 @@ static lit_ray light_ray(const nb_path_scene *world, const nb_tracker *track)
     return lit;
 }
 
-static chosen_lamp choose_lamp(path *p, const double place[3])
+static chosen_light choose_light(path *p, const double place[3])
 {
     const nebel_scene_data *scene = p->world->scene;
     const nebel_ray here = {.origin = {place[0], place[1], place[2]}};
     const double sum = nb_lights_sum(scene, nb_light_weight_at, &here);
-    if (!(sum > 0)) return (chosen_lamp){.lamp = NULL};
-    const nebel_light *lamp = nb_lights_choose(scene, nb_light_weight_at, &here, sum, nb_rng_next(&p->chance));
-    return (chosen_lamp){lamp, nb_light_sight_from(lamp, place), nb_light_weight_at(lamp, &here) / sum};
+    if (!(sum > 0)) return (chosen_light){.light = NULL};
+    const nebel_light *light = nb_lights_choose(scene, nb_light_weight_at, &here, sum, nb_rng_next(&p->chance));
+    return (chosen_light){light, nb_light_sight_from(light, place), nb_light_weight_at(light, &here) / sum};
 }
 
-/* `share` of the light of lamps that comes to a place in fog, times what the phase function sends along the path. */
+/* `share` of the light of point lights that comes to a place in fog, times what the phase function sends along the
+ * path. */
 static nebel_result add_scattered(path *p, const double place[3], const nb_scatterer *scatterer, const double share[3])
 {
-    const chosen_lamp chosen = choose_lamp(p, place);
-    if (chosen.lamp == NULL) return NEBEL_OK;
+    const chosen_light chosen = choose_light(p, place);
+    if (chosen.light == NULL) return NEBEL_OK;
     const nb_sampled_light *sight = &chosen.sight;
     const double cosine = fmin(fmax(nb_vector_dot(p->ray.direction, sight->direction), -1), 1);
     const double value = nb_scatterer_value(scatterer, cosine) * sight->fluence / chosen.probability;
     double light[3];
-    for (int c = 0; c < 3; c++) light[c] = chosen.lamp->intensity[c] * share[c];
+    for (int c = 0; c < 3; c++) light[c] = chosen.light->intensity[c] * share[c];
     return add_arriving(p, place, sight->direction, sight->reach, sight->shadowed, light, value);
 }
 
@@ -167,10 +168,10 @@ static nebel_result choose_scatterer(path *p, const nebel_sample_point *place, c
     return nb_media_choose(&world->media, place, matter, channel, nb_rng_next(&p->chance), scatterer);
 }
 
-/* Places in light are found in two ways: where a flight collides, and as lamps see the ray pass. This is how many there
- * are per metre by both, as if no fog were before them: the balance heuristic of Veach and Guibas, "Optimally Combining
- * Sampling Techniques for Monte Carlo Rendering", 1995, but for that fog, whose transmittance is known by chance alone.
- * Any weights that add up to 1 are right in the mean. */
+/* Places in light are found in two ways: where a flight collides, and as point lights see the ray pass. This is how
+ * many there are per metre by both, as if no fog were before them: the balance heuristic of Veach and Guibas,
+ * "Optimally Combining Sampling Techniques for Monte Carlo Rendering", 1995, but for that fog, whose transmittance is
+ * known by chance alone. Any weights that add up to 1 are right in the mean. */
 static double density_of(const path *p, const lit_ray *lit, double extinction, double t)
 {
     return extinction + nb_lights_density(p->world->scene, &lit->track.ray, lit->sum, t);
@@ -186,15 +187,15 @@ static nebel_result add_colliding_light(path *p, const lit_ray *lit, const nb_fr
     return add_scattered(p, flight->place.position, scatterer, (const double[3]){share, share, share});
 }
 
-/* Where a lamp sees the ray pass. */
+/* Where a point light sees the ray pass. */
 static nebel_result add_passing_light(path *p, const lit_ray *lit)
 {
     const nb_path_scene *world = p->world;
     if (!(lit->sum > 0)) return NEBEL_OK;
     const nebel_ray *ray = &lit->track.ray;
-    const nebel_light *lamp =
+    const nebel_light *light =
         nb_lights_choose(world->scene, nb_light_weight_along, ray, lit->sum, nb_rng_next(&p->chance));
-    const nb_light_pass passing = nb_passing_of(lamp, ray);
+    const nb_light_pass passing = nb_passing_of(light, ray);
     nb_tracker way = lit->track;
     way.ray.t_max = nb_passing_draw(&passing, nb_rng_next(&p->chance));
     nebel_sample_point place;
@@ -217,11 +218,11 @@ static nebel_result add_reflected(path *p, const nb_path_vertex *at)
     const double normal[3] = {(double)at->normal[0], (double)at->normal[1], (double)at->normal[2]};
     const double side[3] = {(double)at->side[0], (double)at->side[1], (double)at->side[2]};
     if (p->world->scene->light_count == 0) return NEBEL_OK;
-    const chosen_lamp chosen = choose_lamp(p, p->ray.origin);
+    const chosen_light chosen = choose_light(p, p->ray.origin);
     const nb_sampled_light *sight = &chosen.sight;
-    if (chosen.lamp == NULL || nb_vector_dot(side, sight->direction) <= 0) return NEBEL_OK;
+    if (chosen.light == NULL || nb_vector_dot(side, sight->direction) <= 0) return NEBEL_OK;
     const double share = nb_vector_dot(normal, sight->direction) * sight->beam / (PI * chosen.probability);
-    return add_arriving(p, p->ray.origin, sight->direction, sight->reach, sight->shadowed, chosen.lamp->intensity,
+    return add_arriving(p, p->ray.origin, sight->direction, sight->reach, sight->shadowed, chosen.light->intensity,
                         share);
 }
 

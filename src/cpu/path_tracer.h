@@ -29,7 +29,7 @@ typedef struct nb_single_ray {
 /* All that is the same for all paths of a frame. */
 typedef struct nb_path_scene {
     nb_media media;
-    const nebel_scene_data *scene; /* for its surfaces and lamps */
+    const nebel_scene_data *scene; /* for its surfaces and point lights */
     const nb_geometry *geometry;
     const nb_srgb_table *table;
     double to_sun[3], sun[3];      /* unit direction; irradiance, 0 without sun */
@@ -37,7 +37,7 @@ typedef struct nb_path_scene {
     nebel_environment environment; /* ambient light, from beyond all air */
     int has_sun, is_grey;
     uint32_t
-        bounces; /* after so many no light is looked for but the sun's, lamps' and the ambient light of the place */
+        bounces; /* after so many no light is looked for but the sun's, point lights' and the ambient light of the place */
 } nb_path_scene;
 
 typedef struct nb_path_light {

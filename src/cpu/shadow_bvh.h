@@ -1,6 +1,6 @@
-/* The triangles of a geometry in a tree of boxes, for the shadows that they cast in the light of lamps. Such a shadow is
- * a pyramid without end, cut out of a ray by four planes, which are made where they are wanted: one tree serves all
- * lamps. That of the sun's light is in sun_cells.h. */
+/* The triangles of a geometry in a tree of boxes, for the shadows that they cast in the light of point lights. Such a
+ * shadow is a pyramid without end, cut out of a ray by four planes, which are made where they are wanted: one tree
+ * serves all point lights. That of the sun's light is in sun_cells.h. */
 #ifndef NB_CPU_SHADOW_BVH_H
 #define NB_CPU_SHADOW_BVH_H
 

@@ -1,4 +1,4 @@
-/* A packet of rays, and what shadows leave of it: what those of the sun and those of lamps have in common. */
+/* A packet of rays, and what shadows leave of it: what those of the sun and those of point lights have in common. */
 #ifndef NB_CPU_SHAFT_RAYS_H
 #define NB_CPU_SHAFT_RAYS_H
 
@@ -18,7 +18,7 @@ NB_ALWAYS_INLINE float nb_reciprocal(float x)
     return 1 / (size < 1e-30f ? least : x);
 }
 
-/* A packet of rays in the sun's frame, or relative to a lamp. */
+/* A packet of rays in the sun's frame, or relative to a point light. */
 typedef struct nb_shaft_rays {
     float start[3][NB_PACKET], way[3][NB_PACKET], inverse[3][NB_PACKET];
     float from[NB_PACKET], to[NB_PACKET];     /* what of them is in fog that is lit; from >= to: nothing */

@@ -11,11 +11,11 @@ typedef struct nb_spot_cone {
     float axis[3], edge, rise;
 } nb_spot_cone;
 
-static nb_spot_cone spot_cone_of(const nebel_light *lamp)
+static nb_spot_cone spot_cone_of(const nebel_light *light)
 {
-    if (lamp->type != NEBEL_LIGHT_SPOT) return (nb_spot_cone){{0, 0, 0}, -1, 1e30f}; /* everything is within */
-    const double edge = cos(lamp->outer_angle * (PI / 180)), inner = cos(lamp->inner_angle * (PI / 180));
-    const double *d = lamp->direction, length = hypot(hypot(d[0], d[1]), d[2]);
+    if (light->type != NEBEL_LIGHT_SPOT) return (nb_spot_cone){{0, 0, 0}, -1, 1e30f}; /* everything is within */
+    const double edge = cos(light->outer_angle * (PI / 180)), inner = cos(light->inner_angle * (PI / 180));
+    const double *d = light->direction, length = hypot(hypot(d[0], d[1]), d[2]);
     return (nb_spot_cone){{(float)(d[0] / length), (float)(d[1] / length), (float)(d[2] / length)},
                           (float)edge,
                           (float)fmin(1 / (inner - edge), 1e30)};
@@ -51,13 +51,13 @@ NB_CLONES static void set_ways(const nb_spot_cone *within, float radius, float c
     }
 }
 
-void nb_shadow_rays_set(const nebel_light *lamp, const nb_ray_starts *starts, const nb_hits *hits,
+void nb_shadow_rays_set(const nebel_light *light, const nb_ray_starts *starts, const nb_hits *hits,
                         const nb_surface_batch *points, nb_shadow_rays *ways)
 {
-    const nb_spot_cone within = spot_cone_of(lamp);
+    const nb_spot_cone within = spot_cone_of(light);
     float place[3];
-    for (int c = 0; c < 3; c++) place[c] = (float)(lamp->position[c] - starts->origin[c]);
-    set_ways(&within, (float)nb_light_radius(lamp->radius), (float)lamp->radius, place, starts, hits, points, ways);
+    for (int c = 0; c < 3; c++) place[c] = (float)(light->position[c] - starts->origin[c]);
+    set_ways(&within, (float)nb_light_radius(light->radius), (float)light->radius, place, starts, hits, points, ways);
 }
 
 void nb_shadow_rays_shadow(RTCScene scene, nb_surface_batch *points, nb_shadow_rays *ways, nb_packets *packets)

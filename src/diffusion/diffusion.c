@@ -212,7 +212,7 @@ static nebel_result fill_sky(nb_diffusion *d, const nebel_lighting *lighting, nb
     return NEBEL_OK;
 }
 
-/* Where nothing goes straight on the exact light has all of lamps' that was scattered once. */
+/* Where nothing goes straight on the exact light has all of point lights' that was scattered once. */
 static void forget_exact_light(const nb_diffusion *d)
 {
     const size_t all = d->has_peaks ? 0 : nb_diffusion_lattice_nodes(&d->lattice) * (size_t)d->channel_count;

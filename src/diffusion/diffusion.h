@@ -143,7 +143,7 @@ static inline int nb_source_is_sky(const nb_diffuse_source *source)
     return source->sun == NULL && source->beams == NULL;
 }
 
-/* Light that begins in the fog or beside it: lamps', and what fog emits. */
+/* Light that begins in the fog or beside it: point lights', and what fog emits. */
 typedef struct nb_local_light {
     int has; /* whether any fog scatters any */
     int has_colour;
@@ -152,7 +152,7 @@ typedef struct nb_local_light {
 
 nb_local_light nb_find_own_light(const nebel_lighting *lighting);
 
-/* Of a lamp's intensity or of what is emitted, per unit. */
+/* Of a point light's intensity or of what is emitted, per unit. */
 double nb_local_amount(const nb_local_light *own, const double color[3], int channel);
 
 /* Follows own light on straight ways to the lattice's ends, in one channel. */
@@ -166,7 +166,7 @@ typedef struct nb_local_node {
     double scaled[3][4], whole[3][4], glow[3][4];
 } nb_local_node;
 
-/* Fills the nodes, which are all 0, with lamps' light. */
+/* Fills the nodes, which are all 0, with point lights' light. */
 nebel_result nb_light_nodes_by_point_lights(const nb_diffusion *diffusion, const nebel_lighting *lighting,
                                             const nb_medium_transport *cells, const nb_local_light *own,
                                             nb_local_node *nodes);
@@ -175,7 +175,7 @@ nebel_result nb_light_nodes_by_point_lights(const nb_diffusion *diffusion, const
 void nb_light_nodes_by_cells(const nb_diffusion_lattice *lattice, const nb_medium_transport *cells,
                              const nb_light_beams *beams, int channel, nb_local_node *nodes);
 
-/* Where the scattered light of lamps and of what fog emits matters, in fog without an end [m]. 0: nowhere. */
+/* Where the scattered light of point lights and of what fog emits matters, in fog without an end [m]. 0: nowhere. */
 int nb_find_reach(const nebel_lighting *lighting, const nebel_snapshot *scaled, double low[3], double high[3]);
 
 int nb_medium_scatters(const nb_medium *medium);

@@ -26,7 +26,7 @@ enum { MOST_HALVINGS = 5 };
 /* What fog leaves less of does not matter. */
 #define DARK 1e-4
 
-/* g of no lobe of lamps' light that went almost straight on is more. */
+/* g of no lobe of point lights' light that went almost straight on is more. */
 #define MOST_GLOW 0.999
 
 /* Rays that go on together, a step each. */

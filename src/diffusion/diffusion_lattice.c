@@ -141,7 +141,8 @@ static void set_height(const nebel_snapshot *scaled, const nb_diffusion_span *s,
     }
 }
 
-/* In fog without an end a lattice of own light holds lamps and bodies that emit, with what lies around them, and ends there. */
+/* In fog without an end a lattice of own light holds point lights and bodies that emit, with what lies around them,
+ * and ends there. */
 static void hold_own_light(const nebel_lighting *lighting, const nebel_snapshot *scaled, nb_diffusion_lattice *l)
 {
     double low[3], high[3];

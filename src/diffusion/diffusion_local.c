@@ -1,5 +1,5 @@
-/* Own light: that of lamps in the fog or beside it, and what fog emits. How far it goes, and what of it comes to cells and to
- * nodes on straight ways. */
+/* Own light: that of point lights in the fog or beside it, and what fog emits. How far it goes, and what of it comes
+ * to cells and to nodes on straight ways. */
 #include "diffusion.h"
 
 #include <math.h>
@@ -14,7 +14,8 @@
 #define PI 3.14159265358979323846
 #define GOLDEN_ANGLE 2.39996322972865332 /* pi (3 - sqrt(5)) */
 
-/* Straight ways from a lamp, from all of them, from a cell that emits; what is left of power that no one follows. */
+/* Straight ways from a point light, from all of them, from a cell that emits; what is left of power that no one
+ * follows. */
 enum { MOST_WAYS = 8192, LEAST_WAYS = 512, WAYS_OF_ALL = 65536, LEAST_WAYS_OF_CELL = 4, BATCH = 256 };
 #define DARK 1e-6
 
@@ -28,13 +29,13 @@ enum { MOST_WAYS = 8192, LEAST_WAYS = 512, WAYS_OF_ALL = 65536, LEAST_WAYS_OF_CE
 #define ASIDE 2
 #define LOW_PART 0.9
 
-/* A ball as bright all over as a lamp's light is in the mean over a cell around it has this radius, in cells: of a cube the mean of
- * 1 / distance^2 is 7.7, of that ball 2 / radius^2. */
+/* A ball as bright all over as a point light's light is in the mean over a cell around it has this radius, in cells:
+ * of a cube the mean of 1 / distance^2 is 7.7, of that ball 2 / radius^2. */
 #define SOFT 0.51
 
 /* ---- what there is --------------------------------------------------------------------------- */
 
-static int has_lamps(const nebel_lighting *lighting)
+static int has_lights(const nebel_lighting *lighting)
 {
     return lighting->scatters_lights && lighting->light_count > 0;
 }
@@ -61,7 +62,7 @@ nb_local_light nb_find_own_light(const nebel_lighting *lighting)
     const nebel_snapshot *snapshot = lighting->snapshot;
     nb_local_light own = {.has = 0};
     int scatters = 0;
-    for (size_t i = 0; has_lamps(lighting) && i < lighting->light_count; i++)
+    for (size_t i = 0; has_lights(lighting) && i < lighting->light_count; i++)
         add_color(&own, lighting->lights[i].intensity);
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
@@ -139,9 +140,9 @@ int nb_find_reach(const nebel_lighting *lighting, const nebel_snapshot *scaled, 
         low[a] = HUGE_VAL;
         high[a] = -HUGE_VAL;
     }
-    for (size_t i = 0; has_lamps(lighting) && i < lighting->light_count; i++) {
-        const nb_light *lamp = &lighting->lights[i];
-        if (most_of(lamp->intensity) > 0) widen(scaled, lamp->place, lamp->place, low, high);
+    for (size_t i = 0; has_lights(lighting) && i < lighting->light_count; i++) {
+        const nb_light *point_light = &lighting->lights[i];
+        if (most_of(point_light->intensity) > 0) widen(scaled, point_light->place, point_light->place, low, high);
     }
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
@@ -182,7 +183,7 @@ void nb_beams_close(const nebel_allocator *allocator, const nb_light_beams *beam
 typedef struct caster {
     const nb_diffusion_lattice *lattice;
     const nb_medium_transport *cells;
-    int channel, is_emitted; /* of lamps nodes know more than cells do */
+    int channel, is_emitted; /* of point lights nodes know more than cells do */
     const nb_light_beams *beams;
 } caster;
 
@@ -276,13 +277,13 @@ typedef struct nb_diffusion_cone {
     double axis[3], width;
 } nb_diffusion_cone;
 
-/* That holds the lattice, as a lamp sees it, or the lamp's own one where that is narrower. */
-static nb_diffusion_cone aim(const nb_diffusion_lattice *l, const nb_light *lamp)
+/* That holds the lattice, as a point light sees it, or the point light's own one where that is narrower. */
+static nb_diffusion_cone aim(const nb_diffusion_lattice *l, const nb_light *point_light)
 {
     nb_diffusion_cone all = {{0, 1, 0}, 2};
     double square = 0, radius2 = 0, away[3];
     for (int a = 0; a < 3; a++) {
-        away[a] = l->low[a] + (l->high[a] - l->low[a]) / 2 - lamp->place[a];
+        away[a] = l->low[a] + (l->high[a] - l->low[a]) / 2 - point_light->place[a];
         square += away[a] * away[a];
         radius2 += (l->high[a] - l->low[a]) * (l->high[a] - l->low[a]) / 4;
     }
@@ -291,9 +292,9 @@ static nb_diffusion_cone aim(const nb_diffusion_lattice *l, const nb_light *lamp
         all.width = sine2 / (1 + sqrt(1 - sine2));
         for (int a = 0; a < 3; a++) all.axis[a] = away[a] / sqrt(square);
     }
-    if (lamp->is_spot && 1 - lamp->edge < all.width) {
-        all.width = 1 - lamp->edge;
-        memcpy(all.axis, lamp->axis, sizeof all.axis);
+    if (point_light->is_spot && 1 - point_light->edge < all.width) {
+        all.width = 1 - point_light->edge;
+        memcpy(all.axis, point_light->axis, sizeof all.axis);
     }
     return all;
 }
@@ -308,17 +309,17 @@ static void find_across(const double axis[3], double right[3], double up[3])
     for (int a = 0; a < 3; a++) up[a] = axis[(a + 1) % 3] * right[(a + 2) % 3] - axis[(a + 2) % 3] * right[(a + 1) % 3];
 }
 
-static double cone_of(const nb_light *lamp, const double direction[3])
+static double cone_of(const nb_light *point_light, const double direction[3])
 {
     double cosine = 0;
-    for (int a = 0; a < 3; a++) cosine += direction[a] * lamp->axis[a];
-    return lamp->is_spot ? nb_light_cone(cosine, lamp->edge, lamp->rise) : 1;
+    for (int a = 0; a < 3; a++) cosine += direction[a] * point_light->axis[a];
+    return point_light->is_spot ? nb_light_cone(cosine, point_light->edge, point_light->rise) : 1;
 }
 
 /* Ways that are spread evenly, along a spiral of the golden angle. */
-static void cast_lamp(const caster *k, const nb_light *lamp, double intensity, int count)
+static void cast_light(const caster *k, const nb_light *point_light, double intensity, int count)
 {
-    const nb_diffusion_cone all = aim(k->lattice, lamp);
+    const nb_diffusion_cone all = aim(k->lattice, point_light);
     double right[3], up[3];
     find_across(all.axis, right, up);
     for (int i = 0; i < count; i++) {
@@ -326,8 +327,8 @@ static void cast_lamp(const caster *k, const nb_light *lamp, double intensity, i
         const double x = sine * cos(i * GOLDEN_ANGLE), y = sine * sin(i * GOLDEN_ANGLE);
         double direction[3];
         for (int a = 0; a < 3; a++) direction[a] = (1 - below) * all.axis[a] + x * right[a] + y * up[a];
-        const double power = intensity * cone_of(lamp, direction) * 2 * PI * all.width / count;
-        if (power > 0) cast(k, lamp->place, lamp->clear, direction, power);
+        const double power = intensity * cone_of(point_light, direction) * 2 * PI * all.width / count;
+        if (power > 0) cast(k, point_light->place, point_light->clear, direction, power);
     }
 }
 
@@ -380,33 +381,33 @@ void nb_cast_beams(const nb_diffusion_lattice *lattice, const nebel_lighting *li
         memset(beams->through[a], 0, nb_diffusion_lattice_faces(lattice, a) * sizeof *beams->through[a]);
     const double share = lighting->light_count > 0 ? WAYS_OF_ALL / (double)lighting->light_count : 0;
     const int ways = (int)fmin(fmax(share, LEAST_WAYS), MOST_WAYS);
-    for (size_t i = 0; has_lamps(lighting) && i < lighting->light_count; i++)
-        cast_lamp(&k, &lighting->lights[i], nb_local_amount(own, lighting->lights[i].intensity, channel), ways);
+    for (size_t i = 0; has_lights(lighting) && i < lighting->light_count; i++)
+        cast_light(&k, &lighting->lights[i], nb_local_amount(own, lighting->lights[i].intensity, channel), ways);
     k.is_emitted = 1;
     cast_emission(&k, own);
 }
 
 /* ---- straight ways to nodes ------------------------------------------------------------------ */
 
-/* Some nodes as a lamp sees them. */
+/* Some nodes as a point light sees them. */
 typedef struct nb_light_view {
     size_t count;
-    double distance[BATCH], direction[3][BATCH]; /* m; from the nodes to the lamp */
+    double distance[BATCH], direction[3][BATCH]; /* m; from the nodes to the point light */
     float offset[3][BATCH], length[BATCH];
     float scaled[3][BATCH], whole[3][BATCH]; /* transmittance */
 } nb_light_view;
 
-static void look(const nb_diffusion_lattice *l, const nb_light *lamp, size_t first, nb_light_view *v)
+static void look(const nb_diffusion_lattice *l, const nb_light *point_light, size_t first, nb_light_view *v)
 {
     for (size_t i = 0; i < v->count; i++) {
         double place[3], square = 0;
         nb_diffusion_lattice_node(l, first + i, place);
-        for (int a = 0; a < 3; a++) square += (lamp->place[a] - place[a]) * (lamp->place[a] - place[a]);
+        for (int a = 0; a < 3; a++) square += (point_light->place[a] - place[a]) * (point_light->place[a] - place[a]);
         v->distance[i] = sqrt(square);
-        v->length[i] = (float)fmax(v->distance[i] - lamp->clear, 0);
+        v->length[i] = (float)fmax(v->distance[i] - point_light->clear, 0);
         for (int a = 0; a < 3; a++) {
             const double upwards = a == 1;
-            v->direction[a][i] = square > 0 ? (lamp->place[a] - place[a]) / v->distance[i] : upwards;
+            v->direction[a][i] = square > 0 ? (point_light->place[a] - place[a]) / v->distance[i] : upwards;
             v->offset[a][i] = (float)(place[a] - (l->low[a] + (l->high[a] - l->low[a]) / 2));
         }
     }
@@ -439,15 +440,15 @@ static void add_light(double sum[4], double fluence, double flux, const double d
     for (int a = 0; a < 3; a++) sum[1 + a] += flux * direction[a];
 }
 
-static void add_lamp(const nb_light_view *v, size_t i, const nb_light *lamp, const nb_local_light *own, double soft2,
-                     const nb_medium_transport *fog, nb_local_node *node)
+static void add_point_light(const nb_light_view *v, size_t i, const nb_light *point_light, const nb_local_light *own,
+                            double soft2, const nb_medium_transport *fog, nb_local_node *node)
 {
     const double away[3] = {-v->direction[0][i], -v->direction[1][i], -v->direction[2][i]};
     const double square = v->distance[i] * v->distance[i];
-    const double part =
-        cone_of(lamp, away) * (double)nb_light_fluence((nb_wide)square, (nb_wide)fmax(lamp->radius2, soft2));
+    const double part = cone_of(point_light, away) *
+                        (double)nb_light_fluence((nb_wide)square, (nb_wide)fmax(point_light->radius2, soft2));
     for (int c = 0; c < 3; c++) {
-        const double full = part * nb_local_amount(own, lamp->intensity, c);
+        const double full = part * nb_local_amount(own, point_light->intensity, c);
         const double scaled = (double)v->scaled[c][i], whole = (double)v->whole[c][i];
         const double straight = full * fmax(scaled - whole, 0);
         const double width = nb_glow_width(turned_cosine(fog, c), scaled, whole);
@@ -466,15 +467,15 @@ nebel_result nb_light_nodes_by_point_lights(const nb_diffusion *diffusion, const
     const double cell = nb_exp(nb_log(l->spacing[0] * l->spacing[1] * l->spacing[2]) / 3);
     for (size_t first = 0; first < count; first += BATCH) {
         nb_light_view v = {.count = count - first < BATCH ? count - first : BATCH};
-        for (size_t k = 0; has_lamps(lighting) && k < lighting->light_count; k++) {
-            const nb_light *lamp = &lighting->lights[k];
-            look(l, lamp, first, &v);
+        for (size_t k = 0; has_lights(lighting) && k < lighting->light_count; k++) {
+            const nb_light *point_light = &lighting->lights[k];
+            look(l, point_light, first, &v);
             nebel_result result = ask(l, diffusion->scaled, NULL, &v, v.scaled);
             if (result == NEBEL_OK) result = ask(l, lighting->snapshot, lighting, &v, v.whole);
             if (result != NEBEL_OK) return result;
             for (size_t i = 0; i < v.count; i++) {
                 const nb_medium_transport around = nb_diffusion_lattice_around(l, cells, first + i);
-                add_lamp(&v, i, lamp, own, SOFT * SOFT * cell * cell, &around, &nodes[first + i]);
+                add_point_light(&v, i, point_light, own, SOFT * SOFT * cell * cell, &around, &nodes[first + i]);
             }
         }
     }

@@ -58,11 +58,11 @@ static inline nebel_result nb_surface_lighting_set(nb_surface_lighting *lighting
         return nb_fail(log, NEBEL_ERROR_VALUE, "scene: background, ambient and sun must be finite and not negative");
     }
     for (size_t i = 0; i < scene->light_count; i++) {
-        const nebel_light *lamp = &scene->lights[i];
-        if (!nb_surface_lighting_is_light(lamp->intensity) ||
-            !isfinite(lamp->position[0] + lamp->position[1] + lamp->position[2]))
+        const nebel_light *light = &scene->lights[i];
+        if (!nb_surface_lighting_is_light(light->intensity) ||
+            !isfinite(light->position[0] + light->position[1] + light->position[2]))
             return nb_fail(log, NEBEL_ERROR_VALUE,
-                           "scene: lamp %zu: place and intensity must be finite, intensity not negative", i);
+                           "scene: light %zu: place and intensity must be finite, intensity not negative", i);
     }
     lighting->environment = nb_surface_lighting_environment(scene);
     lighting->shows_ambient = scene->shows_ambient;

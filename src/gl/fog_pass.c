@@ -320,13 +320,14 @@ void nb_gl_warn_of_turns(nebel_gl *gl, const char *why)
 {
     if (gl->has_warned) return;
     gl->has_warned = 1;
-    nb_log_message(&gl->log, NEBEL_LOG_WARNING, NEBEL_OK,
-                   "nebel_gl_draw_fog: this driver (%s) ends long loops, and %s: light of what is far behind "
-                   "others on a ray of up to %u volumes may be summed in coarse steps, in each of which they count as "
-                   "evenly mixed, and that of lamps left out there. A graphics processor or the CPU renderer has no "
-                   "such bound",
-                   (const char *)glGetString(GL_RENDERER), why,
-                   (unsigned)(gl->fog.tiles != 0 ? gl->fog.max_tile_volumes : nb_gl_count_volumes(gl->packed)));
+    nb_log_message(
+        &gl->log, NEBEL_LOG_WARNING, NEBEL_OK,
+        "nebel_gl_draw_fog: this driver (%s) ends long loops, and %s: light of what is far behind "
+        "others on a ray of up to %u volumes may be summed in coarse steps, in each of which they count as "
+        "evenly mixed, and that of point lights left out there. A graphics processor or the CPU renderer has no "
+        "such bound",
+        (const char *)glGetString(GL_RENDERER), why,
+        (unsigned)(gl->fog.tiles != 0 ? gl->fog.max_tile_volumes : nb_gl_count_volumes(gl->packed)));
 }
 
 /* Units that have textures of several layers while steps are drawn. */

@@ -113,16 +113,16 @@ static uint32_t fullest_tile(const nebel_gl *gl)
 
 /* Of the loops of the fog's text, about, where `listed` volumes of `all` overlap on a ray; each begins and ends. Between
  * two such places all are read some three times where there are more than slots, seven times where their density varies;
- * in sunlight each has as many turns again, and the way to the sun is asked for five times; each lamp takes two steps of
- * eight places, at which all that are there are asked, and all there are on the way to it. */
-static double most_turns_of(const nebel_gl *gl, double listed, double all, double lamps)
+ * in sunlight each has as many turns again, and the way to the sun is asked for five times; each point light takes two
+ * steps of eight places, at which all that are there are asked, and all there are on the way to it. */
+static double most_turns_of(const nebel_gl *gl, double listed, double all, double lights)
 {
     const uint32_t features = gl->fog.features;
     const int is_walked = (features & (NEBEL_FEATURE_MIXED | NEBEL_FEATURE_OVERRIDE)) != 0;
     const double walk = is_walked ? 2 * listed * 8 * listed : 0;
     const double sunlight = (features & NEBEL_FEATURE_SUN) != 0 ? 4 * listed * (8 * listed + 14 * all) : 0;
-    const double lamplight = (features & NEBEL_FEATURE_LIGHTS) != 0 ? lamps * 2 * listed * 16 * (listed + all) : 0;
-    return walk + sunlight + lamplight;
+    const double point_light = (features & NEBEL_FEATURE_LIGHTS) != 0 ? lights * 2 * listed * 16 * (listed + all) : 0;
+    return walk + sunlight + point_light;
 }
 
 /* How many legs a ray in light is cut into is known to the ray alone: uneven profiles make ten of one. The same holds
@@ -144,8 +144,8 @@ static int find_crowd(const nebel_gl *gl, const nebel_lighting *lighting)
     const double listed = gl->fog.tiles != 0 ? (double)gl->fog.max_tile_volumes : all;
     if (gl->context.most_turns == 0 || gl->dims_alone) return 0;
     if ((gl->fog.features & NEBEL_FEATURE_GRID) != 0 && (gl->fog.features & lit) != 0) return 1;
-    const double lamps = (double)nebel_get_lighting_lights(lighting, NULL);
-    return most_turns_of(gl, listed, all, lamps) > (double)gl->context.most_turns;
+    const double lights = (double)nebel_get_lighting_lights(lighting, NULL);
+    return most_turns_of(gl, listed, all, lights) > (double)gl->context.most_turns;
 }
 
 /* ---- textures -------------------------------------------------------------------------------- */

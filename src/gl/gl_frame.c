@@ -190,7 +190,7 @@ static void draw_surfaces(const nb_gl_frame *f)
     if (f->layers != NULL) nb_gl_frame_draw_shell_ground(f);
 }
 
-static int has_lamps(const nb_gl_frame *f)
+static int has_lights(const nb_gl_frame *f)
 {
     return f->renderer->scene->light_count > 0 && (f->renderer->meshes.count > 0 || f->planet != NULL);
 }
@@ -276,22 +276,22 @@ static nebel_result draw_factor(const nb_gl_frame *f)
     return NEBEL_OK;
 }
 
-static void set_lamps(const nb_gl_frame *f, unsigned program)
+static void set_lights(const nb_gl_frame *f, unsigned program)
 {
-    const nb_light_maps *const lamps = &f->renderer->lamps;
-    nb_gl_frame_bind_texture(NB_UNIT_LIGHTS, GL_TEXTURE_2D, lamps->words);
-    nb_gl_frame_bind_texture(NB_UNIT_LIGHT_MAPS, GL_TEXTURE_2D_ARRAY, lamps->maps);
-    glUniform1i(glGetUniformLocation(program, "lamp_count"), (GLint)f->renderer->scene->light_count);
-    glUniform1f(glGetUniformLocation(program, "map_face"), (float)lamps->face);
-    glUniform1f(glGetUniformLocation(program, "map_share"), 1 - 2.f * NB_LIGHT_BORDER / (float)lamps->face);
+    const nb_light_maps *const lights = &f->renderer->lights;
+    nb_gl_frame_bind_texture(NB_UNIT_LIGHTS, GL_TEXTURE_2D, lights->words);
+    nb_gl_frame_bind_texture(NB_UNIT_LIGHT_MAPS, GL_TEXTURE_2D_ARRAY, lights->maps);
+    glUniform1i(glGetUniformLocation(program, "light_count"), (GLint)f->renderer->scene->light_count);
+    glUniform1f(glGetUniformLocation(program, "map_face"), (float)lights->face);
+    glUniform1f(glGetUniformLocation(program, "map_share"), 1 - 2.f * NB_LIGHT_BORDER / (float)lights->face);
 }
 
 /* In the programs of passes, too. */
-static void set_lamp_shade(const void *of, unsigned program)
+static void set_light_shade(const void *of, unsigned program)
 {
-    glUniform1i(glGetUniformLocation(program, "scene_lamps"), NB_UNIT_LIGHTS);
-    glUniform1i(glGetUniformLocation(program, "lamp_maps"), NB_UNIT_LIGHT_MAPS);
-    set_lamps(of, program);
+    glUniform1i(glGetUniformLocation(program, "scene_lights"), NB_UNIT_LIGHTS);
+    glUniform1i(glGetUniformLocation(program, "light_maps"), NB_UNIT_LIGHT_MAPS);
+    set_lights(of, program);
 }
 
 /* From the surfaces' distances. */
@@ -311,8 +311,8 @@ static nebel_result draw_exact_fog(const nb_gl_frame *f)
                                  .is_turned = f->clouds != NULL && f->place == r->cloud_ends,
                                  .shafts = f->shafts ? &r->shafts : NULL};
     nebel_bounds lit;
-    if (has_lamps(f) && nebel_get_lit_bounds(r->fog, NEBEL_LIGHT_GROUP_LOCAL, &lit))
-        picture.shade = (nb_gl_visibility){{nb_light_map_text, nb_light_shade_text}, set_lamp_shade, f};
+    if (has_lights(f) && nebel_get_lit_bounds(r->fog, NEBEL_LIGHT_GROUP_LOCAL, &lit))
+        picture.shade = (nb_gl_visibility){{nb_light_map_text, nb_light_shade_text}, set_light_shade, f};
     if (!f->panorama && nebel_compute_view_rays(&f->sample_view, &pass.depth, &picture.rays) != NEBEL_OK)
         return NEBEL_ERROR_ARGUMENT;
     return nb_gl_draw_fog(r->eye_fog, &pass, &picture);
@@ -357,7 +357,8 @@ int nb_gl_frame_has_particles(const nb_gl_frame *f)
     return f->renderer->particles.count > 0 && !f->method.replaces_fog;
 }
 
-/* Particles ask for the renderer's fog before them whatever is on surfaces, and lamps for that before surfaces. */
+/* Particles ask for the renderer's fog before them whatever is on surfaces, and point lights for that before surfaces.
+ * */
 nebel_result nb_gl_frame_draw_fog(const nb_gl_frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
@@ -373,7 +374,7 @@ nebel_result nb_gl_frame_draw_fog(const nb_gl_frame *f)
         result = draw_pixel_fog(f);
     const int is_exact =
         !nb_method_is_by_vertex(&f->method) && !f->method.replaces_fog && !nb_method_takes_cells(f->desc->method);
-    const int is_asked = is_exact || nb_gl_frame_has_particles(f) || (has_lamps(f) && !f->method.replaces_fog);
+    const int is_asked = is_exact || nb_gl_frame_has_particles(f) || (has_lights(f) && !f->method.replaces_fog);
     if (result == NEBEL_OK && (r->fog != NULL || f->planet != NULL) && is_asked) result = set_eye_fog(f);
     if (result == NEBEL_OK && nb_gl_frame_has_particles(f) && r->eye_fog->is_crowded)
         nb_gl_warn_of_turns(r->eye_fog, "particles ask in one pass for what is before them");
@@ -487,18 +488,18 @@ nebel_result nb_gl_frame_draw_particles(const nb_gl_frame *f)
     return NEBEL_OK;
 }
 
-/* ---- lamps ----------------------------------------------------------------------------------- */
+/* ---- point lights ----------------------------------------------------------------------------------- */
 
 /* Of the whole frame. */
-static nebel_result prepare_lamps(const nb_gl_frame *f)
+static nebel_result prepare_lights(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    if (!has_lamps(f)) return NEBEL_OK;
+    if (!has_lights(f)) return NEBEL_OK;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_LIGHTS);
-    nebel_result result = nb_light_maps_set(&r->lamps, &r->allocator, &r->log, r->scene, r->fog, f->eye);
+    nebel_result result = nb_light_maps_set(&r->lights, &r->allocator, &r->log, r->scene, r->fog, f->eye);
     if (result == NEBEL_OK) result = nb_scene_programs_make_light_map(&r->shading, &r->context, &r->log);
     if (result == NEBEL_OK)
-        result = nb_light_maps_draw(&r->lamps, &r->context, &r->log, r->shading.lamp_map, &r->meshes);
+        result = nb_light_maps_draw(&r->lights, &r->context, &r->log, r->shading.light_map, &r->meshes);
     glActiveTexture(GL_TEXTURE0);
     return result;
 }
@@ -582,7 +583,7 @@ static void set_light_uniforms(const nb_gl_frame *f, const nebel_gl_fog_resource
     glUniform1f(glGetUniformLocation(program, "scene_ahead"), (float)f->ahead);
     glUniform1i(glGetUniformLocation(program, "scene_is_stored"), f->method.blends_stored);
     if (f->casts) nb_gl_frame_set_shadows(f, program);
-    if (has_lamps(f)) set_lamps(f, program);
+    if (has_lights(f)) set_lights(f, program);
     nb_gl_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, t->place);
     nb_gl_frame_bind_texture(NB_UNIT_NORMAL, GL_TEXTURE_2D, t->normal);
     nb_gl_frame_bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, t->reflectance);
@@ -611,13 +612,13 @@ static nebel_result draw_light(const nb_gl_frame *f, uint32_t sample)
     nebel_gl_renderer *const r = f->renderer;
     nebel_gl_fog_resources fog;
     unsigned program = 0;
-    const int is_lit = f->casts || has_lamps(f) || f->planet != NULL, dims = r->fog != NULL && !f->method.replaces_fog,
+    const int is_lit = f->casts || has_lights(f) || f->planet != NULL, dims = r->fog != NULL && !f->method.replaces_fog,
               along_sun = f->casts && f->planet == NULL;
     const nebel_gl *const passes = !is_lit || !dims ? NULL : along_sun ? r->sun_fog : r->eye_fog;
     const nb_composite_key kind = {.sunlit = f->casts,
                                    .air = f->planet != NULL ? r->air.count : 0,
                                    .shells = f->layers != NULL,
-                                   .lamplit = has_lamps(f),
+                                   .lights = has_lights(f),
                                    .dimmed = f->dims || f->clouds != NULL,
                                    .clouds = f->clouds != NULL,
                                    .in_fog = nb_gl_frame_has_fog(f),
@@ -729,7 +730,7 @@ static nebel_result draw_samples(nb_gl_frame *f)
     glActiveTexture(GL_TEXTURE0);
     nebel_result result = nb_targets_fit(&r->targets, &r->log, f->desc->width, f->desc->height);
     if (result == NEBEL_OK && nb_gl_frame_has_particles(f)) result = prepare_particles(f);
-    if (result == NEBEL_OK) result = prepare_lamps(f);
+    if (result == NEBEL_OK) result = prepare_lights(f);
     if (result == NEBEL_OK) result = prepare_environment(f);
     if (result == NEBEL_OK) result = prepare_air(f);
     if (result == NEBEL_OK && f->layers != NULL) result = nb_gl_frame_prepare_shells(f);

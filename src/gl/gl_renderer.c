@@ -82,7 +82,7 @@ nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_light
     made->shadows.count = NB_CASCADES;
     made->shafts.maps.count = NB_MAX_MAPS;
     made->shafts.maps.leaning = 1;
-    made->lamps.most_face = size / 4;
+    made->lights.most_face = size / 4;
     made->fog = nebel_retain_lighting(lighting);
     result = make_renderer(made);
     if (result != NEBEL_OK) {
@@ -103,7 +103,7 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
         nb_scene_programs_delete(&r->shading);
         nb_shadows_delete(&r->shadows);
         nb_shaft_maps_delete(&r->shafts);
-        nb_light_maps_delete(&r->lamps);
+        nb_light_maps_delete(&r->lights);
         nb_targets_delete(&r->targets);
         nb_particles_delete(&r->particles);
         nb_environment_delete(&r->environment);
@@ -124,7 +124,7 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     nb_gl_daylit_fog_release(&r->daylit);
     nb_release(&r->allocator, r->shading.lights);
     nb_release(&r->allocator, r->shadows.blocks);
-    nb_light_maps_release(&r->allocator, &r->lamps);
+    nb_light_maps_release(&r->allocator, &r->lights);
     nb_particles_release(&r->allocator, &r->particles);
     nb_cloud_picture_release(&r->clouds);
     nb_gl_planets_release(&r->air, &r->allocator);
@@ -160,8 +160,8 @@ nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *r, const nebel_p
     return result;
 }
 
-/* Whether particles should take light of lamps, which reaches surfaces and fog. */
-static int dim_lamps(const nebel_gl_renderer *r)
+/* Whether particles should take light of point lights, which reaches surfaces and fog. */
+static int dim_lights(const nebel_gl_renderer *r)
 {
     static const double any[3] = {0, 1, 0}, low[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL},
                         high[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
@@ -182,15 +182,15 @@ void nb_renderer_judge_particles(nebel_gl_renderer *r)
 {
     if (r->has_judged_particles) return;
     r->has_judged_particles = 1;
-    const int lamps = dim_lamps(r), sun = shade_sunlit_fog(r);
-    if (!lamps && !sun) return;
+    const int lights = dim_lights(r), sun = shade_sunlit_fog(r);
+    if (!lights && !sun) return;
     nb_log_message(&r->log, NEBEL_LOG_WARNING, NEBEL_OK,
                    "frame: what is in the shadow of particles is too bright: OpenGL lets them take no light "
                    "%s. The CPU renderer "
                    "(--device cpu) does, and OpenGL where they are volumes among the fog",
-                   !lamps ? "of the sun from fog"
-                   : sun  ? "of lamps, nor of the sun from fog"
-                          : "of lamps");
+                   !lights ? "of the sun from fog"
+                   : sun   ? "of lights, nor of the sun from fog"
+                           : "of point lights");
 }
 
 /* ---- results --------------------------------------------------------------------------------- */

@@ -34,7 +34,7 @@ struct nebel_gl_renderer {
     nb_scene_programs shading;
     nb_shadows shadows;
     nb_shaft_maps shafts;
-    nb_light_maps lamps;
+    nb_light_maps lights;
     nb_environment environment; /* of the scene, for surfaces and the background */
     nb_gl_air air;
     nb_gl_shells shells;
@@ -47,8 +47,8 @@ struct nebel_gl_renderer {
     int has_frame;
 };
 
-/* Particles are asked for no light in fog, nor for that of lamps: tells the log where they should be, once for each fog
- * and cloud. */
+/* Particles are asked for no light in fog, nor for that of point lights: tells the log where they should be, once for
+ * each fog and cloud. */
 void nb_renderer_judge_particles(nebel_gl_renderer *renderer);
 
 #endif

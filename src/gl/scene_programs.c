@@ -473,8 +473,8 @@ static const char light_text[] =
     "        else light_model(at, light, shining);\n"
     "#endif\n"
     "        light += sunlight(at, normal.xyz, normal.w, place.yzw, place.x, shining);\n"
-    "#ifdef SCENE_LAMPLIT\n"
-    "        light += lamplight(at, normal.xyz, place.yzw);\n"
+    "#ifdef SCENE_POINT_LIT\n"
+    "        light += point_light(at, normal.xyz, place.yzw);\n"
     "#endif\n"
     "#ifdef SCENE_SHELLS\n"
     "        if (reflectance.a > 0.5) light = max(dot(normal.xyz, scene_sun), 0.0) * scene_sunlight + shell_ambient;\n"
@@ -581,11 +581,11 @@ nebel_result nb_scene_programs_make_light_map(nb_scene_programs *shading, const 
     const char *const version = nb_program_version(context);
     const nb_shader_parts vertex = {{version, nb_light_map_vertex_text}, 2};
     const nb_shader_parts fragment = {{version, precision_of(context), hole_text, nb_light_map_fragment_text}, 4};
-    if (shading->lamp_map != 0) return NEBEL_OK;
-    const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->lamp_map);
+    if (shading->light_map != 0) return NEBEL_OK;
+    const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->light_map);
     if (result != NEBEL_OK) return result;
-    glUseProgram(shading->lamp_map);
-    set_unit(shading->lamp_map, "scene_mask", NB_UNIT_MASK);
+    glUseProgram(shading->light_map);
+    set_unit(shading->light_map, "scene_mask", NB_UNIT_MASK);
     return NEBEL_OK;
 }
 
@@ -671,7 +671,7 @@ static void write_composite_head(const nb_context *context, const nb_composite_k
         nb_program_version(context), nb_program_limits(context, "", limits, sizeof limits),
         kind->has_fog ? "#define SCENE_FOG\n" : "", kind->has_surfaces ? "#define SCENE_SURFACES\n" : "",
         kind->in_fog ? "#define SCENE_IN_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
-        kind->sunlit ? "#define SCENE_SUNLIT\n" : "", kind->lamplit ? "#define SCENE_LAMPLIT\n" : "",
+        kind->sunlit ? "#define SCENE_SUNLIT\n" : "", kind->lights ? "#define SCENE_POINT_LIT\n" : "",
         kind->panorama ? "#define SCENE_PANORAMA\n" : "", kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
         kind->in_texture ? "#define NEBEL_FOG_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
         (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
@@ -701,8 +701,8 @@ static void set_composite_units(unsigned program)
     set_unit(program, "scene_shadows", NB_UNIT_SHADOWS);
     set_unit(program, "scene_dimming", NB_UNIT_DIMMING);
     set_unit(program, "scene_veil", NB_UNIT_VEIL);
-    set_unit(program, "scene_lamps", NB_UNIT_LIGHTS);
-    set_unit(program, "lamp_maps", NB_UNIT_LIGHT_MAPS);
+    set_unit(program, "scene_lights", NB_UNIT_LIGHTS);
+    set_unit(program, "light_maps", NB_UNIT_LIGHT_MAPS);
     set_unit(program, "nebel_sky_view_texture", NB_UNIT_AIR);
     set_unit(program, "scene_shells", NB_UNIT_SHELLS);
     set_unit(program, "scene_clouds", NB_UNIT_CLOUDS);
@@ -727,8 +727,8 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
     const nb_shader_parts light = {{head, kind->air ? nb_air_words_text : "",
                                     kind->has_fog || kind->environment || kind->air ? fog : "", nb_texel_texture_text,
-                                    ray, shadow_text, sun_text, kind->lamplit ? nb_light_map_text : "",
-                                    kind->lamplit ? nb_light_text : "", kind->air ? nb_air_planets_text : "",
+                                    ray, shadow_text, sun_text, kind->lights ? nb_light_map_text : "",
+                                    kind->lights ? nb_light_text : "", kind->air ? nb_air_planets_text : "",
                                     kind->air ? nb_air_places_text : "", kind->air ? nb_air_sun_text : "",
                                     kind->air ? nb_air_light_text : "", nb_veil_text, nb_device_text, light_text},
                                    16};
@@ -751,7 +751,7 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
 static int is_same_composite(const nb_composite_key *a, const nb_composite_key *b)
 {
     return a->of_particles == b->of_particles && a->of_dimming == b->of_dimming && a->dimmed == b->dimmed &&
-           a->sunlit == b->sunlit && a->environment == b->environment && a->lamplit == b->lamplit &&
+           a->sunlit == b->sunlit && a->environment == b->environment && a->lights == b->lights &&
            a->five_taps == b->five_taps && a->veil_layers == b->veil_layers && a->panorama == b->panorama &&
            a->has_surfaces == b->has_surfaces && a->in_fog == b->in_fog && a->has_fog == b->has_fog &&
            a->shafts == b->shafts && a->air == b->air && a->shells == b->shells && a->of_shells == b->of_shells &&
@@ -790,6 +790,6 @@ void nb_scene_programs_delete(const nb_scene_programs *shading)
     glDeleteProgram(shading->round_factor);
     glDeleteProgram(shading->ground);
     glDeleteProgram(shading->round_ground);
-    glDeleteProgram(shading->lamp_map);
+    glDeleteProgram(shading->light_map);
     for (size_t i = 0; i < shading->light_count; i++) glDeleteProgram(shading->lights[i].name);
 }

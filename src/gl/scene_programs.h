@@ -34,7 +34,7 @@ typedef struct nb_composite_key {
     int of_shells;    /* one of a planet's, and the fog before it */
     int dimmed;       /* that counts, too */
     int sunlit;       /* surfaces are */
-    int lamplit;      /* the same */
+    int lights;       /* the same */
     int five_taps;    /* particles are discs, which are there or not */
     int environment;  /* surfaces are lit by direction, and the background may be */
     int veil_layers;  /* that particles are drawn into, or surfaces are seen through; 0: there are none */
@@ -61,7 +61,7 @@ typedef struct nb_scene_programs {
     unsigned factor, round_factor;
     unsigned ground, round_ground;
     int ground_worlds; /* that they are made for */
-    unsigned lamp_map;
+    unsigned light_map;
     nb_composite_program *lights;
     size_t light_count, light_capacity;
 } nb_scene_programs;
@@ -81,7 +81,7 @@ nebel_result nb_scene_programs_find_light(nb_scene_programs *shading, const nb_c
 nebel_result nb_scene_programs_make_vertex_fog(nb_scene_programs *shading, const nb_context *context,
                                                const nebel_log *log);
 
-/* Maps around lamps. */
+/* Maps around point lights. */
 nebel_result nb_scene_programs_make_light_map(nb_scene_programs *shading, const nb_context *context,
                                               const nebel_log *log);
 

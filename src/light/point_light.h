@@ -1,4 +1,4 @@
-/* Lamps as the core keeps them, see formulas/point_light.inc. */
+/* Point lights as the core keeps them, see formulas/point_light.inc. */
 #ifndef NB_LIGHT_POINT_LIGHT_H
 #define NB_LIGHT_POINT_LIGHT_H
 
@@ -15,10 +15,10 @@ typedef struct nb_light {
     double edge, inner, rise; /* cosines of the outer and the inner angle; what nb_light_cone takes */
 } nb_light;
 
-/* Says through the log which of the lamps is not in order, and why. */
-nebel_result nb_check_lights(const nebel_log *log, size_t count, const nebel_light *lamps);
+/* Says through the log which of the point lights is not in order, and why. */
+nebel_result nb_check_lights(const nebel_log *log, size_t count, const nebel_light *lights);
 
-/* Of a lamp that is in order. */
-nb_light nb_light_resolve(const nebel_light *lamp);
+/* Of a point light that is in order. */
+nb_light nb_light_resolve(const nebel_light *light);
 
 #endif

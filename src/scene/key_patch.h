@@ -81,8 +81,8 @@ typedef struct nb_removed_keys {
 
 void nb_key_patch_lose(nb_removed_keys *lost, const char *key);
 
-/* After a section, an entry of fog, whose volumes begin with number `first` of the scene, a nebula, a model, a lamp,
- * the cells or the planets have been read, while the tree is there. */
+/* After a section, an entry of fog, whose volumes begin with number `first` of the scene, a nebula, a model, a point
+ * light, the cells or the planets have been read, while the tree is there. */
 void nb_key_patch_section(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node);
 bool nb_key_patch_volume(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t first);
 bool nb_key_patch_nebula(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t index);

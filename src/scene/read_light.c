@@ -92,34 +92,34 @@ static const nb_key_set light_keys[] = {{light_names, LIGHT_KEY_COUNT, POINT_KEY
                                          SPOT_REQUIRED | POINT_KEYS | NB_BIT(LIGHT_INNER_ANGLE), SPOT_REQUIRED,
                                          "a spot light"}};
 
-static bool read_cone(nb_json *json, const nb_json_node *const *found, nebel_light *lamp)
+static bool read_cone(nb_json *json, const nb_json_node *const *found, nebel_light *light)
 {
     static const nb_range outer_range = {
         .low = DBL_TRUE_MIN, .high = 180, .text = "a number of degrees from the axis, > 0 and <= 180"};
     static const nb_range inner_range = {
         .low = 0, .high = 180, .text = "a number of degrees from the axis, from 0 to outer_angle"};
-    if (!nb_key_value_direction(json, found[LIGHT_DIRECTION], lamp->direction) ||
-        !nb_key_value_number(json, found[LIGHT_OUTER_ANGLE], &outer_range, &lamp->outer_angle) ||
-        !nb_key_value_number(json, found[LIGHT_INNER_ANGLE], &inner_range, &lamp->inner_angle))
+    if (!nb_key_value_direction(json, found[LIGHT_DIRECTION], light->direction) ||
+        !nb_key_value_number(json, found[LIGHT_OUTER_ANGLE], &outer_range, &light->outer_angle) ||
+        !nb_key_value_number(json, found[LIGHT_INNER_ANGLE], &inner_range, &light->inner_angle))
         return false;
-    if (lamp->inner_angle <= lamp->outer_angle) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[LIGHT_INNER_ANGLE], "is %.15g; must be %s", lamp->inner_angle,
+    if (light->inner_angle <= light->outer_angle) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[LIGHT_INNER_ANGLE], "is %.15g; must be %s", light->inner_angle,
                         inner_range.text);
 }
 
-static bool keep_lamp(nb_scene_reader *in, const nb_json_node *node, const nebel_light *lamp, const char *name)
+static bool keep_light(nb_scene_reader *in, const nb_json_node *node, const nebel_light *light, const char *name)
 {
     nebel_scene *scene = in->scene;
     const size_t count = scene->data.light_count;
-    void *lamps = scene->lamps, *names = (void *)scene->lamp_names;
-    const bool room = nb_grow(&scene->allocator, &lamps, sizeof *lamp, count, &scene->lamp_capacity, count + 1);
-    scene->lamps = lamps;
+    void *lights = scene->lights, *names = (void *)scene->light_names;
+    const bool room = nb_grow(&scene->allocator, &lights, sizeof *light, count, &scene->light_capacity, count + 1);
+    scene->lights = lights;
     const bool name_room =
-        nb_grow(&scene->allocator, &names, sizeof name, count, &scene->lamp_name_capacity, count + 1);
-    scene->lamp_names = names;
+        nb_grow(&scene->allocator, &names, sizeof name, count, &scene->light_name_capacity, count + 1);
+    scene->light_names = names;
     if (!room || !name_room) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
-    scene->lamps[count] = *lamp;
-    scene->lamp_names[count] = name;
+    scene->lights[count] = *light;
+    scene->light_names[count] = name;
     scene->data.light_count = count + 1;
     return true;
 }
@@ -142,7 +142,7 @@ bool nb_keys_read_light(nb_scene_reader *in, const nb_json_node *node)
     static const nb_range radius_range = {.low = 1e-3, .high = 1e6, .dimension = NB_LENGTH, .text = "a length"};
     const nb_json_node *found[LIGHT_KEY_COUNT];
     const char *name = "";
-    nebel_light lamp = {0};
+    nebel_light light = {0};
     const nb_json_node *sphere = find_sphere(in->json, node);
     if (sphere != NULL)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, sphere,
@@ -150,15 +150,15 @@ bool nb_keys_read_light(nb_scene_reader *in, const nb_json_node *node)
     const int type = nb_key_value_type(in->json, node, types, 2);
     if (type < 0 || !nb_key_value_members(in->json, node, &light_keys[type], found) ||
         !nb_key_value_text(in->json, found[LIGHT_NAME], &in->scene->arena, &name) ||
-        !nb_key_value_place(in->json, found[LIGHT_POSITION], lamp.position) ||
-        !nb_key_value_color(in->json, found[LIGHT_INTENSITY], &nb_range_light, lamp.intensity) ||
-        !nb_key_value_number(in->json, found[LIGHT_RADIUS], &radius_range, &lamp.radius) ||
-        !read_cone(in->json, found, &lamp))
+        !nb_key_value_place(in->json, found[LIGHT_POSITION], light.position) ||
+        !nb_key_value_color(in->json, found[LIGHT_INTENSITY], &nb_range_light, light.intensity) ||
+        !nb_key_value_number(in->json, found[LIGHT_RADIUS], &radius_range, &light.radius) ||
+        !read_cone(in->json, found, &light))
         return false;
-    lamp.type = (nebel_light_type)type;
-    lamp.radius *= in->space.unit;
-    nb_file_units_convert_place(&in->space, lamp.position);
-    nb_file_units_convert_direction(&in->space, lamp.direction);
-    nb_vector_normalize(lamp.direction, 3);
-    return keep_lamp(in, node, &lamp, name);
+    light.type = (nebel_light_type)type;
+    light.radius *= in->space.unit;
+    nb_file_units_convert_place(&in->space, light.position);
+    nb_file_units_convert_direction(&in->space, light.direction);
+    nb_vector_normalize(light.direction, 3);
+    return keep_light(in, node, &light, name);
 }

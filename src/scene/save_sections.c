@@ -36,31 +36,31 @@ static void add_sun(nb_key_patch *save, const nb_file_units *space)
     nb_json_patch_add(&save->edit, &save->root, "sun", words);
 }
 
-/* ---- lamps ----------------------------------------------------------------------------------- */
+/* ---- point lights ----------------------------------------------------------------------------------- */
 
-static void restore_lamp(const nb_file_units *space, nebel_light *lamp)
+static void restore_light(const nb_file_units *space, nebel_light *light)
 {
-    nb_file_units_restore_place(space, lamp->position);
-    nb_file_units_restore_direction(space, lamp->direction);
-    lamp->radius /= space->unit;
+    nb_file_units_restore_place(space, light->position);
+    nb_file_units_restore_direction(space, light->direction);
+    light->radius /= space->unit;
 }
 
-static void change_lamp(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, nebel_light was,
-                        nebel_light now)
+static void change_light(nb_key_patch *save, const nb_scene_reader *in, const nb_json_node *node, nebel_light was,
+                         nebel_light now)
 {
     const nb_json_patch_object object = nb_json_patch_find(in->json, node);
-    restore_lamp(&in->space, &was);
-    restore_lamp(&in->space, &now);
+    restore_light(&in->space, &was);
+    restore_light(&in->space, &now);
     nb_key_patch_places(save, in->json, &object, nb_light_places, NB_ALL_PLACES, &was, &now);
 }
 
 bool nb_key_patch_light(nb_key_patch *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
 {
     const nebel_scene_data *before = save->before;
-    if (index >= before->light_count || in->scene->lamps[index].type != before->lights[index].type)
+    if (index >= before->light_count || in->scene->lights[index].type != before->lights[index].type)
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, node,
-                            "is another lamp than the one to be written; the file has changed, load it again");
-    change_lamp(save, in, node, before->lights[index], save->changed->lights[index]);
+                            "is another light than the one to be written; the file has changed, load it again");
+    change_light(save, in, node, before->lights[index], save->changed->lights[index]);
     return true;
 }
 
@@ -217,7 +217,7 @@ static bool check_counts(const nb_scene_reader *in, const nb_key_patch *save, co
                             in->scene->model_count, before->model_count);
     if (now->light_count != before->light_count)
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
-                            "has %zu lamps where %zu were; the file has changed, load it again", now->light_count,
+                            "has %zu lights where %zu were; the file has changed, load it again", now->light_count,
                             before->light_count);
     /* The sky of a planet is in no file. */
     const bool is_sky = before->environment.type == NEBEL_ENVIRONMENT_MAP && before->environment_path == NULL;

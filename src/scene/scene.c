@@ -210,8 +210,8 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
     scene->data.volumes = scene->volumes;
     scene->data.volume_names = scene->volume_names;
     scene->data.volume_tracks = scene->volume_entries;
-    scene->data.lights = scene->lamps;
-    scene->data.light_names = scene->lamp_names;
+    scene->data.lights = scene->lights;
+    scene->data.light_names = scene->light_names;
     scene->data.nebulae = scene->nebulae;
     scene->data.nebula_names = scene->nebula_names;
     scene->data.nebula_transforms = scene->nebula_places;
@@ -465,8 +465,8 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_release(&allocator, (void *)scene->volume_names);
     nb_release(&allocator, scene->volume_origins);
     nb_release(&allocator, scene->volume_entries);
-    nb_release(&allocator, scene->lamps);
-    nb_release(&allocator, (void *)scene->lamp_names);
+    nb_release(&allocator, scene->lights);
+    nb_release(&allocator, (void *)scene->light_names);
     nb_release(&allocator, scene->nebulae);
     nb_release(&allocator, (void *)scene->nebula_names);
     nb_release(&allocator, scene->nebula_places);

@@ -43,9 +43,9 @@ struct nebel_scene {
     nebel_transform *nebula_places;
     size_t nebula_capacity, nebula_name_capacity, nebula_place_capacity;
 
-    nebel_light *lamps;
-    const char **lamp_names;
-    size_t lamp_capacity, lamp_name_capacity;
+    nebel_light *lights;
+    const char **light_names;
+    size_t light_capacity, light_name_capacity;
 
     const char **files;
     size_t file_capacity;
@@ -124,7 +124,7 @@ typedef struct nb_scene_reader {
 #define NB_VOLUME_BYTES 2e3
 #define NB_VOLUME_SECONDS 5e-6
 #define NB_CELL_BYTES                                                                                                  \
-    900.0 /* of the lattice of diffusion, with color, a lamp, emission and ambient light; without 370 */
+    900.0 /* of the lattice of diffusion, with color, a point light, emission and ambient light; without 370 */
 #define NB_CELL_SECONDS 1.3e-5
 #define NB_PLANET_BYTES 1e7
 #define NB_PLANET_SECONDS 0.6

@@ -158,7 +158,7 @@ nb_vec3 nebel_evaluate_environment_diffuse(nb_vec3 normal)
 #define NEBEL_ENVIRONMENT_SCALE nb_splat3(1.0)
 #endif
 
-/* Radiance of a medium's opaque fog along rays of a direction, without the light of sun and lamps. */
+/* Radiance of a medium's opaque fog along rays of a direction, without the light of sun and point lights. */
 nb_vec3 nb_opaque_radiance(int medium, nb_vec3 direction)
 {
     nb_vec3 radiance = NEBEL_FOG_TEXEL(medium + 2).xyz;

@@ -16,7 +16,7 @@ struct nb_media_sum {
     bool met, emits;
     bool mixed; /* more than one quotient of light and extinction */
     bool covers; /* one that covers is met, and another */
-    bool scatters; /* light of sun or lamps */
+    bool scatters; /* light of sun or point lights */
     float last; /* where the last body ends, as far as bodies end at all */
 };
 

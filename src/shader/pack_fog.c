@@ -312,25 +312,25 @@ static void pack_sun(const nebel_lighting *lighting, nebel_texel_f32 word[2])
     set_color(&word[1], lighting->irradiance, 0);
 }
 
-static void pack_lamp(const packer *p, const nb_light *lamp, nebel_texel_f32 word[NB_LIGHT_TEXELS])
+static void pack_light(const packer *p, const nb_light *light, nebel_texel_f32 word[NB_LIGHT_TEXELS])
 {
     long double place[3];
-    for (int i = 0; i < 3; i++) place[i] = (long double)lamp->place[i] - p->eye[i];
+    for (int i = 0; i < 3; i++) place[i] = (long double)light->place[i] - p->eye[i];
     memset(word, 0, NB_LIGHT_TEXELS * sizeof *word);
-    set_word(&word[0], place, lamp->radius2);
-    set_color(&word[1], lamp->intensity, lamp->clear);
-    set_color(&word[2], lamp->axis, lamp->is_spot ? lamp->edge : -1);
-    word[3].v[0] = lamp->is_spot ? (float)lamp->rise : 1e30f; /* without a cone everything is within */
-    word[3].v[1] = (float)lamp->inner;
+    set_word(&word[0], place, light->radius2);
+    set_color(&word[1], light->intensity, light->clear);
+    set_color(&word[2], light->axis, light->is_spot ? light->edge : -1);
+    word[3].v[0] = light->is_spot ? (float)light->rise : 1e30f; /* without a cone everything is within */
+    word[3].v[1] = (float)light->inner;
 }
 
-static void pack_lamps(packer *p, const nebel_lighting *lighting)
+static void pack_lights(packer *p, const nebel_lighting *lighting)
 {
     if (!lighting->scatters_lights) return;
     p->words[0].v[3] = (float)lighting->light_count;
     p->words[NB_HEADER_LIGHTS].v[3] = (float)p->used;
     for (size_t i = 0; i < lighting->light_count; i++, p->used += NB_LIGHT_TEXELS)
-        pack_lamp(p, &lighting->lights[i], &p->words[p->used]);
+        pack_light(p, &lighting->lights[i], &p->words[p->used]);
 }
 
 /* ---- fog ------------------------------------------------------------------------------------- */
@@ -449,7 +449,7 @@ nebel_result nebel_pack_fog(const nebel_lighting *lighting, const double eye[3],
         if (i > 0 && lighting->snapshot->media[i].body.rank > lighting->snapshot->media[i - 1].body.rank) p.rank++;
         pack_medium(&p, i, &words[NB_HEADER_TEXELS + i * NB_MEDIUM_TEXELS]);
     }
-    pack_lamps(&p, lighting);
+    pack_lights(&p, lighting);
     if (lighting->diffusion != NULL) words[NB_HEADER_LATTICE].v[0] = (float)p.used;
     if (lighting->local_diffusion != NULL)
         words[NB_HEADER_LATTICE].v[1] = (float)(p.used + nb_own_lattice_word(lighting));

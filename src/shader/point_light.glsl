@@ -1,27 +1,28 @@
-/* Light of lamps that fog scatters towards the eye, once, as src/trace/trace_point_light.h has it: steps of equal angles as the lamp sees them
- * (formulas/point_light.inc), Kronrod's seven nodes compared with the three of Gauss's rule among them, a step made shorter until they agree.
+/* Light of point lights that fog scatters towards the eye, once, as src/trace/trace_point_light.h has it: steps of
+ * equal angles as the point light sees them (formulas/point_light.inc), Kronrod's seven nodes compared with the three
+ * of Gauss's rule among them, a step made shorter until they agree.
  *
  * What surfaces keep away is the host's to say, by a function that it defines before this text:
  *
- *     #define NEBEL_LIGHT_VISIBILITY(lamp, origin, direction, t, end)
+ *     #define NEBEL_LIGHT_VISIBILITY(light, origin, direction, t, end)
  *
- * is a vec2: the share of the light of lamp number `lamp` that reaches the ray from t on, and up to where along the ray that holds, at
- * most `end`. */
+ * is a vec2: the share of the light of point light number `point_light` that reaches the ray from t on, and up to
+ * where along the ray that holds, at most `end`. */
 #ifndef NEBEL_LIGHT_VISIBILITY
-#define NEBEL_LIGHT_VISIBILITY(lamp, origin, direction, t, end) nb_vec2(1.0, end)
+#define NEBEL_LIGHT_VISIBILITY(point_light, origin, direction, t, end) nb_vec2(1.0, end)
 #endif
 
-/* How far along a ray light of lamps has been found. */
-struct nb_lamplit {
+/* How far along a ray light of point lights has been found. */
+struct nb_light_state {
     float reached;
     float most; /* metres that a piece may take; 0: any number */
     nb_vec3 before; /* depth up to there */
     nb_vec3 light;
 };
 
-nb_lamplit nb_open_lamplit()
+nb_light_state nb_start_lights()
 {
-    nb_lamplit l;
+    nb_light_state l;
     l.reached = 0.0;
     l.most = 0.0;
     l.before = nb_splat3(0.0);
@@ -31,15 +32,15 @@ nb_lamplit nb_open_lamplit()
 
 #if NB_DECLARES(NB_HAS_LIGHTS)
 
-/* A lamp that is passed by a ray. */
+/* A point light that is passed by a ray. */
 struct nb_light_pass {
     int number;
     nb_vec3 intensity, axis;
     float radius2, clear, edge, inner, rise;
-    nb_vec3 foot;   /* from the lamp to the place closest to it on the line of the ray */
+    nb_vec3 foot;   /* from the point light to the place closest to it on the line of the ray */
     float closest;  /* where that is, m along the ray */
     float aside2;   /* its distance squared */
-    float aside;    /* its distance, at least the lamp's radius */
+    float aside;    /* its distance, at least the point light's radius */
 };
 
 nb_light_pass nb_pass_light(nb_ray ray, int number)
@@ -89,7 +90,7 @@ float nb_root_behind(float closest, float t, float end, float a, float b, float 
     return next;
 }
 
-/* Where the ray next enters or leaves the lamp, or the light of its cone changes otherwise. */
+/* Where the ray next enters or leaves the point light, or the light of its cone changes otherwise. */
 float nb_light_turn(nb_light_pass by, nb_ray ray, float t, float end)
 {
     float near = t + nb_nearest(t);
@@ -295,7 +296,7 @@ float nb_light_weight_of_three(int j) { return j == 3 ? 8.0 / 18.0 : j == 1 || j
 struct nb_light_start {
     float from;    /* metres behind the start of the piece */
     nb_vec3 depth; /* from the eye */
-    nb_vec3 way;   /* depth from there to the lamp */
+    nb_vec3 way;   /* depth from there to the point light */
     bool is_known;
 };
 
@@ -329,7 +330,7 @@ float nb_unseen_share(float change)
 /* Light of the first part of a swing, up to w = length, from `start.from` to `end` metres behind the start of the piece, of which `drop` of
  * transmittance is lost. `before` is the depth in front of the piece. Where nodes do not see that loss they have passed over what causes it, and light that changes by large factors from node to
  * node may be anywhere between them; what is between the start and the first node may be all the light there is. `start` is asked where
- * it is not known: a way to the lamp may pass many voxels. */
+ * it is not known: a way to the point light may pass many voxels. */
 nb_light_step nb_step_past_light(nb_ray ray, int first, bool listed, nb_light_segment piece, nb_light_pass by, nb_swing swing, float length,
                                float end, nb_vec3 before, nb_vec3 seen, nb_vec3 drop, inout nb_light_start start, inout int turns)
 {
@@ -392,7 +393,7 @@ nb_light_step nb_step_past_light(nb_ray ray, int first, bool listed, nb_light_se
     return s;
 }
 
-/* Behind a lamp nothing of its light is left [m]; squares of squares of it are numbers. */
+/* Behind a point light nothing of its light is left [m]; squares of squares of it are numbers. */
 #define NB_LIGHT_REACH 1e8
 
 /* The length of a first step of a few optical depths: light in dense fog comes from there. Density may begin with nothing and grow. */
@@ -410,7 +411,7 @@ float nb_first_swing(nb_ray ray, int first, bool listed, nb_light_segment piece,
 
 /* The end of a step on which phase functions change smoothly. `ahead` is the tangent of half the angle by which light is turned: a step
  * goes to 2.5 times as much, and by 1.5 widths where it is in a peak. Towards peaks of light that is turned back it ends at a quarter of
- * 1 / ahead. On a ray through the lamp itself what is shorter than a hundredth of its radius does not count. */
+ * 1 / ahead. On a ray through the point light itself what is shorter than a hundredth of its radius does not count. */
 float nb_smooth_end(nb_light_pass by, nb_light_segment piece, float t, float end)
 {
     float from = t - by.closest;
@@ -425,10 +426,10 @@ float nb_smooth_end(nb_light_pass by, nb_light_segment piece, float t, float end
     return min(max(place, t + max(0.01 * by.aside, t * (8.0 * NB_EPSILON))), end);
 }
 
-/* Steps that a lamp takes in a piece; the rest is one. */
+/* Steps that a point light takes in a piece; the rest is one. */
 #define NB_MAX_LIGHT_STEPS 96
 
-/* The light of one lamp in a piece. */
+/* The light of one point light in a piece. */
 nb_vec3 nb_in_scatter_past_light(nb_ray ray, int first, bool listed, nb_light_segment piece, nb_light_pass by, nb_vec3 before,
                            float tolerance, inout int turns)
 {
@@ -476,26 +477,26 @@ nb_vec3 nb_in_scatter_past_light(nb_ray ray, int first, bool listed, nb_light_se
     return sum;
 }
 
-/* ---- all lamps ------------------------------------------------------------------------------- */
+/* ---- all point lights ------------------------------------------------------------------------------- */
 
 /* Nodes of a step are far better than the three that its error is told by. */
 #define NB_LIGHT_TOLERANCE 60.0
-/* What lamps that are left out may give, of that. */
+/* What point lights that are left out may give, of that. */
 #define NB_FAINT_SHARE 0.05
 
 /* Adds a piece. */
-void nb_scatter_light_segment(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns)
+void nb_scatter_light_segment(inout nb_light_state l, nb_ray ray, int first, int count, bool listed, inout int turns)
 {
     float tolerance = NEBEL_FOG_TEXEL(0).y * NB_LIGHT_TOLERANCE;
-    int lamps = int(NEBEL_FOG_TEXEL(0).w);
+    int lights = int(NEBEL_FOG_TEXEL(0).w);
     float end = l.most > 0.0 ? min(ray.t_max, l.reached + l.most) : ray.t_max;
     nb_light_segment piece = nb_next_piece(ray, first, count, listed, l.reached, end, turns);
     nb_vec3 drop = nb_exp3(-l.before) - nb_exp3(-(l.before + piece.depth));
-    for (int i = 0; i < (piece.scatters ? lamps : 0); i++) {
+    for (int i = 0; i < (piece.scatters ? lights : 0); i++) {
         nb_light_pass by = nb_pass_light(ray, i);
         float most = nb_most_fluence(by, piece.start, piece.end) * piece.scatter * nb_largest(drop);
         turns += 1;
-        if (most * float(lamps) <= tolerance * NB_FAINT_SHARE) continue;
+        if (most * float(lights) <= tolerance * NB_FAINT_SHARE) continue;
         l.light += nb_in_scatter_past_light(ray, first, listed, piece, by, l.before, tolerance, turns);
     }
     l.before += piece.depth;
@@ -503,15 +504,15 @@ void nb_scatter_light_segment(inout nb_lamplit l, nb_ray ray, int first, int cou
     l.most *= 2.0;
 }
 
-void nb_keep_lamplit(int count, nb_lamplit l)
+void nb_store_lights(int count, nb_light_state l)
 {
     nb_keep(count, 0, l.light, l.reached);
     nb_keep(count, 1, l.before, l.most);
 }
 
-nb_lamplit nb_kept_lamplit(int count)
+nb_light_state nb_restore_lights(int count)
 {
-    nb_lamplit l = nb_open_lamplit();
+    nb_light_state l = nb_start_lights();
     l.light = nb_kept_word(count, 0).xyz;
     l.reached = nb_kept_word(count, 0).w;
     l.before = nb_kept_word(count, 1).xyz;
@@ -521,30 +522,30 @@ nb_lamplit nb_kept_lamplit(int count)
 
 /* As far as turns suffice. In several passes a piece that they do not suffice for is begun again in the next one, shorter if it was the
  * first. */
-void nb_surface_lights(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns)
+void nb_surface_lights(inout nb_light_state l, nb_ray ray, int first, int count, bool listed, inout int turns)
 {
     float from = l.reached;
     nb_grid_turns = 0;
-    if (NB_RESUMES) nb_keep_lamplit(count, l);
+    if (NB_RESUMES) nb_store_lights(count, l);
     while (l.reached < ray.t_max && nb_smallest(l.before) < NB_OPAQUE && !nb_is_tired(turns + nb_grid_turns)) {
-        nb_lamplit before = l;
+        nb_light_state before = l;
         nb_scatter_light_segment(l, ray, first, count, listed, turns);
         if (NB_RESUMES && (nb_is_tired(turns + nb_grid_turns) || !nb_has_loops(count))) {
             if (before.reached > from) break;
             float most = before.most > 0.0 ? before.most : l.reached - from;
             l = before;
             l.most = 0.25 * (most > 0.0 ? most : 1.0); /* it may be anything where loops were ended */
-            nb_keep_lamplit(count, l);
+            nb_store_lights(count, l);
             break;
         }
-        if (NB_RESUMES) nb_keep_lamplit(count, l);
+        if (NB_RESUMES) nb_store_lights(count, l);
     }
-    if (NB_RESUMES) l = nb_kept_lamplit(count);
+    if (NB_RESUMES) l = nb_restore_lights(count);
     turns += nb_grid_turns;
 }
 
 #else
 
-void nb_surface_lights(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns) {}
+void nb_surface_lights(inout nb_light_state l, nb_ray ray, int first, int count, bool listed, inout int turns) {}
 
 #endif

@@ -1,4 +1,4 @@
-/* What the light of sun and lamps needs: what phase functions scatter, and the optical depth on its way. */
+/* What the light of sun and point lights needs: what phase functions scatter, and the optical depth on its way. */
 
 /* What part of the light that comes from `towards` a medium's phase function sends back along the ray, per steradian. */
 float nb_scattered(int scattering, nb_vec3 direction, nb_vec3 towards)

@@ -2,10 +2,11 @@
  * GLSL and HLSL. A word is four floats; integers are kept as floats, exact to 2^24, because a texture may change the
  * bits of small numbers. Lengths are in metres, places relative to the packed eye, distances at most 1e18 in size.
  *
- * Word 0: media, what one step of an integral without a closed form may be off by, the largest opacity, lamps that light
+ * Word 0: media, what one step of an integral without a closed form may be off by, the largest opacity, point lights
+ * that light
  *         fog.
  * Word 1: the direction towards the sun, of length 1; how what the sun adds is had between turns, NB_SUN_.
- * Word 2: the sun's irradiance; the first word of the lamps. The sun's numbers are 0 where no medium is sunlit.
+ * Word 2: the sun's irradiance; the first word of the point lights. The sun's numbers are 0 where no medium is sunlit.
  * Word 3: the first word of the lattice of diffuse light, and of that of own light, 0 where there is none; what is shorter along a ray
  *         has no digits near the eye [m], a millionth of what the fog is wide, or of a metre; one unused.
  *
@@ -22,7 +23,8 @@
  *        base the density is the same everywhere, what it is there, the eye's height above the base
  *     4  its only leaf; of a body of several: bounds low, first leaf's word; bounds high
  *        The last number of words 5 and 6 is where along a ray it starts to act and where it ends, 1e18 where it does
- *        not [m]; that of word 7 its first scattering word, 0 where it scatters no light of sun or lamps; that of word 8
+ *        not [m]; that of word 7 its first scattering word, 0 where it scatters no light of sun or point lights; that
+ * of word 8
  *        what part of the light it scatters diffusion takes to go straight on; that of word 9 the first environment word of
  *        its phase function's filter, 0 where no environment lights it.
  *
@@ -37,7 +39,7 @@
  *     1  first lobe: factor, alpha, peak, slope of nb_phase_lobe
  *     2  second lobe; zeros where there is none
  *
- * A lamp, NB_LIGHT_TEXELS words; for formulas/point_light.inc:
+ * A point light, NB_LIGHT_TEXELS words; for formulas/point_light.inc:
  *     0  place, square of the radius, which is not 0
  *     1  intensity, how near to its place light does not pass through fog [m]
  *     2  axis and cosine at the edge of its cone; 0, -1 where it has none

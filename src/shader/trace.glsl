@@ -164,7 +164,7 @@ void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed,
 struct nb_progress {
     int stage;
     nb_gathered walked;
-    nb_lamplit lamps;
+    nb_light_state lights;
     int turns; /* of loops, in this shader */
 };
 
@@ -178,7 +178,7 @@ nb_progress nb_open_progress()
     nb_progress p;
     p.stage = NB_STAGE_WALK;
     p.walked = nb_open_gathered();
-    p.lamps = nb_open_lamplit();
+    p.lights = nb_start_lights();
     p.turns = 0;
     return p;
 }
@@ -240,11 +240,11 @@ nebel_transfer nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media,
     if (walks && covers) transfer.transmittance = nb_exp3(-p.walked.depth);
     if (p.stage == NB_STAGE_WALK && !(NB_MAY_TIRE && p.walked.is_cut)) p.stage = NB_STAGE_LIGHTS;
     if (NB_HAS(NB_HAS_LIGHTS) && lit && sum.scatters) {
-        int lamp_turns = NB_RESUMES ? turns : before;
-        if (p.stage == NB_STAGE_LIGHTS && nb_is_fresh(turns) && nb_has_loops(count)) nb_surface_lights(p.lamps, ray, first, count, listed, lamp_turns);
-        turns = NB_RESUMES ? lamp_turns : turns + lamp_turns - before;
-        transfer.in_scattering += p.lamps.light;
-        bool is_lit = !(p.lamps.reached < ray.t_max && nb_smallest(p.lamps.before) < NB_OPAQUE);
+        int light_iterations = NB_RESUMES ? turns : before;
+        if (p.stage == NB_STAGE_LIGHTS && nb_is_fresh(turns) && nb_has_loops(count)) nb_surface_lights(p.lights, ray, first, count, listed, light_iterations);
+        turns = NB_RESUMES ? light_iterations : turns + light_iterations - before;
+        transfer.in_scattering += p.lights.light;
+        bool is_lit = !(p.lights.reached < ray.t_max && nb_smallest(p.lights.before) < NB_OPAQUE);
         if (p.stage == NB_STAGE_LIGHTS && (last || is_lit)) p.stage = NB_STAGE_DIFFUSION;
     } else if (p.stage == NB_STAGE_LIGHTS) {
         p.stage = NB_STAGE_DIFFUSION;
@@ -334,10 +334,10 @@ nb_progress nb_read_progress(nb_progress_words words)
         p.walked.sunlight = words.word[3].xyz;
     } else {
         p.walked.radiance = words.word[3].xyz;
-        p.lamps.light = words.word[0].xyz;
-        p.lamps.reached = words.word[0].w;
-        p.lamps.before = words.word[2].xyz;
-        p.lamps.most = words.word[2].w;
+        p.lights.light = words.word[0].xyz;
+        p.lights.reached = words.word[0].w;
+        p.lights.before = words.word[2].xyz;
+        p.lights.most = words.word[2].w;
     }
     return p;
 }
@@ -356,9 +356,9 @@ nb_progress_words nb_write_progress(nb_progress p, nebel_transfer transfer)
         words.word[2] = nb_vec4(p.walked.light, 0.0);
         words.word[3] = nb_vec4(p.walked.sunlight, 0.0);
     } else {
-        words.word[0] = nb_vec4(p.lamps.light, p.lamps.reached);
+        words.word[0] = nb_vec4(p.lights.light, p.lights.reached);
         words.word[1] = nb_vec4(p.walked.depth, float(p.stage));
-        words.word[2] = nb_vec4(p.lamps.before, p.lamps.most);
+        words.word[2] = nb_vec4(p.lights.before, p.lights.most);
         words.word[3] = nb_vec4(p.walked.radiance, 0.0);
     }
     return words;

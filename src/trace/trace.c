@@ -267,7 +267,7 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
         job->first_boundary = desc->sun_visibility->offsets;
         job->boundaries = desc->sun_visibility->boundaries;
     }
-    job->lamplit = desc->light_visibility;
+    job->light_visibility = desc->light_visibility;
     job->snapshot = snapshot;
     job->lighting = lighting;
     job->max_opacity = desc->ignore_max_opacity ? 1 : snapshot->max_opacity;

@@ -1,6 +1,6 @@
 /* Where the way from a ray to a light begins or ends to meet a body, or passes one of its edges: its *turns*. Over the
- * ray the ways are the lines b + t b' + u (v + t v'): to the sun from a place that moves, v' = 0; to a lamp from the
- * lamp, b' = 0. Turns are then roots of polynomials of the second degree. Included by trace_sun.h. */
+ * ray the ways are the lines b + t b' + u (v + t v'): to the sun from a place that moves, v' = 0; to a point light
+ * from the point light, b' = 0. Turns are then roots of polynomials of the second degree. Included by trace_sun.h. */
 
 static void note_turn(sunlight *sun, nb_wide t, nb_wmask real)
 {
@@ -146,18 +146,18 @@ static void note_round(sunlight *sun, const nb_leaf *leaf, const breakpoint_line
 /* ---- all of them ----------------------------------------------------------------------------- */
 
 /* Of a ray p + t d to a light in the direction `towards`, or as far from p; all in one frame. */
-static breakpoint_lines make_ways(nb_wvec3 p, nb_wvec3 d, nb_wvec3 towards, int is_lamp)
+static breakpoint_lines make_ways(nb_wvec3 p, nb_wvec3 d, nb_wvec3 towards, int is_light)
 {
     const nb_wvec3 zero = nb_wvec3(NB_W(0.0), NB_W(0.0), NB_W(0.0));
-    if (!is_lamp) return (breakpoint_lines){p, d, towards, zero};
+    if (!is_light) return (breakpoint_lines){p, d, towards, zero};
     return (breakpoint_lines){nb_wadd3(p, towards), zero, nb_wsub3(zero, towards), d};
 }
 
 /* The shadow of a gaussian has no edge: its steep parts and its middle. */
 static void note_gaussian(sunlight *sun, const packet *rays, const nebel_density *density, nb_wvec3 towards,
-                          int is_lamp)
+                          int is_light)
 {
-    const breakpoint_lines s = make_ways(rays->origin, rays->direction, towards, is_lamp);
+    const breakpoint_lines s = make_ways(rays->origin, rays->direction, towards, is_light);
     const nb_wvec3 center = wide_vector(density->center);
     note_ball(sun, &s, center, WIDE(density->sigma));
     note_ball(sun, &s, center, WIDE(4 * density->sigma));
@@ -165,9 +165,9 @@ static void note_gaussian(sunlight *sun, const packet *rays, const nebel_density
 
 /* Within this ball the density is the same everywhere. */
 static void note_altitude(sunlight *sun, const packet *rays, const nebel_density *density, nb_wvec3 towards,
-                          int is_lamp)
+                          int is_light)
 {
-    const breakpoint_lines s = make_ways(rays->origin, rays->direction, towards, is_lamp);
+    const breakpoint_lines s = make_ways(rays->origin, rays->direction, towards, is_light);
     note_ball(sun, &s, wide_vector(density->center), WIDE(density->radius + density->base));
 }
 
@@ -213,11 +213,11 @@ static void note_levels(sunlight *sun, const packet *rays, const nb_volume *body
 }
 
 static void note_leaf(sunlight *sun, const packet *rays, const nb_volume *body, const nb_leaf *leaf, nb_wvec3 towards,
-                      int is_lamp)
+                      int is_light)
 {
     if (leaf->type == NB_LEAF_WORLD) return;
     const local_ray local = localize(rays, leaf);
-    const breakpoint_lines s = make_ways(local.p, local.d, in_frame(leaf, towards), is_lamp);
+    const breakpoint_lines s = make_ways(local.p, local.d, in_frame(leaf, towards), is_light);
     if (leaf->type == NB_LEAF_BOX)
         note_box(sun, leaf, &s);
     else if (leaf->type == NB_LEAF_PLANES)
@@ -226,20 +226,21 @@ static void note_leaf(sunlight *sun, const packet *rays, const nb_volume *body, 
         note_round(sun, leaf, &s);
 }
 
-/* Of all media, whether the rays meet them or not: their shadows may. `lamp` NULL: in the light of the sun. */
-static void note_media(sunlight *sun, const packet *rays, const nb_light *lamp)
+/* Of all media, whether the rays meet them or not: their shadows may. `point_light` NULL: in the light of the sun. */
+static void note_media(sunlight *sun, const packet *rays, const nb_light *point_light)
 {
     const nebel_snapshot *snapshot = sun->snapshot;
-    const nb_wvec3 towards = lamp != NULL ? nb_wsub3(wide_vector(lamp->place), rays->origin) : sun->direction;
+    const nb_wvec3 towards =
+        point_light != NULL ? nb_wsub3(wide_vector(point_light->place), rays->origin) : sun->direction;
     if (snapshot->medium_count > MOST_TURNING_MEDIA) return;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         for (size_t k = 0; k < body->leaf_count; k++)
-            note_leaf(sun, rays, body, &body->leaves[k], towards, lamp != NULL);
-        if (lamp == NULL) note_levels(sun, rays, body);
+            note_leaf(sun, rays, body, &body->leaves[k], towards, point_light != NULL);
+        if (point_light == NULL) note_levels(sun, rays, body);
         if (body->density.type == NEBEL_DENSITY_GAUSSIAN)
-            note_gaussian(sun, rays, &body->density, towards, lamp != NULL);
+            note_gaussian(sun, rays, &body->density, towards, point_light != NULL);
         if (body->density.type == NEBEL_DENSITY_ALTITUDE && body->density.below == NEBEL_BELOW_CONSTANT)
-            note_altitude(sun, rays, &body->density, towards, lamp != NULL);
+            note_altitude(sun, rays, &body->density, towards, point_light != NULL);
     }
 }

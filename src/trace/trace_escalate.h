@@ -38,8 +38,8 @@ static double settle_lane(const nb_trace_job *job, size_t i, const nebel_ray *ra
                         .wants_error = 1,
                         .first_boundary = boundaries_of(job, i),
                         .boundaries = job->boundaries,
-                        .lamplit = job->lamplit,
-                        .first_lamplit = job->first_lamplit + i,
+                        .light_visibility = job->light_visibility,
+                        .first_visibility = job->first_visibility + i,
                         .count = 1,
                         .rays = ray,
                         .ray_stride = sizeof *ray,
@@ -90,7 +90,7 @@ static nebel_result ask_again(nb_trace_job *job, size_t i)
     nb_trace_job one = *job;
     one.count = 1;
     one.first_boundary = boundaries_of(job, i);
-    one.first_lamplit = job->first_lamplit + i;
+    one.first_visibility = job->first_visibility + i;
     one.rays = nb_stride_from(job->rays, job->ray_stride, i);
     one.transfers = nb_stride_to(job->transfers, job->transfer_stride, i);
     job->failed = i;

@@ -49,7 +49,7 @@ static void add_end_of(interval_ends *sum, const medium_hit *k, nb_wide t, nb_re
         sum->depth[c] = sum->depth[c] + weight * k->extinction[c];
         const nb_real seen =
             nb_min(weight, nb_rcp_bounded(k->extinction[c])); /* no more than what it lets through itself */
-        sum->light[c] = sum->light[c] + seen * (k->light[c] + k->glow[c] + k->extinction[c] * k->lamps);
+        sum->light[c] = sum->light[c] + seen * (k->light[c] + k->glow[c] + k->extinction[c] * k->point_lights);
     }
 }
 
@@ -173,10 +173,10 @@ static nb_real per_extinction(const medium_hit *k, int c, nb_real light)
 }
 
 /* Light per extinction of a medium: the radiance it has where it is opaque, in full sunlight and without any; that of
- * lamps at most. */
+ * point lights at most. */
 static nb_real opaque_radiance(const medium_hit *k, int c)
 {
-    return per_extinction(k, c, k->light[c] + k->glow[c]) + k->lamps;
+    return per_extinction(k, c, k->light[c] + k->glow[c]) + k->point_lights;
 }
 
 static nb_real shaded_radiance(const medium_hit *k, int c)
@@ -307,9 +307,9 @@ static void meet_medium(packet_state *m, const nb_medium *medium, const nb_mediu
         k->glow[c] = NB_F(0.0);
     }
     if (lit->environment != NULL && m->wants_sky) set_skylight(m, k);
-    k->lamps = NB_F(0.0);
+    k->point_lights = NB_F(0.0);
     if (m->sun != NULL && lit->scatters_sun) set_glow(k, &m->rays, m->sun);
-    if (m->sun != NULL && lit->scatters_lights) k->lamps = m->lamps * REAL(most_scattered(&medium->body));
+    if (m->sun != NULL && lit->scatters_lights) k->point_lights = m->point_lights * REAL(most_scattered(&medium->body));
     k->least_slack = 1 / fmax(medium->densest + lit->brightest, 1e-9);
     if (nb_volume_has_fog(&medium->body)) profile_contact(k, &m->rays);
     if (!meet_leaves(m, k)) return;

@@ -559,7 +559,7 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     job->failed = first;
     w->m.wants_error = job->wants_error;
     w->m.ignores_distances = job->ignore_distances;
-    if (w->m.sun != NULL && job->lighting->scatters_lights) w->m.lamps = most_of_lamps(&w->m);
+    if (w->m.sun != NULL && job->lighting->scatters_lights) w->m.point_lights = max_of_lights(&w->m);
     if (!meet_fog(w, job->lighting)) return NEBEL_ERROR_MEMORY;
     allowance share = *may;
     const nb_real pieces = w->m.event_count + NB_F(1.0);
@@ -627,7 +627,8 @@ static nebel_result trace_job(nb_trace_job *job, workspace *w)
 #endif
 }
 
-/* What part of the budget the sun may spend, or all lamps: nothing but lights spends any in fog of one medium. */
+/* What part of the budget the sun may spend, or all point lights: nothing but lights spends any in fog of one medium.
+ * */
 static double share_of_light(const nebel_lighting *lighting)
 {
     const double all = lighting->snapshot->medium_count == 1 ? 0.9 : 0.3;
@@ -651,7 +652,7 @@ static nebel_result trace_lit(nb_trace_job *job, workspace *w)
                     .shadows = shadows,
                     .shadow_capacity = STACK_SHADOWS,
                     .share = share_of_light(lighting) * job->budget};
-    if (!open_lamp_shades(&sun, job)) return NEBEL_ERROR_MEMORY;
+    if (!open_light_shades(&sun, job)) return NEBEL_ERROR_MEMORY;
     open_workspace(&way);
     w->m.sun = &sun;
     const nebel_result result = trace_job(job, w);

@@ -35,9 +35,10 @@ typedef struct nb_trace_job {
     const uint32_t
         *first_boundary;     /* of each ray in `boundaries`, and one more; NULL: the sun reaches all of every ray */
     const float *boundaries; /* checked */
-    const nebel_ray_visibility *lamplit; /* of each lamp; NULL: every lamp reaches all of every ray. Checked */
-    size_t first_lamplit;                /* by which number the job's first ray goes there */
-    size_t failed;                       /* out: the ray that was an error */
+    const nebel_ray_visibility
+        *light_visibility;   /* of each point light; NULL: every point light reaches all of every ray. Checked */
+    size_t first_visibility; /* by which number the job's first ray goes there */
+    size_t failed;           /* out: the ray that was an error */
 } nb_trace_job;
 
 typedef nebel_result nb_trace_fn(nb_trace_job *job);

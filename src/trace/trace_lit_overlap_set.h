@@ -1,4 +1,5 @@
-/* Sunlight and lamplight in many bodies that lie over each other and shade each other: those of which depths add.
+/* Sunlight and light of point lights in many bodies that lie over each other and shade each other: those of which
+ * depths add.
  *
  * From piece to piece, as trace_sun.h and trace_point_light.h go, the cost is quadratic in the bodies: each has two ends and two turns on the ray, and
  * after each of them places are asked for the depth to the light, of all bodies. Here steps know nothing of ends. In
@@ -61,32 +62,32 @@ static lit_point no_place(void)
     return place;
 }
 
-static nb_wvec3 apart_from_lamp(const packet_state *m, const light_pass *pass, nb_wide t)
+static nb_wvec3 apart_from_light(const packet_state *m, const light_pass *pass, nb_wide t)
 {
     return nb_wadd3(pass->foot, nb_wscale3(m->rays.direction, t - pass->closest));
 }
 
-/* What a lamp brings to t, and from where; how far it is. Light jumps at the edge of a hard cone, where steps begin and
- * end: whether t is in the cone is asked at `beside`, within the step. */
-static nb_real lamp_arrives(const packet_state *m, const light_pass *pass, const nb_phase *phase, nb_wide t,
-                            nb_wide beside, nb_wvec3 *towards, nb_wide *reach)
+/* What a point light brings to t, and from where; how far it is. Light jumps at the edge of a hard cone, where steps
+ * begin and end: whether t is in the cone is asked at `beside`, within the step. */
+static nb_real light_arrives(const packet_state *m, const light_pass *pass, const nb_phase *phase, nb_wide t,
+                             nb_wide beside, nb_wvec3 *towards, nb_wide *reach)
 {
-    const nb_light *lamp = pass->lamp;
-    const nb_wvec3 apart = apart_from_lamp(m, pass, t);
+    const nb_light *point_light = pass->point_light;
+    const nb_wvec3 apart = apart_from_light(m, pass, t);
     const nb_wide square = nb_wdot3(apart, apart), distance = nb_wsqrt(square);
     *towards = nb_wscale3(apart, -nb_wrcp_bounded(distance));
-    *reach = nb_wmax(distance - WIDE(lamp->clear), NB_W(0.0));
-    const nb_real fluence = nb_narrow(nb_light_fluence(square, WIDE(lamp->radius2)));
+    *reach = nb_wmax(distance - WIDE(point_light->clear), NB_W(0.0));
+    const nb_real fluence = nb_narrow(nb_light_fluence(square, WIDE(point_light->radius2)));
     const nb_real light = fluence * scattered(phase, nb_turn_between(m->rays.direction, *towards));
-    if (!lamp->is_spot) return light;
-    const nb_wvec3 from = apart_from_lamp(m, pass, beside);
-    return light * part_in_cone(lamp, nb_wscale3(from, -nb_wrcp_bounded(nb_wsqrt(nb_wdot3(from, from)))));
+    if (!point_light->is_spot) return light;
+    const nb_wvec3 from = apart_from_light(m, pass, beside);
+    return light * part_in_cone(point_light, nb_wscale3(from, -nb_wrcp_bounded(nb_wsqrt(nb_wdot3(from, from)))));
 }
 
 /* The light that is scattered: of the sun where `pass` is NULL. */
 typedef struct overlap_light {
     const light_pass *pass;
-    const nb_phase *phase; /* of a lamp: all media that it lights have this one */
+    const nb_phase *phase; /* of a point light: all media that it lights have this one */
     nb_real most;          /* radiance of fog that is opaque, at most */
     double share;          /* what its steps may add to the error */
 } overlap_light;
@@ -97,20 +98,20 @@ static void set_seen(const sunlight *sun, const overlap_light *light, lit_point 
     nb_real through[3];
     map_channels(sun->snapshot, transmitted, at->way, through);
     for (int c = 0; c < 3; c++) {
-        const double intensity = light->pass != NULL ? light->pass->lamp->intensity[c] : 1;
+        const double intensity = light->pass != NULL ? light->pass->point_light->intensity[c] : 1;
         at->comes[c] = through[c] * at->arrives * REAL(intensity);
         at->seen[c] = at->behind[c] * at->comes[c];
     }
 }
 
-/* `beside`: see lamp_arrives. */
+/* `beside`: see light_arrives. */
 static void look_from(const sunlight *sun, const packet_state *m, const overlap_light *light, const lit_point *before,
                       nb_wide beside, lit_point *at)
 {
     nb_wvec3 towards = sun->direction;
     nb_wide reach = NB_WFAR;
     nb_real arriving = NB_F(1.0);
-    if (light->pass != NULL) arriving = lamp_arrives(m, light->pass, light->phase, at->t, beside, &towards, &reach);
+    if (light->pass != NULL) arriving = light_arrives(m, light->pass, light->phase, at->t, beside, &towards, &reach);
     const shadowed_way all = way_through_shadows(sun, m, before->t, at->t, towards, reach);
     const light_depth way = all.depth;
     at->doubt = NB_F(0.0);
@@ -138,7 +139,7 @@ typedef struct lit_half {
         [3]; /* by how much the first moment may be off through densities that are not linear, or half the second */
 } lit_half;
 
-/* Of the sun its radiance per metre; of a lamp what scatters. */
+/* Of the sun its radiance per metre; of a point light what scatters. */
 static nb_real glow_in(const medium_hit *k, const overlap_light *light, int c)
 {
     if (light->pass == NULL) return k->glow[c];
@@ -283,7 +284,7 @@ static nb_real hidden_in_shadows(const sunlight *sun, nb_wide start, nb_wide end
 static nb_real unseen_between_places(const lit_point at[5], int c, const overlap_light *light)
 {
     const nb_real most = light->pass != NULL ? NB_F(1.0) : light->most;
-    const double intensity = light->pass != NULL ? light->pass->lamp->intensity[c] : 1;
+    const double intensity = light->pass != NULL ? light->pass->point_light->intensity[c] : 1;
     nb_real unseen = NB_F(0.0);
     for (int i = 0; i < 4; i++) {
         const lit_point *from = &at[i], *to = &at[i + 1];
@@ -292,7 +293,7 @@ static nb_real unseen_between_places(const lit_point at[5], int c, const overlap
         const nb_real change = nb_abs((to->depth[c] - from->depth[c]) + (to->way[c] - from->way[c])) + dip;
         const nb_real lost = nb_max(from->behind[c] - to->behind[c], NB_F(0.0));
         nb_real comes = nb_max(from->comes[c], to->comes[c]);
-        if (light->pass != NULL && light->pass->lamp->is_spot) {
+        if (light->pass != NULL && light->pass->point_light->is_spot) {
             /* At the edge of its cone there is no light yet, and behind it all at once. */
             const nb_real arrives = nb_max(from->arrives, to->arrives) * REAL(intensity);
             comes = nb_max(comes, arrives * nb_exp(-nb_min(from->way[c], to->way[c])));
@@ -329,8 +330,8 @@ static lit_point look_ahead_from(const sunlight *sun, const packet_state *m, con
     lit_point at = *start;
     nb_wvec3 towards;
     nb_wide reach;
-    if (light->pass == NULL || !light->pass->lamp->is_spot) return at;
-    at.arrives = lamp_arrives(m, light->pass, light->phase, at.t, at.t + margin, &towards, &reach);
+    if (light->pass == NULL || !light->pass->point_light->is_spot) return at;
+    at.arrives = light_arrives(m, light->pass, light->phase, at.t, at.t + margin, &towards, &reach);
     set_seen(sun, light, &at);
     return at;
 }
@@ -449,13 +450,13 @@ static void step_through_crowd(sunlight *sun, const packet_state *m, const overl
 /* ---- the walk -------------------------------------------------------------------------------- */
 
 /* From the first lit body of each ray to the last. */
-static nb_mask find_lit_stretch(const packet_state *m, int by_lamp, nb_wide *first, nb_wide *last)
+static nb_mask find_lit_stretch(const packet_state *m, int by_light, nb_wide *first, nb_wide *last)
 {
     *first = NB_WFAR;
     *last = NB_W(0.0);
     for (size_t i = 0; i < m->contact_count; i++) {
         const medium_hit *k = &m->contacts[i];
-        if (!(by_lamp ? k->lit->scatters_lights : k->lit->scatters_sun)) continue;
+        if (!(by_light ? k->lit->scatters_lights : k->lit->scatters_sun)) continue;
         const nb_wmask met = k->hull_enter < k->hull_leave;
         *first = nb_wselect(met, nb_wmin(*first, k->hull_enter), *first);
         *last = nb_wselect(met, nb_wmax(*last, k->hull_leave), *last);
@@ -544,10 +545,10 @@ static void gather_light_of_crowd(sunlight *sun, const packet_state *m, const ov
     g->radiance_error = g->radiance_error + nb_select(lit, beyond, NB_F(0.0));
     sun->turn_count = 0;
     if (light->pass != NULL) {
-        note_lamp(sun, m, light->pass);
+        note_light(sun, m, light->pass);
         note_turn(sun, light->pass->closest, nb_wmask_true); /* on either side what arrives rises or falls */
     }
-    list_shadows(sun, &m->rays, light->pass != NULL ? light->pass->lamp : NULL);
+    list_shadows(sun, &m->rays, light->pass != NULL ? light->pass->point_light : NULL);
     if (sun->out_of_memory) return;
     walk_through_crowd(sun, m, light, shadows, lit, first, end, g);
 }
@@ -588,9 +589,9 @@ static void gather_crowd_lights(sunlight *sun, const packet_state *m, gathered_l
         most = nb_max(most, nb_select(is_met(k), REAL(most_scattered(&k->medium->body)), NB_F(0.0)));
     }
     for (size_t i = 0; i < lighting->light_count && phase != NULL; i++) {
-        light_pass pass = pass_lamp(m, &lighting->lights[i]);
+        light_pass pass = pass_light(m, &lighting->lights[i]);
         const overlap_light light = {&pass, phase, most, sun->share / (double)lighting->light_count};
-        gather_light_of_crowd(sun, m, &light, sun->lamp_shades != NULL ? &sun->lamp_shades[i] : NULL, g);
+        gather_light_of_crowd(sun, m, &light, sun->light_shades != NULL ? &sun->light_shades[i] : NULL, g);
     }
     note_group(sun->by_lights, before, g);
 }

@@ -1,4 +1,4 @@
-/* The rule that sums the light of the sun or of a lamp over a step, and the estimate of its error. Included by
+/* The rule that sums the light of the sun or of a point light over a step, and the estimate of its error. Included by
  * trace_sun.h.
  *
  * The rule is Kronrod's extension, of seven nodes, of Lobatto's rule of four. Both ends are nodes: light in a thin skin

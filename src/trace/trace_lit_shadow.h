@@ -65,11 +65,12 @@ static void set_sun_shadow(lit_shadow *s, const packet *rays, nb_wvec3 sun, nb_w
     s->first = nb_wselect(along < -level, nb_wmax(s->first, passed), s->first);
 }
 
-/* The ways to a lamp are in the plane of lamp and ray: those that meet a ball are between two of them, on its side of the lamp
- * where it does not hold the lamp, and as long as the way there. */
-static void set_lamp_shadow(lit_shadow *s, const packet *rays, nb_wvec3 lamp, nb_wvec3 center, nb_wide radius)
+/* The ways to a point light are in the plane of point light and ray: those that meet a ball are between two of them,
+ * on its side of the point light where it does not hold the point light, and as long as the way there. */
+static void set_light_shadow(lit_shadow *s, const packet *rays, nb_wvec3 point_light, nb_wvec3 center, nb_wide radius)
 {
-    const nb_wvec3 from = nb_wsub3(nb_wvec3(NB_W(0.0), NB_W(0.0), NB_W(0.0)), lamp), apart = nb_wsub3(center, lamp);
+    const nb_wvec3 from = nb_wsub3(nb_wvec3(NB_W(0.0), NB_W(0.0), NB_W(0.0)), point_light),
+                   apart = nb_wsub3(center, point_light);
     const nb_wvec3 moment = nb_wcross3(apart, from), rate = nb_wcross3(apart, rays->direction);
     const nb_wide r2 = radius * radius, along = nb_wdot3(apart, rays->direction), least = r2 * NB_W(1e-6);
     set_between_roots(s, nb_wdot3(rate, rate) - r2, nb_wdot3(moment, rate) - r2 * nb_wdot3(from, rays->direction),
@@ -79,7 +80,7 @@ static void set_lamp_shadow(lit_shadow *s, const packet *rays, nb_wvec3 lamp, nb
     const nb_wide passed = -nb_wdot3(apart, from) * nb_wrcp_bounded(along), level = radius * NB_W(1e-6);
     s->first = nb_wselect(nb_wand(beside, along > level), nb_wmax(s->first, passed), s->first);
     s->last = nb_wselect(nb_wand(beside, along < -level), nb_wmin(s->last, passed), s->last);
-    /* nearer to the lamp than the ball is */
+    /* nearer to the point light than the ball is */
     const nb_wide closest = -nb_wdot3(from, rays->direction);
     const nb_wide square = clear * clear - (nb_wdot3(from, from) - closest * closest);
     const nb_wide reach = nb_wsqrt(nb_wmax(square, NB_W(0.0)));
@@ -99,34 +100,34 @@ static void cut_shadow(lit_shadow *s, nb_wide a, nb_wide c, nb_wide worst)
 }
 
 /* The flat faces n.x <= level that hold a body, as bounds a t + b u <= c of the ways that meet it, and one of the end of the
- * way. Of the sun u is the length of the way; of a lamp t and u are such that (lamp u + place at 0 - lamp + direction t) / u is
- * on the way, with u >= 1. */
+ * way. Of the sun u is the length of the way; of a point light t and u are such that (point light u + place at 0 -
+ * point light + direction t) / u is on the way, with u >= 1. */
 typedef struct flat_bounds {
     nb_wvec3 place, direction, light;
     nb_wide margin;
-    int is_lamp;
+    int is_light;
     size_t count;
     nb_wide a[NB_MAX_EDGED_FACES + 1], b[NB_MAX_EDGED_FACES + 1], c[NB_MAX_EDGED_FACES + 1];
 } flat_bounds;
 
-static flat_bounds no_bounds(const packet *rays, nb_wvec3 light, int is_lamp, const nb_leaf *leaf)
+static flat_bounds no_bounds(const packet *rays, nb_wvec3 light, int is_light, const nb_leaf *leaf)
 {
     const local_ray local = localize(rays, leaf);
-    const packet from_light = {is_lamp ? light : rays->origin, light, rays->t_max};
+    const packet from_light = {is_light ? light : rays->origin, light, rays->t_max};
     const local_ray other = localize(&from_light, leaf);
-    flat_bounds f = {.direction = local.d, .margin = NB_W(4.0) * (local.reach + other.reach), .is_lamp = is_lamp};
-    f.light = is_lamp ? other.p : other.d;
-    f.place = is_lamp ? nb_wsub3(local.p, f.light) : local.p;
+    flat_bounds f = {.direction = local.d, .margin = NB_W(4.0) * (local.reach + other.reach), .is_light = is_light};
+    f.light = is_light ? other.p : other.d;
+    f.place = is_light ? nb_wsub3(local.p, f.light) : local.p;
     f.a[0] = NB_W(0.0);
     f.b[0] = NB_W(-1.0);
-    f.c[0] = is_lamp ? NB_W(-1.0) : NB_W(0.0);
+    f.c[0] = is_light ? NB_W(-1.0) : NB_W(0.0);
     f.count = 1;
     return f;
 }
 
 static void add_bound(flat_bounds *f, nb_wvec3 normal, nb_wide level)
 {
-    const nb_wide zero = NB_W(0.0), rest = f->is_lamp ? zero : level;
+    const nb_wide zero = NB_W(0.0), rest = f->is_light ? zero : level;
     f->a[f->count] = nb_wdot3(normal, f->direction);
     f->b[f->count] = nb_wdot3(normal, f->light) - (level - rest);
     f->c[f->count++] = rest - nb_wdot3(normal, f->place);
@@ -186,14 +187,14 @@ static void set_flat_shadow(lit_shadow *s, const flat_bounds *f)
     }
 }
 
-static void set_narrow_shadow(lit_shadow *s, const packet *rays, nb_wvec3 light, int is_lamp)
+static void set_narrow_shadow(lit_shadow *s, const packet *rays, nb_wvec3 light, int is_light)
 {
     const nb_volume *body = &s->medium->body;
     const nb_leaf *leaf = &body->leaves[0];
     const int is_polytope = leaf->type == NB_LEAF_PLANES && leaf->face_count <= NB_MAX_EDGED_FACES;
     double low[3], high[3];
     if (leaf->type == NB_LEAF_PLANES ? !is_polytope : !box_around_leaf(leaf, low, high)) return;
-    flat_bounds f = no_bounds(rays, light, is_lamp, leaf);
+    flat_bounds f = no_bounds(rays, light, is_light, leaf);
     if (is_polytope)
         bound_by_planes(&f, body, leaf);
     else
@@ -201,7 +202,8 @@ static void set_narrow_shadow(lit_shadow *s, const packet *rays, nb_wvec3 light,
     set_flat_shadow(s, &f);
 }
 
-static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_light *lamp, const nb_medium *medium)
+static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_light *point_light,
+                            const nb_medium *medium)
 {
     const nb_volume *body = &medium->body;
     lit_shadow s = {NB_W(0.0), NB_WFAR, most_depth(body), NB_F(0.0), NB_F(0.0), medium, 0};
@@ -211,21 +213,22 @@ static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_li
     const nb_wide margin = (sum_of_sizes(low) + sum_of_sizes(high)) * WIDE(SCENE_MARGIN * medium->proportion);
     const nb_wide radius = WIDE(radius_around(body)) + margin;
     const nb_wvec3 center = nb_wscale3(nb_wadd3(low, high), NB_W(0.5));
-    if (lamp == NULL)
+    if (point_light == NULL)
         set_sun_shadow(&s, rays, sun->direction, center, radius);
     else
-        set_lamp_shadow(&s, rays, nb_wsub3(wide_vector(lamp->place), rays->origin), center, radius);
-    set_narrow_shadow(&s, rays, lamp == NULL ? sun->direction : wide_vector(lamp->place), lamp != NULL);
+        set_light_shadow(&s, rays, nb_wsub3(wide_vector(point_light->place), rays->origin), center, radius);
+    set_narrow_shadow(&s, rays, point_light == NULL ? sun->direction : wide_vector(point_light->place),
+                      point_light != NULL);
     return s;
 }
 
-/* Those that lie on the rays; `lamp` NULL: in the sun. */
-static void list_shadows(sunlight *sun, const packet *rays, const nb_light *lamp)
+/* Those that lie on the rays; `point_light` NULL: in the sun. */
+static void list_shadows(sunlight *sun, const packet *rays, const nb_light *point_light)
 {
     const nebel_snapshot *snapshot = sun->snapshot;
     sun->shadow_count = 0;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const lit_shadow s = shadow_of(sun, rays, lamp, &snapshot->media[i]);
+        const lit_shadow s = shadow_of(sun, rays, point_light, &snapshot->media[i]);
         if (!nb_wany(nb_wand(s.first <= nb_wmin(s.last, rays->t_max), s.last >= NB_W(0.0)))) continue;
         if (sun->shadow_count == sun->shadow_capacity) {
             void *grown = grow_aligned(&snapshot->allocator, sun->shadows, sun->shadow_count, sizeof *sun->shadows,

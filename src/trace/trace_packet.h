@@ -38,7 +38,7 @@ typedef struct medium_hit {
     nb_wide hull_enter, hull_leave; /* from the first entry to the last exit */
     nb_real extinction[3], light[3], radiance[3];
     nb_real glow[3];        /* radiance per metre that full sunlight adds where the density is 1 */
-    nb_real lamps;          /* radiance that opaque fog has of all lamps, at most */
+    nb_real point_lights;   /* radiance that opaque fog has of all point lights, at most */
     double least_slack;     /* the length over which the medium's extinction and light come to 1 */
     nb_wvec3 offset, slope; /* affine profile coordinates: offset + slope t */
     nb_wvec3 size;          /* soft edge: half widths of a box; `ends` of a round body */
@@ -85,7 +85,7 @@ typedef struct packet_state {
     int wants_error;                 /* 0: media that no ray comes near may be left out */
     const known_interval *total;     /* NULL the first time */
     struct sunlight *sun;            /* NULL where sunlight is not asked for, or none is there */
-    nb_real lamps;                   /* irradiance of all lamps on the rays, at most */
+    nb_real point_lights;            /* irradiance of all point lights on the rays, at most */
     int wants_sky;                   /* 0: light is not asked for, and the sky's may be taken for its most */
     const nb_environment_light *sky; /* the last that a medium had, NULL: none yet, */
     nb_real sky_light[3];            /* and what comes of it along the rays */

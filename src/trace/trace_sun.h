@@ -35,15 +35,15 @@ typedef struct sunlight {
     nb_wide *turns;                 /* of all media in all lanes, in any order; NB_WFAR and more: none */
     size_t turn_count, turn_capacity;
     int has_turns;           /* of the packet at hand */
-    const nb_light *turning; /* they are this lamp's; NULL: the sun's */
+    const nb_light *turning; /* they are this point light's; NULL: the sun's */
     void *turn_memory;
     struct lit_shadow *shadows; /* see trace_lit_shadow.h */
     size_t shadow_count, shadow_capacity, first_shadow;
     void *shadow_memory;
     sun_attenuation shade;
-    sun_attenuation *lamp_shades; /* of each lamp; NULL: surfaces keep none away */
+    sun_attenuation *light_shades; /* of each point light; NULL: surfaces keep none away */
     void *shade_memory;
-    double share; /* what steps may add to the error of radiance, all together: of the sun, of all lamps */
+    double share; /* what steps may add to the error of radiance, all together: of the sun, of all point lights */
     int out_of_memory;
     nb_real by_sun[3], by_lights[3]; /* of the packet's radiance, before opacity is limited */
 } sunlight;
@@ -85,14 +85,15 @@ static int is_ball_alone(const sunlight *sun)
            medium->body.leaves[0].type == NB_LEAF_SPHERE;
 }
 
-/* Those of the lamp, or of the sun where it is NULL. Returns whether they were not there yet. */
-static int find_turns(sunlight *sun, const packet *rays, const nb_light *lamp)
+/* Those of the point light, or of the sun where it is NULL. Returns whether they were not there yet. */
+static int find_turns(sunlight *sun, const packet *rays, const nb_light *point_light)
 {
-    if (sun->has_turns && sun->turning == lamp) return 0;
+    if (sun->has_turns && sun->turning == point_light) return 0;
     sun->turn_count = 0;
     sun->has_turns = 1;
-    sun->turning = lamp;
-    if (lamp != NULL || !is_ball_alone(sun)) note_media(sun, rays, lamp); /* inside a ball there are none */
+    sun->turning = point_light;
+    if (point_light != NULL || !is_ball_alone(sun))
+        note_media(sun, rays, point_light); /* inside a ball there are none */
     return 1;
 }
 
@@ -149,10 +150,10 @@ static void pass_boundaries(sun_attenuation *s, nb_wide t, nb_wmask lanes)
 struct light_pass;
 
 typedef struct sun_step {
-    const struct light_pass *lamp; /* NULL: of the sun */
+    const struct light_pass *point_light; /* NULL: of the sun */
     nb_wide start;
-    nb_swing swing;                                      /* of a lamp alone */
-    nb_real length;                                      /* m; of a lamp in the counting of its swing */
+    nb_swing swing;                                      /* of a point light alone */
+    nb_real length;                                      /* m; of a point light in the counting of its swing */
     nb_real scale[3];                                    /* of the step: x = s (scale[0] + s (scale[1] + s scale[2])) */
     nb_real before[3], depth_before[3], error_before[3]; /* transmittance and depth up to its start */
     nb_real depth[3], depth_error[3];                    /* from the ray's origin to its end */
@@ -245,7 +246,7 @@ static nb_wide place_of_node(const sun_step *s, nb_wide end, int n)
     if (n == 0) return nb_wselect(s->knows_start, s->start, s->start + margin);
     if (n == SUN_NODES - 1) return nb_wselect(s->to_stop, end - margin, end);
     const nb_wide x = nb_widen(s->length * scaled_place(s, REAL(sun_nodes[n])));
-    return s->lamp != NULL ? nb_swing_place(s->swing, x) : s->start + x;
+    return s->point_light != NULL ? nb_swing_place(s->swing, x) : s->start + x;
 }
 
 /* What fog is at a place of a step, of all media: extinction, and what it makes of light. `most` is of the brightest. */
@@ -286,7 +287,7 @@ static void depth_of_node(const sunlight *sun, const packet_state *m, const ray_
     }
 }
 
-/* The rest of a node that stands for `length` of fog, m; of a lamp the same times what it brings there. */
+/* The rest of a node that stands for `length` of fog, m; of a point light the same times what it brings there. */
 static void fill_node(const sunlight *sun, sun_node *at, const lit_fog *fog, nb_real length, const nb_real error[3],
                       const light_depth *to_light)
 {
@@ -301,20 +302,20 @@ static void fill_node(const sunlight *sun, sun_node *at, const lit_fog *fog, nb_
     at->most = fog->most;
 }
 
-static light_depth way_to_lamp(sunlight *sun, const packet_state *m, const struct light_pass *pass, nb_wide t,
-                               nb_wmask lanes);
-static lit_fog lamplit_fog(const packet_state *m, const struct light_pass *pass, nb_wide t);
-static nb_real most_of_lamp(const struct light_pass *pass, nb_wide start, nb_wide end);
-static nb_real length_past_lamp(const sun_step *s, nb_wide t, int n);
+static light_depth way_to_light(sunlight *sun, const packet_state *m, const struct light_pass *pass, nb_wide t,
+                                nb_wmask lanes);
+static lit_fog point_lit_fog(const packet_state *m, const struct light_pass *pass, nb_wide t);
+static nb_real max_of_light(const struct light_pass *pass, nb_wide start, nb_wide end);
+static nb_real length_past_light(const sun_step *s, nb_wide t, int n);
 
 /* What node n of a step stands for; `way` is known at a start that the step knows. */
 static sun_node find_node(sunlight *sun, const packet_state *m, const ray_segment *p, const gathered_light *g,
                           const sun_step *s, nb_wide end, int n, const light_depth *way)
 {
     const nb_wide t = place_of_node(s, end, n);
-    const int by_lamp = s->lamp != NULL;
-    const lit_fog fog = by_lamp ? lamplit_fog(m, s->lamp, t) : sunlit_fog(m, t);
-    const nb_real length = by_lamp ? length_past_lamp(s, t, n) : s->length * scaled_speed(s, REAL(sun_nodes[n]));
+    const int by_light = s->point_light != NULL;
+    const lit_fog fog = by_light ? point_lit_fog(m, s->point_light, t) : sunlit_fog(m, t);
+    const nb_real length = by_light ? length_past_light(s, t, n) : s->length * scaled_speed(s, REAL(sun_nodes[n]));
     sun_node at;
     nb_real error[3];
     depth_of_node(sun, m, p, g, s, t, n, &at, error);
@@ -358,7 +359,7 @@ static nb_mask lanes_in_voxels(const packet_state *m)
 static light_depth way_from(sunlight *sun, const packet_state *m, const sun_step *s, nb_wide end, int n, nb_wmask lanes)
 {
     const nb_wide t = place_of_node(s, end, n);
-    return s->lamp != NULL ? way_to_lamp(sun, m, s->lamp, t, lanes) : depth_to_sun(sun, m, t, lanes);
+    return s->point_light != NULL ? way_to_light(sun, m, s->point_light, t, lanes) : depth_to_sun(sun, m, t, lanes);
 }
 
 static void sum_light_nodes(sunlight *sun, const packet_state *m, const ray_segment *p, const gathered_light *g,
@@ -376,7 +377,7 @@ static void sum_light_nodes(sunlight *sun, const packet_state *m, const ray_segm
         kinked = nb_or(kinked, nb_not(s->at_end.signature == s->at_start.signature));
         at[n] = find_node(sun, m, p, g, s, end, n, &s->at_end);
     }
-    const nb_real most = s->lamp != NULL ? most_of_lamp(s->lamp, s->start, end) : at[0].most;
+    const nb_real most = s->point_light != NULL ? max_of_light(s->point_light, s->start, end) : at[0].most;
     const lit_sum sum = sum_nodes_of_step(at, most, count_media(m), sun->snapshot->is_gray);
     take_sum(s, &sum);
     const nb_mask rough = lanes_in_voxels(m);
@@ -660,7 +661,7 @@ static nb_real doubt_at_face(sunlight *sun, const packet_state *m, const struct 
         const nb_wide place = i == 0 ? t - off : t + off;
         const nb_wmask asked = nb_widen_mask(matters);
         const light_depth way =
-            pass != NULL ? way_to_lamp(sun, m, pass, place, asked) : depth_to_sun(sun, m, place, asked);
+            pass != NULL ? way_to_light(sun, m, pass, place, asked) : depth_to_sun(sun, m, place, asked);
         map_channels(sun->snapshot, transmitted, way.depth, beside[i]);
     }
     for (int c = 0; c < 3; c++) change = nb_max(change, nb_abs(beside[1][c] - beside[0][c]));

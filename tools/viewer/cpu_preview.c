@@ -106,7 +106,7 @@ static int make_picture(nb_preview_work *w, uint32_t by)
 static void take_light(nebel_scene_data *scene, const nb_preview_request *wish)
 {
     const nebel_scene_data *const light = &wish->light;
-    scene->lights = wish->lamps;
+    scene->lights = wish->lights;
     scene->light_count = light->light_count;
     memcpy(scene->background, light->background, sizeof scene->background);
     memcpy(scene->ambient, light->ambient, sizeof scene->ambient);
@@ -141,10 +141,10 @@ static void forget(nb_preview_request *wish)
 {
     nebel_release_lighting(wish->fog);
     nebel_destroy_cells(wish->cells);
-    free(wish->lamps);
+    free(wish->lights);
     wish->fog = NULL;
     wish->cells = NULL;
-    wish->lamps = NULL;
+    wish->lights = NULL;
 }
 
 /* Waits for a wish; 0 at the end. */
@@ -160,7 +160,7 @@ static int take_wish(nb_preview_work *w)
         w->wish = twin->wish;
         twin->wish.fog = NULL;
         twin->wish.cells = NULL;
-        twin->wish.lamps = NULL;
+        twin->wish.lights = NULL;
         twin->is_asked = 0;
         twin->is_working = 1;
     }
@@ -176,7 +176,7 @@ static int run(void *user)
         if (prepare(&w) == NEBEL_OK) {
             while (make_picture(&w, by) && by > 1) by /= 2;
         }
-        /* The renderer looks neither at cells nor at lamps between frames. */
+        /* The renderer looks neither at cells nor at point lights between frames. */
         forget(&w.wish);
     }
     nebel_destroy_renderer(w.renderer);

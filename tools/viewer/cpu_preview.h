@@ -18,8 +18,8 @@ typedef struct nb_preview_request {
     nebel_method method;
     nebel_factor_desc factor;
     nebel_cells *cells;     /* of the methods of that name; the twin's from then on */
-    nebel_light *lamps;     /* by malloc; the twin's from then on */
-    nebel_scene_data light; /* sun, ambient and background of it, and how many lamps there are */
+    nebel_light *lights;    /* by malloc; the twin's from then on */
+    nebel_scene_data light; /* sun, ambient and background of it, and how many point lights there are */
     nebel_lighting *fog;
 } nb_preview_request;
 

@@ -118,8 +118,8 @@ static nebel_result light_fog(const nb_document *draft, const nb_document_state 
                               nebel_lighting **made)
 {
     nebel_lighting_desc desc = {.host.log = draft->log,
-                                .lights = edition->lamps,
-                                .light_count = edition->lamp_count,
+                                .lights = edition->lights,
+                                .light_count = edition->light_count,
                                 .diffusion = nebel_get_scene_data(draft->file)->diffusion,
                                 .previous = draft->volumes};
     const nebel_result result = find_fog_light(draft, edition, &desc.sun, &desc.environment);

@@ -192,11 +192,11 @@ static int add_models(nb_document_state *edition, const nebel_scene_model *model
     return edition->models != NULL ? 0 : -1;
 }
 
-static int add_lamps(nb_document_state *edition, const nebel_light *lamps, size_t count)
+static int add_lights(nb_document_state *edition, const nebel_light *lights, size_t count)
 {
-    edition->lamps = copy_array(lamps, count, sizeof *lamps);
-    edition->lamp_count = edition->lamps != NULL ? count : 0;
-    return edition->lamps != NULL ? 0 : -1;
+    edition->lights = copy_array(lights, count, sizeof *lights);
+    edition->light_count = edition->lights != NULL ? count : 0;
+    return edition->lights != NULL ? 0 : -1;
 }
 
 /* What is made of them is made anew where they change. */
@@ -251,7 +251,7 @@ int nb_document_state_make(const nebel_scene_data *scene, nb_document_state *edi
     memcpy(made.sun_irradiance, scene->sun_irradiance, sizeof made.sun_irradiance);
     int result = add_nebulae(&made, scene->nebulae, scene->nebula_transforms, scene->nebula_count);
     if (result == 0) result = add_models(&made, scene->models, scene->model_count);
-    if (result == 0) result = add_lamps(&made, scene->lights, scene->light_count);
+    if (result == 0) result = add_lights(&made, scene->lights, scene->light_count);
     if (result == 0) result = add_camera_keys(&made, scene->camera_keys, scene->camera_key_count);
     if (result == 0) result = add_planets(&made, scene->planets, scene->planet_count);
     if (result == 0) result = add_cells(&made, scene->cells);
@@ -272,16 +272,16 @@ int nb_document_state_copy(const nb_document_state *from, nb_document_state *to)
     made.nebulae = NULL;
     made.nebula_places = NULL;
     made.models = NULL;
-    made.lamps = NULL;
+    made.lights = NULL;
     made.camera_keys = NULL;
     made.planets = NULL;
     made.cells = NULL;
     made.cells_desc.cell_count = 0;
-    made.count = made.capacity = made.nebula_count = made.model_count = made.lamp_count = made.camera_key_count = 0;
+    made.count = made.capacity = made.nebula_count = made.model_count = made.light_count = made.camera_key_count = 0;
     made.planet_count = 0;
     int result = add_nebulae(&made, from->nebulae, from->nebula_places, from->nebula_count);
     if (result == 0) result = add_models(&made, from->models, from->model_count);
-    if (result == 0) result = add_lamps(&made, from->lamps, from->lamp_count);
+    if (result == 0) result = add_lights(&made, from->lights, from->light_count);
     if (result == 0) result = add_camera_keys(&made, from->camera_keys, from->camera_key_count);
     if (result == 0) result = add_planets(&made, from->planets, from->planet_count);
     if (result == 0 && from->cells != NULL) result = add_cells(&made, &from->cells_desc);
@@ -313,7 +313,7 @@ void nb_document_state_free(nb_document_state *edition)
     free(edition->nebulae);
     free(edition->nebula_places);
     free(edition->models);
-    free(edition->lamps);
+    free(edition->lights);
     free(edition->camera_keys);
     free(edition->planets);
     free(edition->cells);
@@ -345,8 +345,8 @@ void nb_document_state_show(nb_document_state *edition, nebel_scene_data *scene)
     scene->nebula_transforms = edition->nebula_places;
     scene->models = edition->models;
     scene->model_count = edition->model_count;
-    scene->lights = edition->lamps;
-    scene->light_count = edition->lamp_count;
+    scene->lights = edition->lights;
+    scene->light_count = edition->light_count;
     scene->camera_keys = edition->camera_keys;
     scene->camera_key_count = edition->camera_key_count;
     scene->planets = edition->planets;
@@ -370,7 +370,7 @@ size_t nb_document_state_size(const nb_document_state *edition)
         size += sizeof *edition->volumes + sizeof *edition->entries + nb_shape_size(&edition->volumes[i].shape) +
                 (edition->entries[i].key_count + 1) * sizeof(nebel_volume_key) + strlen(edition->names[i]);
     size += edition->model_count * sizeof *edition->models;
-    size += edition->lamp_count * sizeof *edition->lamps;
+    size += edition->light_count * sizeof *edition->lights;
     size += edition->camera_key_count * sizeof *edition->camera_keys;
     size += edition->planet_count * sizeof *edition->planets;
     for (size_t i = 0; i < edition->nebula_count; i++)
@@ -487,16 +487,16 @@ int nb_document_state_has_same_models(const nb_document_state *a, const nb_docum
     return 1;
 }
 
-static int is_same_lamp(const nebel_light *a, const nebel_light *b)
+static int is_same_light(const nebel_light *a, const nebel_light *b)
 {
     return a->type == b->type && HAS_SAME(a, b, nebel_light, position, outer_angle) && a->outer_angle == b->outer_angle;
 }
 
 int nb_document_state_has_same_lights(const nb_document_state *a, const nb_document_state *b)
 {
-    if (a->lamp_count != b->lamp_count) return 0;
-    for (size_t i = 0; i < a->lamp_count; i++)
-        if (!is_same_lamp(&a->lamps[i], &b->lamps[i])) return 0;
+    if (a->light_count != b->light_count) return 0;
+    for (size_t i = 0; i < a->light_count; i++)
+        if (!is_same_light(&a->lights[i], &b->lights[i])) return 0;
     return 1;
 }
 

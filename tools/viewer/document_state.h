@@ -21,8 +21,8 @@ typedef struct nb_document_state {
     size_t nebula_count;
     nebel_scene_model *models; /* their file names are those of the file that was read: not to be used */
     size_t model_count;
-    nebel_light *lamps; /* as many as the file has */
-    size_t lamp_count;
+    nebel_light *lights; /* as many as the file has */
+    size_t light_count;
     nebel_planet *planets; /* their maps, and what is made of them, are the scene's: not to be used */
     size_t planet_count;
     nebel_cell *cells;
@@ -70,7 +70,8 @@ int nb_document_state_has_same_camera_keys(const nb_document_state *a, const nb_
 int nb_document_state_has_same_light(const nb_document_state *a, const nb_document_state *b);
 int nb_document_state_has_same_sources(const nb_document_state *a, const nb_document_state *b);
 
-/* Puts light, lamps, camera keys, volumes, nebulae, cells, models and planets in the place of the scene's, which points to the edition then. */
+/* Puts light, point lights, camera keys, volumes, nebulae, cells, models and planets in the place of the scene's,
+ * which points to the edition then. */
 void nb_document_state_show(nb_document_state *edition, nebel_scene_data *scene);
 
 /* Bytes that it takes, more or less. */

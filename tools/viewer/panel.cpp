@@ -370,8 +370,8 @@ void draw_window(nb_panel *panel)
     draw_nebulae(panel, reach);
     draw_cells(panel, reach);
     draw_models(panel, reach);
-    draw_lamps(panel, reach);
-    draw_lights(panel);
+    draw_point_lights(panel, reach);
+    draw_point_lights(panel);
     draw_planets(panel);
     draw_classic(panel, reach);
     draw_camera(panel, reach);

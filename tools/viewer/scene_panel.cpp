@@ -100,7 +100,7 @@ bool draw_background(nb_document_state *now)
     return pick("background", now->background, false, "Radiance where no surface is: the sky.") || switched;
 }
 
-/* ---- lamps
+/* ---- point lights
  * -----------------------------------------------------------------------------------------------------------
  */
 
@@ -117,46 +117,47 @@ bool slide_strength(double intensity[3])
 }
 
 // The light falls off between the two angles.
-bool draw_cone(nebel_light *lamp)
+bool draw_cone(nebel_light *light)
 {
-    bool changed = slide_direction(lamp->direction, "turn", "Where it shines to, seen from above: 0 is along z.",
+    bool changed = slide_direction(light->direction, "turn", "Where it shines to, seen from above: 0 is along z.",
                                    "height", "How far above the horizon it shines to.");
-    if (slide("outer angle", &lamp->outer_angle, 0.1, 180, "%.1f deg", false, "From the axis: no light beyond.")) {
-        lamp->outer_angle = fmax(0.1, fmin(180, lamp->outer_angle));
+    if (slide("outer angle", &light->outer_angle, 0.1, 180, "%.1f deg", false, "From the axis: no light beyond.")) {
+        light->outer_angle = fmax(0.1, fmin(180, light->outer_angle));
         changed = true;
     }
-    changed |= slide("inner angle", &lamp->inner_angle, 0, 180, "%.1f deg", false, "From the axis: full light within.");
-    lamp->inner_angle = fmax(0, fmin(lamp->outer_angle, lamp->inner_angle));
+    changed |=
+        slide("inner angle", &light->inner_angle, 0, 180, "%.1f deg", false, "From the axis: full light within.");
+    light->inner_angle = fmax(0, fmin(light->outer_angle, light->inner_angle));
     return changed;
 }
 
-bool draw_lamp(nebel_light *lamp, double reach)
+bool draw_light(nebel_light *light, double reach)
 {
-    double radius = lamp->radius > 0 ? lamp->radius : 1e-3;
-    bool changed = slide_strength(lamp->intensity);
+    double radius = light->radius > 0 ? light->radius : 1e-3;
+    bool changed = slide_strength(light->intensity);
     changed |=
-        pick("intensity", lamp->intensity, false, "W/sr, as one sees it from far away; of a spot along its axis.");
-    changed |= drag_place("position", lamp->position, reach, "Where it is.");
+        pick("intensity", light->intensity, false, "W/sr, as one sees it from far away; of a spot along its axis.");
+    changed |= drag_place("position", light->position, reach, "Where it is.");
     if (slide("radius", &radius, 1e-3, 100, "%.4g m", true,
               "Of the ball that shines: nothing is brighter than its surface.")) {
-        lamp->radius = fmax(1e-3, fmin(1e6, radius));
+        light->radius = fmax(1e-3, fmin(1e6, radius));
         changed = true;
     }
-    return (lamp->type == NEBEL_LIGHT_SPOT && draw_cone(lamp)) || changed;
+    return (light->type == NEBEL_LIGHT_SPOT && draw_cone(light)) || changed;
 }
 
-bool draw_lamp_header(nb_panel *panel, size_t index, double reach)
+bool draw_light_header(nb_panel *panel, size_t index, double reach)
 {
     const Owner owner("lights", index);
     const char *const name = panel->data->light_names[index];
-    nebel_light *const lamp = &panel->now->lamps[index];
+    nebel_light *const light = &panel->now->lights[index];
     char title[160];
-    snprintf(title, sizeof title, "%.100s%s%u###lamp", name, name[0] != '\0' ? ", lamp " : "lamp ", unsigned(index));
+    snprintf(title, sizeof title, "%.100s%s%u###light", name, name[0] != '\0' ? ", light " : "light ", unsigned(index));
     const bool is_open = ImGui::CollapsingHeader(title);
     note_place("open");
     if (!is_open) return false;
     ImGui::Indent(4 * scale);
-    const bool changed = draw_lamp(lamp, reach);
+    const bool changed = draw_light(light, reach);
     ImGui::Unindent(4 * scale);
     return changed;
 }
@@ -309,15 +310,15 @@ void draw_models(nb_panel *panel, double reach)
     panel->fog_changed = 1;
 }
 
-void draw_lamps(nb_panel *panel, double reach)
+void draw_point_lights(nb_panel *panel, double reach)
 {
-    const size_t count = panel->now->lamp_count;
+    const size_t count = panel->now->light_count;
     if (count == 0) return;
-    ImGui::Text("Lamps: %u", unsigned(count));
-    for (size_t i = 0; i < count; i++) panel->fog_changed |= draw_lamp_header(panel, i, reach);
+    ImGui::Text("Lights: %u", unsigned(count));
+    for (size_t i = 0; i < count; i++) panel->fog_changed |= draw_light_header(panel, i, reach);
 }
 
-void draw_lights(nb_panel *panel)
+void draw_point_lights(nb_panel *panel)
 {
     nb_document_state *const now = panel->now;
     if (!open_section("Light", false)) return;

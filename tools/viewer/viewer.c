@@ -617,11 +617,11 @@ static nebel_result make_cells(viewer *all, nebel_cells **cells)
 }
 
 /* To be freed. */
-static nebel_light *copy_lamps(const nebel_scene_data *scene)
+static nebel_light *copy_lights(const nebel_scene_data *scene)
 {
-    nebel_light *const lamps = malloc((scene->light_count + 1) * sizeof *lamps);
-    if (lamps != NULL && scene->light_count > 0) memcpy(lamps, scene->lights, scene->light_count * sizeof *lamps);
-    return lamps;
+    nebel_light *const lights = malloc((scene->light_count + 1) * sizeof *lights);
+    if (lights != NULL && scene->light_count > 0) memcpy(lights, scene->lights, scene->light_count * sizeof *lights);
+    return lights;
 }
 
 static nebel_result ask_twin(viewer *all)
@@ -642,8 +642,8 @@ static nebel_result ask_twin(viewer *all)
     }
     if (result == NEBEL_OK) result = make_cells(all, &wish.cells);
     if (result != NEBEL_OK) return result;
-    wish.lamps = copy_lamps(&all->draft.data);
-    if (wish.lamps == NULL) {
+    wish.lights = copy_lights(&all->draft.data);
+    if (wish.lights == NULL) {
         nebel_destroy_cells(wish.cells);
         return NEBEL_ERROR_MEMORY;
     }

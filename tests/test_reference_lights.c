@@ -1,4 +1,5 @@
-/* Lamps in the reference renderer: the collected physics (T17, T19, T20), light that has nowhere to go but out, shadows. */
+/* Point lights in the reference renderer: the collected physics (T17, T19, T20), light that has nowhere to go but out,
+ * shadows. */
 #include "test_render_scene.h"
 
 #include "cpu/light_sampling.h"
@@ -24,9 +25,9 @@ typedef struct trial {
     nb_path_scene world;
 } trial;
 
-static void start(trial *t, const nebel_light *lamps, size_t count, const nebel_volume_desc *volume)
+static void start(trial *t, const nebel_light *lights, size_t count, const nebel_volume_desc *volume)
 {
-    *t = (trial){.scene = {.light_count = count, .lights = lamps}};
+    *t = (trial){.scene = {.light_count = count, .lights = lights}};
     t->world = (nb_path_scene){.media.fog = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, volume, 1),
                                .scene = &t->scene,
                                .geometry = &t->geometry,
@@ -66,7 +67,7 @@ static void expect(const tally *all, double expected, double part)
 
 /* ---- airlight (T17, T19) --------------------------------------------------------------------- */
 
-static tally see_airlight(double extinction, const nebel_light *lamp, double length)
+static tally see_airlight(double extinction, const nebel_light *light, double length)
 {
     enum { PATHS = 40000 };
     const nebel_volume_desc fog = white_fog(extinction);
@@ -74,7 +75,7 @@ static tally see_airlight(double extinction, const nebel_light *lamp, double len
     const nb_path_vertex black = {.t = length};
     tally all = {0, 0, 0};
     trial t;
-    start(&t, lamp, 1, &fog);
+    start(&t, light, 1, &fog);
     for (int i = 0; i < PATHS; i++) follow(&t, &eye, &black, 1, &all);
     end(&t);
     return all;
@@ -92,10 +93,10 @@ static void airlight_is_that_of_T17(void **state)
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const double angle = cases[i].angle * test_pi / 180;
-        nebel_light lamp = point;
-        lamp.position[0] = cases[i].distance * cos(angle);
-        lamp.position[1] = cases[i].distance * sin(angle);
-        const tally all = see_airlight(cases[i].extinction, &lamp, cases[i].length);
+        nebel_light point_light = point;
+        point_light.position[0] = cases[i].distance * cos(angle);
+        point_light.position[1] = cases[i].distance * sin(angle);
+        const tally all = see_airlight(cases[i].extinction, &point_light, cases[i].length);
         expect(&all, cases[i].light, cases[i].error);
     }
 }
@@ -119,27 +120,27 @@ static void places_are_those_of_T20(void **state)
     (void)state;
     static const double chances[] = {.1, .5, .9}, places[] = {10.62638608785674, 19.66907215105618, 31.49775892242482};
     const double angle = 15 * test_pi / 180;
-    const nebel_light lamp = {.position = {20 * cos(angle), 20 * sin(angle), 0}, .intensity = {1, 1, 1}};
+    const nebel_light light = {.position = {20 * cos(angle), 20 * sin(angle), 0}, .intensity = {1, 1, 1}};
     const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 60};
-    const nb_light_pass passing = nb_passing_of(&lamp, &ray);
+    const nb_light_pass passing = nb_passing_of(&light, &ray);
     for (int i = 0; i < 3; i++) {
         const double t = nb_passing_draw(&passing, chances[i]);
-        const nb_sampled_light sight = nb_light_sight_from(&lamp, (const double[3]){t, 0, 0});
+        const nb_sampled_light sight = nb_light_sight_from(&light, (const double[3]){t, 0, 0});
         assert_true(fabs(t - places[i]) < 1e-12 * places[i]);
         assert_true(fabs(sight.beam / nb_passing_density(&passing, t) - .5318835164163347) < 1e-12);
     }
 }
 
-/* The chance of a place is the integral of the density up to it: also far from the lamp, where one angle is as good as
- * the next, beyond it, and through it. */
+/* The chance of a place is the integral of the density up to it: also far from the point light, where one angle is as
+ * good as the next, beyond it, and through it. */
 static void places_are_as_dense_as_they_say(void **state)
 {
     (void)state;
-    static const double lamps[][2] = {{5, 1}, {-5, 1}, {1e7, 1}, {-1e7, 1}, {5, 0}, {20, 1e-2}, {5, 1e6}};
-    for (size_t i = 0; i < sizeof lamps / sizeof *lamps; i++) {
-        const nebel_light lamp = {.position = {lamps[i][0], lamps[i][1], 0}, .radius = .25, .intensity = {1, 1, 1}};
+    static const double lights[][2] = {{5, 1}, {-5, 1}, {1e7, 1}, {-1e7, 1}, {5, 0}, {20, 1e-2}, {5, 1e6}};
+    for (size_t i = 0; i < sizeof lights / sizeof *lights; i++) {
+        const nebel_light light = {.position = {lights[i][0], lights[i][1], 0}, .radius = .25, .intensity = {1, 1, 1}};
         const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 10};
-        const nb_light_pass passing = nb_passing_of(&lamp, &ray);
+        const nb_light_pass passing = nb_passing_of(&light, &ray);
         const double middle = nb_passing_draw(&passing, .3);
         double sum = 0;
         enum { STEPS = 4000 };
@@ -163,7 +164,8 @@ static nebel_ray ray_past(double away, uint64_t *numbers)
     return ray;
 }
 
-/* Per W/sr, what a ball of fog of radius 1 around a lamp scatters once: within the lamp, which fog fills, and around. */
+/* Per W/sr, what a ball of fog of radius 1 around a point light scatters once: within the point light, which fog
+ * fills, and around. */
 static double scattered_once(double extinction, double radius)
 {
     enum { STEPS = 2000 };
@@ -176,20 +178,20 @@ static double scattered_once(double extinction, double radius)
     return sum;
 }
 
-/* White fog around lamps keeps nothing: all that it scatters leaves it, so much to every side. What goes through a disc
- * of parallel rays as wide as the fog is 1 / (4 pi) of it. */
+/* White fog around point lights keeps nothing: all that it scatters leaves it, so much to every side. What goes
+ * through a disc of parallel rays as wide as the fog is 1 / (4 pi) of it. */
 static void all_light_gets_out_of_white_fog(void **state)
 {
     (void)state;
     enum { PATHS = 40000 };
-    const nebel_light lamps[] = {{.intensity = {2, 2, 2}, .radius = .25}, {.intensity = {1, 1, 1}, .radius = .125}};
+    const nebel_light lights[] = {{.intensity = {2, 2, 2}, .radius = .25}, {.intensity = {1, 1, 1}, .radius = .125}};
     nebel_volume_desc ball = white_fog(2);
     ball.shape = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .radius = 1};
     ball.phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .5};
     trial t;
     tally all = {0, 0, 0};
     uint64_t numbers = 5;
-    start(&t, lamps, 2, &ball);
+    start(&t, lights, 2, &ball);
     t.world.bounces = 10000;
     for (int i = 0; i < PATHS; i++) {
         const double away = dice(&numbers, 0, 1);
@@ -203,15 +205,15 @@ static void all_light_gets_out_of_white_fog(void **state)
 
 /* ---- surfaces -------------------------------------------------------------------------------- */
 
-/* A lamp above a square that hides it from the camera's fog, and nothing else. */
+/* A point light above a square that hides it from the camera's fog, and nothing else. */
 static float look_below(float half)
 {
     const float positions[] = {-half, 1, -half, -half, 1, half, half, 1, half, half, 1, -half};
     static const uint32_t indices[] = {0, 1, 2, 0, 2, 3};
     const nebel_mesh lid = {
         .positions = positions, .indices = indices, .vertex_count = 4, .triangle_count = 2, .texture = -1};
-    const nebel_light lamp = {.position = {0, 3, 0}, .intensity = {10, 10, 10}, .radius = .1};
-    const nebel_scene_data scene = {.mesh_count = 1, .meshes = &lid, .light_count = 1, .lights = &lamp};
+    const nebel_light light = {.position = {0, 3, 0}, .intensity = {10, 10, 10}, .radius = .1};
+    const nebel_scene_data scene = {.mesh_count = 1, .meshes = &lid, .light_count = 1, .lights = &light};
     nebel_volume_desc box = white_fog(.5);
     box.shape = (nebel_shape){.type = NEBEL_SHAPE_BOX, .min = {-1, -1, -1}, .max = {1, 0, 1}};
     nebel_lighting *fog = test_fog(1, &box);
@@ -230,7 +232,7 @@ static float look_below(float half)
     return color[0];
 }
 
-static void surfaces_keep_lamps_from_fog(void **state)
+static void surfaces_keep_lights_from_fog(void **state)
 {
     (void)state;
     assert_true(look_below(2) == 0);
@@ -242,7 +244,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(airlight_is_that_of_T17),         cmocka_unit_test(spots_are_those_of_T19),
         cmocka_unit_test(places_are_those_of_T20),         cmocka_unit_test(places_are_as_dense_as_they_say),
-        cmocka_unit_test(all_light_gets_out_of_white_fog), cmocka_unit_test(surfaces_keep_lamps_from_fog),
+        cmocka_unit_test(all_light_gets_out_of_white_fog), cmocka_unit_test(surfaces_keep_lights_from_fog),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

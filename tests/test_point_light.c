@@ -1,5 +1,5 @@
-/* Light of lamps in fog: airlight and spots of the collected physics (T17, T19), brute force, the contracts of every
- * query, and the error that is told. */
+/* Light of point lights in fog: airlight and spots of the collected physics (T17, T19), brute force, the contracts of
+ * every query, and the error that is told. */
 #include "unit.h"
 
 #include "fog_help.h"
@@ -16,10 +16,10 @@ static nebel_transfer ask(const nebel_lighting *lighting, nebel_trace_desc desc,
 
 /* ---- even fog -------------------------------------------------------------------------------- */
 
-static nebel_lighting *make_airlight(double extinction, const nebel_light *lamp)
+static nebel_lighting *make_airlight(double extinction, const nebel_light *point_light)
 {
     const nebel_volume_desc volume = {.extinction = {extinction, extinction, extinction}, .albedo = {1, 1, 1}};
-    const nebel_lighting_desc lights = {.lights = lamp, .light_count = 1};
+    const nebel_lighting_desc lights = {.lights = point_light, .light_count = 1};
     return fog_light(&lights, &volume, 1);
 }
 
@@ -33,7 +33,8 @@ static void expect_light(const nebel_lighting *lighting, nebel_ray ray, double w
         for (int c = 0; c < 3; c++) {
             const double off = fabs(transfer.in_scattering[c] - wanted), rounding = 1e-6 * wanted;
             assert_true(off <= tolerance + rounding);
-            assert_true(off <= transfer.error + rounding); /* of the wanted number: it is that of a lamp without size */
+            assert_true(off <=
+                        transfer.error + rounding); /* of the wanted number: it is that of a point light without size */
         }
     }
 }
@@ -48,9 +49,10 @@ static void airlight_is_that_of_T17(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const double angle = cases[i].angle * 3.14159265358979323846 / 180;
-        const nebel_light lamp = {.position = {cases[i].distance * cos(angle), 0, cases[i].distance * sin(angle)},
-                                  .intensity = {100, 100, 100}};
-        nebel_lighting *lighting = make_airlight(cases[i].extinction, &lamp);
+        const nebel_light point_light = {
+            .position = {cases[i].distance * cos(angle), 0, cases[i].distance * sin(angle)},
+            .intensity = {100, 100, 100}};
+        nebel_lighting *lighting = make_airlight(cases[i].extinction, &point_light);
         expect_light(lighting, (nebel_ray){{0, 0, 0}, {1, 0, 0}, cases[i].length}, cases[i].light);
         nebel_release_lighting(lighting);
     }
@@ -58,25 +60,25 @@ static void airlight_is_that_of_T17(void **state)
 
 static void spots_are_those_of_T19(void **state)
 {
-    nebel_light lamp = {.type = NEBEL_LIGHT_SPOT,
-                        .position = {10, 5, 0},
-                        .intensity = {100, 100, 100},
-                        .direction = {0, -2, 0},
-                        .inner_angle = 30,
-                        .outer_angle = 30};
+    nebel_light point_light = {.type = NEBEL_LIGHT_SPOT,
+                               .position = {10, 5, 0},
+                               .intensity = {100, 100, 100},
+                               .direction = {0, -2, 0},
+                               .inner_angle = 30,
+                               .outer_angle = 30};
     const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, HUGE_VAL};
     (void)state;
-    nebel_lighting *lighting = make_airlight(0.02, &lamp);
+    nebel_lighting *lighting = make_airlight(0.02, &point_light);
     expect_light(lighting, ray, 0.02458581030636606);
     expect_light(lighting, (nebel_ray){{0, 0, 0}, {1, 0, 0}, 7.1132}, 0);
     nebel_release_lighting(lighting);
-    lamp.inner_angle = lamp.outer_angle = 180; /* a point */
-    lighting = make_airlight(0.02, &lamp);
+    point_light.inner_angle = point_light.outer_angle = 180; /* a point */
+    lighting = make_airlight(0.02, &point_light);
     const nebel_trace_desc fine = {.tolerance = 1e-9};
     const nebel_transfer spot = ask(lighting, fine, ray);
     nebel_release_lighting(lighting);
-    lamp.type = NEBEL_LIGHT_POINT;
-    lighting = make_airlight(0.02, &lamp);
+    point_light.type = NEBEL_LIGHT_POINT;
+    lighting = make_airlight(0.02, &point_light);
     const nebel_transfer point = ask(lighting, fine, ray);
     assert_true(fog_difference(&spot, &point) < 2e-9);
     nebel_release_lighting(lighting);
@@ -90,33 +92,35 @@ static double square_to(const double a[3], const double b[3])
 }
 
 /* Smooth from the inner angle to the outer one, by cosines. */
-static double cone_of(const nebel_light *lamp, const double towards[3])
+static double cone_of(const nebel_light *point_light, const double towards[3])
 {
-    if (lamp->type != NEBEL_LIGHT_SPOT) return 1;
+    if (point_light->type != NEBEL_LIGHT_SPOT) return 1;
     const double degree = 3.14159265358979323846 / 180;
-    const double inner = cos(lamp->inner_angle * degree), outer = cos(lamp->outer_angle * degree);
+    const double inner = cos(point_light->inner_angle * degree), outer = cos(point_light->outer_angle * degree);
     double dot = 0, square = 0;
     for (int i = 0; i < 3; i++) {
-        dot -= towards[i] * lamp->direction[i];
-        square += lamp->direction[i] * lamp->direction[i];
+        dot -= towards[i] * point_light->direction[i];
+        square += point_light->direction[i] * point_light->direction[i];
     }
     const double s = fmin(fmax((dot / sqrt(square) - outer) / (inner - outer), 0), 1);
     return s * s * (3 - 2 * s);
 }
 
 /* What balls of fog give there per metre towards -view, in red. */
-static double glow_at(const nebel_volume_desc *balls, size_t count, const nebel_light *lamp, const double view[3],
-                      const double place[3], double *reach, double towards[3])
+static double glow_at(const nebel_volume_desc *balls, size_t count, const nebel_light *point_light,
+                      const double view[3], const double place[3], double *reach, double towards[3])
 {
-    const double square = square_to(place, lamp->position), distance = sqrt(square), r2 = lamp->radius * lamp->radius;
+    const double square = square_to(place, point_light->position), distance = sqrt(square),
+                 r2 = point_light->radius * point_light->radius;
     double cosine = 0, glow = 0;
     for (int i = 0; i < 3; i++) {
-        towards[i] = (lamp->position[i] - place[i]) / distance;
+        towards[i] = (point_light->position[i] - place[i]) / distance;
         cosine += towards[i] * view[i];
     }
-    *reach = fmax(distance - lamp->radius, 0);
+    *reach = fmax(distance - point_light->radius, 0);
     const double seen = 2 * 3.14159265358979323846 * (1 - sqrt(1 - r2 / fmax(square, r2)));
-    const double irradiance = lamp->intensity[0] / (3.14159265358979323846 * r2) * seen * cone_of(lamp, towards);
+    const double irradiance =
+        point_light->intensity[0] / (3.14159265358979323846 * r2) * seen * cone_of(point_light, towards);
     for (size_t k = 0; k < count; k++)
         if (square_to(place, balls[k].shape.center) < balls[k].shape.radius * balls[k].shape.radius)
             glow += balls[k].extinction[0] * balls[k].albedo[0] * nebel_evaluate_phase(&balls[k].phase, cosine);
@@ -126,7 +130,7 @@ static double glow_at(const nebel_volume_desc *balls, size_t count, const nebel_
 enum { STEPS = 40000 };
 
 static double brute_force(const nebel_lighting *lighting, const nebel_volume_desc *balls, size_t count,
-                          const nebel_light *lamp, const nebel_ray *ray)
+                          const nebel_light *point_light, const nebel_ray *ray)
 {
     static nebel_ray rays[2 * STEPS];
     static nebel_transfer transfers[2 * STEPS];
@@ -136,7 +140,7 @@ static double brute_force(const nebel_lighting *lighting, const nebel_volume_des
         const double t = (i + 0.5) * h;
         double place[3], towards[3], reach;
         for (int k = 0; k < 3; k++) place[k] = ray->origin[k] + t * ray->direction[k];
-        glow[i] = glow_at(balls, count, lamp, ray->direction, place, &reach, towards);
+        glow[i] = glow_at(balls, count, point_light, ray->direction, place, &reach, towards);
         rays[2 * i] = *ray;
         rays[2 * i].t_max = t;
         rays[2 * i + 1] = (nebel_ray){{place[0], place[1], place[2]}, {towards[0], towards[1], towards[2]}, reach};
@@ -148,7 +152,8 @@ static double brute_force(const nebel_lighting *lighting, const nebel_volume_des
     return sum;
 }
 
-/* Two balls that overlap, of different light; lamps outside, within, in both, and a ray through the lamp. */
+/* Two balls that overlap, of different light; point lights outside, within, in both, and a ray through the point
+ * light. */
 static void light_is_that_of_brute_force(void **state)
 {
     const nebel_volume_desc balls[] = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 0, 0}, .radius = 2},
@@ -159,28 +164,28 @@ static void light_is_that_of_brute_force(void **state)
                                         .extinction = {1, 1, 1},
                                         .albedo = {0.4, 0.4, 0.4},
                                         .phase = {.type = NEBEL_PHASE_RAYLEIGH}}};
-    const nebel_light lamps[] = {{.position = {0, 3, 1}, .intensity = {10, 10, 10}, .radius = 0.1},
-                                 {.position = {1.2, 0.2, 0.1}, .intensity = {1, 1, 1}, .radius = 0.25},
-                                 {.position = {-0.5, 0.1, 0.5}, .intensity = {3, 3, 3}, .radius = 0.01},
-                                 {.type = NEBEL_LIGHT_SPOT,
-                                  .position = {0, 2.5, 0},
-                                  .intensity = {9, 9, 9},
-                                  .radius = 0.05,
-                                  .direction = {0.1, -1, 0.05},
-                                  .inner_angle = 5,
-                                  .outer_angle = 20}};
+    const nebel_light point_lights[] = {{.position = {0, 3, 1}, .intensity = {10, 10, 10}, .radius = 0.1},
+                                        {.position = {1.2, 0.2, 0.1}, .intensity = {1, 1, 1}, .radius = 0.25},
+                                        {.position = {-0.5, 0.1, 0.5}, .intensity = {3, 3, 3}, .radius = 0.01},
+                                        {.type = NEBEL_LIGHT_SPOT,
+                                         .position = {0, 2.5, 0},
+                                         .intensity = {9, 9, 9},
+                                         .radius = 0.05,
+                                         .direction = {0.1, -1, 0.05},
+                                         .inner_angle = 5,
+                                         .outer_angle = 20}};
     enum { RAY_KINDS = 3 };
     const nebel_ray rays[RAY_KINDS] = {
         {{-4, 0.1, 0.2}, {1, 0, 0}, 9}, {{-4, 0.2, 0.1}, {1, 0, 0}, 9}, {{0, 0, 0}, {0, 0.6, 0.8}, 1}};
     (void)state;
     double worst = 0;
-    for (size_t l = 0; l < sizeof lamps / sizeof lamps[0]; l++) {
-        const nebel_lighting_desc lights = {.lights = &lamps[l], .light_count = 1};
+    for (size_t l = 0; l < sizeof point_lights / sizeof point_lights[0]; l++) {
+        const nebel_lighting_desc lights = {.lights = &point_lights[l], .light_count = 1};
         nebel_lighting *lighting = fog_light(&lights, balls, 2);
         for (size_t r = 0; r < nb_test_count(RAY_KINDS); r++) {
             const nebel_ray *const ray = &rays[(l + r) % RAY_KINDS];
             const nebel_transfer transfer = ask(lighting, (nebel_trace_desc){.tolerance = 1e-6}, *ray);
-            const double sum = brute_force(lighting, balls, 2, &lamps[l], ray);
+            const double sum = brute_force(lighting, balls, 2, &point_lights[l], ray);
             worst = fmax(worst, fabs(transfer.in_scattering[0] - sum) / sum);
             assert_true(transfer.error <= 1.1e-6);
         }
@@ -199,35 +204,35 @@ enum { SEEDS = 1 };
 enum { SEEDS = 3 };
 #endif
 
-enum { RAYS = 16, LAMPS = 3 };
+enum { RAYS = 16, LIGHTS = 3 };
 
 static random_fog fog;
 static nebel_lighting_desc sky;
-static nebel_light lamps[LAMPS];
+static nebel_light point_lights[LIGHTS];
 
-/* Random fog under a sun and lamps within and beside it. */
+/* Random fog under a sun and point lights within and beside it. */
 static void make_lit(random_fog_kind kind, uint64_t seed)
 {
     uint64_t numbers = seed * 1481 + (uint64_t)kind;
     random_fog_make(&fog, kind, seed);
     random_fog_light(&fog, &numbers);
-    for (int i = 0; i < LAMPS; i++) {
-        nebel_light *lamp = &lamps[i];
-        *lamp = (nebel_light){.type = i == 1 ? NEBEL_LIGHT_SPOT : NEBEL_LIGHT_POINT,
-                              .direction = {dice(&numbers, -1, 1), -1, dice(&numbers, -1, 1)},
-                              .inner_angle = 10,
-                              .outer_angle = dice(&numbers, 15, 100),
-                              .radius = i == 2 ? dice(&numbers, 0.01, 0.5) : 0};
+    for (int i = 0; i < LIGHTS; i++) {
+        nebel_light *point_light = &point_lights[i];
+        *point_light = (nebel_light){.type = i == 1 ? NEBEL_LIGHT_SPOT : NEBEL_LIGHT_POINT,
+                                     .direction = {dice(&numbers, -1, 1), -1, dice(&numbers, -1, 1)},
+                                     .inner_angle = 10,
+                                     .outer_angle = dice(&numbers, 15, 100),
+                                     .radius = i == 2 ? dice(&numbers, 0.01, 0.5) : 0};
         for (int c = 0; c < 3; c++) {
-            lamp->position[c] = dice(&numbers, -4, 4);
-            lamp->intensity[c] = dice(&numbers, 0, 20);
+            point_light->position[c] = dice(&numbers, -4, 4);
+            point_light->intensity[c] = dice(&numbers, 0, 20);
         }
     }
     sky = (nebel_lighting_desc){.sun = {.direction = {dice(&numbers, -1, 1), dice(&numbers, 0.2, 1), 0.3}}};
     if (seed % 2 == 0) sky.sun.irradiance[0] = sky.sun.irradiance[1] = sky.sun.irradiance[2] = 4;
     memcpy(sky.environment.radiance, fog.ambient, sizeof fog.ambient);
-    sky.lights = lamps;
-    sky.light_count = LAMPS;
+    sky.lights = point_lights;
+    sky.light_count = LIGHTS;
 }
 
 static nebel_lighting *commit_lit(void)
@@ -302,7 +307,7 @@ static void light_is_the_same_in_any_set_and_split(void **state)
             first[i + 1] = first[i] + count;
         }
         const nebel_ray_visibility none = {(const uint32_t[RAYS + 1]){0}, NULL}, some = {first, boundaries};
-        const nebel_ray_visibility pieces[LAMPS] = {some, none, some};
+        const nebel_ray_visibility pieces[LIGHTS] = {some, none, some};
         nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
         trace(lighting, &desc, rays, all);
         desc.light_visibility = pieces;
@@ -315,7 +320,7 @@ static void light_is_the_same_in_any_set_and_split(void **state)
             trace(lighting, &desc, rays, other);
             assert_memory_equal(expected, other, sizeof expected);
             for (size_t i = 0; i < nb_test_count(RAYS); i++) {
-                const nebel_ray_visibility one[LAMPS] = {{first + i, boundaries}, none, {first + i, boundaries}};
+                const nebel_ray_visibility one[LIGHTS] = {{first + i, boundaries}, none, {first + i, boundaries}};
                 desc.light_visibility = one;
                 fog_trace(lighting, desc, 1, &rays[i], &other[i]);
             }
@@ -325,15 +330,15 @@ static void light_is_the_same_in_any_set_and_split(void **state)
     }
 }
 
-/* The pieces of one lamp in even fog add up to all of its light. */
+/* The pieces of one point light in even fog add up to all of its light. */
 static void pieces_add_up(void **state)
 {
     static const float odd[] = {2, 5, 9.5f, 10.25f, 31}, even[] = {0, 2, 5, 9.5f, 10.25f, 31};
     static const uint32_t odd_first[] = {0, 5}, even_first[] = {0, 6};
     const nebel_ray_visibility pieces[] = {{odd_first, odd}, {even_first, even}};
-    const nebel_light lamp = {.position = {10, 1, 2}, .intensity = {100, 50, 20}};
+    const nebel_light point_light = {.position = {10, 1, 2}, .intensity = {100, 50, 20}};
     const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 60};
-    nebel_lighting *lighting = make_airlight(0.03, &lamp);
+    nebel_lighting *lighting = make_airlight(0.03, &point_light);
     (void)state;
     nebel_transfer transfer[3];
     for (int i = 0; i < 3; i++)
@@ -349,11 +354,11 @@ static void pieces_add_up(void **state)
 
 /* ---- hard cases ------------------------------------------------------------------------------ */
 
-/* Through the lamp, from it, along its axis; lamps far away, and far from the origin. */
+/* Through the point light, from it, along its axis; point lights far away, and far from the origin. */
 static void hard_rays_are_answered(void **state)
 {
     const double far = 1e7;
-    const nebel_light lamp = {.position = {far, 5, 0}, .intensity = {100, 100, 100}};
+    const nebel_light point_light = {.position = {far, 5, 0}, .intensity = {100, 100, 100}};
     const nebel_ray rays[] = {{{far - 10, 5, 0}, {1, 0, 0}, HUGE_VAL},
                               {{far, 5, 0}, {1, 0, 0}, HUGE_VAL},
                               {{far, 5, 0}, {1, 0, 0}, 0},
@@ -361,7 +366,7 @@ static void hard_rays_are_answered(void **state)
                               {{far + 1e-4, 5, 0}, {0, 1, 0}, 1e-6},
                               {{0, 5, 0}, {0, 1, 0}, HUGE_VAL},
                               {{far - 20, 5, 0}, {0, 1, 0}, HUGE_VAL}};
-    nebel_lighting *lighting = make_airlight(0.02, &lamp), *near;
+    nebel_lighting *lighting = make_airlight(0.02, &point_light), *near;
     (void)state;
     for (size_t i = 0; i < sizeof rays / sizeof rays[0]; i++)
         for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
@@ -378,7 +383,7 @@ static void hard_rays_are_answered(void **state)
     nebel_release_lighting(near);
 }
 
-static void lamps_are_checked(void **state)
+static void lights_are_checked(void **state)
 {
     const double nan = (double)NAN;
     const nebel_light right = {.type = NEBEL_LIGHT_SPOT, .direction = {0, -1, 0}, .outer_angle = 40};
@@ -404,7 +409,7 @@ static void lamps_are_checked(void **state)
         const nebel_light both[] = {right, wrong[i]};
         const nebel_lighting_desc desc = {.lights = both, .light_count = 2};
         assert_int_equal(nebel_create_lighting(empty, &desc, &made), NEBEL_ERROR_VALUE);
-        assert_non_null(strstr(messages.text, "lamp 1: "));
+        assert_non_null(strstr(messages.text, "light 1: "));
         assert_null(made);
     }
     const nebel_lighting_desc none = {.light_count = 1}, one = {.lights = &right, .light_count = 1};
@@ -418,13 +423,13 @@ static void lamps_are_checked(void **state)
 static void lost_memory_is_survived(void **state)
 {
     const nebel_volume_desc volume = {.extinction = {0.1, 0.1, 0.1}, .albedo = {1, 1, 1}};
-    const nebel_light lamp = {.position = {1, 2, 3}, .intensity = {1, 1, 1}};
+    const nebel_light point_light = {.position = {1, 2, 3}, .intensity = {1, 1, 1}};
     static const uint32_t first[] = {0, 0};
     const nebel_ray_visibility pieces = {first, NULL};
     const nebel_ray ray = {{0, 0.2, -1}, {0, 0, 1}, HUGE_VAL};
     fog_memory memory = {0};
     const nebel_fog_desc desc = {.host.allocator = fog_memory_allocator(&memory)};
-    const nebel_lighting_desc lights = {.lights = &lamp, .light_count = 1};
+    const nebel_lighting_desc lights = {.lights = &point_light, .light_count = 1};
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;
     nebel_lighting *lighting = NULL;
@@ -457,7 +462,7 @@ static void lost_memory_is_survived(void **state)
 }
 
 /* What a renderer asks that casts shadows into fog. */
-static void a_lighting_tells_of_its_lamps(void **state)
+static void a_lighting_tells_of_its_lights(void **state)
 {
     const nebel_volume_desc volumes[] = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {1, 2, 3}, .radius = 2},
                                           .extinction = {1, 1, 1},
@@ -493,9 +498,9 @@ int main(void)
         cmocka_unit_test(light_is_the_same_in_any_set_and_split),
         cmocka_unit_test(pieces_add_up),
         cmocka_unit_test(hard_rays_are_answered),
-        cmocka_unit_test(lamps_are_checked),
+        cmocka_unit_test(lights_are_checked),
         cmocka_unit_test(lost_memory_is_survived),
-        cmocka_unit_test(a_lighting_tells_of_its_lamps),
+        cmocka_unit_test(a_lighting_tells_of_its_lights),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

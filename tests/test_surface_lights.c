@@ -1,4 +1,5 @@
-/* Lamps on surfaces: a floor under a lamp, its cone, its shadow, and the fog between, against closed forms. */
+/* Point lights on surfaces: a floor under a point light, its cone, its shadow, and the fog between, against closed
+ * forms. */
 #include "test_render_scene.h"
 
 enum { SIZE = 33 };
@@ -18,10 +19,10 @@ static nebel_mesh make_square(const float *positions)
 }
 
 /* Straight down on the floor, 1 m to 8 pixels. */
-static void render(const nebel_light *lamp, int has_lid, double extinction, test_picture *picture)
+static void render(const nebel_light *light, int has_lid, double extinction, test_picture *picture)
 {
     const nebel_mesh meshes[] = {make_square(floor_positions), make_square(lid_positions)};
-    const nebel_scene_data scene = {.mesh_count = has_lid ? 2 : 1, .meshes = meshes, .light_count = 1, .lights = lamp};
+    const nebel_scene_data scene = {.mesh_count = has_lid ? 2 : 1, .meshes = meshes, .light_count = 1, .lights = light};
     nebel_camera camera = test_camera(0, 1, 0, 0, 0, 0);
     camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     camera.up[1] = 0;
@@ -45,19 +46,19 @@ static double at(uint32_t pixel)
 /* Light is that at the start of shadow rays, 1.4e-4 m above so large a floor. */
 static void a_floor_is_lit(void **state)
 {
-    const nebel_light lamp = {.position = {0.5, 3, 0.25}, .intensity = {10, 20, 5}};
+    const nebel_light light = {.position = {0.5, 3, 0.25}, .intensity = {10, 20, 5}};
     test_picture picture = test_picture_make(SIZE, SIZE);
     (void)state;
     for (int foggy = 0; foggy < 2; foggy++) {
         const double extinction = foggy ? 0.1 : 0;
-        render(&lamp, 0, extinction, &picture);
+        render(&light, 0, extinction, &picture);
         for (uint32_t y = 0; y < SIZE; y++)
             for (uint32_t x = 0; x < SIZE; x++) {
                 const double dx = at(x) - 0.5, dz = at(y) - 0.25, d2 = dx * dx + dz * dz + 9, d = sqrt(d2);
                 for (int c = 0; c < 3; c++) {
                     static const double share[] = {1, 2, .5}, color[] = {.5, .25, 1};
                     const double left = exp(-extinction * share[c] * (d + 1)); /* and to the camera */
-                    const double wanted = lamp.intensity[c] * 3 / (d2 * d) / test_pi * color[c] * left;
+                    const double wanted = light.intensity[c] * 3 / (d2 * d) / test_pi * color[c] * left;
                     assert_true(fabs((double)test_color(&picture, x, y)[c] - wanted) < 4e-4 * wanted + 1e-6);
                 }
             }
@@ -65,18 +66,18 @@ static void a_floor_is_lit(void **state)
     test_picture_free(&picture);
 }
 
-/* The lid, 2 m wide at 2 m, shades 6 m of the floor about the middle; no lamp shines beyond its cone. */
+/* The lid, 2 m wide at 2 m, shades 6 m of the floor about the middle; no point light shines beyond its cone. */
 static void shadows_and_cones_have_edges(void **state)
 {
-    nebel_light lamp = {.position = {0, 3, 0}, .intensity = {10, 10, 10}};
+    nebel_light light = {.position = {0, 3, 0}, .intensity = {10, 10, 10}};
     test_picture picture = test_picture_make(SIZE, SIZE);
     (void)state;
-    render(&lamp, 1, 0, &picture);
+    render(&light, 1, 0, &picture);
     for (uint32_t x = 0; x < SIZE; x++) assert_true(test_color(&picture, x, SIZE / 2)[0] == 0);
-    lamp.type = NEBEL_LIGHT_SPOT;
-    lamp.direction[1] = -3;
-    lamp.inner_angle = lamp.outer_angle = 22.5; /* of 3 m: 1.2426 m */
-    render(&lamp, 0, 0, &picture);
+    light.type = NEBEL_LIGHT_SPOT;
+    light.direction[1] = -3;
+    light.inner_angle = light.outer_angle = 22.5; /* of 3 m: 1.2426 m */
+    render(&light, 0, 0, &picture);
     for (uint32_t x = 0; x < SIZE; x++) {
         const double away = fabs(at(x));
         assert_true((test_color(&picture, x, SIZE / 2)[0] > 0) == (away < 1.2426));
@@ -84,16 +85,16 @@ static void shadows_and_cones_have_edges(void **state)
     test_picture_free(&picture);
 }
 
-/* A lamp on the floor, below it, in a surface's own place, and one that is none. */
-static void odd_lamps_are_answered(void **state)
+/* A point light on the floor, below it, in a surface's own place, and one that is none. */
+static void odd_lights_are_answered(void **state)
 {
-    const nebel_light lamps[] = {{.position = {0, 0, 0}, .intensity = {10, 10, 10}},
-                                 {.position = {0, -1, 0}, .intensity = {10, 10, 10}},
-                                 {.position = {0, 0.5, 0}, .intensity = {10, 10, 10}, .radius = 1}};
+    const nebel_light lights[] = {{.position = {0, 0, 0}, .intensity = {10, 10, 10}},
+                                  {.position = {0, -1, 0}, .intensity = {10, 10, 10}},
+                                  {.position = {0, 0.5, 0}, .intensity = {10, 10, 10}, .radius = 1}};
     test_picture picture = test_picture_make(SIZE, SIZE);
     (void)state;
-    for (size_t i = 0; i < sizeof lamps / sizeof lamps[0]; i++) {
-        render(&lamps[i], 0, 0.1, &picture);
+    for (size_t i = 0; i < sizeof lights / sizeof lights[0]; i++) {
+        render(&lights[i], 0, 0.1, &picture);
         for (uint32_t p = 0; p < 3 * SIZE * SIZE; p++) {
             const float light = picture.planes.color[p];
             assert_true(light >= 0 && light < (i == 0 ? HUGE_VALF : 10));
@@ -113,18 +114,18 @@ static void odd_lamps_are_answered(void **state)
 
 static const float wall_positions[] = {-50, -50, -3, 50, -50, -3, 50, 50, -3, -50, 50, -3};
 
-/* Level at a wall 3 m behind the lamp, through fog about it; the floor is seen from its edge. */
-static void render_wall(const nebel_light *lamp, int has_floor, nebel_method method, test_picture *picture)
+/* Level at a wall 3 m behind the point light, through fog about it; the floor is seen from its edge. */
+static void render_wall(const nebel_light *light, int has_floor, nebel_method method, test_picture *picture)
 {
     static const uint32_t upright[] = {0, 1, 2, 0, 2, 3};
     nebel_mesh meshes[] = {make_square(wall_positions), make_square(floor_positions)};
     meshes[0].indices = upright;
     const nebel_scene_data scene = {
-        .mesh_count = has_floor ? 2 : 1, .meshes = meshes, .light_count = 1, .lights = lamp};
+        .mesh_count = has_floor ? 2 : 1, .meshes = meshes, .light_count = 1, .lights = light};
     const nebel_volume_desc box = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-4, -4, -2.9}, .max = {4, 4, 3}},
                                    .extinction = {.1, .1, .1},
                                    .albedo = {1, 1, 1}};
-    const nebel_lighting_desc lights = {.lights = lamp, .light_count = 1};
+    const nebel_lighting_desc lights = {.lights = light, .light_count = 1};
     nebel_lighting *fog = fog_commit_lit(&(nebel_fog_desc){0}, &box, 1, &lights);
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_create_cpu_renderer(&scene, fog, &(nebel_cpu_renderer_desc){0}, &renderer), NEBEL_OK);
@@ -138,22 +139,22 @@ static void render_wall(const nebel_light *lamp, int has_floor, nebel_method met
     nebel_release_lighting(fog);
 }
 
-/* On a floor, in it, and deeper in it by less than 1 mm, a lamp lights what is above as if there were no floor; but for
- * the last one's light that leaves the floor farther from it than that: below 5.8 degrees. */
-static void floors_do_not_hide_lamps_in_them(void **state)
+/* On a floor, in it, and deeper in it by less than 1 mm, a point light lights what is above as if there were no floor;
+ * but for the last one's light that leaves the floor farther from it than that: below 5.8 degrees. */
+static void floors_do_not_hide_lights_in_them(void **state)
 {
-    const nebel_light lamps[] = {{.position = {0, 0, 0}, .intensity = {10, 10, 10}},
-                                 {.position = {0.3, 0, 0.2}, .intensity = {10, 10, 10}},
-                                 {.position = {0.3, -1e-4, 0.2}, .intensity = {10, 10, 10}}};
+    const nebel_light lights[] = {{.position = {0, 0, 0}, .intensity = {10, 10, 10}},
+                                  {.position = {0.3, 0, 0.2}, .intensity = {10, 10, 10}},
+                                  {.position = {0.3, -1e-4, 0.2}, .intensity = {10, 10, 10}}};
     const nebel_method methods[] = {NEBEL_METHOD_EXACT, NEBEL_METHOD_PATH};
     test_picture with = test_picture_make(SIZE, SIZE), without = test_picture_make(SIZE, SIZE);
     (void)state;
-    for (size_t i = 0; i < 2 * sizeof lamps / sizeof lamps[0]; i++) {
-        const nebel_light *lamp = &lamps[i / 2];
-        const uint32_t rows = lamp->position[1] < 0 ? SIZE * 3 / 4 : SIZE; /* from 1.02 m or 0.11 m up */
+    for (size_t i = 0; i < 2 * sizeof lights / sizeof lights[0]; i++) {
+        const nebel_light *light = &lights[i / 2];
+        const uint32_t rows = light->position[1] < 0 ? SIZE * 3 / 4 : SIZE; /* from 1.02 m or 0.11 m up */
         uint32_t lit = 0;
-        render_wall(lamp, 1, methods[i % 2], &with);
-        render_wall(lamp, 0, methods[i % 2], &without);
+        render_wall(light, 1, methods[i % 2], &with);
+        render_wall(light, 0, methods[i % 2], &without);
         for (uint32_t y = 0; y < rows; y++)
             for (uint32_t x = 0; x < SIZE; x++) {
                 const double seen = (double)test_color(&with, x, y)[0], all = (double)test_color(&without, x, y)[0];
@@ -171,8 +172,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_floor_is_lit),
         cmocka_unit_test(shadows_and_cones_have_edges),
-        cmocka_unit_test(odd_lamps_are_answered),
-        cmocka_unit_test(floors_do_not_hide_lamps_in_them),
+        cmocka_unit_test(odd_lights_are_answered),
+        cmocka_unit_test(floors_do_not_hide_lights_in_them),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

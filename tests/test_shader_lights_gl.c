@@ -1,4 +1,5 @@
-/* Lamps in fog that scatters sharply, in shaders against nebel_trace in double: at the eye, near it, in view, beside.
+/* Point lights in fog that scatters sharply, in shaders against nebel_trace in double: at the eye, near it, in view,
+ * beside.
  * The argument `all` tries more rays. */
 #include "shader_help.h"
 
@@ -13,7 +14,7 @@ static const nebel_phase phases[HAZES] = {
 };
 static const char *const phase_names[HAZES] = {"isotropic", "forward", "backward", "droplets", "large droplets"};
 
-/* Where the lamp is, in metres from the eye. */
+/* Where the point light is, in metres from the eye. */
 typedef struct setting {
     const char *name;
     double place[3], radius;
@@ -28,7 +29,7 @@ static const setting settings[PLACES] = {
 static const double eye[3] = {0, 0, 0};
 static int asked = 192;
 
-/* Half of them past the lamp, closely or not. */
+/* Half of them past the point light, closely or not. */
 static void strew_rays(const setting *s)
 {
     uint64_t state = 1;
@@ -44,14 +45,14 @@ static void strew_rays(const setting *s)
 static nebel_lighting *commit_haze(const nebel_phase *phase, const setting *s)
 {
     const nebel_volume_desc volume = {.extinction = {.05, .06, .08}, .albedo = {.95, .95, .9}, .phase = *phase};
-    nebel_light lamp = {.intensity = {10, 8, 6}, .radius = s->radius};
-    memcpy(lamp.position, s->place, sizeof lamp.position);
-    const nebel_lighting_desc lights = {.lights = &lamp, .light_count = 1};
+    nebel_light light = {.intensity = {10, 8, 6}, .radius = s->radius};
+    memcpy(light.position, s->place, sizeof light.position);
+    const nebel_lighting_desc lights = {.lights = &light, .light_count = 1};
     return fog_light(&lights, &volume, 1);
 }
 
 /* As a share of the ray's own light, or of a hundredth of what is bright where that is more. */
-static double lamplight_off(const answer *got, const nebel_transfer *wanted, double bright)
+static double point_light_off(const answer *got, const nebel_transfer *wanted, double bright)
 {
     double most = 0;
     for (int c = 0; c < 3; c++) {
@@ -73,10 +74,10 @@ static void try_setting(tracer *t, int phase, const setting *s)
     evaluate(t);
     fog_trace(lighting, truth, count, rays, transfers);
     for (size_t i = 0; i < count; i++) brightest = fmax(brightest, transfers[i].in_scattering[0]);
-    for (size_t i = 0; i < count; i++) differences[i] = lamplight_off(&answers[i], &transfers[i], fmin(brightest, 1));
+    for (size_t i = 0; i < count; i++) differences[i] = point_light_off(&answers[i], &transfers[i], fmin(brightest, 1));
     qsort(differences, count, sizeof *differences, ascending);
-    print_message("%s, lamp %s: light up to %.3g; median %.1e, 95 %% %.1e, worst %.1e\n", phase_names[phase], s->name,
-                  brightest, differences[count / 2], differences[count * 95 / 100], differences[count - 1]);
+    print_message("%s, point light %s: light up to %.3g; median %.1e, 95 %% %.1e, worst %.1e\n", phase_names[phase],
+                  s->name, brightest, differences[count / 2], differences[count * 95 / 100], differences[count - 1]);
     assert_true(brightest > .05);
     assert_true(differences[count * 95 / 100] <= 4e-4);
     assert_true(differences[count - 1] <= 2e-3);
@@ -106,7 +107,7 @@ static void try_all(nb_gl_language language)
     nb_gl_close(&t.gl);
 }
 
-static void test_lamps_in_sharply_scattering_fog(void **unused)
+static void test_lights_in_sharply_scattering_fog(void **unused)
 {
     (void)unused;
     try_all(NB_GL_330);
@@ -115,7 +116,7 @@ static void test_lamps_in_sharply_scattering_fog(void **unused)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_lamps_in_sharply_scattering_fog)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_lights_in_sharply_scattering_fog)};
     if (argc > 1 && strcmp(argv[1], "all") == 0) asked = RAYS;
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
