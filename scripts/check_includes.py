@@ -45,9 +45,6 @@ ROOMS = {
     "scene": {"file", "json", "image", "grid_file", "keys", "model", "photograph", "aerial", "frame"},
 }
 
-# Arrows against that order, which go when light leaves the snapshot of fog for an object of its own.
-PENDING = {("cpu", "light"), ("gl", "light")}
-
 # Everything outside src/ uses the public face and its own folder. Tests and fuzzers may enter every room.
 OUTSIDE = ("tools", "examples", "bench")
 
@@ -117,7 +114,7 @@ def judge(path, quote, name):
     there = place_of(target)
     if there == place or (place, there) == ("tools", "bench"):
         return None
-    if place in ROOMS and (there in ROOMS[place] or (place, there) in PENDING or there in EVERYWHERE and place != "formulas"):
+    if place in ROOMS and (there in ROOMS[place] or there in EVERYWHERE and place != "formulas"):
         return None
     return f"{place} may not enter {there}"
 

@@ -38,11 +38,11 @@ def add(table, text):
 
 def print_table(table):
     ways = ["double", "double, 1e-5", "float"]
-    print(f"{'fog':12} {'light':5} " + " ".join(f"{way:>22}" for way in ways) + f" {'float again':>22}")
-    print(f"{'':18} " + " ".join(f"{'rays':>9} {'bad':>6} {'worst':>5}" for _ in ways) + f" {'rays':>11} {'other bits':>10}")
+    print(f"{'fog':12} {'light':6} " + " ".join(f"{way:>22}" for way in ways) + f" {'float again':>22}")
+    print(f"{'':19} " + " ".join(f"{'rays':>9} {'bad':>6} {'worst':>5}" for _ in ways) + f" {'rays':>11} {'other bits':>10}")
     for (fog, light), sums in table.items():
         cells = " ".join(f"{sums[i]:9.0f} {sums[i + 1]:6.0f} {sums[i + 2]:5.2f}" for i in (0, 3, 6))
-        print(f"{fog:12} {light:5}  {cells} {sums[9]:11.0f} {sums[10]:10.0f}")
+        print(f"{fog:12} {light:6}  {cells} {sums[9]:11.0f} {sums[10]:10.0f}")
 
 
 def main():

@@ -1,6 +1,6 @@
 /* Sunlight in voxels that are cut off at the faces of their box, where the way to the sun ends at one face here and at
- * another one there: the error that is told against light by brute force, and what the lattice of depths says of
- * itself against exact integrals. A number as argument tries so many grids. */
+ * another one there: the error that is told against light by brute force, and among other fog against light in double; and
+ * what the lattice of depths says of itself against exact integrals. A number as argument tries so many grids. */
 #include "dice.h"
 #include "fog_help.h"
 
@@ -65,19 +65,26 @@ static cloud random_cloud(uint64_t *state)
     return c;
 }
 
-static nebel_lighting *fog_of(const cloud *c)
+static nebel_volume_desc fog_volume(const cloud *c, nebel_lighting_desc *lights)
 {
     nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX},
                            .density = {.type = NEBEL_DENSITY_GRID, .grid = c->grid}};
-    nebel_lighting_desc lights = {.sun = {{0}, {0}}};
-    memcpy(lights.sun.direction, c->sun, sizeof c->sun);
+    *lights = (nebel_lighting_desc){.sun = {{0}, {0}}};
+    memcpy(lights->sun.direction, c->sun, sizeof c->sun);
     for (int i = 0; i < 3; i++) {
         v.shape.min[i] = c->low[i];
         v.shape.max[i] = c->high[i];
         v.extinction[i] = c->extinction;
         v.albedo[i] = 1;
-        lights.sun.irradiance[i] = 4 * acos(-1); /* opaque fog that is lit from all around has a radiance of 1 */
+        lights->sun.irradiance[i] = 4 * acos(-1); /* opaque fog that is lit from all around has a radiance of 1 */
     }
+    return v;
+}
+
+static nebel_lighting *fog_of(const cloud *c)
+{
+    nebel_lighting_desc lights;
+    const nebel_volume_desc v = fog_volume(c, &lights);
     return fog_light(&lights, &v, 1);
 }
 
@@ -171,6 +178,73 @@ static void errors_hold_where_voxels_are_cut_off(void **state)
 {
     (void)state;
     for (int i = 0; i < grid_count; i++) check_rays((uint64_t)i, i % 3 == 0 ? 1e-2 : 2e-3);
+}
+
+/* Haze of some profile around voxels, or a second box of the same voxels that lies over them. */
+static nebel_volume_desc random_company(uint64_t *state, const cloud *c)
+{
+    nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX}};
+    const double extinction = exp(dice(state, log(.01), log(1)));
+    for (int i = 0; i < 3; i++) {
+        v.shape.min[i] = c->low[i] - dice(state, -1, 9);
+        v.shape.max[i] = c->high[i] + dice(state, 0, 9);
+        v.extinction[i] = extinction;
+        v.albedo[i] = dice(state, .2, 1);
+    }
+    switch (dice_below(state, 6)) {
+    case 0:
+        break;
+    case 1:
+        v.density = (nebel_density){.type = NEBEL_DENSITY_GRID, .grid = c->grid};
+        break;
+    case 2:
+        v.density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .edge_width = dice(state, .1, 2)};
+        break;
+    case 3:
+        v.shape = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .radius = dice(state, 1, 6)};
+        v.density = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = 2};
+        break;
+    case 4:
+        v.shape = (nebel_shape){.type = NEBEL_SHAPE_WORLD};
+        v.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = dice(state, .3, 4)};
+        break;
+    default:
+        v.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = dice(state, 1, 6)};
+    }
+    return v;
+}
+
+/* Columns are asked in float alone: double walks to the sun. */
+static void check_company(uint64_t seed, double tolerance, double *worst)
+{
+    nebel_ray rays[RAYS];
+    nebel_transfer found[RAYS], truth[RAYS];
+    uint64_t state = seed + 1000003;
+    const cloud c = random_cloud(&state);
+    nebel_lighting_desc lights;
+    nebel_volume_desc v[2] = {fog_volume(&c, &lights), random_company(&state, &c)};
+    nebel_lighting *fog = fog_light(&lights, v, 2);
+    for (int i = 0; i < RAYS; i++) rays[i] = random_ray(&state, &c);
+    fog_trace(fog, (nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT, .tolerance = tolerance}, RAYS, rays, found);
+    fog_trace(fog, (nebel_trace_desc){.tolerance = tolerance * 1e-2}, RAYS, rays, truth);
+    for (int i = 0; i < RAYS; i++)
+        for (int k = 0; k < 3; k++) {
+            const double off = fabs(found[i].in_scattering[k] - truth[i].in_scattering[k]);
+            *worst = fmax(*worst, off / (found[i].error + truth[i].error));
+            if (!(off <= found[i].error + truth[i].error))
+                fail_msg("seed %d ray %d: off by %g, said %g", (int)seed, i, off, found[i].error);
+        }
+    nebel_release_lighting(fog);
+    nebel_release_grid(c.grid);
+}
+
+static void errors_hold_for_voxels_in_company(void **state)
+{
+    static const double tolerances[] = {1e-2, 1e-3, 1e-4};
+    double worst = 0;
+    (void)state;
+    for (int i = 0; i < grid_count; i++) check_company((uint64_t)i, tolerances[i % 3], &worst);
+    print_message("voxels in company: %d rays, off by %.2f of what is told at most\n", grid_count * RAYS, worst);
 }
 
 /* Steps of light end within cells, at edges of the box and at shadows; it stops where it cannot be seen. */
@@ -292,6 +366,7 @@ int main(int argc, char **argv)
     if (argc > 1) grid_count = atoi(argv[1]);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(errors_hold_where_voxels_are_cut_off),
+        cmocka_unit_test(errors_hold_for_voxels_in_company),
         cmocka_unit_test(transmittance_has_the_bits_that_it_has_alone),
         cmocka_unit_test(lattices_say_how_far_they_are_off),
     };

@@ -90,7 +90,7 @@ static void print_case(lit_kind kind, lit_source source, uint64_t seed, int i, w
 {
     print_message("%s, %s, seed %llu, ray %d, %s: %.9g %.9g %.9g, not %.9g %.9g %.9g (+- %.1e); T %.9g, not %.9g; "
                   "error %.3g\n",
-                  lit_kind_names[kind], source == LIT_BY_LIGHTS ? "point lights" : "sun", (unsigned long long)seed, i,
+                  lit_kind_names[kind], source == LIT_BY_LIGHTS ? "lights" : "sun", (unsigned long long)seed, i,
                   way_names[way], transfer->in_scattering[0], transfer->in_scattering[1], transfer->in_scattering[2],
                   is->in_scattering[0], is->in_scattering[1], is->in_scattering[2], is->uncertainty,
                   transfer->transmittance[0], is->transmittance[0], transfer->error);
@@ -204,15 +204,15 @@ static void print_tally(const tally *t)
 static size_t print_tallies(void)
 {
     size_t rays = 0, wrong = 0, other_bits = 0;
-    print_message("%-12s %-5s %20s %20s %20s %20s\n", "fog", "light", way_names[0], way_names[1], way_names[2],
+    print_message("%-12s %-6s %20s %20s %20s %20s\n", "fog", "light", way_names[0], way_names[1], way_names[2],
                   "float again");
-    print_message("%-12s %-5s", "", "");
+    print_message("%-12s %-6s", "", "");
     for (int i = 0; i < ASK_COUNT; i++) print_message(" %9s %4s %5s", "rays", "bad", "worst");
     print_message(" %9s %10s\n", "rays", "other bits");
     for (int kind = 0; kind < LIT_KIND_COUNT; kind++)
         for (int source = 0; source < LIT_SOURCE_COUNT; source++) {
             const tally *t = tallies[kind][source], *b = &bits[kind][source];
-            print_message("%-12s %-5s", lit_kind_names[kind], source == LIT_BY_LIGHTS ? "point lights" : "sun");
+            print_message("%-12s %-6s", lit_kind_names[kind], source == LIT_BY_LIGHTS ? "lights" : "sun");
             for (int way = 0; way < ASK_COUNT; way++) print_tally(&t[way]);
             print_message(" %9zu %10zu\n", b->rays, b->wrong);
             rays += t[0].rays;

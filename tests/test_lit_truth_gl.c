@@ -91,7 +91,7 @@ static void judge(const lit_fog *lit, lit_kind kind, lit_source source, uint64_t
     if (off <= 1. / 255) return;
     t->wrong++;
     print_message("%s, %s, seed %llu, ray %d: %.6g %.6g %.6g, not %.6g %.6g %.6g; T %.6g, not %.6g\n",
-                  lit_kind_names[kind], source == LIT_BY_LIGHTS ? "point lights" : "sun", (unsigned long long)seed, i,
+                  lit_kind_names[kind], source == LIT_BY_LIGHTS ? "lights" : "sun", (unsigned long long)seed, i,
                   (double)answers[VECTOR * i].in_scattering[0], (double)answers[VECTOR * i].in_scattering[1],
                   (double)answers[VECTOR * i].in_scattering[2], is->in_scattering[0], is->in_scattering[1],
                   is->in_scattering[2], (double)answers[VECTOR * i].transmittance[0], is->transmittance[0]);
@@ -156,7 +156,7 @@ static void try_kinds(lit_kind first, lit_kind last, lit_source source)
 static size_t print_tallies(void)
 {
     size_t rays_in_all = 0, wrong = 0;
-    print_message("%-12s %-5s %9s %5s %5s %5s %9s %9s %9s\n", "fog", "light", "rays", "bad", "ill", "cut", "median",
+    print_message("%-12s %-6s %9s %5s %5s %5s %9s %9s %9s\n", "fog", "light", "rays", "bad", "ill", "cut", "median",
                   "99 %", "worst");
     for (int kind = 0; kind < LIT_KIND_COUNT; kind++)
         for (int source = 0; source < LIT_SOURCE_COUNT; source++) {
@@ -164,8 +164,8 @@ static size_t print_tallies(void)
             const size_t n = t->rays < 1 << 14 ? t->rays : 1 << 14;
             if (n == 0) continue;
             qsort(t->off, n, sizeof t->off[0], ascending);
-            print_message("%-12s %-5s %9zu %5zu %5zu %5zu %9.1e %9.1e %9.1e\n", lit_kind_names[kind],
-                          source == LIT_BY_LIGHTS ? "point lights" : "sun", t->rays, t->wrong, t->ill, t->cut,
+            print_message("%-12s %-6s %9zu %5zu %5zu %5zu %9.1e %9.1e %9.1e\n", lit_kind_names[kind],
+                          source == LIT_BY_LIGHTS ? "lights" : "sun", t->rays, t->wrong, t->ill, t->cut,
                           t->off[n / 2], t->off[n * 99 / 100], t->worst);
             rays_in_all += t->rays;
             wrong += t->wrong;

@@ -23,6 +23,10 @@ typedef enum nebel_light_type {
     NEBEL_LIGHT_SPOT       /* shines into a cone */
 } nebel_light_type;
 
+/* m. A point light without a radius has this one: what a ray through a point sees has no bound. Nothing nearer gets more
+ * light, nor does what is nearer cast a shadow: a light may stand on a surface, or lie in it. */
+#define NEBEL_MIN_LIGHT_RADIUS 1e-3
+
 /* A ball that shines. Its light reaches a place through all fog on the straight way there, scattered once, as the
  * sun's. What it brings is the irradiance from all sides of a ball that is equally bright everywhere; phase functions
  * take it for light from the ball's centre, and fog dims it from the ball's surface on, with
@@ -31,8 +35,9 @@ typedef struct nebel_light {
     nebel_light_type type;
     double position[3];  /* m */
     double intensity[3]; /* W/sr, 0 to 1e9, seen from far away; of a spot along its axis */
-    double radius;       /* m, 1e-3 to 1e6; 0: 1e-3. Rays that pass nearer see no more than at its surface */
-    double direction[3]; /* spot: where it shines to, any length but 0 */
+    double
+        radius; /* m, NEBEL_MIN_LIGHT_RADIUS to 1e6; 0: that. Rays that pass nearer see no more than at its surface */
+    double direction[3];             /* spot: where it shines to, any length but 0 */
     double inner_angle, outer_angle; /* spot: degrees from the axis, 0 <= inner <= outer, 0 < outer <= 180: full light
                                         within the inner one, none beyond the outer one, smooth between */
 } nebel_light;

@@ -11,7 +11,7 @@ struct nb_arena_block {
 
 enum { FIRST_BLOCK = 4096, LARGEST_BLOCK = 1 << 20 };
 
-/* Blocks double up to a mebibyte, so that a small scene stays small and a large one needs few calls. */
+/* Blocks double up to a mebibyte, so that little stays little and much needs few calls. */
 static nb_arena_block *add_block(nb_arena *arena, size_t wanted)
 {
     size_t size = arena->blocks != NULL ? arena->blocks->size * 2 : FIRST_BLOCK;

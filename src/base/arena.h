@@ -1,4 +1,4 @@
-/* Memory that is given back all at once: everything a scene keeps from its file. */
+/* Memory that is given back all at once. */
 #ifndef NB_BASE_ARENA_H
 #define NB_BASE_ARENA_H
 

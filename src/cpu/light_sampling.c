@@ -1,7 +1,10 @@
 #include "light_sampling.h"
 
-#include "light/light_radius.h"
 #include "math/vector.h"
+
+#include <nebel/light.h>
+
+#include <math.h>
 
 #define PI 3.14159265358979323846
 
@@ -25,7 +28,7 @@ nb_sampled_light nb_light_sight_from(const nebel_light *light, const double plac
 {
     nb_sampled_light sight;
     for (int i = 0; i < 3; i++) sight.direction[i] = light->position[i] - place[i];
-    const double distance = nb_vector_length(sight.direction), radius = nb_light_radius(light->radius);
+    const double distance = nb_vector_length(sight.direction), radius = fmax(light->radius, NEBEL_MIN_LIGHT_RADIUS);
     for (int i = 0; i < 3 && distance > 0; i++) sight.direction[i] /= distance;
     const double nearest = fmax(distance, radius), part = radius / nearest;
     sight.reach = fmax(distance - light->radius, 0);
@@ -43,7 +46,7 @@ nb_light_pass nb_passing_of(const nebel_light *light, const nebel_ray *ray)
     for (int i = 0; i < 3; i++) to_light[i] = light->position[i] - ray->origin[i];
     nb_light_pass p = {.start = -nb_vector_dot(to_light, ray->direction), .t_max = ray->t_max};
     for (int i = 0; i < 3; i++) aside[i] = to_light[i] + p.start * ray->direction[i];
-    p.aside = fmax(nb_vector_length(aside), nb_light_radius(light->radius));
+    p.aside = fmax(nb_vector_length(aside), fmax(light->radius, NEBEL_MIN_LIGHT_RADIUS));
     /* One angle between two places; as the difference of two it would be lost to rounding far from the point light. */
     p.angle = atan2(p.aside * p.t_max, p.aside * p.aside + p.start * (p.start + p.t_max));
     return p;

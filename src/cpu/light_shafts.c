@@ -2,8 +2,9 @@
 
 #include "masked_triangle.h"
 
-#include "light/light_radius.h"
 #include "math/vector.h"
+
+#include <nebel/light.h>
 
 #include <math.h>
 
@@ -361,7 +362,7 @@ static int reserve_pieces(nb_light_shafts *shafts, const nebel_allocator *alloca
 
 static nb_light_place place_light(const nebel_light *light, const double origin[3])
 {
-    nb_light_place point_light = {.radius = nb_light_radius(light->radius)};
+    nb_light_place point_light = {.radius = fmax(light->radius, NEBEL_MIN_LIGHT_RADIUS)};
     for (int c = 0; c < 3; c++) point_light.place[c] = light->position[c] - origin[c];
     return point_light;
 }

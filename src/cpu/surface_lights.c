@@ -1,6 +1,6 @@
 #include "surface_lights.h"
 
-#include "light/light_radius.h"
+#include <nebel/light.h>
 
 #include <math.h>
 
@@ -57,7 +57,8 @@ void nb_shadow_rays_set(const nebel_light *light, const nb_ray_starts *starts, c
     const nb_spot_cone within = spot_cone_of(light);
     float place[3];
     for (int c = 0; c < 3; c++) place[c] = (float)(light->position[c] - starts->origin[c]);
-    set_ways(&within, (float)nb_light_radius(light->radius), (float)light->radius, place, starts, hits, points, ways);
+    set_ways(&within, (float)fmax(light->radius, NEBEL_MIN_LIGHT_RADIUS), (float)light->radius, place, starts, hits,
+             points, ways);
 }
 
 void nb_shadow_rays_shadow(RTCScene scene, nb_surface_batch *points, nb_shadow_rays *ways, nb_packets *packets)

@@ -22,7 +22,7 @@ typedef struct nb_medium_light {
     const struct nb_environment_light *environment; /* what lights it instead, by the ray's direction; NULL: nothing */
     double brightest;                               /* the most light of any channel anywhere */
     double shine[3]; /* albedo times the sun's irradiance: of opaque fog, if the phase function were 1 */
-    struct nb_sun_lattice *sun_lattice; /* of linear voxels that the sun lights, alone; else NULL */
+    struct nb_sun_lattice *sun_lattice; /* of linear voxels whose depth to the sun is a term of a sum; else NULL */
     int scatters_sun, scatters_lights;  /* of point and spot lights */
     int joins; /* its density is constant and its body convex, so that sums can stand for it among many of its kind */
 } nb_medium_light;
@@ -31,6 +31,7 @@ typedef struct nb_medium_light {
 typedef enum nb_sun_depth_method {
     NB_SUN_DEPTH_MARCHED = 0, /* by a march of its own */
     NB_SUN_DEPTH_ADDED,       /* convex bodies of constant density that add: what they cut out of the way, summed */
+    NB_SUN_DEPTH_SUMMED,      /* the same of other densities, voxels included */
     NB_SUN_DEPTH_FLAT,        /* few of them, where all faces are flat: along any ray it is linear between turns */
     NB_SUN_DEPTH_HEIGHT,      /* one height fog without an end, and a sun above: a multiple of the density */
     NB_SUN_DEPTH_ALTITUDE,    /* one fog of an altitude without an end: its integral from the place on */

@@ -29,6 +29,18 @@ static void find_moments(nb_medium *medium)
     medium->turned_cosine = cosine > 0 ? cosine / (1 + cosine) : cosine;
 }
 
+static const double most_grown = 1e18; /* no density is more, as formulas/profiles.inc has it */
+
+static double peak_of(const nb_volume *v)
+{
+    const nebel_density *density = &v->density;
+    const int grows = density->below == NEBEL_BELOW_GROW &&
+                      (density->type == NEBEL_DENSITY_HEIGHT || density->type == NEBEL_DENSITY_ALTITUDE);
+    if (!grows) return nb_density_peak(density);
+    if (density->type == NEBEL_DENSITY_ALTITUDE || !isfinite(v->low[1])) return most_grown;
+    return fmin(exp((density->base - v->low[1]) / density->scale_height), most_grown);
+}
+
 static void find_limits(nb_medium *medium)
 {
     const nb_volume *v = &medium->body;
@@ -37,6 +49,7 @@ static void find_limits(nb_medium *medium)
         medium->emits = medium->emits || v->emission[c] > 0;
     }
     medium->densest *= nb_density_peak(&v->density);
+    medium->peak = peak_of(v);
     medium->proportion = proportion_of(v);
 }
 
@@ -130,12 +143,24 @@ static int is_gray(const nebel_snapshot *s)
     return 1;
 }
 
-/* Whether all media are convex bodies of constant density that add. */
-static int is_added(const nebel_snapshot *s)
+/* Growing fog is no denser at its ends than this, else slack there is better had from the density there. */
+#define MAX_GROWN 1e3
+
+int nb_medium_adds_depth(const nb_medium *medium)
+{
+    const nb_volume *body = &medium->body;
+    const nebel_density *density = &body->density;
+    if (density->type == NEBEL_DENSITY_GRID || density->type == NEBEL_DENSITY_ALTITUDE) return 0;
+    return !nb_volume_covers(body) && body->leaf_count == 1 &&
+           (medium->peak <= MAX_GROWN || body->leaves[0].type == NB_LEAF_WORLD);
+}
+
+static int adds_depths(const nebel_snapshot *s)
 {
     for (size_t i = 0; i < s->medium_count; i++) {
         const nb_volume *body = &s->media[i].body;
-        if (nb_volume_covers(body) || body->leaf_count != 1 || body->density.type != NEBEL_DENSITY_CONSTANT) return 0;
+        const int is_grid = body->density.type == NEBEL_DENSITY_GRID && !nb_volume_covers(body);
+        if (!is_grid && !nb_medium_adds_depth(&s->media[i])) return 0;
     }
     return 1;
 }
@@ -161,7 +186,7 @@ static nebel_result finish_snapshot(nebel_snapshot *s)
     static const double dark[3] = {0, 0, 0};
     qsort(s->media, s->medium_count, sizeof *s->media, compare_media);
     s->is_gray = is_gray(s);
-    s->is_added = is_added(s);
+    s->adds_depths = adds_depths(s);
     s->unlit.media = nb_allocate_zero(&s->allocator, s->medium_count, sizeof *s->unlit.media);
     if (s->unlit.media == NULL) return NEBEL_ERROR_MEMORY;
     nb_light_media(&s->unlit, dark, dark);

@@ -12,6 +12,7 @@
 typedef struct nb_medium {
     nb_volume body;
     double densest;    /* largest extinction of any channel anywhere */
+    double peak;       /* the density anywhere in the body is no more */
     double proportion; /* of the body's extent to the least of its leaves' sizes where their frames scale, at least 1;
                            for margins */
     int emits;
@@ -37,8 +38,8 @@ struct nebel_snapshot {
     nebel_lighting unlit; /* what they give without lights */
     double max_opacity;   /* 1 where there is no limit */
     int is_gray;          /* no fog has a colour in its extinction */
-    int is_added;  /* all media are convex bodies of constant density that add: any way's depth is a sum over them */
-    int has_parts; /* some body has parts, or takes fog away from others */
+    int adds_depths; /* no medium takes fog away, has parts or steep ends: the depth of any way is a sum over media */
+    int has_parts;   /* some body has parts, or takes fog away from others */
     size_t covering_count; /* media that cover others */
     size_t endless_count;  /* media without finite bounds, by index: every ray may meet them */
     uint32_t *endless;
@@ -56,6 +57,10 @@ typedef struct nb_medium_selection {
     int is_scaled; /* what light goes straight on through is no fog, and the rest scatters and gives nothing */
     int is_level;  /* fog without an end along x or z alone */
 } nb_medium_selection;
+
+/* Whether the depth along any way is a sum over other bodies and this one, of which the density has an integral in closed
+ * form, and is not so dense at its ends that their slack matters more than that of others. */
+int nb_medium_adds_depth(const nb_medium *medium);
 
 /* Another snapshot of the same fog. Errors: MEMORY. */
 nebel_result nb_snapshot_select(const nebel_snapshot *from, nb_medium_selection of, nebel_snapshot **made);

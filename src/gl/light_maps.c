@@ -5,9 +5,9 @@
 #include "gl_state.h"
 #include "gl_targets.h"
 
-#include "light/light_radius.h"
 #include "math/vector.h"
 
+#include <nebel/light.h>
 #include <nebel/shader.h>
 
 #include <epoxy/gl.h>
@@ -42,7 +42,7 @@ static void set_cone(const nebel_light *point_light, float *axis, float *rise)
 
 static void set_words(const nebel_light *point_light, const double eye[3], int layer, int fog_layer, float *words)
 {
-    const double radius = nb_light_radius(point_light->radius);
+    const double radius = fmax(point_light->radius, NEBEL_MIN_LIGHT_RADIUS);
     nb_camera_subtract(point_light->position, eye, words);
     words[3] = (float)layer;
     for (int i = 0; i < 3; i++) words[4 + i] = (float)point_light->intensity[i];
@@ -272,8 +272,8 @@ static void draw_face(const nb_light_maps *point_lights, const nb_light_map_sour
     set_turn(face, turn);
     glUniformMatrix3fv(glGetUniformLocation(program, "map_turn"), 1, GL_FALSE, turn);
     glUniform1f(glGetUniformLocation(program, "map_share"), share);
-    glUniform1f(glGetUniformLocation(program, "map_radius"), (float)nb_light_radius(source->radius));
-    glUniform1f(glGetUniformLocation(program, "map_near"), .5f * (float)nb_light_radius(source->radius));
+    glUniform1f(glGetUniformLocation(program, "map_radius"), (float)fmax(source->radius, NEBEL_MIN_LIGHT_RADIUS));
+    glUniform1f(glGetUniformLocation(program, "map_near"), .5f * (float)fmax(source->radius, NEBEL_MIN_LIGHT_RADIUS));
     for (size_t i = 0; i < meshes->count; i++) {
         const nb_mesh *const mesh = &meshes->list[i];
         float from_light[3], low[3], high[3];

@@ -93,18 +93,27 @@ static int are_flat(const nebel_snapshot *s)
     return 1;
 }
 
+static int are_constant(const nebel_snapshot *s)
+{
+    for (size_t i = 0; i < s->medium_count; i++)
+        if (s->media[i].body.density.type != NEBEL_DENSITY_CONSTANT) return 0;
+    return 1;
+}
+
 static nb_sun_depth_method choose_sun_depth_method(const nebel_lighting *lighting)
 {
     const nebel_snapshot *s = lighting->snapshot;
     if (!lighting->scatters_sun) return NB_SUN_DEPTH_MARCHED;
-    if (s->is_added) return s->medium_count <= MOST_FLAT && are_flat(s) ? NB_SUN_DEPTH_FLAT : NB_SUN_DEPTH_ADDED;
+    if (s->adds_depths && are_constant(s))
+        return s->medium_count <= MOST_FLAT && are_flat(s) ? NB_SUN_DEPTH_FLAT : NB_SUN_DEPTH_ADDED;
     const nb_volume *body = &s->media[0].body;
-    if (s->medium_count != 1 || nb_volume_covers(body) || body->leaf_count != 1) return NB_SUN_DEPTH_MARCHED;
+    const nb_sun_depth_method other = s->adds_depths ? NB_SUN_DEPTH_SUMMED : NB_SUN_DEPTH_MARCHED;
+    if (s->medium_count != 1 || nb_volume_covers(body) || body->leaf_count != 1) return other;
     if (body->density.type == NEBEL_DENSITY_GRID) return NB_SUN_DEPTH_GRID;
-    if (body->leaves[0].type != NB_LEAF_WORLD) return NB_SUN_DEPTH_MARCHED;
+    if (body->leaves[0].type != NB_LEAF_WORLD) return other;
     if (body->density.type == NEBEL_DENSITY_ALTITUDE) return NB_SUN_DEPTH_ALTITUDE;
     const int is_height = body->density.type == NEBEL_DENSITY_HEIGHT && body->density.below == NEBEL_BELOW_GROW;
-    return is_height && lighting->to_sun[1] > 0 ? NB_SUN_DEPTH_HEIGHT : NB_SUN_DEPTH_MARCHED;
+    return is_height && lighting->to_sun[1] > 0 ? NB_SUN_DEPTH_HEIGHT : other;
 }
 
 void nb_way_in_cells(const nebel_lighting *lighting, const nb_volume *body, double way[3])
@@ -120,23 +129,49 @@ void nb_way_in_cells(const nebel_lighting *lighting, const nb_volume *body, doub
     }
 }
 
-/* Two columns per cell where they come to no more than 64 MiB. */
+/* Two columns per cell where those of all voxels come to no more than 64 MiB. */
 static const nb_sun_lattice_limit lattice_limit = {2, (size_t)1 << 25, 1};
 
-/* Of a box of voxels alone; the one that the lighting before has where it still serves. 0 when memory is out. */
-static int take_sun_lattice(nebel_lighting *lighting, const nebel_lighting *previous)
+static int wants_lattice(const nebel_lighting *lighting, size_t medium)
 {
-    const nb_volume *body = lighting->snapshot->medium_count > 0 ? &lighting->snapshot->media[0].body : NULL;
-    if (lighting->sun_depth_method != NB_SUN_DEPTH_GRID || !nb_grid_is_linear(body->density.grid)) return 1;
-    const int has_one = previous != NULL && previous->snapshot->medium_count == 1;
-    nb_sun_lattice *before = has_one ? previous->media[0].sun_lattice : NULL;
-    double way[3];
-    nb_way_in_cells(lighting, body, way);
-    lighting->media[0].sun_lattice =
-        before != NULL && nb_sun_lattice_is_of(before, body->density.grid, way)
-            ? nb_sun_lattice_retain(before)
-            : nb_sun_lattice_make(body->density.grid, &lighting->allocator, way, lattice_limit);
-    return lighting->media[0].sun_lattice != NULL;
+    const nebel_density *density = &lighting->snapshot->media[medium].body.density;
+    const nb_sun_depth_method method = lighting->sun_depth_method;
+    return (method == NB_SUN_DEPTH_GRID || method == NB_SUN_DEPTH_SUMMED) && density->type == NEBEL_DENSITY_GRID &&
+           nb_grid_is_linear(density->grid);
+}
+
+/* The lattice of a lighting that would be made anew for such a grid and way. NULL: it has none. */
+static nb_sun_lattice *find_lattice(const nebel_lighting *lighting, const nebel_grid *grid, const double way[3],
+                                    nb_sun_lattice_limit limit)
+{
+    for (size_t i = 0; lighting != NULL && i < lighting->snapshot->medium_count; i++) {
+        nb_sun_lattice *lattice = lighting->media[i].sun_lattice;
+        if (lattice != NULL && nb_sun_lattice_is_of(lattice, grid, way, limit)) return lattice;
+    }
+    return NULL;
+}
+
+/* Of voxels whose depth to the sun is a term of a sum; those that the lighting before has where they still serve. 0 when
+ * memory is out. */
+static int take_sun_lattices(nebel_lighting *lighting, const nebel_lighting *previous)
+{
+    nb_sun_lattice_limit limit = lattice_limit;
+    size_t count = 0;
+    for (size_t i = 0; i < lighting->snapshot->medium_count; i++) count += wants_lattice(lighting, i) ? 1 : 0;
+    if (count > 0) limit.most_nodes /= count;
+    for (size_t i = 0; i < lighting->snapshot->medium_count; i++) {
+        const nb_volume *body = &lighting->snapshot->media[i].body;
+        double way[3];
+        if (!wants_lattice(lighting, i)) continue;
+        nb_way_in_cells(lighting, body, way);
+        nb_sun_lattice *known = find_lattice(lighting, body->density.grid, way, limit);
+        if (known == NULL) known = find_lattice(previous, body->density.grid, way, limit);
+        lighting->media[i].sun_lattice =
+            known != NULL ? nb_sun_lattice_retain(known)
+                          : nb_sun_lattice_make(body->density.grid, &lighting->allocator, way, limit);
+        if (lighting->media[i].sun_lattice == NULL) return 0;
+    }
+    return 1;
 }
 
 /* ---- point and spot lights ------------------------------------------------------------------- */
@@ -157,16 +192,6 @@ static int copy_lights(nebel_lighting *lighting, size_t count, const nebel_light
 /* Fewer media than these are better asked from turn to turn. */
 #define LEAST_LIT_OVERLAP_SET 9
 
-/* Whether depths of the body are a sum over others and it, and have a closed form whose ends slack moves by no more than
- * itself. */
-static int adds_depth(const nb_volume *body)
-{
-    const nebel_density *density = &body->density;
-    const int grows = density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_GROW;
-    if (density->type == NEBEL_DENSITY_GRID || density->type == NEBEL_DENSITY_ALTITUDE) return 0;
-    return !nb_volume_covers(body) && body->leaf_count == 1 && (!grows || body->leaves[0].type == NB_LEAF_WORLD);
-}
-
 /* What lights light has one phase function, which is a part of what is seen from places. */
 static int is_lit_overlap_set(const nebel_lighting *lighting)
 {
@@ -175,7 +200,7 @@ static int is_lit_overlap_set(const nebel_lighting *lighting)
     if (s->medium_count < LEAST_LIT_OVERLAP_SET || !(lighting->scatters_sun || lighting->scatters_lights)) return 0;
     for (size_t i = 0; i < s->medium_count; i++) {
         const nb_volume *body = &s->media[i].body;
-        if (!adds_depth(body)) return 0;
+        if (!nb_medium_adds_depth(&s->media[i])) return 0;
         if (!lighting->media[i].scatters_lights) continue;
         if (phase != NULL && nb_phase_compare(phase, &body->phase) != 0) return 0;
         phase = &body->phase;
@@ -290,7 +315,7 @@ static nebel_result fill_lighting(nebel_lighting *lighting, const nebel_lighting
     nb_join_media(lighting);
     lighting->sun_depth_method = choose_sun_depth_method(lighting);
     lighting->is_lit_overlap_set = is_lit_overlap_set(lighting);
-    return take_sun_lattice(lighting, previous) ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+    return take_sun_lattices(lighting, previous) ? NEBEL_OK : NEBEL_ERROR_MEMORY;
 }
 
 nebel_result nb_prepare_lighting(nebel_snapshot *snapshot, const nebel_lighting_desc *desc, nebel_lighting **made)

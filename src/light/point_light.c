@@ -1,7 +1,5 @@
 #include "point_light.h"
 
-#include "light_radius.h"
-
 #include <math.h>
 
 #define PI 3.14159265358979323846
@@ -40,7 +38,7 @@ static const char *fault_of_light(const nebel_light *light)
         return "position: must be three finite numbers, at most " NB_TEXT(NEBEL_MAX_LENGTH) " m from the origin";
     if (!is_within(light->intensity, 0, NEBEL_MAX_AMOUNT))
         return "intensity: every channel must be within 0 and " NB_TEXT(NEBEL_MAX_AMOUNT);
-    if (light->radius != 0 && !(light->radius >= NB_MIN_LIGHT_RADIUS && light->radius <= largest_radius))
+    if (light->radius != 0 && !(light->radius >= NEBEL_MIN_LIGHT_RADIUS && light->radius <= largest_radius))
         return "radius: must be 0 or a length from 1e-3 to 1e6 m";
     return light->type == NEBEL_LIGHT_SPOT ? fault_of_cone(light) : NULL;
 }
@@ -67,7 +65,7 @@ static void set_cone(const nebel_light *light, nb_light *made)
 
 nb_light nb_light_resolve(const nebel_light *light)
 {
-    const double radius = nb_light_radius(light->radius);
+    const double radius = fmax(light->radius, NEBEL_MIN_LIGHT_RADIUS);
     nb_light made = {.radius2 = radius * radius, .clear = light->radius};
     for (int i = 0; i < 3; i++) {
         made.place[i] = light->position[i] + 0;

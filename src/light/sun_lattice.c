@@ -428,8 +428,12 @@ void nb_sun_lattice_release(nb_sun_lattice *lattice)
     if (b != NULL && atomic_fetch_sub_explicit(&b->owners, 1, memory_order_acq_rel) == 1) free_body(b);
 }
 
-int nb_sun_lattice_is_of(const nb_sun_lattice *lattice, const nebel_grid *grid, const double to_sun[3])
+int nb_sun_lattice_is_of(const nb_sun_lattice *lattice, const nebel_grid *grid, const double to_sun[3],
+                         nb_sun_lattice_limit limit)
 {
     const body *b = (const body *)(const void *)lattice;
-    return b->grid == grid && memcmp(b->to_sun, to_sun, sizeof b->to_sun) == 0;
+    nb_sun_lattice wanted = {0};
+    if (b->grid != grid || memcmp(b->to_sun, to_sun, sizeof b->to_sun) != 0) return 0;
+    nb_sun_lattice_lay(&wanted, grid, to_sun, limit);
+    return wanted.axis == lattice->axis && memcmp(wanted.count, lattice->count, sizeof wanted.count) == 0;
 }

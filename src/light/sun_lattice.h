@@ -71,6 +71,7 @@ nb_sun_lattice *nb_sun_lattice_retain(nb_sun_lattice *lattice);
 void nb_sun_lattice_release(nb_sun_lattice *lattice);
 
 /* Whether this is the lattice that nb_sun_lattice_make would make. */
-int nb_sun_lattice_is_of(const nb_sun_lattice *lattice, const nebel_grid *grid, const double to_sun[3]);
+int nb_sun_lattice_is_of(const nb_sun_lattice *lattice, const nebel_grid *grid, const double to_sun[3],
+                         nb_sun_lattice_limit limit);
 
 #endif

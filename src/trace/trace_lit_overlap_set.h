@@ -178,7 +178,7 @@ static void add_part(const medium_hit *k, const leaf_span *span, const overlap_l
     const nb_real zero = NB_F(0.0), h = nb_narrow(leave - enter);
     const nb_estimate along = contact_integral(k, enter, leave, h);
     const nb_real value = nb_select(some, along.value, zero), error = nb_select(some, along.error, zero);
-    const nb_real scale = nb_rcp_bounded(quarter), most = nb_min(most_depth(&k->medium->body), NB_F(1.0));
+    const nb_real scale = nb_rcp_bounded(quarter), most = nb_min(most_depth(k->medium), NB_F(1.0));
     const nb_mask narrow = nb_narrow_mask(span->leave - span->enter < nb_widen(quarter + quarter));
     const int varies = k->medium->body.density.type != NEBEL_DENSITY_CONSTANT;
     nb_real first, second, hidden = zero, doubt = zero, most_light = zero, deepest = zero;

@@ -28,15 +28,17 @@ static double radius_around(const nb_volume *body)
     return 0.5 * (is_ball ? fmax(fmax(x, y), z) : sqrt(x * x + y * y + z * z));
 }
 
-static double most_extinction(const nb_volume *body)
+static double most_extinction(const nb_medium *medium)
 {
-    return fmax(fmax(body->extinction[0], body->extinction[1]), body->extinction[2]);
+    const double *extinction = medium->body.extinction;
+    return fmax(fmax(extinction[0], extinction[1]), extinction[2]) * fmax(medium->peak, 1);
 }
 
 /* No way through the body is deeper. */
-static nb_real most_depth(const nb_volume *body)
+static nb_real most_depth(const nb_medium *medium)
 {
-    return is_endless(body) ? NB_HUGE : REAL(fmin(2 * most_extinction(body) * radius_around(body), 1e18));
+    const nb_volume *body = &medium->body;
+    return is_endless(body) ? NB_HUGE : REAL(fmin(2 * most_extinction(medium) * radius_around(body), 1e18));
 }
 
 /* Where a t^2 + 2 b t + c <= 0; where a is not above `least` that may be anywhere. The plane of the ways cuts a disc out of a
@@ -49,7 +51,7 @@ static void set_between_roots(lit_shadow *s, nb_wide a, nb_wide b, nb_wide c, nb
     s->first = nb_wselect(curved, nb_wselect(some, (-b - root) * inverse, NB_WFAR), NB_W(0.0));
     s->last = nb_wselect(curved, nb_wselect(some, (root - b) * inverse, -NB_WFAR), NB_WFAR);
     const nb_real width = nb_narrow(nb_wclamp(s->last - s->first, NB_W(0.0), NB_WFAR));
-    s->amount = nb_min(s->amount, REAL(most_extinction(&s->medium->body)) * width);
+    s->amount = nb_min(s->amount, REAL(most_extinction(s->medium)) * width);
 }
 
 /* Of a ball in the sun, its centre from where the rays start. */
@@ -206,7 +208,7 @@ static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_li
                             const nb_medium *medium)
 {
     const nb_volume *body = &medium->body;
-    lit_shadow s = {NB_W(0.0), NB_WFAR, most_depth(body), NB_F(0.0), NB_F(0.0), medium, 0};
+    lit_shadow s = {NB_W(0.0), NB_WFAR, most_depth(medium), NB_F(0.0), NB_F(0.0), medium, 0};
     if (is_endless(body)) return s;
     const nb_wvec3 low = nb_wsub3(wide_vector(body->low), rays->origin);
     const nb_wvec3 high = nb_wsub3(wide_vector(body->high), rays->origin);
@@ -239,18 +241,6 @@ static void list_shadows(sunlight *sun, const packet *rays, const nb_light *poin
         }
         sun->shadows[sun->shadow_count++] = s;
     }
-}
-
-/* The integral of a body's density along the way, of any profile, and by how much it may be off. */
-static nb_estimate profile_along(const packet *way, const nb_medium *medium)
-{
-    const next_interval s = ahead_in(way, &medium->body, 0);
-    const nb_wide leave = nb_wmax(s.leave, s.enter);
-    medium_hit k = {.medium = medium, .inside = nb_narrow_mask(s.enter < leave)};
-    profile_contact(&k, way);
-    const nb_estimate along = contact_integral(&k, s.enter, leave, nb_narrow(leave - s.enter));
-    return (nb_estimate){nb_select(k.inside, along.value, NB_F(0.0)),
-                         nb_select(k.inside, along.error, NB_F(0.0)) + s.error};
 }
 
 static nb_estimate length_along(const packet_state *m, const packet *way, const nb_volume *body)
@@ -292,7 +282,7 @@ static shadowed_way way_through_shadows(const sunlight *sun, const packet_state 
         if (!nb_any(near)) continue;
         const nb_volume *body = &s->medium->body;
         const int varies = body->density.type != NEBEL_DENSITY_CONSTANT;
-        const nb_estimate along = varies ? profile_along(&way, s->medium) : length_along(m, &way, body);
+        const nb_estimate along = varies ? profile_along(&way, s->medium, 0, NULL) : length_along(m, &way, body);
         const nb_mask covers = nb_and(near, nb_narrow_mask(nb_wand(s->first <= before, s->last >= before)));
         const nb_real value = nb_select(near, along.value, zero), error = nb_select(near, along.error, zero);
         if (nb_any(covers)) note_covering(&sum, body, covers, s->at_last, value);

@@ -92,8 +92,8 @@ static light_depth way_to_light(sunlight *sun, const packet_state *m, const ligh
     const nb_wvec3 towards = nb_wscale3(apart, -nb_wrcp_bounded(distance));
     const nb_wide clear = nb_wmax(distance - WIDE(pass->point_light->clear), NB_W(0.0));
     const nb_wide reach = nb_wselect(lanes, clear, NB_W(0.0));
-    return sun->snapshot->is_added ? depth_of_bodies(sun, m, t, towards, reach)
-                                   : depth_by_march(sun, m, t, towards, reach);
+    return sun->snapshot->adds_depths ? depth_of_bodies(sun, m, t, towards, reach, 0)
+                                      : depth_by_march(sun, m, t, towards, reach);
 }
 
 /* What part of its light a spot sends away from the direction in which it is seen. At the edge of a hard cone the rounding

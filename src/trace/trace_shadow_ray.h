@@ -136,11 +136,77 @@ static void add_body_error(light_depth *sum, const packet *way, const nb_volume 
     for (int c = 0; c < 3; c++) sum->error[c] = sum->error[c] + REAL(body->extinction[c]) * error;
 }
 
+#if !defined(NB_DOUBLE)
+/* A block says how far columns are off at its worst place, in its worst direction. Along a ray this part of it is enough:
+ * tests/test_grid_sun.c prints how much of it was found. */
+#define COLUMN_ERROR 0.5
+
+/* What columns may do to light, of what steps may add to the error. Ways of which they say more are walked. */
+#define COLUMN_SHARE 1.0
+
+/* From t of each way on, of lanes inside; `inside` becomes the lanes that are still to be walked. */
+static nb_estimate along_columns(const sunlight *sun, medium_hit *k, const nb_sun_lattice *lattice, nb_wide t)
+{
+    const double *extinction = k->medium->body.extinction;
+    const nb_real densest = REAL(fmax(fmax(extinction[0], extinction[1]), extinction[2]));
+    const nb_real thinnest = REAL(fmin(fmin(extinction[0], extinction[1]), extinction[2]));
+    nb_estimate along = amount_by_columns(k, lattice, t);
+    const nb_real through = nb_exp(-thinnest * nb_max(along.value - along.error, NB_F(0.0)));
+    along.error = along.error * REAL(COLUMN_ERROR);
+    const nb_real off = densest * along.error * through * sun->most_light;
+    const nb_mask fits = nb_and(k->inside, off <= REAL(COLUMN_SHARE * sun->share));
+    along.value = nb_select(fits, along.value, NB_F(0.0));
+    along.error = nb_select(fits, along.error, NB_F(0.0));
+    k->inside = nb_and(k->inside, nb_not(fits));
+    return along;
+}
+#endif
+
+/* The integral of a body's density along the way, of any profile, and by how much it may be off. `to_sun`: the way to it,
+ * else NULL. */
+static nb_estimate profile_along(const packet *way, const nb_medium *medium, int by_tree, const sunlight *to_sun)
+{
+    const next_interval s = ahead_in(way, &medium->body, by_tree);
+    const nb_wide leave = nb_wmax(s.leave, s.enter);
+    medium_hit k = {.medium = medium, .inside = nb_narrow_mask(s.enter < leave)};
+    nb_estimate along = {NB_F(0.0), s.error * REAL(medium->peak)};
+    if (!nb_any(k.inside)) return along;
+    profile_contact(&k, way);
+#if !defined(NB_DOUBLE)
+    const nb_sun_lattice *lattice =
+        to_sun != NULL ? to_sun->lighting->media[medium - to_sun->snapshot->media].sun_lattice : NULL;
+    if (lattice != NULL) {
+        const nb_estimate columns = along_columns(to_sun, &k, lattice, s.enter);
+        along.value = columns.value;
+        along.error = along.error + columns.error;
+        if (!nb_any(k.inside)) return along;
+    }
+#else
+    (void)to_sun;
+#endif
+    const nb_estimate inside = contact_integral(&k, s.enter, leave, nb_narrow(leave - s.enter));
+    along.value = nb_select(k.inside, inside.value, along.value);
+    along.error = along.error + nb_select(k.inside, inside.error, NB_F(0.0));
+    return along;
+}
+
+static void add_profile(light_depth *sum, const packet *way, const nb_medium *medium, int by_tree, nb_real noise,
+                        const sunlight *to_sun)
+{
+    const nb_estimate along = profile_along(way, medium, by_tree, to_sun);
+    for (int c = 0; c < 3; c++) {
+        const nb_real extinction = REAL(medium->body.extinction[c]);
+        sum->depth[c] = sum->depth[c] + extinction * along.value;
+        sum->error[c] = sum->error[c] + extinction * (along.error + along.value * noise);
+    }
+}
+
 /* Bodies up to so many are asked one by one: sooner done than asking the tree. */
 #define MOST_ASKED 64
 
-/* Convex bodies that add: each cuts one stretch out of the way, and the order of its ends does not count. */
-static light_depth depth_of_bodies(sunlight *sun, const packet_state *m, nb_wide t, nb_wvec3 direction, nb_wide reach)
+/* Bodies that add: each cuts one interval out of the way, and the order of its ends does not count. */
+static light_depth depth_of_bodies(sunlight *sun, const packet_state *m, nb_wide t, nb_wvec3 direction, nb_wide reach,
+                                   int is_to_sun)
 {
     const nebel_snapshot *snapshot = sun->snapshot;
     const int by_tree = snapshot->medium_count > MOST_ASKED;
@@ -152,9 +218,13 @@ static light_depth depth_of_bodies(sunlight *sun, const packet_state *m, nb_wide
     sun->out_of_memory = by_tree && !find_media(sun->way, snapshot);
     const size_t count = by_tree ? sun->way->found_count : snapshot->medium_count;
     for (size_t i = 0; i < count && !sun->out_of_memory; i++) {
-        const nb_volume *body = &snapshot->media[by_tree ? sun->way->found[i] : i].body;
-        add_body(&to_light, &way, body);
-        if (m->wants_error) add_body_error(&to_light, &way, body, by_tree, noise);
+        const nb_medium *medium = &snapshot->media[by_tree ? sun->way->found[i] : i];
+        if (medium->body.density.type != NEBEL_DENSITY_CONSTANT) {
+            add_profile(&to_light, &way, medium, by_tree, noise, is_to_sun ? sun : NULL);
+            continue;
+        }
+        add_body(&to_light, &way, &medium->body);
+        if (m->wants_error) add_body_error(&to_light, &way, &medium->body, by_tree, noise);
     }
     return to_light;
 }
@@ -187,8 +257,9 @@ static light_depth depth_to_sun(sunlight *sun, const packet_state *m, nb_wide t,
     case NB_SUN_DEPTH_ALTITUDE:
         return depth_of_altitude(sun, m, t);
     case NB_SUN_DEPTH_ADDED:
+    case NB_SUN_DEPTH_SUMMED:
     case NB_SUN_DEPTH_FLAT:
-        return depth_of_bodies(sun, m, t, sun->direction, reach);
+        return depth_of_bodies(sun, m, t, sun->direction, reach, 1);
     case NB_SUN_DEPTH_GRID:
         return depth_of_grid(sun, m, t, nb_narrow_mask(lanes), NB_HUGE);
     default:

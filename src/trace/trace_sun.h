@@ -43,7 +43,8 @@ typedef struct sunlight {
     sun_attenuation shade;
     sun_attenuation *light_shades; /* of each point light; NULL: surfaces keep none away */
     void *shade_memory;
-    double share; /* what steps may add to the error of radiance, all together: of the sun, of all point lights */
+    double share;       /* what steps may add to the error of radiance, all together: of the sun, of all point lights */
+    nb_real most_light; /* radiance that the sun may give in the piece at hand, at most */
     int out_of_memory;
     nb_real by_sun[3], by_lights[3]; /* of the packet's radiance, before opacity is limited */
 } sunlight;
@@ -143,6 +144,9 @@ static void pass_boundaries(sun_attenuation *s, nb_wide t, nb_wmask lanes)
     look_ahead(s);
 }
 
+#if !defined(NB_DOUBLE)
+#include "trace_sun_columns.h"
+#endif
 #include "trace_shadow_ray.h"
 
 /* ---- steps ----------------------------------------------------------------------------------- */
@@ -687,8 +691,8 @@ static void gather_sunlight(sunlight *sun, const packet_state *m, const ray_segm
         return;
     }
     const sun_piece s = sun_piece_of(m, p, g, is_grid_alone(sun) ? nb_mask_false : lanes_in_voxels(m));
-    const nb_real most = largest(g->transmittance) * sunlit_fog(m, p->start).most;
-    g->radiance_error = g->radiance_error + doubt_at_faces(sun, m, NULL, p, most, lit);
+    sun->most_light = largest(g->transmittance) * sunlit_fog(m, p->start).most;
+    g->radiance_error = g->radiance_error + doubt_at_faces(sun, m, NULL, p, sun->most_light, lit);
     sun_walk w = begin_walk(m, p, g, lit);
     while (nb_wany(w.lanes)) {
         pass_boundaries(&sun->shade, w.t, w.lanes);
