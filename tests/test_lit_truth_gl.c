@@ -165,8 +165,8 @@ static size_t print_tallies(void)
             if (n == 0) continue;
             qsort(t->off, n, sizeof t->off[0], ascending);
             print_message("%-12s %-6s %9zu %5zu %5zu %5zu %9.1e %9.1e %9.1e\n", lit_kind_names[kind],
-                          source == LIT_BY_LIGHTS ? "lights" : "sun", t->rays, t->wrong, t->ill, t->cut,
-                          t->off[n / 2], t->off[n * 99 / 100], t->worst);
+                          source == LIT_BY_LIGHTS ? "lights" : "sun", t->rays, t->wrong, t->ill, t->cut, t->off[n / 2],
+                          t->off[n * 99 / 100], t->worst);
             rays_in_all += t->rays;
             wrong += t->wrong;
         }
