@@ -28,7 +28,7 @@ static void commit(const nebel_scene *scene, double frame)
     if ((lit == NEBEL_OK) != (lighting != NULL)) abort();
 }
 
-/* What a scene promises to its users. That a shape leaves no place for particles is found when they are strewn. */
+/* What a scene promises to its users. That a shape leaves no place for particles is found when they are distributed. */
 static void check_scene(nebel_scene *scene)
 {
     const nebel_scene_data *data = nebel_get_scene_data(scene);

@@ -209,8 +209,8 @@ static inline void take_volume(input *in, march_input *fog, size_t which)
     take_amounts(in, volume);
 }
 
-/* Copies of the first volume in a row, enough of them to be summed as a crowd. */
-static inline void take_crowd(input *in, march_input *fog)
+/* Copies of the first volume in a row, enough of them to be summed as an overlap set. */
+static inline void take_overlap_set(input *in, march_input *fog)
 {
     double step[3];
     if (take(in) % 4 != 0) return;
@@ -263,7 +263,7 @@ static inline void take_all(input *in, march_input *fog)
     for (size_t i = 0; i < MOST_RAYS && in->size > 0; i++) take_ray(in, fog);
     const size_t written = fog->count;
     for (size_t i = 0; i < written; i++) take_volume(in, fog, i);
-    take_crowd(in, fog);
+    take_overlap_set(in, fog);
 }
 
 static inline void release_all(march_input *fog)

@@ -50,7 +50,7 @@ static void test_fills_its_shape_evenly(void **unused)
     for (int i = 0; i < 3; i++) assert_true(fabs(in_lower_octave[i] - COUNT / 3.0) < 5 * sqrt(COUNT * 2 / 9.0));
 }
 
-/* Points take the place of the shape, and are stirred and coloured like strewn places. */
+/* Points take the place of the shape, and are stirred and coloured like distributed places. */
 static void test_starts_at_points(void **unused)
 {
     (void)unused;
@@ -80,7 +80,7 @@ static void test_starts_at_points(void **unused)
     assert_int_equal(nebel_generate_nebula(&desc, again), NEBEL_ERROR_VALUE);
 }
 
-static void test_is_strewn_as_its_density_says(void **unused)
+static void test_is_distributed_as_its_density_says(void **unused)
 {
     (void)unused;
     nebel_nebula_desc desc = a_nebula();
@@ -356,7 +356,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_fills_its_shape_evenly),
         cmocka_unit_test(test_starts_at_points),
-        cmocka_unit_test(test_is_strewn_as_its_density_says),
+        cmocka_unit_test(test_is_distributed_as_its_density_says),
         cmocka_unit_test(test_fades_as_its_density_says),
         cmocka_unit_test(test_every_shape_holds_its_particles),
         cmocka_unit_test(test_the_same_seed_gives_the_same_particles),

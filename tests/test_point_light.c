@@ -257,6 +257,63 @@ static void draw_rays(nebel_ray rays[RAYS])
     for (uint64_t i = 0; i < RAYS; i++) rays[i] = random_fog_ray(&fog, i);
 }
 
+/* Lights from faint to bright, of which some are left out: against the sum of all that are alone in the fog. Nine volumes and more of
+ * one phase function are lit along the ray as a whole, others from piece to piece. */
+static void many_lights_are_the_sum_of_each_alone(void **state)
+{
+    enum { MANY = 20, SOME = 2 };
+    static const size_t volume_counts[] = {1, 2, 12};
+    double worst = 0;
+    (void)state;
+    for (uint64_t seed = 0; seed < 6; seed++) {
+        uint64_t numbers = 7 * seed + 5;
+        nebel_light many[MANY];
+        nebel_volume_desc volumes[12];
+        nebel_ray rays[SOME];
+        nebel_transfer all[2][SOME], alone;
+        double sum[SOME] = {0}, off[SOME] = {0};
+        const size_t volume_count = volume_counts[seed % 3];
+        for (size_t i = 0; i < volume_count; i++) {
+            volumes[i] = (nebel_volume_desc){.extinction = {.02, .02, .02}, .albedo = {.8, .8, .8}};
+            volumes[i].shape = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .radius = dice(&numbers, 4, 30)};
+            for (int c = 0; c < 3; c++) volumes[i].shape.center[c] = dice(&numbers, -9, 9);
+        }
+        for (int i = 0; i < MANY; i++) {
+            const double power = pow(10, dice(&numbers, -6, 2));
+            many[i] = (nebel_light){.intensity = {power, power, power}, .direction = {0, -1, 0}, .outer_angle = 60};
+            many[i].type = i % 5 == 0 ? NEBEL_LIGHT_SPOT : NEBEL_LIGHT_POINT;
+            for (int c = 0; c < 3; c++) many[i].position[c] = dice(&numbers, -30, 30);
+        }
+        for (int i = 0; i < SOME; i++) {
+            rays[i] = (nebel_ray){.t_max = 60};
+            for (int c = 0; c < 3; c++) rays[i].origin[c] = dice(&numbers, -20, 20);
+            for (int c = 0; c < 3; c++) rays[i].direction[c] = dice(&numbers, -9, 9) - rays[i].origin[c];
+        }
+        nebel_lighting *lighting =
+            fog_light(&(nebel_lighting_desc){.lights = many, .light_count = MANY}, volumes, volume_count);
+        const nebel_trace_desc descs[2] = {{.tolerance = 1e-3}, {.precision = NEBEL_PRECISION_FLOAT}};
+        for (int way = 0; way < 2; way++) fog_trace(lighting, descs[way], SOME, rays, all[way]);
+        nebel_release_lighting(lighting);
+        for (int l = 0; l < MANY; l++) {
+            lighting = fog_light(&(nebel_lighting_desc){.lights = &many[l], .light_count = 1}, volumes, volume_count);
+            for (int i = 0; i < SOME; i++) {
+                fog_trace(lighting, (nebel_trace_desc){.tolerance = 1e-5}, 1, &rays[i], &alone);
+                sum[i] += alone.in_scattering[0];
+                off[i] += alone.error;
+            }
+            nebel_release_lighting(lighting);
+        }
+        for (int way = 0; way < 2; way++)
+            for (int i = 0; i < SOME; i++) {
+                const double told = all[way][i].error + off[i];
+                const double ratio = fabs(all[way][i].in_scattering[0] - sum[i]) / told;
+                worst = fmax(worst, ratio);
+                if (!(ratio <= 1)) fail_msg("seed %d ray %d: off by %g of what is told", (int)seed, i, ratio);
+            }
+    }
+    print_message("many lights: off by %.2f of what is told at most\n", worst);
+}
+
 /* Against the same light within a hundredth of the tolerance. */
 static void errors_are_told(void **state)
 {
@@ -494,6 +551,7 @@ int main(void)
         cmocka_unit_test(airlight_is_that_of_T17),
         cmocka_unit_test(spots_are_those_of_T19),
         cmocka_unit_test(light_is_that_of_brute_force),
+        cmocka_unit_test(many_lights_are_the_sum_of_each_alone),
         cmocka_unit_test(errors_are_told),
         cmocka_unit_test(light_is_the_same_in_any_set_and_split),
         cmocka_unit_test(pieces_add_up),

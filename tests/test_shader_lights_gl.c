@@ -30,7 +30,7 @@ static const double eye[3] = {0, 0, 0};
 static int asked = 192;
 
 /* Half of them past the point light, closely or not. */
-static void strew_rays(const setting *s)
+static void distribute_rays(const setting *s)
 {
     uint64_t state = 1;
     for (int i = 0; i < RAYS; i++) {
@@ -69,7 +69,7 @@ static void try_setting(tracer *t, int phase, const setting *s)
     nebel_lighting *const lighting = commit_haze(&phases[phase], s);
     const size_t count = (size_t)asked;
     double brightest = 0;
-    strew_rays(s);
+    distribute_rays(s);
     pack_and_upload(t, lighting, eye);
     evaluate(t);
     fog_trace(lighting, truth, count, rays, transfers);

@@ -135,7 +135,7 @@ static nebel_lighting *commit_skin(const skin *s, uint64_t seed)
     return fog_light(&lights, &volume, 1);
 }
 
-static void strew_rays(const skin *s, uint64_t seed)
+static void distribute_rays(const skin *s, uint64_t seed)
 {
     uint64_t state = seed;
     for (int i = 0; i < RAYS; i++) {
@@ -199,7 +199,7 @@ static void try_light(int by_lights, int seeds)
         const uint64_t seed = (uint64_t)i + 1;
         const skin s = draw_skin(seed, by_lights, i / EYE_PLACES % TYPES, (eye_place)(i % EYE_PLACES));
         nebel_lighting *lighting = commit_skin(&s, seed);
-        strew_rays(&s, seed);
+        distribute_rays(&s, seed);
         pack_and_upload(&t, lighting, s.eye);
         evaluate(&t);
         judge(&s, lighting, seed);

@@ -500,7 +500,7 @@ static forced light_by_force(const nebel_volume_desc *balls, size_t ball_count, 
 }
 
 /* Balls over each other, together `thick` times as dense. */
-static void strew_balls(nebel_volume_desc *balls, size_t count, double thick, uint64_t *numbers)
+static void distribute_balls(nebel_volume_desc *balls, size_t count, double thick, uint64_t *numbers)
 {
     for (size_t i = 0; i < count; i++) {
         balls[i] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = dice(numbers, 2, 6)},
@@ -513,7 +513,7 @@ static void strew_balls(nebel_volume_desc *balls, size_t count, double thick, ui
 }
 
 /* Through balls about the origin. */
-static void strew_rays(nebel_ray *rays, int count, uint64_t *numbers)
+static void distribute_rays(nebel_ray *rays, int count, uint64_t *numbers)
 {
     for (int i = 0; i < count; i++) {
         rays[i] = (nebel_ray){.origin = {dice(numbers, -4, 4), dice(numbers, -4, 4), -12}, .t_max = 24};
@@ -535,8 +535,8 @@ static void expect_brute_force(nebel_sun sun, const nebel_light *light, size_t c
     const nebel_lighting_desc lights = {.sun = sun, .lights = light, .light_count = light != NULL};
     const int forced_rays = (int)nb_test_count(BALL_RAYS);
     const size_t ray_count = count > 20 ? nb_test_count(RAYS) : RAYS;
-    strew_balls(balls, count, thick, &numbers);
-    strew_rays(rays, RAYS, &numbers);
+    distribute_balls(balls, count, thick, &numbers);
+    distribute_rays(rays, RAYS, &numbers);
     for (int i = 0; i < forced_rays; i++) {
         fine[i] = light_by_force(balls, count, light, &rays[i], i % 3, HALVES);
         const double halved = light_by_force(balls, count, light, &rays[i], i % 3, HALVES / 2).light;

@@ -64,7 +64,7 @@ typedef struct nebel_nebula_desc {
                                extent of the shape or the points */
 } nebel_nebula_desc;
 
-/* Strews desc->count particles. O(count / share of the shape's bounding box that is taken). Any thread.
+/* Distributes desc->count particles. O(count / share of the shape's bounding box that is taken). Any thread.
  * Errors: ARGUMENT; MEMORY; VALUE (as for nebel_add_volume, a shape without bounds, or one in which no place is found;
  * a point that is not finite). */
 NEBEL_API nebel_result nebel_generate_nebula(const nebel_nebula_desc *desc, nebel_particle *particles);

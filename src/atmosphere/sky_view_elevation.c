@@ -33,7 +33,8 @@ static nb_view_elevation rise_slope(const nb_elevation_map *outlook, double row)
         const double sine = (outlook->ground + row * row * outlook->thickness) / outlook->radius;
         return (nb_view_elevation){-sqrt((1 - sine) * (1 + sine)), sine};
     }
-    const double crowd = nb_row_prefilter(*outlook), left = row * row / (crowd - (crowd - 1) * row * row);
+    const double concentration = nb_row_concentration(*outlook),
+                 left = row * row / (concentration - (concentration - 1) * row * row);
     const double half = outlook->horizon * (1 - left);
     return (nb_view_elevation){1 - 2 * half * half, 2 * half * sqrt((1 - half) * (1 + half))};
 }

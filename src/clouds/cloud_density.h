@@ -29,8 +29,8 @@ static inline float nb_cloud_grid_level(float grid, float width)
     return nb_level_of(nb_smaller(2 * width / grid, (float)(1U << (NB_CLOUD_GRIDS - 2))));
 }
 
-/* Grids blend over the last quarter of the way to the next one; from grid 4 on, a third of a heap wide, where heaps fade, over all of
- * it: they would end at a line across pictures. */
+/* Grids blend over the last quarter of the way to the next one; from grid 4 on, a third of a cumulus cell wide, where
+ * cumulus cells fade, over all of it: they would end at a line across pictures. */
 enum { NB_CLOUD_FADING = 4 };
 
 /* The next grid's part. */
@@ -58,11 +58,11 @@ struct nb_cloud_density_query {
 
     /* By find_places. */
     double radius[NB_CLOUD_LANES];
-    float height[NB_CLOUD_LANES];                     /* part of the layer's: cloud may be where it is within 0 and 1 */
-    float climb[NB_CLOUD_LANES];                      /* of rays: cosine to straight up */
-    nb_cloud_cells cells[2];                          /* in the grid below a width, and in the next where that counts */
-    float next[NB_CLOUD_LANES];                       /* the part of that */
-    float parts[NB_CLOUD_BILLOWS][3][NB_CLOUD_LANES]; /* of a period of each scale of billows */
+    float height[NB_CLOUD_LANES]; /* part of the layer's: cloud may be where it is within 0 and 1 */
+    float climb[NB_CLOUD_LANES];  /* of rays: cosine to straight up */
+    nb_cloud_cells cells[2];      /* in the grid below a width, and in the next where that counts */
+    float next[NB_CLOUD_LANES];   /* the part of that */
+    float parts[NB_CLOUD_WORLEY_SCALES][3][NB_CLOUD_LANES]; /* of a period of each scale of Worley noise */
 
     /* The places' columns: asked of whoever keeps them. */
     float rank[NB_CLOUD_LANES], scale[NB_CLOUD_LANES], variance[NB_CLOUD_LANES];

@@ -16,7 +16,7 @@
 
 #include "cloud_kernel_prelude.h"
 
-/* ---- billows --------------------------------------------------------------------------------- */
+/* ---- Worley noise --------------------------------------------------------------------------------- */
 
 static inline nb_real load(const float from[], int p)
 {
@@ -38,7 +38,7 @@ static inline nb_table choose_table(nb_real numbers)
     const nb_halvings halvings = nb_halve(numbers);
     nb_table table;
     table.level = halvings.whole + halvings.part;
-    table.low = nb_min(halvings.whole, nb_splat(NB_BILLOW_LEVELS - 2));
+    table.low = nb_min(halvings.whole, nb_splat(NB_WORLEY_LEVELS - 2));
     table.next = nb_clamp(NB_F(4.0) * (table.level - table.low) - NB_F(3.0), NB_F(0.0), NB_F(1.0));
     return table;
 }
@@ -46,14 +46,14 @@ static inline nb_table choose_table(nb_real numbers)
 static inline nb_real read_pair(const nb_cloud_noise *noise, nb_real index, nb_real part)
 {
     nb_real behind;
-    const nb_real number = nb_gather_pairs(noise->billows, index, &behind);
+    const nb_real number = nb_gather_pairs(noise->worley, index, &behind);
     return mix(number, behind, part);
 }
 
 /* Linear between the eight numbers around a place. */
 static inline nb_real read_level(const nb_cloud_noise *noise, const nb_real parts[3], nb_real level)
 {
-    const nb_real size = nb_scale_pow2(nb_splat(NB_BILLOW_SIZE), -level), row = size + NB_F(2.0);
+    const nb_real size = nb_scale_pow2(nb_splat(NB_WORLEY_SIZE), -level), row = size + NB_F(2.0);
     nb_real at[3], low[3];
     for (int c = 0; c < 3; c++) {
         const nb_real place = parts[c] * size + NB_F(0.5); /* numbers stand for the middles of their cells */
@@ -61,35 +61,35 @@ static inline nb_real read_level(const nb_cloud_noise *noise, const nb_real part
         at[c] = place - low[c];
     }
     /* Tables have less than 2^24 numbers all together, so that floats count them. */
-    const nb_real near = (low[2] * row + low[1]) * row + low[0] + nb_gather(noise->billow_starts, level);
+    const nb_real near = (low[2] * row + low[1]) * row + low[0] + nb_gather(noise->worley_starts, level);
     const nb_real far = near + row * row;
     const nb_real a = read_pair(noise, near, at[0]), b = read_pair(noise, near + row, at[0]);
     const nb_real c = read_pair(noise, far, at[0]), d = read_pair(noise, far + row, at[0]);
     return mix(mix(a, b, at[1]), mix(c, d, at[1]), at[2]);
 }
 
-/* 0 to 1, 1 in the middle of a billow. Where they are halved too often all is their mean. */
-static inline nb_real read_billows(const nb_cloud_noise *noise, const nb_real parts[3], const nb_table *table)
+/* 0 to 1, 1 at a feature point. Where they are halved too often all is their mean. */
+static inline nb_real read_worley(const nb_cloud_noise *noise, const nb_real parts[3], const nb_table *table)
 {
-    const nb_mask is_mean = table->level >= nb_splat(NB_BILLOW_LEVELS - 1);
-    if (nb_all(is_mean)) return nb_splat(noise->billow_mean);
-    nb_real billows = read_level(noise, parts, table->low);
+    const nb_mask is_mean = table->level >= nb_splat(NB_WORLEY_LEVELS - 1);
+    if (nb_all(is_mean)) return nb_splat(noise->worley_mean);
+    nb_real worley = read_level(noise, parts, table->low);
     if (nb_any(table->next > NB_F(0.0)))
-        billows = mix(billows, read_level(noise, parts, table->low + NB_F(1.0)), table->next);
-    return nb_select(is_mean, nb_splat(noise->billow_mean), billows * nb_splat(1.0f / NB_MAX_BILLOW));
+        worley = mix(worley, read_level(noise, parts, table->low + NB_F(1.0)), table->next);
+    return nb_select(is_mean, nb_splat(noise->worley_mean), worley * nb_splat(1.0f / NB_MAX_WORLEY));
 }
 
 /* Each scale's table for widths. Returns the variance that they lose by that. */
 static inline nb_real choose_tables(const nb_cloud_noise *noise, const nb_cloud_layer *layer, nb_real width,
-                                    nb_table tables[NB_CLOUD_BILLOWS])
+                                    nb_table tables[NB_CLOUD_WORLEY_SCALES])
 {
-    nb_real numbers = width * nb_splat(layer->last_billow), lost = NB_F(0.0);
-    for (int k = NB_CLOUD_BILLOWS - 1; k >= 0; k--) {
-        const float weight = nb_billow_weights[k] * nb_billow_weights[k];
+    nb_real numbers = width * nb_splat(layer->last_worley), lost = NB_F(0.0);
+    for (int k = NB_CLOUD_WORLEY_SCALES - 1; k >= 0; k--) {
+        const float weight = nb_worley_weights[k] * nb_worley_weights[k];
         tables[k] = choose_table(numbers);
-        lost += nb_splat(weight) * mix(nb_gather(noise->billow_variance, tables[k].low),
-                                       nb_gather(noise->billow_variance + 1, tables[k].low), tables[k].next);
-        numbers *= NB_F(1.0) / nb_splat(NB_BILLOW_RATIO);
+        lost += nb_splat(weight) * mix(nb_gather(noise->worley_variance, tables[k].low),
+                                       nb_gather(noise->worley_variance + 1, tables[k].low), tables[k].next);
+        numbers *= NB_F(1.0) / nb_splat(NB_WORLEY_RATIO);
     }
     return lost;
 }
@@ -119,7 +119,7 @@ static inline nb_real least_rank(nebel_cloud_type kind, nb_real height)
     return nb_splat(nb_cloud_sheet_bulge(kind)) * from_middle * from_middle;
 }
 
-/* How deep billows may cut. */
+/* How deep Worley noise may cut. */
 static inline nb_real deepest(const nb_cloud_layer *layer, nb_real height)
 {
     const nb_real detail = nb_splat(layer->detail);
@@ -128,13 +128,13 @@ static inline nb_real deepest(const nb_cloud_layer *layer, nb_real height)
 }
 
 /* Extinction at a place is `most` times `part` held within 0 and 1; where a width hides some of it, all within `spread` of
- * `part` is as likely. missing[n]: by how much the rank is at least too low, whatever billows behind the first n scales do; below
- * 0 where it may not be. */
+ * `part` is as likely. missing[n]: by how much the rank is at least too low, whatever noise behind the first n scales
+ * do; below 0 where it may not be. */
 typedef struct nb_density_lanes {
-    nb_real most, part, spread, missing[NB_CLOUD_BILLOWS + 1];
+    nb_real most, part, spread, missing[NB_CLOUD_WORLEY_SCALES + 1];
 } nb_density_lanes;
 
-/* Billows cut one minus the weighted sum of their scales. From the largest scale on they are read only until what is
+/* Worley noise cuts one minus the weighted sum of its scales. From the largest scale on it is read only until what is
  * left of them can neither make cloud nor thin it. */
 static inline nb_density_lanes drops_of(const nb_cloud_noise *noise, const nb_cloud_layer *layer,
                                         const nb_cloud_density_query *looks, int p)
@@ -145,23 +145,23 @@ static inline nb_density_lanes drops_of(const nb_cloud_noise *noise, const nb_cl
     nb_real spread = nb_sqrt(NB_F(3.0) * variance), missing = -whole - spread, most = deep, cut = NB_F(0.0);
     /* What is far within is whole. */
     nb_mask is_open = nb_and(nb_and(missing<NB_F(0.0), deep> NB_F(0.0)), whole - deep < softness + spread);
-    nb_table tables[NB_CLOUD_BILLOWS];
+    nb_table tables[NB_CLOUD_WORLEY_SCALES];
     nb_density_lanes drops;
-    for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) drops.missing[n] = missing;
+    for (int n = 0; n <= NB_CLOUD_WORLEY_SCALES; n++) drops.missing[n] = missing;
     if (nb_any(is_open)) {
         const nb_real lost = choose_tables(noise, layer, load(looks->width, p), tables);
         spread = nb_select(is_open, nb_sqrt(NB_F(3.0) * (variance + deep * deep * lost)), spread);
     }
-    for (int k = 0; k < NB_CLOUD_BILLOWS; k++) {
+    for (int k = 0; k < NB_CLOUD_WORLEY_SCALES; k++) {
         is_open = nb_and(is_open, whole - most < softness + spread);
         if (!nb_any(is_open)) break;
         const nb_real parts[3] = {load(looks->parts[k][0], p), load(looks->parts[k][1], p),
                                   load(looks->parts[k][2], p)};
-        const nb_real billows = read_billows(noise, parts, &tables[k]), part = deep * nb_splat(nb_billow_weights[k]);
-        cut = nb_select(is_open, cut + part * (NB_F(1.0) - billows), cut);
-        most = most - part * billows;
+        const nb_real worley = read_worley(noise, parts, &tables[k]), part = deep * nb_splat(nb_worley_weights[k]);
+        cut = nb_select(is_open, cut + part * (NB_F(1.0) - worley), cut);
+        most = most - part * worley;
         missing = nb_select(is_open, cut - whole - spread, missing);
-        for (int n = k + 1; n <= NB_CLOUD_BILLOWS; n++) drops.missing[n] = missing;
+        for (int n = k + 1; n <= NB_CLOUD_WORLEY_SCALES; n++) drops.missing[n] = missing;
         is_open = nb_and(is_open, missing < NB_F(0.0));
     }
     drops.most = nb_splat(layer->extinction) * thin_out(layer->kind, height);
@@ -247,16 +247,16 @@ static inline void see_through(const nb_cloud_layer *layer, const nb_density_lan
     }
 }
 
-/* Of billows, the slope of the first scales counts, whatever the others do. */
+/* Of Worley noise, the slope of the first scales counts, whatever the others do. */
 static inline nb_real clear_of(const nb_cloud_layer *layer, const nb_cloud_density_query *looks,
                                const nb_real missing[], int p)
 {
     nb_real slope = nb_splat(layer->slope) * load(looks->scale, p) +
                     nb_splat(NB_CLOUD_RANK_SLOPE * layer->per_thickness) * nb_abs(load(looks->climb, p));
     nb_real clear = NB_F(0.0);
-    for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) {
+    for (int n = 0; n <= NB_CLOUD_WORLEY_SCALES; n++) {
         clear = nb_max(clear, missing[n] / slope);
-        if (n < NB_CLOUD_BILLOWS) slope += nb_splat(layer->billow_slopes[n]);
+        if (n < NB_CLOUD_WORLEY_SCALES) slope += nb_splat(layer->worley_slopes[n]);
     }
     return clear;
 }
@@ -267,7 +267,7 @@ static inline void find_in_packet(const nb_cloud_noise *noise, const nb_cloud_la
     const nb_real height = load(looks->height, p);
     const nb_mask is_in = nb_and(height > NB_F(0.0), height < NB_F(1.0));
     const nb_density_lanes drops = drops_of(noise, layer, looks, p);
-    const nb_mask is_cloud = nb_and(is_in, drops.missing[NB_CLOUD_BILLOWS] < NB_F(0.0));
+    const nb_mask is_cloud = nb_and(is_in, drops.missing[NB_CLOUD_WORLEY_SCALES] < NB_F(0.0));
     see_through(layer, &drops, is_cloud, p, looks);
     if (looks->are_of_rays)
         nb_store_lanes(looks->clear + p, nb_select(is_in, clear_of(layer, looks, drops.missing, p), NB_F(0.0)));

@@ -89,9 +89,10 @@ nebel_result nebel_create_cloud_workspace(const nebel_cloud_lighting *view, nebe
     made->points = nb_allocate_zero(&view->allocator, NB_CLOUD_POINTS, sizeof *made->points);
     made->patches = nb_allocate_zero(&view->allocator, NB_CLOUD_PATCHES, sizeof *made->patches);
     if (view->clouds->layer_count > 0)
-        made->crowds = nb_allocate_zero(&view->allocator, (size_t)view->clouds->layer_count, sizeof *made->crowds);
+        made->prefilters =
+            nb_allocate_zero(&view->allocator, (size_t)view->clouds->layer_count, sizeof *made->prefilters);
     int is_whole = made->blocks != NULL && made->points != NULL && made->patches != NULL &&
-                   (made->crowds != NULL || view->clouds->layer_count == 0);
+                   (made->prefilters != NULL || view->clouds->layer_count == 0);
     for (int i = 0; i < NB_CLOUD_ROOFS + view->clouds->layer_count; i++) {
         nb_cloud_lattice *lattice = &made->lattices[i];
         lattice->nodes = nb_allocate_zero(&view->allocator, NB_CLOUD_NODES, sizeof *lattice->nodes);
@@ -117,6 +118,6 @@ void nebel_destroy_cloud_workspace(nebel_cloud_workspace *workspace)
     nb_release(&allocator, workspace->points);
     nb_release(&allocator, workspace->patches);
     nb_release(&allocator, workspace->blocks);
-    nb_release(&allocator, workspace->crowds);
+    nb_release(&allocator, workspace->prefilters);
     nb_release(&allocator, workspace);
 }

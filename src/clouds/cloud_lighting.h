@@ -137,7 +137,7 @@ struct nebel_cloud_workspace {
     nb_cloud_point *points;
     nb_cloud_patch *patches;
     nb_cloud_column_block *blocks;
-    nb_cloud_prefilter *crowds; /* of each layer */
+    nb_cloud_prefilter *prefilters; /* of each layer */
 };
 
 /* Where a ray is within a shell: at most two pieces, before and behind what lies below it. Returns how many. */
@@ -235,7 +235,7 @@ typedef struct nb_cloud_ray {
      * other. */
     float ahead_phase[NEBEL_MAX_CLOUD_LAYERS][3], ahead;
     float
-        own; /* how much what comes straight from the sun is that of a place's own way, where pixels hide heaps, too */
+        own; /* how much what comes straight from the sun is that of a place's own way, where pixels hide cumulus cells, too */
     float apart[NEBEL_MAX_CLOUD_LAYERS]; /* what part of scattering leads away */
     double sun;                          /* cosine between ray and sun */
     double direction[3];

@@ -1,4 +1,4 @@
-/* Two kinds of noise, both on periodic lattices: Perlin's gradient noise (Improving Noise, 2002), and billows, which are
+/* Two kinds of noise, both on periodic lattices: Perlin's gradient noise (Improving Noise, 2002), and Worley noise,
  * three octaves of one minus the distance to the nearest of random points (Worley, A Cellular Texture Basis Function,
  * 1996), tabulated, since finding the nearest takes long. */
 #include "cloud_noise.h"
@@ -79,9 +79,9 @@ float nb_gradient_noise(const nb_cloud_noise *noise, const double place[3])
     return mix(mix(a, b, v), mix(c, d, v), smooth(z));
 }
 
-/* ---- billows --------------------------------------------------------------------------------- */
+/* ---- Worley noise --------------------------------------------------------------------------------- */
 
-enum { MOST_CELLS = 4 * NB_BILLOW_CELLS };
+enum { MOST_CELLS = 4 * NB_WORLEY_CELLS };
 
 /* One per cell, as parts of it. */
 static void set_points(int cells, float (*points)[3])
@@ -113,26 +113,26 @@ static float distance_to_point(int cells, const float (*points)[3], const float 
     return sqrtf(nearest);
 }
 
-static void add_billows(int cells, float weight, float *table)
+static void add_worley(int cells, float weight, float *table)
 {
     float points[MOST_CELLS * MOST_CELLS * MOST_CELLS][3];
     set_points(cells, points);
-    for (int i = 0; i < NB_BILLOW_SIZE * NB_BILLOW_SIZE * NB_BILLOW_SIZE; i++) {
-        const int at[3] = {i % NB_BILLOW_SIZE, i / NB_BILLOW_SIZE % NB_BILLOW_SIZE,
-                           i / NB_BILLOW_SIZE / NB_BILLOW_SIZE};
+    for (int i = 0; i < NB_WORLEY_SIZE * NB_WORLEY_SIZE * NB_WORLEY_SIZE; i++) {
+        const int at[3] = {i % NB_WORLEY_SIZE, i / NB_WORLEY_SIZE % NB_WORLEY_SIZE,
+                           i / NB_WORLEY_SIZE / NB_WORLEY_SIZE};
         float place[3];
-        for (int c = 0; c < 3; c++) place[c] = ((float)at[c] + 0.5f) * (float)cells / NB_BILLOW_SIZE;
+        for (int c = 0; c < 3; c++) place[c] = ((float)at[c] + 0.5f) * (float)cells / NB_WORLEY_SIZE;
         table[i] += weight * (1 - distance_to_point(cells, (const float(*)[3])points, place));
     }
 }
 
-static void set_billows(float *table)
+static void set_worley(float *table)
 {
-    enum { COUNT = NB_BILLOW_SIZE * NB_BILLOW_SIZE * NB_BILLOW_SIZE };
+    enum { COUNT = NB_WORLEY_SIZE * NB_WORLEY_SIZE * NB_WORLEY_SIZE };
     memset(table, 0, COUNT * sizeof *table);
-    add_billows(NB_BILLOW_CELLS, 1, table);
-    add_billows(2 * NB_BILLOW_CELLS, 0.5f, table);
-    add_billows(4 * NB_BILLOW_CELLS, 0.25f, table);
+    add_worley(NB_WORLEY_CELLS, 1, table);
+    add_worley(2 * NB_WORLEY_CELLS, 0.5f, table);
+    add_worley(4 * NB_WORLEY_CELLS, 0.25f, table);
     for (int i = 0; i < COUNT; i++) table[i] = nb_smaller(1, nb_larger(0, table[i] / 1.75f));
 }
 
@@ -170,23 +170,23 @@ static void surround(const float *table, int size, uint16_t *wider)
             for (int x = 0; x < row; x++) {
                 const int at[3] = {(x + size - 1) % size, (y + size - 1) % size, (z + size - 1) % size};
                 const float value = table[(at[2] * size + at[1]) * size + at[0]];
-                wider[(z * row + y) * row + x] = (uint16_t)(NB_MAX_BILLOW * value + 0.5f);
+                wider[(z * row + y) * row + x] = (uint16_t)(NB_MAX_WORLEY * value + 0.5f);
             }
 }
 
-static void fill_billows(nb_cloud_noise *noise, float *table)
+static void fill_worley(nb_cloud_noise *noise, float *table)
 {
     float all = 0;
-    set_billows(table);
-    for (int level = 0; level < NB_BILLOW_LEVELS; level++) {
-        const int size = NB_BILLOW_SIZE >> level;
+    set_worley(table);
+    for (int level = 0; level < NB_WORLEY_LEVELS; level++) {
+        const int size = NB_WORLEY_SIZE >> level;
         double mean;
         if (level > 0) halve(table, 2 * size);
-        surround(table, size, noise->billows + (size_t)noise->billow_starts[level]);
+        surround(table, size, noise->worley + (size_t)noise->worley_starts[level]);
         const float left = variance_of(table, size * size * size, &mean);
         if (level == 0) all = left;
-        noise->billow_mean = (float)mean;
-        noise->billow_variance[level] = all - left;
+        noise->worley_mean = (float)mean;
+        noise->worley_variance[level] = all - left;
     }
 }
 
@@ -196,21 +196,21 @@ nebel_result nb_cloud_noise_make(const nebel_allocator *allocator, nb_cloud_nois
 {
     enum { LATTICE_POINTS = NB_CLOUD_LATTICE * NB_CLOUD_LATTICE * NB_CLOUD_LATTICE };
     size_t all = 0;
-    for (int level = 0; level < NB_BILLOW_LEVELS; level++) {
-        const size_t row = ((size_t)NB_BILLOW_SIZE >> level) + 2;
-        noise->billow_starts[level] = (float)all;
+    for (int level = 0; level < NB_WORLEY_LEVELS; level++) {
+        const size_t row = ((size_t)NB_WORLEY_SIZE >> level) + 2;
+        noise->worley_starts[level] = (float)all;
         all += row * row * row;
     }
     noise->turns = nb_allocate(allocator, LATTICE_POINTS, 1);
     noise->directions = nb_allocate(allocator, NB_CLOUD_DIRECTIONS, sizeof *noise->directions);
     uint16_t *tables = nb_allocate(allocator, all, sizeof *tables);
-    float *table = nb_allocate(allocator, NB_BILLOW_SIZE * NB_BILLOW_SIZE * NB_BILLOW_SIZE, sizeof *table);
+    float *table = nb_allocate(allocator, NB_WORLEY_SIZE * NB_WORLEY_SIZE * NB_WORLEY_SIZE, sizeof *table);
     const int is_whole = noise->turns != NULL && noise->directions != NULL && tables != NULL && table != NULL;
-    noise->billows = tables;
+    noise->worley = tables;
     if (is_whole) {
         for (uint32_t i = 0; i < LATTICE_POINTS; i++) noise->turns[i] = (uint8_t)(nb_mix_bits(i + 77) >> 13);
         fill_directions(noise->directions);
-        fill_billows(noise, table);
+        fill_worley(noise, table);
     }
     nb_release(allocator, table);
     return is_whole ? NEBEL_OK : NEBEL_ERROR_MEMORY;
@@ -220,5 +220,5 @@ void nb_cloud_noise_free(const nebel_allocator *allocator, nb_cloud_noise *noise
 {
     nb_release(allocator, noise->turns);
     nb_release(allocator, noise->directions);
-    nb_release(allocator, noise->billows);
+    nb_release(allocator, noise->worley);
 }

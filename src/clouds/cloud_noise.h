@@ -9,10 +9,10 @@
 enum {
     NB_CLOUD_LATTICE = 64, /* points of gradient noise before it repeats, on each axis */
     NB_CLOUD_DIRECTIONS = 256,
-    NB_BILLOW_SIZE = 64,  /* numbers of billows before they repeat */
-    NB_BILLOW_LEVELS = 6, /* each half the one before */
-    NB_BILLOW_CELLS = 4,  /* the largest billows, before they repeat */
-    NB_MAX_BILLOW = 65535,
+    NB_WORLEY_SIZE = 64,  /* numbers of Worley noise before it repeats */
+    NB_WORLEY_LEVELS = 6, /* each half the one before */
+    NB_WORLEY_CELLS = 4,  /* of the largest scale, before it repeats */
+    NB_MAX_WORLEY = 65535,
 };
 
 /* Of numbers; fminf and fmaxf are calls. */
@@ -38,10 +38,10 @@ typedef struct nb_cloud_noise {
     uint8_t *turns; /* [z][y][x]: which direction */
     float (*directions)[4];
     uint16_t
-        *billows; /* tables: NB_MAX_BILLOW in the middle of one; a number more on each side, as if it went on there */
-    float billow_starts[NB_BILLOW_LEVELS];   /* of each level, whole numbers */
-    float billow_mean;                       /* where they are halved more often */
-    float billow_variance[NB_BILLOW_LEVELS]; /* what a level has lost of the first one's */
+        *worley; /* tables: NB_MAX_WORLEY in the middle of one; a number more on each side, as if it went on there */
+    float worley_starts[NB_WORLEY_LEVELS];   /* of each level, whole numbers */
+    float worley_mean;                       /* where they are halved more often */
+    float worley_variance[NB_WORLEY_LEVELS]; /* what a level has lost of the first one's */
 } nb_cloud_noise;
 
 /* Errors: MEMORY. */
@@ -54,6 +54,6 @@ float nb_gradient_noise(const nb_cloud_noise *noise, const double place[3]);
 /* Asserted by test_clouds: variance, and the largest slope per length of the lattice. */
 #define NB_GRADIENT_VARIANCE 0.0364f
 #define NB_GRADIENT_SLOPE 2.3f
-#define NB_BILLOW_SLOPE 7.f /* of billows, per period: each octave's is that of a distance */
+#define NB_WORLEY_SLOPE 7.f /* of Worley noise, per period: each octave's is that of a distance */
 
 #endif

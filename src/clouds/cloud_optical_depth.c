@@ -74,7 +74,7 @@ enum { OWN_STEPS = 7, MOST_STEPS = 128 };
 #define OWN_GROWTH 6.2748517f /* GROWTH to the power of OWN_STEPS */
 #define NODES_STEP 0.5f
 
-/* Who looks from within a heap sees no gaps of it. */
+/* Who looks from within a cumulus cell sees no gaps of it. */
 #define HEAP_PART 0.45f
 
 /* A way from a place, and its optical depth. */
@@ -183,8 +183,9 @@ float nb_cloud_depth_along(nebel_cloud_workspace *workspace, const double from[3
 
 /* ---- lattices -------------------------------------------------------------------------------- */
 
-/* Columns next to each other in a layer are as good as one so wide, in sizes of heaps. Wider ones would count what comes through
- * gaps and what scatters through heaps as if all were as thick as their mean: of those, some across are asked. */
+/* Columns next to each other in a layer are as good as one so wide, in sizes of cumulus cells. Wider ones would count
+ * what comes through gaps and what scatters through cumulus cells as if all were as thick as their mean: of those, some
+ * across are asked. */
 #define COLUMN_PART 0.2f
 enum { MOST_COLUMNS = 4 };
 

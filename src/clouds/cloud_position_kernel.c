@@ -81,7 +81,7 @@ static inline void find_cells(const nb_cloud_layer *layer, int number, const nb_
         find_in_grid(faces, halvings.whole + NB_F(1.0), layer->grids[0].per_spacing, number, p, &looks->cells[1]);
 }
 
-/* ---- billows --------------------------------------------------------------------------------- */
+/* ---- Worley noise --------------------------------------------------------------------------------- */
 
 /* Where places are in a period of each scale, as parts of it; of wisps, places are drawn together along the wind. */
 static inline void find_parts(const nb_cloud_layer *layer, const nb_wide place[3], int p, nb_cloud_density_query *looks)
@@ -89,13 +89,13 @@ static inline void find_parts(const nb_cloud_layer *layer, const nb_wide place[3
     nb_wide drawn[3] = {place[0], place[1], place[2]};
     if (layer->kind == NEBEL_CLOUD_CIRRUS) {
         const nb_wide x = nb_wsplat(-layer->axis[2]), z = nb_wsplat(layer->axis[0]);
-        const nb_wide shift = (place[0] * x + place[2] * z) * nb_wsplat(1.0 / NB_BILLOWS_DRAWN_OUT - 1);
+        const nb_wide shift = (place[0] * x + place[2] * z) * nb_wsplat(1.0 / NB_WORLEY_STRETCH - 1);
         drawn[0] += shift * x;
         drawn[2] += shift * z;
     }
-    for (int k = 0; k < NB_CLOUD_BILLOWS; k++)
+    for (int k = 0; k < NB_CLOUD_WORLEY_SCALES; k++)
         for (int c = 0; c < 3; c++) {
-            const nb_wide at = drawn[(c + k) % 3] * nb_wsplat(layer->per_billow[k]) + nb_wsplat(layer->billow_shift[c]);
+            const nb_wide at = drawn[(c + k) % 3] * nb_wsplat(layer->per_worley[k]) + nb_wsplat(layer->worley_shift[c]);
             nb_store_lanes(looks->parts[k][c] + p, nb_narrow(at - whole_below(at)));
         }
 }

@@ -1,8 +1,9 @@
-/* Light of clouds that pixels hide: of a pixel as wide as heaps are, one place knows nothing of lit and shaded sides, nor
- * of which of them are seen. What it shows of a layer is the mean over places in its clouds all around the planet, by how
- * much of each is seen that way, which hangs on the height of the sun, on how steep the ray is and on how far aside of the
- * sun it leads: a table of three, whose entries are found when they are asked for. Of heights it knows nothing: the mean of
- * clouds lets a pixel see deeper into a layer than thin rays do, which end on the first cloud.
+/* Light of clouds that pixels hide: of a pixel as wide as cumulus cells are, one place knows nothing of lit and shaded
+ * sides, nor of which of them are seen. What it shows of a layer is the mean over places in its clouds all around the
+ * planet, by how much of each is seen that way, which hangs on the height of the sun, on how steep the ray is and on
+ * how far aside of the sun it leads: a table of three, whose entries are found when they are asked for. Of heights it
+ * knows nothing: the mean of clouds lets a pixel see deeper into a layer than thin rays do, which end on the first
+ * cloud.
  *
  * The places stay with the clouds, so that the table is the same at all times, and it is the same for all rays, so that
  * such pixels have no grain. */
@@ -21,7 +22,8 @@
 
 #define PI 3.14159265358979323846
 
-/* Of heaps, wide: what is found finely, and the least width and the one beyond twice of which only the table counts. */
+/* Of cumulus cells, wide: what is found finely, and the least width and the one beyond twice of which only the table
+ * counts. */
 #define FINE_PART 0.005f
 #define NEAR_PART 0.03f
 #define FAR_PART 0.15f
@@ -59,12 +61,12 @@ static void spread(int i, double unit[3], double *height, double *turn)
     *turn = 2 * PI * parts[3];
 }
 
-static void find_places(const nebel_cloud_lighting *view, int k, nb_cloud_prefilter *crowd)
+static void find_places(const nebel_cloud_lighting *view, int k, nb_cloud_prefilter *prefilter)
 {
     const nb_cloud_layer *layer = &view->clouds->layers[k];
     const nb_cloud_rotation *pose = &view->poses[k];
     nb_cloud_density_query looks = {.count = 0, .are_of_rays = 0};
-    for (int first = 0; first < TRIES && crowd->count < NB_PREFILTER_PLACES; first += NB_CLOUD_LANES) {
+    for (int first = 0; first < TRIES && prefilter->count < NB_PREFILTER_PLACES; first += NB_CLOUD_LANES) {
         nb_prefilter_point places[NB_CLOUD_LANES];
         float extinction[NB_CLOUD_LANES];
         for (int i = 0; i < NB_CLOUD_LANES; i++) {
@@ -76,26 +78,26 @@ static void find_places(const nebel_cloud_lighting *view, int k, nb_cloud_prefil
             nb_cloud_ask(&looks, pose, places[i].from, FINE_PART * layer->size);
         }
         nb_cloud_find_means(view->clouds, k, &looks, extinction);
-        for (int i = 0; i < NB_CLOUD_LANES && crowd->count < NB_PREFILTER_PLACES; i++) {
+        for (int i = 0; i < NB_CLOUD_LANES && prefilter->count < NB_PREFILTER_PLACES; i++) {
             places[i].extinction = extinction[i];
-            if (extinction[i] > 0) crowd->places[crowd->count++] = places[i];
+            if (extinction[i] > 0) prefilter->places[prefilter->count++] = places[i];
         }
     }
 }
 
-static void set_places(nebel_cloud_workspace *workspace, int k, nb_cloud_prefilter *crowd)
+static void set_places(nebel_cloud_workspace *workspace, int k, nb_cloud_prefilter *prefilter)
 {
     const float wide = (float)(AROUND_PART / (double)workspace->view->clouds->layers[k].per_thickness);
-    find_places(workspace->view, k, crowd);
-    for (int i = 0; i < crowd->count; i++) {
-        nb_prefilter_point *place = &crowd->places[i];
+    find_places(workspace->view, k, prefilter);
+    for (int i = 0; i < prefilter->count; i++) {
+        nb_prefilter_point *place = &prefilter->places[i];
         double up[3], down[3];
         const double radius = nb_vector_length(place->from);
         for (int c = 0; c < 3; c++) up[c] = place->from[c] / radius, down[c] = -up[c];
         place->up = nb_cloud_depth_along(workspace, place->from, up, wide, wide, 1);
         place->down = nb_cloud_depth_along(workspace, place->from, down, wide, wide, 1);
     }
-    crowd->is_set = 1;
+    prefilter->is_set = 1;
 }
 
 /* ---- entries --------------------------------------------------------------------------------- */
@@ -121,26 +123,27 @@ static nb_fine fine_of(const nb_cloud_layer *layer)
     return (nb_fine){width, first};
 }
 
-static const nb_cloud_depths *depths_under(nebel_cloud_workspace *workspace, int k, nb_cloud_prefilter *crowd, int sun)
+static const nb_cloud_depths *depths_under(nebel_cloud_workspace *workspace, int k, nb_cloud_prefilter *prefilter,
+                                           int sun)
 {
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
     const nb_fine fine = fine_of(layer);
     const float wide = (float)(AROUND_PART / (double)layer->per_thickness);
-    if (crowd->has_depths[sun]) return crowd->depths[sun];
-    for (int i = 0; i < crowd->count; i++) {
-        const nb_prefilter_point *place = &crowd->places[i];
+    if (prefilter->has_depths[sun]) return prefilter->depths[sun];
+    for (int i = 0; i < prefilter->count; i++) {
+        const nb_prefilter_point *place = &prefilter->places[i];
         double to[3], away[3];
         direct(place, (double)suns[sun], place->turn, to);
         for (int c = 0; c < 3; c++) away[c] = -to[c];
-        crowd->depths[sun][i] = (nb_cloud_depths){
+        prefilter->depths[sun][i] = (nb_cloud_depths){
             .sun = nb_cloud_depth_along(workspace, place->from, to, fine.first, fine.width, 1),
             .away = nb_cloud_depth_along(workspace, place->from, away, wide, wide, 1),
             .up = place->up,
             .down = place->down,
         };
     }
-    crowd->has_depths[sun] = 1;
-    return crowd->depths[sun];
+    prefilter->has_depths[sun] = 1;
+    return prefilter->depths[sun];
 }
 
 /* No ray from below a layer is flatter than one that just passes its base. */
@@ -153,29 +156,29 @@ static double steepness_of(const nb_cloud_layer *layer, const nb_prefilter_point
 }
 
 /* What counts is how places differ: where none is seen, too, some are seen more than others. */
-static const nb_prefilter_weight *seen_by(nebel_cloud_workspace *workspace, int k, nb_cloud_prefilter *crowd, int view,
-                                          int turn)
+static const nb_prefilter_weight *seen_by(nebel_cloud_workspace *workspace, int k, nb_cloud_prefilter *prefilter,
+                                          int view, int turn)
 {
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
     const nb_fine fine = fine_of(layer);
     const float apart = layer->apart;
-    nb_prefilter_weight *seen = crowd->seen[view][turn];
+    nb_prefilter_weight *seen = prefilter->seen[view][turn];
     float least = HUGE_VALF;
-    if (crowd->has_seen[view][turn]) return seen;
-    for (int i = 0; i < crowd->count; i++) {
-        const nb_prefilter_point *place = &crowd->places[i];
+    if (prefilter->has_seen[view][turn]) return seen;
+    for (int i = 0; i < prefilter->count; i++) {
+        const nb_prefilter_point *place = &prefilter->places[i];
         double ray[3];
         direct(place, steepness_of(layer, place, view), place->turn + acos((double)turns[turn]), ray);
         for (int c = 0; c < 3; c++) ray[c] = -ray[c];
         seen[i].whole = nb_cloud_depth_along(workspace, place->from, ray, fine.first, fine.width, 1);
         least = nb_smaller(least, seen[i].whole);
     }
-    for (int i = 0; i < crowd->count; i++) {
+    for (int i = 0; i < prefilter->count; i++) {
         const double depth = (double)(seen[i].whole - least);
-        seen[i].whole = crowd->places[i].extinction * (float)nb_exp(-depth);
-        seen[i].apart = crowd->places[i].extinction * (float)nb_exp(-(double)apart * depth);
+        seen[i].whole = prefilter->places[i].extinction * (float)nb_exp(-depth);
+        seen[i].apart = prefilter->places[i].extinction * (float)nb_exp(-(double)apart * depth);
     }
-    crowd->has_seen[view][turn] = 1;
+    prefilter->has_seen[view][turn] = 1;
     return seen;
 }
 
@@ -191,21 +194,21 @@ static void add_parts(nb_cloud_irradiance *sum, const nb_cloud_irradiance *parts
 static const nb_cloud_irradiance *entry_of(nebel_cloud_workspace *workspace, int k, const int at[3])
 {
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
-    nb_cloud_prefilter *crowd = &workspace->crowds[k];
-    nb_cloud_irradiance *mean = &crowd->means[at[0]][at[1]][at[2]];
-    if (crowd->has_mean[at[0]][at[1]][at[2]]) return mean;
-    const nb_cloud_depths *depths = depths_under(workspace, k, crowd, at[2]);
-    const nb_prefilter_weight *seen = seen_by(workspace, k, crowd, at[0], at[1]);
+    nb_cloud_prefilter *prefilter = &workspace->prefilters[k];
+    nb_cloud_irradiance *mean = &prefilter->means[at[0]][at[1]][at[2]];
+    if (prefilter->has_mean[at[0]][at[1]][at[2]]) return mean;
+    const nb_cloud_depths *depths = depths_under(workspace, k, prefilter, at[2]);
+    const nb_prefilter_weight *seen = seen_by(workspace, k, prefilter, at[0], at[1]);
     nb_prefilter_weight sum = {0, 0};
-    for (int i = 0; i < crowd->count; i++)
+    for (int i = 0; i < prefilter->count; i++)
         sum = (nb_prefilter_weight){sum.whole + seen[i].whole, sum.apart + seen[i].apart};
-    for (int i = 0; i < crowd->count; i++) {
-        const float sun = suns[at[2]], rise = (float)steepness_of(layer, &crowd->places[i], at[0]);
+    for (int i = 0; i < prefilter->count; i++) {
+        const float sun = suns[at[2]], rise = (float)steepness_of(layer, &prefilter->places[i], at[0]);
         const float ahead = sun * rise + turns[at[1]] * sqrtf((1 - sun * sun) * (1 - rise * rise));
         const nb_cloud_irradiance parts = nb_cloud_parts_of(layer, &depths[i], &(nb_cloud_sight){sun, rise, ahead});
         add_parts(mean, &parts, seen[i].whole / sum.whole, seen[i].apart / sum.apart);
     }
-    crowd->has_mean[at[0]][at[1]][at[2]] = 1;
+    prefilter->has_mean[at[0]][at[1]][at[2]] = 1;
     return mean;
 }
 
@@ -224,9 +227,9 @@ float nb_cloud_prefilter_part(nebel_cloud_workspace *workspace, int k, float wid
 {
     const float size = workspace->view->clouds->layers[k].size;
     const float part = nb_larger(0, nb_smaller(1, (width / size - NEAR_PART) / (FAR_PART - NEAR_PART)));
-    nb_cloud_prefilter *crowd = &workspace->crowds[k];
-    if (part > 0 && !crowd->is_set) set_places(workspace, k, crowd);
-    return crowd->count > 0 ? part : 0;
+    nb_cloud_prefilter *prefilter = &workspace->prefilters[k];
+    if (part > 0 && !prefilter->is_set) set_places(workspace, k, prefilter);
+    return prefilter->count > 0 ? part : 0;
 }
 
 /* The part of what is seen from below between the flattest views: a ray keeps the side on which it came into the layer up to

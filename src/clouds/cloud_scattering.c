@@ -125,10 +125,10 @@ nb_cloud_depths nb_cloud_bound_depths(const nebel_cloud_lighting *view, int k, d
 #define AHEAD_ANGLE 0.010
 #define ASIDE_ANGLE 0.026
 
-/* Light of a crowd of places knows nothing of which clouds are before the sun: up to the first of these angles a place's own way to it
- * counts, from the second on that of the crowd. */
+/* Light of many places knows nothing of which clouds are before the sun: up to the first of these angles a place's own
+ * way to it counts, from the second on their mean. */
 #define OWN_ANGLE 0.07
-#define CROWD_ANGLE 0.17
+#define PREFILTER_ANGLE 0.17
 
 /* The phase function has a peak half a degree wide: a pixel so many times its width from where that counts has a mean of it, over places
  * so far apart. */
@@ -191,7 +191,7 @@ nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_lighting *view, const double di
         ray.apart[k] = layer->apart;
     }
     set_phases(view, spread, &ray);
-    ray.own = (float)part_within(ray.sun, OWN_ANGLE, CROWD_ANGLE);
+    ray.own = (float)part_within(ray.sun, OWN_ANGLE, PREFILTER_ANGLE);
     return ray;
 }
 

@@ -46,8 +46,8 @@
 /* The first step from a piece towards the sun: optical depth in the middle of clouds; half of the least piece at most. */
 #define FIRST_DEPTH 0.3
 
-/* Where there may be cloud and is none, of a sixteenth of the smallest heaps: near, where wisps are many pixels wide, and where a
- * pixel is half a step. */
+/* Where there may be cloud and is none, of a sixteenth of the smallest cumulus cells: near, where wisps are many
+ * pixels wide, and where a pixel is half a step. */
 #define LEAST_STEP 0.2
 #define FAR_STEP 0.7
 
@@ -55,20 +55,20 @@
 #define DIM 0.3
 #define MOST_TIMES 3
 
-/* The first piece of who stands within cloud, of the same: small billows are shorter, and three values of a longer piece may lie on
- * a line by chance. Later ones have grown from pieces that were smooth. */
+/* The first piece of who stands within cloud, of the same: small noise is shorter, and three values of a longer piece
+ * may lie on a line by chance. Later ones have grown from pieces that were smooth. */
 #define FIRST_STEP 0.1
 
 /* Pixels may be wider than a layer is high: parts of the ray's stay in it that steps, and the least pieces, do not exceed. */
 #define STAY_STEP 0.16
 #define STAY_PIECE 0.0625
 
-/* Nodes of depths up, down and away from the sun, in parts of the layer's height: heaps between wider ones share the
- * depths of their middle, and are half as bright (test_clouds). */
+/* Nodes of depths up, down and away from the sun, in parts of the layer's height: cumulus cells between wider ones
+ * share the depths of their middle, and are half as bright (test_clouds). */
 #define NODES_PART 0.08
 
-/* Across a pixel heaps rise by so many times what they do in the mean, which is their height by their size: no less than the
- * pixel is wide where they are as high as the usual ones. */
+/* Across a pixel cumulus cells rise by so many times what they do in the mean, which is their height by their size: no
+ * less than the pixel is wide where they are as high as the usual ones. */
 #define STEEPNESS 1.5
 
 /* Pixels so wide beside a layer's height, times the square of how much wider they are than what they hide of it, hold nodes so far
@@ -173,8 +173,8 @@ static nb_cloud_sample spot_at(const nb_cloud_walk *walk, int k, double t)
     return spot;
 }
 
-/* How much of the way through a layer a pixel hides, of a way so long from base to top: as much as heaps rise across it, but no
- * less than their softness. */
+/* How much of the way through a layer a pixel hides, of a way so long from base to top: as much as cumulus cells rise
+ * across it, but no less than their softness. */
 static double hidden_way(const nb_cloud_layer *layer, double length, double width)
 {
     const double soft = (double)(layer->softness / NB_CLOUD_RANK_SLOPE);
@@ -300,8 +300,8 @@ typedef struct nb_lights {
     int layers[NB_CLOUD_ASKED];
     nb_cloud_segment stretches[NB_CLOUD_ASKED];
     double radius[NB_CLOUD_ASKED];
-    float crowd[NB_CLOUD_ASKED];   /* part of a mean of the layer */
-    float entered[NB_CLOUD_ASKED]; /* of that: part of its height where the ray came into it */
+    float prefiltered[NB_CLOUD_ASKED]; /* part of a mean of the layer */
+    float entered[NB_CLOUD_ASKED];     /* of that: part of its height where the ray came into it */
     nb_cloud_depth_query asked[NB_CLOUD_ASKED];
 } nb_lights;
 
@@ -324,7 +324,7 @@ static nb_cloud_resolution grain_of(const nb_cloud_walk *walk, int k, double wid
         .first =
             (float)nb_max(nb_min((layer->kind == NEBEL_CLOUD_CUMULUS ? 0.03 : 0.02) * thickness, 2 * hidden),
                           nb_min(0.1 * thickness, nb_min(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
-        /* Wider lattices than the layer is high would show through it, also where heaps are far wider than that. */
+        /* Wider lattices than the layer is high would show through it, also where cells are far wider than that. */
         .wide = (float)nb_max(nb_min(20 * width, nb_min(nb_max(2 * width, nodes), 0.8 * thickness)),
                               nb_min(0.08 * walk->least, nodes)),
         .own = (float)nb_max(
@@ -338,17 +338,17 @@ static void light_stretch(nb_lights *lights, int i)
     const int k = lights->layers[i];
     const nb_cloud_depth_query *asked = &lights->asked[i];
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
-    const float crowd = lights->crowd[i];
+    const float part = lights->prefiltered[i];
     const nb_cloud_depths depths = nb_cloud_bound_depths(walk->view, k, lights->radius[i], &asked->depths);
     double up[3];
     for (int c = 0; c < 3; c++) up[c] = asked->place[c] / lights->radius[i];
     const nb_cloud_sight sight = {(float)nb_vector_dot(up, walk->view->sun.direction),
                                   (float)nb_vector_dot(up, walk->unit), (float)walk->ray.sun};
     nb_cloud_irradiance parts = nb_cloud_parts_of(layer, &depths, &sight);
-    if (crowd > 0) {
+    if (part > 0) {
         const nb_cloud_irradiance mean = nb_cloud_prefilter_at(walk->workspace, k, up, walk->unit, lights->entered[i]);
-        const float left = parts.left + crowd * (1 - walk->ray.own) * (mean.left - parts.left);
-        parts = nb_cloud_mix_parts(&parts, &mean, crowd);
+        const float left = parts.left + part * (1 - walk->ray.own) * (mean.left - parts.left);
+        parts = nb_cloud_mix_parts(&parts, &mean, part);
         parts.left = left;
     }
     const nb_cloud_light light = nb_cloud_clear_light(walk->view, asked->place, lights->radius[i]);
@@ -401,9 +401,9 @@ static void add_light(nb_cloud_walk *walk, int k)
     lights->stretches[i] = stretch;
     lights->radius[i] = radius_at(walk, t, lights->asked[i].place);
     lights->asked[i].grain = grain_of(walk, k, walk->spread * t);
-    lights->crowd[i] = nb_cloud_prefilter_part(walk->workspace, k, lights->asked[i].grain.width);
-    lights->entered[i] = lights->crowd[i] > 0 ? height_entered(walk, k) : 0;
-    lights->asked[i].is_alike = lights->crowd[i] >= 1 && !(walk->ray.own > 0);
+    lights->prefiltered[i] = nb_cloud_prefilter_part(walk->workspace, k, lights->asked[i].grain.width);
+    lights->entered[i] = lights->prefiltered[i] > 0 ? height_entered(walk, k) : 0;
+    lights->asked[i].is_alike = lights->prefiltered[i] >= 1 && !(walk->ray.own > 0);
     walk->tally.asked++;
     if (lights->count == NB_CLOUD_ASKED) find_lights(walk->party);
 }

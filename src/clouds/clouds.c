@@ -18,8 +18,8 @@
 #define PI 3.14159265358979323846
 
 /* A pixel hides no more along a ray than a way through a ball of cloud that is so high, in parts of the layer, and so wide, in
- * sizes of heaps: of heaps, of sheets. Beyond it the ray meets other cloud. As thin rays find, straight down to 9 degrees flat
- * (test_clouds). */
+ * sizes of cumulus cells: of cumulus cells, of sheets. Beyond it the ray meets other cloud. As thin rays find,
+ * straight down to 9 degrees flat (test_clouds). */
 static const float hidden_heights[] = {0.37f, 0.75f}, hidden_widths[] = {0.42f, 0.55f};
 
 /* ---- places ---------------------------------------------------------------------------------- */
@@ -49,7 +49,7 @@ static float step_up(float x)
 /* ---- columns --------------------------------------------------------------------------------- */
 
 /* The part of an octave that is seen where pixels are `width` wide: none where four pixels go into three waves, each two
- * cells long. It fades over three octaves of widths: heaps would end at a line across pictures from orbit. */
+ * cells long. It fades over three octaves of widths: cumulus cells would end at a line across pictures from orbit. */
 static float share_of(float width, float cell)
 {
     return 1 - step_up((width / cell - 0.2f) / 1.4f);
@@ -122,19 +122,20 @@ static float rank_of(const nb_cloud_layer *layer, float part)
     return layer->ranks[low] + (place - (float)low) * (layer->ranks[low + 1] - layer->ranks[low]);
 }
 
-/* Billows cut into heaps, but into sheets on one side and fill them on the other, so that as much of the planet is under
- * them as is asked for. Where nearly all is, they close: gaps are filled, and what is left of noise makes thick and thin. */
+/* Worley noise cuts into cumulus cells, but into sheets on one side and fills them on the other, so that as much of
+ * the planet is under them as is asked for. Where nearly all is, they close: gaps are filled, and what is left of noise
+ * makes thick and thin. */
 static float fill_of(const nb_cloud_noise *noise, const nb_cloud_layer *layer, float coverage)
 {
     if (layer->kind == NEBEL_CLOUD_CUMULUS) return 0;
-    return layer->detail * (1 - noise->billow_mean) + 0.5f * layer->softness * step_up(10 * (coverage - 0.9f));
+    return layer->detail * (1 - noise->worley_mean) + 0.5f * layer->softness * step_up(10 * (coverage - 0.9f));
 }
 
 /* Where less is under clouds, their ranks are not drawn apart further, but lowered: columns are mixed with those next to them, which must
  * not be thousands of times as far above or below all cloud. */
 #define LEAST_COVERAGE 0.015625f
 
-/* The middle of a heap is where a twentieth of all cloud is more so. */
+/* The middle of a cumulus cell is where a twentieth of all cloud is more so. */
 nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const double unit[3],
                                    float width)
 {
@@ -209,7 +210,7 @@ static void set_default(double *number, double value)
     if (*number == 0) *number = value;
 }
 
-/* In little air heaps are as small as it is, or as the layer is that was asked for. */
+/* In little air cumulus cells are as small as it is, or as the layer is that was asked for. */
 static nebel_cloud_layer resolve(double thickness, const nebel_cloud_layer *desc)
 {
     const double scale = fmin(1, thickness / 1e5), depth = kinds[desc->type].top - kinds[desc->type].base;
@@ -315,7 +316,7 @@ static void turn_further(const double last[3][3], double next[3][3])
         }
 }
 
-/* From the planet's weather, over groups of clouds, to heaps. */
+/* From the planet's weather, over groups of clouds, to cumulus cells. */
 static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_layer *layer)
 {
     static const double weights[NB_CLOUD_OCTAVES] = {1, 1, 1, 0.45, 0.14};
@@ -339,14 +340,14 @@ static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_l
         layer->slope += octave->weight * NB_GRADIENT_SLOPE / octave->cell;
         layer->most += octave->weight; /* noise is within -1 and 1 */
     }
-    for (int i = 0; i < 3; i++) layer->billow_shift[i] = (double)nb_mix_bits(hash + (uint32_t)i) * 0x1p-32;
+    for (int i = 0; i < 3; i++) layer->worley_shift[i] = (double)nb_mix_bits(hash + (uint32_t)i) * 0x1p-32;
     double period = 0.9 * desc->cell_size;
-    for (int i = 0; i < NB_CLOUD_BILLOWS; i++, period /= (double)NB_BILLOW_RATIO) {
-        layer->per_billow[i] = 1 / period;
-        layer->billow_slopes[i] =
-            nb_billow_weights[i] * (float)fmax(0, desc->erosion) * NB_BILLOW_SLOPE / (float)period;
+    for (int i = 0; i < NB_CLOUD_WORLEY_SCALES; i++, period /= (double)NB_WORLEY_RATIO) {
+        layer->per_worley[i] = 1 / period;
+        layer->worley_slopes[i] =
+            nb_worley_weights[i] * (float)fmax(0, desc->erosion) * NB_WORLEY_SLOPE / (float)period;
     }
-    layer->last_billow = NB_BILLOW_SIZE * (float)layer->per_billow[NB_CLOUD_BILLOWS - 1];
+    layer->last_worley = NB_WORLEY_SIZE * (float)layer->per_worley[NB_CLOUD_WORLEY_SCALES - 1];
     layer->grid = layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 12;
     for (int i = 0; i < NB_CLOUD_GRIDS; i++) {
         const double wide = ldexp((double)layer->grid, i);

@@ -9,19 +9,19 @@
 #include <nebel/planet.h>
 
 enum {
-    NB_CLOUD_OCTAVES = 5, /* of where heaps are */
-    NB_CLOUD_BILLOWS = 3, /* scales of billows */
-    NB_CLOUD_RANKS = 257, /* of the octaves' sum */
-    NB_CLOUD_GRIDS = 32,  /* on which columns are kept */
+    NB_CLOUD_OCTAVES = 5,       /* of where cumulus cells are */
+    NB_CLOUD_WORLEY_SCALES = 3, /* scales of Worley noise */
+    NB_CLOUD_RANKS = 257,       /* of the octaves' sum */
+    NB_CLOUD_GRIDS = 32,        /* on which columns are kept */
 };
 
-/* Each scale of billows is so much smaller than the one before. */
-#define NB_BILLOW_RATIO 6.1f
-static const float nb_billow_weights[NB_CLOUD_BILLOWS] = {0.68f, 0.24f, 0.08f};
+/* Each scale of Worley noise is so much smaller than the one before. */
+#define NB_WORLEY_RATIO 6.1f
+static const float nb_worley_weights[NB_CLOUD_WORLEY_SCALES] = {0.68f, 0.24f, 0.08f};
 
-/* Wisps are so many times longer along the wind than across; billows in them. */
+/* Wisps are so many times longer along the wind than across; Worley noise in them. */
 #define NB_WISPS_DRAWN_OUT 4
-#define NB_BILLOWS_DRAWN_OUT 10
+#define NB_WORLEY_STRETCH 10
 
 /* Octaves of noise have their lattices turned against each other, so that no axis shows. */
 typedef struct nb_cloud_octave {
@@ -40,13 +40,13 @@ typedef struct nb_cloud_layer {
     double low, high;    /* m from the planet's centre */
     float per_thickness; /* 1/m */
     float extinction, detail, softness;
-    float size;                        /* m, of heaps */
+    float size;                        /* m, of cumulus cells */
     float hidden_height, hidden_width; /* m, of what is hidden at most */
     double axis[3], per_time;          /* the shell turns by that angle in a unit of time */
     nb_cloud_octave octaves[NB_CLOUD_OCTAVES];
-    double billow_shift[3], per_billow[NB_CLOUD_BILLOWS]; /* 1/m, of the largest first */
-    float last_billow;                                    /* 1/m, numbers in the table of the smallest */
-    float billow_slopes[NB_CLOUD_BILLOWS];                /* of ranks, at most, per m */
+    double worley_shift[3], per_worley[NB_CLOUD_WORLEY_SCALES]; /* 1/m, of the largest first */
+    float last_worley;                                          /* 1/m, numbers in the table of the smallest */
+    float worley_slopes[NB_CLOUD_WORLEY_SCALES];                /* of ranks, at most, per m */
     float ranks[NB_CLOUD_RANKS]; /* of the octaves' sum over the planet: what a part of it is below of */
     float slope, most;           /* of that sum, at most, per m; the sum itself */
     float grid;                  /* m, between columns that are kept */
@@ -81,9 +81,10 @@ typedef struct nb_cloud_rotation {
 
 nb_cloud_rotation nb_cloud_pose_at(const nb_cloud_layer *layer, double time);
 
-/* How much cloud is about a column: 0 is its border, 1 the middle of a heap. */
+/* How much cloud is about a column: 0 is its border, 1 the middle of a cumulus cell. */
 typedef struct nb_cloud_column {
-    float rank, scale, variance; /* rank: in units of heaps; scale: what the sum's are worth; of what a width hides */
+    float rank, scale,
+        variance; /* rank: in units of cumulus cells; scale: what the sum's are worth; of what a width hides */
 } nb_cloud_column;
 
 /* `unit` is from the planet's centre in the layer's axes. */
@@ -106,7 +107,8 @@ static inline float nb_cloud_base_thins(nebel_cloud_type kind)
     return kind == NEBEL_CLOUD_CUMULUS ? 16.0f : 6.0f;
 }
 
-/* Where rank is less there is no cloud at a part of the layer's height; a width is counted by the column's variance. Heaps are domes:
+/* Where rank is less there is no cloud at a part of the layer's height; a width is counted by the column's variance.
+ * Cumulus cells are domes:
  * where their rank falls as a parabola from the middle, its root is a half ball. */
 #define NB_CLOUD_RANK_SLOPE 2.8f /* of it over height, at most */
 static inline float nb_cloud_least_rank(nebel_cloud_type kind, float height)

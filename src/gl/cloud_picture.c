@@ -395,7 +395,7 @@ static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_c
     return result;
 }
 
-/* Knots move over from those before, and one may come between them. */
+/* Nodes move over from those before, and one may come between them. */
 static nebel_result choose_pixel(const job *j, nb_cloud_part *part, nb_cloud_pixel *pixel, const double direction[3])
 {
     const nb_cloud_pixel_node *const before = part->before + pixel->first;

@@ -26,7 +26,7 @@ struct nebel_gl {
     int dims_alone;            /* the fog is asked for transmittance alone: nothing of it is mixed */
     int has_warned;            /* of the turns of loops */
     int may_tire;              /* rays may take more of them than this driver has */
-    int is_crowded;            /* some will */
+    int overlaps_much;         /* some will */
     int has_fog;               /* what follows is of the last nebel_gl_set_fog, and that went well */
     nebel_lighting *packed;    /* what words and tiles are made of, as `view` sees it; NULL: of nothing */
     nebel_lighting *voxels_of; /* what the texture of voxels is made of; NULL: of nothing */
@@ -77,7 +77,7 @@ typedef struct nb_fog_pass_input {
 /* nebel_gl_draw_fog along these. */
 nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nb_fog_pass_input *picture);
 
-/* Tells once, of fog that is crowded, what this driver leaves out of its light, and `why`. */
+/* Tells once, of many volumes that overlap, what this driver leaves out of its light, and `why`. */
 void nb_gl_warn_of_turns(nebel_gl *gl, const char *why);
 
 /* The number of a tile's pixels in a row is 2 to this. */

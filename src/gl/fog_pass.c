@@ -405,7 +405,7 @@ static nebel_result draw_with_program(nb_pass_task *t, GLuint target_framebuffer
         nb_programs_find(&gl->programs, &gl->context, &gl->allocator, &gl->log, &kind, &t->program);
     if (result != NEBEL_OK) return result;
     if (in_steps) return draw_in_steps(t, target_framebuffer);
-    if (gl->is_crowded)
+    if (gl->overlaps_much)
         nb_gl_warn_of_turns(gl, "several samples of a pixel, or pieces of air, share what it gives to a ray");
     return draw(t, target_framebuffer);
 }

@@ -137,7 +137,7 @@ static int may_tire(const nebel_gl *gl)
 }
 
 /* How many cells of voxels a ray passes is not known. */
-static int find_crowd(const nebel_gl *gl, const nebel_lighting *lighting)
+static int find_overlap(const nebel_gl *gl, const nebel_lighting *lighting)
 {
     const uint32_t lit = NEBEL_FEATURE_SUN | NEBEL_FEATURE_LIGHTS | NEBEL_FEATURE_MIXED;
     const double all = (double)nb_gl_count_volumes(lighting);
@@ -356,8 +356,8 @@ static nebel_result prepare(nebel_gl *gl, nebel_lighting *lighting, const double
     }
     if (result == NEBEL_OK) result = upload_fog(gl, has_words ? NULL : lighting, entry_count);
     keep(&gl->packed, result == NEBEL_OK ? lighting : NULL);
-    gl->is_crowded = result == NEBEL_OK && find_crowd(gl, lighting);
-    gl->may_tire = gl->is_crowded || (result == NEBEL_OK && may_tire(gl));
+    gl->overlaps_much = result == NEBEL_OK && find_overlap(gl, lighting);
+    gl->may_tire = gl->overlaps_much || (result == NEBEL_OK && may_tire(gl));
     gl->has_fog = result == NEBEL_OK;
     return result;
 }

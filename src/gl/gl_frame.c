@@ -376,7 +376,7 @@ nebel_result nb_gl_frame_draw_fog(const nb_gl_frame *f)
         !nb_method_is_by_vertex(&f->method) && !f->method.replaces_fog && !nb_method_takes_cells(f->desc->method);
     const int is_asked = is_exact || nb_gl_frame_has_particles(f) || (has_lights(f) && !f->method.replaces_fog);
     if (result == NEBEL_OK && (r->fog != NULL || f->planet != NULL) && is_asked) result = set_eye_fog(f);
-    if (result == NEBEL_OK && nb_gl_frame_has_particles(f) && r->eye_fog->is_crowded)
+    if (result == NEBEL_OK && nb_gl_frame_has_particles(f) && r->eye_fog->overlaps_much)
         nb_gl_warn_of_turns(r->eye_fog, "particles ask in one pass for what is before them");
     return result == NEBEL_OK && is_exact ? draw_exact_fog(f) : result;
 }

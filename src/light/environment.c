@@ -149,7 +149,7 @@ static double integrate_lobe(const nb_lobe *lobe, double u)
     return lobe->weight * sum / (1 + of.alpha * (1 + 2 * of.g * of.g) / 3);
 }
 
-/* Knots are dense where |y| has its edge, as wide as the sharpest lobe: equal steps of log(1 + u / width). */
+/* Nodes are dense where |y| has its edge, as wide as the sharpest lobe: equal steps of log(1 + u / width). */
 static void fill_gradient(nb_environment_filter *filter)
 {
     double sharpest = 0;
@@ -165,7 +165,7 @@ static void fill_gradient(nb_environment_filter *filter)
     }
 }
 
-/* The cubic through the four nearest knots. */
+/* The cubic through the four nearest nodes. */
 static double rectified_at(const nb_environment_filter *filter, double u)
 {
     const double place = (NB_SKY_NODES - 1) * (nb_log1p(u / filter->width) / nb_log1p(1 / filter->width));

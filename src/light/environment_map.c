@@ -248,9 +248,9 @@ static int analyse(nebel_environment_map *map, const recurrence *r)
 
 /* ---- from harmonics to tables ---------------------------------------------------------------- */
 
-/* Knots of a B-spline through the values of a circle: z / (1 - z^2) z^|n|, z = sqrt(3) - 2, and the transform of it
+/* Nodes of a B-spline through the values of a circle: z / (1 - z^2) z^|n|, z = sqrt(3) - 2, and the transform of it
  * (Unser, Aldroubi and Eden, B-Spline Signal Processing, 1993), by its two recursive filters. */
-static void find_knots(double *values, size_t count)
+static void find_nodes(double *values, size_t count)
 {
     const double pole = sqrt(3.0) - 2;
     enum { RUN_UP = 32 }; /* pole^32 is below 1e-18 */
@@ -263,7 +263,7 @@ static void find_knots(double *values, size_t count)
     for (size_t i = 0; i < count; i++) values[i] *= 6;
 }
 
-/* Knots along every circle of latitude, then along every great circle through the poles: down one column and up the
+/* Nodes along every circle of latitude, then along every great circle through the poles: down one column and up the
  * opposite one. */
 static void make_splines(nb_environment_table *table, double *circle)
 {
@@ -272,7 +272,7 @@ static void make_splines(nb_environment_table *table, double *circle)
         for (size_t i = 0; i < rows; i++) {
             float *row = &table->coefficients[3 * i * columns + (size_t)c];
             for (size_t j = 0; j < columns; j++) circle[j] = (double)row[3 * j];
-            find_knots(circle, columns);
+            find_nodes(circle, columns);
             for (size_t j = 0; j < columns; j++) row[3 * j] = (float)circle[j];
         }
         for (size_t j = 0; j < rows; j++) {
@@ -281,7 +281,7 @@ static void make_splines(nb_environment_table *table, double *circle)
                 circle[i] = (double)down[3 * i * columns];
                 circle[columns - 1 - i] = (double)up[3 * i * columns];
             }
-            find_knots(circle, columns);
+            find_nodes(circle, columns);
             for (size_t i = 0; i < rows; i++) {
                 down[3 * i * columns] = (float)circle[i];
                 up[3 * i * columns] = (float)circle[columns - 1 - i];

@@ -10,10 +10,10 @@
 /* Cubic B-splines over longitude and latitude; `columns` is twice `rows`. */
 typedef struct nb_environment_table {
     size_t rows, columns;
-    float *coefficients; /* 3 for each knot, the top row first */
+    float *coefficients; /* 3 for each node, the top row first */
 } nb_environment_table;
 
-/* Knots of a gradient's filter: see sky.c. */
+/* Nodes of a gradient's filter: see sky.c. */
 enum { NB_SKY_NODES = 129 };
 
 struct nb_environment_filter {

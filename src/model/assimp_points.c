@@ -1,4 +1,4 @@
-/* The vertices of a model as places: what a nebula is strewn on. */
+/* The vertices of a model as places: what a nebula is distributed on. */
 #include "assimp_builder.h"
 #include "assimp_load.h"
 

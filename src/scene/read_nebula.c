@@ -144,7 +144,7 @@ static bool check_bounds(nb_json *json, const nb_json_node *shape, nebel_shape_t
                         "has no bounds; particles need a shape that has, a sphere or a box");
 }
 
-/* The core's own checks: of nothing strewn, so quick. */
+/* The core's own checks: of nothing distributed, so quick. */
 static bool try_nebula(nb_scene_reader *in, const nb_json_node *node, const nebel_nebula_desc *nebula)
 {
     static const char subject[] = "nebula: ";

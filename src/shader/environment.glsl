@@ -48,7 +48,7 @@ nb_vec3 nb_mix_gradient(float mean, float rectified)
                nb_splat3(0.0));
 }
 
-/* The cubic through the four nearest knots. */
+/* The cubic through the four nearest nodes. */
 float nb_rectified(int table, float y)
 {
     nb_vec4 head = NEBEL_ENVIRONMENT_TEXEL(table);

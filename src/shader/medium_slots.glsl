@@ -110,10 +110,10 @@ struct nb_window {
     int turns; /* it took */
 };
 
-/* Stretches behind t. The nearest of all media; or in a crowd, where more begin at t than there are slots, those of the media
- * from `begin` on until the slots are full. A stretch of a body of several leaves ends the window: another may follow. Without a
- * crowd, a window that ends at t says that there is one. */
-nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin, float t, bool crowd)
+/* Stretches behind t. The nearest of all media; or in an overflow, where more begin at t than there are slots, those
+ * of the media from `begin` on until the slots are full. A stretch of a body of several leaves ends the window: another
+ * may follow. Without a overflow, a window that ends at t says that there is one. */
+nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin, float t, bool overflow)
 {
     nb_window window;
     window.used = 0;
@@ -123,7 +123,7 @@ nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin
     int farthest = 0;
     for (int i = begin; i < count; i++) {
         if (window.end <= t || nb_is_tired(window.turns)) break;
-        if (crowd && window.used == NEBEL_MEDIUM_SLOTS) {
+        if (overflow && window.used == NEBEL_MEDIUM_SLOTS) {
             window.rest = i;
             break;
         }
@@ -137,7 +137,7 @@ nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin
             nb_set_slot(window.used, at, s);
             nb_light_slot(window.used, at, ray.direction);
             window.used++;
-            if (!crowd && window.used == NEBEL_MEDIUM_SLOTS) farthest = nb_farthest_slot(window.used);
+            if (!overflow && window.used == NEBEL_MEDIUM_SLOTS) farthest = nb_farthest_slot(window.used);
             continue;
         }
         float dropped = max(s.enter, nb_fog_slot(farthest).x);

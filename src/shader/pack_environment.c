@@ -12,7 +12,7 @@
 
 #define MOST_WORDS ((size_t)1 << 24) /* indices are exact floats */
 
-_Static_assert(NB_FILTER_PIECES == NB_SKY_NODES - 3, "a piece has four knots");
+_Static_assert(NB_FILTER_PIECES == NB_SKY_NODES - 3, "a piece has four nodes");
 _Static_assert(NB_ENVIRONMENT_CONSTANT == (int)NEBEL_ENVIRONMENT_CONSTANT &&
                    NB_ENVIRONMENT_GRADIENT == (int)NEBEL_ENVIRONMENT_GRADIENT &&
                    NB_ENVIRONMENT_MAP == (int)NEBEL_ENVIRONMENT_MAP,

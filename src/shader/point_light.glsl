@@ -112,8 +112,8 @@ float nb_light_turn(nb_light_pass by, nb_ray ray, float t, float end)
 struct nb_light_segment {
     float start, end;
     int floor;        /* what ranks lower is covered */
-    int media;        /* how many to ask: those in slots, or in a crowd all */
-    bool crowd;
+    int media;        /* how many to ask: those in slots, or in an overflow all */
+    bool overflow;
     bool scatters;
     nb_vec3 depth;    /* of all of it */
     float scatter;    /* radiance per irradiance that opaque fog of it gives at most */
@@ -149,7 +149,7 @@ void nb_narrow_peaks(int scattering, inout nb_light_segment piece)
 int nb_light_medium(nb_ray ray, int first, bool listed, nb_light_segment piece, int i, inout int turns)
 {
     int at = 0;
-    if (!piece.crowd) {
+    if (!piece.overflow) {
         at = int(nb_fog_slot(i).z);
     } else {
         int asked = nb_medium_at(first + i, listed);
@@ -200,7 +200,7 @@ nb_light_segment nb_next_piece(nb_ray ray, int first, int count, bool listed, fl
     piece.end = end;
     piece.floor = 0;
     piece.media = 0;
-    piece.crowd = false;
+    piece.overflow = false;
     piece.scatters = false;
     piece.depth = nb_splat3(0.0);
     piece.scatter = 0.0;
@@ -220,9 +220,9 @@ nb_light_segment nb_next_piece(nb_ray ray, int first, int count, bool listed, fl
         if (piece.media < NEBEL_MEDIUM_SLOTS) nb_set_slot(piece.media, at, s);
         piece.media++;
     }
-    piece.crowd = piece.media > NEBEL_MEDIUM_SLOTS;
-    if (NB_HAS(NB_HAS_OVERRIDE) && !piece.crowd) piece.media = nb_drop_covered(piece.media, piece.floor);
-    if (piece.crowd) piece.media = count;
+    piece.overflow = piece.media > NEBEL_MEDIUM_SLOTS;
+    if (NB_HAS(NB_HAS_OVERRIDE) && !piece.overflow) piece.media = nb_drop_covered(piece.media, piece.floor);
+    if (piece.overflow) piece.media = count;
     for (int i = 0; i < piece.media; i++) {
         int at = nb_light_medium(ray, first, listed, piece, i, turns);
         turns += 1;

@@ -90,9 +90,9 @@
  *     3  a gradient's ground
  * then a filter for each phase function that scatters it, and for a map, where they were asked for, the same for surfaces, and
  * its pixels behind one word with its width and height. A filter of a gradient, see sky.c:
- *     0  mean cosine of the phase function, 1 / width of the knots, number of the last / log(1 + 1 / width)
- *     then for each of the NB_FILTER_PIECES four knots from its number on
- * A filter of a map, B-splines over longitude and latitude, see environment_map.c:
+ *     0  mean cosine of the phase function, 1 / width of the nodes, number of the last / log(1 + 1 / width)
+ * then for each of the NB_FILTER_PIECES four nodes from its number on A filter of a map, B-splines over longitude and
+ * latitude, see environment_map.c:
  *     0  columns, rows
  *     then the coefficients, the top row first.
  *

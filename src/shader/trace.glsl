@@ -87,7 +87,7 @@ void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed,
 {
     float tolerance = NEBEL_FOG_TEXEL(0).y;
     float t = g.reached;
-    bool crowd = false;
+    bool overflow = false;
     bool stepping = false;
     nb_vec2 sunlit = nb_vec2(1.0, 0.0);
     nb_piece piece = nb_open_piece(0.0, 0.0);
@@ -104,24 +104,24 @@ void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed,
             nb_plan_leg(leg, piece, ray, sunlit, turns);
             leg.h = min(leg.h, min(leg.stop - leg.from, leg.most));
         }
-        bool stale = crowd || t >= window.end;
+        bool stale = overflow || t >= window.end;
         if (!on_leg) piece = nb_open_piece(t, ray.t_max);
         for (int next = 0; next < count;) {
             if (stale) {
-                window = nb_fill_slots(ray, first, count, listed, next, t, crowd);
+                window = nb_fill_slots(ray, first, count, listed, next, t, overflow);
                 turns += window.turns;
                 if (nb_is_tired(turns)) break;
             }
             turns += 1 + window.used * (on_leg ? 1 + NB_NODES : 2);
-            bool over_full = !crowd && window.end <= t;
-            crowd = crowd || over_full;
+            bool over_full = !overflow && window.end <= t;
+            overflow = overflow || over_full;
             if (over_full) continue;
             next = window.rest;
             piece.end = min(piece.end, window.end);
             if (NB_HAS(NB_HAS_OVERRIDE) && !on_leg) piece = nb_cover_piece(piece, window.used);
             for (int k = 0; k < window.used; k++) {
                 if (!on_leg)
-                    piece = nb_note_slot(piece, k, ray, lit && !crowd && nb_is_day());
+                    piece = nb_note_slot(piece, k, ray, lit && !overflow && nb_is_day());
                 else if (nb_is_there(nb_fog_slot(k), piece))
                     nb_add_slot(leg, piece, k, ray);
             }
@@ -148,8 +148,8 @@ void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed,
         stepping = !over;
         if (over) {
             t = piece.end;
-            if (crowd) window.end = t;
-            crowd = false;
+            if (overflow) window.end = t;
+            overflow = false;
         }
         g.reached = t + (stepping ? leg.from : 0.0);
         if (!nb_has_loops(count)) break;

@@ -1,5 +1,5 @@
 /* Which media the walk along the rays looks at: where very many lie on them, only those about the place where it is,
- * and the crowd (trace_overlap_set.h) as a whole. Included by trace_kernel.c after that.
+ * and the overlap set (trace_overlap_set.h) as a whole. Included by trace_kernel.c after that.
  *
  * Media are sorted by where the packet first enters one. All lanes walk up to the first entry that the window does not
  * hold, then the window moves on: it lets go of what they have left behind and takes in what comes next. A lane's
@@ -55,7 +55,7 @@ static void look_at_all(packet_state *m)
 {
     m->window_count = 0;
     for (uint32_t i = 0; i < m->contact_count; i++)
-        if (!is_in_crowd(m, i)) m->window[m->window_count++] = i;
+        if (!is_in_overlap_set(m, i)) m->window[m->window_count++] = i;
     m->stretch_count = m->entered = m->window_count;
     m->window_end = HUGE_VAL;
 }
@@ -85,7 +85,7 @@ static void open_window(packet_state *m, int at_all)
     }
     m->stretch_count = 0;
     for (uint32_t i = 0; i < m->contact_count; i++) {
-        if (is_in_crowd(m, i)) continue;
+        if (is_in_overlap_set(m, i)) continue;
         const active_interval s = stretch_of(m, i);
         m->stretches[m->stretch_count++] = s;
         m->lasts[i] = s.last;

@@ -53,7 +53,7 @@ static double find_depth(packet_state *m, int channel, nb_real wanted)
     nb_real depth = NB_F(0.0);
     nb_wide t = NB_W(0.0);
     ray_segment p;
-    m->crowd.is_walking = nb_any(m->crowd.lanes);
+    m->overlap_set.is_walking = nb_any(m->overlap_set.lanes);
     open_window(m, nb_any(ends_matter(m)));
     while (next_piece(m, t, m->rays.t_max > t, &p)) {
         if (mark_inside(m, &p)) {

@@ -193,7 +193,7 @@ static int meet_fog(workspace *w, const nebel_lighting *lighting)
         for (size_t i = 0; i < w->found_count; i++)
             if (!meet_one(w, lighting, w->found[i])) return 0;
     }
-    return open_crowd(m, lighting);
+    return open_overlap_set(m, lighting);
 }
 
 /* ---- light out ------------------------------------------------------------------------------- */
@@ -346,18 +346,18 @@ static void select_gathered(nb_mask mask, gathered_light *to, const gathered_lig
     to->radiance_error = nb_select(mask, from->radiance_error, to->radiance_error);
 }
 
-/* Lanes that are crowded and those that are not, each kind by itself. */
+/* Lanes with an overlap set and those without, each kind by itself. */
 static gathered_light gather_light(packet_state *m, const allowance *may, nb_mask *unbounded)
 {
-    const nb_mask crowded = m->crowd.lanes;
-    if (!nb_any(crowded)) return walk_lanes(m, may, nb_mask_true, unbounded);
-    m->crowd.is_walking = 1;
-    gathered_light g = walk_lanes(m, may, crowded, unbounded);
-    m->crowd.is_walking = 0;
-    if (nb_all(crowded)) return g;
+    const nb_mask overlapping = m->overlap_set.lanes;
+    if (!nb_any(overlapping)) return walk_lanes(m, may, nb_mask_true, unbounded);
+    m->overlap_set.is_walking = 1;
+    gathered_light g = walk_lanes(m, may, overlapping, unbounded);
+    m->overlap_set.is_walking = 0;
+    if (nb_all(overlapping)) return g;
     nb_mask others_unbounded;
-    const gathered_light others = walk_lanes(m, may, nb_not(crowded), &others_unbounded);
-    select_gathered(nb_not(crowded), &g, &others);
+    const gathered_light others = walk_lanes(m, may, nb_not(overlapping), &others_unbounded);
+    select_gathered(nb_not(overlapping), &g, &others);
     *unbounded = nb_or(*unbounded, others_unbounded);
     return g;
 }
@@ -568,7 +568,7 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     nb_mask unbounded;
     if (w->m.sun != NULL) begin_lights(w->m.sun, job, first, count);
     *g = gather_light(&w->m, &share, &unbounded);
-    if (w->m.sun != NULL && job->lighting->is_lit_overlap_set) gather_crowd_lights(w->m.sun, &w->m, g);
+    if (w->m.sun != NULL && job->lighting->is_lit_overlap_set) gather_overlap_lights(w->m.sun, &w->m, g);
     if (w->m.sun != NULL && w->m.sun->out_of_memory) return NEBEL_ERROR_MEMORY;
     limit_radiance(&w->m, g);
     for (size_t i = 0; i < count && nb_any(unbounded); i++)

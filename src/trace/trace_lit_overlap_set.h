@@ -21,7 +21,7 @@
 #define EDGE_SHARE 0.02
 
 /* More steps of bodies over each other than of one: around each edge of a shadow they are halved. */
-#define MOST_CROWD_STEPS (16 * MOST_SUN_STEPS)
+#define MAX_OVERLAP_STEPS (16 * MOST_SUN_STEPS)
 
 /* What a root that begins within a step is off by, more or less. */
 #define EDGE_ERROR NB_F(0.02)
@@ -336,8 +336,8 @@ static lit_point look_ahead_from(const sunlight *sun, const packet_state *m, con
     return at;
 }
 
-static overlap_step try_crowd_step(const sunlight *sun, const packet_state *m, const overlap_light *light,
-                                   const lit_point *start, nb_real length, nb_wide end)
+static overlap_step try_overlap_step(const sunlight *sun, const packet_state *m, const overlap_light *light,
+                                     const lit_point *start, nb_real length, nb_wide end)
 {
     const nb_real quarter = NB_F(0.25) * length;
     const nb_wide margin = (end - start->t) * WIDE(CONE_MARGIN);
@@ -419,15 +419,15 @@ static nb_real next_length(nb_real length, nb_real error, nb_real allowed)
     return length * nb_select(error <= allowed, next, half);
 }
 
-static void step_through_crowd(sunlight *sun, const packet_state *m, const overlap_light *light, nb_wide bright,
-                               overlap_walk *w, gathered_light *g)
+static void step_through_overlap(sunlight *sun, const packet_state *m, const overlap_light *light, nb_wide bright,
+                                 overlap_walk *w, gathered_light *g)
 {
     const nb_mask final = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
     const nb_real rest = nb_narrow(bright - w->at.t);
     const nb_real length = nb_select(final, rest, nb_min(w->guess, rest));
     const nb_wide end = nb_wselect(nb_widen_mask(length >= rest), bright, w->at.t + nb_widen(length));
     list_shadows_of_step(sun, w->at.t, end, w->lanes);
-    const overlap_step s = try_crowd_step(sun, m, light, &w->at, length, end);
+    const overlap_step s = try_overlap_step(sun, m, light, &w->at, length, end);
     const nb_real least = NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
     const nb_real steady = REAL(0.5 * (1 - EDGE_SHARE)) * (s.drop + length * nb_rcp_bounded(w->whole));
     const nb_real at_edge =
@@ -504,12 +504,13 @@ static nb_wide trim_stretch(const packet_state *m, const overlap_light *light, n
 }
 
 /* Steps end where a surface's shadow begins or ends, and pass over it. */
-static void walk_through_crowd(sunlight *sun, const packet_state *m, const overlap_light *light,
-                               sun_attenuation *shadows, nb_mask lanes, nb_wide first, nb_wide last, gathered_light *g)
+static void walk_through_overlap(sunlight *sun, const packet_state *m, const overlap_light *light,
+                                 sun_attenuation *shadows, nb_mask lanes, nb_wide first, nb_wide last,
+                                 gathered_light *g)
 {
     const lit_point origin = no_place();
     overlap_walk w = {
-        .last = last, .lanes = nb_wand(nb_widen_mask(lanes), first < last), .left = REAL(MOST_CROWD_STEPS)};
+        .last = last, .lanes = nb_wand(nb_widen_mask(lanes), first < last), .left = REAL(MAX_OVERLAP_STEPS)};
     w.at = place_behind(sun, m, light, &origin, nb_wselect(w.lanes, first, NB_W(0.0)), w.lanes);
     start_from_last(sun, nb_mask_true);
     w.whole = nb_max(nb_narrow(last - first), NB_TINY);
@@ -522,16 +523,16 @@ static void walk_through_crowd(sunlight *sun, const packet_state *m, const overl
             const lit_point behind = place_behind(sun, m, light, &w.at, nb_wselect(dark, bright, w.at.t), w.lanes);
             select_place(nb_narrow_mask(dark), &w.at, &behind);
             start_from_last(sun, nb_narrow_mask(dark));
-            w.left = nb_select(nb_narrow_mask(dark), REAL(MOST_CROWD_STEPS), w.left);
+            w.left = nb_select(nb_narrow_mask(dark), REAL(MAX_OVERLAP_STEPS), w.left);
         } else {
-            step_through_crowd(sun, m, light, next_turn(sun, w.at.t, bright), &w, g);
+            step_through_overlap(sun, m, light, next_turn(sun, w.at.t, bright), &w, g);
         }
         w.lanes = nb_wand(w.lanes, w.at.t < last);
     }
 }
 
-static void gather_light_of_crowd(sunlight *sun, const packet_state *m, const overlap_light *light,
-                                  sun_attenuation *shadows, gathered_light *g)
+static void gather_overlap_light(sunlight *sun, const packet_state *m, const overlap_light *light,
+                                 sun_attenuation *shadows, gathered_light *g)
 {
     nb_wide first, last;
     const nb_mask lit = find_lit_stretch(m, light->pass != NULL, &first, &last);
@@ -550,7 +551,7 @@ static void gather_light_of_crowd(sunlight *sun, const packet_state *m, const ov
     }
     list_shadows(sun, &m->rays, light->pass != NULL ? light->pass->point_light : NULL);
     if (sun->out_of_memory) return;
-    walk_through_crowd(sun, m, light, shadows, lit, first, end, g);
+    walk_through_overlap(sun, m, light, shadows, lit, first, end, g);
 }
 
 /* ---- all lights ------------------------------------------------------------------------------ */
@@ -570,13 +571,13 @@ static nb_real most_sunlight(const packet_state *m)
 }
 
 /* Adds what all lights give along the rays. */
-static void gather_crowd_lights(sunlight *sun, const packet_state *m, gathered_light *g)
+static void gather_overlap_lights(sunlight *sun, const packet_state *m, gathered_light *g)
 {
     const nebel_lighting *lighting = sun->lighting;
     nb_real before[3] = {g->radiance[0], g->radiance[1], g->radiance[2]};
     if (lighting->scatters_sun) {
         const overlap_light light = {.most = most_sunlight(m), .share = sun->share};
-        gather_light_of_crowd(sun, m, &light, sun->shade.boundaries != NULL ? &sun->shade : NULL, g);
+        gather_overlap_light(sun, m, &light, sun->shade.boundaries != NULL ? &sun->shade : NULL, g);
     }
     note_group(sun->by_sun, before, g);
     for (int c = 0; c < 3; c++) before[c] = g->radiance[c];
@@ -591,7 +592,7 @@ static void gather_crowd_lights(sunlight *sun, const packet_state *m, gathered_l
     for (size_t i = 0; i < lighting->light_count && phase != NULL; i++) {
         light_pass pass = pass_light(m, &lighting->lights[i]);
         const overlap_light light = {&pass, phase, most, sun->share / (double)lighting->light_count};
-        gather_light_of_crowd(sun, m, &light, sun->light_shades != NULL ? &sun->light_shades[i] : NULL, g);
+        gather_overlap_light(sun, m, &light, sun->light_shades != NULL ? &sun->light_shades[i] : NULL, g);
     }
     note_group(sun->by_lights, before, g);
 }

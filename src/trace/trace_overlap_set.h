@@ -1,12 +1,12 @@
 /* Very many media over each other: where n of them overlap, asking each one at each of the 2 n ends is n squared.
  *
  * Between two ends media of constant density are as one, whose extinction and light are their sums. So those that may
- * (nb_medium.joins) form a crowd: their ends are sorted, and a binary tree has the sums, in which a medium that begins
- * or ends changes one leaf and the log n nodes above it. To the walk the crowd is one contact more.
+ * (nb_medium.joins) form an overlap set: their ends are sorted, and a binary tree has the sums, in which a medium that
+ * begins or ends changes one leaf and the log n nodes above it. To the walk the overlap set is one contact more.
  *
  * A sum depends on which media are there and on nothing else: neither on how it came about, as it would with running
  * sums, nor on a lane's company, because every lane has its own events and a tree over the media that it meets itself.
- * For the same reason each lane decides by itself whether it is crowded: the walk is walked once for those that are and
+ * For the same reason each lane decides by itself whether it has one: the walk is walked once for those that are and
  * once for the others. Included by trace_kernel.c after trace_active_set.h. */
 
 /* A place on the ray of one lane, with all its digits. */
@@ -76,9 +76,9 @@ static void list_events(const packet_state *m, overlap_set *c, int lane)
         if (events[i].reach < events[i - 1].reach) events[i - 1].reach = events[i].reach;
 }
 
-/* ---- the crowd ------------------------------------------------------------------------------- */
+/* ---- the overlap set ------------------------------------------------------------------------ */
 
-/* Light per extinction, exactly where all in the crowd have the same. */
+/* Light per extinction, exactly where all in the overlap set have the same. */
 static void find_common_radiance(const packet_state *m, overlap_set *c)
 {
     nb_mask seen = nb_mask_false;
@@ -97,8 +97,8 @@ static void find_common_radiance(const packet_state *m, overlap_set *c)
     }
 }
 
-/* How many of the crowd each lane meets; the most of all lanes. */
-static size_t count_crowd(const packet_state *m, nb_scalar lane[NB_WIDTH])
+/* How many of the overlap set each lane meets; the most of all lanes. */
+static size_t count_overlap_set(const packet_state *m, nb_scalar lane[NB_WIDTH])
 {
     nb_real met = NB_F(0.0);
     for (size_t i = 0; i < m->contact_count; i++)
@@ -117,8 +117,8 @@ static int height_of(size_t count)
     return height;
 }
 
-/* Room for a crowd of `most` in each lane, whose sums are 0. 0 when memory is out. */
-static int reserve_crowd(overlap_set *c, const nebel_allocator *allocator, size_t most)
+/* Room for an overlap set of `most` in each lane, whose sums are 0. 0 when memory is out. */
+static int reserve_overlap_set(overlap_set *c, const nebel_allocator *allocator, size_t most)
 {
     c->seats = (size_t)1 << height_of(most);
     const size_t places = 2 * c->seats * NB_WIDTH;
@@ -135,24 +135,24 @@ static int reserve_crowd(overlap_set *c, const nebel_allocator *allocator, size_
     return 1;
 }
 
-/* The contact that stands for the crowd, behind all others. */
-static medium_hit *crowd_contact(packet_state *m)
+/* The contact that stands for the overlap set, behind all others. */
+static medium_hit *overlap_set_contact(packet_state *m)
 {
     return &m->contacts[m->contact_count];
 }
 
-/* Lists the crowds of all lanes that have one. 0 when memory is out. */
-static int open_crowd(packet_state *m, const nebel_lighting *lighting)
+/* Lists the overlap sets of all lanes that have one. 0 when memory is out. */
+static int open_overlap_set(packet_state *m, const nebel_lighting *lighting)
 {
     const nebel_allocator *allocator = &lighting->snapshot->allocator;
-    overlap_set *c = &m->crowd;
+    overlap_set *c = &m->overlap_set;
     c->lanes = nb_mask_false;
     c->is_walking = 0;
     if (lighting->joining_count < NB_MIN_OVERLAP_SET || m->contact_count < NB_MIN_OVERLAP_SET) return 1;
     nb_scalar met[NB_WIDTH];
-    const size_t most = count_crowd(m, met);
+    const size_t most = count_overlap_set(m, met);
     if (most < NB_MIN_OVERLAP_SET) return 1;
-    if (!reserve_crowd(c, allocator, most)) return 0;
+    if (!reserve_overlap_set(c, allocator, most)) return 0;
     c->lanes = nb_load_lanes(met) >= nb_splat(NB_MIN_OVERLAP_SET);
     c->rank = lighting->joining->body.rank;
     for (int i = 0; i < NB_WIDTH; i++) {
@@ -161,16 +161,16 @@ static int open_crowd(packet_state *m, const nebel_lighting *lighting)
         met[i] = (nb_scalar)(1 + height_of((size_t)met[i]));
     }
     find_common_radiance(m, c);
-    *crowd_contact(m) = (medium_hit){.medium = lighting->joining,
-                                     .lit = &lighting->media[lighting->joining - lighting->snapshot->media],
-                                     .noise = nb_load_lanes(met) * NB_EPSILON};
+    *overlap_set_contact(m) = (medium_hit){.medium = lighting->joining,
+                                           .lit = &lighting->media[lighting->joining - lighting->snapshot->media],
+                                           .noise = nb_load_lanes(met) * NB_EPSILON};
     return 1;
 }
 
-/* Whether the walk finds the medium in the crowd instead of in its window. */
-static int is_in_crowd(const packet_state *m, size_t index)
+/* Whether the walk finds the medium in the overlap set instead of in its window. */
+static int is_in_overlap_set(const packet_state *m, size_t index)
 {
-    return m->crowd.is_walking && m->contacts[index].lit->joins;
+    return m->overlap_set.is_walking && m->contacts[index].lit->joins;
 }
 
 /* ---- the walk -------------------------------------------------------------------------------- */
@@ -197,9 +197,9 @@ static void pass_event(const packet_state *m, overlap_sum *sums, size_t seats, c
 }
 
 /* Passes all events up to t. */
-static void advance_crowd(packet_state *m, nb_wide t)
+static void advance_overlap_set(packet_state *m, nb_wide t)
 {
-    overlap_set *c = &m->crowd;
+    overlap_set *c = &m->overlap_set;
     for (int i = 0; i < NB_WIDTH; i++) {
         const overlap_event *events = &c->events[2 * c->seats * (size_t)i];
         const lane_place here = nb_lane(t, i);
@@ -211,8 +211,8 @@ static void advance_crowd(packet_state *m, nb_wide t)
     }
 }
 
-/* The next event of the crowd; NB_WFAR * 2 where there is none. */
-static nb_wide next_in_crowd(const overlap_set *c)
+/* The next event of the overlap set; NB_WFAR * 2 where there is none. */
+static nb_wide next_in_overlap_set(const overlap_set *c)
 {
     lane_place lane[NB_WIDTH];
     for (int i = 0; i < NB_WIDTH; i++) {
@@ -222,10 +222,10 @@ static nb_wide next_in_crowd(const overlap_set *c)
     return load_places(lane);
 }
 
-/* Gives the crowd's contact the sums of what is there now, in `lanes`. Returns whether anything is. */
-static int mark_crowd(packet_state *m, nb_mask lanes)
+/* Gives the overlap set's contact the sums of what is there now, in `lanes`. Returns whether anything is. */
+static int mark_overlap_set(packet_state *m, nb_mask lanes)
 {
-    const overlap_set *c = &m->crowd;
+    const overlap_set *c = &m->overlap_set;
     nb_scalar lane[7][NB_WIDTH];
     for (int i = 0; i < NB_WIDTH; i++) {
         const overlap_sum *sum = &c->sums[2 * c->seats * (size_t)i + 1];
@@ -235,7 +235,7 @@ static int mark_crowd(packet_state *m, nb_mask lanes)
             lane[3 + channel][i] = sum->light[channel];
         }
     }
-    medium_hit *k = crowd_contact(m);
+    medium_hit *k = overlap_set_contact(m);
     k->inside = nb_and(lanes, nb_load_lanes(lane[6]) > NB_F(0.0));
     if (!nb_any(k->inside)) return 0;
     for (int channel = 0; channel < 3; channel++) {

@@ -62,8 +62,8 @@ typedef struct overlap_event overlap_event;
 typedef struct overlap_sum overlap_sum;
 
 typedef struct overlap_set {
-    nb_mask lanes;                                             /* that are crowded */
-    int is_walking;                                            /* whether the walk is that of the crowded lanes */
+    nb_mask lanes;                                             /* with such a set */
+    int is_walking;                                            /* whether the walk is that of these lanes */
     int64_t rank;                                              /* of all its media */
     nb_mask is_even;                                           /* all have one radiance, */
     nb_real radiance[3];                                       /* this one */
@@ -106,14 +106,14 @@ typedef struct packet_state {
     uint32_t *window; /* the contacts that the walk looks at, ascending; see trace_active_set.h */
     size_t window_count;
     uint32_t *
-        present; /* the contacts within the current piece in any lane: of the window from present_first on, the crowd */
+        present; /* the contacts within the current piece in any lane: of the window from present_first on, the overlap set */
     size_t present_first, present_end;
     double window_end;                 /* up to here they are all there are */
     struct active_interval *stretches; /* of all contacts, by their first places */
     double *lasts;                     /* of all contacts */
     size_t stretch_count;
     size_t entered; /* how many of the stretches the window has had */
-    overlap_set crowd;
+    overlap_set overlap_set;
     const nb_estimate
         *whole; /* the integral of the density of the only medium of the piece at hand, where it is known */
 } packet_state;

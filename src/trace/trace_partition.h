@@ -42,7 +42,7 @@ static nb_wide next_event(const packet_state *m, nb_wide t)
             next = nb_wselect(nb_wand(some, nb_wand(span->leave > t, span->leave < next)), span->leave, next);
         }
     }
-    return m->crowd.is_walking ? nb_wmin(next, next_in_crowd(&m->crowd)) : next;
+    return m->overlap_set.is_walking ? nb_wmin(next, next_in_overlap_set(&m->overlap_set)) : next;
 }
 
 /* ANY or ALL of a body's program: the two topmost masks become one. Returns the new height. */
@@ -57,7 +57,7 @@ static int fold_step(nb_shape_op step, nb_mask *stack, int top)
  * Returns 0 when no lane has a piece left. */
 static int next_piece(packet_state *m, nb_wide t, nb_wmask lanes, ray_segment *p)
 {
-    if (m->crowd.is_walking) advance_crowd(m, t);
+    if (m->overlap_set.is_walking) advance_overlap_set(m, t);
     for (;;) {
         const nb_wide next = next_event(m, t);
         const nb_wmask within = nb_wand(lanes, nb_wand(next <= NB_WFAR, next <= WIDE(m->window_end)));
@@ -92,7 +92,7 @@ static nb_mask is_inside(const packet_state *m, const medium_hit *k, nb_wide sta
  * ranks below it. */
 static int mark_inside(packet_state *m, const ray_segment *p)
 {
-    nb_mask covered = nb_not(p->lanes), covered_below = covered, crowd_covered = covered;
+    nb_mask covered = nb_not(p->lanes), covered_below = covered, overlap_set_covered = covered;
     int64_t rank = INT64_MAX;
     size_t first = m->window_count;
     for (size_t i = m->window_count; i-- > 0;) {
@@ -102,14 +102,14 @@ static int mark_inside(packet_state *m, const ray_segment *p)
         rank = body->rank;
         k->inside = is_inside(m, k, p->start);
         if (nb_volume_covers(body)) covered_below = nb_or(covered_below, k->inside);
-        if (rank > m->crowd.rank) crowd_covered = covered_below;
+        if (rank > m->overlap_set.rank) overlap_set_covered = covered_below;
         if (!nb_volume_has_fog(body)) continue;
         k->inside = nb_and(k->inside, nb_not(covered));
         if (nb_any(k->inside)) m->present[--first] = m->window[i];
     }
     m->present_first = first;
     m->present_end = m->window_count;
-    if (m->crowd.is_walking && mark_crowd(m, nb_not(crowd_covered)))
+    if (m->overlap_set.is_walking && mark_overlap_set(m, nb_not(overlap_set_covered)))
         m->present[m->present_end++] = (uint32_t)m->contact_count;
     return first < m->present_end;
 }
@@ -407,10 +407,10 @@ static void pass_ends_of(const packet_state *m, const gathered_light *g, segment
     }
 }
 
-/* Ends of the crowd that may be at t, of those not passed yet. */
-static void pass_ends_of_crowd(const packet_state *m, const gathered_light *g, segment_pass *p, nb_mask lanes)
+/* Ends of the overlap set that may be at t, of those not passed yet. */
+static void pass_ends_of_overlap_set(const packet_state *m, const gathered_light *g, segment_pass *p, nb_mask lanes)
 {
-    const overlap_set *c = &m->crowd;
+    const overlap_set *c = &m->overlap_set;
     for (int i = 0; i < NB_WIDTH; i++) {
         if (!nb_lane(lanes, i)) continue;
         const overlap_event *events = &c->events[2 * c->seats * (size_t)i];
@@ -427,7 +427,7 @@ static void pass_ends_of_crowd(const packet_state *m, const gathered_light *g, s
     }
 }
 
-/* Window and crowd hold all media where ends are watched. */
+/* Window and overlap set hold all media where ends are watched. */
 static void pass_ends(const packet_state *m, gathered_light *g, nb_wide t, nb_mask lanes)
 {
     segment_pass p = {t, lanes, no_ends(), no_ends(), {NB_F(0.0), NB_F(0.0), NB_F(0.0)}};
@@ -435,7 +435,7 @@ static void pass_ends(const packet_state *m, gathered_light *g, nb_wide t, nb_ma
         const medium_hit *k = in_window(m, i);
         pass_ends_of(m, g, &p, k, lanes);
     }
-    if (m->crowd.is_walking) pass_ends_of_crowd(m, g, &p, lanes);
+    if (m->overlap_set.is_walking) pass_ends_of_overlap_set(m, g, &p, lanes);
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real doubt = g->depth_error[c] + g->ends_depth[c] + p.less.depth[c] + m->revealed[c];

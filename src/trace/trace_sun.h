@@ -44,7 +44,8 @@ typedef struct sunlight {
     sun_attenuation *light_shades; /* of each point light; NULL: surfaces keep none away */
     void *shade_memory;
     double share;       /* what steps may add to the error of radiance, all together: of the sun, of all point lights */
-    nb_real most_light; /* radiance that the sun may give in the piece at hand, at most */
+    nb_real brightest;  /* radiance of the fog of the piece at hand in full sunlight, at most */
+    nb_real most_light; /* and how much of that is seen from the step at hand */
     int out_of_memory;
     nb_real by_sun[3], by_lights[3]; /* of the packet's radiance, before opacity is limited */
 } sunlight;
@@ -617,6 +618,7 @@ static void step_along(sunlight *sun, const packet_state *m, const sun_piece *s,
     const nb_wide end = nb_wselect(to_stop, stop, w->t + nb_widen(length));
     const nb_wmask turns = nb_wand(to_stop, stop < bright);
     const sun_origin from = origin_of(s, w);
+    sun->most_light = largest(w->before) * sun->brightest;
     const sun_step tried = try_step(sun, m, &from.p, &from.before, w, length, end, turns, to_stop);
     const nb_real least = tried.noise + tried.noise; /* what no shorter step makes less */
     const nb_real share = REAL(sun->share);
@@ -691,7 +693,8 @@ static void gather_sunlight(sunlight *sun, const packet_state *m, const ray_segm
         return;
     }
     const sun_piece s = sun_piece_of(m, p, g, is_grid_alone(sun) ? nb_mask_false : lanes_in_voxels(m));
-    sun->most_light = largest(g->transmittance) * sunlit_fog(m, p->start).most;
+    sun->brightest = sunlit_fog(m, p->start).most;
+    sun->most_light = largest(g->transmittance) * sun->brightest;
     g->radiance_error = g->radiance_error + doubt_at_faces(sun, m, NULL, p, sun->most_light, lit);
     sun_walk w = begin_walk(m, p, g, lit);
     while (nb_wany(w.lanes)) {

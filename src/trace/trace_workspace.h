@@ -51,7 +51,7 @@ static int reserve_window(workspace *w, const nebel_allocator *allocator, size_t
 static int reserve(workspace *w, const nebel_allocator *allocator, size_t leaves)
 {
     packet_state *m = &w->m;
-    const size_t contacts = m->contact_count + 2; /* and one for the crowd */
+    const size_t contacts = m->contact_count + 2; /* and one for the overlap set */
     if (contacts > w->contact_capacity) {
         medium_hit *moved = grow_aligned(allocator, m->contacts, m->contact_count, sizeof *moved, &w->contact_capacity,
                                          contacts, &w->contact_memory);
@@ -88,10 +88,10 @@ static void open_workspace(workspace *w)
     w->m.sun = NULL;
     w->m.wants_sky = 0;
     w->m.spans = w->spans;
-    w->m.crowd.memory = NULL;
-    w->m.crowd.capacity = 0;
-    w->m.crowd.rank = 0;
-    w->m.crowd.is_walking = 0;
+    w->m.overlap_set.memory = NULL;
+    w->m.overlap_set.capacity = 0;
+    w->m.overlap_set.rank = 0;
+    w->m.overlap_set.is_walking = 0;
 }
 
 static void close_workspace(workspace *w, const nebel_allocator *allocator)
@@ -99,6 +99,6 @@ static void close_workspace(workspace *w, const nebel_allocator *allocator)
     nb_release(allocator, w->contact_memory);
     nb_release(allocator, w->window_memory);
     nb_release(allocator, w->span_memory);
-    nb_release(allocator, w->m.crowd.memory);
+    nb_release(allocator, w->m.overlap_set.memory);
     nb_release(allocator, w->found);
 }

@@ -338,7 +338,7 @@ bool is_wanted(const nb_panel *panel, const ImGuiTextFilter &filter, size_t inde
 
 enum { MOST_PARTICLES = 1000000 };
 
-bool draw_strewing(nb_panel *panel, nebel_nebula_desc *nebula, nebel_transform *place, double reach)
+bool draw_distribution(nb_panel *panel, nebel_nebula_desc *nebula, nebel_transform *place, double reach)
 {
     int count = int(nebula->count), seed = int(nebula->seed);
     bool changed = false;
@@ -363,7 +363,7 @@ bool draw_strewing(nb_panel *panel, nebel_nebula_desc *nebula, nebel_transform *
 bool draw_turbulence(nebel_nebula_desc *nebula, double reach)
 {
     bool changed = drag("turbulence", &nebula->turbulence, 1, reach / 10, 0, "%.4g m",
-                        "How far eddies carry particles from where they were strewn.");
+                        "How far eddies carry particles from where they were distributed.");
     return drag("eddies", &nebula->turbulence_scale, 1, reach / 10, 0,
                 nebula->turbulence_scale > 0 ? "%.4g m" : "a quarter of the shape",
                 "How large the largest eddies are. 0: a quarter of the extent.") ||
@@ -394,7 +394,7 @@ bool draw_nebula_numbers(nb_panel *panel, nebel_nebula_desc *nebula, nebel_trans
 {
     static const char *const profiles[] = {"soft", "gaussian", "uniform"};
     int profile = nebula->profile;
-    bool changed = draw_strewing(panel, nebula, place, reach);
+    bool changed = draw_distribution(panel, nebula, place, reach);
     changed |= choose("profile", &profile, profiles, NEBEL_PARTICLE_PROFILE_COUNT,
                       "How a particle thins from its middle to its surface.");
     nebula->profile = nebel_particle_profile(profile);

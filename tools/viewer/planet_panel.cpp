@@ -137,8 +137,9 @@ bool draw_layer(nebel_cloud_layer *layer, double thickness)
     changed |= drag_height(layer, shown, &nebel_cloud_layer::top, "top", "Above the ground; more than the base.");
     changed |= slide_extinction(layer, shown);
     changed |= drag_height(layer, shown, &nebel_cloud_layer::cell_size, "cell size",
-                           "Of the largest heaps: half of the distance from one to the next.");
-    changed |= slide_part(layer, shown, &nebel_cloud_layer::erosion, "erosion", "How deep billows cut into clouds.");
+                           "Of the largest cells: half of the distance from one to the next.");
+    changed |= slide_part(layer, shown, &nebel_cloud_layer::erosion, "erosion",
+                          "How deep small-scale noise cuts into clouds.");
     changed |= slide_part(layer, shown, &nebel_cloud_layer::patchiness, "patchiness",
                           "How much more clouds are here than there, over ten sizes and more.");
     return drag("wind [m]", layer->wind, 2, 1, -DBL_MAX, "%.4g", "From frame to frame, along x and z.") || changed;
