@@ -281,14 +281,24 @@ static void error_covers_glow_around_the_sun(void **state)
 
 /* Haze of depth 1 around a ball as large as the Earth: level ways past it and to its ground, seen from orbit, and low suns. Light is that of
  * 774,400 paths each (`nebel render --method path`), with standard errors; views are of tests/check_air_truth.py with the seed 7.
- * When light that peaks turn went as if it came straight, these were up to 34 % (`fast`) and 15 % too bright. */
+ * When light that peaks turn went as if it came straight, the first six were up to 34 % (`fast`) and 15 % too bright. The
+ * others see the edge of the night past the ball (230,400 paths). When sunlight that peaks turn went straight, two of them
+ * were 34 and 42 % too dark, and `error` told 25 and 29 %. */
 static void haze_around_a_ball_has_its_light(void **state)
 {
     static const struct {
-        double height, elevation, azimuth, sun, light, by_chance;
-    } views[] = {{4.178e5, -19.69, 25.5, 16.4, 0.18133, 2.2e-4},   {2.642e5, -16.28, 101.5, 52.6, 0.033324, 6.1e-5},
-                 {3.808e5, -19.26, 157.4, 33.2, 0.021146, 4.9e-5}, {2.339e5, -14.46, 177.4, 82.0, 0.025405, 4.0e-5},
-                 {2, 84.85, 74.9, 7.6, 0.0090402, 3.3e-5},         {1.092e4, 0.62, 14.8, 4.1, 0.16669, 3.0e-4}};
+        double height, elevation, azimuth, sun, light, by_chance, most; /* most: part of the light that may be off */
+    } views[] = {{4.178e5, -19.69, 25.5, 16.4, 0.18133, 2.2e-4, 0.05},
+                 {2.642e5, -16.28, 101.5, 52.6, 0.033324, 6.1e-5, 0.05},
+                 {3.808e5, -19.26, 157.4, 33.2, 0.021146, 4.9e-5, 0.05},
+                 {2.339e5, -14.46, 177.4, 82.0, 0.025405, 4.0e-5, 0.05},
+                 {2, 84.85, 74.9, 7.6, 0.0090402, 3.3e-5, 0.05},
+                 {1.092e4, 0.62, 14.8, 4.1, 0.16669, 3.0e-4, 0.05},
+                 {563188, -22.570602, 20.3744, -22.822, 0.11647, 3.5e-4, 0.12},
+                 {698081, -25.601103, 3.6545, -27.5529, 0.0063544, 8.6e-5, 0.12},
+                 {242247, -14.960875, 6.9842, -15.2729, 0.037072, 2.2e-4, 0.12},
+                 {484802, -20.633339, 56.6906, -14.395, 0.01461, 3.8e-5, 0.12},
+                 {645822, -23.955332, 73.4904, -10.9405, 0.0047794, 2.0e-5, 0.12}};
     nebel_atmosphere_desc desc = {.radius = 6.36e6, .thickness = 1e5, .component_count = 1};
     (void)state;
     desc.components[0] =
@@ -306,7 +316,7 @@ static void haze_around_a_ball_has_its_light(void **state)
             print_message("around a ball, quality %d: off %+.1f %%, told %.1f %%\n", q, 100 * off / views[i].light,
                           100 * (double)transfer.error / views[i].light);
             assert_true(fabs(off) <= (double)transfer.error + 3 * views[i].by_chance);
-            assert_true(fabs(off) <= 0.05 * views[i].light + 3 * views[i].by_chance);
+            assert_true(fabs(off) <= views[i].most * views[i].light + 3 * views[i].by_chance);
         }
         nebel_destroy_atmosphere(air);
     }

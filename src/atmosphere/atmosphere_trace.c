@@ -202,7 +202,7 @@ nb_in_scattered nb_gather_path(const nebel_atmosphere *atmosphere, nb_atmosphere
                                     .smooth = nb_atmosphere_smooth(atmosphere),
                                     .scatter = &atmosphere->scatter,
                                     .wants_sun = 1,
-                                    .strays = atmosphere->stray.count > 0,
+                                    .strays = atmosphere->stray.strays,
                                     .track = track,
                                     .aspect = aspect,
                                     .path = path};
@@ -346,7 +346,7 @@ static void trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, cons
     nb_gather(atmosphere, &atmosphere->rule, inside.track, aspect, inside.length < inside.end ? 2 : 1, ends, gathered);
     nb_gathered_once(atmosphere, &gathered[0], aspect.sun, once);
     for (int c = 0; c < 3; c++) {
-        transfer->in_scattering[c] = sun->irradiance[c] * (once[c] + gathered[0].often[c]);
+        transfer->in_scattering[c] = sun->irradiance[c] * fmax(0, once[c] + gathered[0].often[c]);
         const double off = nb_gathered_off(atmosphere, &gathered[0], once, c);
         transfer->error = fmax(transfer->error, sun->irradiance[c] * off + NB_LIGHT_ROUNDING);
     }

@@ -114,6 +114,7 @@ void nb_peaks_add(const nb_peaks *peaks, const nb_gather_job *job, const nb_node
 
 nb_peak_light nb_peaks_before(const nb_peaks *peaks, const nb_peak_sums *before)
 {
+    const int is_bent = peaks->strays == NB_STRAYS_AND_BENDS; /* then nb_stray_add has it */
     nb_peak_light sum;
     for (int c = 0; c < 3; c++) {
         double turned = 0, size = 0;
@@ -122,13 +123,14 @@ nb_peak_light nb_peaks_before(const nb_peaks *peaks, const nb_peak_sums *before)
             const double smooth = (before->ahead[k][c] - powers[0]) * peaks->smooth[k];
             turned += smooth;
             size += fabs(smooth);
-            for (int m = 1; m <= NB_PEAK_POWERS && peaks->peak[k] > 0; m++) {
+            for (int m = 1; m <= NB_PEAK_POWERS && peaks->peak[k] > 0 && !is_bent; m++) {
                 turned += powers[m] * peaks->turned[k][m];
                 size += fabs(powers[m] * peaks->turned[k][m]);
             }
         }
         sum.light[c] = before->often[c] + turned;
-        sum.missing[c] = before->missing[c] + (peaks->strays ? TURNED_OFF_IN_HAZE : TURNED_OFF) * size;
+        sum.missing[c] = before->missing[c];
+        if (!is_bent) sum.missing[c] += (peaks->strays ? TURNED_OFF_IN_HAZE : TURNED_OFF) * size;
     }
     return sum;
 }

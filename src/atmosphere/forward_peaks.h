@@ -18,7 +18,8 @@ typedef struct nb_peak_sums {
 
 /* What phase functions give towards a ray, of sunlight. */
 typedef struct nb_peaks {
-    int air_count, strays;             /* strays: as of the job */
+    int air_count;
+    nb_strays strays;                  /* as of the job */
     double peak[NEBEL_MAX_COMPONENTS]; /* the part of what is scattered that the peak turns; 0: there is none */
     double smooth[NEBEL_MAX_COMPONENTS];
     /* Per power; the first is not used: light scattered once has its own phase function. */

@@ -21,12 +21,16 @@ typedef struct nb_node_light {
     double mean[3][NB_GATHER_NODES]; /* the first moment of the table there, as it comes to the start */
 } nb_node_light;
 
+/* What nb_stray_add adds, so that it is not counted elsewhere: light that peaks turn on the way from a node to the start; and
+ * sunlight that they turned before it comes to a node. */
+typedef enum nb_strays { NB_STRAYS_NONE = 0, NB_STRAYS, NB_STRAYS_AND_BENDS } nb_strays;
+
 typedef struct nb_gather_job {
     const nb_air_components *airs;
     const nb_air_components *smooth;    /* what light scattered often is scattered by, if it is not `airs`; else NULL */
     const nb_scattering_table *scatter; /* NULL: sunlight alone */
     int wants_sun;
-    int strays; /* what peaks turn on the way from a node to the start is not counted: nb_stray_add has it */
+    nb_strays strays;
     nb_atmosphere_ray track;
     nb_moment_basis aspect;            /* of the ray's direction, where it starts */
     double rest[NEBEL_MAX_COMPONENTS]; /* by nb_gather_aim, else 0: nothing is missing */

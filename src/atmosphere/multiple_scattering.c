@@ -174,6 +174,7 @@ typedef struct nb_table_builder {
     const double *albedo;
     const nb_table_resolution *effort;
     nb_gauss_rule slopes, nodes;
+    int turns; /* around */
     double turn_cosines[MOST_TURNS];
     const nb_stray *stray; /* the layout of what follows */
     double *radiance;      /* NULL, or to which light is added: [height][sun][side][slope][turn][colour] */
@@ -314,7 +315,7 @@ static void gather(const nb_direction_fan *fan, nb_moment_basis aspect, double l
 static void keep(const nb_table_builder *maker, int entry, int side, int slope, int turn, const double light[3])
 {
     const nb_stray *stray = maker->stray;
-    const size_t way = (size_t)((side * stray->slopes.count + slope) * stray->turns + turn);
+    const size_t way = (size_t)((side * stray->slopes.count + slope) * NB_STRAY_TURNS + turn);
     if (maker->radiance == NULL) return;
     double *to = maker->radiance + 3 * ((size_t)entry * nb_stray_ways(stray) + way);
     for (int c = 0; c < 3; c++) to[c] += light[c];
@@ -338,13 +339,13 @@ static void add_slope(const nb_table_builder *maker, int height, int side, int s
                      NULL, &fan.path);
     for (int i = 0; i < effort->suns; i++) {
         const double sun = sun_at(maker->next, i), aside = sqrt(fmax(0, 1 - sun * sun));
-        for (int k = 0; k < effort->turns; k++) {
+        for (int k = 0; k < maker->turns; k++) {
             const double x = level * maker->turn_cosines[k];
             const nb_moment_basis aspect = {zenith, x * aside + zenith * sun, sun};
             double light[3];
             gather(&fan, aspect, light);
             keep(maker, height * effort->suns + i, side, slope, k, light);
-            for (int c = 0; c < 3; c++) light[c] *= weight * 2 * PI / effort->turns;
+            for (int c = 0; c < 3; c++) light[c] *= weight * 2 * PI / maker->turns;
             nb_radiance_moments_add(&maker->next->fields[height * effort->suns + i], effort->moments, aspect, light);
             if (height == 0 && zenith > 0)
                 for (int c = 0; c < 3; c++) maker->next->ground[i][c] += zenith * light[c];
@@ -459,11 +460,19 @@ typedef struct nb_scattering_rounds {
     double slowest[3]; /* by nb_orders_extrapolate */
 } nb_scattering_rounds;
 
-/* What air and ground make of sunlight, or of all light of the sealed table. */
+static void set_turns(nb_table_builder *maker, int turns)
+{
+    maker->turns = turns;
+    for (int k = 0; k < turns; k++) maker->turn_cosines[k] = cos(PI * (k + 0.5) / turns);
+}
+
+/* What air and ground make of sunlight, or of all light of the sealed table. Light that is kept is gathered from more turns
+ * than moments need. */
 static void scatter_again(nb_table_builder *maker, const nebel_parallel *parts, int first, nb_scattering_table *made)
 {
     maker->first = first;
     maker->next = made;
+    set_turns(maker, maker->radiance != NULL ? NB_STRAY_TURNS : maker->effort->turns);
     clear(made);
     nb_parallel_for(parts, (size_t)made->heights, add_height, maker);
 }
@@ -560,8 +569,11 @@ static nebel_result allocate_stray(const nebel_allocator *allocator, nb_table_bu
     stray->sun = nb_allocate_zero(allocator, entries, sizeof *stray->sun);
     stray->parts =
         nb_allocate_zero(allocator, entries * nb_stray_entry(stray) * (size_t)stray->count, sizeof *stray->parts);
+    stray->bent = nb_allocate_zero(allocator, entries * nb_bent_entry(stray), sizeof *stray->bent);
     maker->radiance = nb_allocate_zero(allocator, entries * nb_stray_ways(stray), 3 * sizeof *maker->radiance);
-    return stray->sun != NULL && stray->parts != NULL && maker->radiance != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+    return stray->sun != NULL && stray->parts != NULL && stray->bent != NULL && maker->radiance != NULL
+               ? NEBEL_OK
+               : NEBEL_ERROR_MEMORY;
 }
 
 /* Light that peaks of phase functions turn was sunlight so far; on the ground it comes from the sky around the sun. */
@@ -609,11 +621,10 @@ nebel_result nb_scattering_table_make(const nebel_allocator *allocator, const ne
                               .slopes = nb_gauss_rule_make(effort->slopes),
                               .nodes = nb_gauss_rule_make(effort->nodes),
                               .gather = nb_gather_choose(NEBEL_ISA_DEFAULT)};
-    for (int k = 0; k < effort->turns; k++) maker.turn_cosines[k] = cos(PI * (k + 0.5) / effort->turns);
     const nb_scattering_table layout = layout_of(smooth, effort);
     nb_scattering_table fine = layout;
     nb_scattering_rounds rounds = {.once = {.heights = 0}};
-    *stray = nb_stray_plan(airs, &layout, &maker.slopes, effort->turns);
+    *stray = nb_stray_plan(airs, effort->moments, &layout, &maker.slopes);
     maker.stray = stray;
     fine.suns = FINE * (layout.suns - 1) + 1;
     nebel_result result = allocate(allocator, &fine, scatter);

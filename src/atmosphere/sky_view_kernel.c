@@ -306,7 +306,7 @@ static inline nb_real light_of(const nb_sky_view_table *table, const nb_sky_view
     }
     for (int c = 0; c < 3; c++) {
         const nb_real sunlight = looks->along * nb_splat(table->irradiance[c]);
-        light[c] = sunlight * (once[c] + nb_load_floats(read->mean[often + c]));
+        light[c] = sunlight * nb_max(NB_F(0.0), once[c] + nb_load_floats(read->mean[often + c]));
         error = nb_max(error, sunlight * NB_F(NB_ONCE_OFF) * once[c]);
         most = nb_max(most, light[c]);
     }

@@ -6,33 +6,43 @@
 
 #include <math.h>
 
-/* Sunlight at a place: what of it comes straight, as a part of what smooth air lets through; and of what peaks turn, which comes from around
- * the sun, the logarithm. */
+/* Sunlight at a place: what of it comes straight, as a part of what smooth air lets through; and the logarithm of what peaks
+ * turn, which comes from around the sun. */
 typedef struct nb_stray_sun {
     double straight[3], around[3];
 } nb_stray_sun;
 
 /* By height, the sun's height and direction: what peaks make of light from everywhere, for a scattering of 1/m. Directions are those from which light was gathered, on both sides of the horizon. */
 struct nb_stray {
-    int heights, suns, turns, count; /* count: of kinds of air that have it */
+    int heights, suns, count; /* count: of kinds of air that have it */
+    nb_strays strays;
     int airs[NEBEL_MAX_COMPONENTS];
     nb_gauss_rule slopes; /* over the part of the way from the horizon, of which the cosine is the square */
     nb_stray_sun *sun;    /* [height][sun] */
     /* [air][height][sun][side][slope]: NB_STRAY_SIZE, [order of the turn][colour], as parts of the first moment there. */
     float *parts;
+    /* [height][sun][side][slope]: NB_BENT_SIZE, [mean, rest][order of the turn][colour]. */
+    float *bent;
 };
 
-/* Size: numbers of a slope, some of which are 0, so that loops over them are of one length. */
-enum { NB_STRAY_TURNS = 5, NB_STRAY_SIDES = 2, NB_STRAY_SIZE = 16 };
+/* Turns: directions around, the middles of even parts of half a circle, and orders that are kept of them; five were too few
+ * on the edge of the night. Size: numbers of a slope. */
+enum { NB_STRAY_TURNS = 8, NB_STRAY_SIDES = 2, NB_STRAY_SIZE = 3 * NB_STRAY_TURNS };
 
-/* Which airs have it; allocates nothing. */
-nb_stray nb_stray_plan(const nb_air_components *airs, const nb_scattering_table *layout, const nb_gauss_rule *slopes,
-                       int turns);
+/* Sunlight that peaks turned, by the direction to which it is scattered next. mean: how much there is, in the mean of the
+ * directions from which it can come; the closed form for straight ways is multiplied by it. rest: what is then missing of the
+ * scattered light, for a scattering of 1/m. */
+enum { NB_BENT_SIZE = 2 * NB_STRAY_SIZE };
+
+/* Which airs have it; allocates nothing. orders: of moments that are kept. */
+nb_stray nb_stray_plan(const nb_air_components *airs, int orders, const nb_scattering_table *layout,
+                       const nb_gauss_rule *slopes);
 
 static inline void nb_stray_free(const nebel_allocator *allocator, nb_stray *stray)
 {
     nb_release(allocator, stray->parts);
     nb_release(allocator, stray->sun);
+    nb_release(allocator, stray->bent);
 }
 
 /* Numbers of one entry. */
@@ -41,10 +51,15 @@ static inline size_t nb_stray_entry(const nb_stray *stray)
     return (size_t)(NB_STRAY_SIDES * stray->slopes.count * NB_STRAY_SIZE);
 }
 
+static inline size_t nb_bent_entry(const nb_stray *stray)
+{
+    return (size_t)(NB_STRAY_SIDES * stray->slopes.count * NB_BENT_SIZE);
+}
+
 /* How many directions the light of one entry comes from. */
 static inline size_t nb_stray_ways(const nb_stray *stray)
 {
-    return (size_t)(NB_STRAY_SIDES * stray->slopes.count * stray->turns);
+    return (size_t)(NB_STRAY_SIDES * stray->slopes.count * NB_STRAY_TURNS);
 }
 
 /* Cosine of the angle to the zenith of a direction on a side of the horizon (0: below), and what it counts in an integral over cosines. */
@@ -57,7 +72,7 @@ static inline double nb_stray_horizon(const nb_air_components *airs, double radi
     return -sqrt(fmax(0, (1 - ratio) * (1 + ratio)));
 }
 
-/* Fills the parts of one height. radiance: [sun][side][slope][turn][colour]; turns are the middles of even parts of half a circle. */
+/* Fills the parts of one height. radiance: [sun][side][slope][turn][colour]. */
 void nb_stray_fill(nb_stray *stray, const nb_air_components *airs, int orders, int height, double radius,
                    const double *radiance, const nb_radiance_moments *fields);
 
