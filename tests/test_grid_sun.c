@@ -214,26 +214,67 @@ static nebel_volume_desc random_company(uint64_t *state, const cloud *c)
     return v;
 }
 
-/* Columns are asked in float alone: double walks to the sun. */
-static void check_company(uint64_t seed, double tolerance, double *worst)
+/* Into the box, at its faces, or beside it; a spot now and then. */
+static nebel_light random_light(uint64_t *state, const cloud *c)
+{
+    nebel_light light = {.radius = dice(state, .01, .2)};
+    const double wide = dice_below(state, 2) ? 1 : 3;
+    for (int i = 0; i < 3; i++) {
+        const double middle = .5 * (c->low[i] + c->high[i]);
+        light.position[i] = middle + (dice(state, c->low[i], c->high[i]) - middle) * wide;
+        light.intensity[i] = exp(dice(state, log(.3), log(30)));
+        light.direction[i] = dice(state, -1, 1);
+    }
+    if (dice_below(state, 3) == 0) {
+        light.type = NEBEL_LIGHT_SPOT;
+        light.outer_angle = dice(state, 20, 80);
+        light.inner_angle = light.outer_angle * dice(state, 0, 1);
+    }
+    return light;
+}
+
+/* What has been found: rays, the largest part of what is told that one was off by, and how many were off by more. */
+typedef struct tally {
+    int rays, bad;
+    double worst;
+} tally;
+
+static void compare_channels(const nebel_transfer *found, const nebel_transfer *truth, uint64_t seed, int ray, tally *t)
+{
+    double worst = 0;
+    for (int k = 0; k < 3; k++) {
+        const double off = fabs(found->in_scattering[k] - truth->in_scattering[k]);
+        worst = fmax(worst, off / (found->error + truth->error));
+        if (!(off <= found->error + truth->error) && t->bad < 10)
+            print_message("seed %d ray %d: off by %g, said %g\n", (int)seed, ray, off, found->error);
+    }
+    t->rays++;
+    t->bad += !(worst <= 1);
+    t->worst = fmax(t->worst, worst);
+}
+
+/* Columns and common steps are asked in float alone: double walks to the light from place to place. */
+static void check_company(uint64_t seed, double tolerance, size_t light_count, tally *t)
 {
     nebel_ray rays[RAYS];
     nebel_transfer found[RAYS], truth[RAYS];
     uint64_t state = seed + 1000003;
     const cloud c = random_cloud(&state);
+    nebel_light all[3];
     nebel_lighting_desc lights;
     nebel_volume_desc v[2] = {fog_volume(&c, &lights), random_company(&state, &c)};
-    nebel_lighting *fog = fog_light(&lights, v, 2);
+    for (size_t i = 0; i < light_count; i++) all[i] = random_light(&state, &c);
+    if (light_count > 0) {
+        lights = (nebel_lighting_desc){.light_count = light_count, .lights = all};
+        for (int i = 0; i < 2; i++)
+            if (dice_below(&state, 2))
+                v[i].phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = dice(&state, -.5, .8)};
+    }
+    nebel_lighting *fog = fog_light(&lights, v, light_count > 0 && dice_below(&state, 2) ? 1 : 2);
     for (int i = 0; i < RAYS; i++) rays[i] = random_ray(&state, &c);
     fog_trace(fog, (nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT, .tolerance = tolerance}, RAYS, rays, found);
     fog_trace(fog, (nebel_trace_desc){.tolerance = tolerance * 1e-2}, RAYS, rays, truth);
-    for (int i = 0; i < RAYS; i++)
-        for (int k = 0; k < 3; k++) {
-            const double off = fabs(found[i].in_scattering[k] - truth[i].in_scattering[k]);
-            *worst = fmax(*worst, off / (found[i].error + truth[i].error));
-            if (!(off <= found[i].error + truth[i].error))
-                fail_msg("seed %d ray %d: off by %g, said %g", (int)seed, i, off, found[i].error);
-        }
+    for (int i = 0; i < RAYS; i++) compare_channels(&found[i], &truth[i], seed, i, t);
     nebel_release_lighting(fog);
     nebel_release_grid(c.grid);
 }
@@ -241,10 +282,14 @@ static void check_company(uint64_t seed, double tolerance, double *worst)
 static void errors_hold_for_voxels_in_company(void **state)
 {
     static const double tolerances[] = {1e-2, 1e-3, 1e-4};
-    double worst = 0;
     (void)state;
-    for (int i = 0; i < grid_count; i++) check_company((uint64_t)i, tolerances[i % 3], &worst);
-    print_message("voxels in company: %d rays, off by %.2f of what is told at most\n", grid_count * RAYS, worst);
+    for (size_t lights = 0; lights < 4; lights += 1 + lights) {
+        tally t = {0, 0, 0};
+        for (int i = 0; i < grid_count; i++) check_company((uint64_t)i, tolerances[i % 3], lights, &t);
+        print_message("voxels in company, %d lights: %d rays, off by %.2f of what is told at most\n", (int)lights,
+                      t.rays, t.worst);
+        assert_int_equal(t.bad, 0);
+    }
 }
 
 /* Steps of light end within cells, at edges of the box and at shadows; it stops where it cannot be seen. */

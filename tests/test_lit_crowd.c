@@ -341,25 +341,25 @@ static void light_falls_through_slits(void **state)
     expect_light_through_slits(7, 0.04);
 }
 
-/* More than 64 media are no crowd where point lights light two phase functions: those on the way to a point light are
- * looked for in the tree. What light never passes changes nothing. */
+/* More than 64 media are no crowd where point lights light more phase functions than common steps can have: those on the way to
+ * a point light are looked for in the tree. What light never passes changes nothing. */
 static void bodies_far_away_change_nothing(void **state)
 {
     (void)state;
     static const nebel_light light = {.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
     const nebel_lighting_desc lights = {.lights = &light, .light_count = 1};
-    enum { MANY = 70 };
+    enum { NEAR = 5, MANY = 70 };
     nebel_volume_desc bodies[MANY];
     nebel_lighting *fog[2];
     nebel_transfer transfers[2][FORCED];
     nebel_ray rays[RAYS];
     for (int i = 0; i < MANY; i++)
         bodies[i] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1}, .extinction = {1, 1, 1}};
-    for (int i = 0; i < MANY; i++) bodies[i].shape.center[0] = i < 2 ? i : 100 + 2 * i;
-    for (int i = 0; i < 6; i++) bodies[i / 3].albedo[i % 3] = 0.5, bodies[i / 3].extinction[i % 3] = 0.1;
+    for (int i = 0; i < MANY; i++) bodies[i].shape.center[0] = i < NEAR ? .5 * i : 100 + 2 * i;
+    for (int i = 0; i < 3 * NEAR; i++) bodies[i / 3].albedo[i % 3] = 0.5, bodies[i / 3].extinction[i % 3] = 0.1;
     bodies[0].shape.radius = 5;
-    bodies[1].phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.5};
-    for (int k = 0; k < 2; k++) fog[k] = fog_light(&lights, bodies, k == 0 ? 2 : MANY);
+    for (int i = 1; i < NEAR; i++) bodies[i].phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .1 * i};
+    for (int k = 0; k < 2; k++) fog[k] = fog_light(&lights, bodies, k == 0 ? NEAR : MANY);
     make_rays(rays, 11);
     for (int precision = 0; precision < 2; precision++) {
         const nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = 1e-3};

@@ -24,6 +24,7 @@ typedef struct nb_medium_light {
     double shine[3]; /* albedo times the sun's irradiance: of opaque fog, if the phase function were 1 */
     struct nb_sun_lattice *sun_lattice; /* of linear voxels whose depth to the sun is a term of a sum; else NULL */
     int scatters_sun, scatters_lights;  /* of point and spot lights */
+    size_t phase;                       /* of media that scatter lights: see phase_count of the lighting */
     int joins; /* its density is constant and its body convex, so that sums can stand for it among many of its kind */
 } nb_medium_light;
 
@@ -37,6 +38,13 @@ typedef enum nb_sun_depth_method {
     NB_SUN_DEPTH_ALTITUDE,    /* one fog of an altitude without an end: its integral from the place on */
     NB_SUN_DEPTH_GRID         /* one box of voxels: they are walked through from the place on */
 } nb_sun_depth_method;
+
+/* Whether lights are gathered in steps that all media have in common: see trace_common_steps.h. */
+typedef enum nb_common_steps {
+    NB_COMMON_STEPS_NEVER = 0,
+    NB_COMMON_STEPS_IN_FLOAT, /* voxels among them, which are marched through in double */
+    NB_COMMON_STEPS_ALWAYS
+} nb_common_steps;
 
 /* Immutable once it is made. A snapshot has one of its own, without lights, which owns nothing but `media`. */
 struct nebel_lighting {
@@ -53,10 +61,11 @@ struct nebel_lighting {
     nb_sun_depth_method sun_depth_method;
 
     int scatters_lights; /* whether any medium does */
+    size_t phase_count;  /* phase functions of the media that do; each has a number */
     size_t light_count;
     struct nb_light *lights;
     nebel_light *described_lights; /* the same as they were given */
-    int is_lit_overlap_set;        /* many media whose depths add are lit: see trace_lit_overlap_set.h */
+    nb_common_steps common_steps;
 
     nebel_environment environment;                   /* one owner of its map */
     size_t environment_light_count;                  /* one for each phase function that scatters it, if not constant */

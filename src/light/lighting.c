@@ -190,22 +190,43 @@ static int copy_lights(nebel_lighting *lighting, size_t count, const nebel_light
 }
 
 /* Fewer media than these are better asked from turn to turn. */
-#define LEAST_LIT_OVERLAP_SET 9
+#define LEAST_COMMON 9
 
-/* What lights light has one phase function, which is a part of what is seen from places. */
-static int is_lit_overlap_set(const nebel_lighting *lighting)
+/* Common steps go along a ray once for each light and phase function. */
+#define MOST_PHASES 4
+
+/* Depths have to add. The steps of voxels alone in sunlight are their cells. */
+static nb_common_steps choose_common_steps(const nebel_lighting *lighting)
 {
     const nebel_snapshot *s = lighting->snapshot;
-    const nb_phase *phase = NULL;
-    if (s->medium_count < LEAST_LIT_OVERLAP_SET || !(lighting->scatters_sun || lighting->scatters_lights)) return 0;
+    const int has_company = s->medium_count > 1 || lighting->scatters_lights;
+    int has_voxels = 0;
+    if (!(lighting->scatters_sun || lighting->scatters_lights)) return NB_COMMON_STEPS_NEVER;
+    if (lighting->phase_count > MOST_PHASES) return NB_COMMON_STEPS_NEVER;
     for (size_t i = 0; i < s->medium_count; i++) {
-        const nb_volume *body = &s->media[i].body;
-        if (!nb_medium_adds_depth(&s->media[i])) return 0;
-        if (!lighting->media[i].scatters_lights) continue;
-        if (phase != NULL && nb_phase_compare(phase, &body->phase) != 0) return 0;
-        phase = &body->phase;
+        const nebel_density *density = &s->media[i].body.density;
+        const int is_voxels = density->type == NEBEL_DENSITY_GRID && !nb_volume_covers(&s->media[i].body);
+        if (is_voxels && !nb_grid_is_linear(density->grid)) return NB_COMMON_STEPS_NEVER;
+        if (!is_voxels && !nb_medium_adds_depth(&s->media[i])) return NB_COMMON_STEPS_NEVER;
+        has_voxels = has_voxels || is_voxels;
     }
-    return 1;
+    if (has_voxels) return has_company ? NB_COMMON_STEPS_IN_FLOAT : NB_COMMON_STEPS_NEVER;
+    return s->medium_count >= LEAST_COMMON ? NB_COMMON_STEPS_ALWAYS : NB_COMMON_STEPS_NEVER;
+}
+
+/* Numbers the phase functions that scatter point lights, up to one more than common steps can have. */
+static void number_phases(nebel_lighting *lighting)
+{
+    const nebel_snapshot *s = lighting->snapshot;
+    for (size_t i = 0; i < s->medium_count && lighting->phase_count <= MOST_PHASES; i++) {
+        nb_medium_light *lit = &lighting->media[i];
+        size_t known = 0;
+        if (!lit->scatters_lights) continue;
+        while (known < i && (!lighting->media[known].scatters_lights ||
+                             nb_phase_compare(&s->media[known].body.phase, &s->media[i].body.phase) != 0))
+            known++;
+        lit->phase = known < i ? lighting->media[known].phase : lighting->phase_count++;
+    }
 }
 
 /* ---- the environment ------------------------------------------------------------------------- */
@@ -314,7 +335,8 @@ static nebel_result fill_lighting(nebel_lighting *lighting, const nebel_lighting
     if (result != NEBEL_OK) return result;
     nb_join_media(lighting);
     lighting->sun_depth_method = choose_sun_depth_method(lighting);
-    lighting->is_lit_overlap_set = is_lit_overlap_set(lighting);
+    number_phases(lighting);
+    lighting->common_steps = choose_common_steps(lighting);
     return take_sun_lattices(lighting, previous) ? NEBEL_OK : NEBEL_ERROR_MEMORY;
 }
 

@@ -383,6 +383,13 @@ static nb_wide next_in_grid(const medium_hit *k, nb_wide t, grid_distance *next)
     return t + nb_wload_lanes(distance);
 }
 
+/* The density's integral over a stretch of the rays, and that of the density times place and times its square, where places
+ * are counted as the caller wants. */
+typedef struct density_moments {
+    nb_estimate amount;
+    nb_real first, second;
+} density_moments;
+
 #if !defined(NB_DOUBLE)
 #include "trace_voxels.h"
 #endif

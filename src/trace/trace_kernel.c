@@ -231,12 +231,21 @@ static void note_clear(const packet_state *m, const ray_segment *p, gathered_lig
 
 #include "trace_point_light.h"
 
-#include "trace_lit_overlap_set.h"
+#include "trace_common_steps.h"
+
+static int takes_common_steps(const nebel_lighting *lighting)
+{
+#if defined(NB_DOUBLE)
+    return lighting->common_steps == NB_COMMON_STEPS_ALWAYS;
+#else
+    return lighting->common_steps != NB_COMMON_STEPS_NEVER;
+#endif
+}
 
 /* Sunlight that is found while voxels are crossed anyway. Returns the lanes that it is still to be added in. */
 static nb_mask cross_sunlit_voxels(packet_state *m, const ray_segment *p, gathered_light *g, nb_estimate *along)
 {
-    if (m->sun == NULL || m->sun->lighting->is_lit_overlap_set) return nb_mask_false;
+    if (m->sun == NULL || takes_common_steps(m->sun->lighting)) return nb_mask_false;
 #if !defined(NB_DOUBLE)
     if (has_lattice(m)) {
         m->whole = along;
@@ -264,7 +273,7 @@ static void gather_piece(packet_state *m, const ray_segment *p, const allowance 
         return;
     }
     *unbounded = nb_or(*unbounded, is_unbounded(m, p, &sum));
-    if (m->sun != NULL && !m->sun->lighting->is_lit_overlap_set) gather_lights(m->sun, m, p, sunlit, g);
+    if (m->sun != NULL && !takes_common_steps(m->sun->lighting)) gather_lights(m->sun, m, p, sunlit, g);
     const nb_mask closed = nb_and(p->lanes, nb_not(sum.mixed));
     const nb_mask mixed = nb_and(p->lanes, sum.mixed);
     if (nb_any(closed)) gather_closed(g, &sum, closed);
@@ -568,7 +577,7 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     nb_mask unbounded;
     if (w->m.sun != NULL) begin_lights(w->m.sun, job, first, count);
     *g = gather_light(&w->m, &share, &unbounded);
-    if (w->m.sun != NULL && job->lighting->is_lit_overlap_set) gather_overlap_lights(w->m.sun, &w->m, g);
+    if (w->m.sun != NULL && takes_common_steps(job->lighting)) gather_overlap_lights(w->m.sun, &w->m, g);
     if (w->m.sun != NULL && w->m.sun->out_of_memory) return NEBEL_ERROR_MEMORY;
     limit_radiance(&w->m, g);
     for (size_t i = 0; i < count && nb_any(unbounded); i++)

@@ -1,5 +1,5 @@
 /* The shadows of many bodies on rays: between which places of a ray the ways to a light may meet a body, and how deep a way
- * is through all of them. Included by trace_lit_overlap_set.h. */
+ * is through all of them. Included by trace_common_steps.h. */
 
 /* Where the ways from a ray to a light may meet a body: nowhere else on the ray; nowhere where first > last. */
 typedef struct lit_shadow {
@@ -269,8 +269,8 @@ static void note_covering(shadowed_way *sum, const nb_volume *body, nb_mask near
 
 /* From t of each ray; of the bodies in whose shadow that is, lane by lane: slack beside them depends on no company.
  * `before`: the last place that was asked. */
-static shadowed_way way_through_shadows(const sunlight *sun, const packet_state *m, nb_wide before, nb_wide t,
-                                        nb_wvec3 direction, nb_wide reach)
+static shadowed_way way_through_shadows(const sunlight *sun, const packet_state *m, int is_to_sun, nb_wide before,
+                                        nb_wide t, nb_wvec3 direction, nb_wide reach)
 {
     const packet way = {nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t)), direction, reach};
     const nb_real zero = NB_F(0.0);
@@ -282,7 +282,8 @@ static shadowed_way way_through_shadows(const sunlight *sun, const packet_state 
         if (!nb_any(near)) continue;
         const nb_volume *body = &s->medium->body;
         const int varies = body->density.type != NEBEL_DENSITY_CONSTANT;
-        const nb_estimate along = varies ? profile_along(&way, s->medium, 0, NULL) : length_along(m, &way, body);
+        const nb_estimate along =
+            varies ? profile_along(&way, s->medium, 0, is_to_sun ? sun : NULL) : length_along(m, &way, body);
         const nb_mask covers = nb_and(near, nb_narrow_mask(nb_wand(s->first <= before, s->last >= before)));
         const nb_real value = nb_select(near, along.value, zero), error = nb_select(near, along.error, zero);
         if (nb_any(covers)) note_covering(&sum, body, covers, s->at_last, value);

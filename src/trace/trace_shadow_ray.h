@@ -136,13 +136,14 @@ static void add_body_error(light_depth *sum, const packet *way, const nb_volume 
     for (int c = 0; c < 3; c++) sum->error[c] = sum->error[c] + REAL(body->extinction[c]) * error;
 }
 
+/* What columns may do to light, of what steps may add to the error. Ways of which they say more are walked; in common steps
+ * all ways of a ray or none. */
+#define COLUMN_SHARE 1.0
+
 #if !defined(NB_DOUBLE)
 /* A block says how far columns are off at its worst place, in its worst direction. Along a ray this part of it is enough:
  * tests/test_grid_sun.c prints how much of it was found. */
 #define COLUMN_ERROR 0.5
-
-/* What columns may do to light, of what steps may add to the error. Ways of which they say more are walked. */
-#define COLUMN_SHARE 1.0
 
 /* From t of each way on, of lanes inside; `inside` becomes the lanes that are still to be walked. */
 static nb_estimate along_columns(const sunlight *sun, medium_hit *k, const nb_sun_lattice *lattice, nb_wide t)
@@ -154,7 +155,8 @@ static nb_estimate along_columns(const sunlight *sun, medium_hit *k, const nb_su
     const nb_real through = nb_exp(-thinnest * nb_max(along.value - along.error, NB_F(0.0)));
     along.error = along.error * REAL(COLUMN_ERROR);
     const nb_real off = densest * along.error * through * sun->most_light;
-    const nb_mask fits = nb_and(k->inside, off <= REAL(COLUMN_SHARE * sun->share));
+    const nb_mask good = sun->has_common_steps ? sun->takes_columns : off <= REAL(COLUMN_SHARE * sun->share);
+    const nb_mask fits = nb_and(k->inside, good);
     along.value = nb_select(fits, along.value, NB_F(0.0));
     along.error = nb_select(fits, along.error, NB_F(0.0));
     k->inside = nb_and(k->inside, nb_not(fits));

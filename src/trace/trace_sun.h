@@ -46,6 +46,8 @@ typedef struct sunlight {
     double share;       /* what steps may add to the error of radiance, all together: of the sun, of all point lights */
     nb_real brightest;  /* radiance of the fog of the piece at hand in full sunlight, at most */
     nb_real most_light; /* and how much of that is seen from the step at hand */
+    int has_common_steps;  /* where these are gone, */
+    nb_mask takes_columns; /* these lanes have depths from columns */
     int out_of_memory;
     nb_real by_sun[3], by_lights[3]; /* of the packet's radiance, before opacity is limited */
 } sunlight;

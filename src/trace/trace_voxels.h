@@ -195,25 +195,43 @@ static inline cell_voxels voxels_of_cell(const voxel_rays *r, const voxel_walk *
     return (cell_voxels){NB_F(0.5) * (a + b), NB_F(1.7320508075688772) * (b - a)};
 }
 
+/* Where a lane leaves its cell, or `end`. */
+typedef struct cell_exit {
+    nb_wide leave, until;
+    nb_wmask is_axis[3]; /* of the face by which it leaves */
+} cell_exit;
+
+static inline cell_exit exit_of_cell(const voxel_rays *r, const voxel_walk *w, nb_wide end)
+{
+    nb_wide crossing[3];
+    cell_exit x;
+    for (int i = 0; i < 3; i++) crossing[i] = leave_at(r, i, w->cell[i], w->cell[i] + NB_W(1.0));
+    x.leave = nearest_of(crossing, x.is_axis);
+    x.until = nb_wmax(nb_wmin(x.leave, end), w->t);
+    return x;
+}
+
+/* Returns how long the way was. */
+static inline nb_wide leave_cell(const voxel_rays *r, const cell_exit *x, nb_wide end, nb_wmask lanes, voxel_walk *w)
+{
+    const nb_wmask leaves = nb_wand(lanes, x->leave < end);
+    for (int i = 0; i < 3; i++) {
+        const nb_wide next = w->cell[i] + nb_wselect(r->forward[i], NB_W(1.0), NB_W(-1.0));
+        w->cell[i] = nb_wselect(nb_wand(leaves, x->is_axis[i]), next, w->cell[i]);
+    }
+    const nb_wide length = nb_wselect(lanes, x->until - w->t, NB_W(0.0));
+    w->t = nb_wselect(lanes, x->until, w->t);
+    w->clear = clearance_of(r, w->cell);
+    return length;
+}
+
 /* To the end of the cell, or to `end`. Always in line: a call keeps the walk of all lanes in memory. */
 static inline __attribute__((always_inline)) nb_wide step_voxel(const voxel_rays *r, voxel_walk *w, nb_wide end,
                                                                 nb_wmask lanes, cell_voxels *voxels)
 {
-    nb_wide crossing[3];
-    nb_wmask is_axis[3];
-    for (int i = 0; i < 3; i++) crossing[i] = leave_at(r, i, w->cell[i], w->cell[i] + NB_W(1.0));
-    const nb_wide leave = nearest_of(crossing, is_axis);
-    const nb_wide until = nb_wmax(nb_wmin(leave, end), w->t);
-    *voxels = voxels_of_cell(r, w, until);
-    const nb_wmask leaves = nb_wand(lanes, leave < end);
-    for (int i = 0; i < 3; i++) {
-        const nb_wide next = w->cell[i] + nb_wselect(r->forward[i], NB_W(1.0), NB_W(-1.0));
-        w->cell[i] = nb_wselect(nb_wand(leaves, is_axis[i]), next, w->cell[i]);
-    }
-    const nb_wide length = nb_wselect(lanes, until - w->t, NB_W(0.0));
-    w->t = nb_wselect(lanes, until, w->t);
-    w->clear = clearance_of(r, w->cell);
-    return length;
+    const cell_exit x = exit_of_cell(r, w, end);
+    *voxels = voxels_of_cell(r, w, x.until);
+    return leave_cell(r, &x, end, lanes, w);
 }
 
 /* ---- along the rays -------------------------------------------------------------------------- */
@@ -288,4 +306,60 @@ static nb_estimate voxels_integral(const medium_hit *k, nb_wide start, nb_wide e
     nb_estimate along = estimate_of_voxels(k, &sum);
     along.error = nb_select(nb_narrow_mask(w.t < end), REAL(NB_GRID_ENDLESS), along.error);
     return along;
+}
+
+/* ---- moments --------------------------------------------------------------------------------- */
+
+/* The means of 1, x and x^2 times the density over the way to `until`, where x goes from -1 to 1. The density is a cubic
+ * along a cell: three points of Gauss's rule are exact. */
+typedef struct cell_moments {
+    nb_real mean, first, second;
+} cell_moments;
+
+static inline cell_moments moments_of_cell(const voxel_rays *r, const voxel_walk *w, nb_wide until)
+{
+    const nb_wide middle = NB_W(0.5) * (w->t + until), half = (until - w->t) * NB_W(0.3872983346207417);
+    const nb_real scale = REAL(scale_of_voxels(r->grid)), offset = REAL(r->grid->offset);
+    nb_real v[8], place[3][3], density[3];
+    corners_of_cell(r->grid, w->cell, v);
+    for (int i = 0; i < 3; i++) {
+        const nb_real at = nb_narrow(r->from[i] + r->slope[i] * middle - w->cell[i]);
+        const nb_real off = nb_narrow(r->slope[i] * half);
+        place[0][i] = clamp_share(at - off);
+        place[1][i] = clamp_share(at);
+        place[2][i] = clamp_share(at + off);
+    }
+    for (int n = 0; n < 3; n++) density[n] = nb_max(offset + scale * within_corners(v, place[n]), NB_F(0.0));
+    const nb_real ends = (density[0] + density[2]) * REAL(5.0 / 18);
+    const nb_real rise = (density[2] - density[0]) * REAL(5.0 / 18 * 0.7745966692414834);
+    return (cell_moments){ends + density[1] * REAL(8.0 / 18), rise, ends * NB_F(0.6)};
+}
+
+/* Of the lanes inside, from `start` to `end`; places are `first` at the start and go by `rate` a metre. */
+static density_moments voxels_moments(const medium_hit *k, nb_wide start, nb_wide end, nb_mask inside, nb_real first,
+                                      nb_real rate)
+{
+    const voxel_rays rays = voxel_rays_of(k);
+    const nb_wmask lanes = nb_wand(nb_widen_mask(inside), start < end);
+    voxel_walk w = begin_voxels(&rays, start);
+    nb_wide amount = NB_W(0.0), filled = NB_W(0.0);
+    density_moments sum = {.first = NB_F(0.0), .second = NB_F(0.0)};
+    for (;;) {
+        (void)find_voxels(&rays, &w, end, lanes);
+        const nb_wmask going = nb_wand(lanes, w.t < end);
+        if (!nb_wany(going)) break;
+        const cell_exit x = exit_of_cell(&rays, &w, end);
+        const cell_moments cell = moments_of_cell(&rays, &w, x.until);
+        const nb_real middle = first + nb_narrow(NB_W(0.5) * (w.t + x.until) - start) * rate;
+        const nb_wide length = leave_cell(&rays, &x, end, going, &w);
+        const nb_real h = nb_narrow(length), half = NB_F(0.5) * h * rate;
+        amount = amount + length * nb_widen(cell.mean);
+        filled = filled + length;
+        sum.first = sum.first + h * (middle * cell.mean + half * cell.first);
+        sum.second = sum.second +
+                     h * (middle * middle * cell.mean + half * (NB_F(2.0) * middle * cell.first + half * cell.second));
+    }
+    const nb_real value = nb_narrow(amount);
+    sum.amount = nb_estimate_of(value, error_of_voxels(k, value, nb_narrow(filled)));
+    return sum;
 }

@@ -87,9 +87,10 @@ static nb_real light_arrives(const packet_state *m, const light_pass *pass, cons
 /* The light that is scattered: of the sun where `pass` is NULL. */
 typedef struct overlap_light {
     const light_pass *pass;
-    const nb_phase *phase; /* of a point light: all media that it lights have this one */
-    nb_real most;          /* radiance of fog that is opaque, at most */
-    double share;          /* what its steps may add to the error */
+    const nb_phase *phase; /* of a point light: only media with this one scatter it */
+    size_t phase_number;
+    nb_real most; /* radiance of fog that is opaque, at most */
+    double share; /* what its steps may add to the error */
 } overlap_light;
 
 /* What is seen of a place that has its depths and what arrives there. */
@@ -112,7 +113,7 @@ static void look_from(const sunlight *sun, const packet_state *m, const overlap_
     nb_wide reach = NB_WFAR;
     nb_real arriving = NB_F(1.0);
     if (light->pass != NULL) arriving = light_arrives(m, light->pass, light->phase, at->t, beside, &towards, &reach);
-    const shadowed_way all = way_through_shadows(sun, m, before->t, at->t, towards, reach);
+    const shadowed_way all = way_through_shadows(sun, m, light->pass == NULL, before->t, at->t, towards, reach);
     const light_depth way = all.depth;
     at->doubt = NB_F(0.0);
     at->arrives = arriving;
@@ -139,64 +140,93 @@ typedef struct lit_half {
         [3]; /* by how much the first moment may be off through densities that are not linear, or half the second */
 } lit_half;
 
+static int is_lit_by(const medium_hit *k, const overlap_light *light)
+{
+    if (light->pass == NULL) return k->lit->scatters_sun;
+    return k->lit->scatters_lights && k->lit->phase == light->phase_number;
+}
+
 /* Of the sun its radiance per metre; of a point light what scatters. */
 static nb_real glow_in(const medium_hit *k, const overlap_light *light, int c)
 {
     if (light->pass == NULL) return k->glow[c];
-    return k->lit->scatters_lights ? k->extinction[c] * REAL(k->medium->body.albedo[c]) : NB_F(0.0);
+    return is_lit_by(k, light) ? k->extinction[c] * REAL(k->medium->body.albedo[c]) : NB_F(0.0);
 }
 
-/* The mean place and the mean of its square within a part from s on, of length l. Densities are linear from end to end of it: what that
- * misses is in the moments alone. */
-static void find_moments_of(const medium_hit *k, nb_wide enter, nb_wide leave, nb_real s, nb_real l, nb_real *first,
-                            nb_real *second)
+/* Of a body between two places: its density's integral and moments, and by how much the first of these may be off, or half
+ * the second. */
+typedef struct part_moments {
+    density_moments of;
+    nb_real doubt;
+} part_moments;
+
+/* Of a part that has the places from s on, h metres of them at `rate` a metre. Densities are taken as linear from end to
+ * end of it: what that misses is in the moments alone. Voxels have theirs. */
+static part_moments moments_of_part(const medium_hit *k, nb_wide enter, nb_wide leave, nb_mask some, nb_real s,
+                                    nb_real h, nb_real rate)
 {
-    nb_real last = NB_F(0.5);
-    if (k->medium->body.density.type != NEBEL_DENSITY_CONSTANT) {
+    const nebel_density_type type = k->medium->body.density.type;
+#if !defined(NB_DOUBLE)
+    if (type == NEBEL_DENSITY_GRID) return (part_moments){voxels_moments(k, enter, leave, some, s, rate), NB_F(0.0)};
+#else
+    (void)some;
+#endif
+    const nb_estimate along = contact_integral(k, enter, leave, h);
+    const nb_real l = h * rate;
+    nb_real last = NB_F(0.5), doubt = NB_F(0.0);
+    if (type != NEBEL_DENSITY_CONSTANT) {
         const nb_real a = contact_density(k, enter), b = contact_density(k, leave);
+        const nb_real bent = nb_abs(along.value - NB_F(0.5) * h * (a + b)) / nb_max(along.value, NB_TINY);
         last = nb_select(a + b > NB_TINY, b / nb_max(a + b, NB_TINY), last);
+        doubt = along.value * (nb_min(bent, NB_F(1.0)) * l * REAL(MOMENT_ERROR));
     }
     const nb_real mean = (NB_F(1.0) + last) * REAL(1.0 / 3), square = (NB_F(1.0) + last + last) * REAL(1.0 / 6);
-    *first = s + l * mean;
-    *second = s * (s + NB_F(2.0) * l * mean) + l * l * square;
+    const nb_real first = s + l * mean, second = s * (s + NB_F(2.0) * l * mean) + l * l * square;
+    return (part_moments){{along, along.value * first, along.value * second}, doubt};
 }
 
 /* What bodies add between two places: optical depth and its error, how many depths are summed, light that is not seen from
- * places, and by how much light is off, per optical depth, of bodies that end there together with shadows. */
+ * places, and by how much light is off, per optical depth, of bodies that end there together with shadows. What is
+ * not seen is as much as it would be if all were. */
 typedef struct lit_between {
     nb_real depth[3], error[3], terms, unresolved, cut, cut_depth;
 } lit_between;
 
-/* Adds what a body gives from `from` to `to`, which has the places from `place` to place + 1 of its half. */
-static void add_part(const medium_hit *k, const leaf_span *span, const overlap_light *light, const lit_point *from,
-                     nb_wide to, int place, nb_real quarter, lit_half *half, lit_between *sum)
+static lit_between nothing_between(void)
 {
-    const nb_wide enter = nb_wmin(nb_wmax(span->enter, from->t), to);
+    const nb_real zero = NB_F(0.0);
+    lit_between none = {.terms = NB_F(2.0), .unresolved = zero, .cut = zero, .cut_depth = zero};
+    for (int c = 0; c < 3; c++) none.depth[c] = none.error[c] = zero;
+    return none;
+}
+
+/* Adds what a body gives from `from` to `to`, which has the places from `place` to place + 1 of its half */
+static void add_part(const medium_hit *k, const leaf_span *span, const overlap_light *light, nb_wide from, nb_wide to,
+                     int place, nb_real quarter, lit_half *half, lit_between *sum)
+{
+    const nb_real zero = NB_F(0.0);
+    const nb_wide enter = nb_wmin(nb_wmax(span->enter, from), to);
     const nb_wide leave = nb_wmax(nb_wmin(span->leave, to), enter);
     const nb_mask some = nb_narrow_mask(enter < leave);
     if (!nb_any(some)) return;
-    const nb_real zero = NB_F(0.0), h = nb_narrow(leave - enter);
-    const nb_estimate along = contact_integral(k, enter, leave, h);
-    const nb_real value = nb_select(some, along.value, zero), error = nb_select(some, along.error, zero);
-    const nb_real scale = nb_rcp_bounded(quarter), most = nb_min(most_depth(k->medium), NB_F(1.0));
+    const nb_real h = nb_narrow(leave - enter), scale = nb_rcp_bounded(quarter);
+    const nb_real from_start = nb_narrow(enter - from) * scale + REAL(place);
+    const part_moments part = moments_of_part(k, enter, leave, some, from_start, h, scale);
+    const nb_real value = nb_select(some, part.of.amount.value, zero);
+    const nb_real error = nb_select(some, part.of.amount.error, zero);
+    const nb_real first = nb_select(some, part.of.first, zero), second = nb_select(some, part.of.second, zero);
+    const nb_real doubt = nb_select(some, part.doubt, zero), most = nb_min(most_depth(k->medium), NB_F(1.0));
     const nb_mask narrow = nb_narrow_mask(span->leave - span->enter < nb_widen(quarter + quarter));
-    const int varies = k->medium->body.density.type != NEBEL_DENSITY_CONSTANT;
-    nb_real first, second, hidden = zero, doubt = zero, most_light = zero, deepest = zero;
-    if (varies) {
-        const nb_real even = NB_F(0.5) * h * (contact_density(k, enter) + contact_density(k, leave));
-        const nb_real bent = nb_min(nb_abs(value - even) / nb_max(value, NB_TINY), NB_F(1.0));
-        doubt = nb_select(some, bent * h * scale * REAL(MOMENT_ERROR), zero);
-    }
-    find_moments_of(k, enter, leave, nb_narrow(enter - from->t) * scale + REAL(place), h * scale, &first, &second);
+    nb_real hidden = zero, most_light = zero, deepest = zero;
     for (int c = 0; c < 3; c++) {
-        const nb_real glow = glow_in(k, light, c) * value;
+        const nb_real lit = glow_in(k, light, c), glow = lit * value;
         sum->depth[c] = sum->depth[c] + k->extinction[c] * value;
         sum->error[c] = sum->error[c] + k->extinction[c] * error;
         half->sum[c] = half->sum[c] + glow;
-        half->first[c] = half->first[c] + glow * nb_select(some, first, zero);
-        half->second[c] = half->second[c] + glow * nb_select(some, second, zero);
-        if (varies) half->doubt[c] = half->doubt[c] + glow * doubt;
-        hidden = nb_max(hidden, glow * most * from->seen[c]);
+        half->first[c] = half->first[c] + lit * first;
+        half->second[c] = half->second[c] + lit * second;
+        half->doubt[c] = half->doubt[c] + lit * doubt;
+        hidden = nb_max(hidden, glow * most);
         most_light = nb_max(most_light, glow);
         deepest = nb_max(deepest, k->extinction[c] * value);
     }
@@ -208,24 +238,26 @@ static void add_part(const medium_hit *k, const leaf_span *span, const overlap_l
     sum->cut_depth = sum->cut_depth + nb_select(nb_and(some, open > NB_F(1e-3)), deepest, zero);
 }
 
-/* All of them. */
-static void add_parts(const packet_state *m, const overlap_light *light, const lit_point *from, lit_point *to,
-                      int place, nb_real quarter, lit_half *half, nb_real *unresolved)
+/* Of all bodies from place to place of a step, or of one part of it. */
+static void add_parts(const packet_state *m, const overlap_light *light, const nb_wide *t, int count, nb_real quarter,
+                      lit_half half[2], lit_between *sum)
 {
-    const nb_real zero = NB_F(0.0);
-    lit_between sum = {{zero, zero, zero}, {zero, zero, zero}, NB_F(2.0), zero, zero, zero};
     for (size_t i = 0; i < m->contact_count; i++) {
         const medium_hit *k = &m->contacts[i];
-        add_part(k, &m->spans[k->first_span], light, from, to->t, place, quarter, half, &sum);
+        for (int n = 0; n < count; n++)
+            add_part(k, &m->spans[k->first_span], light, t[n], t[n + 1], n % 2, quarter, &half[n / 2], &sum[n]);
     }
+}
+
+static void add_depths(const lit_point *from, const lit_between *between, lit_point *to)
+{
     for (int c = 0; c < 3; c++) {
-        to->depth[c] = from->depth[c] + sum.depth[c];
-        const nb_real rounding = (sum.depth[c] * sum.terms + to->depth[c]) * NB_EPSILON;
-        to->depth_error[c] = from->depth_error[c] + sum.error[c] + rounding;
+        to->depth[c] = from->depth[c] + between->depth[c];
+        const nb_real rounding = (between->depth[c] * between->terms + to->depth[c]) * NB_EPSILON;
+        to->depth_error[c] = from->depth_error[c] + between->error[c] + rounding;
     }
-    *unresolved = *unresolved + sum.unresolved;
-    to->cut = sum.cut;
-    to->cut_depth = sum.cut_depth;
+    to->cut = between->cut;
+    to->cut_depth = between->cut_depth;
 }
 
 static lit_half nothing_scattered(void)
@@ -250,9 +282,13 @@ static nb_real doubt_of_half(const lit_half *half, int c, nb_real a, nb_real b, 
 
 /* ---- steps ----------------------------------------------------------------------------------- */
 
+/* What light in voxels may be off by, as a multiple of what places tell. */
+#define STEP_CAUTION NB_F(2.0)
+
 typedef struct overlap_step {
     lit_point end;
     nb_real light[3], error, rounding, drop;
+    nb_real most;     /* no more light is in it */
     nb_mask has_edge; /* a shadow begins or ends in it */
 } overlap_step;
 
@@ -336,6 +372,15 @@ static lit_point look_ahead_from(const sunlight *sun, const packet_state *m, con
     return at;
 }
 
+/* What comes to any of the places if nothing is before the light. */
+static void most_arriving(const overlap_light *light, const lit_point at[5], nb_real arriving[3])
+{
+    nb_real most = at[0].arrives;
+    for (int i = 1; i < 5; i++) most = nb_max(most, at[i].arrives);
+    for (int c = 0; c < 3; c++)
+        arriving[c] = light->pass != NULL ? most * REAL(light->pass->point_light->intensity[c]) : most;
+}
+
 static overlap_step try_overlap_step(const sunlight *sun, const packet_state *m, const overlap_light *light,
                                      const lit_point *start, nb_real length, nb_wide end)
 {
@@ -343,19 +388,26 @@ static overlap_step try_overlap_step(const sunlight *sun, const packet_state *m,
     const nb_wide margin = (end - start->t) * WIDE(CONE_MARGIN);
     lit_point at[5] = {look_ahead_from(sun, m, light, start, margin)};
     lit_half half[2] = {nothing_scattered(), nothing_scattered()};
-    nb_real unresolved = NB_F(0.0);
+    lit_between between[4];
+    nb_wide t[5] = {start->t};
     for (int i = 1; i < 5; i++) {
-        at[i].t = i == 4 ? end : nb_wmin(start->t + nb_widen(quarter * REAL(i)), end);
-        add_parts(m, light, &at[i - 1], &at[i], (i - 1) % 2, quarter, &half[(i - 1) / 2], &unresolved);
+        t[i] = at[i].t = i == 4 ? end : nb_wmin(start->t + nb_widen(quarter * REAL(i)), end);
+        between[i - 1] = nothing_between();
+    }
+    add_parts(m, light, t, 4, quarter, half, between);
+    for (int i = 1; i < 5; i++) {
+        add_depths(&at[i - 1], &between[i - 1], &at[i]);
         look_from(sun, m, light, &at[i - 1], i == 4 ? end - margin : at[i].t, &at[i]);
     }
     overlap_step s = {.end = at[4],
                       .error = NB_F(0.0),
                       .rounding = NB_F(0.0),
                       .drop = NB_F(0.0),
+                      .most = NB_F(0.0),
                       .has_edge = nb_or(nb_or(at[1].has_edge, at[2].has_edge), nb_or(at[3].has_edge, at[4].has_edge))};
-    nb_real doubt = NB_F(0.0), full = NB_F(0.0), unseen = NB_F(0.0);
+    nb_real doubt = NB_F(0.0), full = NB_F(0.0), unseen = NB_F(0.0), arriving[3], unresolved = NB_F(0.0);
     for (int i = 0; i < 5; i++) doubt = nb_max(doubt, at[i].doubt);
+    most_arriving(light, at, arriving);
     for (int c = 0; c < 3; c++) {
         const nb_real a = at[0].seen[c], b = at[2].seen[c], e = at[4].seen[c], eighth = NB_F(0.125);
         const nb_real first = nb_abs(at[1].seen[c] - eighth * (NB_F(3.0) * a + NB_F(6.0) * b - e));
@@ -363,12 +415,16 @@ static overlap_step try_overlap_step(const sunlight *sun, const packet_state *m,
         const nb_real most = nb_max(nb_max(nb_max(a, at[1].seen[c]), b), nb_max(at[3].seen[c], e));
         const nb_real light_of_all =
             light_of_half(&half[0], c, a, at[1].seen[c], b) + light_of_half(&half[1], c, b, at[3].seen[c], e);
+        nb_real hidden = NB_F(0.0);
+        for (int i = 0; i < 4; i++) hidden = hidden + between[i].unresolved * at[i].seen[c];
+        unresolved = nb_max(unresolved, hidden);
         s.light[c] = nb_max(light_of_all, NB_F(0.0));
         s.error = nb_max(s.error, first * half[0].sum[c] + last * half[1].sum[c]);
         const nb_real moments =
             doubt_of_half(&half[0], c, a, at[1].seen[c], b) + doubt_of_half(&half[1], c, b, at[3].seen[c], e);
         s.rounding = nb_max(s.rounding, (half[0].sum[c] + half[1].sum[c]) * most * doubt + moments);
         full = nb_max(full, (half[0].sum[c] + half[1].sum[c]) * most);
+        s.most = nb_max(s.most, (half[0].sum[c] + half[1].sum[c]) * (at[0].behind[c] * arriving[c]));
         s.drop = nb_max(s.drop, at[0].behind[c] - at[4].behind[c]);
         unseen = nb_max(unseen, unseen_between_places(at, c, light) + light_of_cut_bodies(at, c));
     }
@@ -382,6 +438,8 @@ typedef struct overlap_walk {
     nb_wide last;
     nb_wmask lanes;
     nb_real guess, left, whole; /* length of the next step; steps that may still be tried; of all */
+    nb_real least;              /* what the next step is taken to be off by at least */
+    nb_real doubt;              /* see walk_through_overlap */
 } overlap_walk;
 
 static void select_place(nb_mask mask, lit_point *to, const lit_point *from)
@@ -401,11 +459,13 @@ static void select_place(nb_mask mask, lit_point *to, const lit_point *from)
 static lit_point place_behind(sunlight *sun, const packet_state *m, const overlap_light *light, const lit_point *from,
                               nb_wide t, nb_wmask lanes)
 {
-    lit_half none = nothing_scattered();
-    nb_real unresolved = NB_F(0.0);
+    const nb_wide part[2] = {from->t, t};
+    lit_half none[2] = {nothing_scattered(), nothing_scattered()};
+    lit_between between = nothing_between();
     lit_point at = {.t = t};
     list_shadows_of_step(sun, from->t, t, lanes);
-    add_parts(m, light, from, &at, 0, NB_F(1.0), &none, &unresolved);
+    add_parts(m, light, part, 1, NB_F(1.0), none, &between);
+    add_depths(from, &between, &at);
     look_from(sun, m, light, from, t, &at);
     return at;
 }
@@ -427,8 +487,11 @@ static void step_through_overlap(sunlight *sun, const packet_state *m, const ove
     const nb_real length = nb_select(final, rest, nb_min(w->guess, rest));
     const nb_wide end = nb_wselect(nb_widen_mask(length >= rest), bright, w->at.t + nb_widen(length));
     list_shadows_of_step(sun, w->at.t, end, w->lanes);
-    const overlap_step s = try_overlap_step(sun, m, light, &w->at, length, end);
-    const nb_real least = NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
+    const int has_voxels = sun->lighting->common_steps == NB_COMMON_STEPS_IN_FLOAT;
+    const nb_real caution = has_voxels ? STEP_CAUTION : NB_F(1.0);
+    overlap_step s = try_overlap_step(sun, m, light, &w->at, length, end);
+    if (has_voxels) s.error = nb_max(s.error * caution, w->least);
+    const nb_real least = caution * NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
     const nb_real steady = REAL(0.5 * (1 - EDGE_SHARE)) * (s.drop + length * nb_rcp_bounded(w->whole));
     const nb_real at_edge =
         nb_select(s.has_edge, REAL(EDGE_SHARE / (double)(2 * sun->snapshot->medium_count)), NB_F(0.0));
@@ -439,24 +502,27 @@ static void step_through_overlap(sunlight *sun, const packet_state *m, const ove
         g->radiance[c] = g->radiance[c] + nb_select(taken, s.light[c], NB_F(0.0));
         most = nb_max(most, g->radiance[c]);
     }
-    const nb_real error = s.error * REAL(ESTIMATE_MARGIN) + s.rounding + most * NB_EPSILON;
+    const nb_real gaps = has_voxels ? nb_min(s.most, allowed) * GAP_SHARE : NB_F(0.0);
+    const nb_real error = nb_max(s.error * REAL(ESTIMATE_MARGIN), gaps) + s.rounding + most * NB_EPSILON;
     g->radiance_error = g->radiance_error + nb_select(taken, error, NB_F(0.0));
+    w->doubt = w->doubt + nb_select(taken, s.rounding, NB_F(0.0));
     select_place(taken, &w->at, &s.end);
     start_from_last(sun, taken);
     w->guess = nb_select(nb_narrow_mask(w->lanes), next_length(length, s.error, allowed), w->guess);
+    w->least = nb_select(taken, NB_F(0.25) * w->least, s.error * NB_F(0.0625));
     w->left = w->left - NB_F(1.0);
 }
 
 /* ---- the walk -------------------------------------------------------------------------------- */
 
 /* From the first lit body of each ray to the last. */
-static nb_mask find_lit_stretch(const packet_state *m, int by_light, nb_wide *first, nb_wide *last)
+static nb_mask find_lit_stretch(const packet_state *m, const overlap_light *light, nb_wide *first, nb_wide *last)
 {
     *first = NB_WFAR;
     *last = NB_W(0.0);
     for (size_t i = 0; i < m->contact_count; i++) {
         const medium_hit *k = &m->contacts[i];
-        if (!(by_light ? k->lit->scatters_lights : k->lit->scatters_sun)) continue;
+        if (!is_lit_by(k, light)) continue;
         const nb_wmask met = k->hull_enter < k->hull_leave;
         *first = nb_wselect(met, nb_wmin(*first, k->hull_enter), *first);
         *last = nb_wselect(met, nb_wmax(*last, k->hull_leave), *last);
@@ -464,16 +530,22 @@ static nb_mask find_lit_stretch(const packet_state *m, int by_light, nb_wide *fi
     return nb_narrow_mask(*first < *last);
 }
 
-static void transmittance_at(const packet_state *m, nb_wide t, nb_real behind[3])
+/* Transmittance up to t, at most and at least. Voxels are not walked for it: there may be none up to `full`, and as many as
+ * there can be from there on. */
+static void transmittance_at(const packet_state *m, nb_wide full, nb_wide t, nb_real behind[3])
 {
     nb_real depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (size_t i = 0; i < m->contact_count; i++) {
         const medium_hit *k = &m->contacts[i];
         const leaf_span *span = &m->spans[k->first_span];
-        const nb_wide leave = nb_wmax(nb_wmin(span->leave, t), span->enter);
-        const nb_mask some = nb_narrow_mask(span->enter < leave);
+        const int is_grid = k->medium->body.density.type == NEBEL_DENSITY_GRID;
+        const nb_wide enter = is_grid ? nb_wmax(span->enter, full) : span->enter;
+        const nb_wide leave = nb_wmax(nb_wmin(span->leave, t), enter);
+        const nb_mask some = nb_narrow_mask(enter < leave);
         if (!nb_any(some)) continue;
-        const nb_real value = contact_integral(k, span->enter, leave, nb_narrow(leave - span->enter)).value;
+        const nb_real length = nb_narrow(leave - enter);
+        const nb_real value =
+            is_grid ? length * REAL(k->medium->peak) : contact_integral(k, enter, leave, length).value;
         for (int c = 0; c < 3; c++) depth[c] = depth[c] + nb_select(some, k->extinction[c] * value, NB_F(0.0));
     }
     map_channels(m->sun->snapshot, transmitted, depth, behind);
@@ -483,8 +555,8 @@ static void transmittance_at(const packet_state *m, nb_wide t, nb_real behind[3]
 static nb_real most_between(const packet_state *m, const overlap_light *light, nb_wide start, nb_wide end)
 {
     nb_real before[3], behind[3], drop = NB_F(0.0);
-    transmittance_at(m, start, before);
-    transmittance_at(m, end, behind);
+    transmittance_at(m, start, start, before);
+    transmittance_at(m, start, end, behind);
     for (int c = 0; c < 3; c++) drop = nb_max(drop, before[c] - behind[c]);
     const nb_real arriving = light->pass != NULL ? most_fluence(light->pass, start, end) : NB_F(1.0);
     return drop * arriving * light->most;
@@ -503,14 +575,17 @@ static nb_wide trim_stretch(const packet_state *m, const overlap_light *light, n
     return last;
 }
 
-/* Steps end where a surface's shadow begins or ends, and pass over it. */
-static void walk_through_overlap(sunlight *sun, const packet_state *m, const overlap_light *light,
-                                 sun_attenuation *shadows, nb_mask lanes, nb_wide first, nb_wide last,
-                                 gathered_light *g)
+/* Steps end where a surface's shadow begins or ends, and pass over it. Returns what light may be off by through depths. */
+static nb_real walk_through_overlap(sunlight *sun, const packet_state *m, const overlap_light *light,
+                                    sun_attenuation *shadows, nb_mask lanes, nb_wide first, nb_wide last,
+                                    gathered_light *g)
 {
     const lit_point origin = no_place();
-    overlap_walk w = {
-        .last = last, .lanes = nb_wand(nb_widen_mask(lanes), first < last), .left = REAL(MAX_OVERLAP_STEPS)};
+    overlap_walk w = {.last = last,
+                      .lanes = nb_wand(nb_widen_mask(lanes), first < last),
+                      .left = REAL(MAX_OVERLAP_STEPS),
+                      .least = NB_F(0.0),
+                      .doubt = NB_F(0.0)};
     w.at = place_behind(sun, m, light, &origin, nb_wselect(w.lanes, first, NB_W(0.0)), w.lanes);
     start_from_last(sun, nb_mask_true);
     w.whole = nb_max(nb_narrow(last - first), NB_TINY);
@@ -529,13 +604,38 @@ static void walk_through_overlap(sunlight *sun, const packet_state *m, const ove
         }
         w.lanes = nb_wand(w.lanes, w.at.t < last);
     }
+    return w.doubt;
+}
+
+/* Depths to the sun come from columns, or for rays where these say that they may be too far off, from walks. A ray has one kind
+ * of them: between both its light would jump. */
+static void walk_by_columns(sunlight *sun, const packet_state *m, const overlap_light *light,
+                            const sun_attenuation *shadows, nb_mask lanes, nb_wide first, nb_wide last,
+                            gathered_light *g)
+{
+    const gathered_light before = *g;
+    sun_attenuation passed;
+    if (shadows != NULL) passed = *shadows;
+    sun->has_common_steps = 1;
+    sun->takes_columns = lanes;
+    const nb_real doubt = walk_through_overlap(sun, m, light, shadows != NULL ? &passed : NULL, lanes, first, last, g);
+    const nb_mask others = nb_and(lanes, nb_not(doubt <= REAL(COLUMN_SHARE * light->share)));
+    const int has_columns = light->pass == NULL && sun->lighting->common_steps == NB_COMMON_STEPS_IN_FLOAT;
+    if (!has_columns || !nb_any(others)) return;
+    gathered_light by_walks = before;
+    if (shadows != NULL) passed = *shadows;
+    sun->takes_columns = nb_mask_false;
+    list_shadows(sun, &m->rays, NULL);
+    (void)walk_through_overlap(sun, m, light, shadows != NULL ? &passed : NULL, others, first, last, &by_walks);
+    for (int c = 0; c < 3; c++) g->radiance[c] = nb_select(others, by_walks.radiance[c], g->radiance[c]);
+    g->radiance_error = nb_select(others, by_walks.radiance_error, g->radiance_error);
 }
 
 static void gather_overlap_light(sunlight *sun, const packet_state *m, const overlap_light *light,
-                                 sun_attenuation *shadows, gathered_light *g)
+                                 const sun_attenuation *shadows, gathered_light *g)
 {
     nb_wide first, last;
-    const nb_mask lit = find_lit_stretch(m, light->pass != NULL, &first, &last);
+    const nb_mask lit = find_lit_stretch(m, light, &first, &last);
     if (!nb_any(lit)) return;
     const nb_wide end = trim_stretch(m, light, first, last, REAL(0.5 * TAIL_SHARE * light->share));
     const nb_real arriving = light->pass != NULL ? most_fluence(light->pass, end, last) : NB_F(1.0);
@@ -551,7 +651,7 @@ static void gather_overlap_light(sunlight *sun, const packet_state *m, const ove
     }
     list_shadows(sun, &m->rays, light->pass != NULL ? light->pass->point_light : NULL);
     if (sun->out_of_memory) return;
-    walk_through_overlap(sun, m, light, shadows, lit, first, end, g);
+    walk_by_columns(sun, m, light, shadows, lit, first, end, g);
 }
 
 /* ---- all lights ------------------------------------------------------------------------------ */
@@ -570,6 +670,26 @@ static nb_real most_sunlight(const packet_state *m)
     return most;
 }
 
+/* What all point lights give to the media that scatter by one phase function. */
+static void gather_point_lights_of_phase(sunlight *sun, const packet_state *m, size_t number, gathered_light *g)
+{
+    const nebel_lighting *lighting = sun->lighting;
+    const double share = sun->share / ((double)lighting->light_count * (double)lighting->phase_count);
+    nb_real most = NB_F(0.0);
+    const nb_phase *phase = NULL;
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const medium_hit *k = &m->contacts[i];
+        if (!k->lit->scatters_lights || k->lit->phase != number) continue;
+        phase = &k->medium->body.phase;
+        most = nb_max(most, nb_select(is_met(k), REAL(most_scattered(&k->medium->body)), NB_F(0.0)));
+    }
+    for (size_t i = 0; i < lighting->light_count && phase != NULL; i++) {
+        light_pass pass = pass_light(m, &lighting->lights[i]);
+        const overlap_light light = {&pass, phase, number, most, share};
+        gather_overlap_light(sun, m, &light, sun->light_shades != NULL ? &sun->light_shades[i] : NULL, g);
+    }
+}
+
 /* Adds what all lights give along the rays. */
 static void gather_overlap_lights(sunlight *sun, const packet_state *m, gathered_light *g)
 {
@@ -581,18 +701,6 @@ static void gather_overlap_lights(sunlight *sun, const packet_state *m, gathered
     }
     note_group(sun->by_sun, before, g);
     for (int c = 0; c < 3; c++) before[c] = g->radiance[c];
-    nb_real most = NB_F(0.0);
-    const nb_phase *phase = NULL;
-    for (size_t i = 0; i < m->contact_count; i++) {
-        const medium_hit *k = &m->contacts[i];
-        if (!k->lit->scatters_lights) continue;
-        phase = &k->medium->body.phase;
-        most = nb_max(most, nb_select(is_met(k), REAL(most_scattered(&k->medium->body)), NB_F(0.0)));
-    }
-    for (size_t i = 0; i < lighting->light_count && phase != NULL; i++) {
-        light_pass pass = pass_light(m, &lighting->lights[i]);
-        const overlap_light light = {&pass, phase, most, sun->share / (double)lighting->light_count};
-        gather_overlap_light(sun, m, &light, sun->light_shades != NULL ? &sun->light_shades[i] : NULL, g);
-    }
+    for (size_t i = 0; i < lighting->phase_count; i++) gather_point_lights_of_phase(sun, m, i, g);
     note_group(sun->by_lights, before, g);
 }
