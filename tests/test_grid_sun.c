@@ -1,10 +1,12 @@
 /* Sunlight in voxels that are cut off at the faces of their box, where the way to the sun ends at one face here and at
  * another one there: the error that is told against light by brute force, and among other fog against light in double; and
- * what the lattice of depths says of itself against exact integrals. A number as argument tries so many grids. */
+ * what lattices of depths say of themselves against exact integrals. A number as argument tries so many grids. */
 #include "dice.h"
 #include "fog_help.h"
 
 #include "base/base.h"
+#include "light/light_lattice.h"
+#include "light/lighting.h"
 #include "light/sun_lattice.h"
 
 #include <math.h>
@@ -406,6 +408,66 @@ static void lattices_say_how_far_they_are_off(void **state)
     assert_true(over * 500 <= places);
 }
 
+static double in_light_lattice(const nb_light_lattice *l, const double cell[3], double *deviation)
+{
+    size_t first[3];
+    double share[3], mean = 0;
+    for (int i = 0; i < 3; i++) {
+        const double place = fmin(fmax((cell[i] - l->first) * l->per_cell[i], 0), l->count[i] - 1);
+        first[i] = (size_t)fmin(floor(place), l->count[i] - 2);
+        share[i] = place - (double)first[i];
+    }
+    for (size_t n = 0; n < 8; n++) {
+        const size_t x = first[0] + (n & 1), y = first[1] + (n >> 1 & 1), z = first[2] + (n >> 2);
+        const double weight = (n & 1 ? share[0] : 1 - share[0]) * (n >> 1 & 1 ? share[1] : 1 - share[1]) *
+                              (n >> 2 ? share[2] : 1 - share[2]);
+        mean += weight * (double)l->mean[(z * (size_t)l->count[1] + y) * (size_t)l->count[0] + x];
+    }
+    *deviation =
+        (double)l->deviation[(first[2] * (size_t)(l->count[1] - 1) + first[1]) * (size_t)(l->count[0] - 1) + first[0]];
+    return mean;
+}
+
+/* The same of those of point lights, in and beside the box. */
+static void check_light_lattice(uint64_t seed, size_t *over, size_t *places)
+{
+    const cloud c = random_cloud(&seed);
+    nebel_lighting_desc unused;
+    const nebel_volume_desc v = fog_volume(&c, &unused);
+    const nebel_light light = random_light(&seed, &c);
+    const nebel_lighting_desc lights = {.lights = &light, .light_count = 1};
+    nebel_lighting *fog = fog_light(&lights, &v, 1);
+    const nb_light_lattice *l = nb_light_lattices_of(fog)->of_medium[0];
+    for (int n = 0; n < PLACES; n++, ++*places) {
+        double place[3], way[3], cell[3], inside, deviation, square = 0;
+        for (int a = 0; a < 3; a++) {
+            place[a] = dice(&seed, c.low[a], c.high[a]);
+            way[a] = light.position[a] - place[a];
+            square += way[a] * way[a];
+        }
+        const double reach = sqrt(square) - light.radius;
+        if (!(reach > 0)) continue;
+        for (int a = 0; a < 3; a++) way[a] /= sqrt(square);
+        const nb_grid_line line = in_cells(&c, place, way, 0, &inside);
+        for (int a = 0; a < 3; a++) cell[a] = line.from[a];
+        const double truth = nb_grid_integral(c.grid, &line, fmin(inside, reach), 0, HUGE_VAL).value;
+        const double off = fabs(in_light_lattice(l, cell, &deviation) * reach - truth);
+        *over += off > deviation * reach + 1e-6;
+        if (!(off <= 4 * deviation * reach + 1e-6)) fail_msg("off by %g, said %g", off, deviation * reach);
+    }
+    nebel_release_lighting(fog);
+    nebel_release_grid(c.grid);
+}
+
+static void lattices_of_point_lights_say_how_far_they_are_off(void **state)
+{
+    size_t over = 0, places = 0;
+    (void)state;
+    for (int i = 0; i < grid_count; i++) check_light_lattice((uint64_t)i, &over, &places);
+    print_message("lattices of point lights: %zu places, %zu off by more than is told\n", places, over);
+    assert_true(over * 500 <= places);
+}
+
 int main(int argc, char **argv)
 {
     if (argc > 1) grid_count = atoi(argv[1]);
@@ -414,6 +476,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(errors_hold_for_voxels_in_company),
         cmocka_unit_test(transmittance_has_the_bits_that_it_has_alone),
         cmocka_unit_test(lattices_say_how_far_they_are_off),
+        cmocka_unit_test(lattices_of_point_lights_say_how_far_they_are_off),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

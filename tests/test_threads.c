@@ -81,22 +81,23 @@ static question make_question(const random_fog *fog)
     return q;
 }
 
-static void query_with_threads(random_fog *fog, uint64_t seed)
+/* One lighting is asked by this thread alone, another one of the same by threads, what it prepares when it is asked included. */
+static void query_with_threads(const question *q, const nebel_volume_desc *volumes, size_t count,
+                               const nebel_lighting_desc *lights)
 {
     static answers alone, results[THREADS];
     question questions[THREADS];
     pthread_t threads[THREADS];
-    random_fog_make(fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), 300 + seed);
-    const question q = make_question(fog);
     const nebel_fog_desc desc = {.host.allocator = {allocate, release, NULL}};
-    const nebel_lighting_desc lights = {.environment = {.radiance = {.1, .2, .3}}};
-    nebel_lighting *const lighting = fog_commit_lit(&desc, fog->volumes, fog->count, &lights);
+    nebel_lighting *const first = fog_commit_lit(&desc, volumes, count, lights);
+    nebel_lighting *const lighting = fog_commit_lit(&desc, volumes, count, lights);
     memset(&alone, 0, sizeof alone);
-    ask(lighting, &q, &alone);
+    ask(first, q, &alone);
+    nebel_release_lighting(first);
     assert_int_equal(alone.failures, 0);
     for (int i = 0; i < THREADS; i++) {
         memset(&results[i], 0, sizeof results[i]);
-        questions[i] = q;
+        questions[i] = *q;
         questions[i].lighting = nebel_retain_lighting(lighting);
         questions[i].results = &results[i];
     }
@@ -104,14 +105,46 @@ static void query_with_threads(random_fog *fog, uint64_t seed)
     nebel_release_lighting(lighting); /* some thread is the last owner */
     for (int i = 0; i < THREADS; i++) assert_int_equal(pthread_join(threads[i], NULL), 0);
     for (int i = 0; i < THREADS; i++) assert_memory_equal(&alone, &results[i], sizeof alone);
-    assert_int_equal(atomic_load(&live), 0);
 }
 
 static void test_threads_get_the_same_bits_from_one_lighting(void **unused)
 {
     (void)unused;
     static random_fog fog;
-    for (uint64_t seed = 0; seed < 2 * RANDOM_FOG_KIND_COUNT; seed++) query_with_threads(&fog, seed);
+    const nebel_lighting_desc lights = {.environment = {.radiance = {.1, .2, .3}}};
+    for (uint64_t seed = 0; seed < 2 * RANDOM_FOG_KIND_COUNT; seed++) {
+        random_fog_make(&fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), 300 + seed);
+        const question q = make_question(&fog);
+        query_with_threads(&q, fog.volumes, fog.count, &lights);
+        assert_int_equal(atomic_load(&live), 0);
+    }
+}
+
+/* Depths to point lights in voxels are found when they are asked for, by all threads that ask. */
+static void test_threads_share_what_voxels_prepare(void **unused)
+{
+    enum { SIDE = 16, LIGHTS = 5 };
+    static unsigned char voxels[SIDE * SIDE * SIDE];
+    (void)unused;
+    for (unsigned i = 0; i < sizeof voxels; i++) voxels[i] = (unsigned char)(i * 2654435761U >> 24);
+    const nebel_grid_desc desc = {.size = {SIDE, SIDE, SIDE}, .type = NEBEL_VOXEL_UINT8, .voxels = voxels};
+    nebel_grid *grid;
+    assert_int_equal(nebel_create_grid(&desc, &grid), NEBEL_OK);
+    const nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-3, -3, -3}, .max = {3, 3, 3}},
+                                 .density = {.type = NEBEL_DENSITY_GRID, .grid = grid},
+                                 .extinction = {.2, .3, .4},
+                                 .albedo = {.9, .8, .7}};
+    nebel_light all[LIGHTS];
+    question q = {.lighting = NULL};
+    for (int i = 0; i < LIGHTS; i++)
+        all[i] = (nebel_light){.position = {i - 2, sin(i), 2 * cos(i)}, .intensity = {3, 4, 5}, .radius = .1};
+    for (int i = 0; i < RAYS; i++) {
+        q.rays[i] = (nebel_ray){{8 * sin(i), 3 * cos(3 * i), 8 * cos(i)}, {-sin(i), .1 * sin(5 * i), -cos(i)}, 20};
+        for (int k = 0; k < 3; k++) q.to[i][k] = (float)(4 * sin(1 + i * (k + 1.3)));
+    }
+    query_with_threads(&q, &v, 1, &(nebel_lighting_desc){.lights = all, .light_count = LIGHTS});
+    nebel_release_grid(grid);
+    assert_int_equal(atomic_load(&live), 0);
 }
 
 /* Fogs of different threads have nothing in common. */
@@ -149,6 +182,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_threads_get_the_same_bits_from_one_lighting),
+        cmocka_unit_test(test_threads_share_what_voxels_prepare),
         cmocka_unit_test(test_threads_edit_fogs_of_their_own),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

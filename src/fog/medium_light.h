@@ -11,6 +11,7 @@
 struct nb_diffusion;
 struct nb_environment_light;
 struct nb_light;
+struct nb_light_lattices;
 struct nb_medium;
 struct nb_sun_lattice;
 struct nb_trace_job;
@@ -66,6 +67,7 @@ struct nebel_lighting {
     struct nb_light *lights;
     nebel_light *described_lights; /* the same as they were given */
     nb_common_steps common_steps;
+    _Atomic(struct nb_light_lattices *) light_lattices; /* made when they are asked for: see nb_light_lattices_of */
 
     nebel_environment environment;                   /* one owner of its map */
     size_t environment_light_count;                  /* one for each phase function that scatters it, if not constant */

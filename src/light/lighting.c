@@ -1,5 +1,7 @@
 #include "lighting.h"
 
+#include "light_lattice.h"
+
 #include "medium/density.h"
 #include "medium/grid.h"
 #include "medium/medium_check.h"
@@ -284,6 +286,23 @@ static nebel_result light_by_environment(nebel_lighting *lighting, const nebel_l
 
 /* ---- all of it ------------------------------------------------------------------------------- */
 
+const nb_light_lattices *nb_light_lattices_of(const nebel_lighting *lighting)
+{
+    _Atomic(nb_light_lattices *) *slot = (_Atomic(nb_light_lattices *) *)&lighting->light_lattices; /* a cache */
+    nb_light_lattices *known = atomic_load_explicit(slot, memory_order_acquire);
+    if (known == NULL) {
+        nb_light_lattices *made =
+            nb_light_lattices_open(&lighting->allocator, lighting->snapshot, lighting->light_count);
+        if (made == NULL) return NULL;
+        if (atomic_compare_exchange_strong_explicit(slot, &known, made, memory_order_acq_rel, memory_order_acquire))
+            known = made;
+        else
+            nb_light_lattices_free(made);
+    }
+    nb_light_lattices_fill(known, lighting->snapshot, lighting->lights);
+    return known;
+}
+
 void nb_free_lighting(nebel_lighting *lighting)
 {
     const nebel_allocator allocator = lighting->allocator;
@@ -292,6 +311,7 @@ void nb_free_lighting(nebel_lighting *lighting)
     for (size_t i = 0; i < lighting->environment_light_count; i++)
         nb_environment_filter_release(lighting->environment_lights[i].filter);
     nebel_release_environment_map(lighting->environment.map);
+    nb_light_lattices_free(atomic_load(&lighting->light_lattices));
     nb_release(&allocator, lighting->media);
     nb_release(&allocator, lighting->lights);
     nb_release(&allocator, lighting->described_lights);

@@ -18,6 +18,9 @@ nebel_result nb_prepare_lighting(nebel_snapshot *snapshot, const nebel_lighting_
 /* Frees what nb_prepare_lighting made. */
 void nb_free_lighting(nebel_lighting *lighting);
 
+/* Those of the lighting's voxels and point lights, made when the first asks. NULL where memory is out. Any thread. */
+const struct nb_light_lattices *nb_light_lattices_of(const nebel_lighting *lighting);
+
 /* Cells per metre of the way to the sun through the voxels that are the body's density. */
 void nb_way_in_cells(const nebel_lighting *lighting, const nb_volume *body, double way[3]);
 

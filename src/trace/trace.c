@@ -1,6 +1,8 @@
 /* The public queries: arguments checked, a kernel chosen. */
 #include "trace_kernel.h"
 
+#include "light/lighting.h"
+
 #include "base/isa.h"
 #include "base/isa_list.h"
 #include "base/precision.h"
@@ -177,6 +179,12 @@ static nebel_result run_kernel(nb_trace_fn *kernel, nb_trace_job *job, double to
     const nebel_lighting *lighting = job->lighting;
     job->budget = tolerance * fmax(1, lighting->largest_radiance);
     job->promised = job->budget + (kernel == nb_trace_double ? DOUBLE_ROUNDING : FLOAT_ROUNDING);
+    job->light_lattices = NULL;
+    if (kernel != nb_trace_double && !job->transmittance_only && lighting->scatters_lights &&
+        lighting->common_steps == NB_COMMON_STEPS_IN_FLOAT) {
+        job->light_lattices = nb_light_lattices_of(lighting);
+        if (job->light_lattices == NULL) return NEBEL_ERROR_MEMORY;
+    }
     return kernel(job);
 }
 

@@ -1,5 +1,5 @@
-/* Sunlight and light of point lights in many bodies that lie over each other and shade each other: those of which
- * depths add.
+/* Sunlight and light of point lights in media that lie over each other and shade each other: those of which depths add,
+ * many bodies, or in float voxels and any others.
  *
  * From piece to piece, as trace_sun.h and trace_point_light.h go, the cost is quadratic in the bodies: each has two ends and two turns on the ray, and
  * after each of them places are asked for the depth to the light, of all bodies. Here steps know nothing of ends. In
@@ -10,6 +10,10 @@
  * takes `seen` at five places, and between three of them the parabola through it, of which a body needs the integral of its
  * density and its first two moments: nothing but sums over bodies. The error that is told is by how much the parabola through
  * the first, third and fifth place misses the others, and what bodies may do that are too small to be seen from place to place.
+ *
+ * Voxels have their moments by one walk, exactly (trace_voxels.h). Their depth to the light is as rough as they are, so that
+ * places may show less than there is: what they tell counts several times (STEP_CAUTION), more where no longer step was tried,
+ * and no less than a sixteenth of what was told of the step that was halved.
  *
  * Included by trace_kernel.c after trace_point_light.h. */
 
@@ -105,6 +109,13 @@ static void set_seen(const sunlight *sun, const overlap_light *light, lit_point 
     }
 }
 
+/* By what part of it light is more where so much less depth is before it. */
+static nb_real brighter_by(nb_real depth)
+{
+    const nb_mask much = depth > NB_F(0.01);
+    return nb_any(much) ? nb_select(much, nb_exp(nb_min(depth, NB_F(80.0))) - NB_F(1.0), depth) : depth;
+}
+
 /* `beside`: see light_arrives. */
 static void look_from(const sunlight *sun, const packet_state *m, const overlap_light *light, const lit_point *before,
                       nb_wide beside, lit_point *at)
@@ -113,7 +124,8 @@ static void look_from(const sunlight *sun, const packet_state *m, const overlap_
     nb_wide reach = NB_WFAR;
     nb_real arriving = NB_F(1.0);
     if (light->pass != NULL) arriving = light_arrives(m, light->pass, light->phase, at->t, beside, &towards, &reach);
-    const shadowed_way all = way_through_shadows(sun, m, light->pass == NULL, before->t, at->t, towards, reach);
+    const known_depths known = {sun, light->pass != NULL ? light->pass->point_light : NULL};
+    const shadowed_way all = way_through_shadows(&known, m, before->t, at->t, towards, reach);
     const light_depth way = all.depth;
     at->doubt = NB_F(0.0);
     at->arrives = arriving;
@@ -125,7 +137,9 @@ static void look_from(const sunlight *sun, const packet_state *m, const overlap_
         at->before[c] = all.before[c];
         at->here[c] = all.here[c];
         const nb_real rounding = (at->depth[c] + way.depth[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
-        at->doubt = nb_max(at->doubt, nb_min(at->depth_error[c] + way.error[c], NB_F(1.0)) + rounding);
+        const nb_real less = nb_min(at->depth_error[c], at->depth[c]) + nb_min(way.error[c], way.depth[c]);
+        const nb_real darker = nb_min(at->depth_error[c] + way.error[c], NB_F(1.0));
+        at->doubt = nb_max(at->doubt, nb_max(darker, brighter_by(less)) + rounding);
     }
     map_channels(sun->snapshot, transmitted, at->depth, at->behind);
     set_seen(sun, light, at);
@@ -283,7 +297,7 @@ static nb_real doubt_of_half(const lit_half *half, int c, nb_real a, nb_real b, 
 /* ---- steps ----------------------------------------------------------------------------------- */
 
 /* What light in voxels may be off by, as a multiple of what places tell. */
-#define STEP_CAUTION NB_F(2.0)
+#define STEP_CAUTION NB_F(4.0)
 
 typedef struct overlap_step {
     lit_point end;
@@ -428,6 +442,7 @@ static overlap_step try_overlap_step(const sunlight *sun, const packet_state *m,
         s.drop = nb_max(s.drop, at[0].behind[c] - at[4].behind[c]);
         unseen = nb_max(unseen, unseen_between_places(at, c, light) + light_of_cut_bodies(at, c));
     }
+    s.rounding = nb_min(s.rounding, s.most);
     s.error = s.error + unseen + unresolved + full * hidden_in_shadows(sun, start->t, end, length);
     return s;
 }
@@ -470,13 +485,13 @@ static lit_point place_behind(sunlight *sun, const packet_state *m, const overla
     return at;
 }
 
-/* After a step: twice as long where its error was far below what was allowed, shorter where it was near or beyond. The
- * error goes with the third power of the length, and where bodies begin and end with less. */
-static nb_real next_length(nb_real length, nb_real error, nb_real allowed)
+/* After a step: twice as long where its error was far below what was allowed, half as long where it was beyond; no shorter
+ * than what was meant where the step was cut short and good. The error goes with the third power of the length, and where bodies
+ * begin and end with less. */
+static nb_real next_length(nb_real guess, nb_real length, nb_real error, nb_real allowed)
 {
-    const nb_real two = NB_F(2.0), half = NB_F(0.5);
-    const nb_real next = nb_select(error * NB_F(8.0) <= allowed, two, NB_F(1.0));
-    return length * nb_select(error <= allowed, next, half);
+    const nb_real longer = length * nb_select(error * NB_F(8.0) <= allowed, NB_F(2.0), NB_F(1.0));
+    return nb_select(error <= allowed, nb_max(guess, longer), NB_F(0.5) * length);
 }
 
 static void step_through_overlap(sunlight *sun, const packet_state *m, const overlap_light *light, nb_wide bright,
@@ -490,7 +505,9 @@ static void step_through_overlap(sunlight *sun, const packet_state *m, const ove
     const int has_voxels = sun->lighting->common_steps == NB_COMMON_STEPS_IN_FLOAT;
     const nb_real caution = has_voxels ? STEP_CAUTION : NB_F(1.0);
     overlap_step s = try_overlap_step(sun, m, light, &w->at, length, end);
-    if (has_voxels) s.error = nb_max(s.error * caution, w->least);
+    /* two places may look alike by chance: more likely where no longer step has said what is there */
+    const nb_real unknown = nb_select(w->least > NB_F(0.0), NB_F(1.0), NB_F(2.0));
+    if (has_voxels) s.error = nb_max(s.error * (caution * unknown), w->least);
     const nb_real least = caution * NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
     const nb_real steady = REAL(0.5 * (1 - EDGE_SHARE)) * (s.drop + length * nb_rcp_bounded(w->whole));
     const nb_real at_edge =
@@ -508,7 +525,7 @@ static void step_through_overlap(sunlight *sun, const packet_state *m, const ove
     w->doubt = w->doubt + nb_select(taken, s.rounding, NB_F(0.0));
     select_place(taken, &w->at, &s.end);
     start_from_last(sun, taken);
-    w->guess = nb_select(nb_narrow_mask(w->lanes), next_length(length, s.error, allowed), w->guess);
+    w->guess = nb_select(nb_narrow_mask(w->lanes), next_length(w->guess, length, s.error, allowed), w->guess);
     w->least = nb_select(taken, NB_F(0.25) * w->least, s.error * NB_F(0.0625));
     w->left = w->left - NB_F(1.0);
 }
@@ -619,13 +636,16 @@ static void walk_by_columns(sunlight *sun, const packet_state *m, const overlap_
     sun->has_common_steps = 1;
     sun->takes_columns = lanes;
     const nb_real doubt = walk_through_overlap(sun, m, light, shadows != NULL ? &passed : NULL, lanes, first, last, g);
-    const nb_mask others = nb_and(lanes, nb_not(doubt <= REAL(COLUMN_SHARE * light->share)));
-    const int has_columns = light->pass == NULL && sun->lighting->common_steps == NB_COMMON_STEPS_IN_FLOAT;
+    const nb_mask fits = sun->doubted + doubt <= REAL(COLUMN_SHARE * sun->share);
+    const nb_mask others = nb_and(lanes, nb_not(fits));
+    sun->doubted = sun->doubted + nb_select(nb_and(lanes, fits), doubt, NB_F(0.0));
+    const int has_columns =
+        sun->lighting->common_steps == NB_COMMON_STEPS_IN_FLOAT && (light->pass == NULL || sun->light_lattices != NULL);
     if (!has_columns || !nb_any(others)) return;
     gathered_light by_walks = before;
     if (shadows != NULL) passed = *shadows;
     sun->takes_columns = nb_mask_false;
-    list_shadows(sun, &m->rays, NULL);
+    list_shadows(sun, &m->rays, light->pass != NULL ? light->pass->point_light : NULL);
     (void)walk_through_overlap(sun, m, light, shadows != NULL ? &passed : NULL, others, first, last, &by_walks);
     for (int c = 0; c < 3; c++) g->radiance[c] = nb_select(others, by_walks.radiance[c], g->radiance[c]);
     g->radiance_error = nb_select(others, by_walks.radiance_error, g->radiance_error);
@@ -695,12 +715,14 @@ static void gather_overlap_lights(sunlight *sun, const packet_state *m, gathered
 {
     const nebel_lighting *lighting = sun->lighting;
     nb_real before[3] = {g->radiance[0], g->radiance[1], g->radiance[2]};
+    sun->doubted = NB_F(0.0);
     if (lighting->scatters_sun) {
         const overlap_light light = {.most = most_sunlight(m), .share = sun->share};
         gather_overlap_light(sun, m, &light, sun->shade.boundaries != NULL ? &sun->shade : NULL, g);
     }
     note_group(sun->by_sun, before, g);
     for (int c = 0; c < 3; c++) before[c] = g->radiance[c];
+    sun->doubted = NB_F(0.0);
     for (size_t i = 0; i < lighting->phase_count; i++) gather_point_lights_of_phase(sun, m, i, g);
     note_group(sun->by_lights, before, g);
 }

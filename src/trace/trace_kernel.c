@@ -660,6 +660,7 @@ static nebel_result trace_lit(nb_trace_job *job, workspace *w)
                     .turn_capacity = STACK_TURNS,
                     .shadows = shadows,
                     .shadow_capacity = STACK_SHADOWS,
+                    .light_lattices = job->light_lattices,
                     .share = share_of_light(lighting) * job->budget};
     if (!open_light_shades(&sun, job)) return NEBEL_ERROR_MEMORY;
     open_workspace(&way);

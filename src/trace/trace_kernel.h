@@ -4,6 +4,7 @@
 
 #include "fog/snapshot.h"
 #include "light/environment.h"
+#include "light/light_lattice.h"
 #include "light/point_light.h"
 #include "light/sun_lattice.h"
 
@@ -38,7 +39,8 @@ typedef struct nb_trace_job {
     const nebel_ray_visibility
         *light_visibility;   /* of each point light; NULL: every point light reaches all of every ray. Checked */
     size_t first_visibility; /* by which number the job's first ray goes there */
-    size_t failed;           /* out: the ray that was an error */
+    const nb_light_lattices *light_lattices; /* NULL: none */
+    size_t failed;                           /* out: the ray that was an error */
 } nb_trace_job;
 
 typedef nebel_result nb_trace_fn(nb_trace_job *job);

@@ -7,7 +7,8 @@ typedef struct lit_shadow {
     nb_real amount;            /* the most optical depth in it */
     nb_real at_start, at_last; /* integral of the density on the way from where the step starts; from its last place */
     const nb_medium *medium;
-    size_t next; /* of the shadows that lie on the step at hand */
+    double cells; /* of voxels, in a metre along the axis that has most; 0: of others */
+    size_t next;  /* of the shadows that lie on the step at hand */
 } lit_shadow;
 
 /* More than these take memory once. */
@@ -204,11 +205,20 @@ static void set_narrow_shadow(lit_shadow *s, const packet *rays, nb_wvec3 light,
     set_flat_shadow(s, &f);
 }
 
+static double cells_in_metre(const nb_volume *body)
+{
+    const nb_leaf *leaf = &body->leaves[0];
+    double rate[3];
+    if (body->density.type != NEBEL_DENSITY_GRID) return 0;
+    nb_grid_rate(body->density.grid, leaf->low, leaf->high, rate);
+    return fmin(fmax(fmax(rate[0], rate[1]), rate[2]), 1e18);
+}
+
 static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_light *point_light,
                             const nb_medium *medium)
 {
     const nb_volume *body = &medium->body;
-    lit_shadow s = {NB_W(0.0), NB_WFAR, most_depth(medium), NB_F(0.0), NB_F(0.0), medium, 0};
+    lit_shadow s = {NB_W(0.0), NB_WFAR, most_depth(medium), NB_F(0.0), NB_F(0.0), medium, cells_in_metre(body), 0};
     if (is_endless(body)) return s;
     const nb_wvec3 low = nb_wsub3(wide_vector(body->low), rays->origin);
     const nb_wvec3 high = nb_wsub3(wide_vector(body->high), rays->origin);
@@ -257,6 +267,14 @@ typedef struct shadowed_way {
     nb_real before[3], here[3]; /* of the bodies that both ways meet: on the way from the place before; from here */
 } shadowed_way;
 
+/* What of voxels ways between two places pass for sure, of what both of them pass: between places more than half a cell
+ * apart there may be gaps. */
+static nb_real sure_part(double cells, nb_wide before, nb_wide t)
+{
+    const nb_real apart = nb_narrow(nb_wmin((t - before) * WIDE(cells), NB_W(2.0)));
+    return NB_F(1.0) - NB_F(0.5) * nb_clamp(apart - NB_F(0.5), NB_F(0.0), NB_F(1.0));
+}
+
 static void note_covering(shadowed_way *sum, const nb_volume *body, nb_mask near, nb_real before, nb_real here)
 {
     const nb_mask both = nb_and(near, nb_and(before > NB_F(0.0), here > NB_F(0.0)));
@@ -269,9 +287,10 @@ static void note_covering(shadowed_way *sum, const nb_volume *body, nb_mask near
 
 /* From t of each ray; of the bodies in whose shadow that is, lane by lane: slack beside them depends on no company.
  * `before`: the last place that was asked. */
-static shadowed_way way_through_shadows(const sunlight *sun, const packet_state *m, int is_to_sun, nb_wide before,
-                                        nb_wide t, nb_wvec3 direction, nb_wide reach)
+static shadowed_way way_through_shadows(const known_depths *known, const packet_state *m, nb_wide before, nb_wide t,
+                                        nb_wvec3 direction, nb_wide reach)
 {
+    const sunlight *sun = known->sun;
     const packet way = {nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t)), direction, reach};
     const nb_real zero = NB_F(0.0);
     shadowed_way sum = {no_depth(), {zero, zero, zero}, {zero, zero, zero}};
@@ -282,11 +301,13 @@ static shadowed_way way_through_shadows(const sunlight *sun, const packet_state 
         if (!nb_any(near)) continue;
         const nb_volume *body = &s->medium->body;
         const int varies = body->density.type != NEBEL_DENSITY_CONSTANT;
-        const nb_estimate along =
-            varies ? profile_along(&way, s->medium, 0, is_to_sun ? sun : NULL) : length_along(m, &way, body);
+        const nb_estimate along = varies ? profile_along(&way, s->medium, 0, known) : length_along(m, &way, body);
         const nb_mask covers = nb_and(near, nb_narrow_mask(nb_wand(s->first <= before, s->last >= before)));
         const nb_real value = nb_select(near, along.value, zero), error = nb_select(near, along.error, zero);
-        if (nb_any(covers)) note_covering(&sum, body, covers, s->at_last, value);
+        if (nb_any(covers)) {
+            const nb_real sure = s->cells > 0 ? sure_part(s->cells, before, t) : NB_F(1.0);
+            note_covering(&sum, body, covers, s->at_last * sure, value * sure);
+        }
         for (int c = 0; c < 3; c++) {
             sum.depth.depth[c] = sum.depth.depth[c] + REAL(body->extinction[c]) * value;
             sum.depth.error[c] = sum.depth.error[c] + REAL(body->extinction[c]) * error;

@@ -136,12 +136,19 @@ static void add_body_error(light_depth *sum, const packet *way, const nb_volume 
     for (int c = 0; c < 3; c++) sum->error[c] = sum->error[c] + REAL(body->extinction[c]) * error;
 }
 
-/* What columns may do to light, of what steps may add to the error. Ways of which they say more are walked; in common steps
+/* Where depths of voxels may be known before: on the way to the sun, or to a point light. */
+typedef struct known_depths {
+    const sunlight *sun;
+    const nb_light *light; /* NULL: to the sun */
+} known_depths;
+
+/* What columns and lattices may do to light, of what steps may add to the error. Ways of which they say more are walked; in common steps
  * all ways of a ray or none. */
 #define COLUMN_SHARE 1.0
 
 #if !defined(NB_DOUBLE)
-/* A block says how far columns are off at its worst place, in its worst direction. Along a ray this part of it is enough:
+/* A block says how far columns are off at its worst place, in its worst direction, a cell the same of lattices of point
+ * lights. Along a ray this part of it is enough:
  * tests/test_grid_sun.c prints how much of it was found. */
 #define COLUMN_ERROR 0.5
 
@@ -164,9 +171,36 @@ static nb_estimate along_columns(const sunlight *sun, medium_hit *k, const nb_su
 }
 #endif
 
-/* The integral of a body's density along the way, of any profile, and by how much it may be off. `to_sun`: the way to it,
- * else NULL. */
-static nb_estimate profile_along(const packet *way, const nb_medium *medium, int by_tree, const sunlight *to_sun)
+#if !defined(NB_DOUBLE)
+/* The same to the point light of this number, from where its ways enter the voxels on. */
+static nb_estimate along_lattice(const sunlight *sun, medium_hit *k, size_t light, const packet *way, nb_wide t)
+{
+    const size_t medium = (size_t)(k->medium - sun->snapshot->media);
+    const nb_light_lattice *of_medium = sun->light_lattices->of_medium[medium];
+    if (of_medium == NULL || !sun->has_common_steps) return nb_estimate_of(NB_F(0.0), NB_F(0.0));
+    const nb_mask fits = nb_and(k->inside, sun->takes_columns);
+    const nb_estimate along = amount_by_lattice(k, &of_medium[light], t, nb_narrow(way->t_max - t));
+    k->inside = nb_and(k->inside, nb_not(fits));
+    const nb_real error = along.error * REAL(COLUMN_ERROR);
+    return (nb_estimate){nb_select(fits, along.value, NB_F(0.0)), nb_select(fits, error, NB_F(0.0))};
+}
+
+/* From where its ways enter the voxels on, as far as that is known before. `inside` becomes the lanes that are still to be
+ * walked. */
+static nb_estimate known_along(const known_depths *known, medium_hit *k, const packet *way, nb_wide t)
+{
+    const sunlight *sun = known->sun;
+    const nb_sun_lattice *lattice = sun->lighting->media[k->medium - sun->snapshot->media].sun_lattice;
+    if (known->light == NULL && lattice != NULL) return along_columns(sun, k, lattice, t);
+    if (known->light != NULL && sun->light_lattices != NULL)
+        return along_lattice(sun, k, (size_t)(known->light - sun->lighting->lights), way, t);
+    return nb_estimate_of(NB_F(0.0), NB_F(0.0));
+}
+#endif
+
+/* The integral of a body's density along the way, of any profile, and by how much it may be off. `known`: to which light
+ * the way goes, else NULL. */
+static nb_estimate profile_along(const packet *way, const nb_medium *medium, int by_tree, const known_depths *known)
 {
     const next_interval s = ahead_in(way, &medium->body, by_tree);
     const nb_wide leave = nb_wmax(s.leave, s.enter);
@@ -175,16 +209,14 @@ static nb_estimate profile_along(const packet *way, const nb_medium *medium, int
     if (!nb_any(k.inside)) return along;
     profile_contact(&k, way);
 #if !defined(NB_DOUBLE)
-    const nb_sun_lattice *lattice =
-        to_sun != NULL ? to_sun->lighting->media[medium - to_sun->snapshot->media].sun_lattice : NULL;
-    if (lattice != NULL) {
-        const nb_estimate columns = along_columns(to_sun, &k, lattice, s.enter);
-        along.value = columns.value;
-        along.error = along.error + columns.error;
+    if (known != NULL && medium->body.density.type == NEBEL_DENSITY_GRID) {
+        const nb_estimate found = known_along(known, &k, way, s.enter);
+        along.value = found.value;
+        along.error = along.error + found.error;
         if (!nb_any(k.inside)) return along;
     }
 #else
-    (void)to_sun;
+    (void)known;
 #endif
     const nb_estimate inside = contact_integral(&k, s.enter, leave, nb_narrow(leave - s.enter));
     along.value = nb_select(k.inside, inside.value, along.value);
@@ -193,9 +225,9 @@ static nb_estimate profile_along(const packet *way, const nb_medium *medium, int
 }
 
 static void add_profile(light_depth *sum, const packet *way, const nb_medium *medium, int by_tree, nb_real noise,
-                        const sunlight *to_sun)
+                        const known_depths *known)
 {
-    const nb_estimate along = profile_along(way, medium, by_tree, to_sun);
+    const nb_estimate along = profile_along(way, medium, by_tree, known);
     for (int c = 0; c < 3; c++) {
         const nb_real extinction = REAL(medium->body.extinction[c]);
         sum->depth[c] = sum->depth[c] + extinction * along.value;
@@ -214,6 +246,7 @@ static light_depth depth_of_bodies(sunlight *sun, const packet_state *m, nb_wide
     const int by_tree = snapshot->medium_count > MOST_ASKED;
     const nb_real noise = REAL(4 + 0.5 * (double)snapshot->medium_count) * NB_EPSILON;
     const packet way = {nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t)), direction, reach};
+    const known_depths known = {sun, NULL};
     light_depth to_light = no_depth();
     sun->way->m.rays = way;
     if (sun->out_of_memory) return to_light;
@@ -222,7 +255,7 @@ static light_depth depth_of_bodies(sunlight *sun, const packet_state *m, nb_wide
     for (size_t i = 0; i < count && !sun->out_of_memory; i++) {
         const nb_medium *medium = &snapshot->media[by_tree ? sun->way->found[i] : i];
         if (medium->body.density.type != NEBEL_DENSITY_CONSTANT) {
-            add_profile(&to_light, &way, medium, by_tree, noise, is_to_sun ? sun : NULL);
+            add_profile(&to_light, &way, medium, by_tree, noise, is_to_sun ? &known : NULL);
             continue;
         }
         add_body(&to_light, &way, &medium->body);

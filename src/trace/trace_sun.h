@@ -46,8 +46,10 @@ typedef struct sunlight {
     double share;       /* what steps may add to the error of radiance, all together: of the sun, of all point lights */
     nb_real brightest;  /* radiance of the fog of the piece at hand in full sunlight, at most */
     nb_real most_light; /* and how much of that is seen from the step at hand */
-    int has_common_steps;  /* where these are gone, */
-    nb_mask takes_columns; /* these lanes have depths from columns */
+    int has_common_steps;                    /* where these are gone, */
+    nb_mask takes_columns;                   /* these lanes have depths from columns and lattices, */
+    nb_real doubted;                         /* by which light of the sun, or of point lights so far, may be off */
+    const nb_light_lattices *light_lattices; /* NULL: none */
     int out_of_memory;
     nb_real by_sun[3], by_lights[3]; /* of the packet's radiance, before opacity is limited */
 } sunlight;
@@ -149,6 +151,7 @@ static void pass_boundaries(sun_attenuation *s, nb_wide t, nb_wmask lanes)
 
 #if !defined(NB_DOUBLE)
 #include "trace_sun_columns.h"
+#include "trace_light_lattice.h"
 #endif
 #include "trace_shadow_ray.h"
 
