@@ -49,7 +49,8 @@ typedef struct lit_point {
     nb_real arrives;            /* what comes through no fog, of intensity 1 */
     nb_real cut, cut_depth;     /* see lit_between: of those between the place before and this */
     nb_real seen[3];
-    nb_real doubt;    /* by what factor that may be off */
+    nb_real doubt;    /* by what factor that may be off, where it is less */
+    nb_real more[3];  /* what more may be seen, of intensity 1, where depths may be less by much; else 0 */
     nb_mask has_edge; /* a shadow begins or ends between the place before and this */
 } lit_point;
 
@@ -61,7 +62,7 @@ static lit_point no_place(void)
         .t = NB_W(0.0), .arrives = zero, .cut = zero, .cut_depth = zero, .doubt = zero, .has_edge = nb_mask_false};
     for (int c = 0; c < 3; c++) {
         place.depth[c] = place.depth_error[c] = place.behind[c] = zero;
-        place.way[c] = place.comes[c] = place.seen[c] = place.before[c] = place.here[c] = zero;
+        place.way[c] = place.comes[c] = place.seen[c] = place.before[c] = place.here[c] = place.more[c] = zero;
     }
     return place;
 }
@@ -109,11 +110,12 @@ static void set_seen(const sunlight *sun, const overlap_light *light, lit_point 
     }
 }
 
-/* By what part of it light is more where so much less depth is before it. */
-static nb_real brighter_by(nb_real depth)
+/* What more comes through a depth that may be so much less, where that is no small part of the light, which may round to 0. */
+static nb_real more_without(nb_real depth, nb_real less, nb_real arriving)
 {
-    const nb_mask much = depth > NB_F(0.01);
-    return nb_any(much) ? nb_select(much, nb_exp(nb_min(depth, NB_F(80.0))) - NB_F(1.0), depth) : depth;
+    const nb_mask much = less > NB_F(0.01);
+    if (!nb_any(much)) return NB_F(0.0);
+    return nb_select(much, arriving * (nb_exp(less - depth) - nb_exp(-depth)), NB_F(0.0));
 }
 
 /* `beside`: see light_arrives. */
@@ -138,8 +140,8 @@ static void look_from(const sunlight *sun, const packet_state *m, const overlap_
         at->here[c] = all.here[c];
         const nb_real rounding = (at->depth[c] + way.depth[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
         const nb_real less = nb_min(at->depth_error[c], at->depth[c]) + nb_min(way.error[c], way.depth[c]);
-        const nb_real darker = nb_min(at->depth_error[c] + way.error[c], NB_F(1.0));
-        at->doubt = nb_max(at->doubt, nb_max(darker, brighter_by(less)) + rounding);
+        at->doubt = nb_max(at->doubt, nb_min(at->depth_error[c] + way.error[c], NB_F(1.0)) + rounding);
+        at->more[c] = more_without(at->depth[c] + way.depth[c], less, arriving);
     }
     map_channels(sun->snapshot, transmitted, at->depth, at->behind);
     set_seen(sun, light, at);
@@ -436,7 +438,11 @@ static overlap_step try_overlap_step(const sunlight *sun, const packet_state *m,
         s.error = nb_max(s.error, first * half[0].sum[c] + last * half[1].sum[c]);
         const nb_real moments =
             doubt_of_half(&half[0], c, a, at[1].seen[c], b) + doubt_of_half(&half[1], c, b, at[3].seen[c], e);
-        s.rounding = nb_max(s.rounding, (half[0].sum[c] + half[1].sum[c]) * most * doubt + moments);
+        const double intensity = light->pass != NULL ? light->pass->point_light->intensity[c] : 1;
+        nb_real more = at[0].more[c];
+        for (int i = 1; i < 5; i++) more = nb_max(more, at[i].more[c]);
+        const nb_real off = nb_max(most * doubt, more * REAL(intensity));
+        s.rounding = nb_max(s.rounding, (half[0].sum[c] + half[1].sum[c]) * off + moments);
         full = nb_max(full, (half[0].sum[c] + half[1].sum[c]) * most);
         s.most = nb_max(s.most, (half[0].sum[c] + half[1].sum[c]) * (at[0].behind[c] * arriving[c]));
         s.drop = nb_max(s.drop, at[0].behind[c] - at[4].behind[c]);
@@ -466,6 +472,7 @@ static void select_place(nb_mask mask, lit_point *to, const lit_point *from)
     select_reals(mask, to->way, from->way);
     select_reals(mask, to->comes, from->comes);
     select_reals(mask, to->seen, from->seen);
+    select_reals(mask, to->more, from->more);
     to->arrives = nb_select(mask, from->arrives, to->arrives);
     to->doubt = nb_select(mask, from->doubt, to->doubt);
 }

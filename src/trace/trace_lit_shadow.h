@@ -268,11 +268,11 @@ typedef struct shadowed_way {
 } shadowed_way;
 
 /* What of voxels ways between two places pass for sure, of what both of them pass: between places more than half a cell
- * apart there may be gaps. */
+ * apart there may be gaps, and none of it where a whole cell lies between. */
 static nb_real sure_part(double cells, nb_wide before, nb_wide t)
 {
     const nb_real apart = nb_narrow(nb_wmin((t - before) * WIDE(cells), NB_W(2.0)));
-    return NB_F(1.0) - NB_F(0.5) * nb_clamp(apart - NB_F(0.5), NB_F(0.0), NB_F(1.0));
+    return NB_F(1.0) - nb_clamp(apart - NB_F(0.5), NB_F(0.0), NB_F(1.0));
 }
 
 static void note_covering(shadowed_way *sum, const nb_volume *body, nb_mask near, nb_real before, nb_real here)
