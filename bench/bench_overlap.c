@@ -120,12 +120,12 @@ static int add_crowd(nb_figures *figures, int count, int is_scattered, int light
     const int fault = lit.fog == NULL || nb_measure(contests, 2, quick ? 1 : 5) != 0;
     nebel_release_lighting(lighting);
     if (fault) return -1;
-    nb_figure figure = {.group = "A crowd of lit balls of constant density on one ray, float, one thread, CPU time",
+    nb_figure figure = {.group = "Overlapping lit balls of constant density on one ray, float, one thread, CPU time",
                         .unit = "us a ray",
                         .value = 1e6 * contests[1].seconds,
                         .floor_name = "transmittance alone",
                         .floor = 1e6 * contests[0].seconds};
-    (void)snprintf(figure.name, sizeof figure.name, "crowd: %d %s, %s", count,
+    (void)snprintf(figure.name, sizeof figure.name, "%d balls %s, %s", count,
                    is_scattered ? "scattered" : "in one place", lights > 0 ? "two point lights" : "sun");
     nb_figures_add(figures, &figure);
     return 0;
