@@ -340,6 +340,64 @@ static void lost_memory_is_survived(void **state)
     }
 }
 
+/* What an older one has prepared is shared only where both use one memory: another's user may go with it. */
+static void memory_of_another_user_is_not_shared(void **state)
+{
+    (void)state;
+    fog_memory memory[2] = {{0}, {0}};
+    nebel_grid *grid = make_grid((nebel_allocator){0}, 1);
+    const nebel_volume_desc cloud = cloud_of(grid);
+    nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, &cloud, 1);
+    nebel_lighting_desc lights = {.sun = noon, .environment = dusk};
+    lights.host.allocator = fog_memory_allocator(&memory[0]);
+    nebel_lighting *first = light_fog(snapshot, &lights);
+    lights.host.allocator = fog_memory_allocator(&memory[1]);
+    lights.previous = first;
+    nebel_lighting *second = light_fog(snapshot, &lights);
+    nebel_release_lighting(first);
+    assert_int_equal(memory[0].live, 0);
+    nebel_release_lighting(second);
+    assert_int_equal(memory[1].live, 0);
+    nebel_release_snapshot(snapshot);
+    nebel_release_grid(grid);
+}
+
+/* Depths to point lights in voxels are prepared by the query that first asks for them. */
+static void memory_lost_by_a_query_is_survived(void **state)
+{
+    (void)state;
+    fog_memory memory = {0};
+    fog_messages messages = {0};
+    nebel_grid *grid = make_grid((nebel_allocator){0}, 1);
+    const nebel_volume_desc cloud = cloud_of(grid);
+    const nebel_fog_desc desc = {.host.log = fog_messages_log(&messages)};
+    nebel_snapshot *snapshot = fog_commit(&desc, &cloud, 1);
+    nebel_lighting_desc lights = {.lights = point_lights, .light_count = 2};
+    lights.host.allocator = fog_memory_allocator(&memory);
+    nebel_lighting *lighting = light_fog(snapshot, &lights);
+    const nebel_trace_desc asked = {.lighting = lighting, .precision = NEBEL_PRECISION_FLOAT};
+    const nebel_ray ray = {.origin = {0, .1, 9}, .direction = {0, 0, -1}, .t_max = 20};
+    const size_t live = memory.live;
+    nebel_transfer transfer;
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    size_t k = 0;
+    while (result != NEBEL_OK) {
+        memory.fail_first = ++k;
+        memory.fail_count = 1;
+        result = nebel_trace(snapshot, &asked, 1, &ray, 0, &transfer, 0);
+        memory.fail_first = 0;
+        if (result == NEBEL_OK) break;
+        assert_int_equal(result, NEBEL_ERROR_MEMORY);
+        assert_int_equal(memory.live, live);
+    }
+    assert_true(k > 4);
+    assert_int_equal(messages.count, k - 1);
+    nebel_release_lighting(lighting);
+    assert_int_equal(memory.live, 0);
+    nebel_release_snapshot(snapshot);
+    nebel_release_grid(grid);
+}
+
 /* ---- the same bits --------------------------------------------------------------------------- */
 
 /* A lighting made with `previous` and one made without: every answer, and what shaders get. */
@@ -581,6 +639,8 @@ int main(void)
         cmocka_unit_test(owners_may_go_in_any_order),
         cmocka_unit_test(what_serves_again_lives_on),
         cmocka_unit_test(lost_memory_is_survived),
+        cmocka_unit_test(memory_of_another_user_is_not_shared),
+        cmocka_unit_test(memory_lost_by_a_query_is_survived),
         cmocka_unit_test(previous_changes_no_bit),
         cmocka_unit_test(a_sun_moves_without_a_commit),
         cmocka_unit_test(a_lighting_tells_what_it_was_given),
