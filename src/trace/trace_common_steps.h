@@ -216,7 +216,7 @@ static lit_between nothing_between(void)
     return none;
 }
 
-/* Adds what a body gives from `from` to `to`, which has the places from `place` to place + 1 of its half */
+/* Adds what a body gives from `from` to `to`, which has the places from `place` to place + 1 of its half. */
 static void add_part(const medium_hit *k, const leaf_span *span, const overlap_light *light, nb_wide from, nb_wide to,
                      int place, nb_real quarter, lit_half *half, lit_between *sum)
 {
